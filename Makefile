@@ -45,7 +45,7 @@ BUILD_FMU = $(if $(PROGRAMS),$(PROGRAMS)/build_fmu,$(CARGO) run $(LOCKED) --rele
 BUILD_CONTROLLER = $(if $(PROGRAMS),$(PROGRAMS)/build_controller,$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller --)
 BUILD_CLOSED_LOOP = $(if $(PROGRAMS),$(PROGRAMS)/build_closed_loop,$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_closed_loop --)
 # Succeeds if the existing FMU contains the page that runs it.
-HAS_PAGE = $(PYTHON) -c 'import sys, zipfile; sys.exit(b".catch(withoutIt)" not in zipfile.ZipFile("$(FMU)").read("documentation/index.html"))' 2>/dev/null
+HAS_PAGE = $(PYTHON) -c 'import sys, zipfile; sys.exit(b".catch(showFailure)" not in zipfile.ZipFile("$(FMU)").read("documentation/index.html"))' 2>/dev/null
 
 stop = { echo '$(1)' >&2; exit 1; }
 

@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 FMUS = ROOT / "target" / "fmu"
 #: The script that a page decompresses and runs.
-SCRIPT = re.compile(r'\nbegin\("([^"]*)"\)\.catch\(withoutIt\);\n')
+SCRIPT = re.compile(r'\nbegin\("([^"]*)"\)\.catch\(showFailure\);\n')
 
 
 def built(name: str, target: str = "closed-loop-fmus") -> Path:

@@ -135,13 +135,13 @@ def test_with_a_mouse(visit: Any, tmp_path: Path) -> None:
     assert rows[0][:3] == ["time", "theta1", "theta2"] and len(rows) == 1002
     page.get_by_label("Enlargement").select_option("5")
     button(page, "Link to this").click()
-    expect(page.locator(".live-status")).to_contain_text("carries these settings")
+    expect(page.locator(".live-status")).to_contain_text("contains these settings")
     again = visit(page.evaluate("location.hash"))
     expect(again.get_by_label("Motion", exact=True)).to_have_value("step")
     expect(again.locator("#live-k1")).to_have_value("1.5")
     expect(again.get_by_label("Speed")).to_have_value("0.05")
     expect(again.get_by_label("Enlargement")).to_have_value("5")
-    button(again, "Parameters as built in").click()
+    button(again, "Default parameters").click()
     expect(again.locator("#live-k1")).not_to_have_value("1.5")
     expect(again.locator("#live-use_omega")).not_to_be_checked()
     # A motor is turned where it is, the wrist beside it.
@@ -323,7 +323,7 @@ def test_a_value_that_the_fmu_rejects(visit: Any) -> None:
 
 def test_integers_are_integers(visit: Any) -> None:
     page = visit("#try&motion=fig4&M=99999999999")
-    expect(page.locator("#live-M-message")).to_contain_text("The link asks for M = 99999999999; it must be an integer")
+    expect(page.locator("#live-M-message")).to_contain_text("The link sets M = 99999999999; it must be an integer")
     expect(field(page, "M")).to_have_value("4")
     page.locator(".live-parameters").evaluate("e => e.open = true")
     field(page, "M").fill("2.5")
@@ -412,7 +412,7 @@ def test_the_guide(visit: Any, tmp_path: Path) -> None:
     page.mouse.click(*middle(page.locator(".live-plots .live-plots canvas")))
     assert 7 < float(frequency.get_attribute("aria-valuenow") or "") < 8.5
     button(page, "Link to this").click()
-    expect(page.locator(".live-status")).to_contain_text("carries these settings")
+    expect(page.locator(".live-status")).to_contain_text("contains these settings")
     again = visit(page.evaluate("location.hash"), reduced_motion="reduce")
     expect(again.get_by_role("slider", name="Frequency")).to_have_text(frequency.inner_text())
     expect(field(again, "k2")).to_have_value("0.5")

@@ -160,7 +160,7 @@ fn house() {
     assert_eq!(page(), None);
     folder.says("my-house", &["build"]);
     let page = page().unwrap();
-    assert!(page.contains("<h1>House</h1>") && page.contains(".catch(withoutIt);"));
+    assert!(page.contains("<h1>House</h1>") && page.contains(".catch(showFailure);"));
 }
 
 /// The reason comes first, and no file of values that are none.

@@ -1,15 +1,15 @@
 "use strict";
 
-/** Why there is no section, at its place. @param {Error} error */
-function withoutIt(error) {
+/** Shows why the page cannot run the FMU. @param {Error} error */
+function showFailure(error) {
   const paragraph = document.createElement("p");
   paragraph.className = "note";
   paragraph.textContent = `Here this page would run the FMU for you to try, but that is not possible: ${error.message}. The rest of the page is complete.`;
   (document.querySelector("main") || document.body).prepend(paragraph);
 }
 
-/** The bytes of base 64, decompressed. @param {string} text */
-async function unpacked(text) {
+/** Decodes base 64 and decompresses the result. @param {string} text */
+async function decompress(text) {
   const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
@@ -22,6 +22,6 @@ async function begin(packed) {
     throw new Error(`this browser has no ${lacking}`);
   }
   const script = document.createElement("script");
-  script.textContent = new TextDecoder().decode(await unpacked(packed));
+  script.textContent = new TextDecoder().decode(await decompress(packed));
   document.body.append(script);
 }

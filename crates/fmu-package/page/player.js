@@ -1,20 +1,20 @@
-// What is seen of a run, and how it is played: a view, courses, and the buttons and the slider below.
+// Plays a run: a view, plots, and a bar with a button, a time slider and the speed.
 
 /**
- * A picture of an instant, beside the courses.
+ * An image of the model at one time, next to the plots.
  * @typedef {{element: HTMLElement, draw(table: Table, time: number): void, set?(parameters: (name: string) => number): void, touch?(): void}} View
  */
 
-/** Whether the user's system lets pages move by themselves. */
+/** Whether the user's system allows animations. */
 const allowsMotion = () => !matchMedia("(prefers-reduced-motion: reduce)").matches;
 
-/** How fast, as in the list. */
+/** The speeds of the list, with their labels. */
 const SPEEDS = new Map([["2", "2 × real time"], ["1", "real time"], ["0.5", "1/2 × real time"], ["0.2", "1/5 × real time"], ["0.05", "1/20 × real time"], ["0.01", "1/100 × real time"], ["Infinity", "at once"]]);
 
 class Player {
   /**
-   * `span` is what the courses show, `advance` calculates until a time and tells how far that went. Beyond `recorded` a
-   * run that goes on is calculated, until `limit`.
+   * `span` returns the time span of the plots. `advance` calculates the run until a time and returns the time that it reached.
+   * `recorded` returns the end of the time slider, `limit` the end of the run.
    * @param {{plots: (seek: (time: number) => void) => Plots, view: View | null, begin: number, isLooping?(): boolean, table: Table,
    *   span(now: number): [number, number], recorded(): number, limit(): number, advance?(now: number): number, earlier?(): Table | null}} options
    */
@@ -24,16 +24,16 @@ class Player {
     this.speed = 1;
     this.isPlaying = false;
     this.last = 0;
-    /** Seconds that passed and that were played since the last look at the pace. */
+    /** Seconds that passed and that were played since the pace was last checked. */
     this.paced = { passed: 0, played: 0 };
-    this.isAsked = false;
-    this.isSeen = true;
+    this.isRequested = false;
+    this.isVisible = true;
     this.plots = options.plots((time) => this.seek(time));
     this.play = element("button", { type: "button", class: "live-play" });
     this.play.addEventListener("click", () => this.setPlaying(!this.isPlaying));
-    this.place = element("input", { type: "range", min: "0", max: "1000", step: "1", value: "0", "aria-label": "Time", class: "live-time" });
-    this.place.addEventListener("input", () => {
-      this.seek(options.begin + ((options.recorded() - options.begin) * Number(this.place.value)) / 1000);
+    this.slider = element("input", { type: "range", min: "0", max: "1000", step: "1", value: "0", "aria-label": "Time", class: "live-time" });
+    this.slider.addEventListener("input", () => {
+      this.seek(options.begin + ((options.recorded() - options.begin) * Number(this.slider.value)) / 1000);
     });
     this.clock = element("span", { class: "live-clock" });
     this.pace = element("select", { "aria-label": "Speed" });
@@ -41,14 +41,14 @@ class Player {
     this.pace.value = "1";
     this.pace.addEventListener("change", () => this.setSpeed(Number(this.pace.value)));
     this.late = element("span", { class: "live-late", hidden: "" });
-    this.bar = element("div", { class: "live-bar" }, this.play, this.place, this.clock, this.pace, this.late);
+    this.bar = element("div", { class: "live-bar" }, this.play, this.slider, this.clock, this.pace, this.late);
     this.side = element("div", { class: "live-side" }, ...(options.view ? [options.view.element] : []), this.bar);
     this.element = element("div", { class: "live-player" }, this.side, this.plots.element);
-    new ResizeObserver(() => this.ask()).observe(this.element);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.ask());
+    new ResizeObserver(() => this.requestFrame()).observe(this.element);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.requestFrame());
     new IntersectionObserver((entries) => {
-      this.isSeen = entries[entries.length - 1].isIntersecting;
-      this.ask();
+      this.isVisible = entries[entries.length - 1].isIntersecting;
+      this.requestFrame();
     }).observe(this.element);
     this.setPlaying(allowsMotion());
   }
@@ -73,28 +73,28 @@ class Player {
     this.late.hidden = true;
     this.play.textContent = isPlaying ? "Pause" : "Play";
     this.last = 0;
-    this.ask();
+    this.requestFrame();
   }
 
   /** @param {number} time */
   seek(time) {
     this.setPlaying(false);
     this.now = time;
-    this.ask();
+    this.requestFrame();
   }
 
-  /** Draws with the next picture of the screen. */
-  ask() {
-    if (!this.isAsked) {
-      this.isAsked = true;
+  /** Draws in the next frame of the screen. */
+  requestFrame() {
+    if (!this.isRequested) {
+      this.isRequested = true;
       requestAnimationFrame((stamp) => this.frame(stamp));
     }
   }
 
   /** @param {number} stamp ms */
   frame(stamp) {
-    this.isAsked = false;
-    if (!this.isSeen && this.isPlaying) {
+    this.isRequested = false;
+    if (!this.isVisible && this.isPlaying) {
       this.last = 0;
       return;
     }
@@ -108,7 +108,7 @@ class Player {
     }
     const reached = this.options.advance?.(this.now) ?? limit;
     const isBehind = reached < this.now - 1e-9;
-    // Where what is new is calculated too slowly, it waits; where a run is calculated anew, the picture stays.
+    // If the calculation is too slow, the time waits for it. While a run is recalculated, the last image stays.
     if (isBehind && this.isPlaying && this.speed !== Infinity) {
       this.now = Math.max(before, reached);
     }
@@ -117,10 +117,10 @@ class Player {
       this.plots.draw(table, this.now, ...this.options.span(this.now), this.options.earlier?.() ?? null);
       view?.draw(table, this.now);
     }
-    this.place.value = String(Math.round((1000 * (this.now - begin)) / (this.options.recorded() - begin || 1)));
+    this.slider.value = String(Math.round((1000 * (this.now - begin)) / (this.options.recorded() - begin || 1)));
     const text = `${this.now.toFixed(Math.max(0, Math.min(3, 5 - Math.floor(Math.log10(limit)))))} s`;
     this.clock.textContent = text;
-    this.place.setAttribute("aria-valuetext", text);
+    this.slider.setAttribute("aria-valuetext", text);
     if (this.isPlaying && this.now >= limit - 1e-9 && !isBehind) {
       if (this.options.isLooping?.()) {
         this.now = begin;
@@ -129,11 +129,11 @@ class Player {
       }
     }
     if (this.isPlaying || isBehind) {
-      this.ask();
+      this.requestFrame();
     }
   }
 
-  /** Shows the pace where the browser cannot keep the chosen one. @param {number} passed s @param {number} played s */
+  /** Shows the actual speed if the browser cannot keep the chosen speed. @param {number} passed s @param {number} played s */
   checkPace(passed, played) {
     if (!this.isPlaying || this.speed === Infinity || played < 0) {
       return;

@@ -1,13 +1,13 @@
-// Courses over time, on canvas.
+// A table of results, and plots on canvas.
 
 /**
- * A course: the column it is in, what it is called, a name of a colour, and what turns its unit into the one shown.
- * Where it is not a number, it is not shown.
- * @typedef {{name: string, label: string, colour: string, factor: number, offset?: number, isWhole?: boolean}} Curve
+ * A curve of a plot: the name of its column, its label, the name of a colour, and `factor` and `offset` to the unit of the plot.
+ * NaN is not drawn.
+ * @typedef {{name: string, label: string, colour: string, factor: number, offset?: number, isInteger?: boolean}} Curve
  * @typedef {{title: string, unit: string, curves: Curve[]}} Panel
  */
 
-/** Columns of numbers of one length that grow together; the first is the time. */
+/** Columns of numbers, all with `count` rows; the first is the time. */
 class Table {
   /** @param {string[]} names */
   constructor(names) {
@@ -25,7 +25,7 @@ class Table {
     return column;
   }
 
-  /** Room for one more row. */
+  /** Makes room for one more row. */
   grow() {
     if (this.count === this.column("time").length) {
       for (const [name, column] of this.columns) {
@@ -60,7 +60,7 @@ class Table {
     return low;
   }
 
-  /** The value at a time, between rows on a line. @param {string} name @param {number} time */
+  /** The value at a time, interpolated linearly. @param {string} name @param {number} time */
   at(name, time) {
     const [times, values, row] = [this.column("time"), this.column(name), this.row(time)];
     if (row + 1 >= this.count || time <= times[row]) {
@@ -79,13 +79,13 @@ function ticks(low, high, count) {
   const found = [];
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) {
     const text = digits > 4 && k ? Number((k * step).toPrecision(6)).toExponential() : (k * step).toFixed(digits > 4 ? 0 : digits);
-    found.push({ place: k * step, text: text.replaceAll("-", "\u2212") });
+    found.push({ value: k * step, text: text.replaceAll("-", "\u2212") });
   }
   return found;
 }
 
-/** A number for reading. @param {number} value @param {number} scale the largest there is */
-function shown(value, scale) {
+/** Formats a number with about three digits. @param {number} value @param {number} scale the largest number of the plot */
+function format(value, scale) {
   const digits = Math.max(0, Math.min(6, 2 - Math.floor(Math.log10(Math.max(scale, 1e-9)))));
   const text = value.toFixed(digits);
   return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "\u2212");
@@ -101,28 +101,28 @@ function element(tag, attributes = {}, ...children) {
   return made;
 }
 
-/** The sizes of canvases, told when they change: to ask costs a layout. @type {WeakMap<Element, {width: number, height: number}>} */
+/** The sizes of canvases. An observer updates them, because reading `clientWidth` costs a layout. @type {WeakMap<Element, {width: number, height: number}>} */
 const SIZES = new WeakMap();
 const RESIZED = new ResizeObserver((entries) => entries.forEach(({ target, contentRect }) => SIZES.set(target, contentRect)));
 
-/** The size of an element, px. @param {HTMLElement} of */
-function sizeOf(of) {
-  let size = SIZES.get(of);
+/** The size of an element, px. @param {HTMLElement} canvas */
+function sizeOf(canvas) {
+  let size = SIZES.get(canvas);
   if (!size) {
-    size = { width: of.clientWidth, height: of.clientHeight };
-    SIZES.set(of, size);
-    RESIZED.observe(of);
+    size = { width: canvas.clientWidth, height: canvas.clientHeight };
+    SIZES.set(canvas, size);
+    RESIZED.observe(canvas);
   }
   return size;
 }
 
-/** A canvas to draw on anew, as fine as the screen. @param {HTMLCanvasElement} canvas */
-function sharp(canvas) {
+/** Clears a canvas and gives it the resolution of the screen. @param {HTMLCanvasElement} canvas */
+function clear(canvas) {
   const ratio = window.devicePixelRatio || 1;
   const { width, height } = sizeOf(canvas);
-  const [fineWidth, fineHeight] = [Math.round(width * ratio), Math.round(height * ratio)];
-  if (canvas.width !== fineWidth || canvas.height !== fineHeight) {
-    [canvas.width, canvas.height] = [fineWidth, fineHeight];
+  const [pixelWidth, pixelHeight] = [Math.round(width * ratio), Math.round(height * ratio)];
+  if (canvas.width !== pixelWidth || canvas.height !== pixelHeight) {
+    [canvas.width, canvas.height] = [pixelWidth, pixelHeight];
   }
   const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -130,39 +130,39 @@ function sharp(canvas) {
   return { pen, width, height };
 }
 
-/** The colours of the style sheet, read once for light and for dark. @type {Map<string, string>} */
+/** The colours of the style sheet, until light or dark changes. @type {Map<string, string>} */
 const COLOURS = new Map();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => COLOURS.clear());
 
-/** @param {Element} place @param {string} name */
-function colourAt(place, name) {
+/** The value of a CSS custom property. @param {Element} target @param {string} name */
+function colourAt(target, name) {
   let colour = COLOURS.get(name);
   if (!colour) {
-    colour = getComputedStyle(place).getPropertyValue(`--${name}`).trim() || "#808080";
+    colour = getComputedStyle(target).getPropertyValue(`--${name}`).trim() || "#808080";
     COLOURS.set(name, colour);
   }
   return colour;
 }
 
-/** Panels of courses, one below the other, with the time on the last. */
+/** Panels of curves, one below the other. The last one has the labels of the time axis. */
 class Plots {
-  /** @param {Panel[]} panels @param {(time: number) => void} seek called where a panel is touched @param {string} axis label of the abscissa */
+  /** @param {Panel[]} panels @param {(time: number) => void} seek called with the time where a panel is touched @param {string} axis label of the abscissa */
   constructor(panels, seek, axis = "time (s)") {
     this.axis = axis;
     this.panels = panels.map((panel) => this.panel(panel, seek));
     this.element = element("div", { class: "live-plots" }, ...this.panels.map((panel) => panel.figure));
     this.span = { begin: 0, end: 1 };
-    /** Room for the numbers on the left of all panels, px. */
+    /** Width of the tick labels on the left of all panels, px. */
     this.left = LEFT;
   }
 
   /** @param {Panel} panel @param {(time: number) => void} seek */
   panel(panel, seek) {
-    const keys = panel.curves.map((curve, place) => {
+    const keys = panel.curves.map((curve, index) => {
       const value = element("span", { class: "live-number" });
       const key = element("span", { class: "live-key" }, curve.label, " ", value);
       key.style.setProperty("--colour", `var(--${curve.colour})`);
-      key.classList.toggle("live-dashed", place % 2 === 1);
+      key.classList.toggle("live-dashed", index % 2 === 1);
       return { value, key };
     });
     const unit = panel.unit ? ` (${panel.unit})` : "";
@@ -194,7 +194,7 @@ class Plots {
   draw(table, now, begin, end, earlier = null) {
     this.span = { begin, end };
     const axes = this.panels.map(({ panel, canvas }) => {
-      const surface = sharp(canvas);
+      const surface = clear(canvas);
       const { pen } = surface;
       pen.font = FONT;
       const ranges = [table, ...(earlier ? [earlier] : [])].map((run) => range(panel, run, ...rowsOf(run, begin, end)));
@@ -202,16 +202,16 @@ class Plots {
       const marks = ticks(low, high, 5);
       return { surface, low, high, marks, textWidth: Math.max(...marks.map(({ text }) => pen.measureText(text).width)) };
     });
-    // In steps, lest the axes move with each digit.
+    // The width changes in steps, so that the axes do not move with each digit.
     this.left = Math.max(LEFT, 8 * Math.ceil((12 + Math.max(...axes.map(({ textWidth }) => textWidth))) / 8));
-    for (const [place, shownPanel] of this.panels.entries()) {
-      this.drawPanel(shownPanel, axes[place], table, now, place === this.panels.length - 1, earlier);
+    for (const [index, panel] of this.panels.entries()) {
+      this.drawPanel(panel, axes[index], table, now, index === this.panels.length - 1, earlier);
     }
   }
 
   /**
-   * @param {ReturnType<Plots["panel"]>} what
-   * @param {{surface: ReturnType<typeof sharp>, low: number, high: number, marks: {place: number, text: string}[]}} axis
+   * @param {ReturnType<Plots["panel"]>} drawn
+   * @param {{surface: ReturnType<typeof clear>, low: number, high: number, marks: {value: number, text: string}[]}} axis
    * @param {Table} table @param {number} now @param {boolean} isLast @param {Table | null} earlier
    */
   drawPanel({ panel, keys }, { surface: { pen, width, height }, low, high, marks }, table, now, isLast, earlier) {
@@ -228,14 +228,14 @@ class Plots {
     pen.textAlign = "right";
     pen.textBaseline = "middle";
     for (const tick of marks) {
-      line(pen, [left, y(tick.place)], [width - RIGHT, y(tick.place)]);
-      pen.fillText(tick.text, left - 6, y(tick.place));
+      line(pen, [left, y(tick.value)], [width - RIGHT, y(tick.value)]);
+      pen.fillText(tick.text, left - 6, y(tick.value));
     }
     pen.textAlign = "center";
     pen.textBaseline = "top";
     for (const tick of ticks(begin, end, Math.min(8, width / 60))) {
-      line(pen, [x(tick.place), 6], [x(tick.place), bottom]);
-      pen.fillText(tick.text, x(tick.place), bottom + 5);
+      line(pen, [x(tick.value), 6], [x(tick.value), bottom]);
+      pen.fillText(tick.text, x(tick.value), bottom + 5);
     }
     if (isLast) {
       pen.fillText(this.axis, (left + width - RIGHT) / 2, bottom + 20);
@@ -250,47 +250,47 @@ class Plots {
       const column = run.column(curve.name);
       pen.strokeStyle = colour("soft");
       pen.globalAlpha = 0.6;
-      course(pen, run.column("time"), x, (row) => y(curve.factor * column[row] + (curve.offset || 0)), ...rowsOf(run, begin, end));
+      drawCurve(pen, run.column("time"), x, (row) => y(curve.factor * column[row] + (curve.offset || 0)), ...rowsOf(run, begin, end));
       pen.globalAlpha = 1;
     }
-    for (const [place, curve] of panel.curves.entries()) {
+    for (const [index, curve] of panel.curves.entries()) {
       const column = table.column(curve.name);
       const value = (/** @type {number} */ row) => y(curve.factor * column[row] + (curve.offset || 0));
       const until = Math.min(table.row(now), last);
       pen.strokeStyle = colour(curve.colour);
       pen.globalAlpha = 0.35;
-      course(pen, table.column("time"), x, value, until, last);
+      drawCurve(pen, table.column("time"), x, value, until, last);
       pen.globalAlpha = 1;
       pen.lineWidth = 1.8;
-      pen.setLineDash(place % 2 ? [5, 3] : []);
-      course(pen, table.column("time"), x, value, first, until);
+      pen.setLineDash(index % 2 ? [5, 3] : []);
+      drawCurve(pen, table.column("time"), x, value, first, until);
       pen.setLineDash([]);
       pen.lineWidth = 1;
       if (table.count) {
         const here = curve.factor * table.at(curve.name, now) + (curve.offset || 0);
-        keys[place].key.hidden = Number.isNaN(here);
+        keys[index].key.hidden = Number.isNaN(here);
         pen.fillStyle = colour(curve.colour);
         pen.beginPath();
         pen.arc(x(Math.min(now, table.end)), y(here), 3.5, 0, 2 * Math.PI);
         pen.fill();
-        const text = curve.isWhole ? String(Math.round(here)) : shown(here, Math.max(Math.abs(low), Math.abs(high)));
-        if (keys[place].value.textContent !== text) {
-          keys[place].value.textContent = text;
+        const text = curve.isInteger ? String(Math.round(here)) : format(here, Math.max(Math.abs(low), Math.abs(high)));
+        if (keys[index].value.textContent !== text) {
+          keys[index].value.textContent = text;
         }
       }
     }
   }
 }
 
-/** The least room beside a panel's axes, px, and the font of their numbers. */
+/** Smallest margins of a panel, px, and the font of the tick labels. */
 const [LEFT, RIGHT, FONT] = [46, 16, "12px system-ui, sans-serif"];
 
-/** The first and the last row that is drawn. @param {Table} table @param {number} begin @param {number} end @returns {[number, number]} */
+/** The first and the last row of a time span. @param {Table} table @param {number} begin @param {number} end @returns {[number, number]} */
 function rowsOf(table, begin, end) {
   return [table.row(begin), Math.min(table.row(end) + 1, table.count - 1)];
 }
 
-/** Least and largest value of these rows, and a little more. @param {Panel} panel @param {Table} table @param {number} first @param {number} last */
+/** The range of an axis: the smallest and the largest value of these rows, with a margin. @param {Panel} panel @param {Table} table @param {number} first @param {number} last */
 function range(panel, table, first, last) {
   let [low, high] = [Infinity, -Infinity];
   for (const { name, factor, offset = 0 } of panel.curves) {
@@ -309,20 +309,20 @@ function range(panel, table, first, last) {
   return [low - margin, high + margin];
 }
 
-/** @param {CanvasRenderingContext2D} pen @param {number[]} from @param {number[]} to */
-function line(pen, from, to) {
+/** @param {CanvasRenderingContext2D} pen @param {number[]} start @param {number[]} end */
+function line(pen, start, end) {
   pen.beginPath();
-  pen.moveTo(from[0], from[1]);
-  pen.lineTo(to[0], to[1]);
+  pen.moveTo(start[0], start[1]);
+  pen.lineTo(end[0], end[1]);
   pen.stroke();
 }
 
 /**
- * A course from row to row; where there are many in a pixel, their extremes.
+ * Draws a curve from row to row. Of many rows in one pixel, it draws the extremes.
  * @param {CanvasRenderingContext2D} pen @param {Float64Array} times
  * @param {(time: number) => number} x @param {(row: number) => number} y @param {number} first @param {number} last
  */
-function course(pen, times, x, y, first, last) {
+function drawCurve(pen, times, x, y, first, last) {
   if (!(last > first)) {
     return;
   }

@@ -22,11 +22,13 @@ const PLAIN: &str = include_str!("../page/page.html");
 const WITHOUT_SCRIPTS: &str = "<noscript><p class=\"note\">With scripts, this page runs the FMU here. All else on it is complete.</p></noscript>";
 const BEGIN: &str = include_str!("../page/begin.js");
 const STYLE: &str = include_str!("../page/live.css");
-const SCRIPTS: [&str; 5] = [
+const SCRIPTS: [&str; 7] = [
     include_str!("../page/plot.js"),
     include_str!("../page/player.js"),
     include_str!("../page/fmu.js"),
     include_str!("../page/guide.js"),
+    include_str!("../page/session.js"),
+    include_str!("../page/fields.js"),
     include_str!("../page/live.js"),
 ];
 
@@ -112,7 +114,7 @@ fn script(runnables: &[Runnable], resources: &Resources, scripts: &[&str]) -> Re
         writeln!(text, "{{ description: \"{description}\", module: \"{}\" }},", base64(&deflated(module)?))?;
     }
     let resources = serde_json::to_string(&(&resources.packed, &resources.missing))?;
-    writeln!(text, "], ...{resources}).catch(withoutIt);\n}})();")?;
+    writeln!(text, "], ...{resources}).catch(showFailure);\n}})();")?;
     // Browsers do not normalize the line ends of a script that another script adds.
     Ok(text.replace("\r\n", "\n"))
 }
@@ -121,7 +123,7 @@ fn script(runnables: &[Runnable], resources: &Resources, scripts: &[&str]) -> Re
 fn live(page: &str, script: &str) -> Result<String> {
     let packed = base64(&deflated(script.as_bytes())?);
     let text = format!(
-        "<style>\n{STYLE}</style>\n<script>\n{BEGIN}begin(\"{packed}\").catch(withoutIt);\n</script>\n"
+        "<style>\n{STYLE}</style>\n<script>\n{BEGIN}begin(\"{packed}\").catch(showFailure);\n</script>\n"
     );
     // At the end, when the elements exist that the scripts change.
     let end = page.rfind("</body>").unwrap_or(page.len());
@@ -228,7 +230,7 @@ mod tests {
 
         let page = live("<body><p>text</p></body></html>", &script).unwrap();
         assert!(page.contains(&format!("<body>{WITHOUT_SCRIPTS}<p>text</p><style>")));
-        assert!(page.ends_with(".catch(withoutIt);\n</script>\n</body></html>"));
+        assert!(page.ends_with(".catch(showFailure);\n</script>\n</body></html>"));
     }
 
     #[test]

@@ -1,8 +1,8 @@
-// A run that is over, for a page of its own: prw.animate(run, "run.html").
+// Plays a recorded run on a separate page: prw.animate(run, "run.html").
 
 /**
  * @param {{title: string, columns: Record<string, string>, speed: number, captions: [number, string][]}} run
- * its columns are numbers of 8 bytes in base 64
+ * each column is an array of 8-byte floats in base 64
  */
 function animation(run) {
   const table = new Table([]);
@@ -16,10 +16,10 @@ function animation(run) {
   const caption = element("p", { class: "live-caption" });
   const view = {
     element: element("div", {}, caption, wrist.element),
-    draw: (/** @type {Table} */ of, /** @type {number} */ time) => {
-      const passed = run.captions.filter(([from]) => from <= time + 1e-9);
+    draw: (/** @type {Table} */ results, /** @type {number} */ time) => {
+      const passed = run.captions.filter(([start]) => start <= time + 1e-9);
       caption.textContent = passed.length ? passed[passed.length - 1][1] : "";
-      wrist.draw(of, time);
+      wrist.draw(results, time);
     },
   };
   const player = new Player({

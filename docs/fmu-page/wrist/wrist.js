@@ -1,11 +1,11 @@
-// The wrist in three dimensions, made of what wrist.json says; how its motors move, and which courses are drawn.
+// The wrist in three dimensions, built from wrist.json, and the panels of its plots.
 
 /**
- * A face of a body: places of its corners, its colour, whether it is seen from one side only.
+ * A face of a body: indices of its corners, its colour, and whether only its outside is visible.
  * @typedef {{corners: number[], colour: number[], isClosed: boolean}} Face
  * @typedef {{points: number[], faces: Face[], turn: string}} Solid
  * @typedef {{turns?: string | null, lathe?: number[][], box?: number[][], colours: string[], lobes?: number}} Shape
- * A body on the graphics card: corners and normals of its triangles, the number of corners, and what turns it.
+ * A body on the graphics card: corners and normals of its triangles, the number of corners, and the angle that turns it.
  * @typedef {{buffer: WebGLBuffer, count: number, turn: string}} Mesh
  */
 
@@ -17,10 +17,10 @@
  *   round: number, piece: number, shown_twist: number, most_twisted: number, azimuth: number, elevation: number, lamp: number[],
  * }} Parts */
 
-/** What wrist.json says; set where the scripts are put together. @type {Parts} */
+/** Content of wrist.json; set when the page is built. @type {Parts} */
 let WRIST;
 
-/** The angles that the picture shows. */
+/** The angles that the image shows. */
 const SHOWN = ["theta1", "theta2", "theta3", "theta4", "theta5", "theta6", "pitch", "roll"];
 const SHAFTS = [
   { side: -1, colour: "blue", motor: "theta1", middle: "theta3", carrier: "theta5" },
@@ -43,10 +43,10 @@ function channels(colour) {
 /** The bodies of the wrist, with a number of cam lobes. @param {Parts} parts @param {number} waves @returns {Solid[]} */
 function bodies(parts, waves) {
   const rgb = (/** @type {string} */ name) => channels(parts.colours[name]);
-  // Enough corners for each lobe.
+  // At least six corners per lobe.
   const round = parts.round * Math.max(1, Math.ceil((6 * waves) / parts.round));
 
-  /** Turned about X from points (x, radius), in stripes of the colours. @param {Shape} shape @param {string} own @returns {Solid} */
+  /** A solid of revolution about X from points (x, radius), in stripes of the colours. @param {Shape} shape @param {string} own @returns {Solid} */
   const lathe = ({ lathe: profile = [], colours, lobes = 0, turns }, own) => {
     const points = [profile[0]];
     for (let k = 1; k < profile.length; k++) {
@@ -67,13 +67,13 @@ function bodies(parts, waves) {
     const faces = [];
     const isClosed = profile[profile.length - 1][1] === 0;
     for (let ring = 0; ring + 1 < points.length; ring++) {
-      // What is flat is one face for each stripe.
+      // A flat ring has one face per stripe.
       const width = points[ring][0] === points[ring + 1][0] ? round / Math.max(colours.length, 2) : 1;
       for (let k = 0; k < round; k += width) {
         const arc = Array.from({ length: width + 1 }, (_, step) => (k + step) % round);
         const inner = points[ring][1] === 0 ? [arc[0]] : arc;
         const outer = points[ring + 1][1] === 0 ? [arc[0]] : arc;
-        faces.push({ corners: [...inner.map((place) => ring * round + place), ...outer.map((place) => (ring + 1) * round + place).reverse()], colour: colourOf(k), isClosed });
+        faces.push({ corners: [...inner.map((corner) => ring * round + corner), ...outer.map((corner) => (ring + 1) * round + corner).reverse()], colour: colourOf(k), isClosed });
       }
     }
     return outward({ points: made, faces, turn: turns ?? "" });
@@ -100,7 +100,7 @@ function bodies(parts, waves) {
   for (const shape of parts.output) {
     const body = shape.box ? box(shape) : lathe(shape, "");
     if (shape.lathe) {
-      // From a body about X to one about Y.
+      // Turns the axis from X to Y.
       const { points } = body;
       for (let k = 0; k < points.length; k += 3) {
         [points[k], points[k + 1], points[k + 2]] = [points[k + 1], points[k], -points[k + 2]];
@@ -111,9 +111,9 @@ function bodies(parts, waves) {
   return all;
 }
 
-/** With corners that run about the outside, by the sign of the volume. @param {Solid} body */
+/** Orders the corners of all faces so that normals point outwards, by the sign of the volume. @param {Solid} body */
 function outward(body) {
-  const at = (/** @type {number} */ place) => body.points.slice(3 * place, 3 * place + 3);
+  const at = (/** @type {number} */ index) => body.points.slice(3 * index, 3 * index + 3);
   let volume = 0;
   for (const { corners } of body.faces) {
     const first = at(corners[0]);
@@ -128,18 +128,18 @@ function outward(body) {
   return body;
 }
 
-/** The conical rollers on a side, which point at the centre. @param {Parts} parts @param {number} side @param {number[]} colour */
-function rollers({ rollers: of }, side, colour) {
+/** The conical rollers of one side. Their axes meet in the centre. @param {Parts} parts @param {number} side @param {number[]} colour */
+function rollers({ rollers: shape }, side, colour) {
   /** @type {number[]} */
   const points = [];
   /** @type {Face[]} */
   const faces = [];
-  const [axis, length] = [[side * of.axis[0], of.axis[1]], Math.hypot(of.axis[0], of.axis[1])];
+  const [axis, length] = [[side * shape.axis[0], shape.axis[1]], Math.hypot(shape.axis[0], shape.axis[1])];
   const across = [axis[1] / length, -axis[0] / length];
-  for (let number = 0; number < of.count; number++) {
-    const [cos, sin] = [Math.cos((2 * Math.PI * number) / of.count), Math.sin((2 * Math.PI * number) / of.count)];
+  for (let number = 0; number < shape.count; number++) {
+    const [cos, sin] = [Math.cos((2 * Math.PI * number) / shape.count), Math.sin((2 * Math.PI * number) / shape.count)];
     const first = points.length / 3;
-    for (const [share, radius] of [[1, of.radius[0]], [of.inner, of.radius[1]]]) {
+    for (const [share, radius] of [[1, shape.radius[0]], [shape.inner, shape.radius[1]]]) {
       for (let k = 0; k < 6; k++) {
         const [c, s] = [radius * Math.cos((Math.PI * k) / 3), radius * Math.sin((Math.PI * k) / 3)];
         const [x, y, z] = [share * axis[0] + c * across[0], share * axis[1] + c * across[1], s];
@@ -150,17 +150,17 @@ function rollers({ rollers: of }, side, colour) {
       const next = (k + 1) % 6;
       faces.push({ corners: [first + k, first + next, first + 6 + next, first + 6 + k], colour, isClosed: false });
     }
-    faces.push({ corners: [6, 7, 8, 9, 10, 11].map((place) => first + place), colour, isClosed: false });
+    faces.push({ corners: [6, 7, 8, 9, 10, 11].map((corner) => first + corner), colour, isClosed: false });
   }
   return { points, faces };
 }
 
-/** The central ring, which pitches: of rectangular section, about Z. @param {Parts} parts @param {number[]} colour @returns {Solid} */
-function ring({ ring: of, round }, colour) {
+/** The central ring, which pitches. It has a rectangular section and its axis is Z. @param {Parts} parts @param {number[]} colour @returns {Solid} */
+function ring({ ring: shape, round }, colour) {
   const sectors = 2 * round;
   const points = Array.from({ length: sectors }, (_, k) => {
     const angle = (2 * Math.PI * k) / sectors;
-    return of.section.flatMap(([radius, z]) => [of.radius * radius * Math.cos(angle), of.radius * radius * Math.sin(angle), z]);
+    return shape.section.flatMap(([radius, z]) => [shape.radius * radius * Math.cos(angle), shape.radius * radius * Math.sin(angle), z]);
   }).flat();
   /** @type {Face[]} */
   const faces = [];
@@ -173,20 +173,20 @@ function ring({ ring: of, round }, colour) {
   return outward({ points, faces, turn: "pitch" });
 }
 
-/** The strands of a coupling, from disc to disc: straight at rest, a twisted bundle under torque. @param {Parts} parts @param {number[]} x @param {number} outer @param {number} inner @param {number} twist */
-function strands({ coupling: of }, x, outer, inner, twist) {
+/** The strands of a coupling between two discs: straight without torque, twisted with torque. @param {Parts} parts @param {number[]} x @param {number} outer @param {number} inner @param {number} twist */
+function strands({ coupling: shape }, x, outer, inner, twist) {
   const points = [];
-  for (let k = 0; k < of.strands; k++) {
-    const begin = (2 * Math.PI * k) / of.strands + outer;
+  for (let k = 0; k < shape.strands; k++) {
+    const begin = (2 * Math.PI * k) / shape.strands + outer;
     const end = begin + twist * (inner - outer);
-    for (const [place, angle] of [[x[0], begin - of.width], [x[0], begin + of.width], [x[1], end + of.width], [x[1], end - of.width]]) {
-      points.push(place, of.radius * Math.cos(angle), of.radius * Math.sin(angle));
+    for (const [axial, angle] of [[x[0], begin - shape.width], [x[0], begin + shape.width], [x[1], end + shape.width], [x[1], end - shape.width]]) {
+      points.push(axial, shape.radius * Math.cos(angle), shape.radius * Math.sin(angle));
     }
   }
   return points;
 }
 
-/** What the twist is multiplied with so that it is seen: 1, 2 or 5 times a power of ten. @param {Parts} parts @param {Table} table */
+/** Factor that makes the twist visible: 1, 2 or 5 times a power of ten. @param {Parts} parts @param {Table} table */
 function enlargement(parts, table) {
   let most = 1e-6;
   for (const { motor, middle, carrier } of SHAFTS) {
@@ -201,7 +201,7 @@ function enlargement(parts, table) {
   return power * (factor >= 5 * power ? 5 : factor >= 2 * power ? 2 : 1);
 }
 
-/** Rotations (3, 3) by what turns. @param {(name: string) => number} angle @returns {Record<string, number[]>} */
+/** Rotation matrices (3, 3) by the name of the angle. @param {(name: string) => number} angle @returns {Record<string, number[]>} */
 function rotations(angle) {
   /** @type {Record<string, number[]>} */
   const all = { "": [1, 0, 0, 0, 1, 0, 0, 0, 1] };
@@ -219,7 +219,7 @@ function multiplied(a, b) {
   return [0, 1, 2].flatMap((row) => [0, 1, 2].map((column) => a[3 * row] * b[column] + a[3 * row + 1] * b[3 + column] + a[3 * row + 2] * b[6 + column]));
 }
 
-/** The wrist on a canvas, faces from the farthest to the nearest. */
+/** The wrist on a canvas. */
 class Wrist {
   /** @param {Parts} parts @param {((motor: string, by: number) => void) | null} move turns a motor, rad */
   constructor(parts, move) {
@@ -232,7 +232,7 @@ class Wrist {
     this.azimuth = parts.azimuth + 90;
     this.elevation = parts.elevation;
     this.twist = 0;
-    /** What is drawn, to be drawn again from elsewhere. @type {[Table, number] | null} */
+    /** The table and the time of the last image. @type {[Table, number] | null} */
     this.last = null;
     this.element = element("canvas", {
       class: "live-scene", role: "img", tabindex: "0",
@@ -243,10 +243,10 @@ class Wrist {
     this.count(LOBES, parts.rollers.count);
   }
 
-  /** Draws this many cam lobes and rollers on each side, within what can be told apart. @param {number} lobes @param {number} rollers */
+  /** Sets the number of cam lobes and rollers of each side, at most 24. @param {number} lobes @param {number} rollers */
   count(lobes, rollers) {
-    const most = (/** @type {number} */ number) => Math.min(Math.max(Math.round(number) || 1, 1), 24);
-    this.bodies = bodies({ ...this.parts, rollers: { ...this.parts.rollers, count: most(rollers) } }, most(lobes));
+    const limited = (/** @type {number} */ number) => Math.min(Math.max(Math.round(number) || 1, 1), 24);
+    this.bodies = bodies({ ...this.parts, rollers: { ...this.parts.rollers, count: limited(rollers) } }, limited(lobes));
     this.shaded?.load(this.bodies);
     this.turn(0, 0);
   }
@@ -255,7 +255,7 @@ class Wrist {
   listen(move) {
     const canvas = this.element;
     /** @type {typeof SHAFTS[number] | undefined} */
-    let held;
+    let dragged;
     let last = [0, 0];
     /** @param {number} x @param {number} y */
     const motorAt = (x, y) => (move ? SHAFTS.find(({ side }) => {
@@ -263,11 +263,11 @@ class Wrist {
       return Math.hypot(x - centre[0], y - centre[1]) < Math.max(24, Math.hypot(edge[0] - centre[0], edge[1] - centre[1]));
     }) : undefined);
     canvas.addEventListener("pointerdown", (event) => {
-      held = motorAt(event.offsetX, event.offsetY);
+      dragged = motorAt(event.offsetX, event.offsetY);
       last = [event.clientX, event.clientY];
       canvas.setPointerCapture(event.pointerId);
     });
-    // A finger on a motor turns it; elsewhere, up and down scrolls the page.
+    // A finger on a motor turns the motor. Elsewhere, a vertical swipe scrolls the page.
     canvas.addEventListener("touchstart", (event) => {
       const box = canvas.getBoundingClientRect();
       const [touch] = event.touches;
@@ -280,13 +280,13 @@ class Wrist {
         canvas.style.cursor = motorAt(event.offsetX, event.offsetY) ? "ns-resize" : "grab";
         return;
       }
-      // Not movementX and movementY, which are 0 under a finger in Safari.
+      // In Safari, movementX and movementY of touch events are 0.
       const [right, down] = [event.clientX - last[0], event.clientY - last[1]];
       last = [event.clientX, event.clientY];
-      if (held) {
+      if (dragged) {
         const box = canvas.getBoundingClientRect();
         this.isHinting = false;
-        move?.(held.motor, this.angleOf(held.side, [event.clientX - box.left, event.clientY - box.top], [right, down]));
+        move?.(dragged.motor, this.angleOf(dragged.side, [event.clientX - box.left, event.clientY - box.top], [right, down]));
       } else {
         this.turn(-0.4 * right, 0.4 * down);
       }
@@ -301,23 +301,23 @@ class Wrist {
   }
 
   /**
-   * The angle by which a motor turns when its surface follows the hand, rad.
-   * @param {number} side @param {number[]} place of the hand, px @param {number[]} way of the hand, px
+   * The angle by which a motor turns when its surface follows the pointer, rad.
+   * @param {number} side @param {number[]} pointer position, px @param {number[]} movement of the pointer, px
    */
-  angleOf(side, place, way) {
+  angleOf(side, pointer, movement) {
     const { rotation, scale } = this.camera();
     const [nearX, nearY, nearZ] = rotation.slice(6);
     const across = Math.hypot(nearY, nearZ);
     const centre = this.project([side * 4.1, 0, 0]);
     if (across < 0.5) {
-      // Seen along its axis, the motor turns about its centre.
-      const [x, y] = [place[0] - centre[0], place[1] - centre[1]];
-      return (-Math.sign(nearX) * (x * way[1] - y * way[0])) / Math.max(x * x + y * y, 100);
+      // The view is along the axis: the motor turns about its centre.
+      const [x, y] = [pointer[0] - centre[0], pointer[1] - centre[1]];
+      return (-Math.sign(nearX) * (x * movement[1] - y * movement[0])) / Math.max(x * x + y * y, 100);
     }
-    // The way that the point next to the viewer takes on the screen.
+    // Velocity of the nearest surface point on the screen.
     const [y, z] = [-nearZ / across, nearY / across];
     const [right, down] = [rotation[1] * y + rotation[2] * z, -(rotation[4] * y + rotation[5] * z)];
-    return (right * way[0] + down * way[1]) / (0.66 * scale * (right * right + down * down));
+    return (right * movement[0] + down * movement[1]) / (0.66 * scale * (right * right + down * down));
   }
 
   /** @param {number} azimuth deg @param {number} elevation deg */
@@ -329,13 +329,13 @@ class Wrist {
     }
   }
 
-  /** @param {number} twist what the couplings' twist is multiplied with; 0: as it fits */
+  /** @param {number} twist factor of the couplings' twist; 0 selects it automatically */
   enlarge(twist) {
     this.twist = twist;
     this.turn(0, 0);
   }
 
-  /** The twist's factor: what is chosen, or as the run asks for. @param {Table} table */
+  /** The factor of the twist: the user's or the automatic one. @param {Table} table */
   factor(table) {
     const key = `${table.count} ${table.column("theta3")[table.count - 1]}`;
     if (key !== this.settled.key && !this.twist) {
@@ -344,7 +344,7 @@ class Wrist {
     return this.twist || this.settled.factor;
   }
 
-  /** Where a point is on the canvas, and how near. @param {number[]} point */
+  /** Position of a point on the canvas, and its distance towards the viewer. @param {number[]} point */
   project([x, y, z]) {
     const { rotation, scale, centre } = this.camera();
     const near = rotation[6] * x + rotation[7] * y + rotation[8] * z;
@@ -363,7 +363,7 @@ class Wrist {
   /** @param {Table} table @param {number} time */
   draw(table, time) {
     this.last = [table, time];
-    const { pen, width, height } = sharp(this.element);
+    const { pen, width, height } = clear(this.element);
     const { rotation, scale, centre } = this.camera();
     const angle = (/** @type {string} */ name) => table.at(name, time);
     const turns = rotations(angle);
@@ -383,7 +383,7 @@ class Wrist {
     return SHAFTS.flatMap((shaft) =>
       this.parts.couplings.map(({ from, to, x }) => {
         const [outer, inner] = [angle(shaft[/** @type {"motor"} */ (from)]), angle(shaft[/** @type {"motor"} */ (to)])];
-        const points = strands(this.parts, x.map((place) => shaft.side * place), outer, inner, twist);
+        const points = strands(this.parts, x.map((axial) => shaft.side * axial), outer, inner, twist);
         const colour = channels(this.parts.colours[shaft.colour]);
         const faces = Array.from({ length: points.length / 12 }, (_, k) => ({ corners: [0, 1, 2, 3].map((corner) => 4 * k + corner), colour, isClosed: false }));
         return { points, faces, turn: "" };
@@ -398,7 +398,7 @@ class Wrist {
    */
   paint(pen, { rotation, scale, centre }, turns, couplings) {
     /** @type {{near: number, points: number[], corners: number[], colour: number[], light: number, isReversed: boolean}[]} */
-    const seen = [];
+    const visible = [];
     const lamp = this.parts.lamp;
     /** @param {Solid} body */
     const add = (body) => {
@@ -427,23 +427,23 @@ class Wrist {
         const sign = area > 0 ? -1 : 1;
         const turn = turns[body.turn];
         const light = sign * (lamp[0] * (turn[0] * x + turn[1] * y + turn[2] * z) + lamp[1] * (turn[3] * x + turn[4] * y + turn[5] * z) + lamp[2] * (turn[6] * x + turn[7] * y + turn[8] * z));
-        seen.push({ near: near / corners.length, points: placed, corners, colour, light, isReversed: area > 0 });
+        visible.push({ near: near / corners.length, points: placed, corners, colour, light, isReversed: area > 0 });
       }
     };
     [...this.bodies, ...couplings].forEach(add);
-    seen.sort((one, other) => one.near - other.near);
+    visible.sort((one, other) => one.near - other.near);
     let shade = "";
     pen.beginPath();
-    for (const { points, corners, colour, light, isReversed } of seen) {
+    for (const { points, corners, colour, light, isReversed } of visible) {
       const bright = 0.62 + 0.38 * Math.max(0, light);
       const own = `rgb(${Math.round(bright * colour[0])},${Math.round(bright * colour[1])},${Math.round(bright * colour[2])})`;
-      // Neighbours of one shade are painted together, all turning the same way.
+      // Consecutive faces of one shade are filled together; all have the same orientation.
       if (own !== shade) {
         pen.fill();
         pen.beginPath();
         pen.fillStyle = shade = own;
       }
-      // A little larger than they are, lest the ground shines through between them; strokes would take much longer.
+      // Faces are enlarged by 0.6 px, so that the background is not visible between them. Strokes would take much longer.
       let [x, y] = [0, 0];
       for (const corner of corners) {
         x += points[3 * corner] / corners.length;
@@ -470,29 +470,29 @@ class Wrist {
     pen.textBaseline = "alphabetic";
     pen.lineWidth = 3;
     pen.strokeStyle = colourAt(this.element, "tint");
-    const words = (/** @type {string} */ text, /** @type {number[]} */ [x, y], /** @type {string} */ colour, /** @type {CanvasTextAlign} */ align) => {
+    const label = (/** @type {string} */ text, /** @type {number[]} */ [x, y], /** @type {string} */ colour, /** @type {CanvasTextAlign} */ align) => {
       pen.textAlign = align;
       pen.fillStyle = colourAt(this.element, colour);
       const half = align === "center" ? pen.measureText(text).width / 2 + 4 : 0;
-      const place = Math.min(Math.max(x, half), width - half);
-      pen.strokeText(text, place, y);
-      pen.fillText(text, place, y);
+      const left = Math.min(Math.max(x, half), width - half);
+      pen.strokeText(text, left, y);
+      pen.fillText(text, left, y);
     };
-    words("motor 1", this.project([-4.1, 0.95, 0]), "curve-1", "center");
-    words("motor 2", this.project([4.1, 0.95, 0]), "curve-2", "center");
-    words("ring: pitch", [width - 8, 20], "curve-3", "right");
-    words("gripper: roll", [width - 8, 38], "curve-4", "right");
-    words(`couplings\u2019 twist drawn \u00d7 ${twist}`, [8, 20], "soft", "left");
+    label("motor 1", this.project([-4.1, 0.95, 0]), "curve-1", "center");
+    label("motor 2", this.project([4.1, 0.95, 0]), "curve-2", "center");
+    label("ring: pitch", [width - 8, 20], "curve-3", "right");
+    label("gripper: roll", [width - 8, 38], "curve-4", "right");
+    label(`couplings\u2019 twist drawn \u00d7 ${twist}`, [8, 20], "soft", "left");
     if (this.isHinting) {
       pen.font = "600 15px system-ui, sans-serif";
-      words("Drag a motor", [width / 2, height - 12], "ink", "center");
+      label("Drag a motor", [width / 2, height - 12], "ink", "center");
     }
   }
 }
 
-/** Draws bodies with a depth buffer, on a canvas of its own. */
+/** Draws bodies with a depth buffer on a separate canvas. */
 class Shaded {
-  /** `null` where the browser has no WebGL, or only a slow one. @returns {Shaded | null} */
+  /** Returns `null` if the browser has no WebGL, or only in software. @returns {Shaded | null} */
   static make() {
     const gl = element("canvas").getContext("webgl", { antialias: true, preserveDrawingBuffer: true, failIfMajorPerformanceCaveat: true });
     return gl && new Shaded(gl);
@@ -516,12 +516,12 @@ class Shaded {
     const locations = ["camera", "turn", "scale", "centre", "lamp"].map((name) => [name, gl.getUniformLocation(program, name)]);
     /** @type {Record<string, WebGLUniformLocation | null>} */
     this.uniforms = Object.fromEntries(locations);
-    this.attributes = ["place", "normal", "colour"].map((name) => gl.getAttribLocation(program, name));
+    this.attributes = ["position", "normal", "colour"].map((name) => gl.getAttribLocation(program, name));
     this.attributes.forEach((attribute) => gl.enableVertexAttribArray(attribute));
     this.strands = /** @type {WebGLBuffer} */ (gl.createBuffer());
   }
 
-  /** Keeps these bodies on the graphics card. @param {Solid[]} bodies */
+  /** Loads these bodies to the graphics card. @param {Solid[]} bodies */
   load(bodies) {
     const { gl } = this;
     this.meshes.forEach(({ buffer }) => gl.deleteBuffer(buffer));
@@ -534,7 +534,7 @@ class Shaded {
   }
 
   /**
-   * The canvas with the bodies and the couplings; `null` if the graphics card was lost.
+   * Draws the bodies and the couplings and returns the canvas, or `null` if the WebGL context is lost.
    * @param {{width: number, height: number, rotation: number[], scale: number, centre: number[], turns: Record<string, number[]>, lamp: number[]}} view
    * @param {Solid[]} couplings
    */
@@ -542,14 +542,14 @@ class Shaded {
     const { gl } = this;
     const canvas = /** @type {HTMLCanvasElement} */ (gl.canvas);
     const ratio = window.devicePixelRatio || 1;
-    const [fineWidth, fineHeight] = [Math.round(width * ratio), Math.round(height * ratio)];
-    if (gl.isContextLost() || !fineWidth || !fineHeight) {
+    const [pixelWidth, pixelHeight] = [Math.round(width * ratio), Math.round(height * ratio)];
+    if (gl.isContextLost() || !pixelWidth || !pixelHeight) {
       return null;
     }
-    if (canvas.width !== fineWidth || canvas.height !== fineHeight) {
-      [canvas.width, canvas.height] = [fineWidth, fineHeight];
+    if (canvas.width !== pixelWidth || canvas.height !== pixelHeight) {
+      [canvas.width, canvas.height] = [pixelWidth, pixelHeight];
     }
-    gl.viewport(0, 0, fineWidth, fineHeight);
+    gl.viewport(0, 0, pixelWidth, pixelHeight);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.uniformMatrix3fv(this.uniforms.camera, false, columns(rotation));
@@ -561,7 +561,7 @@ class Shaded {
     gl.bufferData(gl.ARRAY_BUFFER, corners, gl.DYNAMIC_DRAW);
     for (const { buffer, count, turn } of [...this.meshes, { buffer: this.strands, count: corners.length / 9, turn: "" }]) {
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-      this.attributes.forEach((attribute, place) => gl.vertexAttribPointer(attribute, 3, gl.FLOAT, false, 36, 12 * place));
+      this.attributes.forEach((attribute, index) => gl.vertexAttribPointer(attribute, 3, gl.FLOAT, false, 36, 12 * index));
       gl.uniformMatrix3fv(this.uniforms.turn, false, columns(turns[turn]));
       gl.drawArrays(gl.TRIANGLES, 0, count);
     }
@@ -582,17 +582,17 @@ function normal(points, corners) {
   return [x / length, y / length, z / length];
 }
 
-/** A matrix (3, 3) by columns, as WebGL has them. @param {number[]} m */
+/** A matrix (3, 3) in the column-major order of WebGL. @param {number[]} m */
 function columns(m) {
   return [m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]];
 }
 
-/** Place, normal and colour of each corner of a body's triangles. @param {Solid} body */
+/** Position, normal and colour of each corner of a body's triangles. @param {Solid} body */
 function triangles({ points, faces }) {
   const all = [];
   for (const { corners, colour } of faces) {
     const own = [...normal(points, corners), ...colour.map((part) => part / 255)];
-    // From both ends to the middle: a face of a ring is an arc there and an arc back.
+    // From both ends to the middle: a face of a ring consists of an outer and an inner arc.
     for (let [first, last] = [0, corners.length - 1]; last - first > 1; first++, last--) {
       const [a, b, c, d] = [corners[first], corners[first + 1], corners[last - 1], corners[last]];
       for (const corner of last - first > 2 ? [a, b, d, b, c, d] : [a, b, d]) {
@@ -603,17 +603,17 @@ function triangles({ points, faces }) {
   return Float32Array.from(all);
 }
 
-/** From the viewer to the centre; and the lobes that the cams have before the FMU says otherwise. */
+/** Distance from the viewer to the centre, and the number of cam lobes until the FMU is read. */
 const [DISTANCE, LOBES] = [20, 4];
 
-/** The shaders: a perspective as in `Wrist.project`, and faces that are lit from both sides. */
+/** The shaders: the perspective of `Wrist.project`, and lighting on both sides of the faces. */
 const CORNERS = `
-attribute vec3 place, normal, colour;
+attribute vec3 position, normal, colour;
 uniform mat3 camera, turn;
 uniform vec2 scale, centre;
 varying vec3 own, face;
 void main() {
-  vec3 seen = camera * (turn * place);
+  vec3 seen = camera * (turn * position);
   float far = ${DISTANCE}.0 - seen.z;
   gl_Position = vec4(centre * far + scale * ${DISTANCE}.0 * seen.xy, (far - ${DISTANCE}.0) / 10.0 * far, far);
   own = colour;

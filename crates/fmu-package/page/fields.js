@@ -1,0 +1,122 @@
+// Sliders and number fields for variables.
+
+/** The reason why a variable cannot have a value; "" if it can. @param {Variable} one @param {number | string} value */
+function problem(one, value) {
+  if (one.type === "String") {
+    return "";
+  }
+  if (value === "" || !Number.isFinite(Number(value))) {
+    return "must be a number";
+  }
+  const isInteger = Number.isInteger(value) && Math.abs(Number(value)) < 2 ** 31;
+  return one.type === "Real" || isInteger ? "" : "must be an integer below 2\u00b3\u00b9";
+}
+
+/** Rows with a slider and a number field for variables, in the units of the page. */
+class Fields {
+  /** @param {(one: Variable, value: number | string) => void} changed called with values that the type allows */
+  constructor(changed) {
+    this.changed = changed;
+    /** Functions that show the value of a variable. @type {Map<string, (value: number | string) => void>} */
+    this.show = new Map();
+    /** Functions that mark the field of a variable as invalid with a message, or as valid with "". @type {Map<string, (message: string) => void>} */
+    this.mark = new Map();
+  }
+
+  /** Calls `changed`, or marks the field of an impossible value. @param {Variable} one @param {number | string} value */
+  change(one, value) {
+    const reason = problem(one, value);
+    this.mark.get(one.name)?.(reason && `${one.name} ${reason}`);
+    if (!reason) {
+      this.changed(one, value);
+    }
+  }
+
+  /** An element below a field for its message. @param {Variable} one @param {HTMLElement} field @returns {HTMLElement} */
+  message(one, field) {
+    const id = `${field.id}-message`;
+    const message = element("span", { id, class: "live-message", role: "alert" });
+    this.mark.set(one.name, (text) => {
+      message.textContent = text;
+      field.toggleAttribute("aria-invalid", text !== "");
+      field.toggleAttribute("aria-describedby", text !== "");
+      if (text) {
+        field.setAttribute("aria-invalid", "true");
+        field.setAttribute("aria-describedby", id);
+      }
+    });
+    return message;
+  }
+
+  /** A row. @param {Variable} one @param {string} label @param {[number, number] | null} ends of the slider; `null` derives them from min, max and start @param {string} [about] */
+  row(one, label, ends, about = one.description) {
+    const id = `live-${one.name.replace(/\W/g, "-")}`;
+    const name = element("label", { for: id }, element("b", {}, label), about ? ` ${about}` : "");
+    if (one.type === "Real" || (one.type === "Integer" && !ends)) {
+      return this.number(one, id, name, ends);
+    }
+    if (one.type === "Enumeration") {
+      const list = element("select", { id }, ...one.items.map((item) => element("option", { value: String(item.value) }, item.name)));
+      list.addEventListener("change", () => this.change(one, Number(list.value)));
+      this.show.set(one.name, (value) => (list.value = String(value)));
+      return element("div", { class: "live-row" }, name, list, this.message(one, list));
+    }
+    const kind = one.type === "Boolean" ? "checkbox" : one.type === "String" ? "text" : "number";
+    const field = element("input", { id, type: kind });
+    field.addEventListener("change", () => this.change(one, kind === "checkbox" ? Number(field.checked) : kind === "text" ? field.value : Number(field.value)));
+    this.show.set(one.name, (value) => {
+      field.checked = Number(value) !== 0;
+      field.value = String(value);
+    });
+    return element("div", { class: "live-row" }, name, field, this.message(one, field));
+  }
+
+  /** @param {Variable} one @param {string} id @param {HTMLElement} name @param {[number, number] | null} ends */
+  number(one, id, name, ends) {
+    const { factor, offset, type } = one;
+    const start = startOf(one) * factor + offset;
+    const isInteger = type !== "Real";
+    const [least, most] = [one.min * factor + offset, one.max * factor + offset];
+    // A positive quantity has a logarithmic slider: from a tenth to ten times its start value.
+    const isLog = !ends && !isInteger && least >= 0 && start > 0;
+    const size = Math.max(Math.abs(start), Math.abs(one.nominal * factor));
+    const [low, high] = ends || (isLog ? [start / 10, start * 10] : [start - size, start + (isInteger ? 2 : 1) * size]);
+    const [begin, end] = [Math.max(low, least), Math.min(high, most)];
+    const digits = Math.max(0, 4 - Math.floor(Math.log10(end - begin)));
+    const toShare = (/** @type {number} */ value) => (isLog ? Math.log(Math.max(value, 1e-300) / begin) / Math.log(end / begin) : (value - begin) / (end - begin));
+    const fromShare = (/** @type {number} */ share) => (isLog ? begin * (end / begin) ** share : begin + share * (end - begin));
+    const slider = element("input", { type: "range", min: "0", max: "1", step: isInteger ? String(1 / (end - begin)) : "0.001", "aria-labelledby": `${id}-label` });
+    name.firstElementChild?.setAttribute("id", `${id}-label`);
+    const field = element("input", { id, type: "number", step: isInteger ? "1" : "any" });
+    const show = (/** @type {number} */ value) => {
+      const text = String(ends ? Number(value.toFixed(digits)) : Number(value.toPrecision(6)));
+      slider.value = String(toShare(value));
+      slider.setAttribute("aria-valuetext", `${text} ${one.unit}`);
+      // Does not overwrite what the user is typing.
+      if (document.activeElement !== field) {
+        field.value = text;
+      }
+    };
+    const change = (/** @type {number} */ value) => this.change(one, Math.abs(value - start) <= 1e-12 * Math.abs(start) ? startOf(one) : (value - offset) / factor);
+    slider.addEventListener("input", () => {
+      const value = Number(slider.value) === Number(toShare(start).toFixed(3)) ? start : fromShare(Number(slider.value));
+      const round = isInteger ? Math.round(value) : Number(value.toPrecision(3));
+      last = round;
+      show(round);
+      change(round);
+    });
+    let last = start;
+    field.addEventListener("change", () => {
+      last = field.value === "" ? last : Number(field.value);
+      field.value = String(last);
+      show(last);
+      change(last);
+    });
+    field.addEventListener("focus", () => field.select());
+    field.addEventListener("blur", () => show(last));
+    this.show.set(one.name, (value) => show((last = Number(value) * factor + offset)));
+    const hint = Number.isFinite(most) ? `${least} to ${most}` : least > 0 && least < 1e-200 ? "> 0" : Number.isFinite(least) ? `\u2265 ${least}` : "";
+    const unit = element("span", { class: "live-unit" }, one.unit, hint ? element("small", {}, ` ${hint}`) : "");
+    return element("div", { class: "live-row" }, name, slider, field, unit, this.message(one, field));
+  }
+}
