@@ -14,8 +14,6 @@ import fmpy
 import pytest
 from built import built
 
-from prw.cli import main
-
 
 @pytest.fixture(scope="session")
 def fmu() -> Path:
@@ -57,7 +55,10 @@ def unpack() -> Iterator[Callable[[Path], str]]:
 
 @pytest.fixture
 def prw(tmp_path: Path, fmu: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Runs `prw` with arguments in this process, in a directory of its own. A warning is an error."""
+    """Runs `prw` with arguments in this process, in a temporary directory. A warning is an error."""
+    # The environment of the platform tests has no prw.
+    from prw.cli import main
+
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("prw.progress._wanted", False)
 

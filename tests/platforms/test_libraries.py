@@ -11,7 +11,7 @@ from pathlib import Path
 import fmpy
 import lief
 import pytest
-from conftest import DIST, ROOT, binaries, wheel
+from conftest import DIST, binaries, wheel
 from libraries import EPOCH
 from targets import FOLDERS, GLIBC, MODELS, TARGETS, WINDOWS, Target
 
@@ -22,9 +22,16 @@ LINUX_LIBRARIES = re.compile(r"lib(c|m|pthread|dl)\.so\.\d|ld-linux-(x86-64|aarc
 #: Parts of Windows from 10 on.
 WINDOWS_LIBRARIES = re.compile(r"(kernel32|ntdll|api-ms-win-(core|crt)-\w+-l1-[12]-0)\.dll")
 
-C = ROOT / "crates/fmu-export/tests/c/fmu.h", Path(fmpy.__file__).parent / "c-code" / "fmi3Functions.h"
-FMI2_FUNCTIONS = {f"fmi2{name}" for name in re.findall(r"F\((\w+)\)", C[0].read_text())}
-FMI3_FUNCTIONS = set(re.findall(r"^FMI3_Export +fmi3\w+TYPE +(fmi3\w+);", C[1].read_text(), re.MULTILINE))
+
+def declared(version: int) -> set[str]:
+    """The functions that the standard's header declares."""
+    header = Path(fmpy.__file__).parent / "c-code" / f"fmi{version}Functions.h"
+    pattern = rf"^ *FMI{version}_Export +fmi{version}\w+TYPE +(fmi{version}\w+);"
+    return set(re.findall(pattern, header.read_text(), re.MULTILINE))
+
+
+FMI2_FUNCTIONS = declared(2)
+FMI3_FUNCTIONS = declared(3)
 #: Libraries describe themselves to the program that packs them.
 FUNCTIONS = FMI2_FUNCTIONS | FMI3_FUNCTIONS | {"fmu_export_describe"}
 ELF_MACHINE = {"x86_64": lief.ELF.ARCH.X86_64, "aarch64": lief.ELF.ARCH.AARCH64}

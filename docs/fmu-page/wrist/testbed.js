@@ -59,7 +59,7 @@ function move(time, isShaped) {
 
 /** @type {Motion[]} */
 const MOTIONS = [
-  motorMotion("tour", "Both axes: equal motor angles pitch the wrist, opposite angles roll it", 5.2, (time) => (time < 2.5 ? both(swing(time)) : both(swing(time - 2.6), -1))),
+  motorMotion("tour", "Both axes: equal angles pitch, opposite angles roll", 5.2, (time) => (time < 2.5 ? both(swing(time)) : both(swing(time - 2.6), -1))),
   motorMotion("pitch", "Pitch: equal motor angles", 2.6, (time) => both(swing(time))),
   motorMotion("roll", "Roll: opposite motor angles", 2.6, (time) => both(swing(time), -1)),
   motorMotion("fig4", "The paper\u2019s Fig. 4: opposite rates, sin(10\u03c0t) rad/s", 2, (time) => both(sine(time), -1)),
