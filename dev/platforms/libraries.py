@@ -129,6 +129,23 @@ def library(model: str, target: Target) -> Path:
     return target_directory() / target.triple / "library" / target.library(model)
 
 
+def export_from_object() -> list[str]:
+    """Flags of rustc for the library of the wheel for Windows.
+
+    maturin 1.16 lists PyInit_fmu_run._native, which does not exist, in the last list of exports, and zig reads only that one.
+    Therefore that list is empty, and an object file names the export.
+    """
+    listed = target_directory() / "maturin" / "fmu_run._native.def"
+    listed.parent.mkdir(exist_ok=True)
+    listed.unlink(missing_ok=True)
+    listed.symlink_to(os.devnull)
+    source, compiled = (ROOT / "target" / f"_native.exports.{end}" for end in ("s", "o"))
+    source.write_text('.section .drectve,"yni"\n.ascii " -export:PyInit__native"\n', encoding="utf-8")
+    zig = (sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-windows-gnu")
+    run(*zig, "-c", str(source), "-o", str(compiled))
+    return ["--", f"-Clink-arg=target/{compiled.name}"]
+
+
 def wheel(target: Target, out: Path) -> Path:
     """The wheel of fmu-run for a target and every Python from 3.11 on, in `out`."""
     command = ["maturin", "build", "--profile", "library", *STD, "--target", target.triple, "--out", str(out)]
@@ -136,14 +153,8 @@ def wheel(target: Target, out: Path) -> Path:
         command += ["--zig"]
     if "linux" in target.triple:
         command += ["--compatibility", f"manylinux_{GLIBC.replace('.', '_')}"]
-    name = "_native.dll" if target is WINDOWS else "fmu_run._native.abi3.so"
-    if target is WINDOWS:
-        # maturin 1.16 lists PyInit_fmu_run._native, which does not exist, in this file. `link` lists the function that does.
-        listed = target_directory() / "maturin" / "fmu_run._native.def"
-        listed.parent.mkdir(exist_ok=True)
-        listed.unlink(missing_ok=True)
-        listed.symlink_to(os.devnull)
-    run(*command, *link(target, name, ["PyInit__native"]), environment=environment(target), directory=PACKAGE)
+    flags = export_from_object() if target is WINDOWS else link(target, "fmu_run._native.abi3.so", [])
+    run(*command, *flags, environment=environment(target), directory=PACKAGE)
     (path,) = out.glob(f"fmu_run-*{target.wheel}*.whl")
     return path
 
