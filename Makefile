@@ -123,12 +123,14 @@ test: test-rust test-python $(VENV)/importers.stamp $(VENV)/examples.stamp
 # C programs are compiled against the standard's headers, which FMPy brings.
 headers: $(VENV)/test.stamp
 
+# Many tests wait, for a time limit or for cargo's lock, so there are two for each processor.
 test-rust: need-rust headers
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy $(LOCKED) --workspace --all-targets -- -D warnings
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc $(LOCKED) --workspace --no-deps --quiet
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
-	  set -ex; $(CARGO) nextest run $(LOCKED) --workspace; $(CARGO) test $(LOCKED) --workspace --doc; \
+	  set -ex; $(CARGO) nextest run $(LOCKED) --workspace --test-threads $$((2 * $$(getconf _NPROCESSORS_ONLN))); \
+    $(CARGO) test $(LOCKED) --workspace --doc; \
 	else \
 	  set -ex; $(CARGO) test $(LOCKED) --workspace; \
 	fi
