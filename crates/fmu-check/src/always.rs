@@ -1,10 +1,10 @@
 //! Rules that hold for every run: nothing is written where it does not belong, statuses are those of the standard, messages
 //! are such that importers can show them.
 
-use crate::call_sequence::{CallSequence, Message, Numbered, Run, Step, Written};
+use crate::call_sequence::{CallSequence, Message, Numbered, Run, Step, Written, all_steps};
 use crate::description::Description;
 use crate::finding::{Finding, Judge, Judges, status_name, step_name};
-use crate::rules::claim;
+use crate::rules;
 use fmi_abi::Standard;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -18,8 +18,7 @@ fn rule(name: &'static str, judge: impl Judges) -> Broken {
 
 /// The findings in a run that came to its end.
 pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -> Vec<Finding> {
-    let mut all = Vec::new();
-    walk(sequence, &mut all);
+    let all = all_steps(sequence);
     let mut broken: Vec<Broken> = processes(&all, run).into_iter().collect();
     for numbered in &all {
         if let Some(outcome) = run.of(numbered.id) {
@@ -31,20 +30,10 @@ pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -
     let mut names = HashSet::new();
     let found = broken.into_iter().filter_map(|(name, judge)| {
         let observed = judge(run)?;
-        Some(claim(description.standard, name).finding(observed, sequence.clone(), judge))
+        let finding = rules::broken(description.standard, name, observed);
+        Some(finding.shown_by(sequence.clone(), judge))
     });
     found.filter(|finding| names.insert(finding.name.clone()) || finding.topic() == "arrays").collect()
-}
-
-fn walk<'s>(sequence: &'s [Numbered], all: &mut Vec<&'s Numbered>) {
-    for numbered in sequence {
-        all.push(numbered);
-        match &numbered.step {
-            Step::Repeat(_, steps) => walk(steps, all),
-            Step::Parallel(sequences) => sequences.iter().for_each(|sequence| walk(sequence, all)),
-            _ => {}
-        }
-    }
 }
 
 /// Processes that were left by a sequence that has freed all instances.

@@ -101,7 +101,7 @@ impl Baseline {
 #[cfg(test)]
 mod tests {
     use super::Baseline;
-    use crate::finding::{Finding, Severity};
+    use crate::finding::Finding;
 
     #[test]
     fn a_reason_is_needed_for_each_observation() {
@@ -109,9 +109,8 @@ mod tests {
             "# known\nlogs.silent: since 2024\n\nrefusals.tolerated \"J2\": intended: see the manual\n";
         let baseline = Baseline::parse(text).unwrap_or_default();
         let finding = |name: &str, observed: &[&str]| {
-            let mut finding = Finding::new(name, Severity::Note, String::new(), "", observed[0].to_owned());
-            finding.more = observed[1..].iter().map(|observed| (*observed).to_owned()).collect();
-            finding
+            let more = observed[1..].iter().map(|observed| (*observed).to_owned()).collect();
+            Finding { name: name.to_owned(), observed: observed[0].to_owned(), more, ..Finding::default() }
         };
         assert_eq!(baseline.of_finding(&finding("logs.silent", &["a", "b"])), Some("since 2024".to_owned()));
         let of_one = finding("refusals.tolerated", &["a value for J2"]);

@@ -75,8 +75,6 @@ pub enum Arg {
     Whole(i64),
     /// NULL.
     Null,
-    /// A pointer that is no multiple of what it points to.
-    Misaligned,
     /// An array of numbers, as their bits.
     In(Kind, Vec<u64>),
     /// An array of texts; `None` is NULL.
@@ -111,18 +109,15 @@ impl Arg {
 pub struct Make {
     /// Whether it steps itself.
     pub co_simulation: bool,
-    /// Its name; `None` is NULL.
-    pub name: Option<String>,
-    /// Arguments of the instantiation.
-    pub token: Option<String>,
+    pub name: String,
+    /// The guid or instantiationToken.
+    pub token: String,
     /// Whether it logs.
     pub logging: bool,
     /// Whether the importer handles events (FMI 3.0).
     pub event_mode: bool,
     /// Whether steps may return early (FMI 3.0).
     pub early_return: bool,
-    /// Whether its environment is told where its resources are.
-    pub resources: bool,
 }
 
 /// The index of an instance that is NULL: freeing it is allowed.
@@ -165,6 +160,24 @@ pub struct Numbered {
 /// A sequence of calls.
 pub type CallSequence = Vec<Numbered>;
 
+/// Returns all steps of a sequence, including those of its repetitions and threads.
+pub fn all_steps(sequence: &[Numbered]) -> Vec<&Numbered> {
+    let steps = sequence.iter().flat_map(|numbered| {
+        let inner = match &numbered.step {
+            Step::Repeat(_, steps) => all_steps(steps),
+            Step::Parallel(sequences) => sequences.iter().flat_map(|sequence| all_steps(sequence)).collect(),
+            _ => Vec::new(),
+        };
+        std::iter::once(numbered).chain(inner)
+    });
+    steps.collect()
+}
+
+/// Returns the step with this number.
+pub fn step_of(sequence: &[Numbered], id: u32) -> Option<&Numbered> {
+    all_steps(sequence).into_iter().find(|numbered| numbered.id == id)
+}
+
 /// A message of the FMU.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Message {
@@ -173,8 +186,6 @@ pub struct Message {
     pub category: Option<Vec<u8>>,
     /// Its text, as bytes; `None` is NULL.
     pub text: Option<Vec<u8>>,
-    /// Whether it came with the environment that the instance was given.
-    pub at_home: bool,
 }
 
 /// Values that a call wrote to an array.

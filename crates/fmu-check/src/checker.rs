@@ -1,11 +1,11 @@
 //! The shared part of all checks: runs call sequences, judges the results and keeps the findings.
 
 use crate::always;
-use crate::call_sequence::{CallSequence, End, Numbered, Run, Setting, Step};
+use crate::call_sequence::{CallSequence, End, Numbered, Run, Setting, Step, step_of};
 use crate::description::Description;
 use crate::finding::{Event, Finding, Judge, Judges, Severity, ending, event, step_name};
 use crate::legal::first_illegal;
-use crate::rules::{self, Claim};
+use crate::rules;
 use crate::run::{Stop, Workers};
 use crate::shrink::shrink;
 use crate::writer::{READ, Read, Trajectory, Writer, difference, sample};
@@ -65,7 +65,7 @@ impl Random {
 
 /// The step in which a run ended.
 fn at<'s>(sequence: &'s CallSequence, run: &Run) -> Option<&'s Numbered> {
-    run.at.and_then(|id| sequence.iter().find(|numbered| numbered.id == id))
+    step_of(sequence, run.at?)
 }
 
 /// An FMU under attack.
@@ -240,8 +240,7 @@ impl Checker {
     /// An error in a call sequence itself, for developers of this tool.
     fn illegal(&self, sequence: &CallSequence) -> Option<String> {
         let id = first_illegal(&self.description, sequence)?;
-        let at = sequence.iter().find(|numbered| numbered.id == id)?;
-        Some(format!("{id} {:?}", at.step))
+        Some(format!("{id} {:?}", step_of(sequence, id)?.step))
     }
 
     /// How many sequences were played.
@@ -280,14 +279,15 @@ impl Checker {
     /// Keeps the finding that a run breaks a rule. Whether it does.
     pub fn keep(&self, name: &str, run: &Run, sequence: &CallSequence, judge: impl Judges) -> bool {
         let observed = if run.end == End::Done { judge(run) } else { None };
-        let found = observed
-            .map(|observed| self.add(self.claim(name).finding(observed, sequence.clone(), Arc::new(judge))));
+        let found = observed.map(|observed| {
+            self.add(self.broken(name, observed).shown_by(sequence.clone(), Arc::new(judge)))
+        });
         found.is_some()
     }
 
-    /// The requirement of a rule.
-    pub fn claim(&self, name: &str) -> Claim {
-        rules::claim(self.description.standard, name)
+    /// The finding that the FMU breaks a rule.
+    pub fn broken(&self, name: &str, observed: String) -> Finding {
+        rules::broken(self.description.standard, name, observed)
     }
 
     /// Keeps the findings of the rules that hold for every run.
@@ -342,11 +342,11 @@ impl Checker {
             })
         };
         let keep = |name: &str, observed: String| {
-            let mut ended = self.claim(name);
+            let mut ended = self.broken(name, observed).shown_by(sequence.clone(), Arc::clone(&ends));
             if hostile {
                 ended.severity = ended.severity.max(Severity::Fragile);
             }
-            self.add(ended.finding(observed, sequence.clone(), Arc::clone(&ends)));
+            self.add(ended);
             Ok(())
         };
         // Whether memory beyond an array was touched: with room after it, it shows.
@@ -449,6 +449,12 @@ mod tests {
     /// A graver finding of a name takes the index of the one before, whose evidence is listed.
     #[test]
     fn no_evidence_is_lost() {
+        let finding = |name: &str, severity, observed: &str| Finding {
+            name: name.to_owned(),
+            severity,
+            observed: observed.to_owned(),
+            ..Finding::default()
+        };
         let mut found = Vec::new();
         for (severity, observed) in [
             (Severity::Note, "a"),
@@ -459,9 +465,9 @@ mod tests {
             (Severity::Violation, "e"),
             (Severity::Note, "b"),
         ] {
-            keep(&mut found, Finding::new("topic.name", severity, String::new(), "", observed.to_owned()));
+            keep(&mut found, finding("topic.name", severity, observed));
         }
-        keep(&mut found, Finding::new("topic.other", Severity::Note, String::new(), "", "a".to_owned()));
+        keep(&mut found, finding("topic.other", Severity::Note, "a"));
         let [one, other] = &found[..] else { panic!("{} findings", found.len()) };
         assert_eq!((one.severity, one.observed.as_str()), (Severity::Violation, "c"));
         assert_eq!(one.more, ["a", "b", "d", "e"]);

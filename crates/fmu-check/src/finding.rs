@@ -1,6 +1,6 @@
 //! Findings: severity, section of the standard, and the shortest call sequence that shows the finding.
 
-use crate::call_sequence::{CallSequence, End, Numbered, Run, Step, Written};
+use crate::call_sequence::{CallSequence, End, Numbered, Run, Step, Written, step_of};
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -68,10 +68,9 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// A finding without a call sequence.
-    pub fn new(name: &str, severity: Severity, section: String, requirement: &str, observed: String) -> Self {
-        let (name, requirement) = (name.to_owned(), requirement.to_owned());
-        Self { name, severity, section, requirement, observed, ..Self::default() }
+    /// Adds the calls that show the finding.
+    pub fn shown_by(self, sequence: CallSequence, judge: Judge) -> Self {
+        Self { sequence, judge: Some(judge), ..self }
     }
 
     /// Its topic.
@@ -82,8 +81,10 @@ impl Finding {
 
 /// How a run ended that was not to end so: a sentence with the function it ended in.
 pub fn ending(run: &Run, sequence: &CallSequence) -> Option<String> {
-    let at = run.at.and_then(|id| sequence.iter().find(|numbered| numbered.id == id));
-    let name = at.map_or("the end of the process".to_owned(), |numbered| step_name(&numbered.step));
+    let name = run
+        .at
+        .and_then(|id| step_of(sequence, id))
+        .map_or("the end of the process".to_owned(), |numbered| step_name(&numbered.step));
     Some(match &run.end {
         End::Done => return None,
         End::Crash(why) => format!("{name} crashes ({why})"),
@@ -150,7 +151,7 @@ pub fn refused(sequence: &CallSequence, run: &Run, ids: &[u32]) -> Option<String
 /// A sentence on this call, if it did not answer OK.
 pub fn refused_one(sequence: &CallSequence, run: &Run, id: u32) -> Option<String> {
     let outcome = run.of(id)?;
-    let step = &sequence.iter().find(|numbered| numbered.id == id)?.step;
+    let step = &step_of(sequence, id)?.step;
     let name = step_name(step);
     if outcome.missing {
         return Some(format!("{name} is not in the library"));

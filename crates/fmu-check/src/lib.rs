@@ -2,9 +2,9 @@
 //!
 //! ## Inside
 //!
-//! A check writes sequences (`writer`), sequences of calls as data (`sequence`), has them played by a process of its own
-//! (`run`, `worker`) and judges what came of them. What is found is shortened (`shrink`) as long as it keeps to the
-//! standard (`legal`), and written as programs (`reproduce`). `unsafe` is in `worker` alone: the process that may be lost.
+//! A check writes a call sequence (`writer`, `call_sequence`), which a separate process plays (`run`, `worker`), and judges the
+//! results. The call sequence of a finding is shortened (`shrink`) as long as the standard allows it (`legal`), and written
+//! as a program in C (`reproduce`). Only `worker` has `unsafe` code: an FMU may crash its process.
 
 mod always;
 mod baseline;
@@ -234,7 +234,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     let limit = if options.quick { options.limit.min(QUICK / 10.0) } else { options.limit };
     let mut checker = Checker::new(description, setting, workers, options.seed, limit, deadline);
     checker.quick = options.quick;
-    of_files.into_iter().for_each(|(name, observed)| checker.add(checker.claim(name).of_files(observed)));
+    of_files.into_iter().for_each(|(name, observed)| checker.add(checker.broken(name, observed)));
     without.into_iter().for_each(|(name, why)| checker.unchecked(name, why));
     simulate(&mut checker)?;
     attack(&checker, progress, &wanted)?;

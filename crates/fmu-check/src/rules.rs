@@ -1,8 +1,7 @@
 //! All rules in one table: the name of a finding, its severity and the section for FMI 2.0 and FMI 3.0, and the requirement.
 
-use crate::call_sequence::CallSequence;
+use crate::finding::Finding;
 use crate::finding::Severity::{self, Fragile as F, Note as N, Violation as V};
-use crate::finding::{Finding, Judge};
 use fmi_abi::Standard;
 
 /// The editions of the standard whose sections the table names, for FMI 2.0 and FMI 3.0.
@@ -270,44 +269,20 @@ pub static RULES: &[Rule] = &[
     rule("states.twice", [V; 2], SAVING, "Restoring a state does not change it: it can be restored again."),
 ];
 
-/// A requirement of this FMU: a rule in its FMI version.
-#[derive(Clone)]
-pub struct Claim {
-    rule: &'static Rule,
-    standard: Standard,
-    /// The name of the finding if it does not hold.
-    pub name: String,
-    /// Its severity.
-    pub severity: Severity,
-}
-
-impl Claim {
-    /// The finding that it does not hold.
-    pub fn finding(&self, observed: String, sequence: CallSequence, judge: Judge) -> Finding {
-        let mut finding = self.of_files(observed);
-        finding.sequence = sequence;
-        finding.judge = Some(judge);
-        finding
-    }
-
-    /// The finding that the files do not meet it.
-    pub fn of_files(&self, observed: String) -> Finding {
-        Finding::new(
-            &self.name,
-            self.severity,
-            self.rule.section(self.standard),
-            self.rule.requirement,
-            observed,
-        )
-    }
-}
-/// The requirement of a rule, by its name.
+/// Returns the finding that an FMU breaks a rule.
 ///
 /// # Panics
 /// If there is no such rule. A test looks for such names.
-pub fn claim(standard: Standard, name: &str) -> Claim {
+pub fn broken(standard: Standard, name: &str, observed: String) -> Finding {
     let rule = find(name).unwrap_or_else(|| panic!("no rule is called {name}"));
-    Claim { rule, standard, name: name.to_owned(), severity: rule.severity(standard) }
+    Finding {
+        name: name.to_owned(),
+        severity: rule.severity(standard),
+        section: rule.section(standard),
+        requirement: rule.requirement.to_owned(),
+        observed,
+        ..Finding::default()
+    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The shortest sequence of calls that still shows a finding.
 
-use crate::call_sequence::{CallSequence, Numbered, Step};
+use crate::call_sequence::{CallSequence, Numbered, Step, all_steps};
 use crate::description::Description;
 use crate::legal::first_illegal;
 use std::collections::HashMap;
@@ -42,17 +42,6 @@ fn content(step: &Step) -> Option<String> {
     }
 }
 
-/// The calls of a sequence and of its threads.
-fn flat(sequence: &[Numbered]) -> Vec<&Numbered> {
-    sequence.iter().fold(Vec::new(), |mut all, numbered| {
-        all.push(numbered);
-        if let Step::Parallel(sequences) = &numbered.step {
-            all.extend(sequences.iter().flat_map(|sequence| flat(sequence)));
-        }
-        all
-    })
-}
-
 /// A sequence without some calls, also of its threads.
 fn without(sequence: &[Numbered], ids: &[u32]) -> CallSequence {
     let kept = sequence.iter().filter(|numbered| !ids.contains(&numbered.id)).cloned();
@@ -67,7 +56,7 @@ fn without(sequence: &[Numbered], ids: &[u32]) -> CallSequence {
 
 /// Removes corresponding units of compared simulations together: a simulation that lacks a call would differ for that reason only.
 fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
-    let contents: HashMap<u32, String> = flat(sequence)
+    let contents: HashMap<u32, String> = all_steps(sequence)
         .into_iter()
         .filter_map(|numbered| Some((numbered.id, content(&numbered.step)?)))
         .collect();
@@ -101,7 +90,7 @@ pub fn shrink(
     let all: Vec<Vec<u32>> = units(sequence).into_iter().chain(threads).collect();
     let mut units = if compared { together(sequence, all) } else { all };
     let stays = |id: &u32| {
-        flat(sequence).into_iter().any(|numbered| match &numbered.step {
+        all_steps(sequence).into_iter().any(|numbered| match &numbered.step {
             Step::Call { function, .. } => {
                 numbered.id == *id && pinned.iter().any(|name| function[4..].eq_ignore_ascii_case(name))
             }
@@ -118,7 +107,7 @@ pub fn shrink(
             let begin = end.saturating_sub(size);
             let tried = without(&best, &units[begin..end].concat());
             let keeps = !legal || first_illegal(description, &tried).is_none();
-            if keeps && flat(&tried).len() < flat(&best).len() && shows(&tried) {
+            if keeps && all_steps(&tried).len() < all_steps(&best).len() && shows(&tried) {
                 best = tried;
                 units.drain(begin..end);
                 shorter = true;
@@ -134,8 +123,8 @@ pub fn shrink(
 
 #[cfg(test)]
 mod tests {
-    use super::{flat, shrink};
-    use crate::call_sequence::{CallSequence, Numbered, Step};
+    use super::shrink;
+    use crate::call_sequence::{CallSequence, Numbered, Step, all_steps};
     use crate::description::Description;
     use crate::legal::first_illegal;
     use crate::values::Value;
@@ -162,7 +151,7 @@ mod tests {
     const WHOLE: &[crate::writer::Part] = &[Begin, Ask, Run(0), Free];
 
     fn names(sequence: &[Numbered]) -> Vec<String> {
-        flat(sequence).into_iter().map(|numbered| crate::finding::step_name(&numbered.step)).collect()
+        all_steps(sequence).into_iter().map(|numbered| crate::finding::step_name(&numbered.step)).collect()
     }
 
     fn count(sequence: &CallSequence, name: &str) -> usize {

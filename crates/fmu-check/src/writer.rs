@@ -178,12 +178,11 @@ impl<'a> Writer<'a> {
         let stepped = self.trajectory.is_stepped();
         Make {
             co_simulation: stepped,
-            name: Some("instance".to_owned()),
-            token: Some(self.description.token.clone()),
+            name: "instance".to_owned(),
+            token: self.description.token.clone(),
             logging: true,
             event_mode: stepped && self.description.event_mode(),
             early_return: false,
-            resources: true,
         }
     }
 

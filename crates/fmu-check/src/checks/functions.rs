@@ -17,11 +17,8 @@ fn symbols(checker: &Checker) -> anyhow::Result<()> {
         checker.workers.play(&setting, &sequence, checker.limit)
     });
     if let (End::Done, End::Unloadable(why)) = (late?.end, now?.end) {
-        checker.add(checker.claim("package.symbols").finding(
-            why,
-            sequence,
-            Arc::new(|_: &Run| -> Option<String> { None }),
-        ));
+        let judge = Arc::new(|_: &Run| -> Option<String> { None });
+        checker.add(checker.broken("package.symbols", why).shown_by(sequence, judge));
     }
     Ok(())
 }
@@ -53,7 +50,7 @@ pub fn present(checker: &Checker) -> anyhow::Result<()> {
     }
     if !missing.is_empty() {
         let observed = format!("the library lacks {}", missing.join(", "));
-        checker.add(checker.claim("functions.missing").of_files(observed));
+        checker.add(checker.broken("functions.missing", observed));
     }
     symbols(checker)?;
     version(checker)

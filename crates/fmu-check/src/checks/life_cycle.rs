@@ -52,7 +52,7 @@ fn many(writer: &mut Writer, _: &Trajectory) {
 
 /// A name with spaces and letters beyond ASCII; a stop time and a tolerance.
 fn long_name(writer: &mut Writer, trajectory: &Trajectory) {
-    writer.make_with(0, |how| how.name = Some("a long name, with Gödel in it %s #1#".to_owned()));
+    writer.make_with(0, |how| how.name = "a long name, with Gödel in it %s #1#".to_owned());
     let stop = trajectory.end + 1.0 + trajectory.end.abs();
     writer.enter_with(0, Some(1e-6), writer.description.start_time, Some(stop));
     writer.play(0, &[Leave, Points(3), Free]);
@@ -158,7 +158,7 @@ fn unload(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
 fn token(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.forbidden = true;
-    let id = writer.make_with(0, |how| how.token = Some("no token of this FMU".to_owned()));
+    let id = writer.make_with(0, |how| how.token = "no token of this FMU".to_owned());
     checker.check("life_cycle.token", writer.sequence, move |run| {
         (run.status(id) == Some(1)).then(|| "an instance is made for another one".to_owned())
     })

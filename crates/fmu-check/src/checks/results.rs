@@ -29,7 +29,7 @@ pub fn repeat(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
 pub fn name(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let mut runs = ["instance", "an instance of another name"].map(|name| {
-        writer.make_with(0, |how| how.name = Some(name.to_owned()));
+        writer.make_with(0, |how| how.name = name.to_owned());
         let reads = writer.play(0, &[Part::Enter, Part::Leave, Ask, RunFrom(0)]).reads;
         writer.free(0);
         reads

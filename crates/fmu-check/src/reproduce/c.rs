@@ -197,10 +197,8 @@ impl Writer<'_> {
 
     fn make(&mut self, id: u32, index: usize, make: &Make) -> String {
         self.instances.insert(index);
-        let of =
-            |text: &Option<String>| text.as_ref().map_or("NULL".to_owned(), |text| literal(text.as_bytes()));
-        let (name, token) = (of(&make.name), of(&make.token));
-        let flags = [make.co_simulation, make.resources, make.logging, make.event_mode, make.early_return];
+        let (name, token) = (literal(make.name.as_bytes()), literal(make.token.as_bytes()));
+        let flags = [make.co_simulation, make.logging, make.event_mode, make.early_return];
         let flags = flags.map(|flag| flag.to_string()).join(", ");
         let made = format!("c{index} = make({index}, {name}, {token}, {flags});\n");
         let [_, log] = self.matters(id).unwrap_or_default();
@@ -256,7 +254,6 @@ impl Writer<'_> {
             Arg::Real(bits) => number_of(Kind::F64, *bits),
             Arg::Whole(number) => number.to_string(),
             Arg::Null => "NULL".to_owned(),
-            Arg::Misaligned => "(char *)guarded(NULL, 64) + 1".to_owned(),
             Arg::In(kind, bits) => {
                 parts.array(number, kind.c_name(), bits.iter().map(|bits| number_of(*kind, *bits)))
             }

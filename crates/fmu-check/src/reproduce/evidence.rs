@@ -1,8 +1,8 @@
 //! The results that show a finding, found by leaving out those that the judge does not need. A program that reproduces a
 //! finding compares them.
 
-use crate::call_sequence::{CallSequence, End, Numbered, Outcome, Run, Step, Written};
-use crate::finding::{Finding, Judge};
+use crate::call_sequence::{Arg, CallSequence, End, Numbered, Outcome, Run, Step, Written, step_of};
+use crate::finding::{Finding, Judge, step_name};
 use std::fmt::Write as _;
 
 /// How a program finds out whether a finding shows.
@@ -184,15 +184,12 @@ fn shown(outcome: &Outcome, [written, log]: [bool; 2]) -> String {
 
 /// The function of a step at any depth, and what it reads.
 fn function(sequence: &[Numbered], id: u32) -> Option<String> {
-    sequence.iter().find_map(|numbered| match &numbered.step {
-        Step::Call { function, args, .. } if numbered.id == id => {
-            let outputs = args.iter().filter(|arg| !matches!(arg, crate::call_sequence::Arg::State(_)));
-            Some(format!("{function} {:?}", outputs.collect::<Vec<_>>()))
+    Some(match &step_of(sequence, id)?.step {
+        Step::Call { function, args, .. } => {
+            let outputs: Vec<_> = args.iter().filter(|arg| !matches!(arg, Arg::State(_))).collect();
+            format!("{function} {outputs:?}")
         }
-        other if numbered.id == id => Some(crate::finding::step_name(other)),
-        Step::Repeat(_, steps) => function(steps, id),
-        Step::Parallel(sequences) => sequences.iter().find_map(|sequence| function(sequence, id)),
-        _ => None,
+        other => step_name(other),
     })
 }
 
@@ -235,11 +232,10 @@ pub fn as_repeated(sequence: &CallSequence, run: &Run) -> CallSequence {
 mod tests {
     use super::{Evidence, evidence};
     use crate::call_sequence::{Arg, End, Kind, Message, Numbered, Outcome, Run, Step, Written};
-    use crate::finding::{Finding, Judge, Severity};
+    use crate::finding::{Finding, Judge};
     use std::sync::Arc;
 
     fn finding(judge: Judge) -> Finding {
-        let mut finding = Finding::new("topic.name", Severity::Note, String::new(), "", String::new());
         let call = |id: u32, function: &str| {
             let args = vec![Arg::Out(Kind::F64, 1)];
             Numbered {
@@ -248,9 +244,8 @@ mod tests {
                 step: Step::Call { of: Some(0), function: function.to_owned(), args },
             }
         };
-        finding.sequence = vec![call(1, "fmi2GetReal"), call(2, "fmi2DoStep"), call(3, "fmi2GetReal")];
-        finding.judge = Some(judge);
-        finding
+        let sequence = vec![call(1, "fmi2GetReal"), call(2, "fmi2DoStep"), call(3, "fmi2GetReal")];
+        Finding::default().shown_by(sequence, judge)
     }
 
     fn run() -> Run {
@@ -262,7 +257,7 @@ mod tests {
             outcomes: [outcome(1, 0, 1.0), outcome(2, 3, 0.0), outcome(3, 0, 2.0)].into(),
             ..Run::default()
         };
-        let message = Message { status: 3, category: None, text: Some(b"no".to_vec()), at_home: true };
+        let message = Message { status: 3, category: None, text: Some(b"no".to_vec()) };
         run.outcomes.entry(2).and_modify(|of| of.log.push(message));
         run
     }

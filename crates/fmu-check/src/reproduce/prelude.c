@@ -183,13 +183,13 @@ static __attribute__((unused)) void say3(void *environment, int status, const ch
 static char resources[5000];
 static __attribute__((unused)) Callbacks callbacks = {say2, calloc, free, NULL, NULL};
 
-static void *copy(const char *text) { return text ? guarded(text, strlen(text) + 1) : NULL; }
+static void *copy(const char *text) { return guarded(text, strlen(text) + 1); }
 
 /* Instantiates. */
-static __attribute__((unused)) void *make(int index, const char *name, const char *token, bool co_simulation, bool in_resources, bool logging, bool events, bool early) {
+static __attribute__((unused)) void *make(int index, const char *name, const char *token, bool co_simulation, bool logging, bool events, bool early) {
     size_t before = arrays;
     void *made;
-    const char *where = in_resources ? copy(resources) : NULL;
+    const char *where = copy(resources);
     name = copy(name);
     token = copy(token);
     *said = 0;

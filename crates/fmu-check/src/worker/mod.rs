@@ -193,7 +193,7 @@ unsafe fn remember(environment: *mut c_void, status: c_int, category: *const c_c
     let [category, text] = [category, text].map(|pointer| unsafe { text_at(pointer) });
     let mut said = locked(&SAID);
     if said.len() < 1000 {
-        said.push((environment as usize, Message { status, category, text, at_home: true }));
+        said.push((environment as usize, Message { status, category, text }));
     }
 }
 
@@ -484,16 +484,12 @@ impl Player {
 
     fn make(&self, index: usize, make: &Make, outcome: &mut Outcome) {
         // Strings are unmapped after the call: an FMU must copy what it keeps.
-        let text = |text: &Option<String>| {
-            let bytes = |text: &String| CString::new(text.as_str()).unwrap_or_default().into_bytes_with_nul();
-            text.as_ref().map(|text| Guarded::new(&bytes(text)))
-        };
+        let text = |text: &str| Guarded::new(&CString::new(text).unwrap_or_default().into_bytes_with_nul());
         let (name, token) = (text(&make.name), text(&make.token));
         let standard = if self.setting.fmi3 { Standard::Fmi3 } else { Standard::Fmi2 };
         let location = standard.resources(&self.setting.resources);
-        let resources = make.resources.then(|| Guarded::new(location.as_bytes_with_nul()));
-        let word =
-            |text: &Option<Guarded>| text.as_ref().map_or(0, Guarded::address) as usize as *const c_char;
+        let resources = Guarded::new(location.as_bytes_with_nul());
+        let word = |text: &Guarded| text.address() as usize as *const c_char;
         // No two are the same; nobody may look at what is there.
         let environment = ENVIRONMENTS.fetch_add(16, Ordering::Relaxed) as *mut c_void;
         let mut callbacks = None;
@@ -552,7 +548,7 @@ impl Player {
             }
         };
         INSIDE.leave();
-        for text in [name, token, resources].iter().flatten() {
+        for text in [name, token, resources] {
             outcome.damage.extend(text.damage(true));
         }
         outcome.status = Some(i32::from(!handle.is_null()));
@@ -658,7 +654,6 @@ impl Player {
             Arg::Real(bits) => *bits,
             Arg::Whole(number) => *number as u64,
             Arg::Null => 0,
-            Arg::Misaligned => input(&[FILL; 64]) + 1,
             Arg::In(kind, bits) => {
                 let bytes: Vec<u8> =
                     bits.iter().flat_map(|bits| bits.to_ne_bytes().into_iter().take(kind.size())).collect();
