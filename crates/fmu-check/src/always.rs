@@ -1,7 +1,7 @@
-//! Rules that hold for every run: nothing is written where it does not belong, statuses are those of the standard, messages
-//! are such that importers can show them.
+//! Rules that hold for every run: the FMU writes only to the arrays for results, returns the statuses of the standard, and
+//! logs valid messages.
 
-use crate::call_sequence::{CallSequence, Message, Numbered, Run, Step, Written, all_steps};
+use crate::call_sequence::{CallSequence, Message, Numbered, Run, Step, Values, all_steps};
 use crate::description::Description;
 use crate::finding::{Finding, Judge, Judges, status_name, step_name};
 use crate::rules;
@@ -9,14 +9,14 @@ use fmi_abi::Standard;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-/// A rule for a call, with what is wrong in a run.
+/// A rule, and the judge that describes how a run breaks it.
 type Broken = (&'static str, Judge);
 
 fn rule(name: &'static str, judge: impl Judges) -> Broken {
     (name, Arc::new(judge))
 }
 
-/// The findings in a run that came to its end.
+/// Returns the findings in a run that neither crashed nor hung.
 pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -> Vec<Finding> {
     let all = all_steps(sequence);
     let mut broken: Vec<Broken> = processes(&all, run).into_iter().collect();
@@ -85,7 +85,7 @@ fn call(numbered: &Numbered) -> Vec<Broken> {
     }));
     if function.ends_with("GetString") && !numbered.forbidden {
         broken.push(rule("start_values.utf8", move |run| {
-            let Written::Texts(texts) = run.written(id)? else { return None };
+            let Values::Texts(texts) = run.written(id)? else { return None };
             let bad = texts.iter().flatten().find(|text| std::str::from_utf8(text).is_err())?;
             Some(format!("the string {:?} is not UTF-8", String::from_utf8_lossy(bad)))
         }));
@@ -146,7 +146,7 @@ fn messages(description: &Description, id: u32) -> impl Iterator<Item = Broken> 
     })
 }
 
-/// A call that fails without a message, where logging is on.
+/// The rule against calls that fail without a message while logging is on.
 fn silence(sequence: &CallSequence, numbered: &Numbered) -> Option<Broken> {
     let off = sequence.iter().any(|numbered| {
         matches!(&numbered.step, Step::Make(_, make) if !make.logging)

@@ -1,10 +1,10 @@
-//! Findings that a project has accepted, with the reason of each, in a text file.
+//! Accepted findings of a project, with the reason of each, in a text file.
 
 use crate::finding::Finding;
 use anyhow::Context as _;
 use std::path::Path;
 
-/// An accepted rule, or the observations of a rule that contain a text.
+/// An accepted rule, or the observations of a rule that contain a string.
 struct Accepted {
     name: String,
     text: Option<String>,
@@ -85,7 +85,7 @@ impl Baseline {
         self.accepted.iter().find(|of| of.name == name).map(|of| of.reason.as_str())
     }
 
-    /// Names that nothing was found for.
+    /// Returns the names that match no finding and no unchecked topic.
     pub fn unused(&self, findings: &[Finding], unchecked: &[crate::Unchecked]) -> Vec<String> {
         let used = |of: &&Accepted| {
             unchecked.iter().any(|unchecked| unchecked.name == of.name)

@@ -1,4 +1,4 @@
-//! Sequences of calls as data, and what came of them. A worker plays them, a shrinker shortens them, a printer writes them
+//! Call sequences and their results as data. A worker plays them, a shrinker shortens them, a printer writes them
 //! as programs.
 
 use serde::{Deserialize, Serialize};
@@ -71,13 +71,13 @@ impl Kind {
 pub enum Arg {
     /// A floating-point number, as its bits.
     Real(u64),
-    /// A whole number, a size, a boolean value.
+    /// An integer, a size or a Boolean.
     Whole(i64),
     /// NULL.
     Null,
     /// An array of numbers, as their bits.
     In(Kind, Vec<u64>),
-    /// An array of texts; `None` is NULL.
+    /// An array of strings; `None` is NULL.
     Texts(Vec<Option<Vec<u8>>>),
     /// An array of pointers to bytes.
     Blobs(Vec<Vec<u8>>),
@@ -89,7 +89,7 @@ pub enum Arg {
     StateOut(usize),
     /// Serialized bytes, by the number of their index.
     Saved(usize),
-    /// How many they are.
+    /// The number of these bytes.
     SavedSize(usize),
     /// Receives the size of these bytes.
     SizeOut(usize),
@@ -104,10 +104,10 @@ impl Arg {
     }
 }
 
-/// How an instance is made.
+/// Arguments of an instantiation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Make {
-    /// Whether it steps itself.
+    /// Whether the interface type is Co-Simulation.
     pub co_simulation: bool,
     pub name: String,
     /// The guid or instantiationToken.
@@ -121,7 +121,7 @@ pub struct Make {
 }
 
 /// The index of an instance that is NULL: freeing it is allowed.
-pub const NOBODY: usize = 999;
+pub const NULL_INSTANCE: usize = 999;
 
 /// A step of a sequence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -136,23 +136,23 @@ pub enum Step {
     Version(String),
     /// Repeats steps this many times, or until the time limit.
     Repeat(usize, Vec<Numbered>),
-    /// At once, each in a thread of its own.
+    /// Runs call sequences at the same time, each in a separate thread.
     Parallel(Vec<Vec<Numbered>>),
-    /// Memory, threads and settings of the process.
+    /// Measures memory, threads and settings of the process.
     Measure,
-    /// Goes on in a new process, to which only serialized bytes are passed on.
+    /// Continues in a new process, which receives only serialized bytes.
     FreshProcess,
     /// Unloads the library.
     Unload,
-    /// Ends the process as programs do: with the destructors of its libraries. Nothing follows.
+    /// Exits the process, which runs the destructors of its libraries. Must be the last step.
     Quit,
 }
 
-/// A step with a number of its own, which it keeps when others are left out.
+/// A step with a number that it keeps when others are left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Numbered {
     pub id: u32,
-    /// Whether the standard forbids the call: what it answers changes nothing of what is allowed after it.
+    /// Whether the standard forbids the call. Such calls are not considered in the check of the following ones.
     pub forbidden: bool,
     pub step: Step,
 }
@@ -184,20 +184,30 @@ pub struct Message {
     pub status: i32,
     /// Its category, as bytes; `None` is NULL.
     pub category: Option<Vec<u8>>,
-    /// Its text, as bytes; `None` is NULL.
+    /// The message, as bytes; `None` is NULL.
     pub text: Option<Vec<u8>>,
 }
 
-/// Values that a call wrote to an array.
+/// Values of a variable or an array.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Written {
+pub enum Values {
     /// Numbers, as their bits.
     Numbers(Kind, Vec<u64>),
     /// Texts or bytes; `None` is NULL.
     Texts(Vec<Option<Vec<u8>>>),
 }
 
-impl Written {
+impl Values {
+    /// Numbers of a kind.
+    pub fn new(kind: Kind, numbers: impl IntoIterator<Item = f64>) -> Self {
+        Self::Numbers(kind, numbers.into_iter().map(|number| kind.bits(number)).collect())
+    }
+
+    /// A string or bytes for each element.
+    pub fn texts(text: &[u8], size: usize) -> Self {
+        Self::Texts(vec![Some(text.to_owned()); size])
+    }
+
     /// The numbers.
     pub fn numbers(&self) -> Vec<f64> {
         match self {
@@ -255,12 +265,12 @@ pub struct Outcome {
     /// The library has no such function.
     pub missing: bool,
     /// Values that were written to the arrays, in the order of the arguments.
-    pub written: Vec<Written>,
+    pub written: Vec<Values>,
     /// Messages of the FMU during the step.
     pub log: Vec<Message>,
     /// Writes outside of the arrays.
     pub damage: Vec<String>,
-    /// The text of a version.
+    /// The string that a version function returned.
     pub text: Option<Vec<u8>>,
     /// Result of a measurement or of repetitions.
     pub measured: Option<Measured>,
@@ -269,7 +279,7 @@ pub struct Outcome {
 /// Memory, threads and settings of the process.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
-    /// Bytes in use, as the C library counts them; of the whole process where it does not count.
+    /// Bytes in use as counted by the C library; if it does not count them, memory of the whole process.
     pub memory: u64,
     /// Whether the C library counted them.
     pub exact: bool,
@@ -277,7 +287,7 @@ pub struct Measured {
     pub files: usize,
     /// Settings of the process: rounding, locale, working directory, signal handlers.
     pub settings: Vec<String>,
-    /// How often repetitions came.
+    /// Number of repetitions.
     pub times: usize,
 }
 
@@ -287,13 +297,13 @@ pub enum End {
     /// Ended after its last step.
     #[default]
     Done,
-    /// The process crashed; what the system says.
+    /// The process crashed, for this reason.
     Crash(String),
     /// The process did not end in time.
     Hang(f64),
     /// The library called `exit`.
     Exit(i32),
-    /// The library cannot be loaded; what the loader says.
+    /// The library cannot be loaded, for this reason.
     Unloadable(String),
     /// The FMU started too many processes, which were ended.
     Flood(usize),
@@ -309,7 +319,7 @@ pub struct Run {
     /// The step in which it ended, if not with the last.
     pub at: Option<u32>,
     /// Output on the standard output and the standard error.
-    pub said: String,
+    pub output: String,
     /// Names of the processes that were left at its end.
     pub left: Vec<String>,
 }
@@ -329,7 +339,7 @@ impl Run {
     }
 
     /// The first array that a step wrote.
-    pub fn written(&self, id: u32) -> Option<&Written> {
+    pub fn written(&self, id: u32) -> Option<&Values> {
         self.of(id)?.written.first()
     }
 }
@@ -344,7 +354,7 @@ pub struct Setting {
     pub resources: std::path::PathBuf,
     /// Bytes of memory at most.
     pub memory: u64,
-    /// There is room after arrays, so that it can be observed what is written there.
+    /// Memory after each array is accessible, to detect writes there.
     pub soft: bool,
     /// All symbols are looked up when the library is loaded, as some importers do.
     pub now: bool,

@@ -1,4 +1,4 @@
-//! The shared part of all checks: runs call sequences, judges the results and keeps the findings.
+//! Runs the call sequences of all checks, judges the results and keeps the findings.
 
 use crate::always;
 use crate::call_sequence::{CallSequence, End, Numbered, Run, Setting, Step, step_of};
@@ -75,21 +75,21 @@ pub struct Checker {
     pub readable: Vec<usize>,
     pub setting: Setting,
     pub workers: Workers,
-    /// A simulation that goes well, by Co-Simulation and by Model Exchange.
+    /// A simulation that succeeds, for each interface type.
     pub trajectories: Vec<Trajectory>,
-    /// Chooses what is chosen at random.
+    /// Seed of random choices.
     pub seed: u64,
     /// Seconds for one sequence.
     pub limit: f64,
-    /// When all must be over.
+    /// End of the time for all checks.
     pub deadline: Instant,
     /// Whether fewer values and orders are tried.
     pub quick: bool,
     found: Mutex<Vec<Finding>>,
     unchecked: Mutex<Vec<Unchecked>>,
-    /// Kept by call sequences while they are played; a suspected hang is played again alone.
+    /// Call sequences hold a read lock while they are played. A suspected hang is played again with a write lock.
     alone: RwLock<()>,
-    /// Functions that did not return when they were called alone, with more time.
+    /// Functions that did not return when no other call sequence was played and the limit was three times as long.
     hung: Mutex<HashSet<String>>,
     played: Mutex<u64>,
 }
@@ -98,8 +98,8 @@ fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
     of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Keeps one finding of each name: the gravest, and of several such the one with the shortest call sequence, whichever
-/// check is first. Its `more` lists the observations of the others.
+/// Keeps one finding of each name: the most severe, and of several such the one with the shortest call sequence, regardless
+/// of the order of the checks. Its `more` lists the observations of the others.
 fn keep(found: &mut Vec<Finding>, mut finding: Finding) {
     let Some(kept) = found.iter_mut().find(|kept| kept.name == finding.name) else {
         found.push(finding);
@@ -116,7 +116,7 @@ fn keep(found: &mut Vec<Finding>, mut finding: Finding) {
     }
 }
 
-/// An observation without its numbers: another one is another finding.
+/// Returns an observation without its numbers, to compare observations of one finding.
 fn outline(observed: &str) -> String {
     let names = observed.split(|letter: char| !(letter.is_alphabetic() || letter == '_'));
     names.filter(|name| name.len() > 1 && !["NaN", "inf"].contains(name)).collect::<Vec<_>>().join(" ")
@@ -210,7 +210,7 @@ impl Checker {
             let _with_others = self.alone.read().unwrap_or_else(PoisonError::into_inner);
             self.play_until(sequence, limit)?
         };
-        // The machine may be busy, so a call that seems to hang is played again with nothing beside it and three times the
+        // The machine may be busy, so a call that seems to hang is played again with no other at the same time and three times the
         // time. A function that has not returned then is not tried again.
         let name = |run: &Run| {
             at(sequence, run).map_or(String::new(), |at| format!("{}{}", step_name(&at.step), at.forbidden))
@@ -271,12 +271,12 @@ impl Checker {
         keep(&mut locked(&self.found), finding);
     }
 
-    /// Whether something of this name was found.
+    /// Returns whether there is a finding of this name.
     pub fn has(&self, name: &str) -> bool {
         locked(&self.found).iter().any(|finding| finding.name == name)
     }
 
-    /// Keeps the finding that a run breaks a rule. Whether it does.
+    /// Keeps a finding if a run breaks a rule; returns whether it does.
     pub fn keep(&self, name: &str, run: &Run, sequence: &CallSequence, judge: impl Judges) -> bool {
         let observed = if run.end == End::Done { judge(run) } else { None };
         let found = observed.map(|observed| {
@@ -295,8 +295,8 @@ impl Checker {
         always::findings(&self.description, sequence, run).into_iter().for_each(|finding| self.add(finding));
     }
 
-    /// Plays a sequence that keeps to the standard but for forbidden calls, and judges: first how it ended, then what holds
-    /// of every run, then `judge`.
+    /// Plays a call sequence and judges the run: first by its end, then by the rules that hold
+    /// for every run, then by `judge`.
     pub fn judge(&self, name: &str, sequence: CallSequence, judge: impl Judges) -> anyhow::Result<Run> {
         let hostile = sequence.iter().any(|numbered| numbered.forbidden);
         let limit = if hostile { self.limit.min(3.0) } else { self.limit };
@@ -329,7 +329,7 @@ impl Checker {
         })
     }
 
-    /// A run that did not come to its end.
+    /// Keeps the finding of a run that crashed, hung or exited.
     fn ended(&self, rule: &str, sequence: &CallSequence, run: &Run, hostile: bool) -> anyhow::Result<()> {
         let Some(observed) = ending(run, sequence) else { return Ok(()) };
         let ends: Judge = {
@@ -349,7 +349,7 @@ impl Checker {
             self.add(ended);
             Ok(())
         };
-        // Whether memory beyond an array was touched: with room after it, it shows.
+        // A repetition with accessible memory after each array shows whether an access beyond an array caused the crash.
         if matches!(run.end, End::Crash(_)) && cfg!(unix) && !hostile {
             let soft = Setting { soft: true, ..self.setting.clone() };
             let again = self.workers.play(&soft, sequence, self.limit)?;
@@ -368,7 +368,7 @@ impl Checker {
             End::Exit(_) => "exit",
             _ => "crash",
         };
-        // Ends that only one call sequence shows have a separate name; others are the same in many checks.
+        // An end that only this call sequence can show has the name of its rule; others have the name of the topic.
         let own = ["fresh-process", "unload", "exit"].iter().any(|name| rule.ends_with(name));
         let name = match rule.split_once('.') {
             Some((topic, _)) if !own && (!hostile || topic == "refusals") => topic,
@@ -382,7 +382,7 @@ impl Checker {
         event(run, id, self.fmi3())
     }
 
-    /// The setting in which a finding shows: crashes at the ends of arrays, without room after them.
+    /// Returns the setting that shows a finding: arrays end at a guard page for accesses beyond arrays.
     fn hard(&self, finding: &Finding) -> Setting {
         let ends = ["read-beyond", "written-beyond", "crash"].iter().any(|end| finding.name.ends_with(end));
         Setting { soft: self.setting.soft && !ends, ..self.setting.clone() }
@@ -431,7 +431,7 @@ impl Checker {
             left -= 1;
             left >= 0 && Instant::now() <= self.deadline && shows(tried)
         });
-        // A finding that shows itself only sometimes is not shortened.
+        // A finding that does not show in every run is not shortened.
         if short.len() < finding.sequence.len() && !shows(&short) {
             (short, observed) = (finding.sequence.clone(), finding.observed.clone());
         }
@@ -446,7 +446,7 @@ mod tests {
     use super::keep;
     use crate::finding::{Finding, Severity};
 
-    /// A graver finding of a name takes the index of the one before, whose evidence is listed.
+    /// A more severe finding of a name replaces the one before, whose observation stays in the list.
     #[test]
     fn no_evidence_is_lost() {
         let finding = |name: &str, severity, observed: &str| Finding {

@@ -128,7 +128,7 @@ impl Description {
         has_clocks && self.co_simulation.as_ref().is_some_and(|offer| offer.can(&["hasEventMode"]))
     }
 
-    /// The variables that an index of the same type and reference stands for.
+    /// Returns the variables with the type and value reference of this variable, including itself.
     pub fn aliases(&self, index: usize) -> impl Iterator<Item = usize> + '_ {
         let of = &self.variables[index];
         let (reference, kind) = (of.reference, of.base.map(|base| kind_of(self.standard, base)));
@@ -137,6 +137,11 @@ impl Description {
                 other.reference == reference && other.base.map(|base| kind_of(self.standard, base)) == kind;
             same.then_some(index)
         })
+    }
+
+    /// Returns the kind of the values of a variable.
+    pub fn kind(&self, index: usize) -> Kind {
+        kind_of(self.standard, self.variables[index].base.unwrap_or(BaseType::Boolean))
     }
 
     /// The continuous states, by indices, in the order of their derivatives.
@@ -223,7 +228,7 @@ pub fn type_name(standard: Standard, base: BaseType) -> &'static str {
     }
 }
 
-/// How values of a type lie in memory.
+/// Returns the C type of the values of a type.
 pub fn kind_of(standard: Standard, base: BaseType) -> Kind {
     match type_name(standard, base) {
         "Real" | "Float64" => Kind::F64,

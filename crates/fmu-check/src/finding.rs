@@ -1,19 +1,19 @@
 //! Findings: severity, section of the standard, and the shortest call sequence that shows the finding.
 
-use crate::call_sequence::{CallSequence, End, Numbered, Run, Step, Written, step_of};
+use crate::call_sequence::{CallSequence, End, Numbered, Run, Step, Values, step_of};
 use serde::Serialize;
 use std::sync::Arc;
 
-/// How bad it is.
+/// Severity of a finding.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// Good to know.
+    /// Information.
     #[default]
     Note,
     /// The standard allows it, but importers fail.
     Fragile,
-    /// The standard says must.
+    /// The standard requires it.
     Violation,
 }
 
@@ -39,9 +39,9 @@ pub type Judge = Arc<dyn Judges>;
 /// A finding.
 #[derive(Clone, Default, Serialize)]
 pub struct Finding {
-    /// Its name: the topic, a dot, what is wrong.
+    /// Its name: the topic, a dot, the fault.
     pub name: String,
-    /// How bad it is.
+    /// Its severity.
     pub severity: Severity,
     /// The edition and section of the standard; empty if the rule is not part of it.
     pub section: String,
@@ -51,7 +51,7 @@ pub struct Finding {
     pub observed: String,
     /// Further observations of this rule.
     pub more: Vec<String>,
-    /// The calls that show it; none where the text alone does.
+    /// The calls that show it; empty for findings in files.
     #[serde(skip)]
     pub sequence: CallSequence,
     /// The call sequence as a program in C.
@@ -63,7 +63,7 @@ pub struct Finding {
     pub fails: bool,
     /// The reason for which it is accepted, if the baseline has one.
     pub accepted: Option<String>,
-    /// The steps of the sequence, and what they were before it was shortened.
+    /// The numbers of steps before and after shortening.
     pub steps: (usize, usize),
 }
 
@@ -79,7 +79,7 @@ impl Finding {
     }
 }
 
-/// How a run ended that was not to end so: a sentence with the function it ended in.
+/// Returns a sentence on a run that crashed, hung or exited, with the function in which it did.
 pub fn ending(run: &Run, sequence: &CallSequence) -> Option<String> {
     let name = run
         .at
@@ -134,7 +134,7 @@ pub fn event(run: &Run, id: u32, fmi3: bool) -> Option<Event> {
         ([0, 1, 3, 4].map(|index| number(index) == Some(1.0)), number(5)?)
     } else {
         // fmi2EventInfo has five flags, two to a word, and the time.
-        let Written::Numbers(_, words) = outcome.written.first()? else { return None };
+        let Values::Numbers(_, words) = outcome.written.first()? else { return None };
         let [first, changed, defined, time] = words[..] else { return None };
         let flags = [first as u32 != 0, first >> 32 != 0, changed >> 32 != 0, defined as u32 != 0];
         (flags, f64::from_bits(time))
@@ -143,13 +143,13 @@ pub fn event(run: &Run, id: u32, fmi3: bool) -> Option<Event> {
     Some(Event { again, terminate, states_changed, next: defined.then_some(time) })
 }
 
-/// A sentence on the first of these calls that did not answer OK.
-pub fn refused(sequence: &CallSequence, run: &Run, ids: &[u32]) -> Option<String> {
-    ids.iter().find_map(|id| refused_one(sequence, run, *id))
+/// Returns a sentence on the first of these calls that did not return OK.
+pub fn failure(sequence: &CallSequence, run: &Run, ids: &[u32]) -> Option<String> {
+    ids.iter().find_map(|id| failure_of(sequence, run, *id))
 }
 
-/// A sentence on this call, if it did not answer OK.
-pub fn refused_one(sequence: &CallSequence, run: &Run, id: u32) -> Option<String> {
+/// Returns a sentence on this call if it did not return OK.
+pub fn failure_of(sequence: &CallSequence, run: &Run, id: u32) -> Option<String> {
     let outcome = run.of(id)?;
     let step = &step_of(sequence, id)?.step;
     let name = step_name(step);
@@ -167,8 +167,8 @@ pub fn refused_one(sequence: &CallSequence, run: &Run, id: u32) -> Option<String
     Some(format!("{name} returns {result}{why}"))
 }
 
-/// A sentence on the first failure in a sequence: of an instantiation, else of a call that returns more than `most`.
-pub fn refused_any(sequence: &CallSequence, run: &Run, most: i32) -> Option<String> {
+/// Returns a sentence on the first failed instantiation, otherwise on the first call that returns more than `most`.
+pub fn first_failure(sequence: &CallSequence, run: &Run, most: i32) -> Option<String> {
     let made = |numbered: &&Numbered| matches!(numbered.step, Step::Make(..));
     let failed = |numbered: &&Numbered| {
         matches!(numbered.step, Step::Call { .. })
@@ -176,7 +176,7 @@ pub fn refused_any(sequence: &CallSequence, run: &Run, most: i32) -> Option<Stri
                 .of(numbered.id)
                 .is_some_and(|of| of.status.map_or(of.missing && most < 2, |status| status > most))
     };
-    let one = |numbered: &Numbered| refused_one(sequence, run, numbered.id);
+    let one = |numbered: &Numbered| failure_of(sequence, run, numbered.id);
     let of_makes = sequence.iter().filter(made).find_map(one);
     of_makes.or_else(|| sequence.iter().filter(failed).find_map(one))
 }

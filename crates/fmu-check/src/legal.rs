@@ -1,6 +1,6 @@
 //! Checks that a call sequence follows the standard: no finding may come from a call that the standard does not allow.
 
-use crate::call_sequence::{Arg, Make, NOBODY, Numbered, Step};
+use crate::call_sequence::{Arg, Make, NULL_INSTANCE, Numbered, Step};
 use crate::description::Description;
 use fmi_abi::calls::signature;
 use fmi_abi::{Interface, Mode, Standard};
@@ -38,7 +38,7 @@ fn walk(description: &Description, sequence: &[Numbered], objects: &mut Objects)
     for Numbered { step, id, .. } in sequence.iter().filter(|numbered| !numbered.forbidden) {
         let is_legal = match step {
             Step::Make(index, make) => objects.make(description, *index, make),
-            Step::Free(index) if *index == NOBODY => true,
+            Step::Free(index) if *index == NULL_INSTANCE => true,
             Step::Free(index) => {
                 objects.slots.retain(|_, (owner, _)| owner != index);
                 objects.instances.remove(index).is_some()

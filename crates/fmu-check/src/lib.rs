@@ -47,7 +47,7 @@ use trajectory::{NoTrajectory, find_trajectory};
 /// How an FMU is checked.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Options {
-    /// Checks these topics alone, with commas between: description, package, functions, start_values, life_cycle,
+    /// Checks only these topics, with commas between: description, package, functions, start_values, life_cycle,
     /// states, derivatives, dependencies, results, reset, refusals, logs, resources, hostile.
     #[arg(long, value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(rules::TOPICS))]
     pub only: Vec<String>,
@@ -67,7 +67,7 @@ pub struct Options {
     /// Megabytes that the FMU may have when it is unpacked.
     #[arg(long, default_value_t = 1000)]
     pub unpacked: u64,
-    /// Chooses the order of calls that chance chooses.
+    /// Seed of the random orders of calls.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Checks a part in 30 seconds at most: neither hostile calls nor resources, and fewer values and orders of calls.
@@ -88,7 +88,7 @@ pub struct Options {
     /// Fails for findings of this severity and worse.
     #[arg(long, value_enum, default_value_t = FailOn::Violation)]
     pub fail_on: FailOn,
-    /// Seconds of each of the simulations that are repeated to see what is left behind.
+    /// Seconds of each simulation that is repeated to find leaks.
     #[arg(long, default_value_t = 1.5)]
     pub repeat: f64,
     /// Leaves sequences as long as they are.
@@ -102,17 +102,17 @@ pub struct Options {
 /// Lowest severity that fails the check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum FailOn {
-    /// The standard says must.
+    /// The standard requires it.
     Violation,
     /// Fragile findings and violations.
     Fragile,
-    /// Good to know.
+    /// Information.
     Note,
     /// Not at all.
     Never,
 }
 
-/// Seconds of a quick check; what is under way then may take a little longer.
+/// Seconds of a quick check; call sequences that are played then may take a little longer.
 const QUICK: f64 = 24.0;
 
 /// Topics that a quick check leaves out.
@@ -121,10 +121,10 @@ const LONG: [&str; 2] = ["hostile", "resources"];
 /// The interfaces that an FMU may offer.
 const INTERFACES: [&str; 3] = ["co-simulation", "model-exchange", "scheduled-execution"];
 
-/// Checks an FMU, tells what is found and writes the reports. The exit status: 0 for nothing that is to fail, 1 for
-/// findings of a severity that is to fail, 2 if it, one of its interfaces or a topic could not be checked.
+/// Checks an FMU, prints the findings and writes the reports. The exit status is 1 for findings of a severity that fails the
+/// check, otherwise 2 if the FMU, one of its interfaces or a topic was not checked, otherwise 0.
 ///
-/// The program must call [`work_if_asked`] before anything else: it is started anew for every sequence of calls.
+/// The program must call [`work_if_asked`] before anything else: it is started again to play call sequences.
 pub fn command(fmu: &Path, options: &Options) -> ExitCode {
     if let Some(rule) = &options.explain {
         return match rules::explain(rule) {
@@ -146,7 +146,7 @@ pub fn command(fmu: &Path, options: &Options) -> ExitCode {
             true => format!("{}\n", report.json()?),
             false => report.terminal(std::io::stdout().is_terminal()),
         };
-        // Who stops reading has observed enough.
+        // A closed pipe is not an error.
         let written = std::io::stdout().write_all(text.as_bytes());
         written.or_else(|error| match error.kind() {
             std::io::ErrorKind::BrokenPipe => Ok(()),
@@ -192,10 +192,10 @@ fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Checks an FMU, with a line on the standard error that says how far it is.
+/// Checks an FMU. With `progress`, a line on the standard error shows the progress.
 ///
 /// # Errors
-/// When it is no FMU of FMI 2.0 or 3.0, or has no library for this machine.
+/// Fails if the file is no FMU of FMI 2.0 or 3.0.
 pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<Report> {
     let begin = Instant::now();
     let baseline = options.baseline.as_deref().map(baseline::Baseline::read).transpose()?.unwrap_or_default();
@@ -281,7 +281,7 @@ fn encoding(text: &[u8]) -> Option<rules::Observation> {
     Some(("description.encoding", why))
 }
 
-/// A simulation that succeeds. That there is none is a finding, too.
+/// Finds a simulation that succeeds; keeps a finding if there is none.
 fn reach(checker: &mut Checker, interface: Interface) -> anyhow::Result<writer::Trajectory> {
     let trajectory = find_trajectory(checker, interface);
     let Some(NoTrajectory(_, sequence)) = trajectory.as_ref().err().and_then(|error| error.downcast_ref())
@@ -289,7 +289,7 @@ fn reach(checker: &mut Checker, interface: Interface) -> anyhow::Result<writer::
         return trajectory;
     };
     no_trajectory(checker, sequence.clone())?;
-    // One that reads or writes beyond arrays may have more to show where there is room for it.
+    // An FMU that accesses memory beyond arrays may succeed with accessible memory after them.
     if ["arrays.read-beyond", "arrays.written-beyond"].iter().any(|name| checker.has(name)) {
         checker.setting.soft = true;
         return find_trajectory(checker, interface);
@@ -332,10 +332,10 @@ fn setting(
     (setting, without)
 }
 
-/// A simulation as the standard has it fails: that is the finding.
+/// Keeps the finding that a simulation according to the standard fails.
 fn no_trajectory(checker: &Checker, sequence: call_sequence::CallSequence) -> anyhow::Result<()> {
     let copy = sequence.clone();
-    checker.check("life_cycle.simulation", sequence, move |run| finding::refused_any(&copy, run, 1))
+    checker.check("life_cycle.simulation", sequence, move |run| finding::first_failure(&copy, run, 1))
 }
 
 /// Handles all items, several at a time. After each, progress shows the line that `each` returns.

@@ -7,7 +7,7 @@ use fmi_abi::Standard;
 /// The editions of the standard whose sections the table names, for FMI 2.0 and FMI 3.0.
 pub const EDITIONS: [&str; 2] = ["FMI 2.0.5", "FMI 3.0.2"];
 
-/// The topics that can be asked for.
+/// The topics of the rules.
 pub const TOPICS: [&str; 14] = [
     "description",
     "package",

@@ -5,7 +5,7 @@ use crate::description::Description;
 use crate::legal::first_illegal;
 use std::collections::HashMap;
 
-/// Calls that belong together: they are left out together or not at all.
+/// Returns groups of calls that are only left out together.
 fn units(sequence: &[Numbered]) -> Vec<Vec<u32>> {
     let (mut units, mut open, mut before) = (Vec::<Vec<u32>>::new(), false, "");
     for numbered in sequence {
@@ -72,8 +72,8 @@ fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
     groups.into_iter().map(|(_, ids)| ids).collect()
 }
 
-/// Leaves out the calls that are not needed for `shows` to hold, as long as the rest keeps to the standard. Calls of `pinned`
-/// functions stay; what is the same in simulations that are compared goes together.
+/// Leaves out the calls that are not needed for `shows` to hold, as long as the standard allows the rest. Calls of `pinned`
+/// functions stay; corresponding calls of compared simulations are left out together.
 pub fn shrink(
     description: &Description,
     sequence: &CallSequence,
@@ -124,11 +124,10 @@ pub fn shrink(
 #[cfg(test)]
 mod tests {
     use super::shrink;
-    use crate::call_sequence::{CallSequence, Numbered, Step, all_steps};
+    use crate::call_sequence::{CallSequence, Kind, Numbered, Step, Values, all_steps};
     use crate::description::Description;
     use crate::legal::first_illegal;
-    use crate::values::Value;
-    use crate::writer::Part::{Ask, Begin, Free, Run};
+    use crate::writer::Part::{Begin, Free, ReadAll, Run};
     use crate::writer::{Point, Trajectory, Writer};
     use fmi_abi::Interface;
 
@@ -141,14 +140,14 @@ mod tests {
 
     fn trajectory() -> Trajectory {
         let point = |number: usize| {
-            let inputs = vec![(0, Value::Numbers(vec![number as f64]))];
+            let inputs = vec![(0, Values::new(Kind::F64, [number as f64]))];
             Point { time: number as f64, size: 1.0, inputs, ..Point::default() }
         };
         let points = (0..6).map(point).collect();
         Trajectory { interface: Interface::CoSimulation, updates: 0, points, end: 6.0 }
     }
 
-    const WHOLE: &[crate::writer::Part] = &[Begin, Ask, Run(0), Free];
+    const WHOLE: &[crate::writer::Part] = &[Begin, ReadAll, Run(0), Free];
 
     fn names(sequence: &[Numbered]) -> Vec<String> {
         all_steps(sequence).into_iter().map(|numbered| crate::finding::step_name(&numbered.step)).collect()

@@ -1,15 +1,15 @@
-//! A simulation that succeeds, found by playing it: all checks vary it.
+//! Finds a simulation that succeeds by trying it. All checks are variations of it.
 
-use crate::call_sequence::{CallSequence, End, Run, Step, Written};
+use crate::call_sequence::{CallSequence, End, Run, Step, Values};
 use crate::checker::Checker;
 use crate::description::Description;
-use crate::finding::{Event, ending, refused, refused_one, step_name};
+use crate::finding::{Event, ending, failure, failure_of, step_name};
 use crate::values::input_values;
 use crate::writer::{Part, Point, Trajectory, Writer};
 use fmi_abi::Interface;
 use std::time::{Duration, Instant};
 
-/// A trajectory that takes longer is played too often.
+/// Longest time of a simulation with long steps: checks repeat the simulation many times.
 const LONG: Duration = Duration::from_millis(250);
 
 /// Updates of the discrete states that an event may need.
@@ -47,7 +47,7 @@ fn range(description: &Description) -> f64 {
     description.stop_time.map_or(1.0, |stop| stop - description.start_time).max(1e-6)
 }
 
-/// The size of a step; section 4.4.1 of FMI 3.0: steps are multiples of the solver's.
+/// Returns the step size, a multiple of the solver's (section 4.4.1 of FMI 3.0).
 fn step_size(description: &Description) -> f64 {
     let size = description.step_size.unwrap_or(range(description) / 100.0);
     let internal = description.co_simulation.as_ref().and_then(|offer| offer.number("fixedInternalStepSize"));
@@ -63,8 +63,8 @@ fn up_to(mut trajectory: Trajectory, good: usize) -> Trajectory {
     trajectory
 }
 
-/// Steps of several sizes to the end of the default experiment, if they may have several and that takes no time; otherwise
-/// of one size. Without changes of Booleans, if these fail.
+/// Finds steps of two sizes to the end of the default experiment if the FMU allows it and that is fast; otherwise
+/// of one size. If steps with changes of Booleans fail, the Booleans are constant.
 fn in_steps(checker: &Checker, trajectory: Trajectory) -> anyhow::Result<Trajectory> {
     let description = &checker.description;
     let size = step_size(description);
@@ -86,7 +86,7 @@ fn in_steps(checker: &Checker, trajectory: Trajectory) -> anyhow::Result<Traject
         }
         made(&run, &writer, ids[0])?;
         let (good, discarded) = good_steps(checker, &run, &writer.sequence);
-        match refused(&writer.sequence, &run, &ids) {
+        match failure(&writer.sequence, &run, &ids) {
             None => return Ok(up_to(trajectory, good)),
             // A model may end its simulation.
             Some(_) if discarded && good >= 2 => return Ok(up_to(trajectory, good)),
@@ -105,7 +105,7 @@ fn good_steps(checker: &Checker, run: &Run, sequence: &CallSequence) -> (usize, 
     for id in ids {
         let flags = run.of(id).map_or(&[][..], |of| &of.written);
         let flag = |index: usize| flags.get(index).is_some_and(|flag| flag.numbers().first() == Some(&1.0));
-        // Before one that returns early as well, from where the next step would have to go on.
+        // A step that returns early counts as failed: the next step would have to begin at lastSuccessfulTime.
         if run.status(id).is_none_or(|status| status > 1) || checker.fmi3() && (0..3).any(flag) {
             return (good, run.status(id) == Some(2));
         }
@@ -114,9 +114,9 @@ fn good_steps(checker: &Checker, run: &Run, sequence: &CallSequence) -> (usize, 
     (good, false)
 }
 
-/// Fails if a run has not ended well or its first instance was not made.
+/// Fails if a run has crashed or hung, or its instantiation has failed.
 fn made(run: &Run, writer: &Writer, make: u32) -> anyhow::Result<()> {
-    match ending(run, &writer.sequence).or_else(|| refused_one(&writer.sequence, run, make)) {
+    match ending(run, &writer.sequence).or_else(|| failure_of(&writer.sequence, run, make)) {
         Some(why) => Err(NoTrajectory(why, writer.sequence.clone()).into()),
         None => Ok(()),
     }
@@ -131,7 +131,7 @@ fn initialized(checker: &Checker, trajectory: &mut Trajectory) -> anyhow::Result
         let ids = writer.play(0, &parts).ids;
         let run = checker.play(&writer.sequence)?;
         made(&run, &writer, ids[0])?;
-        if let Some(why) = refused(&writer.sequence, &run, &ids[1..]) {
+        if let Some(why) = failure(&writer.sequence, &run, &ids[1..]) {
             return Err(NoTrajectory(why, writer.sequence).into());
         }
         match ids.last().and_then(|id| checker.event(&run, *id)) {
@@ -158,7 +158,7 @@ fn with_events(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<
             let ids = writer.point(0, &point);
             let run = checker.play(&writer.sequence)?;
             made(&run, &writer, before[0])?;
-            if let Some(why) = refused(&writer.sequence, &run, &ids) {
+            if let Some(why) = failure(&writer.sequence, &run, &ids) {
                 let few = trajectory.points.len() < 3;
                 return if few { Err(NoTrajectory(why, writer.sequence).into()) } else { Ok(trajectory) };
             }
@@ -208,7 +208,7 @@ fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> any
         if let Some(why) = ending(&run, &writer.sequence) {
             return Err(NoTrajectory(why, writer.sequence).into());
         }
-        if let Some(why) = refused(&writer.sequence, &run, &ids[1..]) {
+        if let Some(why) = failure(&writer.sequence, &run, &ids[1..]) {
             let few = trajectory.points.len() < 3;
             return if few { Err(NoTrajectory(why, writer.sequence).into()) } else { Ok(None) };
         }
@@ -226,13 +226,13 @@ fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> any
             continue;
         }
         let [states, slopes, indicators] =
-            asked.map(|id| id.and_then(|id| run.written(id)).map(Written::numbers).unwrap_or_default());
+            asked.map(|id| id.and_then(|id| run.written(id)).map(Values::numbers).unwrap_or_default());
         let ends = flag(1);
         return Ok(Some(Reached { states, slopes, indicators, event, ends }));
     }
 }
 
-/// Euler's method from the start on: first every point, then some on the way to the end of the default experiment, and those
+/// Integrates by Euler's method: first every point, then some up to the end of the default experiment, and those
 /// with events.
 fn integrated(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<Trajectory> {
     let description = &checker.description;
@@ -253,7 +253,7 @@ fn integrated(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<T
         // The first point is the start of the integration.
         let mut size = if number == 0 { 0.0 } else { [far, small][usize::from(number < near)] };
         if let Some(next) = next_event.filter(|next| *next > time) {
-            // Time events are reached at once where nothing is integrated.
+            // Without states, every third point is the next time event.
             if next <= time + size || count == 0 && number > 0 && number % 3 == 0 {
                 size = next - time;
                 event_now = true;

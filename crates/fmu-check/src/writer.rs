@@ -1,9 +1,8 @@
-//! Writes sequences: the calls of an importer that does what the standard says, with the numbers of this FMU.
+//! Writes call sequences: the calls of an importer that follows the standard, with the numbers of this FMU.
 
-use crate::call_sequence::{Arg, CallSequence, Kind, Make, Numbered, Run, Step, Written};
+use crate::call_sequence::{Arg, CallSequence, Kind, Make, Numbered, Run, Step, Values};
 use crate::description::{Description, kind_of, type_name};
 use crate::finding::status_name;
-use crate::values::Value;
 use fmi_abi::calls::signatures;
 use fmi_abi::{Interface, Standard};
 
@@ -22,7 +21,7 @@ pub struct Point {
     /// How long it is.
     pub size: f64,
     /// Values that are set before the step.
-    pub inputs: Vec<(usize, Value)>,
+    pub inputs: Vec<(usize, Values)>,
     /// Continuous states that are set in Model Exchange.
     pub states: Vec<f64>,
     /// Number of updates of the discrete states in an event at this point; 0 if there is no event.
@@ -64,7 +63,7 @@ pub enum Part {
     /// Reads the variables.
     Read,
     /// Reads the variables and vectors.
-    Ask,
+    ReadAll,
     /// Calls a function without arguments.
     Call(&'static str),
     /// Updates the discrete states this many times.
@@ -157,11 +156,11 @@ impl<'a> Writer<'a> {
                 Part::Run(from) => {
                     for point in &points[from..] {
                         played.ids.extend(self.point(of, point));
-                        played.reads.extend(self.ask(of));
+                        played.reads.extend(self.read_all(of));
                     }
                 }
                 Part::Read => played.reads.extend(self.read(of)),
-                Part::Ask => played.reads.extend(self.ask(of)),
+                Part::ReadAll => played.reads.extend(self.read_all(of)),
                 Part::Call(function) => played.ids.push(self.call(of, function, vec![])),
                 Part::Update(times) => played.ids.extend(self.update(of, times)),
                 Part::Save(slot) => played.ids.push(self.call(of, "GetFMUState", vec![Arg::StateOut(slot)])),
@@ -291,7 +290,7 @@ impl<'a> Writer<'a> {
     }
 
     /// Sets values: a call for each type.
-    pub fn set(&mut self, of: usize, values: &[(usize, Value)]) -> Vec<u32> {
+    pub fn set(&mut self, of: usize, values: &[(usize, Values)]) -> Vec<u32> {
         let indices: Vec<usize> = values.iter().map(|(index, _)| *index).collect();
         let mut ids = Vec::new();
         for (name, kind, positions) in self.by_type(&indices) {
@@ -299,23 +298,29 @@ impl<'a> Writer<'a> {
             let (mut numbers, mut texts) = (Vec::new(), Vec::new());
             for position in positions {
                 match &values[position].1 {
-                    Value::Numbers(all) => numbers.extend(all.iter().map(|number| kind.bits(*number))),
-                    Value::Texts(all) => texts.extend(all.iter().cloned()),
+                    Values::Numbers(_, bits) => numbers.extend(bits),
+                    Values::Texts(all) => texts.extend(all.iter().cloned()),
                 }
             }
             let total = numbers.len() + texts.len();
             let values = match name {
                 "Binary" => {
-                    let sizes = texts.iter().map(|blob| blob.len() as u64).collect();
-                    vec![Arg::In(Kind::Size, sizes), Arg::Blobs(texts)]
+                    let blobs: Vec<Vec<u8>> = texts.into_iter().flatten().collect();
+                    let sizes = blobs.iter().map(|blob| blob.len() as u64).collect();
+                    vec![Arg::In(Kind::Size, sizes), Arg::Blobs(blobs)]
                 }
-                "String" => vec![Arg::Texts(texts.into_iter().map(Some).collect())],
+                "String" => vec![Arg::Texts(texts)],
                 _ => vec![Arg::In(kind, numbers)],
             };
             let args = access(self.description.standard, references, values, total);
             ids.push(self.call(of, &format!("Set{name}"), args));
         }
         ids
+    }
+
+    /// Sets the numbers of a variable.
+    pub fn set_numbers(&mut self, of: usize, index: usize, numbers: &[f64]) -> Vec<u32> {
+        self.set(of, &[(index, Values::new(self.description.kind(index), numbers.iter().copied()))])
     }
 
     /// Reads the variables at these indices: a call for each type.
@@ -339,7 +344,7 @@ impl<'a> Writer<'a> {
         self.read_these(of, self.readable)
     }
 
-    /// Goes on to the time of a point, in Model Exchange, or takes the step, in Co-Simulation.
+    /// Takes the step of a point in Co-Simulation; sets time, states and inputs in Model Exchange.
     pub fn point(&mut self, of: usize, point: &Point) -> Vec<u32> {
         let mut ids = Vec::new();
         if self.trajectory.is_stepped() {
@@ -381,8 +386,8 @@ impl<'a> Writer<'a> {
         if self.fmi3() { "GetContinuousStateDerivatives" } else { "GetDerivatives" }
     }
 
-    /// Everything that can be asked: variables, and in Model Exchange the vectors.
-    pub fn ask(&mut self, of: usize) -> Vec<Read> {
+    /// Reads the variables and, in Model Exchange, the vectors.
+    pub fn read_all(&mut self, of: usize) -> Vec<Read> {
         let mut reads = self.read(of);
         if !self.trajectory.is_stepped() {
             let states = self.description.states_count().unwrap_or(0);
@@ -436,10 +441,10 @@ pub fn step_args(standard: Standard, time: f64, size: f64) -> Vec<Arg> {
     args
 }
 
-/// Variables that most checks read at most.
+/// Maximum number of variables that most checks read.
 pub const READ: usize = 1000;
 
-/// At most this many of the variables that can be read at any time: no clocks, none whose size is not known. Of more,
+/// Returns at most this many of the variables that can be read at any time: no clocks, none of unknown size. Of more,
 /// inputs, outputs and derivatives come first, and others are taken at equal distances.
 pub fn sample(description: &Description, most: usize) -> Vec<usize> {
     let known = |index: &usize| {
@@ -466,7 +471,7 @@ pub fn sample(description: &Description, most: usize) -> Vec<usize> {
     found
 }
 
-/// The first difference between what was read here and there: the variable and both values.
+/// Returns the first difference between corresponding reads: the variable and both values.
 pub fn difference(
     description: &Description,
     run: &Run,
@@ -480,9 +485,9 @@ pub fn difference(
                 |status: Option<i32>| format!("status {}", status.map_or("none".to_owned(), status_name));
             return Some(("a call".to_owned(), show(of_one.status), show(of_other.status)));
         }
-        // After an error nothing is required of what was written.
+        // After an error, the standard does not define the values.
         let pairs = of_one.written.iter().zip(&of_other.written).filter(|_| run.succeeds(one.id));
-        let of_pair = |(first, second): (&Written, &Written)| {
+        let of_pair = |(first, second): (&Values, &Values)| {
             let index = first.differ(second)?;
             Some((name_at(description, one, index), first.show(index), second.show(index)))
         };
@@ -490,7 +495,7 @@ pub fn difference(
     })
 }
 
-/// Whose value is at an index of what was read.
+/// Returns the name of the variable whose value is at an index of a read.
 fn name_at(description: &Description, read: &Read, index: usize) -> String {
     let mut rest = index;
     for (variable, size) in &read.of {
@@ -503,8 +508,8 @@ fn name_at(description: &Description, read: &Read, index: usize) -> String {
     format!("number {}", index + 1)
 }
 
-/// The values of the variables in what was read.
-pub fn values_of<'r>(run: &'r Run, reads: &'r [Read]) -> impl Iterator<Item = (usize, Written)> {
+/// Returns the values of the variables of these reads.
+pub fn values_of<'r>(run: &'r Run, reads: &'r [Read]) -> impl Iterator<Item = (usize, Values)> {
     reads.iter().filter(|read| run.succeeds(read.id)).flat_map(move |read| {
         let mut end = 0;
         read.of.iter().filter_map(move |(index, size)| {
@@ -514,8 +519,8 @@ pub fn values_of<'r>(run: &'r Run, reads: &'r [Read]) -> impl Iterator<Item = (u
     })
 }
 
-/// The value of a variable in what was read.
-pub fn value_of(run: &Run, reads: &[Read], variable: usize) -> Option<Written> {
+/// Returns the value of a variable in these reads.
+pub fn value_of(run: &Run, reads: &[Read], variable: usize) -> Option<Values> {
     reads.iter().find_map(|read| {
         let at = read.of.iter().position(|(index, _)| *index == variable)?;
         let begin = read.of[..at].iter().map(|(_, size)| size).sum();

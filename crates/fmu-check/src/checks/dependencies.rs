@@ -1,14 +1,14 @@
-//! Dependencies that the FMU shows are declared.
+//! Checks that the model structure declares the dependencies that the FMU has.
 
-use super::derivatives::{amid, set_known};
+use super::derivatives::{set_known, to_middle};
 use crate::checker::Checker;
 use crate::description::Unknown;
-use crate::values::{Value, near};
+use crate::values::near;
 use crate::writer::Part::{Enter, Make};
 use crate::writer::{Read, Trajectory, Writer, value_of};
 use std::collections::HashSet;
 
-/// The unknowns that do not list a known, nor another name of it.
+/// Returns the unknowns whose dependencies contain neither the known nor an alias of it.
 fn undeclared<'a>(
     checker: &Checker,
     unknowns: impl IntoIterator<Item = &'a Unknown>,
@@ -55,7 +55,7 @@ fn moved(
     })
 }
 
-/// Inputs and, in Model Exchange, states, moved one at a time.
+/// Checks the dependencies on each input and, in Model Exchange, on each state.
 pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let stepped = trajectory.is_stepped();
@@ -72,7 +72,7 @@ pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     });
     let knowns: Vec<usize> = inputs.chain(states.iter().copied()).take(checker.most(60)).collect();
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &amid(trajectory));
+    writer.play(0, &to_middle(trajectory));
     let read = writer.read_these(0, &knowns);
     let now = (!states.is_empty()).then(|| writer.vector(0, "GetContinuousStates", states.len()));
     let run = checker.play(&writer.sequence)?;
@@ -81,7 +81,7 @@ pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
         let unknowns = undeclared(checker, description.outputs.iter().chain(derivatives), known);
         let Some(value) = value_of(&run, &read, known).filter(|_| !unknowns.is_empty()) else { continue };
         let mut writer = checker.writer(trajectory);
-        writer.play(0, &amid(trajectory));
+        writer.play(0, &to_middle(trajectory));
         moved(
             checker,
             "dependencies.missing",
@@ -97,7 +97,7 @@ pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     Ok(())
 }
 
-/// Parameters and inputs, moved one at a time in Initialization Mode.
+/// Checks the dependencies on each input and exact start value in Initialization Mode.
 pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let knowns = (0..description.variables.len()).filter(|index| {
@@ -119,7 +119,7 @@ pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
         writer.play(0, &[Make, Enter]);
         let value = description.variables[known].starts();
         moved(checker, "dependencies.initial", writer, known, &value, unknowns, |writer, numbers| {
-            writer.set(0, &[(known, Value::Numbers(numbers.to_vec()))]);
+            writer.set_numbers(0, known, numbers);
         })?;
     }
     Ok(())

@@ -4,7 +4,6 @@ use crate::call_sequence::{Arg, Kind, Run};
 use crate::checker::Checker;
 use crate::description::Description;
 use crate::finding::Judges;
-use crate::values::Value;
 use crate::writer::{Part, Read, Trajectory, Writer, value_of};
 use fmi_abi::{BaseType, Interface};
 use std::sync::Arc;
@@ -72,7 +71,7 @@ pub fn derivative(
 }
 
 /// The calls up to the point at which partial derivatives are requested: near the middle and outside of events.
-pub fn amid(trajectory: &Trajectory) -> [Part; 2] {
+pub fn to_middle(trajectory: &Trajectory) -> [Part; 2] {
     [Part::Begin, Part::Points(trajectory.points.len() / 2)]
 }
 
@@ -93,7 +92,7 @@ pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
         return Ok(());
     }
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &amid(trajectory));
+    writer.play(0, &to_middle(trajectory));
     let before = writer.read(0);
     let [outputs, inputs] = [&unknowns, &knowns].map(|indices| references(&checker.description, indices));
     let mut request = |function: &str, seed: &[f64], count: usize| {
@@ -191,7 +190,7 @@ fn order(checker: &Checker, trajectory: &Trajectory, unknowns: &[u32], knowns: &
     let seed: Vec<f64> = (1..=knowns.len()).map(|number| number as f64).collect();
     let back: Vec<f64> = seed.iter().rev().copied().collect();
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &amid(trajectory));
+    writer.play(0, &to_middle(trajectory));
     let name = "GetDirectionalDerivative";
     let one = derivative(&mut writer, name, unknowns, knowns, &seed, unknowns.len());
     let other = derivative(&mut writer, name, &reversed(unknowns), &reversed(knowns), &back, unknowns.len());
@@ -216,7 +215,7 @@ pub fn set_known(writer: &mut Writer, states: &[usize], vector: &[f64], known: u
             writer.set_states(0, &vector);
         }
         None => {
-            writer.set(0, &[(known, Value::Numbers(numbers.to_vec()))]);
+            writer.set_numbers(0, known, numbers);
         }
     }
 }
@@ -236,7 +235,7 @@ fn differences(
     }
     // The current values are the base of the differences.
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &amid(trajectory));
+    writer.play(0, &to_middle(trajectory));
     let read = writer.read_these(0, knowns);
     let of_states = (!states.is_empty()).then(|| writer.vector(0, "GetContinuousStates", states.len()));
     let run = checker.play(&writer.sequence)?;
@@ -255,7 +254,7 @@ fn differences(
             continue;
         }
         let mut writer = checker.writer(trajectory);
-        writer.play(0, &amid(trajectory));
+        writer.play(0, &to_middle(trajectory));
         let analytic = column(&mut writer, &references(description, unknowns), variable.reference, by_column);
         let reads = [step, -step, step / 2.0, -step / 2.0, 0.0].map(|by| {
             set_known(&mut writer, &states, &vector, *known, &[value + by]);

@@ -6,7 +6,7 @@ use crate::writer::{Read, Trajectory, Writer, value_of};
 use std::sync::Arc;
 
 /// Checks the outputs of steps over events in FMI 3.0: for importers that handle events, that allow early returns, or both.
-pub fn told(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let time = checker.description.variables.iter().position(|variable| variable.causality == "independent");
     let has_events = checker.can(trajectory.interface, &["hasEventMode"]);
     for (event_mode, early_return) in [(true, true), (true, false), (false, true)] {
@@ -23,7 +23,9 @@ pub fn told(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
                     return Some("a step returns early, where earlyReturnAllowed is false".to_owned());
                 }
                 if event && !event_mode {
-                    return Some("a step says eventHandlingNeeded, where eventModeUsed is false".to_owned());
+                    return Some(
+                        "a step reports eventHandlingNeeded, where eventModeUsed is false".to_owned(),
+                    );
                 }
                 let now = *value_of(run, &step.values, time?)?.numbers().first()?;
                 let off = (now - reached).abs() > 1e-9 * (1.0 + now.abs());
@@ -39,7 +41,9 @@ pub fn told(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
                 let end = step.end;
                 let short = reached < end - 1e-9 * (1.0 + end.abs());
                 (short && event && !early).then(|| {
-                    format!("a step to {end:?} ends at an event at {reached:?} and does not say earlyReturn")
+                    format!(
+                        "a step to {end:?} ends at an event at {reached:?} and does not report earlyReturn"
+                    )
                 })
             })
         });

@@ -3,13 +3,13 @@
 use super::derivatives::{derivative, pair, references};
 use crate::call_sequence::{End, Run, Setting, Step};
 use crate::checker::Checker;
-use crate::finding::refused;
+use crate::finding::failure;
 use crate::writer::{Part, Trajectory};
 use fmi_abi::calls::{fmi2, fmi3, signatures};
 use fmi_abi::{Interface, Mode, Standard};
 use std::sync::Arc;
 
-/// Whether all that the library needs is found, also what is needed late.
+/// Checks that the loader finds all symbols that the library needs, including those that it looks up late.
 fn symbols(checker: &Checker) -> anyhow::Result<()> {
     let sequence = checker.step(checker.version(), false);
     let [late, now] = [false, true].map(|now| {
@@ -23,7 +23,7 @@ fn symbols(checker: &Checker) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Whether every function that must be there is there.
+/// Checks that the library exports all functions of its interface types.
 pub fn present(checker: &Checker) -> anyhow::Result<()> {
     let modes: Vec<Mode> = (0..9).filter_map(|bit| Mode::from_number(1 << bit)).collect();
     let standard = checker.description.standard;
@@ -38,7 +38,7 @@ pub fn present(checker: &Checker) -> anyhow::Result<()> {
             name => name != "fmi3InstantiateScheduledExecution",
         });
         let on_instances = signatures(standard).iter().map(|signature| signature.rule).filter(|rule| {
-            // fmi2CancelStep is of Co-Simulation, and allowed in no state of the table.
+            // fmi2CancelStep belongs to Co-Simulation; the table allows it in no state.
             rule.name == "fmi2CancelStep" && interface == Interface::CoSimulation
                 || modes.iter().any(|mode| rule.standard.contain(standard, interface, *mode))
         });
@@ -66,7 +66,7 @@ fn version(checker: &Checker) -> anyhow::Result<()> {
     let name = if checker.fmi3() { "fmi3GetVersion" } else { "fmi2GetVersion" };
     let declared = checker.description.version.clone();
     checker.check("functions.version", sequence, move |run| {
-        // NULL if there is no text; nothing if there is no function.
+        // "NULL" for a null pointer, None if the library lacks the function.
         let text = |id: u32| {
             let of = run.of(id).filter(|of| !of.missing)?;
             let text = of.text.as_ref().map(|text| String::from_utf8_lossy(text).into_owned());
@@ -83,7 +83,7 @@ fn version(checker: &Checker) -> anyhow::Result<()> {
     })
 }
 
-/// Each declared function returns.
+/// Checks that the functions of declared capabilities succeed.
 pub fn capabilities(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let (interface, mut asked) = (trajectory.interface, Vec::new());
     if checker.saves(interface) {
@@ -120,7 +120,7 @@ pub fn capabilities(checker: &Checker, trajectory: &Trajectory) -> anyhow::Resul
     for (flag, ids, sequence) in asked {
         let copy = sequence.clone();
         checker.check("functions.capability", sequence, move |run| {
-            let why = refused(&copy, run, &ids)?;
+            let why = failure(&copy, run, &ids)?;
             Some(format!("declared by {flag}, but {why}"))
         })?;
     }

@@ -1,4 +1,4 @@
-//! The ZIP, its directories, the names of the libraries, and what these need.
+//! Checks the ZIP file, its directories, and the names and requirements of the libraries.
 
 use crate::description::{Description, Offer};
 use crate::rules::Observation;
@@ -11,10 +11,10 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-/// Unpacks an FMU of at most so many bytes. The findings in its ZIP file.
+/// Unpacks an FMU of at most `most` bytes; returns the findings in its ZIP file.
 ///
 /// # Errors
-/// When it cannot be unpacked.
+/// Fails if the FMU cannot be unpacked.
 pub fn unpack(path: &Path, directory: &Path, most: u64) -> anyhow::Result<Vec<Observation>> {
     let at = path.display();
     let file = File::open(path).map_err(|error| anyhow::anyhow!("{at}: cannot be opened ({error})"))?;
@@ -55,7 +55,7 @@ pub fn unpack(path: &Path, directory: &Path, most: u64) -> anyhow::Result<Vec<Ob
     Ok(found)
 }
 
-/// Looks at an entry of a ZIP file. The path within the FMU's directory, if it has one.
+/// Inspects an entry of a ZIP file; returns its path below the FMU's directory, `None` if it is outside.
 fn entry(
     archive: &mut zip::ZipArchive<File>,
     index: usize,
@@ -94,7 +94,7 @@ fn directories(standard: Standard) -> Vec<String> {
 /// The library for this machine.
 ///
 /// # Errors
-/// The reason for which there is none.
+/// Fails with the reason if there is none.
 pub fn library(directory: &Path, standard: Standard, offer: &Offer) -> Result<PathBuf, String> {
     let name = format!("{}{DLL_SUFFIX}", offer.identifier);
     let wanted = directories(standard);
@@ -176,12 +176,12 @@ pub fn look(directory: &Path, description: &Description) -> Vec<Observation> {
     found
 }
 
-/// How the names of the libraries of Linux, Windows and macOS begin.
+/// Prefixes of the names of the libraries of Linux, Windows and macOS.
 const OF_SYSTEM: &str = "libc.so libm.so libdl.so libpthread.so librt.so libgcc_s.so libstdc++.so ld-linux libutil.so \
     kernel32 kernelbase ntdll msvcrt api-ms-win user32 advapi32 ws2_32 shell32 ole32 bcrypt shlwapi ucrtbase \
     /usr/lib/ /system/library/";
 
-/// System requirements of a library.
+/// Checks the system requirements of a library.
 fn needs(path: &Path, platform: &str, tell: &mut impl FnMut(&'static str, String)) {
     let Ok(bytes) = std::fs::read(path) else { return };
     let Ok(file) = object::File::parse(bytes.as_slice()) else { return };
@@ -225,7 +225,7 @@ fn needs(path: &Path, platform: &str, tell: &mut impl FnMut(&'static str, String
     }
 }
 
-/// Functions that a library for Linux needs from no library in particular: those without a version, where others have one.
+/// Returns the functions without a version that a library for Linux needs, if others have a version: no library provides them.
 /// The program that loads the library may happen to have them.
 fn unlinked(bytes: &[u8]) -> object::Result<Vec<String>> {
     use object::read::elf::{FileHeader as _, Sym as _};
@@ -239,7 +239,7 @@ fn unlinked(bytes: &[u8]) -> object::Result<Vec<String>> {
         if !symbol.is_undefined(endian) || symbol.st_bind() != object::elf::STB_GLOBAL {
             continue;
         }
-        // 0 and 1 are no versions.
+        // 0 and 1 mean that the symbol has no version.
         if versions.version_index(endian, index).index() > object::elf::VER_NDX_GLOBAL {
             versioned = true;
         } else {
@@ -250,7 +250,7 @@ fn unlinked(bytes: &[u8]) -> object::Result<Vec<String>> {
     Ok(found)
 }
 
-/// The newest version of glibc that it needs.
+/// Reports the newest version of glibc that a library needs.
 fn glibc(bytes: &[u8], platform: &str, name: &str, tell: &mut impl FnMut(&'static str, String)) {
     let marker = b"GLIBC_2.";
     let of_marker = bytes.windows(marker.len()).enumerate().filter(|(_, window)| window == marker);

@@ -1,4 +1,4 @@
-//! A rejected call changes nothing.
+//! Checks that a rejected call changes nothing.
 
 use crate::call_sequence::{Arg, Kind, Run};
 use crate::checker::Checker;
@@ -9,7 +9,7 @@ use crate::writer::{Part, Played, Point, Read, Trajectory, Writer, access, diffe
 use fmi_abi::Interface;
 use std::sync::Arc;
 
-/// A call that ought to be rejected: the function, its arguments, what is wrong with them, and the rule that is broken if
+/// A call that ought to be rejected: the function, its arguments, a description, and the rule that is broken if
 /// the call is accepted.
 type Attack = (String, Vec<Arg>, String, Option<&'static str>);
 
@@ -22,13 +22,13 @@ pub fn unknown_reference(checker: &Checker) -> u64 {
     u64::from(most.checked_add(1000).unwrap_or_else(|| (0..).find(|free| !used.contains(free)).unwrap_or(0)))
 }
 
-/// Values for a call that sets some.
+/// Returns the arguments of a setter.
 fn set(checker: &Checker, references: Vec<u64>, kind: Kind, bits: Vec<u64>) -> Vec<Arg> {
     let total = bits.len();
     access(checker.description.standard, references, [Arg::In(kind, bits)], total)
 }
 
-/// Values of variables that cannot be set, or together with one that cannot.
+/// Returns calls that set variables that cannot be set, alone or together with an input that can.
 fn of_variables(checker: &Checker, interface: Interface) -> Vec<Attack> {
     let description = &checker.description;
     let unknown = unknown_reference(checker);
@@ -93,7 +93,7 @@ fn of_variables(checker: &Checker, interface: Interface) -> Vec<Attack> {
     attacks
 }
 
-/// Values that an input cannot have, together with one that it can.
+/// Returns calls that set an input to a valid value and another to an invalid one.
 fn of_input(checker: &Checker, variable: &Variable, function: &str, kind: Kind, other: u64) -> Vec<Attack> {
     let reference = u64::from(variable.reference);
     let another = checker.description.variables.iter().find(|other| {
@@ -112,7 +112,7 @@ fn of_input(checker: &Checker, variable: &Variable, function: &str, kind: Kind, 
     values.map(attack).collect()
 }
 
-/// Unknown references, calls of other modes, and bytes that are no state.
+/// Returns calls with unknown references, calls of other modes, and malformed states.
 fn of_calls(checker: &Checker, interface: Interface, time: f64) -> Vec<Attack> {
     let (unknown, fmi3) = (unknown_reference(checker), checker.fmi3());
     let (get_float, set_float) = if fmi3 { ("GetFloat64", "SetFloat64") } else { ("GetReal", "SetReal") };
@@ -143,7 +143,7 @@ fn of_calls(checker: &Checker, interface: Interface, time: f64) -> Vec<Attack> {
     wanted.map(|(_, name, args, what, rule)| (name.to_owned(), args, what.to_owned(), rule)).collect()
 }
 
-/// Steps that are impossible, and derivatives of inputs that are none.
+/// Returns impossible steps and invalid derivatives of inputs.
 fn of_steps(checker: &Checker, time: f64, size: f64) -> Vec<Attack> {
     let step = |(time, size, what): (f64, f64, &str)| {
         let args = step_args(checker.description.standard, time, size);
@@ -180,7 +180,7 @@ fn of_steps(checker: &Checker, time: f64, size: f64) -> Vec<Attack> {
     steps.map(step).into_iter().chain(derivatives).collect()
 }
 
-/// Times and states that are impossible in Model Exchange.
+/// Returns calls of Model Exchange with invalid times and states.
 fn of_integration(states: &[f64]) -> Vec<Attack> {
     let mode = "entering Continuous-Time Mode, which it is in";
     let mut attacks = vec![
@@ -204,7 +204,7 @@ fn of_integration(states: &[f64]) -> Vec<Attack> {
         .collect()
 }
 
-/// An input of this type, which a call changes before it comes to the value that it cannot set.
+/// Returns an input of this type. A call that is not atomic sets it before it reaches the invalid value.
 fn input_of(checker: &Checker, kind: Kind) -> Option<u64> {
     let of = checker.description.variables.iter().find(|variable| {
         variable.causality == "input"
@@ -222,19 +222,19 @@ fn play(writer: &mut Writer, of: usize, attack: Option<&Attack>) -> (Option<u32>
     let to = trajectory.points.len() / 2;
     writer.play(of, &[Part::Begin, Part::Points(to)]);
     let attack = attack.map(|(function, args, ..)| writer.forbidden(Some(of), function, args.clone()));
-    let at_once = writer.ask(of);
+    let at_once = writer.read_all(of);
     let mut later = Played::default();
     for (number, point) in trajectory.points[to..].iter().enumerate() {
-        // A value that was set has most effect where no other is set.
+        // The first two steps set no inputs, so that a value that the attack has set takes effect.
         let inputs = if number < 2 { Vec::new() } else { point.inputs.clone() };
         later.ids.extend(writer.point(of, &Point { inputs, ..point.clone() }));
-        later.reads.extend(writer.ask(of));
+        later.reads.extend(writer.read_all(of));
     }
     writer.free(of);
     (attack, at_once, later)
 }
 
-/// Each attack amid a trajectory; the simulation continues as it does without the attack.
+/// Checks each attack in the middle of a trajectory: the simulation must continue as without the attack.
 pub fn change_nothing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let interface = trajectory.interface;
     let to = trajectory.points.len() / 2;
@@ -252,7 +252,7 @@ pub fn change_nothing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Res
     after_end(checker, trajectory)
 }
 
-/// A value for an input after the end, where neither version of the standard allows it.
+/// Checks that an input is not set after Terminate, where neither FMI version allows it.
 fn after_end(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let is_input = |index: &&usize| {
@@ -275,7 +275,7 @@ fn after_end(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     })
 }
 
-/// An attack is rejected and changes nothing.
+/// Checks that an attack is rejected and changes nothing.
 fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let (_, alone_at_once, alone) = play(&mut writer, 0, None);
@@ -286,7 +286,7 @@ fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyho
     let description = checker.description.clone();
     let changed = Arc::new(move |run: &Run, rejected: i32| -> Option<String> {
         let status = run.status(id).filter(|status| *status == rejected)?;
-        // After an error an instance may reject everything.
+        // After Error, an instance may reject all calls.
         let rejects = |reads: &[Read]| !reads.iter().all(|read| run.succeeds(read.id));
         if rejects(&at_once) {
             return None;
@@ -297,7 +297,7 @@ fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyho
         let (variable, was, is) = at_once.or_else(later)?;
         Some(format!("{named} {}, and {variable} is {is} after it instead of {was}", status_name(status)))
     });
-    // In FMI 2.0 a step that is discarded may have gone part of the way.
+    // In FMI 2.0, a discarded step may have advanced the time.
     let discarded = match checker.fmi3() {
         true => Some("refusals.discarded"),
         false => Some("refusals.changed").filter(|_| function != "DoStep"),

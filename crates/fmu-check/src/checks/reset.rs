@@ -1,12 +1,13 @@
-//! Reset equals new.
+//! Checks that an instance after a reset behaves like a new one.
 
+use crate::call_sequence::Values;
 use crate::checker::Checker;
-use crate::finding::refused;
-use crate::values::{Value, other_values};
+use crate::finding::failure;
+use crate::values::other_values;
 use crate::writer::Part::{Call, Enter, Leave, Make, Read, Run};
 use crate::writer::Trajectory;
 
-/// After a trajectory and a reset, what is read and what the trajectory gives are those of a new instance.
+/// Checks that the values and the simulation after a reset are the values and the simulation of a new instance.
 pub fn reset(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for end in [&[Call("Terminate")][..], &[]] {
         let mut writer = checker.writer(trajectory);
@@ -19,13 +20,13 @@ pub fn reset(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
             format!("{name} of the new instance was {before}, after the reset it is {after}")
         });
         checker.check("reset.incomplete", writer.sequence, move |run| {
-            refused(&sequence, run, &ids).or_else(|| differ(run))
+            failure(&sequence, run, &ids).or_else(|| differ(run))
         })?;
     }
     changed(checker, trajectory)
 }
 
-/// Values that were set before the reset have their start values after it.
+/// Checks that variables that were set have their start values after a reset.
 fn changed(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let (mut values, mut others) = (Vec::new(), Vec::new());
@@ -47,7 +48,7 @@ fn changed(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
 fn after_values(
     checker: &Checker,
     trajectory: &Trajectory,
-    values: &[(usize, Value)],
+    values: &[(usize, Values)],
     initialized: bool,
 ) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);

@@ -1,10 +1,10 @@
-//! Saved states: what follows a restored one is what followed the first time, in the same instance, after a reset, from
+//! Checks that a simulation from a restored state repeats the first one: in the same instance, from serialized
 //! bytes, and in a fresh process.
 
-use crate::call_sequence::{Step, Written};
+use crate::call_sequence::{Step, Values};
 use crate::checker::Checker;
-use crate::finding::{Judges, refused};
-use crate::writer::Part::{Ask, Begin, Call, Drop, Enter, Free, Leave, Make, Points, Restore, Run, Save};
+use crate::finding::{Judges, failure};
+use crate::writer::Part::{Begin, Call, Drop, Enter, Free, Leave, Make, Points, ReadAll, Restore, Run, Save};
 use crate::writer::{Read, Trajectory};
 
 /// The points at which states are saved: the first, one in the middle, one near the end.
@@ -22,14 +22,14 @@ fn same(checker: &Checker, what: &'static str, one: Vec<Read>, other: Vec<Read>)
         .differ(one, other, move |name, before, after| format!("{name} was {before}, {what} it is {after}"))
 }
 
-/// Saved, gone on, restored, gone on: the same; twice; and saving changes nothing.
+/// Checks that saving changes nothing, and that a simulation can be repeated from a restored state, twice.
 pub fn restore(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for index in indices(trajectory) {
         let mut writer = checker.writer(trajectory);
-        let before = writer.play(0, &[Begin, Points(index), Ask]).reads;
-        let after = writer.play(0, &[Save(0), Ask]).reads;
+        let before = writer.play(0, &[Begin, Points(index), ReadAll]).reads;
+        let after = writer.play(0, &[Save(0), ReadAll]).reads;
         let first = writer.play(0, &[Run(index)]).reads;
-        let at_once = writer.play(0, &[Restore(0), Ask]).reads;
+        let at_once = writer.play(0, &[Restore(0), ReadAll]).reads;
         let second = writer.play(0, &[Run(index)]).reads;
         let third = writer.play(0, &[Restore(0), Run(index)]).reads;
         let sequence = writer.sequence;
@@ -47,22 +47,22 @@ pub fn restore(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     free_null(checker, trajectory)
 }
 
-/// A state of one mode, restored in another.
+/// Checks states that are saved in one mode and restored in another.
 fn modes(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let first = writer.play(0, &[Make, Save(0), Enter, Save(1), Leave, Run(0), Call("Terminate")]).reads;
-    // Back to the initialization, then to the beginning.
+    // Back to Initialization Mode, then to the new instance.
     let back = writer.play(0, &[Restore(1), Leave, Run(0)]);
     let again = writer.play(0, &[Restore(0), Enter, Leave, Run(0)]);
     let one = same(checker, "from the state of Initialization Mode", first.clone(), back.reads);
     let two = same(checker, "from the state of the new instance", first, again.reads);
     let (sequence, ids) = (writer.sequence.clone(), [back.ids, again.ids].concat());
     checker.check("states.modes", writer.sequence, move |run| {
-        refused(&sequence, run, &ids).or_else(|| one(run)).or_else(|| two(run))
+        failure(&sequence, run, &ids).or_else(|| one(run)).or_else(|| two(run))
     })
 }
 
-/// A handle that is used for another state, and two states side by side.
+/// Checks a handle that is used again for another state, and two saved states.
 fn reused(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     if trajectory.points.len() < 3 {
         return Ok(());
@@ -70,12 +70,12 @@ fn reused(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.play(0, &[Begin, Points(1), Save(0), Save(1)]);
     writer.point(0, &trajectory.points[1]);
-    let values = writer.ask(0);
+    let values = writer.read_all(0);
     let first = writer.play(0, &[Save(1), Run(2)]).reads;
-    let again = writer.play(0, &[Restore(0), Restore(1), Ask]).reads;
+    let again = writer.play(0, &[Restore(0), Restore(1), ReadAll]).reads;
     let second = writer.play(0, &[Run(2), Restore(0)]).reads;
     writer.point(0, &trajectory.points[1]);
-    let from_first = writer.play(0, &[Ask, Drop(0), Drop(1)]).reads;
+    let from_first = writer.play(0, &[ReadAll, Drop(0), Drop(1)]).reads;
     let judges = [
         same(checker, "from the state in a used handle", values.clone(), again),
         same(checker, "from the state in a used handle", first, second),
@@ -84,7 +84,7 @@ fn reused(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     checker.check("states.several", writer.sequence, move |run| judges.iter().find_map(|judge| judge(run)))
 }
 
-/// NULL is ignored, and a freed state leaves NULL.
+/// Checks that freeing NULL is ignored and that freeing a state sets its handle to NULL.
 fn free_null(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.play(0, &[Begin, Save(0)]);
@@ -92,7 +92,7 @@ fn free_null(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     checker.check("states.free", writer.sequence, move |run| {
         let (freed, nothing) = (ids[0], ids[1]);
         if run.status(nothing).is_some_and(|status| status > 1) {
-            return Some("freeing a state that is NULL is refused".to_owned());
+            return Some("freeing a state that is NULL is rejected".to_owned());
         }
         let left = run.status(freed) == Some(0) && run.written(freed)?.numbers() != [0.0];
         left.then(|| "the handle of a freed state is not NULL".to_owned())
@@ -103,7 +103,7 @@ fn free_null(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
 pub fn serialized(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for (index, fresh) in indices(trajectory).into_iter().flat_map(|index| [(index, false), (index, true)]) {
         let mut writer = checker.writer(trajectory);
-        let before = writer.play(0, &[Begin, Points(index), Ask, Save(0)]).reads;
+        let before = writer.play(0, &[Begin, Points(index), ReadAll, Save(0)]).reads;
         let [size, bytes] = writer.serialize(0, 0);
         let first = writer.play(0, &[Run(index)]).reads;
         if fresh {
@@ -114,7 +114,7 @@ pub fn serialized(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<
         // States may be set in two situations that importers use: after instantiation and after initialization.
         writer.play(1, &[if index == 0 && fresh { Make } else { Begin }]);
         let read = writer.deserialize(1, 0, 1);
-        let set = writer.play(1, &[Restore(1), Ask]);
+        let set = writer.play(1, &[Restore(1), ReadAll]);
         let second = writer.play(1, &[Run(index)]).reads;
         let sequence = writer.sequence.clone();
         let name = if fresh { "states.fresh-process" } else { "states.serialized" };
@@ -124,13 +124,13 @@ pub fn serialized(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<
             if ![bytes, size].iter().all(|id| run.succeeds(*id)) {
                 return None;
             }
-            refused(&sequence, run, &[read, set.ids[0]]).or_else(|| one(run)).or_else(|| two(run))
+            failure(&sequence, run, &[read, set.ids[0]]).or_else(|| one(run)).or_else(|| two(run))
         })?;
     }
     again(checker, trajectory)
 }
 
-/// Serializing twice gives the same bytes, and serializing what was read gives them, too.
+/// Checks that a deserialized state is serialized to the same bytes.
 fn again(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.play(0, &[Begin, Points(trajectory.points.len() / 2), Save(0)]);
@@ -140,7 +140,7 @@ fn again(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     checker.check("states.bytes", writer.sequence, move |run| {
         let (one, two) = (run.written(first)?, run.written(second)?);
         match (one, two) {
-            (Written::Numbers(_, one), Written::Numbers(_, two)) if one.len() != two.len() => {
+            (Values::Numbers(_, one), Values::Numbers(_, two)) if one.len() != two.len() => {
                 Some(format!("{} bytes, and {} of the same state", one.len(), two.len()))
             }
             _ => one.differ(two).map(|index| format!("byte {index} of {} differs", one.numbers().len())),

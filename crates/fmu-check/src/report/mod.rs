@@ -13,7 +13,7 @@ use std::path::Path;
 /// The report on an FMU.
 #[derive(Clone, serde::Serialize)]
 pub struct Report {
-    /// The version of the report's structure: 1. It changes when a field changes or goes.
+    /// The version of the report's structure: 1. It changes when a field is changed or removed.
     pub schema: u32,
     /// The version of this tool.
     pub version: &'static str,
@@ -31,7 +31,7 @@ pub struct Report {
     pub sequences: u64,
     /// How long it took.
     pub seconds: f64,
-    /// Chose what was chosen at random.
+    /// Seed of random choices.
     pub seed: u64,
     /// How many variables there are, and how many of them most checks read.
     pub variables: [usize; 2],
@@ -105,7 +105,7 @@ impl Report {
         if self.interfaces.is_empty() { "no interface".to_owned() } else { self.interfaces.join(" and ") }
     }
 
-    /// In a sentence.
+    /// Returns the numbers of findings by severity in a sentence.
     fn summary(&self) -> String {
         let many =
             |count: usize, one: &str, more: &str| format!("{count} {}", if count == 1 { one } else { more });

@@ -1,4 +1,4 @@
-//! The report as one page that needs nothing else.
+//! The report as an HTML page without other files.
 
 use super::Report;
 use crate::finding::Severity;

@@ -1,7 +1,7 @@
 //! A sequence as a program in C.
 
 use super::evidence::{Evidence, Measure, Proof};
-use crate::call_sequence::{Arg, CallSequence, Kind, Make, NOBODY, Numbered, Setting, Step};
+use crate::call_sequence::{Arg, CallSequence, Kind, Make, NULL_INSTANCE, Numbered, Setting, Step};
 use crate::description::Description;
 use crate::finding::Finding;
 use fmi_abi::calls::signature;
@@ -47,7 +47,7 @@ pub fn program(
     let save = each(bytes, &|slot| format!("    pass_on({slot}, b{slot}, *n{slot});\n"));
     let list: Vec<String> = (0..parts.len()).map(|number| format!("phase{number}")).collect();
     format!(
-        "/*\n{} * cc repro.c -o repro -ldl -lpthread && ./repro FOLDER_OF_THE_UNPACKED_FMU\n *\n \
+        "/*\n{} * cc repro.c -o repro -ldl -lpthread && ./repro DIRECTORY_OF_THE_UNPACKED_FMU\n *\n \
          * Exit status: 1 if the finding shows, 0 if it does not, 3 if that cannot be told.\n */\n\
          #define FMI {}\n{}{declared}\n{threads}{}static void (*const phases[])(void) = {{{}}};\n\
          static const char library_name[] = \"{}\";\n\nstatic void load(void) {{\n{load}}}\n\n\
@@ -87,7 +87,7 @@ fn library(setting: &Setting, sequence: &CallSequence) -> String {
     path.strip_prefix(directory).unwrap_or(&path).to_string_lossy().replace('\\', "/")
 }
 
-/// The function that tells whether the results of the calls are those of the finding.
+/// Returns the C function that compares the results of the calls with the results of the finding.
 fn shows(evidence: &Evidence) -> String {
     let results = match evidence {
         Evidence::None | Evidence::End | Evidence::Left => None,
@@ -163,7 +163,7 @@ impl Writer<'_> {
             Step::Version(name) => format!("version({id}, \"{name}\");\n"),
             Step::Free(index) => {
                 let name = if self.fmi3 { "fmi3FreeInstance" } else { "fmi2FreeInstance" };
-                let instance = if *index == NOBODY { "NULL".to_owned() } else { format!("c{index}") };
+                let instance = if *index == NULL_INSTANCE { "NULL".to_owned() } else { format!("c{index}") };
                 format!("((void (*)(void *))function(\"{name}\"))({instance});\n")
             }
             Step::Measure => format!("measure({id});\n"),
@@ -202,7 +202,7 @@ impl Writer<'_> {
         let flags = flags.map(|flag| flag.to_string()).join(", ");
         let made = format!("c{index} = make({index}, {name}, {token}, {flags});\n");
         let [_, log] = self.matters(id).unwrap_or_default();
-        let log = if log { "said" } else { "\"\"" };
+        let log = if log { "messages" } else { "\"\"" };
         let result = format!("{{ FILE *file = begin({id}, c{index} != NULL); end(file, {log}); }}\n");
         made + if self.matters(id).is_some() { result.as_str() } else { "" }
     }
@@ -224,14 +224,14 @@ impl Writer<'_> {
         if let Some([written, log]) = self.matters(id) {
             after.push(format!("FILE *file = begin({id}, status);"));
             after.extend(parts.proofs.into_iter().filter(|_| written));
-            after.push(format!("end(file, {});", if log { "said" } else { "\"\"" }));
+            after.push(format!("end(file, {});", if log { "messages" } else { "\"\"" }));
         }
         if *self.evidence == Evidence::Damage {
             after.extend(parts.checks);
         }
         let lines = |lines: Vec<String>| lines.iter().map(|line| format!("    {line}\n")).collect::<String>();
         format!(
-            "{guard}{{{comment}\n    size_t before = arrays;\n{}    *said = 0;\n\
+            "{guard}{{{comment}\n    size_t before = arrays;\n{}    *messages = 0;\n\
              \x20   int status = ((int (*)(void *{types}))function(\"{name}\"))({instance}{passed});\n\
              \x20   print(\"{name}: %d\", status);\n{}    print(\"\\n\"); release(before);\n}}\n",
             lines(parts.before),
@@ -273,13 +273,13 @@ impl Writer<'_> {
             Arg::SavedSize(slot) => format!("*n{slot}"),
             Arg::SizeOut(slot) => {
                 parts.after.push(format!("print(\" -> %zu bytes\", *n{slot});"));
-                parts.proofs.push(format!("put_words(file, n{slot}, 1, 8);"));
+                parts.proofs.push(format!("put_numbers(file, n{slot}, 1, 8);"));
                 format!("n{slot}")
             }
             Arg::SavedOut(slot) => {
                 parts.before.push(format!("void *a{number} = guarded(NULL, *n{slot});"));
                 parts.after.push(format!("memcpy(b{slot}, a{number}, *n{slot});"));
-                parts.proofs.push(format!("put_words(file, a{number}, *n{slot}, 1);"));
+                parts.proofs.push(format!("put_numbers(file, a{number}, *n{slot}, 1);"));
                 format!("a{number}")
             }
         }
@@ -331,14 +331,14 @@ impl Parts {
         if name != "fmi3GetBinary" {
             self.proofs.push(match letter {
                 's' => format!("if (status < 2) put_texts(file, a{number}, {count});"),
-                _ => format!("put_words(file, a{number}, {count}, {width});"),
+                _ => format!("put_numbers(file, a{number}, {count}, {width});"),
             });
         }
         format!("a{number}")
     }
 }
 
-/// The names of the variables that a call is about.
+/// Returns the names of the variables whose value references are the first argument.
 fn comment(args: &[Arg], description: &Description) -> Option<String> {
     let Some(Arg::In(Kind::U32, references)) = args.first() else { return None };
     let names: Vec<&str> = references

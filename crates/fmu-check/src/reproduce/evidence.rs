@@ -1,14 +1,14 @@
 //! The results that show a finding, found by leaving out those that the judge does not need. A program that reproduces a
 //! finding compares them.
 
-use crate::call_sequence::{Arg, CallSequence, End, Numbered, Outcome, Run, Step, Written, step_of};
+use crate::call_sequence::{Arg, CallSequence, End, Numbered, Outcome, Run, Step, Values, step_of};
 use crate::finding::{Finding, Judge, step_name};
 use std::fmt::Write as _;
 
-/// How a program finds out whether a finding shows.
+/// Comparison by which a program decides whether a finding shows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Evidence {
-    /// No program can.
+    /// No comparison is known.
     #[default]
     None,
     /// A process does not end as it should, or the library cannot be loaded.
@@ -27,7 +27,7 @@ pub enum Evidence {
     Grown(Measure, u32, u32, u64),
 }
 
-/// Repetitions in a program, which has as long as it needs, but not for thousands.
+/// Maximum number of repetitions in a program, which should end in seconds.
 const REPETITIONS: usize = 500;
 
 /// The quantity of a measurement.
@@ -63,7 +63,7 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     if without(&|run| run.left.clear()) {
         return Evidence::Left;
     }
-    if without(&|run| run.said.clear()) {
+    if without(&|run| run.output.clear()) {
         return Evidence::Printed;
     }
     if without(&|run| run.outcomes.values_mut().for_each(|of| of.damage.clear())) {
@@ -92,7 +92,7 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     }
 }
 
-/// The queries of threads, each with the one in the simulation before them that it is compared with. Which of them differ
+/// Returns each read of a thread with the corresponding read of the simulation before the threads. Which of them differ
 /// depends on chance.
 fn pairs(sequence: &CallSequence) -> Vec<[u32; 2]> {
     let queries = |sequence: &[Numbered]| -> Vec<u32> {
@@ -161,13 +161,13 @@ fn shown(outcome: &Outcome, [written, log]: [bool; 2]) -> String {
     }
     for array in outcome.written.iter().filter(|_| written) {
         match array {
-            Written::Numbers(kind, bits) => {
+            Values::Numbers(kind, bits) => {
                 for bits in bits {
                     let mask = u64::MAX >> (64 - 8 * kind.size());
                     let _ = write!(text, "{:x},", bits & mask);
                 }
             }
-            Written::Texts(texts) => texts.iter().for_each(|string| {
+            Values::Texts(texts) => texts.iter().for_each(|string| {
                 let _ = write!(text, "{},", or_null(string));
             }),
         }
@@ -231,7 +231,7 @@ pub fn as_repeated(sequence: &CallSequence, run: &Run) -> CallSequence {
 #[cfg(test)]
 mod tests {
     use super::{Evidence, evidence};
-    use crate::call_sequence::{Arg, End, Kind, Message, Numbered, Outcome, Run, Step, Written};
+    use crate::call_sequence::{Arg, End, Kind, Message, Numbered, Outcome, Run, Step, Values};
     use crate::finding::{Finding, Judge};
     use std::sync::Arc;
 
@@ -250,7 +250,7 @@ mod tests {
 
     fn run() -> Run {
         let outcome = |id: u32, status: i32, value: f64| {
-            let written = vec![Written::Numbers(Kind::F64, vec![value.to_bits()])];
+            let written = vec![Values::Numbers(Kind::F64, vec![value.to_bits()])];
             (id, Outcome { id, status: Some(status), written, ..Outcome::default() })
         };
         let mut run = Run {

@@ -64,7 +64,7 @@ fn settings() -> Vec<String> {
     }
     #[cfg(unix)]
     {
-        // SAFETY: asks for the name.
+        // SAFETY: only returns the name.
         let locale = unsafe { super::text_at(libc::setlocale(libc::LC_ALL, std::ptr::null())) };
         found.push(format!("locale {}", String::from_utf8_lossy(&locale.unwrap_or_default())));
         for (name, signal) in [
@@ -73,7 +73,7 @@ fn settings() -> Vec<String> {
             ("SIGINT", libc::SIGINT),
             ("SIGABRT", libc::SIGABRT),
         ] {
-            // SAFETY: asks for what is set.
+            // SAFETY: only returns the current handler.
             let handler = unsafe {
                 let mut action: libc::sigaction = std::mem::zeroed();
                 libc::sigaction(signal, std::ptr::null(), &mut action);

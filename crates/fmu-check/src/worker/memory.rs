@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 
-/// How many bytes after an array may be touched: none, so that it is a crash, or some, so that it is observed.
+/// Number of accessible bytes after an array: 0 if an access beyond it should crash, more if it should be detected.
 pub static AFTER: AtomicUsize = AtomicUsize::new(0);
 
 /// Whether freed arrays stay mapped for reuse. Mapping takes time in repetitions and makes threads wait for each other.
@@ -12,13 +12,13 @@ pub static KEEP: AtomicBool = AtomicBool::new(false);
 /// The byte that fills memory before a call.
 pub const FILL: u8 = 0x5a;
 
-/// One page of it.
+/// A page of this byte.
 static FILLED: [u8; 4096] = [FILL; 4096];
 
 /// The number of functions of the FMU that have not returned, in memory that a forked process shares with its parent.
 pub struct Inside(OnceLock<&'static AtomicU32>);
 
-/// The one of this process.
+/// The calls of this process.
 pub static INSIDE: Inside = Inside(OnceLock::new());
 
 impl Inside {
@@ -47,7 +47,7 @@ impl Inside {
         self.count().fetch_sub(1, Ordering::Relaxed);
     }
 
-    /// The number.
+    /// Returns the number of calls that have not returned.
     pub fn get(&self) -> u32 {
         self.count().load(Ordering::Relaxed)
     }
@@ -68,7 +68,7 @@ mod pages {
     use std::ptr::null_mut;
     use std::sync::{Mutex, PoisonError};
 
-    /// Lengths and addresses of what is kept.
+    /// Lengths and addresses of the pages that are kept for reuse.
     static KEPT: Mutex<Vec<(usize, usize)>> = Mutex::new(Vec::new());
 
     /// Pages of which the last may not be touched.
@@ -78,7 +78,7 @@ mod pages {
     }
 
     fn page() -> usize {
-        // SAFETY: asks for a number.
+        // SAFETY: only returns a number.
         usize::try_from(unsafe { libc::sysconf(libc::_SC_PAGESIZE) }).unwrap_or(4096)
     }
 
@@ -119,7 +119,7 @@ mod pages {
             if KEEP.load(Ordering::Relaxed) {
                 KEPT.lock().unwrap_or_else(PoisonError::into_inner).push((self.length, self.map as usize));
             } else if AFTER.load(Ordering::Relaxed) == 0 {
-                // SAFETY: mapped in `new`, and nobody is given it for longer than a call.
+                // SAFETY: mapped in `new`; no pointer to it is used after the call.
                 unsafe { libc::munmap(self.map.cast(), self.length) };
             }
         }
@@ -157,7 +157,7 @@ impl Guarded {
             true => AFTER.load(Ordering::Relaxed),
             false => 64,
         };
-        // A page more than needed, so that there is something before an array, too.
+        // At least 64 bytes before the array are filled, to detect writes there.
         let pages = pages::Pages::new(bytes.len() + after + 64);
         let (map, open) = pages.open();
         let begin = open - bytes.len() - after;

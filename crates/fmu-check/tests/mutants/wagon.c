@@ -137,7 +137,7 @@ __attribute__((destructor)) static void unloaded(void) {
     if (IS(exit_hangs)) pause();
 }
 
-/* What a process must survive that starts others, and signals that are not for it. */
+/* Starts processes and sends signals that the checker must survive. */
 static void attack(void) {
     if (IS(forks) && fork() == 0) for (;;) pause();
     if (IS(daemon_left) && fork() == 0) {
@@ -149,7 +149,7 @@ static void attack(void) {
     if (IS(duplicates_itself)) fork();
     if (IS(kills_group)) kill(0, SIGKILL);
     if (IS(kills_parent)) kill(getppid(), SIGKILL);
-    /* No signal is sent, in case nothing stops it. */
+    /* Signal 0 only tests the permission, in case the checker does not prevent it. */
     if (IS(kills_all)) kill(-1, 0);
     if (IS(stops_parent)) kill(getppid(), SIGSTOP);
     if (IS(make_hangs)) for (;;) pause();
@@ -181,7 +181,7 @@ static void *make(const char *name, const char *token, int cs, int logging, Logg
     return m;
 }
 
-/* A real variable, or NaN for a reference that is none. */
+/* The value of a real variable; sets `known`. */
 static double get(Model *m, uint32_t vr, bool *known) {
     const State *s = &m->s;
     double y = 2 * s->force + s->x + *m->scratch * 1e-3;
@@ -305,7 +305,7 @@ static int set_none(void *c, const uint32_t *vr, size_t n, const void *value) {
     return n ? no(m, "it cannot be set") : 0;
 }
 
-/* Runge and Kutta's method, in steps that events and ends cut. */
+/* Integrates by the Runge-Kutta method; steps end at events and at the end. */
 static void integrate(Model *m, double end) {
     State *s = &m->s;
     while (s->time < end - 1e-12) {
@@ -584,7 +584,7 @@ static int deserialize(void *c, const char *bytes, size_t size, void **state) {
     if (memcmp(bytes, "wagon001", 8)) return no(m, "no state");
     if (IS(bytes_with_address)) { char *from; memcpy(&from, bytes + 8, sizeof from); memcpy(&copy, from, sizeof copy); }
     else memcpy(&copy, bytes + 8, sizeof copy);
-    /* Only what can be is taken. */
+    /* Only possible values are accepted. */
     copy.label[sizeof copy.label - 1] = 0;
     if (!isfinite(copy.time) || !isfinite(copy.x) || !isfinite(copy.v) || !(copy.next > copy.time - 1) || !(copy.next < 1e9) ||
         !(copy.mass > 0) || !(fabs(copy.time) < 1e9)) return no(m, "no state");
