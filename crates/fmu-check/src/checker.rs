@@ -315,17 +315,12 @@ impl Checker {
         self.judge(name, sequence, judge).map(|_| ())
     }
 
-    /// Judges whether reads that must be equal differ: the variable, its value and the other value.
-    pub fn differ(
-        &self,
-        one: Vec<Read>,
-        other: Vec<Read>,
-        tell: impl Fn(String, String, String) -> String + Send + Sync + 'static,
-    ) -> Box<dyn Judges> {
-        let description = self.description.clone();
-        Box::new(move |run| {
-            let (name, one, other) = difference(&description, run, &one, &other)?;
-            Some(tell(name, one, other))
+    /// Judges whether reads that must be equal differ. The message has `{}` for the variable, its value and the other value.
+    pub fn differ(&self, one: &[Read], other: &[Read], message: &'static str) -> Box<dyn Judges> {
+        let (description, one, other) = (self.description.clone(), one.to_vec(), other.to_vec());
+        Box::new(move |run: &Run| {
+            let values = difference(&description, run, &one, &other)?.into_iter().chain([String::new()]);
+            Some(message.split("{}").zip(values).map(|(text, value)| text.to_owned() + &value).collect())
         })
     }
 

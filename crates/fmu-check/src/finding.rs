@@ -36,6 +36,18 @@ impl<T: Fn(&Run) -> Option<String> + Send + Sync + 'static> Judges for T {}
 /// A judge that findings share.
 pub type Judge = Arc<dyn Judges>;
 
+/// Judges by the first of these judges that finds a violation.
+pub fn any(judges: impl IntoIterator<Item = Box<dyn Judges>>) -> Box<dyn Judges> {
+    let judges: Vec<_> = judges.into_iter().collect();
+    Box::new(move |run: &Run| judges.iter().find_map(|judge| judge(run)))
+}
+
+/// Judges whether one of these calls did not return OK.
+pub fn fails(sequence: &CallSequence, ids: Vec<u32>) -> Box<dyn Judges> {
+    let sequence = sequence.clone();
+    Box::new(move |run: &Run| failure(&sequence, run, &ids))
+}
+
 /// A finding.
 #[derive(Clone, Default, Serialize)]
 pub struct Finding {

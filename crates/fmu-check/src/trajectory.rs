@@ -1,6 +1,6 @@
 //! Finds a simulation that succeeds by trying it. All checks are variations of it.
 
-use crate::call_sequence::{CallSequence, End, Run, Step, Values};
+use crate::call_sequence::{CallSequence, End, Run, Step, Values, step_of};
 use crate::checker::Checker;
 use crate::description::Description;
 use crate::finding::{Event, ending, failure, failure_of, step_name};
@@ -142,94 +142,76 @@ fn initialized(checker: &Checker, trajectory: &mut Trajectory) -> anyhow::Result
     Ok(None)
 }
 
-/// The event of the last update among these calls.
-fn last_event(checker: &Checker, run: &Run, ids: &[u32]) -> Option<Event> {
-    ids.iter().rev().find_map(|id| checker.event(run, *id))
-}
-
-/// Steps of Co-Simulation with Event Mode, in which the events are handled that steps report.
-fn with_events(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<Trajectory> {
-    initialized(checker, &mut trajectory)?;
-    let description = &checker.description;
-    for mut point in steps(description, description.start_time, &[step_size(description); 12], false) {
-        loop {
-            let mut writer = checker.writer(&trajectory);
-            let before = writer.play(0, &[Part::Begin, Part::Points(usize::MAX)]).ids;
-            let ids = writer.point(0, &point);
-            let run = checker.play(&writer.sequence)?;
-            made(&run, &writer, before[0])?;
-            if let Some(why) = failure(&writer.sequence, &run, &ids) {
-                let few = trajectory.points.len() < 3;
-                return if few { Err(NoTrajectory(why, writer.sequence).into()) } else { Ok(trajectory) };
-            }
-            let step = ids.iter().filter_map(|id| run.of(*id)).find(|of| of.written.len() == 4);
-            let flag = |index: usize| step.is_some_and(|of| of.written[index].numbers() == [1.0]);
-            let again = last_event(checker, &run, &ids).is_some_and(|event| event.again);
-            if flag(1) || flag(2) {
-                return Ok(trajectory);
-            }
-            if point.updates == UPDATES || !(again || flag(0) && point.updates == 0) {
-                break;
-            }
-            point.updates += 1;
-        }
-        trajectory.end = point.time + point.size;
-        trajectory.points.push(point);
-    }
-    Ok(trajectory)
-}
-
-/// The result of integrating to a point.
+/// The results at a point.
+#[derive(Default)]
 struct Reached {
     states: Vec<f64>,
     slopes: Vec<f64>,
     indicators: Vec<f64>,
     /// The event there, if there was one.
     event: Option<Event>,
-    /// The model ends.
+    /// The model ends the simulation, or the step returns early.
     ends: bool,
 }
 
-/// Adds a point to an integration, with as many updates as an event there needs; none if a call there fails after some
+/// Adds a point to a trajectory, with as many updates as an event there needs; `None` if a call there fails after some
 /// points.
 fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> anyhow::Result<Option<Reached>> {
     let count = checker.description.states_count().unwrap_or(0);
     let indicators = checker.description.event_indicators.unwrap_or(0);
     loop {
         let mut writer = checker.writer(trajectory);
-        let mut ids = writer.play(0, &[Part::Begin, Part::Points(usize::MAX)]).ids;
+        let before = writer.play(0, &[Part::Begin, Part::Points(usize::MAX)]).ids;
         let here = writer.point(0, point);
-        ids.extend(&here);
-        let derivatives = writer.derivatives_name();
-        let asked =
-            [("GetContinuousStates", count), (derivatives, count), ("GetEventIndicators", indicators)]
-                .map(|(name, count)| (count > 0).then(|| writer.vector(0, name, count)));
+        let vectors = [
+            ("GetContinuousStates", count),
+            (writer.derivatives_name(), count),
+            ("GetEventIndicators", indicators),
+        ];
+        let read =
+            |(name, count)| (count > 0 && !trajectory.is_stepped()).then(|| writer.vector(0, name, count));
+        let vectors = vectors.map(read);
         let run = checker.play(&writer.sequence)?;
-        if let Some(why) = ending(&run, &writer.sequence) {
-            return Err(NoTrajectory(why, writer.sequence).into());
-        }
-        if let Some(why) = failure(&writer.sequence, &run, &ids[1..]) {
+        made(&run, &writer, before[0])?;
+        if let Some(why) = failure(&writer.sequence, &run, &[&before[1..], &here].concat()) {
             let few = trajectory.points.len() < 3;
             return if few { Err(NoTrajectory(why, writer.sequence).into()) } else { Ok(None) };
         }
-        let completed = writer.sequence.iter().rev().find(|numbered| {
-            here.contains(&numbered.id) && step_name(&numbered.step).ends_with("CompletedIntegratorStep")
-        });
-        let flag = |index: usize| {
-            let written = completed.and_then(|numbered| run.of(numbered.id)?.written.get(index));
-            written.is_some_and(|of| of.numbers().first() == Some(&1.0))
+        let advances = |id: &&u32| {
+            let name = step_of(&writer.sequence, **id).map(|numbered| step_name(&numbered.step));
+            name.is_some_and(|name| name.ends_with("DoStep") || name.ends_with("CompletedIntegratorStep"))
         };
-        let event = last_event(checker, &run, &here).filter(|_| point.updates > 0);
+        // The flags for an event, the end of the simulation and, in Co-Simulation, an early return.
+        let outputs = here.iter().find(advances).and_then(|id| run.of(*id)).map_or(&[][..], |of| &of.written);
+        let flag = |index| outputs.get(index).is_some_and(|of: &Values| of.numbers().first() == Some(&1.0));
+        if flag(1) || flag(2) {
+            return Ok(Some(Reached { ends: true, ..Reached::default() }));
+        }
+        let event = here.iter().rev().find_map(|id| checker.event(&run, *id));
         let again = event.is_some_and(|event| event.again) && point.updates < UPDATES;
         if again || point.updates == 0 && flag(0) {
             point.updates += 1;
             continue;
         }
         let [states, slopes, indicators] =
-            asked.map(|id| id.and_then(|id| run.written(id)).map(Values::numbers).unwrap_or_default());
-        let ends = flag(1);
-        return Ok(Some(Reached { states, slopes, indicators, event, ends }));
+            vectors.map(|id| id.and_then(|id| run.written(id)).map(Values::numbers).unwrap_or_default());
+        return Ok(Some(Reached { states, slopes, indicators, event, ends: false }));
     }
+}
+
+/// Finds steps of Co-Simulation with Event Mode, and handles the events that the steps report.
+fn with_events(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<Trajectory> {
+    initialized(checker, &mut trajectory)?;
+    let description = &checker.description;
+    for mut point in steps(description, description.start_time, &[step_size(description); 12], false) {
+        let reached = reached(checker, &trajectory, &mut point)?;
+        if reached.is_none_or(|reached| reached.ends) {
+            break;
+        }
+        trajectory.end = point.time + point.size;
+        trajectory.points.push(point);
+    }
+    Ok(trajectory)
 }
 
 /// Integrates by Euler's method: first every point, then some up to the end of the default experiment, and those
@@ -267,10 +249,7 @@ fn integrated(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<T
         let (inputs, updates) = (input_values(description, phase, false), usize::from(event_now));
         let mut point = Point { time, size, inputs, states: states.clone(), updates };
         let Some(reached) = reached(checker, &trajectory, &mut point)? else { return Ok(trajectory) };
-        if reached.event.is_some_and(|event| event.terminate) {
-            return Ok(trajectory);
-        }
-        if reached.ends {
+        if reached.ends || reached.event.is_some_and(|event| event.terminate) {
             break;
         }
         next_event = reached.event.map_or(next_event, |event| event.next);

@@ -172,7 +172,17 @@ impl<'a> Writer<'a> {
         played
     }
 
-    /// How instances are made.
+    /// Writes parts of a simulation, and returns the reads of each part that reads.
+    pub fn groups<const N: usize>(&mut self, of: usize, parts: &[Part]) -> [Vec<Read>; N] {
+        let groups = parts.iter().filter_map(|part| {
+            let reads = self.play(of, &[*part]).reads;
+            matches!(part, Part::Read | Part::ReadAll | Part::Run(_)).then_some(reads)
+        });
+        let groups: Vec<Vec<Read>> = groups.collect();
+        groups.try_into().unwrap_or_else(|_| panic!("the number of parts that read is not {N}"))
+    }
+
+    /// Returns the usual arguments of an instantiation.
     pub fn how(&self) -> Make {
         let stepped = self.trajectory.is_stepped();
         Make {
@@ -472,24 +482,19 @@ pub fn sample(description: &Description, most: usize) -> Vec<usize> {
 }
 
 /// Returns the first difference between corresponding reads: the variable and both values.
-pub fn difference(
-    description: &Description,
-    run: &Run,
-    one: &[Read],
-    other: &[Read],
-) -> Option<(String, String, String)> {
+pub fn difference(description: &Description, run: &Run, one: &[Read], other: &[Read]) -> Option<[String; 3]> {
     one.iter().zip(other).find_map(|(one, other)| {
         let (of_one, of_other) = (run.of(one.id)?, run.of(other.id)?);
         if of_one.status != of_other.status {
             let show =
                 |status: Option<i32>| format!("status {}", status.map_or("none".to_owned(), status_name));
-            return Some(("a call".to_owned(), show(of_one.status), show(of_other.status)));
+            return Some(["a call".to_owned(), show(of_one.status), show(of_other.status)]);
         }
         // After an error, the standard does not define the values.
         let pairs = of_one.written.iter().zip(&of_other.written).filter(|_| run.succeeds(one.id));
         let of_pair = |(first, second): (&Values, &Values)| {
             let index = first.differ(second)?;
-            Some((name_at(description, one, index), first.show(index), second.show(index)))
+            Some([name_at(description, one, index), first.show(index), second.show(index)])
         };
         pairs.into_iter().find_map(of_pair)
     })

@@ -1,6 +1,6 @@
 //! Checks that the model structure declares the dependencies that the FMU has.
 
-use super::derivatives::{set_known, to_middle};
+use super::derivatives::{middle_values, set_known, to_middle};
 use crate::checker::Checker;
 use crate::description::Unknown;
 use crate::values::near;
@@ -71,28 +71,17 @@ pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
             && !variable.clocked
     });
     let knowns: Vec<usize> = inputs.chain(states.iter().copied()).take(checker.most(60)).collect();
-    let mut writer = checker.writer(trajectory);
-    writer.play(0, &to_middle(trajectory));
-    let read = writer.read_these(0, &knowns);
-    let now = (!states.is_empty()).then(|| writer.vector(0, "GetContinuousStates", states.len()));
-    let run = checker.play(&writer.sequence)?;
-    let vector = now.and_then(|id| run.written(id)).map(|of| of.numbers()).unwrap_or_default();
-    for known in knowns {
+    let (values, vector) = middle_values(checker, trajectory, &knowns, &states)?;
+    for (known, value) in knowns.into_iter().zip(values) {
         let unknowns = undeclared(checker, description.outputs.iter().chain(derivatives), known);
-        let Some(value) = value_of(&run, &read, known).filter(|_| !unknowns.is_empty()) else { continue };
+        if unknowns.is_empty() || value.is_empty() {
+            continue;
+        }
         let mut writer = checker.writer(trajectory);
         writer.play(0, &to_middle(trajectory));
-        moved(
-            checker,
-            "dependencies.missing",
-            writer,
-            known,
-            &value.numbers(),
-            unknowns,
-            |writer, numbers| {
-                set_known(writer, &states, &vector, known, numbers);
-            },
-        )?;
+        moved(checker, "dependencies.missing", writer, known, &value, unknowns, |writer, numbers| {
+            set_known(writer, &states, &vector, known, numbers);
+        })?;
     }
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! Partial derivatives against differences, adjoint against directional ones, vectors against variables.
 
-use crate::call_sequence::{Arg, Kind, Run};
+use crate::call_sequence::{Arg, Kind, Run, Values};
 use crate::checker::Checker;
 use crate::description::Description;
 use crate::finding::Judges;
@@ -111,9 +111,8 @@ pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
         .collect();
     let after = writer.read(0);
     let sequence = writer.sequence.clone();
-    let is_unchanged = checker.differ(before, after, |name, before, after| {
-        format!("{name} was {before}, after derivatives were asked for it is {after}")
-    });
+    let message = "{} was {}, after derivatives were requested it is {}";
+    let is_unchanged = checker.differ(&before, &after, message);
     let run = checker.judge("derivatives.changed", sequence.clone(), is_unchanged)?;
     if run.end != crate::call_sequence::End::Done {
         return Ok(());
@@ -220,6 +219,23 @@ pub fn set_known(writer: &mut Writer, states: &[usize], vector: &[f64], known: u
     }
 }
 
+/// Returns the numbers of each known, and the vector of states, in the middle of a trajectory.
+pub fn middle_values(
+    checker: &Checker,
+    trajectory: &Trajectory,
+    knowns: &[usize],
+    states: &[usize],
+) -> anyhow::Result<(Vec<Vec<f64>>, Vec<f64>)> {
+    let mut writer = checker.writer(trajectory);
+    writer.play(0, &to_middle(trajectory));
+    let read = writer.read_these(0, knowns);
+    let vector = (!states.is_empty()).then(|| writer.vector(0, "GetContinuousStates", states.len()));
+    let run = checker.play(&writer.sequence)?;
+    let numbers = |values: Option<Values>| values.map(|values| values.numbers()).unwrap_or_default();
+    let values = knowns.iter().map(|known| numbers(value_of(&run, &read, *known))).collect();
+    Ok((values, numbers(vector.and_then(|id| run.written(id)).cloned())))
+}
+
 /// Checks each derivative against differences with two step sizes, whose disagreement estimates their error.
 fn differences(
     checker: &Checker,
@@ -233,16 +249,10 @@ fn differences(
     if !trajectory.is_stepped() && states.len() != description.states_count().unwrap_or(0) {
         return Ok(());
     }
-    // The current values are the base of the differences.
-    let mut writer = checker.writer(trajectory);
-    writer.play(0, &to_middle(trajectory));
-    let read = writer.read_these(0, knowns);
-    let of_states = (!states.is_empty()).then(|| writer.vector(0, "GetContinuousStates", states.len()));
-    let run = checker.play(&writer.sequence)?;
-    let vector = of_states.and_then(|id| run.written(id)).map(|of| of.numbers()).unwrap_or_default();
-    for known in knowns {
+    let (values, vector) = middle_values(checker, trajectory, knowns, &states)?;
+    for (known, value) in knowns.iter().zip(values) {
         let variable = &description.variables[*known];
-        let value = value_of(&run, &read, *known).and_then(|value| value.numbers().first().copied());
+        let value = value.first().copied();
         let Some(value) = value.filter(|value| value.is_finite() && !variable.once_per_instant) else {
             continue;
         };

@@ -3,7 +3,7 @@
 use super::derivatives::{derivative, pair, references};
 use crate::call_sequence::{End, Run, Setting, Step};
 use crate::checker::Checker;
-use crate::finding::failure;
+use crate::finding::fails;
 use crate::writer::{Part, Trajectory};
 use fmi_abi::calls::{fmi2, fmi3, signatures};
 use fmi_abi::{Interface, Mode, Standard};
@@ -118,10 +118,9 @@ pub fn capabilities(checker: &Checker, trajectory: &Trajectory) -> anyhow::Resul
         asked.push((name, ids, writer.sequence));
     }
     for (flag, ids, sequence) in asked {
-        let copy = sequence.clone();
+        let fails = fails(&sequence, ids);
         checker.check("functions.capability", sequence, move |run| {
-            let why = failure(&copy, run, &ids)?;
-            Some(format!("declared by {flag}, but {why}"))
+            Some(format!("declared by {flag}, but {}", fails(run)?))
         })?;
     }
     Ok(())

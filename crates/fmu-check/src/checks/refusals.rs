@@ -14,6 +14,11 @@ use std::sync::Arc;
 type Attack = (String, Vec<Arg>, String, Option<&'static str>);
 
 const TOLERATED: Option<&str> = Some("refusals.tolerated");
+const ACCEPTED: Option<&str> = Some("refusals.accepted");
+
+fn attack(function: &str, args: Vec<Arg>, what: &str, rule: Option<&'static str>) -> Attack {
+    (function.to_owned(), args, what.to_owned(), rule)
+}
 
 /// A value reference that no variable has.
 pub fn unknown_reference(checker: &Checker) -> u64 {
@@ -105,11 +110,11 @@ fn of_input(checker: &Checker, variable: &Variable, function: &str, kind: Kind, 
     let second = another.map_or(reference, |other| u64::from(other.reference));
     let beyond = variable.max.map(|max| ([second, reference], max + 1.0 + max.abs(), "beyond its max"));
     let values = [([reference, second], f64::NAN, "and NaN for a second")].into_iter().chain(beyond);
-    let attack = |(references, number, what): ([u64; 2], f64, &str)| {
+    let invalid = |(references, number, what): ([u64; 2], f64, &str)| {
         let args = set(checker, references.to_vec(), kind, vec![other, kind.bits(number)]);
-        (function.to_owned(), args, format!("a value for {} {what}", variable.name), None)
+        attack(function, args, &format!("a value for {} {what}", variable.name), None)
     };
-    values.map(attack).collect()
+    values.map(invalid).collect()
 }
 
 /// Returns calls with unknown references, calls of other modes, and malformed states.
@@ -121,33 +126,29 @@ fn of_calls(checker: &Checker, interface: Interface, time: f64) -> Vec<Attack> {
     let experiment =
         vec![Arg::Whole(0), Arg::real(0.0), Arg::real(time + 7.0), Arg::Whole(0), Arg::real(0.0)];
     let (experiment, nothing) = if fmi3 { (vec![], experiment) } else { (experiment, vec![]) };
-    let bytes = Arg::In(Kind::U8, (0..64).map(|byte| byte * 37 % 256).collect());
-    let bytes = vec![bytes, Arg::Whole(64), Arg::StateOut(90)];
-    let (accepted, serializes) = (Some("refusals.accepted"), checker.serializes(interface));
-    let enter = "EnterInitializationMode";
-    let attacks = [
-        (true, get_float, get, "the value of a reference that no variable has", accepted),
-        (true, set_float, set, "a value for a reference that no variable has", accepted),
-        (
-            true,
-            "ExitInitializationMode",
-            vec![],
-            "leaving Initialization Mode, which it is not in",
-            TOLERATED,
-        ),
-        (true, enter, nothing, "entering Initialization Mode amid the simulation", TOLERATED),
-        (!fmi3, "SetupExperiment", experiment, "another experiment amid the simulation", TOLERATED),
-        (serializes, "DeserializeFMUState", bytes, "bytes that are no state", TOLERATED),
+    let (exit, enter) = ("ExitInitializationMode", "EnterInitializationMode");
+    let mut attacks = vec![
+        attack(get_float, get, "the value of a reference that no variable has", ACCEPTED),
+        attack(set_float, set, "a value for a reference that no variable has", ACCEPTED),
+        attack(exit, vec![], "leaving Initialization Mode, which it is not in", TOLERATED),
+        attack(enter, nothing, "entering Initialization Mode amid the simulation", TOLERATED),
     ];
-    let wanted = attacks.into_iter().filter(|(wanted, ..)| *wanted);
-    wanted.map(|(_, name, args, what, rule)| (name.to_owned(), args, what.to_owned(), rule)).collect()
+    if !fmi3 {
+        let what = "another experiment amid the simulation";
+        attacks.push(attack("SetupExperiment", experiment, what, TOLERATED));
+    }
+    if checker.serializes(interface) {
+        let bytes = Arg::In(Kind::U8, (0..64).map(|byte| byte * 37 % 256).collect());
+        let bytes = vec![bytes, Arg::Whole(64), Arg::StateOut(90)];
+        attacks.push(attack("DeserializeFMUState", bytes, "bytes that are no state", TOLERATED));
+    }
+    attacks
 }
 
 /// Returns impossible steps and invalid derivatives of inputs.
 fn of_steps(checker: &Checker, time: f64, size: f64) -> Vec<Attack> {
     let step = |(time, size, what): (f64, f64, &str)| {
-        let args = step_args(checker.description.standard, time, size);
-        ("DoStep".to_owned(), args, what.to_owned(), TOLERATED)
+        attack("DoStep", step_args(checker.description.standard, time, size), what, TOLERATED)
     };
     let steps = [
         (time, 0.0, "a step of no size"),
@@ -174,7 +175,7 @@ fn of_steps(checker: &Checker, time: f64, size: f64) -> Vec<Attack> {
                 Arg::In(Kind::I32, vec![1, order]),
                 Arg::In(Kind::F64, vec![3_f64.to_bits(); 2]),
             ];
-            ("SetRealInputDerivatives".to_owned(), args, what.to_owned(), None)
+            attack("SetRealInputDerivatives", args, what, None)
         })
     });
     steps.map(step).into_iter().chain(derivatives).collect()
@@ -184,8 +185,8 @@ fn of_steps(checker: &Checker, time: f64, size: f64) -> Vec<Attack> {
 fn of_integration(states: &[f64]) -> Vec<Attack> {
     let mode = "entering Continuous-Time Mode, which it is in";
     let mut attacks = vec![
-        ("SetTime", vec![Arg::real(f64::NAN)], "a time of NaN", None),
-        ("EnterContinuousTimeMode", vec![], mode, TOLERATED),
+        attack("SetTime", vec![Arg::real(f64::NAN)], "a time of NaN", None),
+        attack("EnterContinuousTimeMode", vec![], mode, TOLERATED),
     ];
     if let Some(last) = states.len().checked_sub(1) {
         let other: Vec<u64> = states.iter().map(|state| (state + 0.125).to_bits()).collect();
@@ -195,13 +196,10 @@ fn of_integration(states: &[f64]) -> Vec<Attack> {
             [(more, "one state too many", TOLERATED), (bad, "states one of which is NaN", None)]
         {
             let count = Arg::Whole(states.len() as i64);
-            attacks.push(("SetContinuousStates", vec![Arg::In(Kind::F64, states), count], what, rule));
+            attacks.push(attack("SetContinuousStates", vec![Arg::In(Kind::F64, states), count], what, rule));
         }
     }
     attacks
-        .into_iter()
-        .map(|(name, args, what, rule)| (name.to_owned(), args, what.to_owned(), rule))
-        .collect()
 }
 
 /// Returns an input of this type. A call that is not atomic sets it before it reaches the invalid value.
@@ -294,7 +292,7 @@ fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyho
         let ends = rejects(&later.reads) || !later.ids.iter().all(|id| run.succeeds(*id));
         let at_once = difference(&description, run, &alone_at_once, &at_once);
         let later = || difference(&description, run, &alone.reads, &later.reads).filter(|_| !ends);
-        let (variable, was, is) = at_once.or_else(later)?;
+        let [variable, was, is] = at_once.or_else(later)?;
         Some(format!("{named} {}, and {variable} is {is} after it instead of {was}", status_name(status)))
     });
     // In FMI 2.0, a discarded step may have advanced the time.

@@ -2,7 +2,7 @@
 
 use crate::call_sequence::Values;
 use crate::checker::Checker;
-use crate::finding::failure;
+use crate::finding::{any, fails};
 use crate::values::other_values;
 use crate::writer::Part::{Call, Enter, Leave, Make, Read, Run};
 use crate::writer::Trajectory;
@@ -15,13 +15,9 @@ pub fn reset(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         writer.play(0, end);
         let ids = writer.play(0, &[Call("Reset"), Enter]).ids;
         let second = writer.play(0, &[Read, Leave, Run(0)]).reads;
-        let sequence = writer.sequence.clone();
-        let differ = checker.differ(first, second, |name, before, after| {
-            format!("{name} of the new instance was {before}, after the reset it is {after}")
-        });
-        checker.check("reset.incomplete", writer.sequence, move |run| {
-            failure(&sequence, run, &ids).or_else(|| differ(run))
-        })?;
+        let message = "{} of the new instance was {}, after the reset it is {}";
+        let judges = [fails(&writer.sequence, ids), checker.differ(&first, &second, message)];
+        checker.check("reset.incomplete", writer.sequence, any(judges))?;
     }
     changed(checker, trajectory)
 }
@@ -58,8 +54,6 @@ fn after_values(
         writer.play(0, &[Enter, Leave]);
     }
     let second = writer.play(0, &[Call("Reset"), Enter, Read]).reads;
-    let differ = checker.differ(first, second, |name, before, after| {
-        format!("{name} of the new instance was {before}, after values were set and a reset it is {after}")
-    });
-    checker.check("reset.values", writer.sequence, differ)
+    let message = "{} of the new instance was {}, after values were set and a reset it is {}";
+    checker.check("reset.values", writer.sequence, checker.differ(&first, &second, message))
 }

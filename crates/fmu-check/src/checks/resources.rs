@@ -80,16 +80,17 @@ fn measured(
             format!("{grown} bytes are left after {times} {what}: {} for each", grown / times as u64)
         })
     });
-    checker.keep("resources.threads", &run, &sequence, move |run| {
-        let (one, two, times) = done(run)?;
-        let more = two.threads.checked_sub(one.threads).filter(|more| *more > 2)?;
-        Some(format!("{more} threads are left after {times} {what}"))
-    });
-    checker.keep("resources.files", &run, &sequence, move |run| {
-        let (one, two, times) = done(run)?;
-        let more = two.files.checked_sub(one.files).filter(|more| *more > 2)?;
-        Some(format!("{more} files are left open after {times} {what}"))
-    });
+    let counts: [(_, fn(&Measured) -> usize, _); 2] = [
+        ("resources.threads", |measured| measured.threads, "threads are left"),
+        ("resources.files", |measured| measured.files, "files are left open"),
+    ];
+    for (name, count, are_left) in counts {
+        checker.keep(name, &run, &sequence, move |run| {
+            let (one, two, times) = done(run)?;
+            let more = count(&two).checked_sub(count(&one)).filter(|more| *more > 2)?;
+            Some(format!("{more} {are_left} after {times} {what}"))
+        });
+    }
     let ids: Vec<u32> = steps.iter().map(|numbered| numbered.id).collect();
     checker.keep("resources.cycles", &run, &sequence, move |run| {
         let times = run.of(many)?.measured.as_ref()?.times;

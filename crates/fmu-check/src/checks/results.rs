@@ -3,7 +3,7 @@
 use crate::call_sequence::{Arg, Kind, Numbered, Run, Step};
 use crate::checker::Checker;
 use crate::description::Description;
-use crate::finding::{Judges, status_name};
+use crate::finding::{Judges, any, status_name};
 use crate::trajectory::steps;
 use crate::writer::Part::{Begin, Points, ReadAll, Run as RunFrom};
 use crate::writer::{Part, Point, Read, Trajectory, Writer, access, value_of};
@@ -11,18 +11,14 @@ use crate::writer::{Part, Point, Read, Trajectory, Writer, access, value_of};
 /// The whole trajectory with all that can be read.
 const WHOLE: &[Part] = &[Begin, ReadAll, RunFrom(0)];
 
-fn differ(checker: &Checker, one: Vec<Read>, other: Vec<Read>, what: &'static str) -> Box<dyn Judges> {
-    checker.differ(one, other, move |name, first, second| format!("{name} is {first}, {what} {second}"))
-}
-
 /// Repeats the calls in another process with other addresses and other memory contents.
 pub fn repeat(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let one = writer.play(0, WHOLE).reads;
     writer.add(Step::FreshProcess);
     let other = writer.play(0, WHOLE).reads;
-    let differ = differ(checker, one, other, "in another process");
-    checker.check("results.process", writer.sequence, differ)
+    let judge = checker.differ(&one, &other, "{} is {}, in another process {}");
+    checker.check("results.process", writer.sequence, judge)
 }
 
 /// Repeats the calls with an instance of another name. Strings may contain the name.
@@ -37,8 +33,8 @@ pub fn name(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let is_number = |(index, _): &(usize, usize)| checker.description.variables[*index].is_number();
     runs.iter_mut().for_each(|reads| reads.retain(|read| read.of.iter().all(is_number)));
     let [one, other] = runs;
-    let differ = differ(checker, one, other, "of an instance of another name");
-    checker.check("results.name", writer.sequence, differ)
+    let judge = checker.differ(&one, &other, "{} is {}, of an instance of another name {}");
+    checker.check("results.name", writer.sequence, judge)
 }
 
 /// Checks an instance next to a second one, which is called in turns with it.
@@ -66,23 +62,27 @@ pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<(
             other.extend(writer.read_all(2));
         }
     }
-    let first = differ(checker, alone.clone(), one, "beside another instance");
-    let second = differ(checker, alone, other, "of a second instance beside the first");
-    checker.check("results.instances", writer.sequence, move |run| first(run).or_else(|| second(run)))
+    let judges = [
+        checker.differ(&alone, &one, "{} is {}, next to another instance {}"),
+        checker.differ(&alone, &other, "{} is {}, of a second instance next to the first {}"),
+    ];
+    checker.check("results.instances", writer.sequence, any(judges))
 }
 
 /// Returns a message for the first variable that has one value read separately and another read with others.
 fn unlike(
-    description: &Description,
-    run: &Run,
-    singly: &[(usize, Vec<Read>)],
-    together: &[Read],
-    tell: impl Fn(&str, String, String) -> String,
-) -> Option<String> {
-    singly.iter().find_map(|(index, reads)| {
-        let (one, other) = (value_of(run, reads, *index)?, value_of(run, together, *index)?);
-        let at = one.differ(&other)?;
-        Some(tell(&description.variables[*index].name, one.show(at), other.show(at)))
+    checker: &Checker,
+    singly: Vec<(usize, Vec<Read>)>,
+    together: Vec<Read>,
+    message: fn(&str, String, String) -> String,
+) -> Box<dyn Judges> {
+    let description = checker.description.clone();
+    Box::new(move |run: &Run| {
+        singly.iter().find_map(|(index, reads)| {
+            let (one, other) = (value_of(run, reads, *index)?, value_of(run, &together, *index)?);
+            let at = one.differ(&other)?;
+            Some(message(&description.variables[*index].name, one.show(at), other.show(at)))
+        })
     })
 }
 
@@ -102,17 +102,14 @@ pub fn reading(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     let [read, again] = [(); 2].map(|()| writer.read_all(1));
     let mut single = |index: &usize| (*index, writer.read_these(1, &[*index]));
     let singly: Vec<_> = all.iter().take(400).map(&mut single).collect();
-    let changed = differ(checker, silent, read.clone(), "after more was read meanwhile");
-    let twice = differ(checker, read.clone(), again, "read a second time");
-    let description = checker.description.clone();
-    let alone = move |run: &Run| {
-        let tell =
-            |name: &str, one, together| format!("{name} is {together} read with others and {one} read alone");
-        unlike(&description, run, &singly, &read, tell)
-    };
-    checker.check("results.reading", writer.sequence, move |run| {
-        twice(run).or_else(|| alone(run)).or_else(|| changed(run))
-    })?;
+    let judges = [
+        checker.differ(&read, &again, "{} is {}, read a second time {}"),
+        unlike(checker, singly, read.clone(), |name, one, together| {
+            format!("{name} is {together} read with others and {one} read separately")
+        }),
+        checker.differ(&silent, &read, "{} is {}, after more was read meanwhile {}"),
+    ];
+    checker.check("results.reading", writer.sequence, any(judges))?;
     repeated(checker, trajectory, all)?;
     first(checker, trajectory)
 }
@@ -130,12 +127,10 @@ fn first(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         alone.push((output, writer.read_these(0, &[output])));
         writer.free(0);
     }
-    let description = checker.description.clone();
-    checker.check("results.reading", writer.sequence, move |run| {
-        let tell =
-            |name: &str, one, other| format!("{name} is {one} read first and {other} read after others");
-        unlike(&description, run, &alone, &together, tell)
-    })
+    let judge = unlike(checker, alone, together, |name, one, other| {
+        format!("{name} is {one} read first and {other} read after others")
+    });
+    checker.check("results.reading", writer.sequence, judge)
 }
 
 /// Checks a call that reads each variable twice, and a call that reads none.
@@ -182,14 +177,14 @@ pub fn threads(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
         // Twenty simulations for each thread, so that simulations overlap.
         for _ in 0..20 {
             let reads = thread.play(number, WHOLE).reads;
-            judges.push(differ(checker, alone.clone(), reads, "on a thread beside others"));
+            judges.push(checker.differ(&alone, &reads, "{} is {}, on a thread next to others {}"));
             thread.free(number);
         }
         writer.next = thread.next;
         sequences.push(thread.sequence);
     }
     writer.add(Step::Parallel(sequences));
-    checker.check("results.threads", writer.sequence, move |run| judges.iter().find_map(|judge| judge(run)))
+    checker.check("results.threads", writer.sequence, any(judges))
 }
 
 /// Checks simulations to the same time with other step sizes and constant inputs.

@@ -4,6 +4,7 @@
 use crate::call_sequence::{Run, Values};
 use crate::checker::Checker;
 use crate::description::Variable;
+use crate::finding::{Judges, any};
 use crate::values::other_values;
 use crate::worker::FILL;
 use crate::writer::Part::{Begin, Enter, Free, Leave, Make, Points};
@@ -135,9 +136,8 @@ fn constants(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let first = writer.read_these(0, &fixed);
     writer.play(0, &[Points(usize::MAX)]);
     let last = writer.read_these(0, &fixed);
-    let differ = checker
-        .differ(first, last, |name, before, after| format!("{name} was {before} and has become {after}"));
-    checker.check("start_values.fixed", writer.sequence, differ)
+    let judge = checker.differ(&first, &last, "{} was {} and has become {}");
+    checker.check("start_values.fixed", writer.sequence, judge)
 }
 
 /// Checks that values that are set are read: before and in Initialization Mode, and at a communication point.
@@ -192,9 +192,8 @@ fn when(checker: &Checker, trajectory: &Trajectory, values: &[(usize, Values)]) 
             writer.play(0, after);
             writer.play(0, &[Part::Read, Leave, Part::ReadAll, Free]).reads
         });
-    let differ = checker.differ(before, within, |name, one, other| {
-        format!("{name} is {one} with values set before Initialization Mode, {other} with those set in it")
-    });
+    let message = "{} is {} with values set before Initialization Mode, {} with values set in it";
+    let differ = checker.differ(&before, &within, message);
     checker.check("start_values.when", writer.sequence, move |run| {
         let good = sets.iter().all(|id| run.succeeds(*id));
         if good { differ(run) } else { None }
@@ -208,16 +207,16 @@ fn lost(
     reads: Vec<Read>,
     values: Vec<(usize, Values)>,
     has: &'static str,
-) -> impl Fn(&Run) -> Option<String> + use<> {
+) -> Box<dyn Judges> {
     let description = checker.description.clone();
-    move |run| {
+    Box::new(move |run: &Run| {
         let good = ids.iter().all(|id| run.succeeds(*id));
         values.iter().filter(|_| good).find_map(|(index, value)| {
             let read = value_of(run, &reads, *index).filter(|read| read.differ(value).is_some())?;
             let name = &description.variables[*index].name;
             Some(format!("{name} was set to {} and {has} {}", value.show(0), read.show(0)))
         })
-    }
+    })
 }
 
 fn read_back(
@@ -250,6 +249,5 @@ fn inputs(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         let reads = read_again(&mut writer, &point.inputs);
         judges.push(lost(checker, ids, reads, point.inputs.clone(), "has become"));
     }
-    checker
-        .check("start_values.inputs", writer.sequence, move |run| judges.iter().find_map(|judge| judge(run)))
+    checker.check("start_values.inputs", writer.sequence, any(judges))
 }

@@ -3,9 +3,9 @@
 
 use crate::call_sequence::{Step, Values};
 use crate::checker::Checker;
-use crate::finding::{Judges, failure};
+use crate::finding::{any, fails};
 use crate::writer::Part::{Begin, Call, Drop, Enter, Free, Leave, Make, Points, ReadAll, Restore, Run, Save};
-use crate::writer::{Read, Trajectory};
+use crate::writer::Trajectory;
 
 /// The points at which states are saved: the first, one in the middle, one near the end.
 fn indices(trajectory: &Trajectory) -> Vec<usize> {
@@ -17,30 +17,25 @@ fn indices(trajectory: &Trajectory) -> Vec<usize> {
     indices
 }
 
-fn same(checker: &Checker, what: &'static str, one: Vec<Read>, other: Vec<Read>) -> Box<dyn Judges> {
-    checker
-        .differ(one, other, move |name, before, after| format!("{name} was {before}, {what} it is {after}"))
-}
-
 /// Checks that saving changes nothing, and that a simulation can be repeated from a restored state, twice.
 pub fn restore(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for index in indices(trajectory) {
         let mut writer = checker.writer(trajectory);
-        let before = writer.play(0, &[Begin, Points(index), ReadAll]).reads;
-        let after = writer.play(0, &[Save(0), ReadAll]).reads;
-        let first = writer.play(0, &[Run(index)]).reads;
-        let at_once = writer.play(0, &[Restore(0), ReadAll]).reads;
-        let second = writer.play(0, &[Run(index)]).reads;
-        let third = writer.play(0, &[Restore(0), Run(index)]).reads;
+        let [before, after, first] =
+            writer.groups(0, &[Begin, Points(index), ReadAll, Save(0), ReadAll, Run(index)]);
+        let [at_once, second, third] =
+            writer.groups(0, &[Restore(0), ReadAll, Run(index), Restore(0), Run(index)]);
         let sequence = writer.sequence;
-        let saving = same(checker, "after the state was saved", before.clone(), after);
+        let saving = checker.differ(&before, &after, "{} was {}, after the state was saved it is {}");
         let run = checker.judge("states.changed-by-saving", sequence.clone(), saving)?;
-        let judges = [
-            ("states.restore-values", same(checker, "after the state was restored", before, at_once)),
-            ("states.restore", same(checker, "from the restored state", first.clone(), second)),
-            ("states.twice", same(checker, "from the state restored a second time", first, third)),
+        let pairs = [
+            ("states.restore-values", &before, &at_once, "{} was {}, after the state was restored it is {}"),
+            ("states.restore", &first, &second, "{} was {}, from the restored state it is {}"),
+            ("states.twice", &first, &third, "{} was {}, from the state restored a second time it is {}"),
         ];
-        judges.into_iter().any(|(name, judge)| checker.keep(name, &run, &sequence, judge));
+        pairs.into_iter().any(|(name, one, other, message)| {
+            checker.keep(name, &run, &sequence, checker.differ(one, other, message))
+        });
     }
     modes(checker, trajectory)?;
     reused(checker, trajectory)?;
@@ -54,12 +49,12 @@ fn modes(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     // Back to Initialization Mode, then to the new instance.
     let back = writer.play(0, &[Restore(1), Leave, Run(0)]);
     let again = writer.play(0, &[Restore(0), Enter, Leave, Run(0)]);
-    let one = same(checker, "from the state of Initialization Mode", first.clone(), back.reads);
-    let two = same(checker, "from the state of the new instance", first, again.reads);
-    let (sequence, ids) = (writer.sequence.clone(), [back.ids, again.ids].concat());
-    checker.check("states.modes", writer.sequence, move |run| {
-        failure(&sequence, run, &ids).or_else(|| one(run)).or_else(|| two(run))
-    })
+    let judges = [
+        fails(&writer.sequence, [back.ids, again.ids].concat()),
+        checker.differ(&first, &back.reads, "{} was {}, from the state of Initialization Mode it is {}"),
+        checker.differ(&first, &again.reads, "{} was {}, from the state of the new instance it is {}"),
+    ];
+    checker.check("states.modes", writer.sequence, any(judges))
 }
 
 /// Checks a handle that is used again for another state, and two saved states.
@@ -70,18 +65,17 @@ fn reused(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.play(0, &[Begin, Points(1), Save(0), Save(1)]);
     writer.point(0, &trajectory.points[1]);
-    let values = writer.read_all(0);
-    let first = writer.play(0, &[Save(1), Run(2)]).reads;
-    let again = writer.play(0, &[Restore(0), Restore(1), ReadAll]).reads;
-    let second = writer.play(0, &[Run(2), Restore(0)]).reads;
+    let [values, first] = writer.groups(0, &[ReadAll, Save(1), Run(2)]);
+    let [again, second] = writer.groups(0, &[Restore(0), Restore(1), ReadAll, Run(2), Restore(0)]);
     writer.point(0, &trajectory.points[1]);
     let from_first = writer.play(0, &[ReadAll, Drop(0), Drop(1)]).reads;
+    let used = "{} was {}, from the state in a used handle it is {}";
     let judges = [
-        same(checker, "from the state in a used handle", values.clone(), again),
-        same(checker, "from the state in a used handle", first, second),
-        same(checker, "from the other state", values, from_first),
+        checker.differ(&values, &again, used),
+        checker.differ(&first, &second, used),
+        checker.differ(&values, &from_first, "{} was {}, from the other state it is {}"),
     ];
-    checker.check("states.several", writer.sequence, move |run| judges.iter().find_map(|judge| judge(run)))
+    checker.check("states.several", writer.sequence, any(judges))
 }
 
 /// Checks that freeing NULL is ignored and that freeing a state sets its handle to NULL.
@@ -116,15 +110,15 @@ pub fn serialized(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<
         let read = writer.deserialize(1, 0, 1);
         let set = writer.play(1, &[Restore(1), ReadAll]);
         let second = writer.play(1, &[Run(index)]).reads;
-        let sequence = writer.sequence.clone();
         let name = if fresh { "states.fresh-process" } else { "states.serialized" };
-        let one = same(checker, "from the bytes", before, set.reads);
-        let two = same(checker, "from the bytes", first, second);
+        let message = "{} was {}, from the bytes it is {}";
+        let judge = any([
+            fails(&writer.sequence, vec![read, set.ids[0]]),
+            checker.differ(&before, &set.reads, message),
+            checker.differ(&first, &second, message),
+        ]);
         checker.check(name, writer.sequence, move |run| {
-            if ![bytes, size].iter().all(|id| run.succeeds(*id)) {
-                return None;
-            }
-            failure(&sequence, run, &[read, set.ids[0]]).or_else(|| one(run)).or_else(|| two(run))
+            [bytes, size].iter().all(|id| run.succeeds(*id)).then(|| judge(run))?
         })?;
     }
     again(checker, trajectory)

@@ -148,7 +148,7 @@ macro_rules! mutants {
 mutants! {
     2 half_set "refusals" "refusals.changed";
     3 discard_changes "refusals" "refusals.discarded";
-    2 step_refused_halfway "refusals" "refusals.changed";
+    2 step_rejected_halfway "refusals" "refusals.changed";
     2 getter_changes "results" "results.reading";
     3 reading_once "results" "results.reading";
     2 lossy_state "states" "states.restore-values";
@@ -183,7 +183,7 @@ mutants! {
     2 thread_left "resources" "resources.threads";
     3 rounding_changed "resources" "resources.settings";
     2 locale_changed "resources" "resources.settings";
-    3 second_run_refused "resources" "resources.cycles";
+    3 second_run_rejected "resources" "resources.cycles";
     2 reset_without_count "reset" "reset.incomplete";
     3 reset_keeps_parameter "reset" "reset.values";
     2 event_in_the_past "life_cycle" "life_cycle.next-event-time";
@@ -199,9 +199,9 @@ mutants! {
     3 state_not_supported "functions" "functions.capability";
     2 status_unknown "results" "functions.status";
     3 free_null_crashes "life_cycle" "life_cycle.free-null.crash";
-    2 terminate_refused "life_cycle" "life_cycle.refused";
-    3 reset_refused "reset" "reset.incomplete";
-    2 get_after_end_refused "life_cycle" "life_cycle.refused";
+    2 terminate_rejected "life_cycle" "life_cycle.refused";
+    3 reset_rejected "reset" "reset.incomplete";
+    2 get_after_end_rejected "life_cycle" "life_cycle.refused";
     3 crash_amid "results" "results.crash";
     3 token_ignored "life_cycle" "life_cycle.token";
     2 category_unknown "refusals" "logs.category";
@@ -223,7 +223,7 @@ mutants! {
     3 directional_added "derivatives" "derivatives.directional";
     3 event_again_now "life_cycle" "life_cycle.next-event-time";
     2 event_moves_silently "life_cycle" "life_cycle.states-changed";
-    2 last_step_refused "life_cycle" "life_cycle.refused";
+    2 last_step_rejected "life_cycle" "life_cycle.refused";
     3 early_time_wrong "results" "results.early-return";
     3 early_unsaid "results" "results.early-unsaid";
     2 name_in_result "results" "results.name";
