@@ -97,7 +97,6 @@ fn show(text: &[u8]) -> String {
     format!("{:?}", String::from_utf8_lossy(text))
 }
 
-/// Conversions of printf.
 const CONVERSIONS: [&str; 14] =
     ["%s", "%d", "%i", "%u", "%g", "%f", "%e", "%x", "%lf", "%ld", "%lu", "%zu", "%.", "%p"];
 
@@ -133,7 +132,6 @@ const MESSAGE_TESTS: [(&str, MessageTest); 4] = [
     }),
 ];
 
-/// The messages of a call.
 fn messages(description: &Description, id: u32) -> impl Iterator<Item = Broken> {
     MESSAGE_TESTS.into_iter().map(move |(name, test)| {
         let (categories, standard) = (description.log_categories.clone(), description.standard);

@@ -18,7 +18,6 @@ impl Accepted {
     }
 }
 
-/// The accepted findings.
 #[derive(Default)]
 pub struct Baseline {
     accepted: Vec<Accepted>,
@@ -55,7 +54,7 @@ impl Baseline {
                     None => (None, rest),
                 };
                 let reason = reason.strip_prefix(':').map(str::trim).filter(|reason| !reason.is_empty());
-                let known = crate::rules::find(name).is_some()
+                let known = crate::rules::is_known(name)
                     || crate::INTERFACES.contains(&name)
                     || crate::rules::TOPICS.contains(&name);
                 match reason {

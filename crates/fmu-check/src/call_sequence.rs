@@ -98,7 +98,6 @@ pub enum Arg {
 }
 
 impl Arg {
-    /// A floating-point number.
     pub fn real(number: f64) -> Self {
         Self::Real(number.to_bits())
     }
@@ -128,10 +127,13 @@ pub const NULL_INSTANCE: usize = 999;
 pub enum Step {
     /// A new instance at this index.
     Make(usize, Make),
-    /// Frees the instance.
     Free(usize),
     /// Calls a function of an instance, or of NULL, with the arguments after the instance.
-    Call { of: Option<usize>, function: String, args: Vec<Arg> },
+    Call {
+        of: Option<usize>,
+        function: String,
+        args: Vec<Arg>,
+    },
     /// Calls that need no instance: the version and the platform.
     Version(String),
     /// Repeats steps this many times, or until the time limit.
@@ -142,7 +144,6 @@ pub enum Step {
     Measure,
     /// Continues in a new process, which receives only serialized bytes.
     FreshProcess,
-    /// Unloads the library.
     Unload,
     /// Exits the process, which runs the destructors of its libraries. Must be the last step.
     Quit,
@@ -208,7 +209,6 @@ impl Values {
         Self::Texts(vec![Some(text.to_owned()); size])
     }
 
-    /// The numbers.
     pub fn numbers(&self) -> Vec<f64> {
         match self {
             Self::Numbers(kind, bits) => bits.iter().map(|bits| kind.number(*bits)).collect(),
@@ -314,7 +314,6 @@ pub enum End {
 pub struct Run {
     /// Results by the number of the step.
     pub outcomes: HashMap<u32, Outcome>,
-    /// How it ended.
     pub end: End,
     /// The step in which it ended, if not with the last.
     pub at: Option<u32>,

@@ -51,12 +51,10 @@ const ALONE: [&str; 5] = [
 pub struct Random(u64);
 
 impl Random {
-    /// The numbers that follow from a seed.
     pub fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1)
     }
 
-    /// A number below this one.
     pub fn below(&mut self, end: usize) -> usize {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 33) as usize % end
@@ -150,12 +148,10 @@ impl Checker {
         }
     }
 
-    /// A writer of sequences that vary a simulation.
     pub fn writer<'a>(&'a self, trajectory: &'a Trajectory) -> Writer<'a> {
         Writer::new(&self.description, trajectory, &self.readable)
     }
 
-    /// A sequence of one step.
     pub fn step(&self, step: Step, forbidden: bool) -> CallSequence {
         vec![Numbered { id: 0, forbidden, step }]
     }
@@ -170,7 +166,6 @@ impl Checker {
         if self.quick { many.div_ceil(8) } else { many }
     }
 
-    /// Whether the standard is 3.0.
     pub fn fmi3(&self) -> bool {
         self.description.standard == Standard::Fmi3
     }
@@ -180,12 +175,10 @@ impl Checker {
         self.description.offer(interface).is_some_and(|offer| offer.can(names))
     }
 
-    /// Whether it saves states.
     pub fn saves(&self, interface: Interface) -> bool {
         self.can(interface, &["canGetAndSetFMUstate", "canGetAndSetFMUState"])
     }
 
-    /// Whether it serializes states.
     pub fn serializes(&self, interface: Interface) -> bool {
         self.saves(interface) && self.can(interface, &["canSerializeFMUstate", "canSerializeFMUState"])
     }
@@ -195,7 +188,6 @@ impl Checker {
         !self.can(interface, &["canBeInstantiatedOnlyOncePerProcess"])
     }
 
-    /// Plays a sequence.
     pub fn play(&self, sequence: &CallSequence) -> anyhow::Result<Run> {
         self.play_for(sequence, self.limit)
     }
@@ -243,17 +235,14 @@ impl Checker {
         Some(format!("{id} {:?}", step_of(sequence, id)?.step))
     }
 
-    /// How many sequences were played.
     pub fn played(&self) -> u64 {
         *locked(&self.played)
     }
 
-    /// The findings.
     pub fn take(&self) -> Vec<Finding> {
         std::mem::take(&mut locked(&self.found))
     }
 
-    /// The interfaces and topics that were not checked.
     pub fn take_unchecked(&self) -> Vec<Unchecked> {
         std::mem::take(&mut locked(&self.unchecked))
     }
@@ -266,7 +255,6 @@ impl Checker {
         }
     }
 
-    /// Keeps a finding.
     pub fn add(&self, finding: Finding) {
         keep(&mut locked(&self.found), finding);
     }

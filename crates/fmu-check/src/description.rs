@@ -8,11 +8,9 @@ use fmi_abi::{BaseType, Standard};
 use std::collections::HashSet;
 use std::ops::Deref;
 
-/// The model description.
 #[derive(Clone, Debug)]
 pub struct Description {
     written: ModelDescription,
-    /// Start time of the default experiment.
     pub start_time: f64,
     /// Stop time of the default experiment, if it has one.
     pub stop_time: Option<f64>,

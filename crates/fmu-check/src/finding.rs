@@ -193,7 +193,6 @@ pub fn first_failure(sequence: &CallSequence, run: &Run, most: i32) -> Option<St
     of_makes.or_else(|| sequence.iter().filter(failed).find_map(one))
 }
 
-/// The name of a status.
 pub fn status_name(status: i32) -> String {
     let names = ["OK", "Warning", "Discard", "Error", "Fatal", "Pending"];
     let name = usize::try_from(status).ok().and_then(|index| names.get(index));

@@ -68,7 +68,6 @@ fn walk(description: &Description, sequence: &[Numbered], objects: &mut Objects)
 }
 
 impl Objects {
-    /// Instantiates; returns whether that is allowed.
     fn make(&mut self, description: &Description, index: usize, make: &Make) -> bool {
         let interface = if make.co_simulation { Interface::CoSimulation } else { Interface::ModelExchange };
         let once = description

@@ -268,7 +268,6 @@ fn integrated(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<T
     Ok(trajectory)
 }
 
-/// Steps of Co-Simulation.
 pub fn steps(description: &Description, start: f64, sizes: &[f64], discrete: bool) -> Vec<Point> {
     let mut time = start;
     let points = sizes.iter().enumerate();

@@ -50,7 +50,6 @@ impl Trajectory {
 #[derive(Clone, Copy, Debug)]
 pub enum Part {
     Make,
-    /// Enters Initialization Mode.
     Enter,
     /// Leaves it for the mode in which time advances.
     Leave,
@@ -60,7 +59,6 @@ pub enum Part {
     Points(usize),
     /// Goes from this point to the end, and reads after each.
     Run(usize),
-    /// Reads the variables.
     Read,
     /// Reads the variables and vectors.
     ReadAll,
@@ -73,7 +71,6 @@ pub enum Part {
     Restore(usize),
     /// Frees the saved state.
     Drop(usize),
-    /// Frees the instance.
     Free,
 }
 
@@ -95,24 +92,20 @@ pub struct Writer<'a> {
     pub readable: &'a [usize],
     /// The steps so far.
     pub sequence: CallSequence,
-    /// The next number.
     pub next: u32,
     /// Whether the steps that follow are forbidden by the standard.
     pub forbidden: bool,
 }
 
 impl<'a> Writer<'a> {
-    /// An empty sequence.
     pub fn new(description: &'a Description, trajectory: &'a Trajectory, readable: &'a [usize]) -> Self {
         Self { description, trajectory, readable, sequence: Vec::new(), next: 0, forbidden: false }
     }
 
-    /// Whether the standard is 3.0.
     pub fn fmi3(&self) -> bool {
         self.description.standard == Standard::Fmi3
     }
 
-    /// Adds a step.
     pub fn add(&mut self, step: Step) -> u32 {
         let id = self.next;
         self.next += 1;
@@ -140,7 +133,6 @@ impl<'a> Writer<'a> {
         id
     }
 
-    /// Writes parts of a simulation.
     pub fn play(&mut self, of: usize, parts: &[Part]) -> Played {
         let mut played = Played::default();
         let points = &self.trajectory.points;
@@ -195,24 +187,20 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// A new instance.
     pub fn make(&mut self, of: usize) -> u32 {
         self.make_with(of, |_| {})
     }
 
-    /// A new instance with other arguments.
     pub fn make_with(&mut self, of: usize, change: impl FnOnce(&mut Make)) -> u32 {
         let mut how = self.how();
         change(&mut how);
         self.add(Step::Make(of, how))
     }
 
-    /// Frees an instance.
     pub fn free(&mut self, of: usize) -> u32 {
         self.add(Step::Free(of))
     }
 
-    /// Enters Initialization Mode.
     pub fn enter(&mut self, of: usize) -> u32 {
         self.enter_with(of, None, self.description.start_time, None)
     }
@@ -294,7 +282,6 @@ impl<'a> Writer<'a> {
         groups
     }
 
-    /// Value reference of a variable.
     fn reference(&self, index: usize) -> u64 {
         u64::from(self.description.variables[index].reference)
     }
@@ -349,7 +336,6 @@ impl<'a> Writer<'a> {
         reads
     }
 
-    /// Reads all variables.
     pub fn read(&mut self, of: usize) -> Vec<Read> {
         self.read_these(of, self.readable)
     }
@@ -375,12 +361,10 @@ impl<'a> Writer<'a> {
         ids
     }
 
-    /// A step of Co-Simulation.
     pub fn step(&mut self, of: usize, time: f64, size: f64) -> u32 {
         self.call(of, "DoStep", step_args(self.description.standard, time, size))
     }
 
-    /// Sets the continuous states.
     pub fn set_states(&mut self, of: usize, states: &[f64]) -> u32 {
         let bits = states.iter().map(|number| number.to_bits()).collect();
         self.call(of, "SetContinuousStates", vec![Arg::In(Kind::F64, bits), Arg::Whole(states.len() as i64)])
@@ -391,7 +375,6 @@ impl<'a> Writer<'a> {
         self.call(of, function, vec![Arg::Out(Kind::F64, count), Arg::Whole(count as i64)])
     }
 
-    /// Name of the function that returns the derivatives of the states.
     pub fn derivatives_name(&self) -> &'static str {
         if self.fmi3() { "GetContinuousStateDerivatives" } else { "GetDerivatives" }
     }
@@ -430,7 +413,6 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// The arguments of a getter or setter.
 pub fn access(
     standard: Standard,
     references: Vec<u64>,
@@ -442,7 +424,6 @@ pub fn access(
     [Arg::In(Kind::U32, references), count].into_iter().chain(values).chain(sizes).collect()
 }
 
-/// The arguments of a step.
 pub fn step_args(standard: Standard, time: f64, size: f64) -> Vec<Arg> {
     let mut args = vec![Arg::real(time), Arg::real(size), Arg::Whole(0)];
     if standard == Standard::Fmi3 {

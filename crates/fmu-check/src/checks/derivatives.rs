@@ -131,12 +131,10 @@ pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
     differences(checker, trajectory, &unknowns, &knowns, has_directional)
 }
 
-/// Value references of variables.
 pub fn references(description: &Description, indices: &[usize]) -> Vec<u32> {
     indices.iter().map(|index| description.variables[*index].reference).collect()
 }
 
-/// Names of variables.
 fn names(description: &Description, indices: &[usize]) -> Vec<String> {
     indices.iter().map(|index| description.variables[*index].name.clone()).collect()
 }

@@ -24,7 +24,6 @@ use Fits::{Always, Integrated, Saves, Serializes, Several, Stepped, Stepped3};
 /// A check.
 #[derive(Clone, Copy)]
 pub enum Check {
-    /// Runs once.
     Once(fn(&Checker) -> anyhow::Result<()>),
     /// Runs for each simulation that fits.
     Each(Fits, fn(&Checker, &Trajectory) -> anyhow::Result<()>),
@@ -35,7 +34,6 @@ pub enum Check {
 /// The simulations that a check or an order of calls fits.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Fits {
-    /// All of them.
     Always,
     /// Simulations of Co-Simulation.
     Stepped,

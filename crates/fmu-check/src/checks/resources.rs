@@ -80,7 +80,8 @@ fn measured(
             format!("{grown} bytes are left after {times} {what}: {} for each", grown / times as u64)
         })
     });
-    let counts: [(_, fn(&Measured) -> usize, _); 2] = [
+    type Count = fn(&Measured) -> usize;
+    let counts: [(&str, Count, &str); 2] = [
         ("resources.threads", |measured| measured.threads, "threads are left"),
         ("resources.files", |measured| measured.files, "files are left open"),
     ];

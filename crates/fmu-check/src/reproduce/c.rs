@@ -8,7 +8,6 @@ use fmi_abi::calls::signature;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-/// The program.
 pub fn program(
     finding: &Finding,
     sequence: &CallSequence,
@@ -135,13 +134,11 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    /// The next number.
     fn number(&mut self) -> usize {
         self.next += 1;
         self.next - 1
     }
 
-    /// The steps in C.
     fn block(&mut self, sequence: &[Numbered], indent: &str) -> String {
         let lines = sequence.iter().map(|numbered| self.step(numbered)).collect::<String>();
         lines.lines().fold(String::new(), |text, line| text + indent + line + "\n")
@@ -286,7 +283,6 @@ impl Writer<'_> {
     }
 }
 
-/// The lines of a call.
 #[derive(Default)]
 struct Parts {
     before: Vec<String>,
@@ -298,7 +294,6 @@ struct Parts {
 }
 
 impl Parts {
-    /// An array for reading.
     fn array(&mut self, number: usize, of: &str, list: impl Iterator<Item = String>) -> String {
         let list: Vec<String> = list.collect();
         let (count, list) = (list.len(), if list.is_empty() { "0".to_owned() } else { list.join(", ") });
@@ -309,7 +304,6 @@ impl Parts {
         format!("a{number}")
     }
 
-    /// An array that is written.
     fn out(&mut self, name: &str, kind: Kind, count: usize, number: usize) -> String {
         let (c, width) = (kind.c_name(), kind.size());
         self.before.push(format!("void *a{number} = guarded(NULL, {count} * sizeof({c}));"));

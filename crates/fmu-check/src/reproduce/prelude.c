@@ -107,7 +107,6 @@ static void open_library(void) {
     if (!library) { print("%s\n", dlerror()); fflush(out); _exit(4); }
 }
 
-/* A function of the library. */
 static void *function(const char *name) {
     void *found = dlsym(library, name);
     if (!found) { print("%s is not in the library\n", name); exit(3); }
@@ -185,7 +184,6 @@ static __attribute__((unused)) Callbacks callbacks = {logger2, calloc, free, NUL
 
 static void *copy(const char *text) { return guarded(text, strlen(text) + 1); }
 
-/* Instantiates. */
 static __attribute__((unused)) void *make(int index, const char *name, const char *token, bool co_simulation, bool logging, bool events, bool early) {
     size_t before = arrays;
     void *made;

@@ -2,7 +2,6 @@
 
 use crate::call_sequence::Measured;
 
-/// Measures now.
 pub fn now() -> Measured {
     let (memory, exact) = memory();
     let entries = |directory: &str| std::fs::read_dir(directory).map_or(0, Iterator::count);

@@ -37,12 +37,10 @@ impl Inside {
         })
     }
 
-    /// A function of the FMU is called.
     pub fn enter(&self) {
         self.count().fetch_add(1, Ordering::Relaxed);
     }
 
-    /// The call has returned.
     pub fn leave(&self) {
         self.count().fetch_sub(1, Ordering::Relaxed);
     }
@@ -174,7 +172,6 @@ impl Guarded {
         Self::new(&vec![FILL; size])
     }
 
-    /// Address of the first byte.
     pub fn address(&self) -> u64 {
         self.pages.open().0.wrapping_add(self.begin) as u64
     }
@@ -185,7 +182,6 @@ impl Guarded {
         unsafe { std::slice::from_raw_parts(map, open) }
     }
 
-    /// Its bytes now.
     pub fn bytes(&self) -> &[u8] {
         &self.all()[self.begin..self.begin + self.size]
     }

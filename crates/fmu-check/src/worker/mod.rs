@@ -45,12 +45,10 @@ pub const OWN_FAULT: i32 = 97;
 /// The exit status of a worker that has played its sequence.
 pub const PLAYED: i32 = 96;
 
-/// The job of a worker.
 #[derive(Serialize, Deserialize)]
 pub struct Job {
     /// The setting that all call sequences share.
     pub setting: Setting,
-    /// The steps.
     pub sequence: CallSequence,
     /// Serialized bytes of processes before.
     pub bytes: HashMap<usize, Vec<u8>>,
@@ -59,7 +57,6 @@ pub struct Job {
 /// The last line that a worker writes.
 #[derive(Serialize, Deserialize)]
 pub struct Last {
-    /// Serialized bytes.
     pub bytes: HashMap<usize, Vec<u8>>,
 }
 
@@ -122,7 +119,6 @@ fn work(job: Job, file: File) {
     player.write(&Last { bytes: std::mem::take(&mut locked(&player.bytes)) });
 }
 
-/// Limits of the process.
 fn limit(memory: u64) {
     #[cfg(unix)]
     {
@@ -617,7 +613,6 @@ impl Player {
 /// The loader's reason, as the only line.
 #[derive(Serialize, Deserialize)]
 pub struct Unloadable {
-    /// The messages.
     pub unloadable: String,
 }
 

@@ -528,7 +528,6 @@ EXPORT(GetNominalsOfContinuousStates)(void *c, double *x, size_t n) {
 }
 #endif
 
-/* States. */
 static char *secret[4096];
 static unsigned secrets;
 
