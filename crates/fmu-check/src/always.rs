@@ -21,7 +21,7 @@ pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -
     let all = all_steps(sequence);
     let mut broken: Vec<Broken> = processes(&all, run).into_iter().collect();
     for numbered in &all {
-        if let Some(outcome) = run.of(numbered.id) {
+        if let Some(outcome) = run.outcome(numbered.id) {
             broken.extend(call(numbered));
             broken.extend(messages(description, numbered.id).filter(|_| !outcome.log.is_empty()));
             broken.extend(silence(sequence, numbered));
@@ -44,7 +44,7 @@ fn processes(all: &[&Numbered], run: &Run) -> Option<Broken> {
     let pairs = lives(all)?;
     Some(rule("resources.processes", move |run| {
         let (count, first) = (run.left.len(), run.left.first()?);
-        let freed = |(make, free): &(u32, u32)| run.of(*make).is_none() || run.of(*free).is_some();
+        let freed = |(make, free): &(u32, u32)| run.outcome(*make).is_none() || run.outcome(*free).is_some();
         let processes = if count == 1 { "process is" } else { "processes are" };
         pairs.iter().all(freed).then(|| {
             format!("{count} {processes} left after all instances were freed; the first is called {first:?}")
@@ -72,7 +72,8 @@ fn call(numbered: &Numbered) -> Vec<Broken> {
     let arrays = [("arrays.const", true), ("arrays.written-beyond", false)].map(|(of, constant)| {
         let name = name.clone();
         rule(of, move |run| {
-            let damage = run.of(id)?.damage.iter().find(|damage| damage.contains("const") == constant)?;
+            let damage =
+                run.outcome(id)?.damage.iter().find(|damage| damage.contains("const") == constant)?;
             Some(format!("{name} writes {damage}"))
         })
     });
@@ -136,7 +137,7 @@ fn messages(description: &Description, id: u32) -> impl Iterator<Item = Broken> 
     MESSAGE_TESTS.into_iter().map(move |(name, test)| {
         let (categories, standard) = (description.log_categories.clone(), description.standard);
         rule(name, move |run| {
-            run.of(id)?.log.iter().find_map(|message| {
+            run.outcome(id)?.log.iter().find_map(|message| {
                 let text = show(message.text.as_deref().unwrap_or_default());
                 Some(format!("message {text}: {}", test(message, &categories, standard)?))
             })
@@ -150,12 +151,12 @@ fn silence(sequence: &CallSequence, numbered: &Numbered) -> Option<Broken> {
         matches!(&numbered.step, Step::Make(_, make) if !make.logging)
             || matches!(&numbered.step, Step::Call { function, .. } if function.ends_with("SetDebugLogging"))
     });
-    if off || !matches!(&numbered.step, Step::Call { of: Some(_), .. }) {
+    if off || !matches!(&numbered.step, Step::Call { instance: Some(_), .. }) {
         return None;
     }
     let (id, name) = (numbered.id, step_name(&numbered.step));
     Some(rule("logs.silent", move |run| {
-        let outcome = run.of(id)?;
+        let outcome = run.outcome(id)?;
         let status = outcome.status.filter(|status| (2..=4).contains(status))?;
         outcome.log.is_empty().then(|| format!("{name} returns {} without a message", status_name(status)))
     }))

@@ -68,10 +68,10 @@ impl Baseline {
     }
 
     /// The reason for which all observations of a finding are accepted.
-    pub fn of_finding(&self, finding: &Finding) -> Option<String> {
+    pub fn reason(&self, finding: &Finding) -> Option<String> {
         let mut reasons: Vec<&str> = Vec::new();
         for observed in std::iter::once(&finding.observed).chain(&finding.more) {
-            let accepted = self.accepted.iter().find(|of| of.fits(finding, observed))?;
+            let accepted = self.accepted.iter().find(|accepted| accepted.fits(finding, observed))?;
             if !reasons.contains(&accepted.reason.as_str()) {
                 reasons.push(&accepted.reason);
             }
@@ -80,20 +80,20 @@ impl Baseline {
     }
 
     /// The reason for which an interface or a topic need not be checked.
-    pub fn of_unchecked(&self, name: &str) -> Option<&str> {
-        self.accepted.iter().find(|of| of.name == name).map(|of| of.reason.as_str())
+    pub fn unchecked_reason(&self, name: &str) -> Option<&str> {
+        self.accepted.iter().find(|accepted| accepted.name == name).map(|accepted| accepted.reason.as_str())
     }
 
     /// Returns the names that match no finding and no unchecked topic.
     pub fn unused(&self, findings: &[Finding], unchecked: &[crate::Unchecked]) -> Vec<String> {
-        let used = |of: &&Accepted| {
-            unchecked.iter().any(|unchecked| unchecked.name == of.name)
+        let used = |accepted: &&Accepted| {
+            unchecked.iter().any(|unchecked| unchecked.name == accepted.name)
                 || findings.iter().any(|finding| {
                     let mut all = std::iter::once(&finding.observed).chain(&finding.more);
-                    all.any(|observed| of.fits(finding, observed))
+                    all.any(|observed| accepted.fits(finding, observed))
                 })
         };
-        self.accepted.iter().filter(|of| !used(of)).map(|of| of.name.clone()).collect()
+        self.accepted.iter().filter(|of| !used(of)).map(|accepted| accepted.name.clone()).collect()
     }
 }
 
@@ -111,15 +111,12 @@ mod tests {
             let more = observed[1..].iter().map(|observed| (*observed).to_owned()).collect();
             Finding { name: name.to_owned(), observed: observed[0].to_owned(), more, ..Finding::default() }
         };
-        assert_eq!(baseline.of_finding(&finding("logs.silent", &["a", "b"])), Some("since 2024".to_owned()));
-        let of_one = finding("refusals.tolerated", &["a value for J2"]);
-        assert_eq!(baseline.of_finding(&of_one), Some("intended: see the manual".to_owned()));
-        assert_eq!(
-            baseline.of_finding(&finding("refusals.tolerated", &["a value for J2", "one for J3"])),
-            None
-        );
-        assert_eq!(baseline.of_finding(&finding("states.restore", &["x"])), None);
-        assert_eq!(baseline.unused(&[of_one], &[]), ["logs.silent"]);
+        assert_eq!(baseline.reason(&finding("logs.silent", &["a", "b"])), Some("since 2024".to_owned()));
+        let accepted = finding("refusals.tolerated", &["a value for J2"]);
+        assert_eq!(baseline.reason(&accepted), Some("intended: see the manual".to_owned()));
+        assert_eq!(baseline.reason(&finding("refusals.tolerated", &["a value for J2", "one for J3"])), None);
+        assert_eq!(baseline.reason(&finding("states.restore", &["x"])), None);
+        assert_eq!(baseline.unused(&[accepted], &[]), ["logs.silent"]);
     }
 
     #[test]

@@ -130,7 +130,7 @@ pub enum Step {
     Free(usize),
     /// Calls a function of an instance, or of NULL, with the arguments after the instance.
     Call {
-        of: Option<usize>,
+        instance: Option<usize>,
         function: String,
         args: Vec<Arg>,
     },
@@ -324,12 +324,12 @@ pub struct Run {
 }
 
 impl Run {
-    pub fn of(&self, id: u32) -> Option<&Outcome> {
+    pub fn outcome(&self, id: u32) -> Option<&Outcome> {
         self.outcomes.get(&id)
     }
 
     pub fn status(&self, id: u32) -> Option<i32> {
-        self.of(id)?.status
+        self.outcome(id)?.status
     }
 
     /// Whether a step returned OK or a warning.
@@ -339,7 +339,7 @@ impl Run {
 
     /// The first array that a step wrote.
     pub fn written(&self, id: u32) -> Option<&Values> {
-        self.of(id)?.written.first()
+        self.outcome(id)?.written.first()
     }
 }
 

@@ -92,8 +92,8 @@ pub struct Checker {
     played: Mutex<u64>,
 }
 
-fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
-    of.lock().unwrap_or_else(PoisonError::into_inner)
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Keeps one finding of each name: the most severe, and of several such the one with the shortest call sequence, regardless
@@ -286,11 +286,11 @@ impl Checker {
     /// Plays a call sequence and judges the run: first by its end, then by the rules that hold
     /// for every run, then by `judge`.
     pub fn judge(&self, name: &str, sequence: CallSequence, judge: impl Judges) -> anyhow::Result<Run> {
-        let hostile = sequence.iter().any(|numbered| numbered.forbidden);
-        let limit = if hostile { self.limit.min(3.0) } else { self.limit };
+        let forbidden = sequence.iter().any(|numbered| numbered.forbidden);
+        let limit = if forbidden { self.limit.min(3.0) } else { self.limit };
         let run = self.play_for(&sequence, limit)?;
         if run.end != End::Done {
-            self.ended(name, &sequence, &run, hostile)?;
+            self.ended(name, &sequence, &run, forbidden)?;
             return Ok(run);
         }
         self.keep_always(&sequence, &run);
@@ -313,27 +313,28 @@ impl Checker {
     }
 
     /// Keeps the finding of a run that crashed, hung or exited.
-    fn ended(&self, rule: &str, sequence: &CallSequence, run: &Run, hostile: bool) -> anyhow::Result<()> {
+    fn ended(&self, rule: &str, sequence: &CallSequence, run: &Run, forbidden: bool) -> anyhow::Result<()> {
         let Some(observed) = ending(run, sequence) else { return Ok(()) };
         let ends: Judge = {
             let (sequence, kind) = (sequence.clone(), std::mem::discriminant(&run.end));
-            let place = |run: &Run, sequence: &CallSequence| at(sequence, run).map(|at| step_name(&at.step));
-            let at = place(run, &sequence);
+            let name_at =
+                |run: &Run, sequence: &CallSequence| at(sequence, run).map(|at| step_name(&at.step));
+            let at = name_at(run, &sequence);
             Arc::new(move |run: &Run| {
-                let same = std::mem::discriminant(&run.end) == kind && place(run, &sequence) == at;
+                let same = std::mem::discriminant(&run.end) == kind && name_at(run, &sequence) == at;
                 same.then(|| ending(run, &sequence))?
             })
         };
         let keep = |name: &str, observed: String| {
             let mut ended = self.broken(name, observed).shown_by(sequence.clone(), Arc::clone(&ends));
-            if hostile {
+            if forbidden {
                 ended.severity = ended.severity.max(Severity::Fragile);
             }
             self.add(ended);
             Ok(())
         };
         // A repetition with accessible memory after each array shows whether an access beyond an array caused the crash.
-        if matches!(run.end, End::Crash(_)) && cfg!(unix) && !hostile {
+        if matches!(run.end, End::Crash(_)) && cfg!(unix) && !forbidden {
             let soft = Setting { soft: true, ..self.setting.clone() };
             let again = self.workers.play(&soft, sequence, self.limit)?;
             if again.outcomes.values().any(|outcome| !outcome.damage.is_empty()) {
@@ -354,7 +355,7 @@ impl Checker {
         // An end that only this call sequence can show has the name of its rule; others have the name of the topic.
         let own = ["fresh-process", "unload", "exit"].iter().any(|name| rule.ends_with(name));
         let name = match rule.split_once('.') {
-            Some((topic, _)) if !own && (!hostile || topic == "refusals") => topic,
+            Some((topic, _)) if !own && (!forbidden || topic == "refusals") => topic,
             _ => rule,
         };
         keep(&format!("{name}.{what}"), observed)

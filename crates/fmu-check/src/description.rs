@@ -78,30 +78,30 @@ impl Description {
         for (index, variable) in self.variables.iter().enumerate() {
             let name = &variable.name;
             let (listed, output) = (outputs.contains(&index), variable.causality == "output");
-            let mut tell = |rule, why: String| wrong.push((rule, why));
+            let mut add = |rule, why: String| wrong.push((rule, why));
             if !names.insert(name) {
-                tell("description.names", format!("two variables are called {name:?}"));
+                add("description.names", format!("two variables are called {name:?}"));
             }
             if self.standard == Standard::Fmi3 && !references.insert(variable.reference) {
                 let why =
                     format!("value reference {} of {name} is that of another variable", variable.reference);
-                tell("description.references", why);
+                add("description.references", why);
             }
             if output && !listed && !variable.clocked {
                 let why = format!("output {name} is not among the outputs of ModelStructure");
-                tell("description.structure", why);
+                add("description.structure", why);
             }
             if !output && listed {
                 let why = format!("{name} is no output, and is among those of ModelStructure");
-                tell("description.structure", why);
+                add("description.structure", why);
             }
             if let Some(unit) = variable.unit.as_ref().filter(|unit| !self.units.contains_key(*unit)) {
                 let why = format!("{name} is in {unit:?}, which is no unit of UnitDefinitions");
-                tell("description.units", why);
+                add("description.units", why);
             }
             if let Some(of) = variable.declared_type.as_ref().filter(|of| !self.types.contains(*of)) {
                 let why = format!("{name} is of type {of:?}, which is none of TypeDefinitions");
-                tell("description.types", why);
+                add("description.types", why);
             }
             wrong.extend(faults(variable));
         }
@@ -171,48 +171,48 @@ const COMBINATIONS: &[(&str, &[&str], &[&str])] = &[
 /// Returns the rules that a variable breaks without regard to the others.
 fn faults(of: &Variable) -> Vec<Observation> {
     let (name, mut wrong) = (&of.name, Vec::new());
-    let mut tell = |rule, why: String| wrong.push((rule, why));
+    let mut add = |rule, why: String| wrong.push((rule, why));
     let fits = |(causality, variabilities, _): &&(&str, &[&str], &[&str])| {
         *causality == of.causality && variabilities.contains(&of.variability.as_str())
     };
     let (causality, variability, initial) = (&of.causality, &of.variability, &of.initial);
     match COMBINATIONS.iter().find(fits) {
         _ if of.base.is_none() || of.clocked => {}
-        None => tell("description.combination", format!("{name} is {causality} and {variability}")),
+        None => add("description.combination", format!("{name} is {causality} and {variability}")),
         Some((.., initials)) if !initials.contains(&initial.as_str()) => {
             let why = format!("{name} is {causality} and {variability}, with initial = {initial}");
-            tell("description.combination", why);
+            add("description.combination", why);
         }
         Some(_) => {}
     }
     if variability == "continuous" && !of.is_float() && of.base.is_some() {
-        tell("description.combination", format!("{name} is continuous and no floating-point number"));
+        add("description.combination", format!("{name} is continuous and no floating-point number"));
     }
     let needs_start =
         ["exact", "approx"].contains(&initial.as_str()) || causality == "input" && of.base.is_some();
     if needs_start && of.start.is_empty() && causality != "independent" && !of.clocked {
-        tell("description.start", format!("{name} ({causality}) has no start value"));
+        add("description.start", format!("{name} ({causality}) has no start value"));
     }
     if initial == "calculated" && !of.start.is_empty() && of.base.is_some() {
-        tell("description.start", format!("{name} is calculated and has a start value"));
+        add("description.start", format!("{name} is calculated and has a start value"));
     }
     if let (Some(min), Some(max)) = (of.min, of.max)
         && min > max
     {
-        tell("description.range", format!("{name} has a min of {min} and a max of {max}"));
+        add("description.range", format!("{name} has a min of {min} and a max of {max}"));
     }
     let outside =
         |number: &f64| of.min.is_some_and(|min| *number < min) || of.max.is_some_and(|max| *number > max);
     if let Some(number) = of.starts().into_iter().find(outside) {
         let why = format!("the start value of {name}, {number}, is outside its min and max");
-        tell("description.range", why);
+        add("description.range", why);
     }
     let texts = [BaseType::String, BaseType::Binary, BaseType::Boolean];
     let number =
         |text: &String| text.parse::<f64>().is_ok() || ["INF", "-INF", "NaN"].contains(&text.as_str());
     if of.base.is_some_and(|base| !texts.contains(&base)) && !of.start.iter().all(number) {
         let why = format!("the start value of {name}, {:?}, is no number", of.start.join(" "));
-        tell("description.start", why);
+        add("description.start", why);
     }
     wrong
 }

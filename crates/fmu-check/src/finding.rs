@@ -140,7 +140,7 @@ pub struct Event {
 
 /// The result of a successful update of the discrete states.
 pub fn event(run: &Run, id: u32, fmi3: bool) -> Option<Event> {
-    let outcome = run.of(id).filter(|of| of.status.is_some_and(|status| status <= 1))?;
+    let outcome = run.outcome(id).filter(|of| of.status.is_some_and(|status| status <= 1))?;
     let (flags, time) = if fmi3 {
         let number = |index: usize| outcome.written.get(index)?.numbers().first().copied();
         ([0, 1, 3, 4].map(|index| number(index) == Some(1.0)), number(5)?)
@@ -162,7 +162,7 @@ pub fn failure(sequence: &CallSequence, run: &Run, ids: &[u32]) -> Option<String
 
 /// Returns a sentence on this call if it did not return OK.
 pub fn failure_of(sequence: &CallSequence, run: &Run, id: u32) -> Option<String> {
-    let outcome = run.of(id)?;
+    let outcome = run.outcome(id)?;
     let step = &step_of(sequence, id)?.step;
     let name = step_name(step);
     if outcome.missing {
@@ -185,7 +185,7 @@ pub fn first_failure(sequence: &CallSequence, run: &Run, most: i32) -> Option<St
     let failed = |numbered: &&Numbered| {
         matches!(numbered.step, Step::Call { .. })
             && run
-                .of(numbered.id)
+                .outcome(numbered.id)
                 .is_some_and(|of| of.status.map_or(of.missing && most < 2, |status| status > most))
     };
     let one = |numbered: &Numbered| failure_of(sequence, run, numbered.id);

@@ -43,8 +43,8 @@ fn walk(description: &Description, sequence: &[Numbered], objects: &mut Objects)
                 objects.slots.retain(|_, (owner, _)| owner != index);
                 objects.instances.remove(index).is_some()
             }
-            Step::Call { of, function, args } => {
-                of.is_some_and(|index| objects.call(description.standard, index, function, args))
+            Step::Call { instance, function, args } => {
+                instance.is_some_and(|index| objects.call(description.standard, index, function, args))
             }
             // A call that is allowed twice is allowed any number of times.
             Step::Repeat(_, steps) => (0..2).all(|_| walk(description, steps, objects).is_none()),

@@ -203,7 +203,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     // The workers end, and write nothing any more, before the directory is removed.
     let workers = run::Workers::new(scratch.path().to_owned())?;
     let directory = &scratch.path().join("fmu");
-    let of_zip = checks::package::unpack(path, directory, options.unpacked << 20)?;
+    let zip_observations = checks::package::unpack(path, directory, options.unpacked << 20)?;
     let text = std::fs::read(directory.join("modelDescription.xml")).with_context(|| {
         format!("{}: there is no modelDescription.xml in it; it is no FMU", path.display())
     })?;
@@ -219,14 +219,14 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
         true => !options.quick || !LONG.contains(&topic),
         false => options.only.iter().any(|only| only == topic),
     };
-    let mut of_files = Vec::new();
+    let mut observations = Vec::new();
     if wanted("package") {
-        of_files.extend(of_zip);
-        of_files.extend(checks::package::look(directory, &description));
+        observations.extend(zip_observations);
+        observations.extend(checks::package::look(directory, &description));
     }
     if wanted("description") {
-        of_files.extend(encoding);
-        of_files.extend(description.wrong.iter().cloned());
+        observations.extend(encoding);
+        observations.extend(description.wrong.iter().cloned());
     }
     let (setting, without) = setting(options, directory, &description);
     let time = if options.quick { QUICK } else { options.time.max(1.0) };
@@ -234,7 +234,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     let limit = if options.quick { options.limit.min(QUICK / 10.0) } else { options.limit };
     let mut checker = Checker::new(description, setting, workers, options.seed, limit, deadline);
     checker.quick = options.quick;
-    of_files.into_iter().for_each(|(name, observed)| checker.add(checker.broken(name, observed)));
+    observations.into_iter().for_each(|(name, observed)| checker.add(checker.broken(name, observed)));
     without.into_iter().for_each(|(name, why)| checker.unchecked(name, why));
     simulate(&mut checker)?;
     attack(&checker, progress, &wanted)?;
@@ -288,7 +288,9 @@ fn reach(checker: &mut Checker, interface: Interface) -> anyhow::Result<writer::
     else {
         return trajectory;
     };
-    no_trajectory(checker, sequence.clone())?;
+    let copy = sequence.clone();
+    let judge = move |run: &call_sequence::Run| finding::first_failure(&copy, run, 1);
+    checker.check("life_cycle.simulation", sequence.clone(), judge)?;
     // An FMU that accesses memory beyond arrays may succeed with accessible memory after them.
     if ["arrays.read-beyond", "arrays.written-beyond"].iter().any(|name| checker.has(name)) {
         checker.setting.soft = true;
@@ -332,12 +334,6 @@ fn setting(
     (setting, without)
 }
 
-/// Keeps the finding that a simulation according to the standard fails.
-fn no_trajectory(checker: &Checker, sequence: call_sequence::CallSequence) -> anyhow::Result<()> {
-    let copy = sequence.clone();
-    checker.check("life_cycle.simulation", sequence, move |run| finding::first_failure(&copy, run, 1))
-}
-
 /// Handles all items, several at a time. After each, progress shows the line that `each` returns.
 fn in_parallel<T: Sync>(items: &[T], progress: bool, each: impl Fn(&T, usize) -> String + Sync) {
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
@@ -377,8 +373,8 @@ fn attack_with(
 
 /// All checks that are wanted, several at a time.
 fn attack(checker: &Checker, progress: bool, wanted: &(impl Fn(&str) -> bool + Sync)) -> anyhow::Result<()> {
-    let of_checks = checks::ALL.iter().filter(|(topic, _)| wanted(topic));
-    let jobs: Vec<_> = of_checks
+    let wanted_checks = checks::ALL.iter().filter(|(topic, _)| wanted(topic));
+    let jobs: Vec<_> = wanted_checks
         .flat_map(|(topic, check)| {
             let each = checker.trajectories.iter().map(Some);
             std::iter::once(None).chain(each).map(move |trajectory| (*topic, *check, trajectory))

@@ -10,7 +10,7 @@ use fmi_abi::{Interface, Standard};
 #[derive(Clone, Debug)]
 pub struct Read {
     pub id: u32,
-    pub of: Vec<(usize, usize)>,
+    pub variables: Vec<(usize, usize)>,
 }
 
 /// One point of a trajectory.
@@ -121,53 +121,59 @@ impl<'a> Writer<'a> {
     }
 
     /// Adds a call of a function, named without `fmi2` or `fmi3`.
-    pub fn call(&mut self, of: usize, function: &str, args: Vec<Arg>) -> u32 {
-        self.add(Step::Call { of: Some(of), function: self.named(function), args })
+    pub fn call(&mut self, instance: usize, function: &str, args: Vec<Arg>) -> u32 {
+        self.add(Step::Call { instance: Some(instance), function: self.named(function), args })
     }
 
     /// A call that the standard forbids, or whose arguments it forbids.
-    pub fn forbidden(&mut self, of: Option<usize>, function: &str, args: Vec<Arg>) -> u32 {
+    pub fn forbidden(&mut self, instance: Option<usize>, function: &str, args: Vec<Arg>) -> u32 {
         let before = std::mem::replace(&mut self.forbidden, true);
-        let id = self.add(Step::Call { of, function: self.named(function), args });
+        let id = self.add(Step::Call { instance, function: self.named(function), args });
         self.forbidden = before;
         id
     }
 
-    pub fn play(&mut self, of: usize, parts: &[Part]) -> Played {
+    pub fn play(&mut self, instance: usize, parts: &[Part]) -> Played {
         let mut played = Played::default();
         let points = &self.trajectory.points;
         for part in parts {
             match *part {
-                Part::Make => played.ids.push(self.make(of)),
-                Part::Enter => played.ids.push(self.enter(of)),
-                Part::Leave => played.ids.extend(self.leave(of)),
-                Part::Begin => played.ids.extend(self.begin(of)),
+                Part::Make => played.ids.push(self.make(instance)),
+                Part::Enter => played.ids.push(self.enter(instance)),
+                Part::Leave => played.ids.extend(self.leave(instance)),
+                Part::Begin => played.ids.extend(self.begin(instance)),
                 Part::Points(most) => {
-                    played.ids.extend(points.iter().take(most).flat_map(|point| self.point(of, point)));
+                    played.ids.extend(points.iter().take(most).flat_map(|point| self.point(instance, point)));
                 }
                 Part::Run(from) => {
                     for point in &points[from..] {
-                        played.ids.extend(self.point(of, point));
-                        played.reads.extend(self.read_all(of));
+                        played.ids.extend(self.point(instance, point));
+                        played.reads.extend(self.read_all(instance));
                     }
                 }
-                Part::Read => played.reads.extend(self.read(of)),
-                Part::ReadAll => played.reads.extend(self.read_all(of)),
-                Part::Call(function) => played.ids.push(self.call(of, function, vec![])),
-                Part::Update(times) => played.ids.extend(self.update(of, times)),
-                Part::Save(slot) => played.ids.push(self.call(of, "GetFMUState", vec![Arg::StateOut(slot)])),
-                Part::Restore(slot) => played.ids.push(self.call(of, "SetFMUState", vec![Arg::State(slot)])),
-                Part::Drop(slot) => played.ids.push(self.call(of, "FreeFMUState", vec![Arg::StateOut(slot)])),
-                Part::Free => played.ids.push(self.free(of)),
+                Part::Read => played.reads.extend(self.read(instance)),
+                Part::ReadAll => played.reads.extend(self.read_all(instance)),
+                Part::Call(function) => played.ids.push(self.call(instance, function, vec![])),
+                Part::Update(times) => played.ids.extend(self.update(instance, times)),
+                Part::Save(slot) => {
+                    played.ids.push(self.call(instance, "GetFMUState", vec![Arg::StateOut(slot)]))
+                }
+                Part::Restore(slot) => {
+                    played.ids.push(self.call(instance, "SetFMUState", vec![Arg::State(slot)]))
+                }
+                Part::Drop(slot) => {
+                    played.ids.push(self.call(instance, "FreeFMUState", vec![Arg::StateOut(slot)]))
+                }
+                Part::Free => played.ids.push(self.free(instance)),
             }
         }
         played
     }
 
     /// Writes parts of a simulation, and returns the reads of each part that reads.
-    pub fn groups<const N: usize>(&mut self, of: usize, parts: &[Part]) -> [Vec<Read>; N] {
+    pub fn groups<const N: usize>(&mut self, instance: usize, parts: &[Part]) -> [Vec<Read>; N] {
         let groups = parts.iter().filter_map(|part| {
-            let reads = self.play(of, &[*part]).reads;
+            let reads = self.play(instance, &[*part]).reads;
             matches!(part, Part::Read | Part::ReadAll | Part::Run(_)).then_some(reads)
         });
         let groups: Vec<Vec<Read>> = groups.collect();
@@ -187,26 +193,32 @@ impl<'a> Writer<'a> {
         }
     }
 
-    pub fn make(&mut self, of: usize) -> u32 {
-        self.make_with(of, |_| {})
+    pub fn make(&mut self, instance: usize) -> u32 {
+        self.make_with(instance, |_| {})
     }
 
-    pub fn make_with(&mut self, of: usize, change: impl FnOnce(&mut Make)) -> u32 {
+    pub fn make_with(&mut self, instance: usize, change: impl FnOnce(&mut Make)) -> u32 {
         let mut how = self.how();
         change(&mut how);
-        self.add(Step::Make(of, how))
+        self.add(Step::Make(instance, how))
     }
 
-    pub fn free(&mut self, of: usize) -> u32 {
-        self.add(Step::Free(of))
+    pub fn free(&mut self, instance: usize) -> u32 {
+        self.add(Step::Free(instance))
     }
 
-    pub fn enter(&mut self, of: usize) -> u32 {
-        self.enter_with(of, None, self.description.start_time, None)
+    pub fn enter(&mut self, instance: usize) -> u32 {
+        self.enter_with(instance, None, self.description.start_time, None)
     }
 
     /// Sets tolerance, start time and stop time.
-    pub fn enter_with(&mut self, of: usize, tolerance: Option<f64>, start: f64, stop: Option<f64>) -> u32 {
+    pub fn enter_with(
+        &mut self,
+        instance: usize,
+        tolerance: Option<f64>,
+        start: f64,
+        stop: Option<f64>,
+    ) -> u32 {
         let defined = |number: Option<f64>| {
             [Arg::Whole(number.is_some().into()), Arg::real(number.unwrap_or_default())]
         };
@@ -214,15 +226,15 @@ impl<'a> Writer<'a> {
         experiment.push(Arg::real(start));
         experiment.extend(defined(stop));
         if self.fmi3() {
-            self.call(of, "EnterInitializationMode", experiment)
+            self.call(instance, "EnterInitializationMode", experiment)
         } else {
-            self.call(of, "SetupExperiment", experiment);
-            self.call(of, "EnterInitializationMode", vec![])
+            self.call(instance, "SetupExperiment", experiment);
+            self.call(instance, "EnterInitializationMode", vec![])
         }
     }
 
     /// Writes this many updates of the discrete states; returns their numbers.
-    pub fn update(&mut self, of: usize, times: usize) -> Vec<u32> {
+    pub fn update(&mut self, instance: usize, times: usize) -> Vec<u32> {
         let (name, args) = match self.fmi3() {
             true => {
                 let mut args = vec![Arg::Out(Kind::U8, 1); 5];
@@ -232,37 +244,37 @@ impl<'a> Writer<'a> {
             // The five flags and the time of fmi2EventInfo, with the gap that C leaves between them.
             false => ("NewDiscreteStates", vec![Arg::Out(Kind::U64, 4)]),
         };
-        (0..times).map(|_| self.call(of, name, args.clone())).collect()
+        (0..times).map(|_| self.call(instance, name, args.clone())).collect()
     }
 
     /// The event at a point: enters Event Mode, updates the discrete states and goes back.
-    pub fn event(&mut self, of: usize, updates: usize) -> Vec<u32> {
-        let mut ids = vec![self.call(of, "EnterEventMode", vec![])];
-        ids.extend(self.update(of, updates));
-        ids.push(self.resume(of));
+    pub fn event(&mut self, instance: usize, updates: usize) -> Vec<u32> {
+        let mut ids = vec![self.call(instance, "EnterEventMode", vec![])];
+        ids.extend(self.update(instance, updates));
+        ids.push(self.resume(instance));
         ids
     }
 
     /// Goes from Event Mode back to the mode in which time advances.
-    fn resume(&mut self, of: usize) -> u32 {
+    fn resume(&mut self, instance: usize) -> u32 {
         let stepped = self.trajectory.is_stepped();
-        self.call(of, if stepped { "EnterStepMode" } else { "EnterContinuousTimeMode" }, vec![])
+        self.call(instance, if stepped { "EnterStepMode" } else { "EnterContinuousTimeMode" }, vec![])
     }
 
     /// Leaves Initialization Mode, for the mode in which time goes on.
-    pub fn leave(&mut self, of: usize) -> Vec<u32> {
-        let mut ids = vec![self.call(of, "ExitInitializationMode", vec![])];
+    pub fn leave(&mut self, instance: usize) -> Vec<u32> {
+        let mut ids = vec![self.call(instance, "ExitInitializationMode", vec![])];
         if !self.trajectory.is_stepped() || self.description.event_mode() {
-            ids.extend(self.update(of, self.trajectory.updates));
-            ids.push(self.resume(of));
+            ids.extend(self.update(instance, self.trajectory.updates));
+            ids.push(self.resume(instance));
         }
         ids
     }
 
     /// Instantiates and initializes, up to the mode in which time advances.
-    pub fn begin(&mut self, of: usize) -> Vec<u32> {
-        let mut ids = vec![self.make(of), self.enter(of)];
-        ids.extend(self.leave(of));
+    pub fn begin(&mut self, instance: usize) -> Vec<u32> {
+        let mut ids = vec![self.make(instance), self.enter(instance)];
+        ids.extend(self.leave(instance));
         ids
     }
 
@@ -287,7 +299,7 @@ impl<'a> Writer<'a> {
     }
 
     /// Sets values: a call for each type.
-    pub fn set(&mut self, of: usize, values: &[(usize, Values)]) -> Vec<u32> {
+    pub fn set(&mut self, instance: usize, values: &[(usize, Values)]) -> Vec<u32> {
         let indices: Vec<usize> = values.iter().map(|(index, _)| *index).collect();
         let mut ids = Vec::new();
         for (name, kind, positions) in self.by_type(&indices) {
@@ -310,18 +322,18 @@ impl<'a> Writer<'a> {
                 _ => vec![Arg::In(kind, numbers)],
             };
             let args = access(self.description.standard, references, values, total);
-            ids.push(self.call(of, &format!("Set{name}"), args));
+            ids.push(self.call(instance, &format!("Set{name}"), args));
         }
         ids
     }
 
     /// Sets the numbers of a variable.
-    pub fn set_numbers(&mut self, of: usize, index: usize, numbers: &[f64]) -> Vec<u32> {
-        self.set(of, &[(index, Values::new(self.description.kind(index), numbers.iter().copied()))])
+    pub fn set_numbers(&mut self, instance: usize, index: usize, numbers: &[f64]) -> Vec<u32> {
+        self.set(instance, &[(index, Values::new(self.description.kind(index), numbers.iter().copied()))])
     }
 
     /// Reads the variables at these indices: a call for each type.
-    pub fn read_these(&mut self, of: usize, indices: &[usize]) -> Vec<Read> {
+    pub fn read_these(&mut self, instance: usize, indices: &[usize]) -> Vec<Read> {
         let mut reads = Vec::new();
         for (name, kind, positions) in self.by_type(indices) {
             let size = |index: usize| self.description.variables[index].size.unwrap_or(1);
@@ -331,48 +343,52 @@ impl<'a> Writer<'a> {
             let sizes = (name == "Binary").then_some(Arg::Out(Kind::Size, total));
             let values = sizes.into_iter().chain([Arg::Out(kind, total)]);
             let args = access(self.description.standard, references, values, total);
-            reads.push(Read { id: self.call(of, &format!("Get{name}"), args), of: group });
+            reads.push(Read { id: self.call(instance, &format!("Get{name}"), args), variables: group });
         }
         reads
     }
 
-    pub fn read(&mut self, of: usize) -> Vec<Read> {
-        self.read_these(of, self.readable)
+    pub fn read(&mut self, instance: usize) -> Vec<Read> {
+        self.read_these(instance, self.readable)
     }
 
     /// Takes the step of a point in Co-Simulation; sets time, states and inputs in Model Exchange.
-    pub fn point(&mut self, of: usize, point: &Point) -> Vec<u32> {
+    pub fn point(&mut self, instance: usize, point: &Point) -> Vec<u32> {
         let mut ids = Vec::new();
         if self.trajectory.is_stepped() {
-            ids.extend(self.set(of, &point.inputs));
-            ids.push(self.step(of, point.time, point.size));
+            ids.extend(self.set(instance, &point.inputs));
+            ids.push(self.step(instance, point.time, point.size));
         } else {
-            ids.push(self.call(of, "SetTime", vec![Arg::real(point.time)]));
+            ids.push(self.call(instance, "SetTime", vec![Arg::real(point.time)]));
             if !point.states.is_empty() {
-                ids.push(self.set_states(of, &point.states));
+                ids.push(self.set_states(instance, &point.states));
             }
-            ids.extend(self.set(of, &point.inputs));
+            ids.extend(self.set(instance, &point.inputs));
             let flag = Arg::Out(if self.fmi3() { Kind::U8 } else { Kind::I32 }, 1);
-            ids.push(self.call(of, "CompletedIntegratorStep", vec![Arg::Whole(0), flag.clone(), flag]));
+            ids.push(self.call(instance, "CompletedIntegratorStep", vec![Arg::Whole(0), flag.clone(), flag]));
         }
         if point.updates > 0 {
-            ids.extend(self.event(of, point.updates));
+            ids.extend(self.event(instance, point.updates));
         }
         ids
     }
 
-    pub fn step(&mut self, of: usize, time: f64, size: f64) -> u32 {
-        self.call(of, "DoStep", step_args(self.description.standard, time, size))
+    pub fn step(&mut self, instance: usize, time: f64, size: f64) -> u32 {
+        self.call(instance, "DoStep", step_args(self.description.standard, time, size))
     }
 
-    pub fn set_states(&mut self, of: usize, states: &[f64]) -> u32 {
+    pub fn set_states(&mut self, instance: usize, states: &[f64]) -> u32 {
         let bits = states.iter().map(|number| number.to_bits()).collect();
-        self.call(of, "SetContinuousStates", vec![Arg::In(Kind::F64, bits), Arg::Whole(states.len() as i64)])
+        self.call(
+            instance,
+            "SetContinuousStates",
+            vec![Arg::In(Kind::F64, bits), Arg::Whole(states.len() as i64)],
+        )
     }
 
     /// Reads a vector of so many numbers.
-    pub fn vector(&mut self, of: usize, function: &str, count: usize) -> u32 {
-        self.call(of, function, vec![Arg::Out(Kind::F64, count), Arg::Whole(count as i64)])
+    pub fn vector(&mut self, instance: usize, function: &str, count: usize) -> u32 {
+        self.call(instance, function, vec![Arg::Out(Kind::F64, count), Arg::Whole(count as i64)])
     }
 
     pub fn derivatives_name(&self) -> &'static str {
@@ -380,8 +396,8 @@ impl<'a> Writer<'a> {
     }
 
     /// Reads the variables and, in Model Exchange, the vectors.
-    pub fn read_all(&mut self, of: usize) -> Vec<Read> {
-        let mut reads = self.read(of);
+    pub fn read_all(&mut self, instance: usize) -> Vec<Read> {
+        let mut reads = self.read(instance);
         if !self.trajectory.is_stepped() {
             let states = self.description.states_count().unwrap_or(0);
             let indicators = self.description.event_indicators.unwrap_or(0);
@@ -391,25 +407,25 @@ impl<'a> Writer<'a> {
                 ("GetEventIndicators", indicators),
             ];
             for (name, count) in vectors.into_iter().filter(|(_, count)| *count > 0) {
-                reads.push(Read { id: self.vector(of, name, count), of: Vec::new() });
+                reads.push(Read { id: self.vector(instance, name, count), variables: Vec::new() });
             }
         }
         reads
     }
 
     /// Serializes a saved state: the size, the bytes.
-    pub fn serialize(&mut self, of: usize, slot: usize) -> [u32; 2] {
+    pub fn serialize(&mut self, instance: usize, slot: usize) -> [u32; 2] {
         let bytes = vec![Arg::State(slot), Arg::SavedOut(slot), Arg::SavedSize(slot)];
         [
-            self.call(of, "SerializedFMUStateSize", vec![Arg::State(slot), Arg::SizeOut(slot)]),
-            self.call(of, "SerializeFMUState", bytes),
+            self.call(instance, "SerializedFMUStateSize", vec![Arg::State(slot), Arg::SizeOut(slot)]),
+            self.call(instance, "SerializeFMUState", bytes),
         ]
     }
 
     /// Makes a state of the bytes.
-    pub fn deserialize(&mut self, of: usize, bytes: usize, slot: usize) -> u32 {
+    pub fn deserialize(&mut self, instance: usize, bytes: usize, slot: usize) -> u32 {
         let args = vec![Arg::Saved(bytes), Arg::SavedSize(bytes), Arg::StateOut(slot)];
-        self.call(of, "DeserializeFMUState", args)
+        self.call(instance, "DeserializeFMUState", args)
     }
 }
 
@@ -465,7 +481,7 @@ pub fn sample(description: &Description, most: usize) -> Vec<usize> {
 /// Returns the first difference between corresponding reads: the variable and both values.
 pub fn difference(description: &Description, run: &Run, one: &[Read], other: &[Read]) -> Option<[String; 3]> {
     one.iter().zip(other).find_map(|(one, other)| {
-        let (of_one, of_other) = (run.of(one.id)?, run.of(other.id)?);
+        let (of_one, of_other) = (run.outcome(one.id)?, run.outcome(other.id)?);
         if of_one.status != of_other.status {
             let show =
                 |status: Option<i32>| format!("status {}", status.map_or("none".to_owned(), status_name));
@@ -484,7 +500,7 @@ pub fn difference(description: &Description, run: &Run, one: &[Read], other: &[R
 /// Returns the name of the variable whose value is at an index of a read.
 fn name_at(description: &Description, read: &Read, index: usize) -> String {
     let mut rest = index;
-    for (variable, size) in &read.of {
+    for (variable, size) in &read.variables {
         if rest < *size {
             let name = &description.variables[*variable].name;
             return if *size == 1 { name.clone() } else { format!("{name}[{rest}]") };
@@ -498,7 +514,7 @@ fn name_at(description: &Description, read: &Read, index: usize) -> String {
 pub fn values_of<'r>(run: &'r Run, reads: &'r [Read]) -> impl Iterator<Item = (usize, Values)> {
     reads.iter().filter(|read| run.succeeds(read.id)).flat_map(move |read| {
         let mut end = 0;
-        read.of.iter().filter_map(move |(index, size)| {
+        read.variables.iter().filter_map(move |(index, size)| {
             end += size;
             Some((*index, run.written(read.id)?.part(end - size, *size)?))
         })
@@ -508,8 +524,8 @@ pub fn values_of<'r>(run: &'r Run, reads: &'r [Read]) -> impl Iterator<Item = (u
 /// Returns the value of a variable in these reads.
 pub fn value_of(run: &Run, reads: &[Read], variable: usize) -> Option<Values> {
     reads.iter().find_map(|read| {
-        let at = read.of.iter().position(|(index, _)| *index == variable)?;
-        let begin = read.of[..at].iter().map(|(_, size)| size).sum();
-        run.written(read.id).filter(|_| run.succeeds(read.id))?.part(begin, read.of[at].1)
+        let at = read.variables.iter().position(|(index, _)| *index == variable)?;
+        let begin = read.variables[..at].iter().map(|(_, size)| size).sum();
+        run.written(read.id).filter(|_| run.succeeds(read.id))?.part(begin, read.variables[at].1)
     })
 }

@@ -48,9 +48,9 @@ fn moved(
             let at = one.differ(&other)?;
             let (name, of) = (&description.variables[*unknown].name, &description.variables[known].name);
             let (is, becomes) = (one.show(at), other.show(at));
-            let tell =
+            let message =
                 || format!("{name} goes from {is} to {becomes} when {of} changes, and does not list it");
-            one.differ(&again).is_none().then(tell)
+            one.differ(&again).is_none().then(message)
         })
     })
 }

@@ -155,7 +155,7 @@ fn is_linear(columns: Vec<u32>, sum: u32, names: Vec<String>) -> impl Judges {
             let off = (added - together[row]).abs() > 1e-6 * scale.max(1e-12);
             off.then(|| {
                 format!(
-                    "the derivatives of {} add up to {added:?}, asked for together they are {:?}",
+                    "the derivatives of {} add up to {added:?}, vectors for together they are {:?}",
                     names[row], together[row]
                 )
             })
@@ -365,17 +365,17 @@ pub fn vectors(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
     let derivatives_name = writer.derivatives_name();
-    let (mut asked, mut nominals) = (Vec::new(), None);
+    let (mut vectors, mut nominals) = (Vec::new(), None);
     for point in &trajectory.points {
         writer.point(0, point);
         nominals = Some(writer.vector(0, "GetNominalsOfContinuousStates", count));
         for (name, indices) in [("GetContinuousStates", &states), (derivatives_name, &derivatives)] {
-            asked.push((writer.vector(0, name, count), writer.read_these(0, indices), indices.clone()));
+            vectors.push((writer.vector(0, name, count), writer.read_these(0, indices), indices.clone()));
         }
     }
     let model = description.clone();
     let run = checker.judge("derivatives.vectors", writer.sequence.clone(), move |run| {
-        asked.iter().filter(|(vector, ..)| run.succeeds(*vector)).find_map(|(vector, reads, indices)| {
+        vectors.iter().filter(|(vector, ..)| run.succeeds(*vector)).find_map(|(vector, reads, indices)| {
             let numbers = run.written(*vector)?.numbers();
             let values = indices.iter().filter_map(|index| value_of(run, reads, *index));
             let values: Vec<f64> = values.flat_map(|value| value.numbers()).collect();

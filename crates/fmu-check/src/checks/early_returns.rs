@@ -61,7 +61,7 @@ struct Stepped {
 
 /// The outputs eventHandlingNeeded, terminateSimulation, earlyReturn and lastSuccessfulTime of a step that succeeded.
 fn outputs(run: &Run, id: u32) -> Option<([bool; 3], f64)> {
-    let outcome = run.of(id).filter(|_| run.succeeds(id))?;
+    let outcome = run.outcome(id).filter(|_| run.succeeds(id))?;
     let reached = outcome.written.get(3)?.numbers()[0];
     Some(([0, 1, 2].map(|index| outcome.written[index].numbers() == [1.0]), reached))
 }
@@ -117,8 +117,9 @@ fn play(
 /// `None` if an event before the step was not handled.
 fn ended(steps: &[Stepped], run: &Run, id: u32) -> Option<(bool, bool, f64)> {
     let mut before = steps.iter().take_while(|step| step.id != id);
-    let is_skipped =
-        |step: &Stepped| run.of(step.id).is_some() && step.event.is_some_and(|event| run.of(event).is_none());
+    let is_skipped = |step: &Stepped| {
+        run.outcome(step.id).is_some() && step.event.is_some_and(|event| run.outcome(event).is_none())
+    };
     let ([event, _, early], reached) = outputs(run, id)?;
     (!before.any(is_skipped)).then_some((event, early, reached))
 }

@@ -31,8 +31,8 @@ pub fn present(checker: &Checker) -> anyhow::Result<()> {
     for (index, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
         let Some(path) = &checker.setting.libraries[index] else { continue };
         let Some(symbols) = super::package::exported(path) else { continue };
-        let of_all = if standard == Standard::Fmi2 { fmi2::FREE } else { fmi3::FREE };
-        let wanted = of_all.iter().copied().filter(|name| match *name {
+        let free = if standard == Standard::Fmi2 { fmi2::FREE } else { fmi3::FREE };
+        let wanted = free.iter().copied().filter(|name| match *name {
             "fmi3InstantiateModelExchange" => interface == Interface::ModelExchange,
             "fmi3InstantiateCoSimulation" => interface == Interface::CoSimulation,
             name => name != "fmi3InstantiateScheduledExecution",
@@ -68,7 +68,7 @@ fn version(checker: &Checker) -> anyhow::Result<()> {
     checker.check("functions.version", sequence, move |run| {
         // "NULL" for a null pointer, None if the library lacks the function.
         let text = |id: u32| {
-            let of = run.of(id).filter(|of| !of.missing)?;
+            let of = run.outcome(id).filter(|of| !of.missing)?;
             let text = of.text.as_ref().map(|text| String::from_utf8_lossy(text).into_owned());
             Some(text.unwrap_or_else(|| "NULL".to_owned()))
         };
@@ -85,7 +85,7 @@ fn version(checker: &Checker) -> anyhow::Result<()> {
 
 /// Checks that the functions of declared capabilities succeed.
 pub fn capabilities(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let (interface, mut asked) = (trajectory.interface, Vec::new());
+    let (interface, mut calls) = (trajectory.interface, Vec::new());
     if checker.saves(interface) {
         let mut writer = checker.writer(trajectory);
         let mut ids = writer.play(0, &[Part::Begin, Part::Save(0), Part::Restore(0)]).ids;
@@ -94,7 +94,7 @@ pub fn capabilities(checker: &Checker, trajectory: &Trajectory) -> anyhow::Resul
             ids.push(writer.deserialize(0, 0, 1));
         }
         ids.extend(writer.play(0, &[Part::Drop(0)]).ids);
-        asked.push(("canGetAndSetFMUstate and canSerializeFMUstate", ids, writer.sequence));
+        calls.push(("canGetAndSetFMUstate and canSerializeFMUstate", ids, writer.sequence));
     }
     let pair = pair(&checker.description, interface);
     for (name, flags, function) in [
@@ -115,9 +115,9 @@ pub fn capabilities(checker: &Checker, trajectory: &Trajectory) -> anyhow::Resul
         };
         let [unknowns, knowns] = [unknown, known].map(|of| references(&checker.description, &[of]));
         ids.push(derivative(&mut writer, function, &unknowns, &knowns, &vec![1.0; seed], results));
-        asked.push((name, ids, writer.sequence));
+        calls.push((name, ids, writer.sequence));
     }
-    for (flag, ids, sequence) in asked {
+    for (flag, ids, sequence) in calls {
         let fails = fails(&sequence, ids);
         checker.check("functions.capability", sequence, move |run| {
             Some(format!("declared by {flag}, but {}", fails(run)?))

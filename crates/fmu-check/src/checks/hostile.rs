@@ -69,18 +69,18 @@ fn callable(
 
 /// NULL for the instance, and zero or NULL for every argument.
 pub fn null_instances(checker: &Checker, trajectory: &Trajectory) -> Sequences {
-    let of_null = callable(checker, trajectory).map(|(signature, name, _)| {
+    let sequences = callable(checker, trajectory).map(|(signature, name, _)| {
         let args = signature.arguments.iter().map(|argument| harmless(argument.of)).collect();
         after(checker, trajectory, &[], |writer| {
             writer.forbidden(None, name, args);
         })
     });
-    Ok(of_null.collect())
+    Ok(sequences.collect())
 }
 
 /// NULL for one array of a call.
 pub fn nulls(checker: &Checker, trajectory: &Trajectory) -> Sequences {
-    let of_array = callable(checker, trajectory).flat_map(|(signature, name, parts)| {
+    let sequences = callable(checker, trajectory).flat_map(|(signature, name, parts)| {
         let arrays = signature.arguments.iter().filter(|argument| argument.of.starts_with('*')).count();
         (0..arrays).map(move |null| {
             let args = with_null(checker, signature, null);
@@ -89,7 +89,7 @@ pub fn nulls(checker: &Checker, trajectory: &Trajectory) -> Sequences {
             })
         })
     });
-    Ok(of_array.collect())
+    Ok(sequences.collect())
 }
 
 /// An argument of a type: zero, or NULL.
@@ -117,11 +117,11 @@ fn with_null(checker: &Checker, signature: &Signature, null: usize) -> Vec<Arg> 
         match argument.pointee() {
             _ if at - 1 == null => Arg::Null,
             Some(("ValueReference", true)) => {
-                let of_type = checker.description.variables.iter().find(|variable| {
+                let variable = checker.description.variables.iter().find(|variable| {
                     variable.size == Some(1)
                         && variable.base.is_some_and(|base| name.ends_with(type_name(standard, base)))
                 });
-                let reference = of_type.map_or(0, |variable| u64::from(variable.reference));
+                let reference = variable.map_or(0, |variable| u64::from(variable.reference));
                 Arg::In(Kind::U32, vec![reference])
             }
             Some((_, true)) => Arg::In(Kind::F64, vec![0]),

@@ -226,16 +226,16 @@ pub fn events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     let fmi3 = checker.fmi3();
     let mut writer = checker.writer(trajectory);
     let ids = writer.begin(0);
-    let mut asked = vec![(ids, checker.description.start_time)];
+    let mut points = vec![(ids, checker.description.start_time)];
     for point in &trajectory.points {
         let mut ids = writer.point(0, point);
         if point.updates == 0 {
             ids.extend(writer.event(0, 3));
         }
-        asked.push((ids, point.time));
+        points.push((ids, point.time));
     }
     checker.check("life_cycle.next-event-time", writer.sequence, move |run| {
-        let mut all = asked.iter().flat_map(|(ids, time)| ids.iter().map(move |id| (*id, *time)));
+        let mut all = points.iter().flat_map(|(ids, time)| ids.iter().map(move |id| (*id, *time)));
         all.find_map(|(id, time)| {
             let event = event(run, id, fmi3)?;
             let past = !event.again && event.next? <= time;
@@ -272,18 +272,18 @@ fn changed_states(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<
     }
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
-    let mut asked = Vec::new();
+    let mut points = Vec::new();
     for point in &trajectory.points {
         writer.point(0, &Point { updates: 0, ..point.clone() });
         let before = writer.vector(0, "GetContinuousStates", count);
         // Event Mode may be entered without an event.
         let updates = writer.event(0, point.updates.max(3));
         let after = writer.vector(0, "GetContinuousStates", count);
-        asked.push((point.time, before, updates, after));
+        points.push((point.time, before, updates, after));
     }
     let fmi3 = checker.fmi3();
     checker.check("life_cycle.states-changed", writer.sequence, move |run| {
-        asked.iter().find_map(|(time, before, updates, after)| {
+        points.iter().find_map(|(time, before, updates, after)| {
             // A call that fails is a separate finding.
             let updates = &updates[1..updates.len() - 1];
             let is_reported = |id: &u32| event(run, *id, fmi3).is_none_or(|event| event.states_changed);

@@ -34,7 +34,7 @@ fn set(checker: &Checker, references: Vec<u64>, kind: Kind, bits: Vec<u64>) -> V
 }
 
 /// Returns calls that set variables that cannot be set, alone or together with an input that can.
-fn of_variables(checker: &Checker, interface: Interface) -> Vec<Attack> {
+fn variable_attacks(checker: &Checker, interface: Interface) -> Vec<Attack> {
     let description = &checker.description;
     let unknown = unknown_reference(checker);
     let (mut attacks, mut observed, mut inputs_tried) = (Vec::new(), Vec::new(), 0);
@@ -71,7 +71,7 @@ fn of_variables(checker: &Checker, interface: Interface) -> Vec<Attack> {
         }
         if input && kind.is_float() && inputs_tried < 3 {
             inputs_tried += 1;
-            attacks.extend(of_input(checker, variable, &function, kind, other));
+            attacks.extend(input_attacks(checker, variable, &function, kind, other));
         }
         let (of, rule, what) = if variable.variability == "constant" {
             ("constant", Some("refusals.constant"), format!("a value for the constant {}", variable.name))
@@ -99,7 +99,13 @@ fn of_variables(checker: &Checker, interface: Interface) -> Vec<Attack> {
 }
 
 /// Returns calls that set an input to a valid value and another to an invalid one.
-fn of_input(checker: &Checker, variable: &Variable, function: &str, kind: Kind, other: u64) -> Vec<Attack> {
+fn input_attacks(
+    checker: &Checker,
+    variable: &Variable,
+    function: &str,
+    kind: Kind,
+    other: u64,
+) -> Vec<Attack> {
     let reference = u64::from(variable.reference);
     let another = checker.description.variables.iter().find(|other| {
         other.causality == "input"
@@ -118,7 +124,7 @@ fn of_input(checker: &Checker, variable: &Variable, function: &str, kind: Kind, 
 }
 
 /// Returns calls with unknown references, calls of other modes, and malformed states.
-fn of_calls(checker: &Checker, interface: Interface, time: f64) -> Vec<Attack> {
+fn call_attacks(checker: &Checker, interface: Interface, time: f64) -> Vec<Attack> {
     let (unknown, fmi3) = (unknown_reference(checker), checker.fmi3());
     let (get_float, set_float) = if fmi3 { ("GetFloat64", "SetFloat64") } else { ("GetReal", "SetReal") };
     let get = access(checker.description.standard, vec![unknown], [Arg::Out(Kind::F64, 1)], 1);
@@ -146,7 +152,7 @@ fn of_calls(checker: &Checker, interface: Interface, time: f64) -> Vec<Attack> {
 }
 
 /// Returns impossible steps and invalid derivatives of inputs.
-fn of_steps(checker: &Checker, time: f64, size: f64) -> Vec<Attack> {
+fn step_attacks(checker: &Checker, time: f64, size: f64) -> Vec<Attack> {
     let step = |(time, size, what): (f64, f64, &str)| {
         attack("DoStep", step_args(checker.description.standard, time, size), what, TOLERATED)
     };
@@ -182,7 +188,7 @@ fn of_steps(checker: &Checker, time: f64, size: f64) -> Vec<Attack> {
 }
 
 /// Returns calls of Model Exchange with invalid times and states.
-fn of_integration(states: &[f64]) -> Vec<Attack> {
+fn integration_attacks(states: &[f64]) -> Vec<Attack> {
     let mode = "entering Continuous-Time Mode, which it is in";
     let mut attacks = vec![
         attack("SetTime", vec![Arg::real(f64::NAN)], "a time of NaN", None),
@@ -238,13 +244,13 @@ pub fn change_nothing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Res
     let to = trajectory.points.len() / 2;
     let Some(here) = trajectory.points.get(to) else { return Ok(()) };
     let before = trajectory.points[..to].last();
-    let mut attacks = of_variables(checker, interface);
+    let mut attacks = variable_attacks(checker, interface);
     if trajectory.is_stepped() {
-        attacks.extend(of_calls(checker, interface, here.time));
-        attacks.extend(of_steps(checker, here.time, here.size));
+        attacks.extend(call_attacks(checker, interface, here.time));
+        attacks.extend(step_attacks(checker, here.time, here.size));
     } else {
-        attacks.extend(of_calls(checker, interface, before.unwrap_or(here).time));
-        attacks.extend(of_integration(before.map_or(&[], |point| &point.states)));
+        attacks.extend(call_attacks(checker, interface, before.unwrap_or(here).time));
+        attacks.extend(integration_attacks(before.map_or(&[], |point| &point.states)));
     }
     attacks.into_iter().try_for_each(|attack| attacked(checker, trajectory, attack))?;
     after_end(checker, trajectory)

@@ -67,7 +67,7 @@ fn measured(
     checker.keep_always(&sequence, &run);
     // The resources before and after enough cycles, and the number of these.
     let done = move |run: &Run| -> Option<(Measured, Measured, usize)> {
-        let measured = |id| run.of(id)?.measured.clone();
+        let measured = |id| run.outcome(id)?.measured.clone();
         let (before, times) = (measured(warm)?.times, measured(many)?.times);
         (before >= 50 && times >= 50).then_some((measured(first)?, measured(last)?, times))
     };
@@ -94,7 +94,7 @@ fn measured(
     }
     let ids: Vec<u32> = steps.iter().map(|numbered| numbered.id).collect();
     checker.keep("resources.cycles", &run, &sequence, move |run| {
-        let times = run.of(many)?.measured.as_ref()?.times;
+        let times = run.outcome(many)?.measured.as_ref()?.times;
         let why = failure(&steps, run, &ids)?;
         (times > 1).then(|| format!("after {} {what}: {why}", times - 1))
     });
@@ -109,7 +109,7 @@ fn settings(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     writer.play(0, &[Begin, Points(usize::MAX), ReadAll]);
     let last = writer.add(Step::Measure);
     let run = checker.judge("resources.settings", writer.sequence.clone(), move |run| {
-        let (one, two) = (run.of(first)?.measured.as_ref()?, run.of(last)?.measured.as_ref()?);
+        let (one, two) = (run.outcome(first)?.measured.as_ref()?, run.outcome(last)?.measured.as_ref()?);
         let (was, is) = one.settings.iter().zip(&two.settings).find(|(was, is)| was != is)?;
         Some(format!("{was} has become {is}"))
     })?;

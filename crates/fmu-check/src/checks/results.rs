@@ -31,7 +31,7 @@ pub fn name(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         reads
     });
     let is_number = |(index, _): &(usize, usize)| checker.description.variables[*index].is_number();
-    runs.iter_mut().for_each(|reads| reads.retain(|read| read.of.iter().all(is_number)));
+    runs.iter_mut().for_each(|reads| reads.retain(|read| read.variables.iter().all(is_number)));
     let [one, other] = runs;
     let judge = checker.differ(&one, &other, "{} is {}, of an instance of another name {}");
     checker.check("results.name", writer.sequence, judge)
@@ -152,14 +152,14 @@ fn repeated(checker: &Checker, trajectory: &Trajectory, all: &[usize]) -> anyhow
                 return None;
             }
             let mut at = 0;
-            single.of.iter().find_map(|(index, size)| {
+            single.variables.iter().find_map(|(index, size)| {
                 at += 2 * size;
                 let once = value_of(run, std::slice::from_ref(single), *index)?;
                 let second = run.written(double.id)?.part(at - size, *size)?;
                 let element = once.differ(&second)?;
                 let name = &description.variables[*index].name;
                 let (once, second) = (once.show(element), second.show(element));
-                Some(format!("{name} is {once}, asked for twice in a call {second} the second time"))
+                Some(format!("{name} is {once}, points for twice in a call {second} the second time"))
             })
         })
     })
@@ -274,20 +274,20 @@ pub fn time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         writer.make(0);
         writer.enter_with(0, None, description.start_time + by, None);
         writer.leave(0);
-        let mut asked = Vec::new();
+        let mut reads = Vec::new();
         for point in points {
             let point = Point { time: point.time + by, ..point };
             let ids = writer.point(0, &point);
             let stepped = trajectory.is_stepped();
             let time = if stepped { point.time + point.size } else { point.time };
             let id = ids.last().copied().filter(|_| stepped && checker.fmi3());
-            asked.push((writer.read_these(0, &[index]), time, id));
+            reads.push((writer.read_these(0, &[index]), time, id));
         }
         checker.check("results.time", writer.sequence, move |run| {
-            asked.iter().find_map(|(reads, time, step)| {
+            reads.iter().find_map(|(reads, time, step)| {
                 let value = *value_of(run, reads, index)?.numbers().first()?;
                 // Section 4.2.1 of FMI 3.0: a step may end early and returns lastSuccessfulTime.
-                let reached = step.and_then(|id| run.of(id)?.written.get(3)?.numbers().first().copied());
+                let reached = step.and_then(|id| run.outcome(id)?.written.get(3)?.numbers().first().copied());
                 let time = reached.unwrap_or(*time);
                 let off = (value - time).abs() > 1e-9 * (1.0 + time.abs());
                 off.then(|| format!("the independent variable is {value:?} at {time:?}"))
@@ -301,14 +301,14 @@ pub fn time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
 pub fn last_successful(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
-    let mut asked = Vec::new();
+    let mut points = Vec::new();
     for point in &trajectory.points {
         let ids = writer.point(0, point);
-        asked.extend(ids.last().map(|id| (*id, point.time + point.size)));
+        points.extend(ids.last().map(|id| (*id, point.time + point.size)));
     }
     checker.check("results.last-successful-time", writer.sequence, move |run| {
-        asked.iter().find_map(|(id, time)| {
-            let outcome = run.of(*id).filter(|of| of.status == Some(0))?;
+        points.iter().find_map(|(id, time)| {
+            let outcome = run.outcome(*id).filter(|of| of.status == Some(0))?;
             let reached = *outcome.written.get(3)?.numbers().first()?;
             let off = (reached - time).abs() > 1e-9 * (1.0 + time.abs());
             off.then(|| format!("lastSuccessfulTime is {reached:?}, the step ends at {time:?}"))

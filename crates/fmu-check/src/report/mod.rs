@@ -77,11 +77,11 @@ impl Report {
         };
         self.unused = baseline.unused(&self.findings, &self.unreached);
         for finding in &mut self.findings {
-            finding.accepted = baseline.of_finding(finding);
+            finding.accepted = baseline.reason(finding);
             finding.fails = finding.accepted.is_none() && from.is_some_and(|from| finding.severity >= from);
         }
         for unchecked in self.unreached.iter_mut().filter(|unchecked| !unchecked.allowed) {
-            let reason = baseline.of_unchecked(&unchecked.name);
+            let reason = baseline.unchecked_reason(&unchecked.name);
             if let Some(reason) = reason {
                 unchecked.why = format!("{} (accepted: {reason})", unchecked.why);
             }
@@ -175,11 +175,11 @@ impl Report {
         let case = |class: &str, name: &str, body: &str| {
             format!("  <testcase classname=\"fmu-check{class}\" name=\"{name}\">{body}</testcase>\n")
         };
-        let of_unchecked = |Unchecked { name, why, allowed }: &Unchecked| {
+        let unchecked_case = |Unchecked { name, why, allowed }: &Unchecked| {
             let kind = if *allowed { "skipped" } else { "error" };
             case("", name, &format!("<{kind} message=\"not checked: {}\"/>", escape(why)))
         };
-        let of_finding = |finding: &Finding| {
+        let finding_case = |finding: &Finding| {
             let Finding { observed, section, requirement, .. } = finding;
             let body = format!("{observed}\n{section}: {requirement}\n{}", finding.more.join("\n"));
             let accepted = finding.accepted.as_ref().map(|reason| format!("\nAccepted: {reason}"));
@@ -192,8 +192,8 @@ impl Report {
             };
             case(&format!(".{}", finding.topic()), &finding.name, &format!("\n    {body}\n  "))
         };
-        let mut cases: Vec<String> = self.unreached.iter().map(of_unchecked).collect();
-        cases.extend(self.findings.iter().map(of_finding));
+        let mut cases: Vec<String> = self.unreached.iter().map(unchecked_case).collect();
+        cases.extend(self.findings.iter().map(finding_case));
         if self.findings.is_empty() {
             cases.push(case("", "no findings", ""));
         }

@@ -156,7 +156,7 @@ impl Writer<'_> {
     fn step(&mut self, Numbered { id, step, .. }: &Numbered) -> String {
         match step {
             Step::Make(index, make) => self.make(*id, *index, make),
-            Step::Call { of, function, args } => self.call(*id, *of, function, args),
+            Step::Call { instance, function, args } => self.call(*id, *instance, function, args),
             Step::Version(name) => format!("version({id}, \"{name}\");\n"),
             Step::Free(index) => {
                 let name = if self.fmi3 { "fmi3FreeInstance" } else { "fmi2FreeInstance" };
@@ -204,17 +204,17 @@ impl Writer<'_> {
         made + if self.matters(id).is_some() { result.as_str() } else { "" }
     }
 
-    fn call(&mut self, id: u32, of: Option<usize>, name: &str, args: &[Arg]) -> String {
+    fn call(&mut self, id: u32, instance: Option<usize>, name: &str, args: &[Arg]) -> String {
         let Some(signature) = signature(name) else { return String::new() };
-        self.instances.extend(of);
+        self.instances.extend(instance);
         let mut parts = Parts::default();
         let (mut types, mut passed) = (String::new(), String::new());
         for (arg, argument) in args.iter().zip(signature.arguments) {
             let _ = write!(types, ", {}", type_of(argument.of));
             let _ = write!(passed, ", {}", self.argument(&mut parts, arg, name));
         }
-        let instance = of.map_or("NULL".to_owned(), |index| format!("c{index}"));
-        let guard = of.map_or(String::new(), |index| format!("if (c{index}) "));
+        let handle = instance.map_or("NULL".to_owned(), |index| format!("c{index}"));
+        let guard = instance.map_or(String::new(), |index| format!("if (c{index}) "));
         let comment =
             comment(args, self.description).map_or(String::new(), |names| format!(" /* {names} */"));
         let mut after = parts.after;
@@ -229,7 +229,7 @@ impl Writer<'_> {
         let lines = |lines: Vec<String>| lines.iter().map(|line| format!("    {line}\n")).collect::<String>();
         format!(
             "{guard}{{{comment}\n    size_t before = arrays;\n{}    *messages = 0;\n\
-             \x20   int status = ((int (*)(void *{types}))function(\"{name}\"))({instance}{passed});\n\
+             \x20   int status = ((int (*)(void *{types}))function(\"{name}\"))({handle}{passed});\n\
              \x20   print(\"{name}: %d\", status);\n{}    print(\"\\n\"); release(before);\n}}\n",
             lines(parts.before),
             lines(after)

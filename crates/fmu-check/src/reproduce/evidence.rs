@@ -138,11 +138,11 @@ fn proof(judge: &Judge, run: &Run, id: u32) -> Proof {
         judge(&changed).is_none()
     };
     let matters = [
-        without(&|of| of.written.clear()) || run.of(id).is_some_and(|of| of.text.is_some()),
+        without(&|of| of.written.clear()) || run.outcome(id).is_some_and(|of| of.text.is_some()),
         without(&|of| of.log.clear())
-            || run.of(id).is_some_and(|of| of.log.is_empty() && of.status > Some(1)),
+            || run.outcome(id).is_some_and(|of| of.log.is_empty() && of.status > Some(1)),
     ];
-    Proof { id, matters, observed: run.of(id).map_or(String::new(), |of| shown(of, matters)) }
+    Proof { id, matters, observed: run.outcome(id).map_or(String::new(), |of| shown(of, matters)) }
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -200,7 +200,7 @@ fn grown(finding: &Finding, needed: &Run) -> Evidence {
     ids.sort_unstable();
     let times = ids.iter().rev().find(|(_, repeated)| *repeated);
     let times = times
-        .and_then(|(id, _)| needed.of(*id)?.measured.as_ref())
+        .and_then(|(id, _)| needed.outcome(*id)?.measured.as_ref())
         .map_or(0, |of| of.times.min(REPETITIONS) as u64);
     let measures: Vec<u32> = ids.iter().filter(|(_, repeated)| !repeated).map(|(id, _)| *id).collect();
     let known = [
@@ -220,7 +220,7 @@ pub fn as_repeated(sequence: &CallSequence, run: &Run) -> CallSequence {
     let mut sequence = sequence.clone();
     for numbered in &mut sequence {
         if let (Step::Repeat(times, _), Some(measured)) =
-            (&mut numbered.step, run.of(numbered.id).and_then(|of| of.measured.as_ref()))
+            (&mut numbered.step, run.outcome(numbered.id).and_then(|of| of.measured.as_ref()))
         {
             *times = measured.times.min(REPETITIONS);
         }
@@ -241,7 +241,7 @@ mod tests {
             Numbered {
                 id,
                 forbidden: false,
-                step: Step::Call { of: Some(0), function: function.to_owned(), args },
+                step: Step::Call { instance: Some(0), function: function.to_owned(), args },
             }
         };
         let sequence = vec![call(1, "fmi2GetReal"), call(2, "fmi2DoStep"), call(3, "fmi2GetReal")];
@@ -281,7 +281,7 @@ mod tests {
 
     #[test]
     fn messages_are_compared_where_they_matter() {
-        let judge: Judge = Arc::new(|run| run.of(2)?.log.first().map(|_| "a message".to_owned()));
+        let judge: Judge = Arc::new(|run| run.outcome(2)?.log.first().map(|_| "a message".to_owned()));
         let Evidence::Same(proofs) = evidence(&finding(judge), &run()) else { panic!("a call") };
         assert_eq!(proofs[0].observed, "3;3 - 6e6f;");
     }

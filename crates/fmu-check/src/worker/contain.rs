@@ -68,8 +68,8 @@ mod linux {
     }
 
     /// Waits up to 50 ms for data or the end of data.
-    pub fn readable(of: &impl AsRawFd) -> std::io::Result<bool> {
-        let mut poll = libc::pollfd { fd: of.as_raw_fd(), events: libc::POLLIN, revents: 0 };
+    pub fn readable(file: &impl AsRawFd) -> std::io::Result<bool> {
+        let mut poll = libc::pollfd { fd: file.as_raw_fd(), events: libc::POLLIN, revents: 0 };
         // SAFETY: one descriptor, which is open.
         match unsafe { libc::poll(&raw mut poll, 1, 50) } {
             -1 if std::io::Error::last_os_error().kind() != std::io::ErrorKind::Interrupted => {

@@ -139,8 +139,8 @@ fn limit(memory: u64) {
     let _ = memory;
 }
 
-fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
-    of.lock().unwrap_or_else(PoisonError::into_inner)
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Messages with the environment pointer that came with them.
@@ -241,7 +241,7 @@ unsafe extern "C" fn log_of_fmi3(
 /// An array of a call, which is freed after the call.
 struct Kept {
     array: Guarded,
-    of: Content,
+    content: Content,
 }
 
 /// Content of an array: one that the FMU reads, or one that it writes, with the index that receives the content.
@@ -254,7 +254,7 @@ enum Content {
 }
 
 impl Player {
-    fn write(&self, of: &impl Serialize) {
+    fn write(&self, line: &impl Serialize) {
         #[cfg(unix)]
         if std::process::id() != PROCESS.load(Ordering::Relaxed) {
             // The FMU has duplicated this process: the duplicate waits to be found and ended.
@@ -263,7 +263,7 @@ impl Player {
                 unsafe { libc::pause() };
             }
         }
-        let mut line = serde_json::to_vec(of).unwrap_or_default();
+        let mut line = serde_json::to_vec(line).unwrap_or_default();
         line.push(b'\n');
         // If the disk is full, the results are lost, which the checker reports as the end of the process.
         let _ = locked(&self.file).write_all(&line);
@@ -350,7 +350,7 @@ impl Player {
                 }
                 None => outcome.missing = true,
             },
-            Step::Call { of, function, args } => self.call(*of, function, args, outcome),
+            Step::Call { instance, function, args } => self.call(*instance, function, args, outcome),
             Step::Measure => outcome.measured = Some(measure::now()),
             Step::Unload => {
                 let mut loaded: Vec<_> =
@@ -417,17 +417,17 @@ impl Player {
         let mut callbacks = None;
         let logger = log_of_fmi2 as *const ();
         let log: fmi3LogMessageCallback = log_of_fmi3;
-        let name_of = match (self.setting.fmi3, make.co_simulation) {
+        let function = match (self.setting.fmi3, make.co_simulation) {
             (false, _) => "fmi2Instantiate",
             (true, true) => "fmi3InstantiateCoSimulation",
             (true, false) => "fmi3InstantiateModelExchange",
         };
-        let Some(address) = self.find(make.co_simulation, name_of) else {
+        let Some(address) = self.find(make.co_simulation, function) else {
             outcome.missing = true;
             return;
         };
-        let find = |name: &str| (name == name_of).then_some(address);
-        let (name_of_instance, guid, location) = (word(&name), word(&token), word(&resources));
+        let find = |name: &str| (name == function).then_some(address);
+        let (instance_name, guid, location) = (word(&name), word(&token), word(&resources));
         let logging = u8::from(make.logging);
         INSIDE.enter();
         // SAFETY: the function has the type of the standard, and the arguments are as the standard
@@ -444,16 +444,16 @@ impl Player {
                     }));
                     let instantiate = fmi2::Functions::find(find).fmi2Instantiate;
                     let kind = co_simulation.into();
-                    instantiate(name_of_instance, kind, guid, location, given, 0, logging.into())
+                    instantiate(instance_name, kind, guid, location, given, 0, logging.into())
                 }
                 (true, false) => {
                     let instantiate = fmi3::Functions::find(find).fmi3InstantiateModelExchange;
-                    instantiate(name_of_instance, guid, location, 0, logging, environment, Some(log))
+                    instantiate(instance_name, guid, location, 0, logging, environment, Some(log))
                 }
                 (true, true) => {
                     let instantiate = fmi3::Functions::find(find).fmi3InstantiateCoSimulation;
                     instantiate(
-                        name_of_instance,
+                        instance_name,
                         guid,
                         location,
                         0,
@@ -492,8 +492,8 @@ impl Player {
         std::mem::forget(before);
     }
 
-    fn call(&self, of: Option<usize>, function: &str, args: &[Arg], outcome: &mut Outcome) {
-        let (handle, environment, co_simulation) = match of {
+    fn call(&self, instance: Option<usize>, function: &str, args: &[Arg], outcome: &mut Outcome) {
+        let (handle, environment, co_simulation) = match instance {
             Some(index) => match locked(&self.instances).get(&index) {
                 Some(instance) => (instance.handle, instance.environment, instance.co_simulation),
                 // Instantiation failed, so the call is skipped.
@@ -513,9 +513,9 @@ impl Player {
         INSIDE.leave();
         outcome.status = Some(status);
         let succeeded = status == 0 || status == 1;
-        for Kept { array, of } in &kept {
-            outcome.damage.extend(array.damage(matches!(of, Content::Input)));
-            outcome.written.extend(match of {
+        for Kept { array, content } in &kept {
+            outcome.damage.extend(array.damage(matches!(content, Content::Input)));
+            outcome.written.extend(match content {
                 Content::Input => None,
                 Content::Output(kind, count) => Some(read(array, *kind, *count, succeeded)),
                 Content::State(slot) => {
@@ -540,7 +540,7 @@ impl Player {
             // Pointers and sizes, to be read together.
             let arrays: Vec<_> = kept
                 .iter()
-                .filter(|kept| matches!(kept.of, Content::Output(..)))
+                .filter(|kept| matches!(kept.content, Content::Output(..)))
                 .map(|kept| &kept.array)
                 .collect();
             if let [sizes, pointers] = arrays[..] {
@@ -563,9 +563,9 @@ impl Player {
     }
 
     fn word(&self, arg: &Arg, kept: &mut Vec<Kept>) -> u64 {
-        let mut keep = |array: Guarded, of: Content| {
+        let mut keep = |array: Guarded, content: Content| {
             let address = array.address();
-            kept.push(Kept { array, of });
+            kept.push(Kept { array, content });
             address
         };
         let mut input = |bytes: &[u8]| keep(Guarded::new(bytes), Content::Input);

@@ -16,12 +16,12 @@ fn description(fmi: u32) -> String {
 
 /// The compiled library of the wagon, which the tests share. The environment variable `WAGON_FAULT` chooses the fault when
 /// the library is loaded. Each fault in linking has a separate library.
-fn library(fmi: u32, of_linker: &str) -> PathBuf {
+fn library(fmi: u32, macro_name: &str) -> PathBuf {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mutants/wagon.c");
     let text = std::fs::read(&source).expect("the source");
     let mut hasher = std::hash::DefaultHasher::new();
     text.hash(&mut hasher);
-    let name = format!("wagon-{fmi}{of_linker}-{:x}{}", hasher.finish(), std::env::consts::DLL_SUFFIX);
+    let name = format!("wagon-{fmi}{macro_name}-{:x}{}", hasher.finish(), std::env::consts::DLL_SUFFIX);
     let library = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     if library.exists() {
         return library;
@@ -29,7 +29,7 @@ fn library(fmi: u32, of_linker: &str) -> PathBuf {
     let new = tempfile::NamedTempFile::new_in(env!("CARGO_TARGET_TMPDIR")).expect("a file");
     let status = Command::new(std::env::var_os("CC").unwrap_or_else(|| "cc".into()))
         .args(["-O1", "-shared", "-fPIC", &format!("-DFMI={fmi}")])
-        .args((!of_linker.is_empty()).then(|| format!("-D{of_linker}")))
+        .args((!macro_name.is_empty()).then(|| format!("-D{macro_name}")))
         .arg("-o")
         .args([new.path(), &source])
         .args(["-lm", "-lpthread"])
@@ -87,13 +87,13 @@ fn found(fmu: &Path, fault: &str, options: &[&str]) -> (Vec<(String, String)>, s
 
 /// A fault is found under its name: of the library, of what the linker sees, or of the description.
 fn caught(
-    (fmi, fault, of_linker): (u32, &str, &str),
+    (fmi, fault, macro_name): (u32, &str, &str),
     topic: &str,
     name: &str,
     change: impl Fn(String) -> String,
 ) {
     let directory = TempDir::new().expect("a directory");
-    let path = fmu(directory.path(), fmi, &library(fmi, of_linker), change);
+    let path = fmu(directory.path(), fmi, &library(fmi, macro_name), change);
     let out = directory.path().join("out");
     // A call that hangs is waited for as long as the limit.
     let limit = if name.ends_with("hang") { "0.3" } else { "2" };
@@ -102,7 +102,7 @@ fn caught(
     let (found, report) = found(&path, fault, &[&options[..], &["--out", &out.to_string_lossy()]].concat());
     assert!(
         found.iter().any(|(other, _)| other == name),
-        "{fault}{of_linker} is not found as {name}: {found:?} {}",
+        "{fault}{macro_name} is not found as {name}: {found:?} {}",
         report["unreached"]
     );
     if fault != "none" {
