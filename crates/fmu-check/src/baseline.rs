@@ -93,7 +93,11 @@ impl Baseline {
                     all.any(|observed| accepted.fits(finding, observed))
                 })
         };
-        self.accepted.iter().filter(|of| !used(of)).map(|accepted| accepted.name.clone()).collect()
+        self.accepted
+            .iter()
+            .filter(|accepted| !used(accepted))
+            .map(|accepted| accepted.name.clone())
+            .collect()
     }
 }
 

@@ -12,7 +12,7 @@ use crate::writer::{READ, Read, Trajectory, Writer, difference, sample};
 use fmi_abi::{Interface, Standard};
 use std::collections::HashSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// An interface or a topic that was not checked.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -24,6 +24,9 @@ pub struct Unchecked {
     /// Whether the user has allowed it by name.
     pub allowed: bool,
 }
+
+/// Seconds of a quick check; call sequences that are played then may take a little longer.
+const QUICK: f64 = 24.0;
 
 /// Calls that stay in the shortest sequence of a topic: a comparison needs them on both sides, else there are other
 /// differences.
@@ -126,20 +129,21 @@ impl Checker {
         description: Description,
         setting: Setting,
         workers: Workers,
-        seed: u64,
-        limit: f64,
-        deadline: Instant,
+        options: &crate::Options,
+        begin: Instant,
     ) -> Self {
+        let time = if options.quick { QUICK } else { options.time.max(1.0) };
+        let limit = if options.quick { options.limit.min(QUICK / 10.0) } else { options.limit };
         Self {
             readable: sample(&description, READ),
             description: Arc::new(description),
             setting,
             workers,
             trajectories: Vec::new(),
-            seed,
+            seed: options.seed,
             limit,
-            deadline,
-            quick: false,
+            deadline: begin + Duration::from_secs_f64(time),
+            quick: options.quick,
             found: Mutex::default(),
             unchecked: Mutex::default(),
             alone: RwLock::default(),

@@ -99,17 +99,19 @@ impl Description {
                 let why = format!("{name} is in {unit:?}, which is no unit of UnitDefinitions");
                 add("description.units", why);
             }
-            if let Some(of) = variable.declared_type.as_ref().filter(|of| !self.types.contains(*of)) {
-                let why = format!("{name} is of type {of:?}, which is none of TypeDefinitions");
+            let declared = variable.declared_type.as_ref();
+            if let Some(declared) = declared.filter(|declared| !self.types.contains(*declared)) {
+                let why = format!("{name} is of type {declared:?}, which is none of TypeDefinitions");
                 add("description.types", why);
             }
             wrong.extend(faults(variable));
         }
         // A derivative that is not listed may be one that is no state's (section 2.2.8 of FMI 2.0).
         for unknown in &self.derivatives {
-            let of = &self.variables[unknown.variable];
-            if of.derivative_of.is_none() {
-                let why = format!("{} is among the derivatives, and is not declared to be one", of.name);
+            let variable = &self.variables[unknown.variable];
+            if variable.derivative_of.is_none() {
+                let why =
+                    format!("{} is among the derivatives, and is not declared to be one", variable.name);
                 wrong.push(("description.structure", why));
             }
         }
@@ -128,8 +130,8 @@ impl Description {
 
     /// Returns the variables with the type and value reference of this variable, including itself.
     pub fn aliases(&self, index: usize) -> impl Iterator<Item = usize> + '_ {
-        let of = &self.variables[index];
-        let (reference, kind) = (of.reference, of.base.map(|base| kind_of(self.standard, base)));
+        let variable = &self.variables[index];
+        let (reference, kind) = (variable.reference, variable.base.map(|base| kind_of(self.standard, base)));
         self.variables.iter().enumerate().filter_map(move |(index, other)| {
             let same =
                 other.reference == reference && other.base.map(|base| kind_of(self.standard, base)) == kind;
@@ -169,15 +171,15 @@ const COMBINATIONS: &[(&str, &[&str], &[&str])] = &[
 ];
 
 /// Returns the rules that a variable breaks without regard to the others.
-fn faults(of: &Variable) -> Vec<Observation> {
-    let (name, mut wrong) = (&of.name, Vec::new());
+fn faults(variable: &Variable) -> Vec<Observation> {
+    let (name, mut wrong) = (&variable.name, Vec::new());
     let mut add = |rule, why: String| wrong.push((rule, why));
     let fits = |(causality, variabilities, _): &&(&str, &[&str], &[&str])| {
-        *causality == of.causality && variabilities.contains(&of.variability.as_str())
+        *causality == variable.causality && variabilities.contains(&variable.variability.as_str())
     };
-    let (causality, variability, initial) = (&of.causality, &of.variability, &of.initial);
+    let (causality, variability, initial) = (&variable.causality, &variable.variability, &variable.initial);
     match COMBINATIONS.iter().find(fits) {
-        _ if of.base.is_none() || of.clocked => {}
+        _ if variable.base.is_none() || variable.clocked => {}
         None => add("description.combination", format!("{name} is {causality} and {variability}")),
         Some((.., initials)) if !initials.contains(&initial.as_str()) => {
             let why = format!("{name} is {causality} and {variability}, with initial = {initial}");
@@ -185,33 +187,34 @@ fn faults(of: &Variable) -> Vec<Observation> {
         }
         Some(_) => {}
     }
-    if variability == "continuous" && !of.is_float() && of.base.is_some() {
+    if variability == "continuous" && !variable.is_float() && variable.base.is_some() {
         add("description.combination", format!("{name} is continuous and no floating-point number"));
     }
     let needs_start =
-        ["exact", "approx"].contains(&initial.as_str()) || causality == "input" && of.base.is_some();
-    if needs_start && of.start.is_empty() && causality != "independent" && !of.clocked {
+        ["exact", "approx"].contains(&initial.as_str()) || causality == "input" && variable.base.is_some();
+    if needs_start && variable.start.is_empty() && causality != "independent" && !variable.clocked {
         add("description.start", format!("{name} ({causality}) has no start value"));
     }
-    if initial == "calculated" && !of.start.is_empty() && of.base.is_some() {
+    if initial == "calculated" && !variable.start.is_empty() && variable.base.is_some() {
         add("description.start", format!("{name} is calculated and has a start value"));
     }
-    if let (Some(min), Some(max)) = (of.min, of.max)
+    if let (Some(min), Some(max)) = (variable.min, variable.max)
         && min > max
     {
         add("description.range", format!("{name} has a min of {min} and a max of {max}"));
     }
-    let outside =
-        |number: &f64| of.min.is_some_and(|min| *number < min) || of.max.is_some_and(|max| *number > max);
-    if let Some(number) = of.starts().into_iter().find(outside) {
+    let outside = |number: &f64| {
+        variable.min.is_some_and(|min| *number < min) || variable.max.is_some_and(|max| *number > max)
+    };
+    if let Some(number) = variable.starts().into_iter().find(outside) {
         let why = format!("the start value of {name}, {number}, is outside its min and max");
         add("description.range", why);
     }
     let texts = [BaseType::String, BaseType::Binary, BaseType::Boolean];
     let number =
         |text: &String| text.parse::<f64>().is_ok() || ["INF", "-INF", "NaN"].contains(&text.as_str());
-    if of.base.is_some_and(|base| !texts.contains(&base)) && !of.start.iter().all(number) {
-        let why = format!("the start value of {name}, {:?}, is no number", of.start.join(" "));
+    if variable.base.is_some_and(|base| !texts.contains(&base)) && !variable.start.iter().all(number) {
+        let why = format!("the start value of {name}, {:?}, is no number", variable.start.join(" "));
         add("description.start", why);
     }
     wrong

@@ -140,7 +140,7 @@ pub struct Event {
 
 /// The result of a successful update of the discrete states.
 pub fn event(run: &Run, id: u32, fmi3: bool) -> Option<Event> {
-    let outcome = run.outcome(id).filter(|of| of.status.is_some_and(|status| status <= 1))?;
+    let outcome = run.outcome(id).filter(|outcome| outcome.status.is_some_and(|status| status <= 1))?;
     let (flags, time) = if fmi3 {
         let number = |index: usize| outcome.written.get(index)?.numbers().first().copied();
         ([0, 1, 3, 4].map(|index| number(index) == Some(1.0)), number(5)?)
@@ -184,9 +184,9 @@ pub fn first_failure(sequence: &CallSequence, run: &Run, most: i32) -> Option<St
     let made = |numbered: &&Numbered| matches!(numbered.step, Step::Make(..));
     let failed = |numbered: &&Numbered| {
         matches!(numbered.step, Step::Call { .. })
-            && run
-                .outcome(numbered.id)
-                .is_some_and(|of| of.status.map_or(of.missing && most < 2, |status| status > most))
+            && run.outcome(numbered.id).is_some_and(|outcome| {
+                outcome.status.map_or(outcome.missing && most < 2, |status| status > most)
+            })
     };
     let one = |numbered: &Numbered| failure_of(sequence, run, numbered.id);
     let of_makes = sequence.iter().filter(made).find_map(one);

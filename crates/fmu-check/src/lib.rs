@@ -41,7 +41,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use trajectory::{NoTrajectory, find_trajectory};
 
 /// How an FMU is checked.
@@ -111,9 +111,6 @@ pub enum FailOn {
     /// Not at all.
     Never,
 }
-
-/// Seconds of a quick check; call sequences that are played then may take a little longer.
-const QUICK: f64 = 24.0;
 
 /// Topics that a quick check leaves out.
 const LONG: [&str; 2] = ["hostile", "resources"];
@@ -229,11 +226,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
         observations.extend(description.wrong.iter().cloned());
     }
     let (setting, without) = setting(options, directory, &description);
-    let time = if options.quick { QUICK } else { options.time.max(1.0) };
-    let deadline = begin + Duration::from_secs_f64(time);
-    let limit = if options.quick { options.limit.min(QUICK / 10.0) } else { options.limit };
-    let mut checker = Checker::new(description, setting, workers, options.seed, limit, deadline);
-    checker.quick = options.quick;
+    let mut checker = Checker::new(description, setting, workers, options, begin);
     observations.into_iter().for_each(|(name, observed)| checker.add(checker.broken(name, observed)));
     without.into_iter().for_each(|(name, why)| checker.unchecked(name, why));
     simulate(&mut checker)?;
@@ -252,7 +245,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     }
     let mut report = Report::new(path, &checker, findings);
     report.seconds = begin.elapsed().as_secs_f64();
-    let why = if options.only.is_empty() { "left out (--quick)" } else { "not asked for (--only)" };
+    let why = if options.only.is_empty() { "left out (--quick)" } else { "left out (--only)" };
     let unwanted = rules::TOPICS.iter().filter(|topic| !wanted(topic));
     report.unreached.extend(unwanted.map(|topic| Unchecked {
         name: (*topic).to_owned(),
@@ -363,9 +356,11 @@ fn attack_with(
 ) -> anyhow::Result<()> {
     match (check, trajectory) {
         (Check::Once(check), None) => check(checker),
-        (Check::Each(fits, check), Some(of)) if fits.fit(checker, of) => check(checker, of),
-        (Check::Malformed(rule, fits, write), Some(of)) if fits.fit(checker, of) => {
-            checks::hostile::all(checker, rule, write(checker, of)?)
+        (Check::Each(fits, check), Some(trajectory)) if fits.fit(checker, trajectory) => {
+            check(checker, trajectory)
+        }
+        (Check::Malformed(rule, fits, write), Some(trajectory)) if fits.fit(checker, trajectory) => {
+            checks::hostile::all(checker, rule, write(checker, trajectory)?)
         }
         _ => Ok(()),
     }

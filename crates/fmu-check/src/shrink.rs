@@ -60,10 +60,10 @@ fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
         .into_iter()
         .filter_map(|numbered| Some((numbered.id, content(&numbered.step)?)))
         .collect();
-    let of = |id: &u32| contents.get(id).cloned();
+    let content_of = |id: &u32| contents.get(id).cloned();
     let mut groups: Vec<(Vec<String>, Vec<u32>)> = Vec::new();
     for unit in units {
-        let key: Vec<String> = unit.iter().filter_map(of).collect();
+        let key: Vec<String> = unit.iter().filter_map(content_of).collect();
         match groups.iter_mut().find(|(other, _)| !key.is_empty() && *other == key) {
             Some((_, ids)) => ids.extend(unit),
             None => groups.push((key, unit)),
@@ -154,7 +154,7 @@ mod tests {
     }
 
     fn count(sequence: &CallSequence, name: &str) -> usize {
-        names(sequence).iter().filter(|of| *of == name).count()
+        names(sequence).iter().filter(|other| *other == name).count()
     }
 
     #[test]

@@ -103,7 +103,7 @@ fn good_steps(checker: &Checker, run: &Run, sequence: &CallSequence) -> (usize, 
     let ids = sequence.iter().filter(|numbered| step(&numbered.step)).map(|numbered| numbered.id);
     let mut good = 0;
     for id in ids {
-        let flags = run.outcome(id).map_or(&[][..], |of| &of.written);
+        let flags = run.outcome(id).map_or(&[][..], |outcome| &outcome.written);
         let flag = |index: usize| flags.get(index).is_some_and(|flag| flag.numbers().first() == Some(&1.0));
         // A step that returns early counts as failed: the next step would have to begin at lastSuccessfulTime.
         if run.status(id).is_none_or(|status| status > 1) || checker.fmi3() && (0..3).any(flag) {
@@ -182,9 +182,14 @@ fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> any
             name.is_some_and(|name| name.ends_with("DoStep") || name.ends_with("CompletedIntegratorStep"))
         };
         // The flags for an event, the end of the simulation and, in Co-Simulation, an early return.
-        let outputs =
-            here.iter().find(advances).and_then(|id| run.outcome(*id)).map_or(&[][..], |of| &of.written);
-        let flag = |index| outputs.get(index).is_some_and(|of: &Values| of.numbers().first() == Some(&1.0));
+        let outputs = here
+            .iter()
+            .find(advances)
+            .and_then(|id| run.outcome(*id))
+            .map_or(&[][..], |outcome| &outcome.written);
+        let flag = |index| {
+            outputs.get(index).is_some_and(|outcome: &Values| outcome.numbers().first() == Some(&1.0))
+        };
         if flag(1) || flag(2) {
             return Ok(Some(Reached { ends: true, ..Reached::default() }));
         }

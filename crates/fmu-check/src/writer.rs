@@ -115,7 +115,7 @@ impl<'a> Writer<'a> {
 
     /// Name of a function that is given without `fmi2` or `fmi3`. FMI 2.0 spells `FMUState` with another case.
     fn named(&self, function: &str) -> String {
-        let mut all = signatures(self.description.standard).iter().map(|of| of.rule.name);
+        let mut all = signatures(self.description.standard).iter().map(|signature| signature.rule.name);
         let name = all.find(|name| name[4..].eq_ignore_ascii_case(function));
         name.map_or_else(|| function.to_owned(), str::to_owned)
     }

@@ -60,7 +60,7 @@ pub fn derivative(
     let size = |size: usize| sizes.then_some(Arg::Whole(size as i64));
     let mut args = Vec::new();
     for references in [unknowns, knowns] {
-        args.push(Arg::In(Kind::U32, references.iter().map(|of| u64::from(*of)).collect()));
+        args.push(Arg::In(Kind::U32, references.iter().map(|reference| u64::from(*reference)).collect()));
         args.push(Arg::Whole(references.len() as i64));
     }
     args.push(Arg::In(Kind::F64, seed.iter().map(|number| number.to_bits()).collect()));
@@ -141,7 +141,7 @@ fn names(description: &Description, indices: &[usize]) -> Vec<String> {
 
 /// The numbers that a successful call wrote.
 fn numbers(run: &Run, id: u32) -> Option<Vec<f64>> {
-    run.written(id).filter(|_| run.status(id) == Some(0)).map(|of| of.numbers())
+    run.written(id).filter(|_| run.status(id) == Some(0)).map(Values::numbers)
 }
 
 /// Judges whether the derivatives for unit seeds add up to the derivative for a seed of ones.
@@ -155,7 +155,7 @@ fn is_linear(columns: Vec<u32>, sum: u32, names: Vec<String>) -> impl Judges {
             let off = (added - together[row]).abs() > 1e-6 * scale.max(1e-12);
             off.then(|| {
                 format!(
-                    "the derivatives of {} add up to {added:?}, vectors for together they are {:?}",
+                    "the derivatives of {} add up to {added:?}, requested together they are {:?}",
                     names[row], together[row]
                 )
             })
@@ -173,7 +173,9 @@ fn is_transposed(columns: Vec<u32>, rows: Vec<u32>, names: [Vec<String>; 2], tol
             for (column, known) in knowns.iter().enumerate() {
                 let (one, other) = (columns[column][row], rows[row][column]);
                 if (one - other).abs() > tolerance * one.abs().max(other.abs()).max(1e-300) {
-                    return Some(format!("of {name} by {known}: directional {one:?}, adjoint {other:?}"));
+                    return Some(format!(
+                        "the derivative of {name} with respect to {known} is {one:?}, the adjoint one {other:?}"
+                    ));
                 }
             }
         }
@@ -327,14 +329,14 @@ impl Differences {
             };
             let values: Vec<f64> = self.reads.iter().map(number).collect::<Option<_>>()?;
             let (id, index) = self.analytic[row];
-            let answer = numbers(run, id)?.get(index).copied()?;
+            let derivative = numbers(run, id)?.get(index).copied()?;
             let (step, here) = (self.step, values[4]);
             let (wide, narrow) = ((values[0] - values[1]) / (2.0 * step), (values[2] - values[3]) / step);
             // One-sided differences show a kink, where there is no derivative to compare with.
             let (left, right) = ((here - values[3]) / (step / 2.0), (values[2] - here) / (step / 2.0));
             let rounding = 1e-13 * here.abs().max(values[0].abs()) / step;
             let doubt = (wide - narrow).abs() * 10.0 + rounding * 100.0;
-            let scale = narrow.abs().max(answer.abs());
+            let scale = narrow.abs().max(derivative.abs());
             let kink = (left - right).abs() > 0.05 * scale + rounding * 100.0;
             // An output that changes only in the next step has no difference here.
             let silent = self.is_stepped && narrow == 0.0 && wide == 0.0;
@@ -342,9 +344,9 @@ impl Differences {
                 continue;
             }
             let enough = tolerance * (scale + 1e-5);
-            if !answer.is_finite() || (answer - narrow).abs() > enough + doubt {
+            if !derivative.is_finite() || (derivative - narrow).abs() > enough + doubt {
                 return Some(format!(
-                    "of {} by {}: {answer:?}, differences give {narrow:?}",
+                    "the derivative of {} with respect to {} is {derivative:?}, differences give {narrow:?}",
                     self.names[row], self.known
                 ));
             }

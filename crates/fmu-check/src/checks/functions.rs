@@ -68,18 +68,18 @@ fn version(checker: &Checker) -> anyhow::Result<()> {
     checker.check("functions.version", sequence, move |run| {
         // "NULL" for a null pointer, None if the library lacks the function.
         let text = |id: u32| {
-            let of = run.outcome(id).filter(|of| !of.missing)?;
-            let text = of.text.as_ref().map(|text| String::from_utf8_lossy(text).into_owned());
+            let outcome = run.outcome(id).filter(|outcome| !outcome.missing)?;
+            let text = outcome.text.as_ref().map(|text| String::from_utf8_lossy(text).into_owned());
             Some(text.unwrap_or_else(|| "NULL".to_owned()))
         };
-        if let Some(answer) = text(0)
-            && answer != declared
-            && !(declared.starts_with("3.") && answer.starts_with("3."))
+        if let Some(version) = text(0)
+            && version != declared
+            && !(declared.starts_with("3.") && version.starts_with("3."))
         {
-            return Some(format!("{name} returns {answer}, and fmiVersion is {declared}"));
+            return Some(format!("{name} returns {version}, and fmiVersion is {declared}"));
         }
-        let answer = text(1)?;
-        (answer != "default").then(|| format!("fmi2GetTypesPlatform returns {answer}"))
+        let platform = text(1)?;
+        (platform != "default").then(|| format!("fmi2GetTypesPlatform returns {platform}"))
     })
 }
 
@@ -113,7 +113,7 @@ pub fn capabilities(checker: &Checker, trajectory: &Trajectory) -> anyhow::Resul
             "GetAdjointDerivative" => (size(unknown), size(known)),
             _ => (size(known), size(unknown)),
         };
-        let [unknowns, knowns] = [unknown, known].map(|of| references(&checker.description, &[of]));
+        let [unknowns, knowns] = [unknown, known].map(|index| references(&checker.description, &[index]));
         ids.push(derivative(&mut writer, function, &unknowns, &knowns, &vec![1.0; seed], results));
         calls.push((name, ids, writer.sequence));
     }

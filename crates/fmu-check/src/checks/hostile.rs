@@ -93,10 +93,12 @@ pub fn nulls(checker: &Checker, trajectory: &Trajectory) -> Sequences {
 }
 
 /// An argument of a type: zero, or NULL.
-fn harmless(of: &str) -> Arg {
-    match of.trim_start_matches("fmi2").trim_start_matches("fmi3") {
+fn harmless(name: &str) -> Arg {
+    match name.trim_start_matches("fmi2").trim_start_matches("fmi3") {
         "Real" | "Float64" => Arg::real(0.0),
-        of if of.starts_with('*') || of.to_lowercase().contains("state") || of == "String" => Arg::Null,
+        name if name.starts_with('*') || name.to_lowercase().contains("state") || name == "String" => {
+            Arg::Null
+        }
         _ => Arg::Whole(0),
     }
 }

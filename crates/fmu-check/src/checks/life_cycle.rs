@@ -43,12 +43,12 @@ const OTHER_ORDERS: &[(Fits, Order)] = &[
 
 /// Twenty instances, more than a fixed pool may have; four of them are freed in another order.
 fn many(writer: &mut Writer, _: &Trajectory) {
-    (4..20).for_each(|of| drop(writer.play(of, &[Make])));
-    (0..4).for_each(|of| drop(writer.play(of, &[Begin])));
-    (4..20).for_each(|of| drop(writer.play(of, &[Free])));
+    (4..20).for_each(|instance| drop(writer.play(instance, &[Make])));
+    (0..4).for_each(|instance| drop(writer.play(instance, &[Begin])));
+    (4..20).for_each(|instance| drop(writer.play(instance, &[Free])));
     let two = Points(2);
-    for (of, part) in [(0, Free), (1, two), (3, Free), (2, two), (2, Free), (1, Free)] {
-        writer.play(of, &[part]);
+    for (instance, part) in [(0, Free), (1, two), (3, Free), (2, two), (2, Free), (1, Free)] {
+        writer.play(instance, &[part]);
     }
 }
 

@@ -21,9 +21,10 @@ pub fn switches(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()
         checker.check("logs.off", writer.sequence, move |run| {
             let message = ids.iter().find_map(|id| {
                 // For a rejected call, one section of FMI 3.0 requires a message and another forbids it.
-                let of = run.outcome(*id).filter(|of| of.status.is_none_or(|status| status < 2))?;
+                let outcome =
+                    run.outcome(*id).filter(|outcome| outcome.status.is_none_or(|status| status < 2))?;
                 // FMI 2.0 switches off only debug messages.
-                of.log.iter().find(|message| fmi3 || message.status < 2)
+                outcome.log.iter().find(|message| fmi3 || message.status < 2)
             })?;
             let text = String::from_utf8_lossy(message.text.as_deref().unwrap_or_default()).into_owned();
             Some(format!("{text:?}"))

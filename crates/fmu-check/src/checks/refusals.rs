@@ -58,9 +58,9 @@ fn variable_attacks(checker: &Checker, interface: Interface) -> Vec<Attack> {
         let input = variable.causality == "input"
             && !variable.clocked
             && (stepped || variable.variability == "continuous");
-        let mut once = |of: &'static str| {
-            !observed.contains(&of) && {
-                observed.push(of);
+        let mut once = |group: &'static str| {
+            !observed.contains(&group) && {
+                observed.push(group);
                 true
             }
         };
@@ -73,23 +73,23 @@ fn variable_attacks(checker: &Checker, interface: Interface) -> Vec<Attack> {
             inputs_tried += 1;
             attacks.extend(input_attacks(checker, variable, &function, kind, other));
         }
-        let (of, rule, what) = if variable.variability == "constant" {
+        let (group, rule, what) = if variable.variability == "constant" {
             ("constant", Some("refusals.constant"), format!("a value for the constant {}", variable.name))
         } else if variable.causality == "output" && variable.initial == "calculated" {
             ("output", TOLERATED, format!("a value for the output {}", variable.name))
         } else if is("parameter", "fixed") {
             let what = format!("a value for the fixed parameter {} after the initialization", variable.name);
-            let of = match name {
+            let group = match name {
                 "Real" | "Float64" => "fixed",
                 "Integer" | "Int32" => "fixed whole",
                 _ => "fixed other",
             };
-            (of, TOLERATED, what)
+            (group, TOLERATED, what)
         } else {
             continue;
         };
-        if once(of) {
-            let first = input_of(checker, kind).filter(|_| of != "constant");
+        if once(group) {
+            let first = input_of(checker, kind).filter(|_| group != "constant");
             let references: Vec<u64> = first.into_iter().chain([reference]).collect();
             let bits = vec![other; references.len()];
             attacks.push((function, set(checker, references, kind, bits), what, rule));
@@ -210,31 +210,31 @@ fn integration_attacks(states: &[f64]) -> Vec<Attack> {
 
 /// Returns an input of this type. A call that is not atomic sets it before it reaches the invalid value.
 fn input_of(checker: &Checker, kind: Kind) -> Option<u64> {
-    let of = checker.description.variables.iter().find(|variable| {
+    let input = checker.description.variables.iter().find(|variable| {
         variable.causality == "input"
             && variable.size == Some(1)
             && !variable.clocked
             && variable.variability != "discrete"
             && variable.base.is_some_and(|base| kind_of(checker.description.standard, base) == kind)
     });
-    of.map(|variable| u64::from(variable.reference))
+    input.map(|variable| u64::from(variable.reference))
 }
 
 /// A trajectory, with an attack in its middle or without: the attack, the reads after it, and the rest.
-fn play(writer: &mut Writer, of: usize, attack: Option<&Attack>) -> (Option<u32>, Vec<Read>, Played) {
+fn play(writer: &mut Writer, instance: usize, attack: Option<&Attack>) -> (Option<u32>, Vec<Read>, Played) {
     let trajectory = writer.trajectory;
     let to = trajectory.points.len() / 2;
-    writer.play(of, &[Part::Begin, Part::Points(to)]);
-    let attack = attack.map(|(function, args, ..)| writer.forbidden(Some(of), function, args.clone()));
-    let at_once = writer.read_all(of);
+    writer.play(instance, &[Part::Begin, Part::Points(to)]);
+    let attack = attack.map(|(function, args, ..)| writer.forbidden(Some(instance), function, args.clone()));
+    let at_once = writer.read_all(instance);
     let mut later = Played::default();
     for (number, point) in trajectory.points[to..].iter().enumerate() {
         // The first two steps set no inputs, so that a value that the attack has set takes effect.
         let inputs = if number < 2 { Vec::new() } else { point.inputs.clone() };
-        later.ids.extend(writer.point(of, &Point { inputs, ..point.clone() }));
-        later.reads.extend(writer.read_all(of));
+        later.ids.extend(writer.point(instance, &Point { inputs, ..point.clone() }));
+        later.reads.extend(writer.read_all(instance));
     }
-    writer.free(of);
+    writer.free(instance);
     (attack, at_once, later)
 }
 

@@ -19,9 +19,13 @@ pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     })?;
     let variables = checker.description.variables.iter().enumerate();
     let texts: Vec<(usize, Values)> = variables
-        .filter(|(_, of)| of.base == Some(BaseType::String) && of.size == Some(1) && !of.clocked)
-        .filter(|(_, of)| of.causality == "input" || of.causality == "parameter" && of.initial == "exact")
-        .filter_map(|(index, of)| Some((index, Values::texts(of.start.first()?.as_bytes(), 1))))
+        .filter(|(_, variable)| {
+            variable.base == Some(BaseType::String) && variable.size == Some(1) && !variable.clocked
+        })
+        .filter(|(_, variable)| {
+            variable.causality == "input" || variable.causality == "parameter" && variable.initial == "exact"
+        })
+        .filter_map(|(index, variable)| Some((index, Values::texts(variable.start.first()?.as_bytes(), 1))))
         .collect();
     if !texts.is_empty() {
         measured("texts set", &[Make], &|writer| {

@@ -159,7 +159,7 @@ fn repeated(checker: &Checker, trajectory: &Trajectory, all: &[usize]) -> anyhow
                 let element = once.differ(&second)?;
                 let name = &description.variables[*index].name;
                 let (once, second) = (once.show(element), second.show(element));
-                Some(format!("{name} is {once}, points for twice in a call {second} the second time"))
+                Some(format!("{name} is {once}, and {second} when it is read a second time in a call"))
             })
         })
     })
@@ -204,12 +204,12 @@ pub fn cut(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let sizes = [(size, 8), (2.0 * size, 4), (size / 2.0, 16), (size / 3.0, 24)];
     let sizes = if fixed.is_some() { &sizes[..3] } else { &sizes };
     let mut ends = Vec::new();
-    for (of, (size, count)) in sizes.iter().enumerate() {
-        writer.begin(of);
+    for (instance, (size, count)) in sizes.iter().enumerate() {
+        writer.begin(instance);
         for point in steps(&checker.description, start, &vec![*size; *count], false) {
-            writer.point(of, &Point { inputs: Vec::new(), ..point });
+            writer.point(instance, &Point { inputs: Vec::new(), ..point });
         }
-        ends.push(writer.play(of, &[Part::Read, Part::Free]).reads);
+        ends.push(writer.play(instance, &[Part::Read, Part::Free]).reads);
     }
     let description = checker.description.clone();
     checker.check("results.cut", writer.sequence, move |run| {
@@ -308,7 +308,7 @@ pub fn last_successful(checker: &Checker, trajectory: &Trajectory) -> anyhow::Re
     }
     checker.check("results.last-successful-time", writer.sequence, move |run| {
         points.iter().find_map(|(id, time)| {
-            let outcome = run.outcome(*id).filter(|of| of.status == Some(0))?;
+            let outcome = run.outcome(*id).filter(|outcome| outcome.status == Some(0))?;
             let reached = *outcome.written.get(3)?.numbers().first()?;
             let off = (reached - time).abs() > 1e-9 * (1.0 + time.abs());
             off.then(|| format!("lastSuccessfulTime is {reached:?}, the step ends at {time:?}"))

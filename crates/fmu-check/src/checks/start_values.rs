@@ -27,7 +27,7 @@ pub fn starts(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
                 let variable =
                     Some(&model.variables[index]).filter(|variable| !is_start(variable, &value))?;
                 let (name, starts) = (&variable.name, variable.start.join(" "));
-                Some(format!("{name} starts with {}, the description says {starts}", value.show(0)))
+                Some(format!("{name} starts with {}, the model description has {starts}", value.show(0)))
             })
         })?;
     }

@@ -12,9 +12,9 @@ pub fn escape(text: &str) -> String {
 pub fn page(report: &Report) -> String {
     let mut text = String::new();
     for (severity, what) in [
-        (Severity::Violation, "Violation: the standard says must."),
+        (Severity::Violation, "Violation: the standard requires it."),
         (Severity::Fragile, "Fragile: nothing forbids it, but it hurts."),
-        (Severity::Note, "Note: good to know."),
+        (Severity::Note, "Note: information."),
     ] {
         let findings: Vec<_> =
             report.findings.iter().filter(|finding| finding.severity == severity).collect();

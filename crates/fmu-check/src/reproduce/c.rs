@@ -47,7 +47,7 @@ pub fn program(
     let list: Vec<String> = (0..parts.len()).map(|number| format!("phase{number}")).collect();
     format!(
         "/*\n{} * cc repro.c -o repro -ldl -lpthread && ./repro DIRECTORY_OF_THE_UNPACKED_FMU\n *\n \
-         * Exit status: 1 if the finding shows, 0 if it does not, 3 if that cannot be told.\n */\n\
+         * Exit status: 1 if the finding shows, 0 if it does not, 3 if that is not known.\n */\n\
          #define FMI {}\n{}{declared}\n{threads}{}static void (*const phases[])(void) = {{{}}};\n\
          static const char library_name[] = \"{}\";\n\nstatic void load(void) {{\n{load}}}\n\n\
          static void save(void) {{\n{save}}}\n\n{}{}",
@@ -255,9 +255,9 @@ impl Writer<'_> {
                 parts.array(number, kind.c_name(), bits.iter().map(|bits| number_of(*kind, *bits)))
             }
             Arg::Texts(texts) => {
-                let of =
+                let pointer =
                     |text: &Option<Vec<u8>>| text.as_ref().map_or("NULL".to_owned(), |text| string(text, 1));
-                parts.array(number, "void *", texts.iter().map(of))
+                parts.array(number, "void *", texts.iter().map(pointer))
             }
             Arg::Blobs(blobs) => parts.array(number, "void *", blobs.iter().map(|blob| string(blob, 0))),
             Arg::Out(kind, count) => parts.out(name, *kind, *count, number),
@@ -294,12 +294,13 @@ struct Parts {
 }
 
 impl Parts {
-    fn array(&mut self, number: usize, of: &str, list: impl Iterator<Item = String>) -> String {
+    fn array(&mut self, number: usize, element: &str, list: impl Iterator<Item = String>) -> String {
         let list: Vec<String> = list.collect();
         let (count, list) = (list.len(), if list.is_empty() { "0".to_owned() } else { list.join(", ") });
         let size = format!("{count} * sizeof *v{number}");
-        self.before
-            .push(format!("{of} v{number}[] = {{{list}}}; void *a{number} = guarded(v{number}, {size});"));
+        self.before.push(format!(
+            "{element} v{number}[] = {{{list}}}; void *a{number} = guarded(v{number}, {size});"
+        ));
         self.checks.push(format!("look_at(a{number}, v{number}, {size});"));
         format!("a{number}")
     }
@@ -338,20 +339,22 @@ fn comment(args: &[Arg], description: &Description) -> Option<String> {
     let names: Vec<&str> = references
         .iter()
         .take(8)
-        .filter_map(|reference| description.variables.iter().find(|of| u64::from(of.reference) == *reference))
+        .filter_map(|reference| {
+            description.variables.iter().find(|variable| u64::from(variable.reference) == *reference)
+        })
         .map(|variable| variable.name.as_str())
         .collect();
     let more = if references.len() > 8 { ", ..." } else { "" };
     (!names.is_empty()).then(|| format!("{}{more}", names.join(", ").replace("*/", "* /")))
 }
 
-fn type_of(of: &str) -> &'static str {
-    match of {
+fn type_of(name: &str) -> &'static str {
+    match name {
         "usize" => "size_t",
         "fmi2Real" | "fmi3Float64" => "double",
         "fmi3Boolean" => "bool",
         "fmi2ValueReference" | "fmi3ValueReference" => "uint32_t",
-        of if of.starts_with('*') || of.to_lowercase().contains("fmustate") => "void *",
+        name if name.starts_with('*') || name.to_lowercase().contains("fmustate") => "void *",
         _ => "int",
     }
 }

@@ -66,7 +66,7 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     if without(&|run| run.output.clear()) {
         return Evidence::Printed;
     }
-    if without(&|run| run.outcomes.values_mut().for_each(|of| of.damage.clear())) {
+    if without(&|run| run.outcomes.values_mut().for_each(|outcome| outcome.damage.clear())) {
         return Evidence::Damage;
     }
     let pairs = pairs(&finding.sequence);
@@ -74,12 +74,12 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
         return Evidence::Differ(pairs);
     }
     let needed = needed(judge, run);
-    let measured = |of: &&Outcome| of.measured.as_ref().is_some_and(|measured| measured.times == 0);
-    if needed.outcomes.values().any(|of| measured(&of)) {
+    let measured = |outcome: &&Outcome| outcome.measured.as_ref().is_some_and(|measured| measured.times == 0);
+    if needed.outcomes.values().any(|outcome| measured(&outcome)) {
         return grown(finding, &needed);
     }
-    let calls = needed.outcomes.values().filter(|of| of.measured.is_none());
-    let mut ids: Vec<u32> = calls.map(|of| of.id).collect();
+    let calls = needed.outcomes.values().filter(|outcome| outcome.measured.is_none());
+    let mut ids: Vec<u32> = calls.map(|outcome| outcome.id).collect();
     ids.sort_unstable();
     let proofs: Vec<Proof> = ids.iter().map(|id| proof(judge, &needed, *id)).collect();
     let calls: Vec<_> = proofs.iter().filter_map(|proof| function(&finding.sequence, proof.id)).collect();
@@ -138,11 +138,12 @@ fn proof(judge: &Judge, run: &Run, id: u32) -> Proof {
         judge(&changed).is_none()
     };
     let matters = [
-        without(&|of| of.written.clear()) || run.outcome(id).is_some_and(|of| of.text.is_some()),
-        without(&|of| of.log.clear())
-            || run.outcome(id).is_some_and(|of| of.log.is_empty() && of.status > Some(1)),
+        without(&|outcome| outcome.written.clear())
+            || run.outcome(id).is_some_and(|outcome| outcome.text.is_some()),
+        without(&|outcome| outcome.log.clear())
+            || run.outcome(id).is_some_and(|outcome| outcome.log.is_empty() && outcome.status > Some(1)),
     ];
-    Proof { id, matters, observed: run.outcome(id).map_or(String::new(), |of| shown(of, matters)) }
+    Proof { id, matters, observed: run.outcome(id).map_or(String::new(), |outcome| shown(outcome, matters)) }
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -195,13 +196,16 @@ fn function(sequence: &[Numbered], id: u32) -> Option<String> {
 
 /// A growth between two measurements.
 fn grown(finding: &Finding, needed: &Run) -> Evidence {
-    let mut ids: Vec<(u32, bool)> =
-        needed.outcomes.values().filter_map(|of| Some((of.id, of.measured.as_ref()?.times > 0))).collect();
+    let mut ids: Vec<(u32, bool)> = needed
+        .outcomes
+        .values()
+        .filter_map(|outcome| Some((outcome.id, outcome.measured.as_ref()?.times > 0)))
+        .collect();
     ids.sort_unstable();
     let times = ids.iter().rev().find(|(_, repeated)| *repeated);
     let times = times
         .and_then(|(id, _)| needed.outcome(*id)?.measured.as_ref())
-        .map_or(0, |of| of.times.min(REPETITIONS) as u64);
+        .map_or(0, |outcome| outcome.times.min(REPETITIONS) as u64);
     let measures: Vec<u32> = ids.iter().filter(|(_, repeated)| !repeated).map(|(id, _)| *id).collect();
     let known = [
         ("resources.memory", Measure::Memory, 16 * times + 4096),
@@ -220,7 +224,7 @@ pub fn as_repeated(sequence: &CallSequence, run: &Run) -> CallSequence {
     let mut sequence = sequence.clone();
     for numbered in &mut sequence {
         if let (Step::Repeat(times, _), Some(measured)) =
-            (&mut numbered.step, run.outcome(numbered.id).and_then(|of| of.measured.as_ref()))
+            (&mut numbered.step, run.outcome(numbered.id).and_then(|outcome| outcome.measured.as_ref()))
         {
             *times = measured.times.min(REPETITIONS);
         }
@@ -258,7 +262,7 @@ mod tests {
             ..Run::default()
         };
         let message = Message { status: 3, category: None, text: Some(b"no".to_vec()) };
-        run.outcomes.entry(2).and_modify(|of| of.log.push(message));
+        run.outcomes.entry(2).and_modify(|outcome| outcome.log.push(message));
         run
     }
 

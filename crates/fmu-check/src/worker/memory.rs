@@ -15,45 +15,29 @@ pub const FILL: u8 = 0x5a;
 /// A page of this byte.
 static FILLED: [u8; 4096] = [FILL; 4096];
 
-/// The number of functions of the FMU that have not returned, in memory that a forked process shares with its parent.
-pub struct Inside(OnceLock<&'static AtomicU32>);
+/// Returns the number of functions of the FMU that have not returned, in memory that a forked process shares with its parent.
+pub fn calls_under_way() -> &'static AtomicU32 {
+    static COUNT: OnceLock<&AtomicU32> = OnceLock::new();
+    COUNT.get_or_init(|| {
+        #[cfg(unix)]
+        // SAFETY: new memory, which is zero and is never unmapped.
+        unsafe {
+            let (access, flags) = (libc::PROT_READ | libc::PROT_WRITE, libc::MAP_SHARED | libc::MAP_ANON);
+            let map = libc::mmap(std::ptr::null_mut(), 4, access, flags, -1, 0);
+            assert!(map != libc::MAP_FAILED, "no memory");
+            &*map.cast::<AtomicU32>()
+        }
+        #[cfg(not(unix))]
+        Box::leak(Box::default())
+    })
+}
 
-/// The calls of this process.
-pub static INSIDE: Inside = Inside(OnceLock::new());
-
-impl Inside {
-    fn count(&self) -> &AtomicU32 {
-        self.0.get_or_init(|| {
-            #[cfg(unix)]
-            // SAFETY: new memory, which is zero and is never unmapped.
-            unsafe {
-                let (access, flags) = (libc::PROT_READ | libc::PROT_WRITE, libc::MAP_SHARED | libc::MAP_ANON);
-                let map = libc::mmap(std::ptr::null_mut(), 4, access, flags, -1, 0);
-                assert!(map != libc::MAP_FAILED, "no memory");
-                &*map.cast::<AtomicU32>()
-            }
-            #[cfg(not(unix))]
-            Box::leak(Box::default())
-        })
-    }
-
-    pub fn enter(&self) {
-        self.count().fetch_add(1, Ordering::Relaxed);
-    }
-
-    pub fn leave(&self) {
-        self.count().fetch_sub(1, Ordering::Relaxed);
-    }
-
-    /// Returns the number of calls that have not returned.
-    pub fn get(&self) -> u32 {
-        self.count().load(Ordering::Relaxed)
-    }
-
-    /// Sets the number before a process is forked.
-    pub fn set(&self, number: u32) {
-        self.count().store(number, Ordering::Relaxed);
-    }
+/// Runs code of the FMU, and counts it while it has not returned.
+pub fn in_fmu<T>(run: impl FnOnce() -> T) -> T {
+    calls_under_way().fetch_add(1, Ordering::Relaxed);
+    let result = run();
+    calls_under_way().fetch_sub(1, Ordering::Relaxed);
+    result
 }
 
 fn untouched(bytes: &[u8]) -> bool {

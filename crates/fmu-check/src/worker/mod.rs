@@ -22,7 +22,7 @@ use fmi_abi::fmi2::types::{fmi2CallbackFunctions, fmi2CallbackLogger};
 use fmi_abi::fmi3::types::fmi3LogMessageCallback;
 use fmi_abi::{fmi2, fmi3};
 pub use memory::FILL;
-use memory::{Guarded, INSIDE};
+use memory::{Guarded, in_fmu};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::ffi::{CStr, CString};
@@ -324,49 +324,41 @@ impl Player {
                 });
                 let Some(instance) = null.or_else(|| locked(&self.instances).remove(index)) else { return };
                 let name = self.named("FreeInstance");
-                if let Some(address) = self.find(instance.co_simulation, &name) {
-                    INSIDE.enter();
-                    // SAFETY: the functions of both standards for this have this type.
-                    unsafe {
+                let address = self.find(instance.co_simulation, &name);
+                outcome.missing = address.is_none();
+                outcome.status = address.map(|address| {
+                    // SAFETY: the functions of both FMI versions have this type.
+                    in_fmu(|| unsafe {
                         let function: unsafe extern "C" fn(*mut c_void) = std::mem::transmute(address);
                         function(instance.handle as *mut c_void);
-                    }
-                    INSIDE.leave();
-                    outcome.status = Some(0);
-                } else {
-                    outcome.missing = true;
-                }
+                    });
+                    0
+                });
                 outcome.log = messages(instance.environment);
             }
-            Step::Version(name) => match self.find(self.setting.libraries[0].is_some(), name) {
-                Some(address) => {
-                    INSIDE.enter();
-                    // SAFETY: these functions have no arguments and return a text.
-                    outcome.text = unsafe {
-                        let function: unsafe extern "C" fn() -> *const c_char = std::mem::transmute(address);
-                        text_at(function())
-                    };
-                    INSIDE.leave();
-                }
-                None => outcome.missing = true,
-            },
+            Step::Version(name) => {
+                let address = self.find(self.setting.libraries[0].is_some(), name);
+                outcome.missing = address.is_none();
+                // SAFETY: these functions have no arguments and return a string.
+                outcome.text = address.and_then(|address| unsafe {
+                    let function: unsafe extern "C" fn() -> *const c_char = std::mem::transmute(address);
+                    text_at(in_fmu(|| function()))
+                });
+            }
             Step::Call { instance, function, args } => self.call(*instance, function, args, outcome),
             Step::Measure => outcome.measured = Some(measure::now()),
             Step::Unload => {
                 let mut loaded: Vec<_> =
                     locked(&self.libraries).iter_mut().filter_map(Option::take).collect();
                 loaded.dedup_by_key(|library| std::ptr::from_ref(*library));
-                INSIDE.enter();
                 for library in loaded {
                     // SAFETY: made by Box::leak, and nothing else refers to it.
-                    drop(unsafe { Box::from_raw(std::ptr::from_ref(library).cast_mut()) });
+                    in_fmu(|| drop(unsafe { Box::from_raw(std::ptr::from_ref(library).cast_mut()) }));
                 }
-                INSIDE.leave();
             }
             Step::Quit => {
                 self.write(&Last { bytes: HashMap::new() });
-                INSIDE.enter();
-                std::process::exit(PLAYED)
+                in_fmu(|| std::process::exit(PLAYED))
             }
             Step::Repeat(..) | Step::Parallel(_) | Step::FreshProcess => {}
         }
@@ -384,10 +376,8 @@ impl Player {
             if index == 1 && self.setting.libraries[0].as_ref() == Some(path) && libraries[0].is_some() {
                 libraries[1] = libraries[0];
             } else {
-                INSIDE.enter();
                 // SAFETY: loading the library may run any code of the FMU, in a process that may crash.
-                let loaded = unsafe { libloading::Library::new(path) };
-                INSIDE.leave();
+                let loaded = in_fmu(|| unsafe { libloading::Library::new(path) });
                 match loaded {
                     Ok(library) => libraries[index] = Some(Box::leak(Box::new(library))),
                     Err(error) => {
@@ -429,10 +419,8 @@ impl Player {
         let find = |name: &str| (name == function).then_some(address);
         let (instance_name, guid, location) = (word(&name), word(&token), word(&resources));
         let logging = u8::from(make.logging);
-        INSIDE.enter();
-        // SAFETY: the function has the type of the standard, and the arguments are as the standard
-        // requires.
-        let handle = unsafe {
+        // SAFETY: the function has the type of the standard, and the arguments are as the standard requires.
+        let handle = in_fmu(|| unsafe {
             match (self.setting.fmi3, make.co_simulation) {
                 (false, co_simulation) => {
                     let given = &**callbacks.insert(Box::new(fmi2CallbackFunctions {
@@ -468,8 +456,7 @@ impl Player {
                     )
                 }
             }
-        };
-        INSIDE.leave();
+        });
         for text in [name, token, resources] {
             outcome.damage.extend(text.damage(true));
         }
@@ -507,16 +494,17 @@ impl Player {
         };
         let mut kept = Vec::new();
         let words: Vec<u64> = args.iter().map(|arg| self.word(arg, &mut kept)).collect();
-        INSIDE.enter();
         // SAFETY: the words are the arguments of the function; the FMU may still crash this process.
-        let status = unsafe { calls::call(address, function, handle as *mut c_void, &words) };
-        INSIDE.leave();
+        let status = in_fmu(|| unsafe { calls::call(address, function, handle as *mut c_void, &words) });
         outcome.status = Some(status);
         let succeeded = status == 0 || status == 1;
         for Kept { array, content } in &kept {
             outcome.damage.extend(array.damage(matches!(content, Content::Input)));
-            outcome.written.extend(match content {
+            let values = match content {
                 Content::Input => None,
+                Content::Output(Kind::Pointer, _) if function == "fmi3GetBinary" && succeeded => {
+                    std::mem::take(&mut outcome.written).first().map(|sizes| blobs(array, sizes))
+                }
                 Content::Output(kind, count) => Some(read(array, *kind, *count, succeeded)),
                 Content::State(slot) => {
                     let handle = word_of(array);
@@ -534,30 +522,8 @@ impl Player {
                     locked(&self.bytes).insert(*slot, array.bytes().to_vec());
                     Some(read(array, Kind::U8, usize::MAX, succeeded))
                 }
-            });
-        }
-        if function == "fmi3GetBinary" && succeeded {
-            // Pointers and sizes, to be read together.
-            let arrays: Vec<_> = kept
-                .iter()
-                .filter(|kept| matches!(kept.content, Content::Output(..)))
-                .map(|kept| &kept.array)
-                .collect();
-            if let [sizes, pointers] = arrays[..] {
-                let words = |array: &Guarded| -> Vec<usize> {
-                    array
-                        .bytes()
-                        .chunks_exact(8)
-                        .map(|word| usize::from_ne_bytes(word.try_into().unwrap_or_default()))
-                        .collect()
-                };
-                let blobs = words(pointers).into_iter().zip(words(sizes)).map(|(pointer, size)| {
-                    // SAFETY: the FMU has returned the address and the size of the bytes.
-                    (pointer != 0 && size < 1 << 30)
-                        .then(|| unsafe { std::slice::from_raw_parts(pointer as *const u8, size) }.to_vec())
-                });
-                outcome.written = vec![Values::Texts(blobs.collect())];
-            }
+            };
+            outcome.written.extend(values);
         }
         outcome.log = messages(environment);
     }
@@ -636,6 +602,22 @@ fn read(array: &Guarded, kind: Kind, count: usize, succeeded: bool) -> Values {
         return Values::Texts(texts.collect());
     }
     Values::Numbers(kind, words.collect())
+}
+
+/// Returns the bytes that fmi3GetBinary has returned as pointers and sizes.
+fn blobs(pointers: &Guarded, sizes: &Values) -> Values {
+    let (Values::Numbers(_, pointers), Values::Numbers(_, sizes)) =
+        (read(pointers, Kind::Size, usize::MAX, true), sizes)
+    else {
+        return Values::Texts(Vec::new());
+    };
+    let blob = |(pointer, size): (u64, &u64)| {
+        // SAFETY: the FMU has returned the address and the size of the bytes.
+        (pointer != 0 && *size < 1 << 30).then(|| unsafe {
+            std::slice::from_raw_parts(pointer as usize as *const u8, *size as usize).to_vec()
+        })
+    };
+    Values::Texts(pointers.into_iter().zip(sizes).map(blob).collect())
 }
 
 /// Takes the messages that were logged with this environment.

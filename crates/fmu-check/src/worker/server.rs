@@ -2,12 +2,14 @@
 //! and ends the descendants that a call sequence leaves.
 
 use super::contain::{MOST_PROCESSES, abandoned, adopt_descendants, descendants, end_descendants, isolate};
+use super::memory::calls_under_way;
 use super::{File, SCRATCH, work};
 use crate::run::Ended;
 use std::io::{Read as _, Seek as _, Write as _};
 use std::os::unix::process::ExitStatusExt as _;
 use std::path::Path;
 use std::process::ExitStatus;
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// Bytes of the standard output and standard error of a process that are kept.
@@ -35,7 +37,7 @@ fn jobs() -> std::io::Result<()> {
     for line in std::io::stdin().lines() {
         let line = line?;
         let Some((limit, job)) = line.split_once(' ') else { continue };
-        super::INSIDE.set(0);
+        calls_under_way().store(0, Ordering::Relaxed);
         // SAFETY: this process has one thread.
         match unsafe { libc::fork() } {
             -1 => return Err(std::io::Error::last_os_error()),
@@ -52,7 +54,7 @@ fn jobs() -> std::io::Result<()> {
                 if abandoned() {
                     return Ok(());
                 }
-                let inside = super::INSIDE.get() > 0;
+                let inside = calls_under_way().load(Ordering::Relaxed) > 0;
                 let ended = ended.map(Ended::from).unwrap_or_default();
                 pass_on(Ended { left, flood, inside, ..ended }, &mut files)?;
             }
