@@ -55,7 +55,7 @@ impl Baseline {
                 };
                 let reason = reason.strip_prefix(':').map(str::trim).filter(|reason| !reason.is_empty());
                 let known = crate::rules::is_known(name)
-                    || crate::INTERFACES.contains(&name)
+                    || crate::options::INTERFACES.contains(&name)
                     || crate::rules::TOPICS.contains(&name);
                 match reason {
                     Some(reason) if known => {
@@ -85,7 +85,7 @@ impl Baseline {
     }
 
     /// Returns the names that match no finding and no unchecked topic.
-    pub fn unused(&self, findings: &[Finding], unchecked: &[crate::Unchecked]) -> Vec<String> {
+    pub fn unused(&self, findings: &[Finding], unchecked: &[crate::checker::Unchecked]) -> Vec<String> {
         let used = |accepted: &&Accepted| {
             unchecked.iter().any(|unchecked| unchecked.name == accepted.name)
                 || findings.iter().any(|finding| {

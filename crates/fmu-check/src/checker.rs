@@ -129,7 +129,7 @@ impl Checker {
         description: Description,
         setting: Setting,
         workers: Workers,
-        options: &crate::Options,
+        options: &crate::options::Options,
         begin: Instant,
     ) -> Self {
         let time = if options.quick { QUICK } else { options.time.max(1.0) };

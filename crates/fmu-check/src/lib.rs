@@ -5,6 +5,9 @@
 //! A check writes a call sequence (`writer`, `call_sequence`), which a separate process plays (`run`, `worker`), and judges the
 //! results. The call sequence of a finding is shortened (`shrink`) as long as the standard allows it (`legal`), and written
 //! as a program in C (`reproduce`). Only `worker` has `unsafe` code: an FMU may crash its process.
+//!
+//! Each module uses only modules before it: `call_sequence`, `finding`, `rules`, `description`, `values`, `writer`, `legal`,
+//! `shrink`, `worker`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`, `checks`, `baseline`, `report`.
 
 mod always;
 mod baseline;
@@ -14,6 +17,7 @@ mod checks;
 mod description;
 mod finding;
 mod legal;
+mod options;
 mod report;
 mod reproduce;
 mod rules;
@@ -27,6 +31,7 @@ mod writer;
 
 pub use checker::Unchecked;
 pub use finding::{Finding, Severity};
+pub use options::{FailOn, Options};
 pub use report::Report;
 pub use worker::work_if_asked;
 
@@ -35,88 +40,18 @@ use checker::Checker;
 use checks::Check;
 use description::Description;
 use fmi_abi::Interface;
+use options::INTERFACES;
 use run::Stop;
 use std::io::{IsTerminal as _, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 use trajectory::{NoTrajectory, find_trajectory};
 
-/// How an FMU is checked.
-#[derive(Clone, Debug, clap::Args)]
-pub struct Options {
-    /// Checks only these topics, with commas between: description, package, functions, start_values, life_cycle,
-    /// states, derivatives, dependencies, results, reset, refusals, logs, resources, hostile.
-    #[arg(long, value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(rules::TOPICS))]
-    pub only: Vec<String>,
-    /// Succeeds without these topics and interfaces (co-simulation, model-exchange, scheduled-execution), with commas between.
-    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(
-        rules::TOPICS.iter().chain(&INTERFACES)))]
-    pub allow_unchecked: Vec<String>,
-    /// Seconds for all of it.
-    #[arg(long, default_value_t = 120.0)]
-    pub time: f64,
-    /// Seconds for one sequence; longer is a hang.
-    #[arg(long, default_value_t = 10.0)]
-    pub limit: f64,
-    /// Megabytes of memory that the FMU may use.
-    #[arg(long, default_value_t = 8192)]
-    pub memory: u64,
-    /// Megabytes that the FMU may have when it is unpacked.
-    #[arg(long, default_value_t = 1000)]
-    pub unpacked: u64,
-    /// Seed of the random orders of calls.
-    #[arg(long, default_value_t = 1)]
-    pub seed: u64,
-    /// Checks a part in 30 seconds at most: neither hostile calls nor resources, and fewer values and orders of calls.
-    #[arg(long, conflicts_with = "time")]
-    pub quick: bool,
-    /// Accepts the findings in this file, which has a line for each: NAME: REASON.
-    #[arg(long, value_name = "FILE")]
-    pub baseline: Option<PathBuf>,
-    /// Prints a rule, its severity and its section of the standard, or all rules as a page.
-    #[arg(long, value_name = "RULE")]
-    pub explain: Option<String>,
-    /// Writes report.html, report.json, junit.xml, report.sarif and a program in C for each finding to this directory.
-    #[arg(long, value_name = "FOLDER")]
-    pub out: Option<PathBuf>,
-    /// Writes the report as JSON to the standard output.
-    #[arg(long)]
-    pub json: bool,
-    /// Fails for findings of this severity and worse.
-    #[arg(long, value_enum, default_value_t = FailOn::Violation)]
-    pub fail_on: FailOn,
-    /// Seconds of each simulation that is repeated to find leaks.
-    #[arg(long, default_value_t = 1.5)]
-    pub repeat: f64,
-    /// Leaves sequences as long as they are.
-    #[arg(long)]
-    pub no_shrink: bool,
-    /// Runs an FMU that starts another program, which must be installed.
-    #[arg(long)]
-    pub execution_tool: bool,
-}
-
-/// Lowest severity that fails the check.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum FailOn {
-    /// The standard requires it.
-    Violation,
-    /// Fragile findings and violations.
-    Fragile,
-    /// Information.
-    Note,
-    /// Not at all.
-    Never,
-}
-
 /// Topics that a quick check leaves out.
 const LONG: [&str; 2] = ["hostile", "resources"];
-
-/// The interfaces that an FMU may offer.
-const INTERFACES: [&str; 3] = ["co-simulation", "model-exchange", "scheduled-execution"];
 
 /// Checks an FMU, prints the findings and writes the reports. The exit status is 1 for findings of a severity that fails the
 /// check, otherwise 2 if the FMU, one of its interfaces or a topic was not checked, otherwise 0.

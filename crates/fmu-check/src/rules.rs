@@ -22,7 +22,7 @@ pub const TOPICS: [&str; 14] = [
     "hostile",
 ];
 
-/// The rule that the files break, with what is wrong.
+/// A rule that the files of the FMU break, and the observation.
 pub type Observation = (&'static str, String);
 
 /// All rules as a page.
@@ -158,7 +158,7 @@ mod tests {
             ["checker.rs", "lib.rs", "always.rs"].map(|name| format!("{directory}/../{name}").into());
         for path in paths.chain(others) {
             let source: String = std::fs::read_to_string(&path).expect("a source");
-            // Names end before what ends a run, such as ".hang".
+            // Names of rules; the end of a process, such as ".hang", is appended to them.
             let names = source.split('"').filter(|name| {
                 let topic = name.split_once('.').filter(|(_, rule)| !rule.is_empty());
                 topic.is_some_and(|(topic, _)| topic == "arrays" || super::TOPICS.contains(&topic))

@@ -1,12 +1,11 @@
 //! Plays call sequences in separate processes.
 
 use crate::call_sequence::{CallSequence, End, Numbered, Outcome, Run, Setting, Step};
-use crate::worker::{Job, Last, OWN_FAULT, PLAYED, SCRATCH, Unloadable, VARIABLE, interrupted};
+use crate::worker::{Ended, Job, Last, OWN_FAULT, PLAYED, SCRATCH, Unloadable, VARIABLE, interrupted};
 use anyhow::{Context as _, bail};
-use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus};
+use std::process::Command;
 
 /// Processes that play call sequences.
 pub struct Workers {
@@ -19,35 +18,6 @@ pub struct Workers {
 /// Conditions that a process is started with: how many processes of its call sequence come before it, and whether
 /// libraries are bound at once.
 type Situation = (usize, bool);
-
-/// The results of a process. It did not end in time if it has neither an exit status nor a signal.
-#[derive(Default, Serialize, Deserialize)]
-pub struct Ended {
-    /// Its exit status.
-    pub code: Option<i32>,
-    /// The signal that has ended it.
-    pub signal: Option<i32>,
-    /// Its standard output and standard error.
-    pub output: String,
-    /// Its outcomes, a line of JSON for each.
-    pub outcomes: String,
-    /// Names of the processes that it has left.
-    pub left: Vec<String>,
-    /// The number of its processes, if that is why it was ended.
-    pub flood: Option<usize>,
-    /// Whether it ended in a function of the FMU.
-    pub inside: bool,
-}
-
-impl From<ExitStatus> for Ended {
-    fn from(status: ExitStatus) -> Self {
-        #[cfg(unix)]
-        let signal = std::os::unix::process::ExitStatusExt::signal(&status);
-        #[cfg(not(unix))]
-        let signal = None;
-        Self { code: status.code(), signal, ..Self::default() }
-    }
-}
 
 /// Reasons for which a check cannot go on.
 #[derive(Debug)]

@@ -54,7 +54,7 @@ fn step_size(description: &Description) -> f64 {
     internal.map_or(size, |internal| internal * (size / internal).round().clamp(1.0, 100.0))
 }
 
-/// A trajectory of these points, as far as its calls are good.
+/// Returns the trajectory up to the points whose calls succeed.
 fn up_to(mut trajectory: Trajectory, good: usize) -> Trajectory {
     trajectory.points.truncate(good);
     if let Some(last) = trajectory.points.last() {

@@ -62,7 +62,7 @@ pub fn input_values(description: &Description, phase: usize, discrete: bool) -> 
     values
 }
 
-/// A number near another one, by so much of what is usual for the variable, within its range.
+/// Returns a number near the start value and within the range: the difference is this part of the range or the nominal value.
 pub fn near(variable: &Variable, start: f64, by: f64) -> f64 {
     let range = variable.min.zip(variable.max).map(|(min, max)| max - min).filter(|range| range.is_finite());
     let scale = range.unwrap_or(f64::INFINITY).min(variable.nominal.max(start.abs().min(1e6)));

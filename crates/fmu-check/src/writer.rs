@@ -13,6 +13,16 @@ pub struct Read {
     pub variables: Vec<(usize, usize)>,
 }
 
+impl Read {
+    /// Returns each variable with the index of its first value and the number of its values.
+    pub fn parts(&self) -> impl Iterator<Item = (usize, usize, usize)> {
+        self.variables.iter().scan(0, |end, (variable, size)| {
+            *end += size;
+            Some((*variable, *end - size, *size))
+        })
+    }
+}
+
 /// One point of a trajectory.
 #[derive(Clone, Debug, Default)]
 pub struct Point {
@@ -261,7 +271,7 @@ impl<'a> Writer<'a> {
         self.call(instance, if stepped { "EnterStepMode" } else { "EnterContinuousTimeMode" }, vec![])
     }
 
-    /// Leaves Initialization Mode, for the mode in which time goes on.
+    /// Leaves Initialization Mode for the mode in which time advances.
     pub fn leave(&mut self, instance: usize) -> Vec<u32> {
         let mut ids = vec![self.call(instance, "ExitInitializationMode", vec![])];
         if !self.trajectory.is_stepped() || self.description.event_mode() {
@@ -499,33 +509,28 @@ pub fn difference(description: &Description, run: &Run, one: &[Read], other: &[R
 
 /// Returns the name of the variable whose value is at an index of a read.
 fn name_at(description: &Description, read: &Read, index: usize) -> String {
-    let mut rest = index;
-    for (variable, size) in &read.variables {
-        if rest < *size {
-            let name = &description.variables[*variable].name;
-            return if *size == 1 { name.clone() } else { format!("{name}[{rest}]") };
-        }
-        rest -= size;
-    }
-    format!("number {}", index + 1)
+    let part = read.parts().find(|(_, begin, size)| (*begin..begin + size).contains(&index));
+    part.map_or_else(
+        || format!("number {}", index + 1),
+        |(variable, begin, size)| {
+            let name = &description.variables[variable].name;
+            if size == 1 { name.clone() } else { format!("{name}[{}]", index - begin) }
+        },
+    )
 }
 
 /// Returns the values of the variables of these reads.
 pub fn values_of<'r>(run: &'r Run, reads: &'r [Read]) -> impl Iterator<Item = (usize, Values)> {
     reads.iter().filter(|read| run.succeeds(read.id)).flat_map(move |read| {
-        let mut end = 0;
-        read.variables.iter().filter_map(move |(index, size)| {
-            end += size;
-            Some((*index, run.written(read.id)?.part(end - size, *size)?))
-        })
+        let value = move |(variable, begin, size)| Some((variable, run.written(read.id)?.part(begin, size)?));
+        read.parts().filter_map(value)
     })
 }
 
 /// Returns the value of a variable in these reads.
 pub fn value_of(run: &Run, reads: &[Read], variable: usize) -> Option<Values> {
     reads.iter().find_map(|read| {
-        let at = read.variables.iter().position(|(index, _)| *index == variable)?;
-        let begin = read.variables[..at].iter().map(|(_, size)| size).sum();
-        run.written(read.id).filter(|_| run.succeeds(read.id))?.part(begin, read.variables[at].1)
+        let (_, begin, size) = read.parts().find(|(index, ..)| *index == variable)?;
+        run.written(read.id).filter(|_| run.succeeds(read.id))?.part(begin, size)
     })
 }

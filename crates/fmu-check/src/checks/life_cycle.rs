@@ -1,4 +1,4 @@
-//! The life of an instance in every order that the standard allows.
+//! Checks that instances accept every order of calls that the standard allows.
 
 use super::Fits::{self, Always, Integrated, Several, Stepped};
 use crate::call_sequence::{Arg, NULL_INSTANCE, Step};

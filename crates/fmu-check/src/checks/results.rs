@@ -151,13 +151,11 @@ fn repeated(checker: &Checker, trajectory: &Trajectory, all: &[usize]) -> anyhow
             if [single, double].iter().any(|read| !run.succeeds(read.id)) {
                 return None;
             }
-            let mut at = 0;
-            single.variables.iter().find_map(|(index, size)| {
-                at += 2 * size;
-                let once = value_of(run, std::slice::from_ref(single), *index)?;
-                let second = run.written(double.id)?.part(at - size, *size)?;
+            single.parts().find_map(|(index, begin, size)| {
+                let once = run.written(single.id)?.part(begin, size)?;
+                let second = run.written(double.id)?.part(2 * begin + size, size)?;
                 let element = once.differ(&second)?;
-                let name = &description.variables[*index].name;
+                let name = &description.variables[index].name;
                 let (once, second) = (once.show(element), second.show(element));
                 Some(format!("{name} is {once}, and {second} when it is read a second time in a call"))
             })

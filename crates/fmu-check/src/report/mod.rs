@@ -6,7 +6,7 @@ mod sarif;
 use crate::baseline::Baseline;
 use crate::checker::{Checker, Unchecked};
 use crate::finding::{Finding, Severity};
-use crate::{FailOn, Options};
+use crate::options::{FailOn, Options};
 use std::fmt::Write as _;
 use std::path::Path;
 

@@ -13,7 +13,7 @@ pub fn page(report: &Report) -> String {
     let mut text = String::new();
     for (severity, what) in [
         (Severity::Violation, "Violation: the standard requires it."),
-        (Severity::Fragile, "Fragile: nothing forbids it, but it hurts."),
+        (Severity::Fragile, "Fragile: no rule forbids it, but importers fail."),
         (Severity::Note, "Note: information."),
     ] {
         let findings: Vec<_> =

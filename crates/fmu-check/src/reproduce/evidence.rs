@@ -183,7 +183,7 @@ fn shown(outcome: &Outcome, [written, log]: [bool; 2]) -> String {
     text
 }
 
-/// The function of a step at any depth, and what it reads.
+/// Returns the function of a step and its arguments except saved states, to find calls that read the same values.
 fn function(sequence: &[Numbered], id: u32) -> Option<String> {
     Some(match &step_of(sequence, id)?.step {
         Step::Call { function, args, .. } => {

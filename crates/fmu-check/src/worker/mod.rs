@@ -29,6 +29,7 @@ use std::ffi::{CStr, CString};
 use std::fs::File;
 use std::io::Write as _;
 use std::path::Path;
+use std::process::ExitStatus;
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -52,6 +53,35 @@ pub struct Job {
     pub sequence: CallSequence,
     /// Serialized bytes of processes before.
     pub bytes: HashMap<usize, Vec<u8>>,
+}
+
+/// The results of a process. It did not end in time if it has neither an exit status nor a signal.
+#[derive(Default, Serialize, Deserialize)]
+pub struct Ended {
+    /// Its exit status.
+    pub code: Option<i32>,
+    /// The signal that has ended it.
+    pub signal: Option<i32>,
+    /// Its standard output and standard error.
+    pub output: String,
+    /// Its outcomes, a line of JSON for each.
+    pub outcomes: String,
+    /// Names of the processes that it has left.
+    pub left: Vec<String>,
+    /// The number of its processes, if that is why it was ended.
+    pub flood: Option<usize>,
+    /// Whether it ended in a function of the FMU.
+    pub inside: bool,
+}
+
+impl From<ExitStatus> for Ended {
+    fn from(status: ExitStatus) -> Self {
+        #[cfg(unix)]
+        let signal = std::os::unix::process::ExitStatusExt::signal(&status);
+        #[cfg(not(unix))]
+        let signal = None;
+        Self { code: status.code(), signal, ..Self::default() }
+    }
 }
 
 /// The last line that a worker writes.

@@ -3,8 +3,7 @@
 
 use super::contain::{MOST_PROCESSES, abandoned, adopt_descendants, descendants, end_descendants, isolate};
 use super::memory::calls_under_way;
-use super::{File, SCRATCH, work};
-use crate::run::Ended;
+use super::{Ended, File, SCRATCH, work};
 use std::io::{Read as _, Seek as _, Write as _};
 use std::os::unix::process::ExitStatusExt as _;
 use std::path::Path;

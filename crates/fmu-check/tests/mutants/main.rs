@@ -1,4 +1,4 @@
-//! FMUs with one fault each, put in by hand: every one is found, under its own name. Without a fault nothing is.
+//! FMUs with one seeded fault each: every fault is found under the name of its rule. Without a fault, nothing is found.
 
 #![cfg(unix)]
 
@@ -85,7 +85,7 @@ fn found(fmu: &Path, fault: &str, options: &[&str]) -> (Vec<(String, String)>, s
     (findings.iter().map(|finding| (text(finding, "name"), text(finding, "observed"))).collect(), report)
 }
 
-/// A fault is found under its name: of the library, of what the linker sees, or of the description.
+/// Asserts that a fault of the library, of its linking or of the description is found under its name.
 fn caught(
     (fmi, fault, macro_name): (u32, &str, &str),
     topic: &str,
@@ -257,7 +257,7 @@ fn symbol_missing() {
     caught((2, "none", "SYMBOL_MISSING"), "functions", "package.symbols", |text| text);
 }
 
-/// Faults of the description: edition, name of the finding, what is replaced by what.
+/// Faults of the description: FMI version, name of the finding, the text that is replaced, and the replacement.
 #[rustfmt::skip]
 const DESCRIPTIONS: [(u32, &str, &str, &str); 13] = [
     (2, "description.combination", r#""parameter" variability="fixed""#, r#""parameter" variability="discrete""#),
@@ -540,7 +540,7 @@ fn clean(fmi: u32) {
     let directory = TempDir::new().expect("a directory");
     let path = fmu(directory.path(), fmi, &library(fmi, ""), |text| text);
     let (found, report) = found(&path, "none", &["--repeat", "0.3"]);
-    // How old a system may be is that of the compiler; that fixed parameters can be set in the end is not.
+    // The note on glibc depends on the system of the compiler.
     let found: Vec<_> = found.iter().filter(|(name, _)| name != "package.glibc").collect();
     assert!(found.is_empty(), "{found:#?}");
     assert_eq!(report["unreached"].as_array().map(Vec::len), Some(0), "{}", report["unreached"]);
