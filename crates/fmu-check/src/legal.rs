@@ -2,6 +2,7 @@
 
 use crate::call_sequence::{Arg, Make, NULL_INSTANCE, Numbered, Step};
 use crate::description::Description;
+use crate::values::is_other_time;
 use fmi_abi::calls::signature;
 use fmi_abi::{Interface, Mode, Standard};
 use std::collections::HashMap;
@@ -138,9 +139,8 @@ impl State {
                 return self.updated;
             }
             "DoStep" => {
-                let off = real(0) - self.time;
                 // After an early return, only the run knows the time.
-                let here = off.abs() <= 1e-9 * (1.0 + self.time.abs()) || self.early_return && off < 0.0;
+                let here = !is_other_time(real(0), self.time) || self.early_return && real(0) < self.time;
                 self.time = real(0) + real(1);
                 return here && real(1) > 0.0;
             }

@@ -70,3 +70,8 @@ pub fn near(variable: &Variable, start: f64, by: f64) -> f64 {
     let number = variable.min.map_or(number, |min| number.max(min));
     variable.max.map_or(number, |max| number.min(max))
 }
+
+/// Returns whether a time differs from another one by more than rounding errors.
+pub fn is_other_time(time: f64, other: f64) -> bool {
+    (time - other).abs() > 1e-9 * (1.0 + other.abs())
+}

@@ -2,6 +2,7 @@
 
 use crate::call_sequence::Run;
 use crate::checker::Checker;
+use crate::values::is_other_time;
 use crate::writer::{Read, Trajectory, Writer, value_of};
 use std::sync::Arc;
 
@@ -28,9 +29,8 @@ pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
                     );
                 }
                 let now = *value_of(run, &step.values, time?)?.numbers().first()?;
-                let off = (now - reached).abs() > 1e-9 * (1.0 + now.abs());
                 let end = step.end;
-                off.then(|| {
+                is_other_time(reached, now).then(|| {
                     format!("lastSuccessfulTime is {reached:?} of a step to {end:?}, and the time is {now:?}")
                 })
             })
@@ -39,7 +39,7 @@ pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
             steps.iter().find_map(|step| {
                 let (event, early, reached) = ended(&steps, run, step.id)?;
                 let end = step.end;
-                let short = reached < end - 1e-9 * (1.0 + end.abs());
+                let short = reached < end && is_other_time(reached, end);
                 (short && event && !early).then(|| {
                     format!(
                         "a step to {end:?} ends at an event at {reached:?} and does not report earlyReturn"

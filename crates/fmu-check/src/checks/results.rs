@@ -5,6 +5,7 @@ use crate::checker::Checker;
 use crate::description::Description;
 use crate::finding::{Judges, any, status_name};
 use crate::trajectory::steps;
+use crate::values::is_other_time;
 use crate::writer::Part::{Begin, Points, ReadAll, Run as RunFrom};
 use crate::writer::{Part, Point, Read, Trajectory, Writer, access, value_of};
 
@@ -287,8 +288,8 @@ pub fn time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
                 // Section 4.2.1 of FMI 3.0: a step may end early and returns lastSuccessfulTime.
                 let reached = step.and_then(|id| run.outcome(id)?.written.get(3)?.numbers().first().copied());
                 let time = reached.unwrap_or(*time);
-                let off = (value - time).abs() > 1e-9 * (1.0 + time.abs());
-                off.then(|| format!("the independent variable is {value:?} at {time:?}"))
+                is_other_time(value, time)
+                    .then(|| format!("the independent variable is {value:?} at {time:?}"))
             })
         })?;
     }
@@ -308,8 +309,8 @@ pub fn last_successful(checker: &Checker, trajectory: &Trajectory) -> anyhow::Re
         points.iter().find_map(|(id, time)| {
             let outcome = run.outcome(*id).filter(|outcome| outcome.status == Some(0))?;
             let reached = *outcome.written.get(3)?.numbers().first()?;
-            let off = (reached - time).abs() > 1e-9 * (1.0 + time.abs());
-            off.then(|| format!("lastSuccessfulTime is {reached:?}, the step ends at {time:?}"))
+            is_other_time(reached, *time)
+                .then(|| format!("lastSuccessfulTime is {reached:?}, the step ends at {time:?}"))
         })
     })
 }
