@@ -8,7 +8,7 @@ import pytest
 from built import ROOT
 from test_readmes import FILES
 
-#: Generated from the rules of fmu-check, whose names contain such words.
+#: The rules of fmu-check, whose names contain such words.
 NOT_COVERED = {"crates/fmu-check/RULES.md"}
 COVERED = [name for name in FILES if name.endswith(".md") and name not in NOT_COVERED]
 #: Patterns of words and phrases, each with its replacement.

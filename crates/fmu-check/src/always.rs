@@ -1,28 +1,27 @@
-//! Rules that hold for every run: nothing is written where it does not belong, statuses are those of the standard, messages
-//! are such that importers can show them.
+//! Rules that hold for every run: the FMU writes only to the arrays for results, returns the statuses of the standard, and
+//! logs valid messages.
 
-use crate::call_sequence::{CallSequence, Message, Numbered, Run, Step, Written};
+use crate::call_sequence::{CallSequence, Message, Numbered, Run, Step, Values, all_steps};
 use crate::description::Description;
 use crate::finding::{Finding, Judge, Judges, status_name, step_name};
-use crate::rules::claim;
+use crate::rules;
 use fmi_abi::Standard;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-/// A rule for a call, with what is wrong in a run.
+/// A rule, and the judge that describes how a run breaks it.
 type Broken = (&'static str, Judge);
 
 fn rule(name: &'static str, judge: impl Judges) -> Broken {
     (name, Arc::new(judge))
 }
 
-/// The findings in a run that came to its end.
+/// Returns the findings in a run that neither crashed nor hung.
 pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -> Vec<Finding> {
-    let mut all = Vec::new();
-    walk(sequence, &mut all);
+    let all = all_steps(sequence);
     let mut broken: Vec<Broken> = processes(&all, run).into_iter().collect();
     for numbered in &all {
-        if let Some(outcome) = run.of(numbered.id) {
+        if let Some(outcome) = run.outcome(numbered.id) {
             broken.extend(call(numbered));
             broken.extend(messages(description, numbered.id).filter(|_| !outcome.log.is_empty()));
             broken.extend(silence(sequence, numbered));
@@ -31,20 +30,10 @@ pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -
     let mut names = HashSet::new();
     let found = broken.into_iter().filter_map(|(name, judge)| {
         let observed = judge(run)?;
-        Some(claim(description.standard, name).finding(observed, sequence.clone(), judge))
+        let finding = rules::broken(description.standard, name, observed);
+        Some(finding.shown_by(sequence.clone(), judge))
     });
     found.filter(|finding| names.insert(finding.name.clone()) || finding.topic() == "arrays").collect()
-}
-
-fn walk<'s>(sequence: &'s [Numbered], all: &mut Vec<&'s Numbered>) {
-    for numbered in sequence {
-        all.push(numbered);
-        match &numbered.step {
-            Step::Repeat(_, steps) => walk(steps, all),
-            Step::Parallel(sequences) => sequences.iter().for_each(|sequence| walk(sequence, all)),
-            _ => {}
-        }
-    }
 }
 
 /// Processes that were left by a sequence that has freed all instances.
@@ -55,7 +44,7 @@ fn processes(all: &[&Numbered], run: &Run) -> Option<Broken> {
     let pairs = lives(all)?;
     Some(rule("resources.processes", move |run| {
         let (count, first) = (run.left.len(), run.left.first()?);
-        let freed = |(make, free): &(u32, u32)| run.of(*make).is_none() || run.of(*free).is_some();
+        let freed = |(make, free): &(u32, u32)| run.outcome(*make).is_none() || run.outcome(*free).is_some();
         let processes = if count == 1 { "process is" } else { "processes are" };
         pairs.iter().all(freed).then(|| {
             format!("{count} {processes} left after all instances were freed; the first is called {first:?}")
@@ -83,7 +72,8 @@ fn call(numbered: &Numbered) -> Vec<Broken> {
     let arrays = [("arrays.const", true), ("arrays.written-beyond", false)].map(|(of, constant)| {
         let name = name.clone();
         rule(of, move |run| {
-            let damage = run.of(id)?.damage.iter().find(|damage| damage.contains("const") == constant)?;
+            let damage =
+                run.outcome(id)?.damage.iter().find(|damage| damage.contains("const") == constant)?;
             Some(format!("{name} writes {damage}"))
         })
     });
@@ -96,7 +86,7 @@ fn call(numbered: &Numbered) -> Vec<Broken> {
     }));
     if function.ends_with("GetString") && !numbered.forbidden {
         broken.push(rule("start_values.utf8", move |run| {
-            let Written::Texts(texts) = run.written(id)? else { return None };
+            let Values::Texts(texts) = run.written(id)? else { return None };
             let bad = texts.iter().flatten().find(|text| std::str::from_utf8(text).is_err())?;
             Some(format!("the string {:?} is not UTF-8", String::from_utf8_lossy(bad)))
         }));
@@ -108,7 +98,6 @@ fn show(text: &[u8]) -> String {
     format!("{:?}", String::from_utf8_lossy(text))
 }
 
-/// Conversions of printf.
 const CONVERSIONS: [&str; 14] =
     ["%s", "%d", "%i", "%u", "%g", "%f", "%e", "%x", "%lf", "%ld", "%lu", "%zu", "%.", "%p"];
 
@@ -144,12 +133,11 @@ const MESSAGE_TESTS: [(&str, MessageTest); 4] = [
     }),
 ];
 
-/// The messages of a call.
 fn messages(description: &Description, id: u32) -> impl Iterator<Item = Broken> {
     MESSAGE_TESTS.into_iter().map(move |(name, test)| {
         let (categories, standard) = (description.log_categories.clone(), description.standard);
         rule(name, move |run| {
-            run.of(id)?.log.iter().find_map(|message| {
+            run.outcome(id)?.log.iter().find_map(|message| {
                 let text = show(message.text.as_deref().unwrap_or_default());
                 Some(format!("message {text}: {}", test(message, &categories, standard)?))
             })
@@ -157,18 +145,18 @@ fn messages(description: &Description, id: u32) -> impl Iterator<Item = Broken> 
     })
 }
 
-/// A call that fails without a message, where logging is on.
+/// The rule against calls that fail without a message while logging is on.
 fn silence(sequence: &CallSequence, numbered: &Numbered) -> Option<Broken> {
     let off = sequence.iter().any(|numbered| {
         matches!(&numbered.step, Step::Make(_, make) if !make.logging)
             || matches!(&numbered.step, Step::Call { function, .. } if function.ends_with("SetDebugLogging"))
     });
-    if off || !matches!(&numbered.step, Step::Call { of: Some(_), .. }) {
+    if off || !matches!(&numbered.step, Step::Call { instance: Some(_), .. }) {
         return None;
     }
     let (id, name) = (numbered.id, step_name(&numbered.step));
     Some(rule("logs.silent", move |run| {
-        let outcome = run.of(id)?;
+        let outcome = run.outcome(id)?;
         let status = outcome.status.filter(|status| (2..=4).contains(status))?;
         outcome.log.is_empty().then(|| format!("{name} returns {} without a message", status_name(status)))
     }))

@@ -1,10 +1,10 @@
-//! Findings that a project has accepted, with the reason of each, in a text file.
+//! Accepted findings of a project, with the reason of each, in a text file.
 
 use crate::finding::Finding;
 use anyhow::Context as _;
 use std::path::Path;
 
-/// An accepted rule, or the observations of a rule that contain a text.
+/// An accepted rule, or the observations of a rule that contain a string.
 struct Accepted {
     name: String,
     text: Option<String>,
@@ -18,7 +18,6 @@ impl Accepted {
     }
 }
 
-/// The accepted findings.
 #[derive(Default)]
 pub struct Baseline {
     accepted: Vec<Accepted>,
@@ -55,8 +54,8 @@ impl Baseline {
                     None => (None, rest),
                 };
                 let reason = reason.strip_prefix(':').map(str::trim).filter(|reason| !reason.is_empty());
-                let known = crate::rules::find(name).is_some()
-                    || crate::INTERFACES.contains(&name)
+                let known = crate::rules::is_known(name)
+                    || crate::options::INTERFACES.contains(&name)
                     || crate::rules::TOPICS.contains(&name);
                 match reason {
                     Some(reason) if known => {
@@ -69,10 +68,10 @@ impl Baseline {
     }
 
     /// The reason for which all observations of a finding are accepted.
-    pub fn of_finding(&self, finding: &Finding) -> Option<String> {
+    pub fn reason(&self, finding: &Finding) -> Option<String> {
         let mut reasons: Vec<&str> = Vec::new();
         for observed in std::iter::once(&finding.observed).chain(&finding.more) {
-            let accepted = self.accepted.iter().find(|of| of.fits(finding, observed))?;
+            let accepted = self.accepted.iter().find(|accepted| accepted.fits(finding, observed))?;
             if !reasons.contains(&accepted.reason.as_str()) {
                 reasons.push(&accepted.reason);
             }
@@ -81,27 +80,31 @@ impl Baseline {
     }
 
     /// The reason for which an interface or a topic need not be checked.
-    pub fn of_unchecked(&self, name: &str) -> Option<&str> {
-        self.accepted.iter().find(|of| of.name == name).map(|of| of.reason.as_str())
+    pub fn unchecked_reason(&self, name: &str) -> Option<&str> {
+        self.accepted.iter().find(|accepted| accepted.name == name).map(|accepted| accepted.reason.as_str())
     }
 
-    /// Names that nothing was found for.
-    pub fn unused(&self, findings: &[Finding], unchecked: &[crate::Unchecked]) -> Vec<String> {
-        let used = |of: &&Accepted| {
-            unchecked.iter().any(|unchecked| unchecked.name == of.name)
+    /// Returns the names that match no finding and no unchecked topic.
+    pub fn unused(&self, findings: &[Finding], unchecked: &[crate::checker::Unchecked]) -> Vec<String> {
+        let used = |accepted: &&Accepted| {
+            unchecked.iter().any(|unchecked| unchecked.name == accepted.name)
                 || findings.iter().any(|finding| {
                     let mut all = std::iter::once(&finding.observed).chain(&finding.more);
-                    all.any(|observed| of.fits(finding, observed))
+                    all.any(|observed| accepted.fits(finding, observed))
                 })
         };
-        self.accepted.iter().filter(|of| !used(of)).map(|of| of.name.clone()).collect()
+        self.accepted
+            .iter()
+            .filter(|accepted| !used(accepted))
+            .map(|accepted| accepted.name.clone())
+            .collect()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::Baseline;
-    use crate::finding::{Finding, Severity};
+    use crate::finding::Finding;
 
     #[test]
     fn a_reason_is_needed_for_each_observation() {
@@ -109,19 +112,15 @@ mod tests {
             "# known\nlogs.silent: since 2024\n\nrefusals.tolerated \"J2\": intended: see the manual\n";
         let baseline = Baseline::parse(text).unwrap_or_default();
         let finding = |name: &str, observed: &[&str]| {
-            let mut finding = Finding::new(name, Severity::Note, String::new(), "", observed[0].to_owned());
-            finding.more = observed[1..].iter().map(|observed| (*observed).to_owned()).collect();
-            finding
+            let more = observed[1..].iter().map(|observed| (*observed).to_owned()).collect();
+            Finding { name: name.to_owned(), observed: observed[0].to_owned(), more, ..Finding::default() }
         };
-        assert_eq!(baseline.of_finding(&finding("logs.silent", &["a", "b"])), Some("since 2024".to_owned()));
-        let of_one = finding("refusals.tolerated", &["a value for J2"]);
-        assert_eq!(baseline.of_finding(&of_one), Some("intended: see the manual".to_owned()));
-        assert_eq!(
-            baseline.of_finding(&finding("refusals.tolerated", &["a value for J2", "one for J3"])),
-            None
-        );
-        assert_eq!(baseline.of_finding(&finding("states.restore", &["x"])), None);
-        assert_eq!(baseline.unused(&[of_one], &[]), ["logs.silent"]);
+        assert_eq!(baseline.reason(&finding("logs.silent", &["a", "b"])), Some("since 2024".to_owned()));
+        let accepted = finding("refusals.tolerated", &["a value for J2"]);
+        assert_eq!(baseline.reason(&accepted), Some("intended: see the manual".to_owned()));
+        assert_eq!(baseline.reason(&finding("refusals.tolerated", &["a value for J2", "one for J3"])), None);
+        assert_eq!(baseline.reason(&finding("states.restore", &["x"])), None);
+        assert_eq!(baseline.unused(&[accepted], &[]), ["logs.silent"]);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Sequences of calls as data, and what came of them. A worker plays them, a shrinker shortens them, a printer writes them
+//! Call sequences and their results as data. A worker plays them, a shrinker shortens them, a printer writes them
 //! as programs.
 
 use serde::{Deserialize, Serialize};
@@ -71,15 +71,13 @@ impl Kind {
 pub enum Arg {
     /// A floating-point number, as its bits.
     Real(u64),
-    /// A whole number, a size, a boolean value.
+    /// An integer, a size or a Boolean.
     Whole(i64),
     /// NULL.
     Null,
-    /// A pointer that is no multiple of what it points to.
-    Misaligned,
     /// An array of numbers, as their bits.
     In(Kind, Vec<u64>),
-    /// An array of texts; `None` is NULL.
+    /// An array of strings; `None` is NULL.
     Texts(Vec<Option<Vec<u8>>>),
     /// An array of pointers to bytes.
     Blobs(Vec<Vec<u8>>),
@@ -91,7 +89,7 @@ pub enum Arg {
     StateOut(usize),
     /// Serialized bytes, by the number of their index.
     Saved(usize),
-    /// How many they are.
+    /// The number of these bytes.
     SavedSize(usize),
     /// Receives the size of these bytes.
     SizeOut(usize),
@@ -100,64 +98,62 @@ pub enum Arg {
 }
 
 impl Arg {
-    /// A floating-point number.
     pub fn real(number: f64) -> Self {
         Self::Real(number.to_bits())
     }
 }
 
-/// How an instance is made.
+/// Arguments of an instantiation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Make {
-    /// Whether it steps itself.
+    /// Whether the interface type is Co-Simulation.
     pub co_simulation: bool,
-    /// Its name; `None` is NULL.
-    pub name: Option<String>,
-    /// Arguments of the instantiation.
-    pub token: Option<String>,
+    pub name: String,
+    /// The guid or instantiationToken.
+    pub token: String,
     /// Whether it logs.
     pub logging: bool,
     /// Whether the importer handles events (FMI 3.0).
     pub event_mode: bool,
     /// Whether steps may return early (FMI 3.0).
     pub early_return: bool,
-    /// Whether its environment is told where its resources are.
-    pub resources: bool,
 }
 
 /// The index of an instance that is NULL: freeing it is allowed.
-pub const NOBODY: usize = 999;
+pub const NULL_INSTANCE: usize = 999;
 
 /// A step of a sequence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Step {
     /// A new instance at this index.
     Make(usize, Make),
-    /// Frees the instance.
     Free(usize),
     /// Calls a function of an instance, or of NULL, with the arguments after the instance.
-    Call { of: Option<usize>, function: String, args: Vec<Arg> },
+    Call {
+        instance: Option<usize>,
+        function: String,
+        args: Vec<Arg>,
+    },
     /// Calls that need no instance: the version and the platform.
     Version(String),
     /// Repeats steps this many times, or until the time limit.
     Repeat(usize, Vec<Numbered>),
-    /// At once, each in a thread of its own.
+    /// Runs call sequences at the same time, each in a separate thread.
     Parallel(Vec<Vec<Numbered>>),
-    /// Memory, threads and settings of the process.
+    /// Measures memory, threads and settings of the process.
     Measure,
-    /// Goes on in a new process, to which only serialized bytes are passed on.
+    /// Continues in a new process, which receives only serialized bytes.
     FreshProcess,
-    /// Unloads the library.
     Unload,
-    /// Ends the process as programs do: with the destructors of its libraries. Nothing follows.
+    /// Exits the process, which runs the destructors of its libraries. Must be the last step.
     Quit,
 }
 
-/// A step with a number of its own, which it keeps when others are left out.
+/// A step with a number that it keeps when others are left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Numbered {
     pub id: u32,
-    /// Whether the standard forbids the call: what it answers changes nothing of what is allowed after it.
+    /// Whether the standard forbids the call. Such calls are not considered in the check of the following ones.
     pub forbidden: bool,
     pub step: Step,
 }
@@ -165,29 +161,54 @@ pub struct Numbered {
 /// A sequence of calls.
 pub type CallSequence = Vec<Numbered>;
 
+/// Returns all steps of a sequence, including those of its repetitions and threads.
+pub fn all_steps(sequence: &[Numbered]) -> Vec<&Numbered> {
+    let steps = sequence.iter().flat_map(|numbered| {
+        let inner = match &numbered.step {
+            Step::Repeat(_, steps) => all_steps(steps),
+            Step::Parallel(sequences) => sequences.iter().flat_map(|sequence| all_steps(sequence)).collect(),
+            _ => Vec::new(),
+        };
+        std::iter::once(numbered).chain(inner)
+    });
+    steps.collect()
+}
+
+/// Returns the step with this number.
+pub fn step_of(sequence: &[Numbered], id: u32) -> Option<&Numbered> {
+    all_steps(sequence).into_iter().find(|numbered| numbered.id == id)
+}
+
 /// A message of the FMU.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Message {
     pub status: i32,
     /// Its category, as bytes; `None` is NULL.
     pub category: Option<Vec<u8>>,
-    /// Its text, as bytes; `None` is NULL.
+    /// The message, as bytes; `None` is NULL.
     pub text: Option<Vec<u8>>,
-    /// Whether it came with the environment that the instance was given.
-    pub at_home: bool,
 }
 
-/// Values that a call wrote to an array.
+/// Values of a variable or an array.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Written {
+pub enum Values {
     /// Numbers, as their bits.
     Numbers(Kind, Vec<u64>),
     /// Texts or bytes; `None` is NULL.
     Texts(Vec<Option<Vec<u8>>>),
 }
 
-impl Written {
-    /// The numbers.
+impl Values {
+    /// Numbers of a kind.
+    pub fn new(kind: Kind, numbers: impl IntoIterator<Item = f64>) -> Self {
+        Self::Numbers(kind, numbers.into_iter().map(|number| kind.bits(number)).collect())
+    }
+
+    /// A string or bytes for each element.
+    pub fn texts(text: &[u8], size: usize) -> Self {
+        Self::Texts(vec![Some(text.to_owned()); size])
+    }
+
     pub fn numbers(&self) -> Vec<f64> {
         match self {
             Self::Numbers(kind, bits) => bits.iter().map(|bits| kind.number(*bits)).collect(),
@@ -244,12 +265,12 @@ pub struct Outcome {
     /// The library has no such function.
     pub missing: bool,
     /// Values that were written to the arrays, in the order of the arguments.
-    pub written: Vec<Written>,
+    pub written: Vec<Values>,
     /// Messages of the FMU during the step.
     pub log: Vec<Message>,
     /// Writes outside of the arrays.
     pub damage: Vec<String>,
-    /// The text of a version.
+    /// The string that a version function returned.
     pub text: Option<Vec<u8>>,
     /// Result of a measurement or of repetitions.
     pub measured: Option<Measured>,
@@ -258,7 +279,7 @@ pub struct Outcome {
 /// Memory, threads and settings of the process.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
-    /// Bytes in use, as the C library counts them; of the whole process where it does not count.
+    /// Bytes in use as counted by the C library; if it does not count them, memory of the whole process.
     pub memory: u64,
     /// Whether the C library counted them.
     pub exact: bool,
@@ -266,7 +287,7 @@ pub struct Measured {
     pub files: usize,
     /// Settings of the process: rounding, locale, working directory, signal handlers.
     pub settings: Vec<String>,
-    /// How often repetitions came.
+    /// Number of repetitions.
     pub times: usize,
 }
 
@@ -276,13 +297,13 @@ pub enum End {
     /// Ended after its last step.
     #[default]
     Done,
-    /// The process crashed; what the system says.
+    /// The process crashed, for this reason.
     Crash(String),
     /// The process did not end in time.
     Hang(f64),
     /// The library called `exit`.
     Exit(i32),
-    /// The library cannot be loaded; what the loader says.
+    /// The library cannot be loaded, for this reason.
     Unloadable(String),
     /// The FMU started too many processes, which were ended.
     Flood(usize),
@@ -293,23 +314,22 @@ pub enum End {
 pub struct Run {
     /// Results by the number of the step.
     pub outcomes: HashMap<u32, Outcome>,
-    /// How it ended.
     pub end: End,
     /// The step in which it ended, if not with the last.
     pub at: Option<u32>,
     /// Output on the standard output and the standard error.
-    pub said: String,
+    pub output: String,
     /// Names of the processes that were left at its end.
     pub left: Vec<String>,
 }
 
 impl Run {
-    pub fn of(&self, id: u32) -> Option<&Outcome> {
+    pub fn outcome(&self, id: u32) -> Option<&Outcome> {
         self.outcomes.get(&id)
     }
 
     pub fn status(&self, id: u32) -> Option<i32> {
-        self.of(id)?.status
+        self.outcome(id)?.status
     }
 
     /// Whether a step returned OK or a warning.
@@ -318,8 +338,8 @@ impl Run {
     }
 
     /// The first array that a step wrote.
-    pub fn written(&self, id: u32) -> Option<&Written> {
-        self.of(id)?.written.first()
+    pub fn written(&self, id: u32) -> Option<&Values> {
+        self.outcome(id)?.written.first()
     }
 }
 
@@ -333,7 +353,7 @@ pub struct Setting {
     pub resources: std::path::PathBuf,
     /// Bytes of memory at most.
     pub memory: u64,
-    /// There is room after arrays, so that it can be observed what is written there.
+    /// Memory after each array is accessible, to detect writes there.
     pub soft: bool,
     /// All symbols are looked up when the library is loaded, as some importers do.
     pub now: bool,

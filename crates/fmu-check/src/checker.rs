@@ -1,18 +1,18 @@
-//! The shared part of all checks: runs call sequences, judges the results and keeps the findings.
+//! Runs the call sequences of all checks, judges the results and keeps the findings.
 
 use crate::always;
-use crate::call_sequence::{CallSequence, End, Numbered, Run, Setting, Step};
+use crate::call_sequence::{CallSequence, End, Numbered, Run, Setting, Step, step_of};
 use crate::description::Description;
 use crate::finding::{Event, Finding, Judge, Judges, Severity, ending, event, step_name};
 use crate::legal::first_illegal;
-use crate::rules::{self, Claim};
+use crate::rules;
 use crate::run::{Stop, Workers};
 use crate::shrink::shrink;
 use crate::writer::{READ, Read, Trajectory, Writer, difference, sample};
 use fmi_abi::{Interface, Standard};
 use std::collections::HashSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// An interface or a topic that was not checked.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -24,6 +24,9 @@ pub struct Unchecked {
     /// Whether the user has allowed it by name.
     pub allowed: bool,
 }
+
+/// Seconds of a quick check; call sequences that are played then may take a little longer.
+const QUICK: f64 = 24.0;
 
 /// Calls that stay in the shortest sequence of a topic: a comparison needs them on both sides, else there are other
 /// differences.
@@ -51,12 +54,10 @@ const ALONE: [&str; 5] = [
 pub struct Random(u64);
 
 impl Random {
-    /// The numbers that follow from a seed.
     pub fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1)
     }
 
-    /// A number below this one.
     pub fn below(&mut self, end: usize) -> usize {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 33) as usize % end
@@ -65,7 +66,7 @@ impl Random {
 
 /// The step in which a run ended.
 fn at<'s>(sequence: &'s CallSequence, run: &Run) -> Option<&'s Numbered> {
-    run.at.and_then(|id| sequence.iter().find(|numbered| numbered.id == id))
+    step_of(sequence, run.at?)
 }
 
 /// An FMU under attack.
@@ -75,31 +76,31 @@ pub struct Checker {
     pub readable: Vec<usize>,
     pub setting: Setting,
     pub workers: Workers,
-    /// A simulation that goes well, by Co-Simulation and by Model Exchange.
+    /// A simulation that succeeds, for each interface type.
     pub trajectories: Vec<Trajectory>,
-    /// Chooses what is chosen at random.
+    /// Seed of random choices.
     pub seed: u64,
     /// Seconds for one sequence.
     pub limit: f64,
-    /// When all must be over.
+    /// End of the time for all checks.
     pub deadline: Instant,
     /// Whether fewer values and orders are tried.
     pub quick: bool,
     found: Mutex<Vec<Finding>>,
     unchecked: Mutex<Vec<Unchecked>>,
-    /// Kept by call sequences while they are played; a suspected hang is played again alone.
+    /// Call sequences hold a read lock while they are played. A suspected hang is played again with a write lock.
     alone: RwLock<()>,
-    /// Functions that did not return when they were called alone, with more time.
+    /// Functions that did not return when no other call sequence was played and the limit was three times as long.
     hung: Mutex<HashSet<String>>,
     played: Mutex<u64>,
 }
 
-fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
-    of.lock().unwrap_or_else(PoisonError::into_inner)
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Keeps one finding of each name: the gravest, and of several such the one with the shortest call sequence, whichever
-/// check is first. Its `more` lists the observations of the others.
+/// Keeps one finding of each name: the most severe, and of several such the one with the shortest call sequence, regardless
+/// of the order of the checks. Its `more` lists the observations of the others.
 fn keep(found: &mut Vec<Finding>, mut finding: Finding) {
     let Some(kept) = found.iter_mut().find(|kept| kept.name == finding.name) else {
         found.push(finding);
@@ -116,7 +117,7 @@ fn keep(found: &mut Vec<Finding>, mut finding: Finding) {
     }
 }
 
-/// An observation without its numbers: another one is another finding.
+/// Returns an observation without its numbers, to compare observations of one finding.
 fn outline(observed: &str) -> String {
     let names = observed.split(|letter: char| !(letter.is_alphabetic() || letter == '_'));
     names.filter(|name| name.len() > 1 && !["NaN", "inf"].contains(name)).collect::<Vec<_>>().join(" ")
@@ -128,20 +129,21 @@ impl Checker {
         description: Description,
         setting: Setting,
         workers: Workers,
-        seed: u64,
-        limit: f64,
-        deadline: Instant,
+        options: &crate::options::Options,
+        begin: Instant,
     ) -> Self {
+        let time = if options.quick { QUICK } else { options.time.max(1.0) };
+        let limit = if options.quick { options.limit.min(QUICK / 10.0) } else { options.limit };
         Self {
             readable: sample(&description, READ),
             description: Arc::new(description),
             setting,
             workers,
             trajectories: Vec::new(),
-            seed,
+            seed: options.seed,
             limit,
-            deadline,
-            quick: false,
+            deadline: begin + Duration::from_secs_f64(time),
+            quick: options.quick,
             found: Mutex::default(),
             unchecked: Mutex::default(),
             alone: RwLock::default(),
@@ -150,12 +152,10 @@ impl Checker {
         }
     }
 
-    /// A writer of sequences that vary a simulation.
     pub fn writer<'a>(&'a self, trajectory: &'a Trajectory) -> Writer<'a> {
         Writer::new(&self.description, trajectory, &self.readable)
     }
 
-    /// A sequence of one step.
     pub fn step(&self, step: Step, forbidden: bool) -> CallSequence {
         vec![Numbered { id: 0, forbidden, step }]
     }
@@ -170,7 +170,6 @@ impl Checker {
         if self.quick { many.div_ceil(8) } else { many }
     }
 
-    /// Whether the standard is 3.0.
     pub fn fmi3(&self) -> bool {
         self.description.standard == Standard::Fmi3
     }
@@ -180,12 +179,10 @@ impl Checker {
         self.description.offer(interface).is_some_and(|offer| offer.can(names))
     }
 
-    /// Whether it saves states.
     pub fn saves(&self, interface: Interface) -> bool {
         self.can(interface, &["canGetAndSetFMUstate", "canGetAndSetFMUState"])
     }
 
-    /// Whether it serializes states.
     pub fn serializes(&self, interface: Interface) -> bool {
         self.saves(interface) && self.can(interface, &["canSerializeFMUstate", "canSerializeFMUState"])
     }
@@ -195,7 +192,6 @@ impl Checker {
         !self.can(interface, &["canBeInstantiatedOnlyOncePerProcess"])
     }
 
-    /// Plays a sequence.
     pub fn play(&self, sequence: &CallSequence) -> anyhow::Result<Run> {
         self.play_for(sequence, self.limit)
     }
@@ -210,7 +206,7 @@ impl Checker {
             let _with_others = self.alone.read().unwrap_or_else(PoisonError::into_inner);
             self.play_until(sequence, limit)?
         };
-        // The machine may be busy, so a call that seems to hang is played again with nothing beside it and three times the
+        // The machine may be busy, so a call that seems to hang is played again with no other at the same time and three times the
         // time. A function that has not returned then is not tried again.
         let name = |run: &Run| {
             at(sequence, run).map_or(String::new(), |at| format!("{}{}", step_name(&at.step), at.forbidden))
@@ -240,21 +236,17 @@ impl Checker {
     /// An error in a call sequence itself, for developers of this tool.
     fn illegal(&self, sequence: &CallSequence) -> Option<String> {
         let id = first_illegal(&self.description, sequence)?;
-        let at = sequence.iter().find(|numbered| numbered.id == id)?;
-        Some(format!("{id} {:?}", at.step))
+        Some(format!("{id} {:?}", step_of(sequence, id)?.step))
     }
 
-    /// How many sequences were played.
     pub fn played(&self) -> u64 {
         *locked(&self.played)
     }
 
-    /// The findings.
     pub fn take(&self) -> Vec<Finding> {
         std::mem::take(&mut locked(&self.found))
     }
 
-    /// The interfaces and topics that were not checked.
     pub fn take_unchecked(&self) -> Vec<Unchecked> {
         std::mem::take(&mut locked(&self.unchecked))
     }
@@ -267,27 +259,27 @@ impl Checker {
         }
     }
 
-    /// Keeps a finding.
     pub fn add(&self, finding: Finding) {
         keep(&mut locked(&self.found), finding);
     }
 
-    /// Whether something of this name was found.
+    /// Returns whether there is a finding of this name.
     pub fn has(&self, name: &str) -> bool {
         locked(&self.found).iter().any(|finding| finding.name == name)
     }
 
-    /// Keeps the finding that a run breaks a rule. Whether it does.
+    /// Keeps a finding if a run breaks a rule; returns whether it does.
     pub fn keep(&self, name: &str, run: &Run, sequence: &CallSequence, judge: impl Judges) -> bool {
         let observed = if run.end == End::Done { judge(run) } else { None };
-        let found = observed
-            .map(|observed| self.add(self.claim(name).finding(observed, sequence.clone(), Arc::new(judge))));
+        let found = observed.map(|observed| {
+            self.add(self.broken(name, observed).shown_by(sequence.clone(), Arc::new(judge)))
+        });
         found.is_some()
     }
 
-    /// The requirement of a rule.
-    pub fn claim(&self, name: &str) -> Claim {
-        rules::claim(self.description.standard, name)
+    /// The finding that the FMU breaks a rule.
+    pub fn broken(&self, name: &str, observed: String) -> Finding {
+        rules::broken(self.description.standard, name, observed)
     }
 
     /// Keeps the findings of the rules that hold for every run.
@@ -295,14 +287,14 @@ impl Checker {
         always::findings(&self.description, sequence, run).into_iter().for_each(|finding| self.add(finding));
     }
 
-    /// Plays a sequence that keeps to the standard but for forbidden calls, and judges: first how it ended, then what holds
-    /// of every run, then `judge`.
+    /// Plays a call sequence and judges the run: first by its end, then by the rules that hold
+    /// for every run, then by `judge`.
     pub fn judge(&self, name: &str, sequence: CallSequence, judge: impl Judges) -> anyhow::Result<Run> {
-        let hostile = sequence.iter().any(|numbered| numbered.forbidden);
-        let limit = if hostile { self.limit.min(3.0) } else { self.limit };
+        let forbidden = sequence.iter().any(|numbered| numbered.forbidden);
+        let limit = if forbidden { self.limit.min(3.0) } else { self.limit };
         let run = self.play_for(&sequence, limit)?;
         if run.end != End::Done {
-            self.ended(name, &sequence, &run, hostile)?;
+            self.ended(name, &sequence, &run, forbidden)?;
             return Ok(run);
         }
         self.keep_always(&sequence, &run);
@@ -315,42 +307,38 @@ impl Checker {
         self.judge(name, sequence, judge).map(|_| ())
     }
 
-    /// Judges whether reads that must be equal differ: the variable, its value and the other value.
-    pub fn differ(
-        &self,
-        one: Vec<Read>,
-        other: Vec<Read>,
-        tell: impl Fn(String, String, String) -> String + Send + Sync + 'static,
-    ) -> Box<dyn Judges> {
-        let description = self.description.clone();
-        Box::new(move |run| {
-            let (name, one, other) = difference(&description, run, &one, &other)?;
-            Some(tell(name, one, other))
+    /// Judges whether reads that must be equal differ. The message has `{}` for the variable, its value and the other value.
+    pub fn differ(&self, one: &[Read], other: &[Read], message: &'static str) -> Box<dyn Judges> {
+        let (description, one, other) = (self.description.clone(), one.to_vec(), other.to_vec());
+        Box::new(move |run: &Run| {
+            let values = difference(&description, run, &one, &other)?.into_iter().chain([String::new()]);
+            Some(message.split("{}").zip(values).map(|(text, value)| text.to_owned() + &value).collect())
         })
     }
 
-    /// A run that did not come to its end.
-    fn ended(&self, rule: &str, sequence: &CallSequence, run: &Run, hostile: bool) -> anyhow::Result<()> {
+    /// Keeps the finding of a run that crashed, hung or exited.
+    fn ended(&self, rule: &str, sequence: &CallSequence, run: &Run, forbidden: bool) -> anyhow::Result<()> {
         let Some(observed) = ending(run, sequence) else { return Ok(()) };
         let ends: Judge = {
             let (sequence, kind) = (sequence.clone(), std::mem::discriminant(&run.end));
-            let place = |run: &Run, sequence: &CallSequence| at(sequence, run).map(|at| step_name(&at.step));
-            let at = place(run, &sequence);
+            let name_at =
+                |run: &Run, sequence: &CallSequence| at(sequence, run).map(|at| step_name(&at.step));
+            let at = name_at(run, &sequence);
             Arc::new(move |run: &Run| {
-                let same = std::mem::discriminant(&run.end) == kind && place(run, &sequence) == at;
+                let same = std::mem::discriminant(&run.end) == kind && name_at(run, &sequence) == at;
                 same.then(|| ending(run, &sequence))?
             })
         };
         let keep = |name: &str, observed: String| {
-            let mut ended = self.claim(name);
-            if hostile {
+            let mut ended = self.broken(name, observed).shown_by(sequence.clone(), Arc::clone(&ends));
+            if forbidden {
                 ended.severity = ended.severity.max(Severity::Fragile);
             }
-            self.add(ended.finding(observed, sequence.clone(), Arc::clone(&ends)));
+            self.add(ended);
             Ok(())
         };
-        // Whether memory beyond an array was touched: with room after it, it shows.
-        if matches!(run.end, End::Crash(_)) && cfg!(unix) && !hostile {
+        // A repetition with accessible memory after each array shows whether an access beyond an array caused the crash.
+        if matches!(run.end, End::Crash(_)) && cfg!(unix) && !forbidden {
             let soft = Setting { soft: true, ..self.setting.clone() };
             let again = self.workers.play(&soft, sequence, self.limit)?;
             if again.outcomes.values().any(|outcome| !outcome.damage.is_empty()) {
@@ -368,10 +356,10 @@ impl Checker {
             End::Exit(_) => "exit",
             _ => "crash",
         };
-        // Ends that only one call sequence shows have a separate name; others are the same in many checks.
+        // An end that only this call sequence can show has the name of its rule; others have the name of the topic.
         let own = ["fresh-process", "unload", "exit"].iter().any(|name| rule.ends_with(name));
         let name = match rule.split_once('.') {
-            Some((topic, _)) if !own && (!hostile || topic == "refusals") => topic,
+            Some((topic, _)) if !own && (!forbidden || topic == "refusals") => topic,
             _ => rule,
         };
         keep(&format!("{name}.{what}"), observed)
@@ -382,7 +370,7 @@ impl Checker {
         event(run, id, self.fmi3())
     }
 
-    /// The setting in which a finding shows: crashes at the ends of arrays, without room after them.
+    /// Returns the setting that shows a finding: arrays end at a guard page for accesses beyond arrays.
     fn hard(&self, finding: &Finding) -> Setting {
         let ends = ["read-beyond", "written-beyond", "crash"].iter().any(|end| finding.name.ends_with(end));
         Setting { soft: self.setting.soft && !ends, ..self.setting.clone() }
@@ -431,7 +419,7 @@ impl Checker {
             left -= 1;
             left >= 0 && Instant::now() <= self.deadline && shows(tried)
         });
-        // A finding that shows itself only sometimes is not shortened.
+        // A finding that does not show in every run is not shortened.
         if short.len() < finding.sequence.len() && !shows(&short) {
             (short, observed) = (finding.sequence.clone(), finding.observed.clone());
         }
@@ -446,9 +434,15 @@ mod tests {
     use super::keep;
     use crate::finding::{Finding, Severity};
 
-    /// A graver finding of a name takes the index of the one before, whose evidence is listed.
+    /// A more severe finding of a name replaces the one before, whose observation stays in the list.
     #[test]
     fn no_evidence_is_lost() {
+        let finding = |name: &str, severity, observed: &str| Finding {
+            name: name.to_owned(),
+            severity,
+            observed: observed.to_owned(),
+            ..Finding::default()
+        };
         let mut found = Vec::new();
         for (severity, observed) in [
             (Severity::Note, "a"),
@@ -459,9 +453,9 @@ mod tests {
             (Severity::Violation, "e"),
             (Severity::Note, "b"),
         ] {
-            keep(&mut found, Finding::new("topic.name", severity, String::new(), "", observed.to_owned()));
+            keep(&mut found, finding("topic.name", severity, observed));
         }
-        keep(&mut found, Finding::new("topic.other", Severity::Note, String::new(), "", "a".to_owned()));
+        keep(&mut found, finding("topic.other", Severity::Note, "a"));
         let [one, other] = &found[..] else { panic!("{} findings", found.len()) };
         assert_eq!((one.severity, one.observed.as_str()), (Severity::Violation, "c"));
         assert_eq!(one.more, ["a", "b", "d", "e"]);

@@ -8,11 +8,9 @@ use fmi_abi::{BaseType, Standard};
 use std::collections::HashSet;
 use std::ops::Deref;
 
-/// The model description.
 #[derive(Clone, Debug)]
 pub struct Description {
     written: ModelDescription,
-    /// Start time of the default experiment.
     pub start_time: f64,
     /// Stop time of the default experiment, if it has one.
     pub stop_time: Option<f64>,
@@ -80,38 +78,40 @@ impl Description {
         for (index, variable) in self.variables.iter().enumerate() {
             let name = &variable.name;
             let (listed, output) = (outputs.contains(&index), variable.causality == "output");
-            let mut tell = |rule, why: String| wrong.push((rule, why));
+            let mut add = |rule, why: String| wrong.push((rule, why));
             if !names.insert(name) {
-                tell("description.names", format!("two variables are called {name:?}"));
+                add("description.names", format!("two variables are called {name:?}"));
             }
             if self.standard == Standard::Fmi3 && !references.insert(variable.reference) {
                 let why =
                     format!("value reference {} of {name} is that of another variable", variable.reference);
-                tell("description.references", why);
+                add("description.references", why);
             }
             if output && !listed && !variable.clocked {
                 let why = format!("output {name} is not among the outputs of ModelStructure");
-                tell("description.structure", why);
+                add("description.structure", why);
             }
             if !output && listed {
                 let why = format!("{name} is no output, and is among those of ModelStructure");
-                tell("description.structure", why);
+                add("description.structure", why);
             }
             if let Some(unit) = variable.unit.as_ref().filter(|unit| !self.units.contains_key(*unit)) {
                 let why = format!("{name} is in {unit:?}, which is no unit of UnitDefinitions");
-                tell("description.units", why);
+                add("description.units", why);
             }
-            if let Some(of) = variable.declared_type.as_ref().filter(|of| !self.types.contains(*of)) {
-                let why = format!("{name} is of type {of:?}, which is none of TypeDefinitions");
-                tell("description.types", why);
+            let declared = variable.declared_type.as_ref();
+            if let Some(declared) = declared.filter(|declared| !self.types.contains(*declared)) {
+                let why = format!("{name} is of type {declared:?}, which is none of TypeDefinitions");
+                add("description.types", why);
             }
             wrong.extend(faults(variable));
         }
         // A derivative that is not listed may be one that is no state's (section 2.2.8 of FMI 2.0).
         for unknown in &self.derivatives {
-            let of = &self.variables[unknown.variable];
-            if of.derivative_of.is_none() {
-                let why = format!("{} is among the derivatives, and is not declared to be one", of.name);
+            let variable = &self.variables[unknown.variable];
+            if variable.derivative_of.is_none() {
+                let why =
+                    format!("{} is among the derivatives, and is not declared to be one", variable.name);
                 wrong.push(("description.structure", why));
             }
         }
@@ -128,15 +128,20 @@ impl Description {
         has_clocks && self.co_simulation.as_ref().is_some_and(|offer| offer.can(&["hasEventMode"]))
     }
 
-    /// The variables that an index of the same type and reference stands for.
+    /// Returns the variables with the type and value reference of this variable, including itself.
     pub fn aliases(&self, index: usize) -> impl Iterator<Item = usize> + '_ {
-        let of = &self.variables[index];
-        let (reference, kind) = (of.reference, of.base.map(|base| kind_of(self.standard, base)));
+        let variable = &self.variables[index];
+        let (reference, kind) = (variable.reference, variable.base.map(|base| kind_of(self.standard, base)));
         self.variables.iter().enumerate().filter_map(move |(index, other)| {
             let same =
                 other.reference == reference && other.base.map(|base| kind_of(self.standard, base)) == kind;
             same.then_some(index)
         })
+    }
+
+    /// Returns the kind of the values of a variable.
+    pub fn kind(&self, index: usize) -> Kind {
+        kind_of(self.standard, self.variables[index].base.unwrap_or(BaseType::Boolean))
     }
 
     /// The continuous states, by indices, in the order of their derivatives.
@@ -166,50 +171,51 @@ const COMBINATIONS: &[(&str, &[&str], &[&str])] = &[
 ];
 
 /// Returns the rules that a variable breaks without regard to the others.
-fn faults(of: &Variable) -> Vec<Observation> {
-    let (name, mut wrong) = (&of.name, Vec::new());
-    let mut tell = |rule, why: String| wrong.push((rule, why));
+fn faults(variable: &Variable) -> Vec<Observation> {
+    let (name, mut wrong) = (&variable.name, Vec::new());
+    let mut add = |rule, why: String| wrong.push((rule, why));
     let fits = |(causality, variabilities, _): &&(&str, &[&str], &[&str])| {
-        *causality == of.causality && variabilities.contains(&of.variability.as_str())
+        *causality == variable.causality && variabilities.contains(&variable.variability.as_str())
     };
-    let (causality, variability, initial) = (&of.causality, &of.variability, &of.initial);
+    let (causality, variability, initial) = (&variable.causality, &variable.variability, &variable.initial);
     match COMBINATIONS.iter().find(fits) {
-        _ if of.base.is_none() || of.clocked => {}
-        None => tell("description.combination", format!("{name} is {causality} and {variability}")),
+        _ if variable.base.is_none() || variable.clocked => {}
+        None => add("description.combination", format!("{name} is {causality} and {variability}")),
         Some((.., initials)) if !initials.contains(&initial.as_str()) => {
             let why = format!("{name} is {causality} and {variability}, with initial = {initial}");
-            tell("description.combination", why);
+            add("description.combination", why);
         }
         Some(_) => {}
     }
-    if variability == "continuous" && !of.is_float() && of.base.is_some() {
-        tell("description.combination", format!("{name} is continuous and no floating-point number"));
+    if variability == "continuous" && !variable.is_float() && variable.base.is_some() {
+        add("description.combination", format!("{name} is continuous and no floating-point number"));
     }
     let needs_start =
-        ["exact", "approx"].contains(&initial.as_str()) || causality == "input" && of.base.is_some();
-    if needs_start && of.start.is_empty() && causality != "independent" && !of.clocked {
-        tell("description.start", format!("{name} ({causality}) has no start value"));
+        ["exact", "approx"].contains(&initial.as_str()) || causality == "input" && variable.base.is_some();
+    if needs_start && variable.start.is_empty() && causality != "independent" && !variable.clocked {
+        add("description.start", format!("{name} ({causality}) has no start value"));
     }
-    if initial == "calculated" && !of.start.is_empty() && of.base.is_some() {
-        tell("description.start", format!("{name} is calculated and has a start value"));
+    if initial == "calculated" && !variable.start.is_empty() && variable.base.is_some() {
+        add("description.start", format!("{name} is calculated and has a start value"));
     }
-    if let (Some(min), Some(max)) = (of.min, of.max)
+    if let (Some(min), Some(max)) = (variable.min, variable.max)
         && min > max
     {
-        tell("description.range", format!("{name} has a min of {min} and a max of {max}"));
+        add("description.range", format!("{name} has a min of {min} and a max of {max}"));
     }
-    let outside =
-        |number: &f64| of.min.is_some_and(|min| *number < min) || of.max.is_some_and(|max| *number > max);
-    if let Some(number) = of.starts().into_iter().find(outside) {
+    let outside = |number: &f64| {
+        variable.min.is_some_and(|min| *number < min) || variable.max.is_some_and(|max| *number > max)
+    };
+    if let Some(number) = variable.starts().into_iter().find(outside) {
         let why = format!("the start value of {name}, {number}, is outside its min and max");
-        tell("description.range", why);
+        add("description.range", why);
     }
     let texts = [BaseType::String, BaseType::Binary, BaseType::Boolean];
     let number =
         |text: &String| text.parse::<f64>().is_ok() || ["INF", "-INF", "NaN"].contains(&text.as_str());
-    if of.base.is_some_and(|base| !texts.contains(&base)) && !of.start.iter().all(number) {
-        let why = format!("the start value of {name}, {:?}, is no number", of.start.join(" "));
-        tell("description.start", why);
+    if variable.base.is_some_and(|base| !texts.contains(&base)) && !variable.start.iter().all(number) {
+        let why = format!("the start value of {name}, {:?}, is no number", variable.start.join(" "));
+        add("description.start", why);
     }
     wrong
 }
@@ -223,7 +229,7 @@ pub fn type_name(standard: Standard, base: BaseType) -> &'static str {
     }
 }
 
-/// How values of a type lie in memory.
+/// Returns the C type of the values of a type.
 pub fn kind_of(standard: Standard, base: BaseType) -> Kind {
     match type_name(standard, base) {
         "Real" | "Float64" => Kind::F64,

@@ -1,19 +1,19 @@
 //! Findings: severity, section of the standard, and the shortest call sequence that shows the finding.
 
-use crate::call_sequence::{CallSequence, End, Numbered, Run, Step, Written};
+use crate::call_sequence::{CallSequence, End, Numbered, Run, Step, Values, step_of};
 use serde::Serialize;
 use std::sync::Arc;
 
-/// How bad it is.
+/// Severity of a finding.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// Good to know.
+    /// Information.
     #[default]
     Note,
     /// The standard allows it, but importers fail.
     Fragile,
-    /// The standard says must.
+    /// The standard requires it.
     Violation,
 }
 
@@ -36,12 +36,24 @@ impl<T: Fn(&Run) -> Option<String> + Send + Sync + 'static> Judges for T {}
 /// A judge that findings share.
 pub type Judge = Arc<dyn Judges>;
 
+/// Judges by the first of these judges that finds a violation.
+pub fn any(judges: impl IntoIterator<Item = Box<dyn Judges>>) -> Box<dyn Judges> {
+    let judges: Vec<_> = judges.into_iter().collect();
+    Box::new(move |run: &Run| judges.iter().find_map(|judge| judge(run)))
+}
+
+/// Judges whether one of these calls did not return OK.
+pub fn fails(sequence: &CallSequence, ids: Vec<u32>) -> Box<dyn Judges> {
+    let sequence = sequence.clone();
+    Box::new(move |run: &Run| failure(&sequence, run, &ids))
+}
+
 /// A finding.
 #[derive(Clone, Default, Serialize)]
 pub struct Finding {
-    /// Its name: the topic, a dot, what is wrong.
+    /// Its name: the topic, a dot, the fault.
     pub name: String,
-    /// How bad it is.
+    /// Its severity.
     pub severity: Severity,
     /// The edition and section of the standard; empty if the rule is not part of it.
     pub section: String,
@@ -51,7 +63,7 @@ pub struct Finding {
     pub observed: String,
     /// Further observations of this rule.
     pub more: Vec<String>,
-    /// The calls that show it; none where the text alone does.
+    /// The calls that show it; empty for findings in files.
     #[serde(skip)]
     pub sequence: CallSequence,
     /// The call sequence as a program in C.
@@ -63,15 +75,14 @@ pub struct Finding {
     pub fails: bool,
     /// The reason for which it is accepted, if the baseline has one.
     pub accepted: Option<String>,
-    /// The steps of the sequence, and what they were before it was shortened.
+    /// The numbers of steps before and after shortening.
     pub steps: (usize, usize),
 }
 
 impl Finding {
-    /// A finding without a call sequence.
-    pub fn new(name: &str, severity: Severity, section: String, requirement: &str, observed: String) -> Self {
-        let (name, requirement) = (name.to_owned(), requirement.to_owned());
-        Self { name, severity, section, requirement, observed, ..Self::default() }
+    /// Adds the calls that show the finding.
+    pub fn shown_by(self, sequence: CallSequence, judge: Judge) -> Self {
+        Self { sequence, judge: Some(judge), ..self }
     }
 
     /// Its topic.
@@ -80,10 +91,12 @@ impl Finding {
     }
 }
 
-/// How a run ended that was not to end so: a sentence with the function it ended in.
+/// Returns a sentence on a run that crashed, hung or exited, with the function in which it did.
 pub fn ending(run: &Run, sequence: &CallSequence) -> Option<String> {
-    let at = run.at.and_then(|id| sequence.iter().find(|numbered| numbered.id == id));
-    let name = at.map_or("the end of the process".to_owned(), |numbered| step_name(&numbered.step));
+    let name = run
+        .at
+        .and_then(|id| step_of(sequence, id))
+        .map_or("the end of the process".to_owned(), |numbered| step_name(&numbered.step));
     Some(match &run.end {
         End::Done => return None,
         End::Crash(why) => format!("{name} crashes ({why})"),
@@ -127,13 +140,13 @@ pub struct Event {
 
 /// The result of a successful update of the discrete states.
 pub fn event(run: &Run, id: u32, fmi3: bool) -> Option<Event> {
-    let outcome = run.of(id).filter(|of| of.status.is_some_and(|status| status <= 1))?;
+    let outcome = run.outcome(id).filter(|outcome| outcome.status.is_some_and(|status| status <= 1))?;
     let (flags, time) = if fmi3 {
         let number = |index: usize| outcome.written.get(index)?.numbers().first().copied();
         ([0, 1, 3, 4].map(|index| number(index) == Some(1.0)), number(5)?)
     } else {
         // fmi2EventInfo has five flags, two to a word, and the time.
-        let Written::Numbers(_, words) = outcome.written.first()? else { return None };
+        let Values::Numbers(_, words) = outcome.written.first()? else { return None };
         let [first, changed, defined, time] = words[..] else { return None };
         let flags = [first as u32 != 0, first >> 32 != 0, changed >> 32 != 0, defined as u32 != 0];
         (flags, f64::from_bits(time))
@@ -142,15 +155,15 @@ pub fn event(run: &Run, id: u32, fmi3: bool) -> Option<Event> {
     Some(Event { again, terminate, states_changed, next: defined.then_some(time) })
 }
 
-/// A sentence on the first of these calls that did not answer OK.
-pub fn refused(sequence: &CallSequence, run: &Run, ids: &[u32]) -> Option<String> {
-    ids.iter().find_map(|id| refused_one(sequence, run, *id))
+/// Returns a sentence on the first of these calls that did not return OK.
+pub fn failure(sequence: &CallSequence, run: &Run, ids: &[u32]) -> Option<String> {
+    ids.iter().find_map(|id| failure_of(sequence, run, *id))
 }
 
-/// A sentence on this call, if it did not answer OK.
-pub fn refused_one(sequence: &CallSequence, run: &Run, id: u32) -> Option<String> {
-    let outcome = run.of(id)?;
-    let step = &sequence.iter().find(|numbered| numbered.id == id)?.step;
+/// Returns a sentence on this call if it did not return OK.
+pub fn failure_of(sequence: &CallSequence, run: &Run, id: u32) -> Option<String> {
+    let outcome = run.outcome(id)?;
+    let step = &step_of(sequence, id)?.step;
     let name = step_name(step);
     if outcome.missing {
         return Some(format!("{name} is not in the library"));
@@ -166,21 +179,20 @@ pub fn refused_one(sequence: &CallSequence, run: &Run, id: u32) -> Option<String
     Some(format!("{name} returns {result}{why}"))
 }
 
-/// A sentence on the first failure in a sequence: of an instantiation, else of a call that returns more than `most`.
-pub fn refused_any(sequence: &CallSequence, run: &Run, most: i32) -> Option<String> {
+/// Returns a sentence on the first failed instantiation, otherwise on the first call that returns more than `most`.
+pub fn first_failure(sequence: &CallSequence, run: &Run, most: i32) -> Option<String> {
     let made = |numbered: &&Numbered| matches!(numbered.step, Step::Make(..));
     let failed = |numbered: &&Numbered| {
         matches!(numbered.step, Step::Call { .. })
-            && run
-                .of(numbered.id)
-                .is_some_and(|of| of.status.map_or(of.missing && most < 2, |status| status > most))
+            && run.outcome(numbered.id).is_some_and(|outcome| {
+                outcome.status.map_or(outcome.missing && most < 2, |status| status > most)
+            })
     };
-    let one = |numbered: &Numbered| refused_one(sequence, run, numbered.id);
+    let one = |numbered: &Numbered| failure_of(sequence, run, numbered.id);
     let of_makes = sequence.iter().filter(made).find_map(one);
     of_makes.or_else(|| sequence.iter().filter(failed).find_map(one))
 }
 
-/// The name of a status.
 pub fn status_name(status: i32) -> String {
     let names = ["OK", "Warning", "Discard", "Error", "Fatal", "Pending"];
     let name = usize::try_from(status).ok().and_then(|index| names.get(index));

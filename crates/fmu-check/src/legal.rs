@@ -1,7 +1,8 @@
 //! Checks that a call sequence follows the standard: no finding may come from a call that the standard does not allow.
 
-use crate::call_sequence::{Arg, Make, NOBODY, Numbered, Step};
+use crate::call_sequence::{Arg, Make, NULL_INSTANCE, Numbered, Step};
 use crate::description::Description;
+use crate::values::is_other_time;
 use fmi_abi::calls::signature;
 use fmi_abi::{Interface, Mode, Standard};
 use std::collections::HashMap;
@@ -38,13 +39,13 @@ fn walk(description: &Description, sequence: &[Numbered], objects: &mut Objects)
     for Numbered { step, id, .. } in sequence.iter().filter(|numbered| !numbered.forbidden) {
         let is_legal = match step {
             Step::Make(index, make) => objects.make(description, *index, make),
-            Step::Free(index) if *index == NOBODY => true,
+            Step::Free(index) if *index == NULL_INSTANCE => true,
             Step::Free(index) => {
                 objects.slots.retain(|_, (owner, _)| owner != index);
                 objects.instances.remove(index).is_some()
             }
-            Step::Call { of, function, args } => {
-                of.is_some_and(|index| objects.call(description.standard, index, function, args))
+            Step::Call { instance, function, args } => {
+                instance.is_some_and(|index| objects.call(description.standard, index, function, args))
             }
             // A call that is allowed twice is allowed any number of times.
             Step::Repeat(_, steps) => (0..2).all(|_| walk(description, steps, objects).is_none()),
@@ -68,7 +69,6 @@ fn walk(description: &Description, sequence: &[Numbered], objects: &mut Objects)
 }
 
 impl Objects {
-    /// Instantiates; returns whether that is allowed.
     fn make(&mut self, description: &Description, index: usize, make: &Make) -> bool {
         let interface = if make.co_simulation { Interface::CoSimulation } else { Interface::ModelExchange };
         let once = description
@@ -92,7 +92,7 @@ impl Objects {
     fn call(&mut self, standard: Standard, index: usize, function: &str, args: &[Arg]) -> bool {
         let Some(state) = self.instances.get_mut(&index) else { return false };
         let is_allowed = signature(function)
-            .is_some_and(|of| of.rule.standard.contain(standard, state.interface, state.mode));
+            .is_some_and(|signature| signature.rule.standard.contain(standard, state.interface, state.mode));
         let is_legal = match function[4..].to_lowercase().contains("fmustate") {
             true => saved_states(&mut self.slots, &mut self.bytes, index, state, function, args),
             false => state.call(standard, function, args),
@@ -139,9 +139,8 @@ impl State {
                 return self.updated;
             }
             "DoStep" => {
-                let off = real(0) - self.time;
                 // After an early return, only the run knows the time.
-                let here = off.abs() <= 1e-9 * (1.0 + self.time.abs()) || self.early_return && off < 0.0;
+                let here = !is_other_time(real(0), self.time) || self.early_return && real(0) < self.time;
                 self.time = real(0) + real(1);
                 return here && real(1) > 0.0;
             }

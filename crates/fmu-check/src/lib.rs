@@ -2,9 +2,12 @@
 //!
 //! ## Inside
 //!
-//! A check writes sequences (`writer`), sequences of calls as data (`sequence`), has them played by a process of its own
-//! (`run`, `worker`) and judges what came of them. What is found is shortened (`shrink`) as long as it keeps to the
-//! standard (`legal`), and written as programs (`reproduce`). `unsafe` is in `worker` alone: the process that may be lost.
+//! A check writes a call sequence (`writer`, `call_sequence`), which a separate process plays (`run`, `worker`), and judges the
+//! results. The call sequence of a finding is shortened (`shrink`) as long as the standard allows it (`legal`), and written
+//! as a program in C (`reproduce`). Only `worker` has `unsafe` code: an FMU may crash its process.
+//!
+//! Each module uses only modules before it: `call_sequence`, `finding`, `rules`, `description`, `values`, `writer`, `legal`,
+//! `shrink`, `worker`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`, `checks`, `baseline`, `report`.
 
 mod always;
 mod baseline;
@@ -14,6 +17,7 @@ mod checks;
 mod description;
 mod finding;
 mod legal;
+mod options;
 mod report;
 mod reproduce;
 mod rules;
@@ -27,6 +31,7 @@ mod writer;
 
 pub use checker::Unchecked;
 pub use finding::{Finding, Severity};
+pub use options::{FailOn, Options};
 pub use report::Report;
 pub use worker::work_if_asked;
 
@@ -35,96 +40,23 @@ use checker::Checker;
 use checks::Check;
 use description::Description;
 use fmi_abi::Interface;
+use options::INTERFACES;
 use run::Stop;
 use std::io::{IsTerminal as _, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use trajectory::{NoTrajectory, find_trajectory};
-
-/// How an FMU is checked.
-#[derive(Clone, Debug, clap::Args)]
-pub struct Options {
-    /// Checks these topics alone, with commas between: description, package, functions, start_values, life_cycle,
-    /// states, derivatives, dependencies, results, reset, refusals, logs, resources, hostile.
-    #[arg(long, value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(rules::TOPICS))]
-    pub only: Vec<String>,
-    /// Succeeds without these topics and interfaces (co-simulation, model-exchange, scheduled-execution), with commas between.
-    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(
-        rules::TOPICS.iter().chain(&INTERFACES)))]
-    pub allow_unchecked: Vec<String>,
-    /// Seconds for all of it.
-    #[arg(long, default_value_t = 120.0)]
-    pub time: f64,
-    /// Seconds for one sequence; longer is a hang.
-    #[arg(long, default_value_t = 10.0)]
-    pub limit: f64,
-    /// Megabytes of memory that the FMU may use.
-    #[arg(long, default_value_t = 8192)]
-    pub memory: u64,
-    /// Megabytes that the FMU may have when it is unpacked.
-    #[arg(long, default_value_t = 1000)]
-    pub unpacked: u64,
-    /// Chooses the order of calls that chance chooses.
-    #[arg(long, default_value_t = 1)]
-    pub seed: u64,
-    /// Checks a part in 30 seconds at most: neither hostile calls nor resources, and fewer values and orders of calls.
-    #[arg(long, conflicts_with = "time")]
-    pub quick: bool,
-    /// Accepts the findings in this file, which has a line for each: NAME: REASON.
-    #[arg(long, value_name = "FILE")]
-    pub baseline: Option<PathBuf>,
-    /// Prints a rule, its severity and its section of the standard, or all rules as a page.
-    #[arg(long, value_name = "RULE")]
-    pub explain: Option<String>,
-    /// Writes report.html, report.json, junit.xml, report.sarif and a program in C for each finding to this directory.
-    #[arg(long, value_name = "FOLDER")]
-    pub out: Option<PathBuf>,
-    /// Writes the report as JSON to the standard output.
-    #[arg(long)]
-    pub json: bool,
-    /// Fails for findings of this severity and worse.
-    #[arg(long, value_enum, default_value_t = FailOn::Violation)]
-    pub fail_on: FailOn,
-    /// Seconds of each of the simulations that are repeated to see what is left behind.
-    #[arg(long, default_value_t = 1.5)]
-    pub repeat: f64,
-    /// Leaves sequences as long as they are.
-    #[arg(long)]
-    pub no_shrink: bool,
-    /// Runs an FMU that starts another program, which must be installed.
-    #[arg(long)]
-    pub execution_tool: bool,
-}
-
-/// Lowest severity that fails the check.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum FailOn {
-    /// The standard says must.
-    Violation,
-    /// Fragile findings and violations.
-    Fragile,
-    /// Good to know.
-    Note,
-    /// Not at all.
-    Never,
-}
-
-/// Seconds of a quick check; what is under way then may take a little longer.
-const QUICK: f64 = 24.0;
 
 /// Topics that a quick check leaves out.
 const LONG: [&str; 2] = ["hostile", "resources"];
 
-/// The interfaces that an FMU may offer.
-const INTERFACES: [&str; 3] = ["co-simulation", "model-exchange", "scheduled-execution"];
-
-/// Checks an FMU, tells what is found and writes the reports. The exit status: 0 for nothing that is to fail, 1 for
-/// findings of a severity that is to fail, 2 if it, one of its interfaces or a topic could not be checked.
+/// Checks an FMU, prints the findings and writes the reports. The exit status is 1 for findings of a severity that fails the
+/// check, otherwise 2 if the FMU, one of its interfaces or a topic was not checked, otherwise 0.
 ///
-/// The program must call [`work_if_asked`] before anything else: it is started anew for every sequence of calls.
+/// The program must call [`work_if_asked`] before anything else: it is started again to play call sequences.
 pub fn command(fmu: &Path, options: &Options) -> ExitCode {
     if let Some(rule) = &options.explain {
         return match rules::explain(rule) {
@@ -146,7 +78,7 @@ pub fn command(fmu: &Path, options: &Options) -> ExitCode {
             true => format!("{}\n", report.json()?),
             false => report.terminal(std::io::stdout().is_terminal()),
         };
-        // Who stops reading has observed enough.
+        // A closed pipe is not an error.
         let written = std::io::stdout().write_all(text.as_bytes());
         written.or_else(|error| match error.kind() {
             std::io::ErrorKind::BrokenPipe => Ok(()),
@@ -192,10 +124,10 @@ fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Checks an FMU, with a line on the standard error that says how far it is.
+/// Checks an FMU. With `progress`, a line on the standard error shows the progress.
 ///
 /// # Errors
-/// When it is no FMU of FMI 2.0 or 3.0, or has no library for this machine.
+/// Fails if the file is no FMU of FMI 2.0 or 3.0.
 pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<Report> {
     let begin = Instant::now();
     let baseline = options.baseline.as_deref().map(baseline::Baseline::read).transpose()?.unwrap_or_default();
@@ -203,7 +135,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     // The workers end, and write nothing any more, before the directory is removed.
     let workers = run::Workers::new(scratch.path().to_owned())?;
     let directory = &scratch.path().join("fmu");
-    let of_zip = checks::package::unpack(path, directory, options.unpacked << 20)?;
+    let zip_observations = checks::package::unpack(path, directory, options.unpacked << 20)?;
     let text = std::fs::read(directory.join("modelDescription.xml")).with_context(|| {
         format!("{}: there is no modelDescription.xml in it; it is no FMU", path.display())
     })?;
@@ -219,22 +151,18 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
         true => !options.quick || !LONG.contains(&topic),
         false => options.only.iter().any(|only| only == topic),
     };
-    let mut of_files = Vec::new();
+    let mut observations = Vec::new();
     if wanted("package") {
-        of_files.extend(of_zip);
-        of_files.extend(checks::package::look(directory, &description));
+        observations.extend(zip_observations);
+        observations.extend(checks::package::look(directory, &description));
     }
     if wanted("description") {
-        of_files.extend(encoding);
-        of_files.extend(description.wrong.iter().cloned());
+        observations.extend(encoding);
+        observations.extend(description.wrong.iter().cloned());
     }
     let (setting, without) = setting(options, directory, &description);
-    let time = if options.quick { QUICK } else { options.time.max(1.0) };
-    let deadline = begin + Duration::from_secs_f64(time);
-    let limit = if options.quick { options.limit.min(QUICK / 10.0) } else { options.limit };
-    let mut checker = Checker::new(description, setting, workers, options.seed, limit, deadline);
-    checker.quick = options.quick;
-    of_files.into_iter().for_each(|(name, observed)| checker.add(checker.claim(name).of_files(observed)));
+    let mut checker = Checker::new(description, setting, workers, options, begin);
+    observations.into_iter().for_each(|(name, observed)| checker.add(checker.broken(name, observed)));
     without.into_iter().for_each(|(name, why)| checker.unchecked(name, why));
     simulate(&mut checker)?;
     attack(&checker, progress, &wanted)?;
@@ -252,7 +180,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     }
     let mut report = Report::new(path, &checker, findings);
     report.seconds = begin.elapsed().as_secs_f64();
-    let why = if options.only.is_empty() { "left out (--quick)" } else { "not asked for (--only)" };
+    let why = if options.only.is_empty() { "left out (--quick)" } else { "left out (--only)" };
     let unwanted = rules::TOPICS.iter().filter(|topic| !wanted(topic));
     report.unreached.extend(unwanted.map(|topic| Unchecked {
         name: (*topic).to_owned(),
@@ -281,15 +209,17 @@ fn encoding(text: &[u8]) -> Option<rules::Observation> {
     Some(("description.encoding", why))
 }
 
-/// A simulation that succeeds. That there is none is a finding, too.
+/// Finds a simulation that succeeds; keeps a finding if there is none.
 fn reach(checker: &mut Checker, interface: Interface) -> anyhow::Result<writer::Trajectory> {
     let trajectory = find_trajectory(checker, interface);
     let Some(NoTrajectory(_, sequence)) = trajectory.as_ref().err().and_then(|error| error.downcast_ref())
     else {
         return trajectory;
     };
-    no_trajectory(checker, sequence.clone())?;
-    // One that reads or writes beyond arrays may have more to show where there is room for it.
+    let copy = sequence.clone();
+    let judge = move |run: &call_sequence::Run| finding::first_failure(&copy, run, 1);
+    checker.check("life_cycle.simulation", sequence.clone(), judge)?;
+    // An FMU that accesses memory beyond arrays may succeed with accessible memory after them.
     if ["arrays.read-beyond", "arrays.written-beyond"].iter().any(|name| checker.has(name)) {
         checker.setting.soft = true;
         return find_trajectory(checker, interface);
@@ -332,12 +262,6 @@ fn setting(
     (setting, without)
 }
 
-/// A simulation as the standard has it fails: that is the finding.
-fn no_trajectory(checker: &Checker, sequence: call_sequence::CallSequence) -> anyhow::Result<()> {
-    let copy = sequence.clone();
-    checker.check("life_cycle.simulation", sequence, move |run| finding::refused_any(&copy, run, 1))
-}
-
 /// Handles all items, several at a time. After each, progress shows the line that `each` returns.
 fn in_parallel<T: Sync>(items: &[T], progress: bool, each: impl Fn(&T, usize) -> String + Sync) {
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
@@ -367,9 +291,11 @@ fn attack_with(
 ) -> anyhow::Result<()> {
     match (check, trajectory) {
         (Check::Once(check), None) => check(checker),
-        (Check::Each(fits, check), Some(of)) if fits.fit(checker, of) => check(checker, of),
-        (Check::Malformed(rule, fits, write), Some(of)) if fits.fit(checker, of) => {
-            checks::hostile::all(checker, rule, write(checker, of)?)
+        (Check::Each(fits, check), Some(trajectory)) if fits.fit(checker, trajectory) => {
+            check(checker, trajectory)
+        }
+        (Check::Malformed(rule, fits, write), Some(trajectory)) if fits.fit(checker, trajectory) => {
+            checks::hostile::all(checker, rule, write(checker, trajectory)?)
         }
         _ => Ok(()),
     }
@@ -377,8 +303,8 @@ fn attack_with(
 
 /// All checks that are wanted, several at a time.
 fn attack(checker: &Checker, progress: bool, wanted: &(impl Fn(&str) -> bool + Sync)) -> anyhow::Result<()> {
-    let of_checks = checks::ALL.iter().filter(|(topic, _)| wanted(topic));
-    let jobs: Vec<_> = of_checks
+    let wanted_checks = checks::ALL.iter().filter(|(topic, _)| wanted(topic));
+    let jobs: Vec<_> = wanted_checks
         .flat_map(|(topic, check)| {
             let each = checker.trajectories.iter().map(Some);
             std::iter::once(None).chain(each).map(move |trajectory| (*topic, *check, trajectory))

@@ -1,4 +1,4 @@
-//! `fmu-check model.fmu`: attacks an FMU and says, ranked, which requirements it breaks.
+//! `fmu-check model.fmu`: reports the rules of the standard that an FMU breaks.
 
 use clap::Parser as _;
 use std::process::ExitCode;

@@ -1,11 +1,11 @@
 //! The shortest sequence of calls that still shows a finding.
 
-use crate::call_sequence::{CallSequence, Numbered, Step};
+use crate::call_sequence::{CallSequence, Numbered, Step, all_steps};
 use crate::description::Description;
 use crate::legal::first_illegal;
 use std::collections::HashMap;
 
-/// Calls that belong together: they are left out together or not at all.
+/// Returns groups of calls that are only left out together.
 fn units(sequence: &[Numbered]) -> Vec<Vec<u32>> {
     let (mut units, mut open, mut before) = (Vec::<Vec<u32>>::new(), false, "");
     for numbered in sequence {
@@ -42,17 +42,6 @@ fn content(step: &Step) -> Option<String> {
     }
 }
 
-/// The calls of a sequence and of its threads.
-fn flat(sequence: &[Numbered]) -> Vec<&Numbered> {
-    sequence.iter().fold(Vec::new(), |mut all, numbered| {
-        all.push(numbered);
-        if let Step::Parallel(sequences) = &numbered.step {
-            all.extend(sequences.iter().flat_map(|sequence| flat(sequence)));
-        }
-        all
-    })
-}
-
 /// A sequence without some calls, also of its threads.
 fn without(sequence: &[Numbered], ids: &[u32]) -> CallSequence {
     let kept = sequence.iter().filter(|numbered| !ids.contains(&numbered.id)).cloned();
@@ -67,14 +56,14 @@ fn without(sequence: &[Numbered], ids: &[u32]) -> CallSequence {
 
 /// Removes corresponding units of compared simulations together: a simulation that lacks a call would differ for that reason only.
 fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
-    let contents: HashMap<u32, String> = flat(sequence)
+    let contents: HashMap<u32, String> = all_steps(sequence)
         .into_iter()
         .filter_map(|numbered| Some((numbered.id, content(&numbered.step)?)))
         .collect();
-    let of = |id: &u32| contents.get(id).cloned();
+    let content_of = |id: &u32| contents.get(id).cloned();
     let mut groups: Vec<(Vec<String>, Vec<u32>)> = Vec::new();
     for unit in units {
-        let key: Vec<String> = unit.iter().filter_map(of).collect();
+        let key: Vec<String> = unit.iter().filter_map(content_of).collect();
         match groups.iter_mut().find(|(other, _)| !key.is_empty() && *other == key) {
             Some((_, ids)) => ids.extend(unit),
             None => groups.push((key, unit)),
@@ -83,8 +72,8 @@ fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
     groups.into_iter().map(|(_, ids)| ids).collect()
 }
 
-/// Leaves out the calls that are not needed for `shows` to hold, as long as the rest keeps to the standard. Calls of `pinned`
-/// functions stay; what is the same in simulations that are compared goes together.
+/// Leaves out the calls that are not needed for `shows` to hold, as long as the standard allows the rest. Calls of `pinned`
+/// functions stay; corresponding calls of compared simulations are left out together.
 pub fn shrink(
     description: &Description,
     sequence: &CallSequence,
@@ -101,7 +90,7 @@ pub fn shrink(
     let all: Vec<Vec<u32>> = units(sequence).into_iter().chain(threads).collect();
     let mut units = if compared { together(sequence, all) } else { all };
     let stays = |id: &u32| {
-        flat(sequence).into_iter().any(|numbered| match &numbered.step {
+        all_steps(sequence).into_iter().any(|numbered| match &numbered.step {
             Step::Call { function, .. } => {
                 numbered.id == *id && pinned.iter().any(|name| function[4..].eq_ignore_ascii_case(name))
             }
@@ -118,7 +107,7 @@ pub fn shrink(
             let begin = end.saturating_sub(size);
             let tried = without(&best, &units[begin..end].concat());
             let keeps = !legal || first_illegal(description, &tried).is_none();
-            if keeps && flat(&tried).len() < flat(&best).len() && shows(&tried) {
+            if keeps && all_steps(&tried).len() < all_steps(&best).len() && shows(&tried) {
                 best = tried;
                 units.drain(begin..end);
                 shorter = true;
@@ -134,12 +123,11 @@ pub fn shrink(
 
 #[cfg(test)]
 mod tests {
-    use super::{flat, shrink};
-    use crate::call_sequence::{CallSequence, Numbered, Step};
+    use super::shrink;
+    use crate::call_sequence::{CallSequence, Kind, Numbered, Step, Values, all_steps};
     use crate::description::Description;
     use crate::legal::first_illegal;
-    use crate::values::Value;
-    use crate::writer::Part::{Ask, Begin, Free, Run};
+    use crate::writer::Part::{Begin, Free, ReadAll, Run};
     use crate::writer::{Point, Trajectory, Writer};
     use fmi_abi::Interface;
 
@@ -152,21 +140,21 @@ mod tests {
 
     fn trajectory() -> Trajectory {
         let point = |number: usize| {
-            let inputs = vec![(0, Value::Numbers(vec![number as f64]))];
+            let inputs = vec![(0, Values::new(Kind::F64, [number as f64]))];
             Point { time: number as f64, size: 1.0, inputs, ..Point::default() }
         };
         let points = (0..6).map(point).collect();
         Trajectory { interface: Interface::CoSimulation, updates: 0, points, end: 6.0 }
     }
 
-    const WHOLE: &[crate::writer::Part] = &[Begin, Ask, Run(0), Free];
+    const WHOLE: &[crate::writer::Part] = &[Begin, ReadAll, Run(0), Free];
 
     fn names(sequence: &[Numbered]) -> Vec<String> {
-        flat(sequence).into_iter().map(|numbered| crate::finding::step_name(&numbered.step)).collect()
+        all_steps(sequence).into_iter().map(|numbered| crate::finding::step_name(&numbered.step)).collect()
     }
 
     fn count(sequence: &CallSequence, name: &str) -> usize {
-        names(sequence).iter().filter(|of| *of == name).count()
+        names(sequence).iter().filter(|other| *other == name).count()
     }
 
     #[test]

@@ -1,15 +1,15 @@
-//! A simulation that succeeds, found by playing it: all checks vary it.
+//! Finds a simulation that succeeds by trying it. All checks are variations of it.
 
-use crate::call_sequence::{CallSequence, End, Run, Step, Written};
+use crate::call_sequence::{CallSequence, End, Run, Step, Values, step_of};
 use crate::checker::Checker;
 use crate::description::Description;
-use crate::finding::{Event, ending, refused, refused_one, step_name};
+use crate::finding::{Event, ending, failure, failure_of, step_name};
 use crate::values::input_values;
 use crate::writer::{Part, Point, Trajectory, Writer};
 use fmi_abi::Interface;
 use std::time::{Duration, Instant};
 
-/// A trajectory that takes longer is played too often.
+/// Longest time of a simulation with long steps: checks repeat the simulation many times.
 const LONG: Duration = Duration::from_millis(250);
 
 /// Updates of the discrete states that an event may need.
@@ -47,14 +47,14 @@ fn range(description: &Description) -> f64 {
     description.stop_time.map_or(1.0, |stop| stop - description.start_time).max(1e-6)
 }
 
-/// The size of a step; section 4.4.1 of FMI 3.0: steps are multiples of the solver's.
+/// Returns the step size, a multiple of the solver's (section 4.4.1 of FMI 3.0).
 fn step_size(description: &Description) -> f64 {
     let size = description.step_size.unwrap_or(range(description) / 100.0);
     let internal = description.co_simulation.as_ref().and_then(|offer| offer.number("fixedInternalStepSize"));
     internal.map_or(size, |internal| internal * (size / internal).round().clamp(1.0, 100.0))
 }
 
-/// A trajectory of these points, as far as its calls are good.
+/// Returns the trajectory up to the points whose calls succeed.
 fn up_to(mut trajectory: Trajectory, good: usize) -> Trajectory {
     trajectory.points.truncate(good);
     if let Some(last) = trajectory.points.last() {
@@ -63,8 +63,8 @@ fn up_to(mut trajectory: Trajectory, good: usize) -> Trajectory {
     trajectory
 }
 
-/// Steps of several sizes to the end of the default experiment, if they may have several and that takes no time; otherwise
-/// of one size. Without changes of Booleans, if these fail.
+/// Finds steps of two sizes to the end of the default experiment if the FMU allows it and that is fast; otherwise
+/// of one size. If steps with changes of Booleans fail, the Booleans are constant.
 fn in_steps(checker: &Checker, trajectory: Trajectory) -> anyhow::Result<Trajectory> {
     let description = &checker.description;
     let size = step_size(description);
@@ -86,7 +86,7 @@ fn in_steps(checker: &Checker, trajectory: Trajectory) -> anyhow::Result<Traject
         }
         made(&run, &writer, ids[0])?;
         let (good, discarded) = good_steps(checker, &run, &writer.sequence);
-        match refused(&writer.sequence, &run, &ids) {
+        match failure(&writer.sequence, &run, &ids) {
             None => return Ok(up_to(trajectory, good)),
             // A model may end its simulation.
             Some(_) if discarded && good >= 2 => return Ok(up_to(trajectory, good)),
@@ -103,9 +103,9 @@ fn good_steps(checker: &Checker, run: &Run, sequence: &CallSequence) -> (usize, 
     let ids = sequence.iter().filter(|numbered| step(&numbered.step)).map(|numbered| numbered.id);
     let mut good = 0;
     for id in ids {
-        let flags = run.of(id).map_or(&[][..], |of| &of.written);
+        let flags = run.outcome(id).map_or(&[][..], |outcome| &outcome.written);
         let flag = |index: usize| flags.get(index).is_some_and(|flag| flag.numbers().first() == Some(&1.0));
-        // Before one that returns early as well, from where the next step would have to go on.
+        // A step that returns early counts as failed: the next step would have to begin at lastSuccessfulTime.
         if run.status(id).is_none_or(|status| status > 1) || checker.fmi3() && (0..3).any(flag) {
             return (good, run.status(id) == Some(2));
         }
@@ -114,9 +114,9 @@ fn good_steps(checker: &Checker, run: &Run, sequence: &CallSequence) -> (usize, 
     (good, false)
 }
 
-/// Fails if a run has not ended well or its first instance was not made.
+/// Fails if a run has crashed or hung, or its instantiation has failed.
 fn made(run: &Run, writer: &Writer, make: u32) -> anyhow::Result<()> {
-    match ending(run, &writer.sequence).or_else(|| refused_one(&writer.sequence, run, make)) {
+    match ending(run, &writer.sequence).or_else(|| failure_of(&writer.sequence, run, make)) {
         Some(why) => Err(NoTrajectory(why, writer.sequence.clone()).into()),
         None => Ok(()),
     }
@@ -131,7 +131,7 @@ fn initialized(checker: &Checker, trajectory: &mut Trajectory) -> anyhow::Result
         let ids = writer.play(0, &parts).ids;
         let run = checker.play(&writer.sequence)?;
         made(&run, &writer, ids[0])?;
-        if let Some(why) = refused(&writer.sequence, &run, &ids[1..]) {
+        if let Some(why) = failure(&writer.sequence, &run, &ids[1..]) {
             return Err(NoTrajectory(why, writer.sequence).into());
         }
         match ids.last().and_then(|id| checker.event(&run, *id)) {
@@ -142,36 +142,77 @@ fn initialized(checker: &Checker, trajectory: &mut Trajectory) -> anyhow::Result
     Ok(None)
 }
 
-/// The event of the last update among these calls.
-fn last_event(checker: &Checker, run: &Run, ids: &[u32]) -> Option<Event> {
-    ids.iter().rev().find_map(|id| checker.event(run, *id))
+/// The results at a point.
+#[derive(Default)]
+struct Reached {
+    states: Vec<f64>,
+    slopes: Vec<f64>,
+    indicators: Vec<f64>,
+    /// The event there, if there was one.
+    event: Option<Event>,
+    /// The model ends the simulation, or the step returns early.
+    ends: bool,
 }
 
-/// Steps of Co-Simulation with Event Mode, in which the events are handled that steps report.
+/// Adds a point to a trajectory, with as many updates as an event there needs; `None` if a call there fails after some
+/// points.
+fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> anyhow::Result<Option<Reached>> {
+    let count = checker.description.states_count().unwrap_or(0);
+    let indicators = checker.description.event_indicators.unwrap_or(0);
+    loop {
+        let mut writer = checker.writer(trajectory);
+        let before = writer.play(0, &[Part::Begin, Part::Points(usize::MAX)]).ids;
+        let here = writer.point(0, point);
+        let vectors = [
+            ("GetContinuousStates", count),
+            (writer.derivatives_name(), count),
+            ("GetEventIndicators", indicators),
+        ];
+        let read =
+            |(name, count)| (count > 0 && !trajectory.is_stepped()).then(|| writer.vector(0, name, count));
+        let vectors = vectors.map(read);
+        let run = checker.play(&writer.sequence)?;
+        made(&run, &writer, before[0])?;
+        if let Some(why) = failure(&writer.sequence, &run, &[&before[1..], &here].concat()) {
+            let few = trajectory.points.len() < 3;
+            return if few { Err(NoTrajectory(why, writer.sequence).into()) } else { Ok(None) };
+        }
+        let advances = |id: &&u32| {
+            let name = step_of(&writer.sequence, **id).map(|numbered| step_name(&numbered.step));
+            name.is_some_and(|name| name.ends_with("DoStep") || name.ends_with("CompletedIntegratorStep"))
+        };
+        // The flags for an event, the end of the simulation and, in Co-Simulation, an early return.
+        let outputs = here
+            .iter()
+            .find(advances)
+            .and_then(|id| run.outcome(*id))
+            .map_or(&[][..], |outcome| &outcome.written);
+        let flag = |index| {
+            outputs.get(index).is_some_and(|outcome: &Values| outcome.numbers().first() == Some(&1.0))
+        };
+        if flag(1) || flag(2) {
+            return Ok(Some(Reached { ends: true, ..Reached::default() }));
+        }
+        let event = here.iter().rev().find_map(|id| checker.event(&run, *id));
+        let again = event.is_some_and(|event| event.again) && point.updates < UPDATES;
+        if again || point.updates == 0 && flag(0) {
+            point.updates += 1;
+            continue;
+        }
+        let [states, slopes, indicators] =
+            vectors.map(|id| id.and_then(|id| run.written(id)).map(Values::numbers).unwrap_or_default());
+        return Ok(Some(Reached { states, slopes, indicators, event, ends: false }));
+    }
+}
+
+/// Finds steps of Co-Simulation with Event Mode, and handles the events that the steps report.
 fn with_events(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<Trajectory> {
     initialized(checker, &mut trajectory)?;
     let description = &checker.description;
     for mut point in steps(description, description.start_time, &[step_size(description); 12], false) {
-        loop {
-            let mut writer = checker.writer(&trajectory);
-            let before = writer.play(0, &[Part::Begin, Part::Points(usize::MAX)]).ids;
-            let ids = writer.point(0, &point);
-            let run = checker.play(&writer.sequence)?;
-            made(&run, &writer, before[0])?;
-            if let Some(why) = refused(&writer.sequence, &run, &ids) {
-                let few = trajectory.points.len() < 3;
-                return if few { Err(NoTrajectory(why, writer.sequence).into()) } else { Ok(trajectory) };
-            }
-            let step = ids.iter().filter_map(|id| run.of(*id)).find(|of| of.written.len() == 4);
-            let flag = |index: usize| step.is_some_and(|of| of.written[index].numbers() == [1.0]);
-            let again = last_event(checker, &run, &ids).is_some_and(|event| event.again);
-            if flag(1) || flag(2) {
-                return Ok(trajectory);
-            }
-            if point.updates == UPDATES || !(again || flag(0) && point.updates == 0) {
-                break;
-            }
-            point.updates += 1;
+        let reached = reached(checker, &trajectory, &mut point)?;
+        if reached.is_none_or(|reached| reached.ends) {
+            break;
         }
         trajectory.end = point.time + point.size;
         trajectory.points.push(point);
@@ -179,60 +220,7 @@ fn with_events(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<
     Ok(trajectory)
 }
 
-/// The result of integrating to a point.
-struct Reached {
-    states: Vec<f64>,
-    slopes: Vec<f64>,
-    indicators: Vec<f64>,
-    /// The event there, if there was one.
-    event: Option<Event>,
-    /// The model ends.
-    ends: bool,
-}
-
-/// Adds a point to an integration, with as many updates as an event there needs; none if a call there fails after some
-/// points.
-fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> anyhow::Result<Option<Reached>> {
-    let count = checker.description.states_count().unwrap_or(0);
-    let indicators = checker.description.event_indicators.unwrap_or(0);
-    loop {
-        let mut writer = checker.writer(trajectory);
-        let mut ids = writer.play(0, &[Part::Begin, Part::Points(usize::MAX)]).ids;
-        let here = writer.point(0, point);
-        ids.extend(&here);
-        let derivatives = writer.derivatives_name();
-        let asked =
-            [("GetContinuousStates", count), (derivatives, count), ("GetEventIndicators", indicators)]
-                .map(|(name, count)| (count > 0).then(|| writer.vector(0, name, count)));
-        let run = checker.play(&writer.sequence)?;
-        if let Some(why) = ending(&run, &writer.sequence) {
-            return Err(NoTrajectory(why, writer.sequence).into());
-        }
-        if let Some(why) = refused(&writer.sequence, &run, &ids[1..]) {
-            let few = trajectory.points.len() < 3;
-            return if few { Err(NoTrajectory(why, writer.sequence).into()) } else { Ok(None) };
-        }
-        let completed = writer.sequence.iter().rev().find(|numbered| {
-            here.contains(&numbered.id) && step_name(&numbered.step).ends_with("CompletedIntegratorStep")
-        });
-        let flag = |index: usize| {
-            let written = completed.and_then(|numbered| run.of(numbered.id)?.written.get(index));
-            written.is_some_and(|of| of.numbers().first() == Some(&1.0))
-        };
-        let event = last_event(checker, &run, &here).filter(|_| point.updates > 0);
-        let again = event.is_some_and(|event| event.again) && point.updates < UPDATES;
-        if again || point.updates == 0 && flag(0) {
-            point.updates += 1;
-            continue;
-        }
-        let [states, slopes, indicators] =
-            asked.map(|id| id.and_then(|id| run.written(id)).map(Written::numbers).unwrap_or_default());
-        let ends = flag(1);
-        return Ok(Some(Reached { states, slopes, indicators, event, ends }));
-    }
-}
-
-/// Euler's method from the start on: first every point, then some on the way to the end of the default experiment, and those
+/// Integrates by Euler's method: first every point, then some up to the end of the default experiment, and those
 /// with events.
 fn integrated(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<Trajectory> {
     let description = &checker.description;
@@ -253,7 +241,7 @@ fn integrated(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<T
         // The first point is the start of the integration.
         let mut size = if number == 0 { 0.0 } else { [far, small][usize::from(number < near)] };
         if let Some(next) = next_event.filter(|next| *next > time) {
-            // Time events are reached at once where nothing is integrated.
+            // Without states, every third point is the next time event.
             if next <= time + size || count == 0 && number > 0 && number % 3 == 0 {
                 size = next - time;
                 event_now = true;
@@ -267,10 +255,7 @@ fn integrated(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<T
         let (inputs, updates) = (input_values(description, phase, false), usize::from(event_now));
         let mut point = Point { time, size, inputs, states: states.clone(), updates };
         let Some(reached) = reached(checker, &trajectory, &mut point)? else { return Ok(trajectory) };
-        if reached.event.is_some_and(|event| event.terminate) {
-            return Ok(trajectory);
-        }
-        if reached.ends {
+        if reached.ends || reached.event.is_some_and(|event| event.terminate) {
             break;
         }
         next_event = reached.event.map_or(next_event, |event| event.next);
@@ -289,7 +274,6 @@ fn integrated(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<T
     Ok(trajectory)
 }
 
-/// Steps of Co-Simulation.
 pub fn steps(description: &Description, start: f64, sizes: &[f64], discrete: bool) -> Vec<Point> {
     let mut time = start;
     let points = sizes.iter().enumerate();

@@ -1,49 +1,22 @@
 //! Values for variables: within their ranges, near their start values or other than these.
 
-use crate::call_sequence::{Kind, Written};
+use crate::call_sequence::Values;
 use crate::description::{Description, Variable, kind_of};
 use fmi_abi::BaseType;
 
-/// A value for a variable.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Value {
-    /// Numbers, one for each element.
-    Numbers(Vec<f64>),
-    /// Texts or bytes.
-    Texts(Vec<Vec<u8>>),
-}
-
-impl Value {
-    /// The first of it, for people.
-    pub fn show(&self) -> String {
-        match self {
-            Self::Numbers(numbers) => {
-                numbers.first().map_or("nothing".to_owned(), |number| format!("{number:?}"))
-            }
-            Self::Texts(texts) => texts
-                .first()
-                .map_or("nothing".to_owned(), |text| format!("{:?}", String::from_utf8_lossy(text))),
-        }
-    }
-}
-
 /// Values other than the start value that a variable can take: a non-ASCII string, bytes with NULs, the next
 /// number, the other boolean value.
-pub fn other_values(description: &Description, index: usize) -> Option<Value> {
+pub fn other_values(description: &Description, index: usize) -> Option<Values> {
     let variable = &description.variables[index];
-    let starts = variable.starts();
+    let (starts, size) = (variable.starts(), variable.start.len());
+    let kind = kind_of(description.standard, variable.base?);
     Some(match variable.base? {
         BaseType::Real | BaseType::Float32 => {
-            let kind = kind_of(description.standard, variable.base?);
-            let near = |start: &f64| kind.number(kind.bits(near(variable, *start, 1.0 / 64.0)));
-            Value::Numbers(starts.iter().map(near).collect())
+            Values::new(kind, starts.iter().map(|start| near(variable, *start, 1.0 / 64.0)))
         }
-        BaseType::String => Value::Texts(vec!["Gödel, Escher, Bach".into(); variable.start.len()]),
-        BaseType::Binary => {
-            let bytes = (0..300).map(|byte| (byte % 256) as u8).collect();
-            Value::Texts(vec![bytes; variable.start.len()])
-        }
-        BaseType::Boolean => Value::Numbers(starts.iter().map(|start| 1.0 - start).collect()),
+        BaseType::String => Values::texts("Gödel, Escher, Bach".as_bytes(), size),
+        BaseType::Binary => Values::texts(&Vec::from_iter((0..300).map(|byte| (byte % 256) as u8)), size),
+        BaseType::Boolean => Values::new(kind, starts.iter().map(|start| 1.0 - start)),
         BaseType::Enumeration if variable.max.is_none() => return None,
         _ => {
             let other = |start: &f64| match variable.max.is_some_and(|max| start + 1.0 > max) {
@@ -55,28 +28,13 @@ pub fn other_values(description: &Description, index: usize) -> Option<Value> {
             if !others.iter().all(inside) {
                 return None;
             }
-            Value::Numbers(others)
+            Values::new(kind, others)
         }
     })
 }
 
-/// Each value that is read is the value that was set.
-pub fn is_read(read: &Written, value: &Value) -> bool {
-    match (read, value) {
-        (Written::Numbers(kind, bits), Value::Numbers(numbers)) => {
-            bits.iter().zip(numbers).all(|(bits, number)| {
-                *bits == kind.bits(*number) || *kind == Kind::F64 && kind.number(*bits) == *number
-            })
-        }
-        (Written::Texts(texts), Value::Texts(set)) => {
-            texts.iter().zip(set).all(|(text, set)| text.as_ref() == Some(set))
-        }
-        _ => true,
-    }
-}
-
 /// Values for inputs: near their start values, within their ranges.
-pub fn input_values(description: &Description, phase: usize, discrete: bool) -> Vec<(usize, Value)> {
+pub fn input_values(description: &Description, phase: usize, discrete: bool) -> Vec<(usize, Values)> {
     let mut values = Vec::new();
     for (index, variable) in description.variables.iter().enumerate() {
         if values.len() == 1000 {
@@ -88,27 +46,32 @@ pub fn input_values(description: &Description, phase: usize, discrete: bool) -> 
         if variable.once_per_instant {
             continue;
         }
-        let starts = variable.starts();
+        let (starts, kind) = (variable.starts(), description.kind(index));
         if variable.is_float() && variable.variability != "discrete" {
             let numbers = (0..size).map(|element| {
                 let start = starts.get(element).copied().unwrap_or(0.0);
                 near(variable, start, 0.1 * ((phase * 7 + index * 3 + element) as f64 * 0.7).sin())
             });
-            values.push((index, Value::Numbers(numbers.collect())));
+            values.push((index, Values::new(kind, numbers)));
         } else if discrete && variable.base == Some(BaseType::Boolean) {
             let on = f64::from(u8::from(phase / 4 % 2 == 1));
             let numbers = (0..size).map(|element| (starts.get(element).copied().unwrap_or(0.0) - on).abs());
-            values.push((index, Value::Numbers(numbers.collect())));
+            values.push((index, Values::new(kind, numbers)));
         }
     }
     values
 }
 
-/// A number near another one, by so much of what is usual for the variable, within its range.
+/// Returns a number near the start value and within the range: the difference is this part of the range or the nominal value.
 pub fn near(variable: &Variable, start: f64, by: f64) -> f64 {
     let range = variable.min.zip(variable.max).map(|(min, max)| max - min).filter(|range| range.is_finite());
     let scale = range.unwrap_or(f64::INFINITY).min(variable.nominal.max(start.abs().min(1e6)));
     let number = start + by * scale;
     let number = variable.min.map_or(number, |min| number.max(min));
     variable.max.map_or(number, |max| number.min(max))
+}
+
+/// Returns whether a time differs from another one by more than rounding errors.
+pub fn is_other_time(time: f64, other: f64) -> bool {
+    (time - other).abs() > 1e-9 * (1.0 + other.abs())
 }

@@ -1,9 +1,8 @@
-//! Writes sequences: the calls of an importer that does what the standard says, with the numbers of this FMU.
+//! Writes call sequences: the calls of an importer that follows the standard, with the numbers of this FMU.
 
-use crate::call_sequence::{Arg, CallSequence, Kind, Make, Numbered, Run, Step, Written};
+use crate::call_sequence::{Arg, CallSequence, Kind, Make, Numbered, Run, Step, Values};
 use crate::description::{Description, kind_of, type_name};
 use crate::finding::status_name;
-use crate::values::Value;
 use fmi_abi::calls::signatures;
 use fmi_abi::{Interface, Standard};
 
@@ -11,7 +10,17 @@ use fmi_abi::{Interface, Standard};
 #[derive(Clone, Debug)]
 pub struct Read {
     pub id: u32,
-    pub of: Vec<(usize, usize)>,
+    pub variables: Vec<(usize, usize)>,
+}
+
+impl Read {
+    /// Returns each variable with the index of its first value and the number of its values.
+    pub fn parts(&self) -> impl Iterator<Item = (usize, usize, usize)> {
+        self.variables.iter().scan(0, |end, (variable, size)| {
+            *end += size;
+            Some((*variable, *end - size, *size))
+        })
+    }
 }
 
 /// One point of a trajectory.
@@ -22,7 +31,7 @@ pub struct Point {
     /// How long it is.
     pub size: f64,
     /// Values that are set before the step.
-    pub inputs: Vec<(usize, Value)>,
+    pub inputs: Vec<(usize, Values)>,
     /// Continuous states that are set in Model Exchange.
     pub states: Vec<f64>,
     /// Number of updates of the discrete states in an event at this point; 0 if there is no event.
@@ -51,7 +60,6 @@ impl Trajectory {
 #[derive(Clone, Copy, Debug)]
 pub enum Part {
     Make,
-    /// Enters Initialization Mode.
     Enter,
     /// Leaves it for the mode in which time advances.
     Leave,
@@ -61,10 +69,9 @@ pub enum Part {
     Points(usize),
     /// Goes from this point to the end, and reads after each.
     Run(usize),
-    /// Reads the variables.
     Read,
     /// Reads the variables and vectors.
-    Ask,
+    ReadAll,
     /// Calls a function without arguments.
     Call(&'static str),
     /// Updates the discrete states this many times.
@@ -74,7 +81,6 @@ pub enum Part {
     Restore(usize),
     /// Frees the saved state.
     Drop(usize),
-    /// Frees the instance.
     Free,
 }
 
@@ -96,24 +102,20 @@ pub struct Writer<'a> {
     pub readable: &'a [usize],
     /// The steps so far.
     pub sequence: CallSequence,
-    /// The next number.
     pub next: u32,
     /// Whether the steps that follow are forbidden by the standard.
     pub forbidden: bool,
 }
 
 impl<'a> Writer<'a> {
-    /// An empty sequence.
     pub fn new(description: &'a Description, trajectory: &'a Trajectory, readable: &'a [usize]) -> Self {
         Self { description, trajectory, readable, sequence: Vec::new(), next: 0, forbidden: false }
     }
 
-    /// Whether the standard is 3.0.
     pub fn fmi3(&self) -> bool {
         self.description.standard == Standard::Fmi3
     }
 
-    /// Adds a step.
     pub fn add(&mut self, step: Step) -> u32 {
         let id = self.next;
         self.next += 1;
@@ -123,94 +125,110 @@ impl<'a> Writer<'a> {
 
     /// Name of a function that is given without `fmi2` or `fmi3`. FMI 2.0 spells `FMUState` with another case.
     fn named(&self, function: &str) -> String {
-        let mut all = signatures(self.description.standard).iter().map(|of| of.rule.name);
+        let mut all = signatures(self.description.standard).iter().map(|signature| signature.rule.name);
         let name = all.find(|name| name[4..].eq_ignore_ascii_case(function));
         name.map_or_else(|| function.to_owned(), str::to_owned)
     }
 
     /// Adds a call of a function, named without `fmi2` or `fmi3`.
-    pub fn call(&mut self, of: usize, function: &str, args: Vec<Arg>) -> u32 {
-        self.add(Step::Call { of: Some(of), function: self.named(function), args })
+    pub fn call(&mut self, instance: usize, function: &str, args: Vec<Arg>) -> u32 {
+        self.add(Step::Call { instance: Some(instance), function: self.named(function), args })
     }
 
     /// A call that the standard forbids, or whose arguments it forbids.
-    pub fn forbidden(&mut self, of: Option<usize>, function: &str, args: Vec<Arg>) -> u32 {
+    pub fn forbidden(&mut self, instance: Option<usize>, function: &str, args: Vec<Arg>) -> u32 {
         let before = std::mem::replace(&mut self.forbidden, true);
-        let id = self.add(Step::Call { of, function: self.named(function), args });
+        let id = self.add(Step::Call { instance, function: self.named(function), args });
         self.forbidden = before;
         id
     }
 
-    /// Writes parts of a simulation.
-    pub fn play(&mut self, of: usize, parts: &[Part]) -> Played {
+    pub fn play(&mut self, instance: usize, parts: &[Part]) -> Played {
         let mut played = Played::default();
         let points = &self.trajectory.points;
         for part in parts {
             match *part {
-                Part::Make => played.ids.push(self.make(of)),
-                Part::Enter => played.ids.push(self.enter(of)),
-                Part::Leave => played.ids.extend(self.leave(of)),
-                Part::Begin => played.ids.extend(self.begin(of)),
+                Part::Make => played.ids.push(self.make(instance)),
+                Part::Enter => played.ids.push(self.enter(instance)),
+                Part::Leave => played.ids.extend(self.leave(instance)),
+                Part::Begin => played.ids.extend(self.begin(instance)),
                 Part::Points(most) => {
-                    played.ids.extend(points.iter().take(most).flat_map(|point| self.point(of, point)));
+                    played.ids.extend(points.iter().take(most).flat_map(|point| self.point(instance, point)));
                 }
                 Part::Run(from) => {
                     for point in &points[from..] {
-                        played.ids.extend(self.point(of, point));
-                        played.reads.extend(self.ask(of));
+                        played.ids.extend(self.point(instance, point));
+                        played.reads.extend(self.read_all(instance));
                     }
                 }
-                Part::Read => played.reads.extend(self.read(of)),
-                Part::Ask => played.reads.extend(self.ask(of)),
-                Part::Call(function) => played.ids.push(self.call(of, function, vec![])),
-                Part::Update(times) => played.ids.extend(self.update(of, times)),
-                Part::Save(slot) => played.ids.push(self.call(of, "GetFMUState", vec![Arg::StateOut(slot)])),
-                Part::Restore(slot) => played.ids.push(self.call(of, "SetFMUState", vec![Arg::State(slot)])),
-                Part::Drop(slot) => played.ids.push(self.call(of, "FreeFMUState", vec![Arg::StateOut(slot)])),
-                Part::Free => played.ids.push(self.free(of)),
+                Part::Read => played.reads.extend(self.read(instance)),
+                Part::ReadAll => played.reads.extend(self.read_all(instance)),
+                Part::Call(function) => played.ids.push(self.call(instance, function, vec![])),
+                Part::Update(times) => played.ids.extend(self.update(instance, times)),
+                Part::Save(slot) => {
+                    played.ids.push(self.call(instance, "GetFMUState", vec![Arg::StateOut(slot)]))
+                }
+                Part::Restore(slot) => {
+                    played.ids.push(self.call(instance, "SetFMUState", vec![Arg::State(slot)]))
+                }
+                Part::Drop(slot) => {
+                    played.ids.push(self.call(instance, "FreeFMUState", vec![Arg::StateOut(slot)]))
+                }
+                Part::Free => played.ids.push(self.free(instance)),
             }
         }
         played
     }
 
-    /// How instances are made.
+    /// Writes parts of a simulation, and returns the reads of each part that reads.
+    pub fn groups<const N: usize>(&mut self, instance: usize, parts: &[Part]) -> [Vec<Read>; N] {
+        let groups = parts.iter().filter_map(|part| {
+            let reads = self.play(instance, &[*part]).reads;
+            matches!(part, Part::Read | Part::ReadAll | Part::Run(_)).then_some(reads)
+        });
+        let groups: Vec<Vec<Read>> = groups.collect();
+        groups.try_into().unwrap_or_else(|_| panic!("the number of parts that read is not {N}"))
+    }
+
+    /// Returns the usual arguments of an instantiation.
     pub fn how(&self) -> Make {
         let stepped = self.trajectory.is_stepped();
         Make {
             co_simulation: stepped,
-            name: Some("instance".to_owned()),
-            token: Some(self.description.token.clone()),
+            name: "instance".to_owned(),
+            token: self.description.token.clone(),
             logging: true,
             event_mode: stepped && self.description.event_mode(),
             early_return: false,
-            resources: true,
         }
     }
 
-    /// A new instance.
-    pub fn make(&mut self, of: usize) -> u32 {
-        self.make_with(of, |_| {})
+    pub fn make(&mut self, instance: usize) -> u32 {
+        self.make_with(instance, |_| {})
     }
 
-    /// A new instance with other arguments.
-    pub fn make_with(&mut self, of: usize, change: impl FnOnce(&mut Make)) -> u32 {
+    pub fn make_with(&mut self, instance: usize, change: impl FnOnce(&mut Make)) -> u32 {
         let mut how = self.how();
         change(&mut how);
-        self.add(Step::Make(of, how))
+        self.add(Step::Make(instance, how))
     }
 
-    /// Frees an instance.
-    pub fn free(&mut self, of: usize) -> u32 {
-        self.add(Step::Free(of))
+    pub fn free(&mut self, instance: usize) -> u32 {
+        self.add(Step::Free(instance))
     }
 
-    /// Enters Initialization Mode.
-    pub fn enter(&mut self, of: usize) -> u32 {
-        self.enter_with(of, None, self.description.start_time, None)
+    pub fn enter(&mut self, instance: usize) -> u32 {
+        self.enter_with(instance, None, self.description.start_time, None)
     }
 
     /// Sets tolerance, start time and stop time.
-    pub fn enter_with(&mut self, of: usize, tolerance: Option<f64>, start: f64, stop: Option<f64>) -> u32 {
+    pub fn enter_with(
+        &mut self,
+        instance: usize,
+        tolerance: Option<f64>,
+        start: f64,
+        stop: Option<f64>,
+    ) -> u32 {
         let defined = |number: Option<f64>| {
             [Arg::Whole(number.is_some().into()), Arg::real(number.unwrap_or_default())]
         };
@@ -218,15 +236,15 @@ impl<'a> Writer<'a> {
         experiment.push(Arg::real(start));
         experiment.extend(defined(stop));
         if self.fmi3() {
-            self.call(of, "EnterInitializationMode", experiment)
+            self.call(instance, "EnterInitializationMode", experiment)
         } else {
-            self.call(of, "SetupExperiment", experiment);
-            self.call(of, "EnterInitializationMode", vec![])
+            self.call(instance, "SetupExperiment", experiment);
+            self.call(instance, "EnterInitializationMode", vec![])
         }
     }
 
     /// Writes this many updates of the discrete states; returns their numbers.
-    pub fn update(&mut self, of: usize, times: usize) -> Vec<u32> {
+    pub fn update(&mut self, instance: usize, times: usize) -> Vec<u32> {
         let (name, args) = match self.fmi3() {
             true => {
                 let mut args = vec![Arg::Out(Kind::U8, 1); 5];
@@ -236,37 +254,37 @@ impl<'a> Writer<'a> {
             // The five flags and the time of fmi2EventInfo, with the gap that C leaves between them.
             false => ("NewDiscreteStates", vec![Arg::Out(Kind::U64, 4)]),
         };
-        (0..times).map(|_| self.call(of, name, args.clone())).collect()
+        (0..times).map(|_| self.call(instance, name, args.clone())).collect()
     }
 
     /// The event at a point: enters Event Mode, updates the discrete states and goes back.
-    pub fn event(&mut self, of: usize, updates: usize) -> Vec<u32> {
-        let mut ids = vec![self.call(of, "EnterEventMode", vec![])];
-        ids.extend(self.update(of, updates));
-        ids.push(self.resume(of));
+    pub fn event(&mut self, instance: usize, updates: usize) -> Vec<u32> {
+        let mut ids = vec![self.call(instance, "EnterEventMode", vec![])];
+        ids.extend(self.update(instance, updates));
+        ids.push(self.resume(instance));
         ids
     }
 
     /// Goes from Event Mode back to the mode in which time advances.
-    fn resume(&mut self, of: usize) -> u32 {
+    fn resume(&mut self, instance: usize) -> u32 {
         let stepped = self.trajectory.is_stepped();
-        self.call(of, if stepped { "EnterStepMode" } else { "EnterContinuousTimeMode" }, vec![])
+        self.call(instance, if stepped { "EnterStepMode" } else { "EnterContinuousTimeMode" }, vec![])
     }
 
-    /// Leaves Initialization Mode, for the mode in which time goes on.
-    pub fn leave(&mut self, of: usize) -> Vec<u32> {
-        let mut ids = vec![self.call(of, "ExitInitializationMode", vec![])];
+    /// Leaves Initialization Mode for the mode in which time advances.
+    pub fn leave(&mut self, instance: usize) -> Vec<u32> {
+        let mut ids = vec![self.call(instance, "ExitInitializationMode", vec![])];
         if !self.trajectory.is_stepped() || self.description.event_mode() {
-            ids.extend(self.update(of, self.trajectory.updates));
-            ids.push(self.resume(of));
+            ids.extend(self.update(instance, self.trajectory.updates));
+            ids.push(self.resume(instance));
         }
         ids
     }
 
     /// Instantiates and initializes, up to the mode in which time advances.
-    pub fn begin(&mut self, of: usize) -> Vec<u32> {
-        let mut ids = vec![self.make(of), self.enter(of)];
-        ids.extend(self.leave(of));
+    pub fn begin(&mut self, instance: usize) -> Vec<u32> {
+        let mut ids = vec![self.make(instance), self.enter(instance)];
+        ids.extend(self.leave(instance));
         ids
     }
 
@@ -286,13 +304,12 @@ impl<'a> Writer<'a> {
         groups
     }
 
-    /// Value reference of a variable.
     fn reference(&self, index: usize) -> u64 {
         u64::from(self.description.variables[index].reference)
     }
 
     /// Sets values: a call for each type.
-    pub fn set(&mut self, of: usize, values: &[(usize, Value)]) -> Vec<u32> {
+    pub fn set(&mut self, instance: usize, values: &[(usize, Values)]) -> Vec<u32> {
         let indices: Vec<usize> = values.iter().map(|(index, _)| *index).collect();
         let mut ids = Vec::new();
         for (name, kind, positions) in self.by_type(&indices) {
@@ -300,27 +317,33 @@ impl<'a> Writer<'a> {
             let (mut numbers, mut texts) = (Vec::new(), Vec::new());
             for position in positions {
                 match &values[position].1 {
-                    Value::Numbers(all) => numbers.extend(all.iter().map(|number| kind.bits(*number))),
-                    Value::Texts(all) => texts.extend(all.iter().cloned()),
+                    Values::Numbers(_, bits) => numbers.extend(bits),
+                    Values::Texts(all) => texts.extend(all.iter().cloned()),
                 }
             }
             let total = numbers.len() + texts.len();
             let values = match name {
                 "Binary" => {
-                    let sizes = texts.iter().map(|blob| blob.len() as u64).collect();
-                    vec![Arg::In(Kind::Size, sizes), Arg::Blobs(texts)]
+                    let blobs: Vec<Vec<u8>> = texts.into_iter().flatten().collect();
+                    let sizes = blobs.iter().map(|blob| blob.len() as u64).collect();
+                    vec![Arg::In(Kind::Size, sizes), Arg::Blobs(blobs)]
                 }
-                "String" => vec![Arg::Texts(texts.into_iter().map(Some).collect())],
+                "String" => vec![Arg::Texts(texts)],
                 _ => vec![Arg::In(kind, numbers)],
             };
             let args = access(self.description.standard, references, values, total);
-            ids.push(self.call(of, &format!("Set{name}"), args));
+            ids.push(self.call(instance, &format!("Set{name}"), args));
         }
         ids
     }
 
+    /// Sets the numbers of a variable.
+    pub fn set_numbers(&mut self, instance: usize, index: usize, numbers: &[f64]) -> Vec<u32> {
+        self.set(instance, &[(index, Values::new(self.description.kind(index), numbers.iter().copied()))])
+    }
+
     /// Reads the variables at these indices: a call for each type.
-    pub fn read_these(&mut self, of: usize, indices: &[usize]) -> Vec<Read> {
+    pub fn read_these(&mut self, instance: usize, indices: &[usize]) -> Vec<Read> {
         let mut reads = Vec::new();
         for (name, kind, positions) in self.by_type(indices) {
             let size = |index: usize| self.description.variables[index].size.unwrap_or(1);
@@ -330,61 +353,61 @@ impl<'a> Writer<'a> {
             let sizes = (name == "Binary").then_some(Arg::Out(Kind::Size, total));
             let values = sizes.into_iter().chain([Arg::Out(kind, total)]);
             let args = access(self.description.standard, references, values, total);
-            reads.push(Read { id: self.call(of, &format!("Get{name}"), args), of: group });
+            reads.push(Read { id: self.call(instance, &format!("Get{name}"), args), variables: group });
         }
         reads
     }
 
-    /// Reads all variables.
-    pub fn read(&mut self, of: usize) -> Vec<Read> {
-        self.read_these(of, self.readable)
+    pub fn read(&mut self, instance: usize) -> Vec<Read> {
+        self.read_these(instance, self.readable)
     }
 
-    /// Goes on to the time of a point, in Model Exchange, or takes the step, in Co-Simulation.
-    pub fn point(&mut self, of: usize, point: &Point) -> Vec<u32> {
+    /// Takes the step of a point in Co-Simulation; sets time, states and inputs in Model Exchange.
+    pub fn point(&mut self, instance: usize, point: &Point) -> Vec<u32> {
         let mut ids = Vec::new();
         if self.trajectory.is_stepped() {
-            ids.extend(self.set(of, &point.inputs));
-            ids.push(self.step(of, point.time, point.size));
+            ids.extend(self.set(instance, &point.inputs));
+            ids.push(self.step(instance, point.time, point.size));
         } else {
-            ids.push(self.call(of, "SetTime", vec![Arg::real(point.time)]));
+            ids.push(self.call(instance, "SetTime", vec![Arg::real(point.time)]));
             if !point.states.is_empty() {
-                ids.push(self.set_states(of, &point.states));
+                ids.push(self.set_states(instance, &point.states));
             }
-            ids.extend(self.set(of, &point.inputs));
+            ids.extend(self.set(instance, &point.inputs));
             let flag = Arg::Out(if self.fmi3() { Kind::U8 } else { Kind::I32 }, 1);
-            ids.push(self.call(of, "CompletedIntegratorStep", vec![Arg::Whole(0), flag.clone(), flag]));
+            ids.push(self.call(instance, "CompletedIntegratorStep", vec![Arg::Whole(0), flag.clone(), flag]));
         }
         if point.updates > 0 {
-            ids.extend(self.event(of, point.updates));
+            ids.extend(self.event(instance, point.updates));
         }
         ids
     }
 
-    /// A step of Co-Simulation.
-    pub fn step(&mut self, of: usize, time: f64, size: f64) -> u32 {
-        self.call(of, "DoStep", step_args(self.description.standard, time, size))
+    pub fn step(&mut self, instance: usize, time: f64, size: f64) -> u32 {
+        self.call(instance, "DoStep", step_args(self.description.standard, time, size))
     }
 
-    /// Sets the continuous states.
-    pub fn set_states(&mut self, of: usize, states: &[f64]) -> u32 {
+    pub fn set_states(&mut self, instance: usize, states: &[f64]) -> u32 {
         let bits = states.iter().map(|number| number.to_bits()).collect();
-        self.call(of, "SetContinuousStates", vec![Arg::In(Kind::F64, bits), Arg::Whole(states.len() as i64)])
+        self.call(
+            instance,
+            "SetContinuousStates",
+            vec![Arg::In(Kind::F64, bits), Arg::Whole(states.len() as i64)],
+        )
     }
 
     /// Reads a vector of so many numbers.
-    pub fn vector(&mut self, of: usize, function: &str, count: usize) -> u32 {
-        self.call(of, function, vec![Arg::Out(Kind::F64, count), Arg::Whole(count as i64)])
+    pub fn vector(&mut self, instance: usize, function: &str, count: usize) -> u32 {
+        self.call(instance, function, vec![Arg::Out(Kind::F64, count), Arg::Whole(count as i64)])
     }
 
-    /// Name of the function that returns the derivatives of the states.
     pub fn derivatives_name(&self) -> &'static str {
         if self.fmi3() { "GetContinuousStateDerivatives" } else { "GetDerivatives" }
     }
 
-    /// Everything that can be asked: variables, and in Model Exchange the vectors.
-    pub fn ask(&mut self, of: usize) -> Vec<Read> {
-        let mut reads = self.read(of);
+    /// Reads the variables and, in Model Exchange, the vectors.
+    pub fn read_all(&mut self, instance: usize) -> Vec<Read> {
+        let mut reads = self.read(instance);
         if !self.trajectory.is_stepped() {
             let states = self.description.states_count().unwrap_or(0);
             let indicators = self.description.event_indicators.unwrap_or(0);
@@ -394,29 +417,28 @@ impl<'a> Writer<'a> {
                 ("GetEventIndicators", indicators),
             ];
             for (name, count) in vectors.into_iter().filter(|(_, count)| *count > 0) {
-                reads.push(Read { id: self.vector(of, name, count), of: Vec::new() });
+                reads.push(Read { id: self.vector(instance, name, count), variables: Vec::new() });
             }
         }
         reads
     }
 
     /// Serializes a saved state: the size, the bytes.
-    pub fn serialize(&mut self, of: usize, slot: usize) -> [u32; 2] {
+    pub fn serialize(&mut self, instance: usize, slot: usize) -> [u32; 2] {
         let bytes = vec![Arg::State(slot), Arg::SavedOut(slot), Arg::SavedSize(slot)];
         [
-            self.call(of, "SerializedFMUStateSize", vec![Arg::State(slot), Arg::SizeOut(slot)]),
-            self.call(of, "SerializeFMUState", bytes),
+            self.call(instance, "SerializedFMUStateSize", vec![Arg::State(slot), Arg::SizeOut(slot)]),
+            self.call(instance, "SerializeFMUState", bytes),
         ]
     }
 
     /// Makes a state of the bytes.
-    pub fn deserialize(&mut self, of: usize, bytes: usize, slot: usize) -> u32 {
+    pub fn deserialize(&mut self, instance: usize, bytes: usize, slot: usize) -> u32 {
         let args = vec![Arg::Saved(bytes), Arg::SavedSize(bytes), Arg::StateOut(slot)];
-        self.call(of, "DeserializeFMUState", args)
+        self.call(instance, "DeserializeFMUState", args)
     }
 }
 
-/// The arguments of a getter or setter.
 pub fn access(
     standard: Standard,
     references: Vec<u64>,
@@ -428,7 +450,6 @@ pub fn access(
     [Arg::In(Kind::U32, references), count].into_iter().chain(values).chain(sizes).collect()
 }
 
-/// The arguments of a step.
 pub fn step_args(standard: Standard, time: f64, size: f64) -> Vec<Arg> {
     let mut args = vec![Arg::real(time), Arg::real(size), Arg::Whole(0)];
     if standard == Standard::Fmi3 {
@@ -437,10 +458,10 @@ pub fn step_args(standard: Standard, time: f64, size: f64) -> Vec<Arg> {
     args
 }
 
-/// Variables that most checks read at most.
+/// Maximum number of variables that most checks read.
 pub const READ: usize = 1000;
 
-/// At most this many of the variables that can be read at any time: no clocks, none whose size is not known. Of more,
+/// Returns at most this many of the variables that can be read at any time: no clocks, none of unknown size. Of more,
 /// inputs, outputs and derivatives come first, and others are taken at equal distances.
 pub fn sample(description: &Description, most: usize) -> Vec<usize> {
     let known = |index: &usize| {
@@ -467,59 +488,49 @@ pub fn sample(description: &Description, most: usize) -> Vec<usize> {
     found
 }
 
-/// The first difference between what was read here and there: the variable and both values.
-pub fn difference(
-    description: &Description,
-    run: &Run,
-    one: &[Read],
-    other: &[Read],
-) -> Option<(String, String, String)> {
+/// Returns the first difference between corresponding reads: the variable and both values.
+pub fn difference(description: &Description, run: &Run, one: &[Read], other: &[Read]) -> Option<[String; 3]> {
     one.iter().zip(other).find_map(|(one, other)| {
-        let (of_one, of_other) = (run.of(one.id)?, run.of(other.id)?);
+        let (of_one, of_other) = (run.outcome(one.id)?, run.outcome(other.id)?);
         if of_one.status != of_other.status {
             let show =
                 |status: Option<i32>| format!("status {}", status.map_or("none".to_owned(), status_name));
-            return Some(("a call".to_owned(), show(of_one.status), show(of_other.status)));
+            return Some(["a call".to_owned(), show(of_one.status), show(of_other.status)]);
         }
-        // After an error nothing is required of what was written.
+        // After an error, the standard does not define the values.
         let pairs = of_one.written.iter().zip(&of_other.written).filter(|_| run.succeeds(one.id));
-        let of_pair = |(first, second): (&Written, &Written)| {
+        let of_pair = |(first, second): (&Values, &Values)| {
             let index = first.differ(second)?;
-            Some((name_at(description, one, index), first.show(index), second.show(index)))
+            Some([name_at(description, one, index), first.show(index), second.show(index)])
         };
         pairs.into_iter().find_map(of_pair)
     })
 }
 
-/// Whose value is at an index of what was read.
+/// Returns the name of the variable whose value is at an index of a read.
 fn name_at(description: &Description, read: &Read, index: usize) -> String {
-    let mut rest = index;
-    for (variable, size) in &read.of {
-        if rest < *size {
-            let name = &description.variables[*variable].name;
-            return if *size == 1 { name.clone() } else { format!("{name}[{rest}]") };
-        }
-        rest -= size;
-    }
-    format!("number {}", index + 1)
+    let part = read.parts().find(|(_, begin, size)| (*begin..begin + size).contains(&index));
+    part.map_or_else(
+        || format!("number {}", index + 1),
+        |(variable, begin, size)| {
+            let name = &description.variables[variable].name;
+            if size == 1 { name.clone() } else { format!("{name}[{}]", index - begin) }
+        },
+    )
 }
 
-/// The values of the variables in what was read.
-pub fn values_of<'r>(run: &'r Run, reads: &'r [Read]) -> impl Iterator<Item = (usize, Written)> {
+/// Returns the values of the variables of these reads.
+pub fn values_of<'r>(run: &'r Run, reads: &'r [Read]) -> impl Iterator<Item = (usize, Values)> {
     reads.iter().filter(|read| run.succeeds(read.id)).flat_map(move |read| {
-        let mut end = 0;
-        read.of.iter().filter_map(move |(index, size)| {
-            end += size;
-            Some((*index, run.written(read.id)?.part(end - size, *size)?))
-        })
+        let value = move |(variable, begin, size)| Some((variable, run.written(read.id)?.part(begin, size)?));
+        read.parts().filter_map(value)
     })
 }
 
-/// The value of a variable in what was read.
-pub fn value_of(run: &Run, reads: &[Read], variable: usize) -> Option<Written> {
+/// Returns the value of a variable in these reads.
+pub fn value_of(run: &Run, reads: &[Read], variable: usize) -> Option<Values> {
     reads.iter().find_map(|read| {
-        let at = read.of.iter().position(|(index, _)| *index == variable)?;
-        let begin = read.of[..at].iter().map(|(_, size)| size).sum();
-        run.written(read.id).filter(|_| run.succeeds(read.id))?.part(begin, read.of[at].1)
+        let (_, begin, size) = read.parts().find(|(index, ..)| *index == variable)?;
+        run.written(read.id).filter(|_| run.succeeds(read.id))?.part(begin, size)
     })
 }

@@ -1,14 +1,14 @@
-//! Dependencies that the FMU shows are declared.
+//! Checks that the model structure declares the dependencies that the FMU has.
 
-use super::derivatives::{amid, set_known};
+use super::derivatives::{middle_values, set_known, to_middle};
 use crate::checker::Checker;
 use crate::description::Unknown;
-use crate::values::{Value, near};
+use crate::values::near;
 use crate::writer::Part::{Enter, Make};
 use crate::writer::{Read, Trajectory, Writer, value_of};
 use std::collections::HashSet;
 
-/// The unknowns that do not list a known, nor another name of it.
+/// Returns the unknowns whose dependencies contain neither the known nor an alias of it.
 fn undeclared<'a>(
     checker: &Checker,
     unknowns: impl IntoIterator<Item = &'a Unknown>,
@@ -48,14 +48,14 @@ fn moved(
             let at = one.differ(&other)?;
             let (name, of) = (&description.variables[*unknown].name, &description.variables[known].name);
             let (is, becomes) = (one.show(at), other.show(at));
-            let tell =
+            let message =
                 || format!("{name} goes from {is} to {becomes} when {of} changes, and does not list it");
-            one.differ(&again).is_none().then(tell)
+            one.differ(&again).is_none().then(message)
         })
     })
 }
 
-/// Inputs and, in Model Exchange, states, moved one at a time.
+/// Checks the dependencies on each input and, in Model Exchange, on each state.
 pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let stepped = trajectory.is_stepped();
@@ -71,33 +71,22 @@ pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
             && !variable.clocked
     });
     let knowns: Vec<usize> = inputs.chain(states.iter().copied()).take(checker.most(60)).collect();
-    let mut writer = checker.writer(trajectory);
-    writer.play(0, &amid(trajectory));
-    let read = writer.read_these(0, &knowns);
-    let now = (!states.is_empty()).then(|| writer.vector(0, "GetContinuousStates", states.len()));
-    let run = checker.play(&writer.sequence)?;
-    let vector = now.and_then(|id| run.written(id)).map(|of| of.numbers()).unwrap_or_default();
-    for known in knowns {
+    let (values, vector) = middle_values(checker, trajectory, &knowns, &states)?;
+    for (known, value) in knowns.into_iter().zip(values) {
         let unknowns = undeclared(checker, description.outputs.iter().chain(derivatives), known);
-        let Some(value) = value_of(&run, &read, known).filter(|_| !unknowns.is_empty()) else { continue };
+        if unknowns.is_empty() || value.is_empty() {
+            continue;
+        }
         let mut writer = checker.writer(trajectory);
-        writer.play(0, &amid(trajectory));
-        moved(
-            checker,
-            "dependencies.missing",
-            writer,
-            known,
-            &value.numbers(),
-            unknowns,
-            |writer, numbers| {
-                set_known(writer, &states, &vector, known, numbers);
-            },
-        )?;
+        writer.play(0, &to_middle(trajectory));
+        moved(checker, "dependencies.missing", writer, known, &value, unknowns, |writer, numbers| {
+            set_known(writer, &states, &vector, known, numbers);
+        })?;
     }
     Ok(())
 }
 
-/// Parameters and inputs, moved one at a time in Initialization Mode.
+/// Checks the dependencies on each input and exact start value in Initialization Mode.
 pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let knowns = (0..description.variables.len()).filter(|index| {
@@ -119,7 +108,7 @@ pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
         writer.play(0, &[Make, Enter]);
         let value = description.variables[known].starts();
         moved(checker, "dependencies.initial", writer, known, &value, unknowns, |writer, numbers| {
-            writer.set(0, &[(known, Value::Numbers(numbers.to_vec()))]);
+            writer.set_numbers(0, known, numbers);
         })?;
     }
     Ok(())

@@ -1,10 +1,9 @@
 //! Partial derivatives against differences, adjoint against directional ones, vectors against variables.
 
-use crate::call_sequence::{Arg, Kind, Run};
+use crate::call_sequence::{Arg, Kind, Run, Values};
 use crate::checker::Checker;
 use crate::description::Description;
 use crate::finding::Judges;
-use crate::values::Value;
 use crate::writer::{Part, Read, Trajectory, Writer, value_of};
 use fmi_abi::{BaseType, Interface};
 use std::sync::Arc;
@@ -61,7 +60,7 @@ pub fn derivative(
     let size = |size: usize| sizes.then_some(Arg::Whole(size as i64));
     let mut args = Vec::new();
     for references in [unknowns, knowns] {
-        args.push(Arg::In(Kind::U32, references.iter().map(|of| u64::from(*of)).collect()));
+        args.push(Arg::In(Kind::U32, references.iter().map(|reference| u64::from(*reference)).collect()));
         args.push(Arg::Whole(references.len() as i64));
     }
     args.push(Arg::In(Kind::F64, seed.iter().map(|number| number.to_bits()).collect()));
@@ -72,7 +71,7 @@ pub fn derivative(
 }
 
 /// The calls up to the point at which partial derivatives are requested: near the middle and outside of events.
-pub fn amid(trajectory: &Trajectory) -> [Part; 2] {
+pub fn to_middle(trajectory: &Trajectory) -> [Part; 2] {
     [Part::Begin, Part::Points(trajectory.points.len() / 2)]
 }
 
@@ -93,7 +92,7 @@ pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
         return Ok(());
     }
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &amid(trajectory));
+    writer.play(0, &to_middle(trajectory));
     let before = writer.read(0);
     let [outputs, inputs] = [&unknowns, &knowns].map(|indices| references(&checker.description, indices));
     let mut request = |function: &str, seed: &[f64], count: usize| {
@@ -112,9 +111,8 @@ pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
         .collect();
     let after = writer.read(0);
     let sequence = writer.sequence.clone();
-    let is_unchanged = checker.differ(before, after, |name, before, after| {
-        format!("{name} was {before}, after derivatives were asked for it is {after}")
-    });
+    let message = "{} was {}, after derivatives were requested it is {}";
+    let is_unchanged = checker.differ(&before, &after, message);
     let run = checker.judge("derivatives.changed", sequence.clone(), is_unchanged)?;
     if run.end != crate::call_sequence::End::Done {
         return Ok(());
@@ -133,19 +131,17 @@ pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
     differences(checker, trajectory, &unknowns, &knowns, has_directional)
 }
 
-/// Value references of variables.
 pub fn references(description: &Description, indices: &[usize]) -> Vec<u32> {
     indices.iter().map(|index| description.variables[*index].reference).collect()
 }
 
-/// Names of variables.
 fn names(description: &Description, indices: &[usize]) -> Vec<String> {
     indices.iter().map(|index| description.variables[*index].name.clone()).collect()
 }
 
 /// The numbers that a successful call wrote.
 fn numbers(run: &Run, id: u32) -> Option<Vec<f64>> {
-    run.written(id).filter(|_| run.status(id) == Some(0)).map(|of| of.numbers())
+    run.written(id).filter(|_| run.status(id) == Some(0)).map(Values::numbers)
 }
 
 /// Judges whether the derivatives for unit seeds add up to the derivative for a seed of ones.
@@ -159,7 +155,7 @@ fn is_linear(columns: Vec<u32>, sum: u32, names: Vec<String>) -> impl Judges {
             let off = (added - together[row]).abs() > 1e-6 * scale.max(1e-12);
             off.then(|| {
                 format!(
-                    "the derivatives of {} add up to {added:?}, asked for together they are {:?}",
+                    "the derivatives of {} add up to {added:?}, requested together they are {:?}",
                     names[row], together[row]
                 )
             })
@@ -177,7 +173,9 @@ fn is_transposed(columns: Vec<u32>, rows: Vec<u32>, names: [Vec<String>; 2], tol
             for (column, known) in knowns.iter().enumerate() {
                 let (one, other) = (columns[column][row], rows[row][column]);
                 if (one - other).abs() > tolerance * one.abs().max(other.abs()).max(1e-300) {
-                    return Some(format!("of {name} by {known}: directional {one:?}, adjoint {other:?}"));
+                    return Some(format!(
+                        "the derivative of {name} with respect to {known} is {one:?}, the adjoint one {other:?}"
+                    ));
                 }
             }
         }
@@ -191,7 +189,7 @@ fn order(checker: &Checker, trajectory: &Trajectory, unknowns: &[u32], knowns: &
     let seed: Vec<f64> = (1..=knowns.len()).map(|number| number as f64).collect();
     let back: Vec<f64> = seed.iter().rev().copied().collect();
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &amid(trajectory));
+    writer.play(0, &to_middle(trajectory));
     let name = "GetDirectionalDerivative";
     let one = derivative(&mut writer, name, unknowns, knowns, &seed, unknowns.len());
     let other = derivative(&mut writer, name, &reversed(unknowns), &reversed(knowns), &back, unknowns.len());
@@ -216,9 +214,26 @@ pub fn set_known(writer: &mut Writer, states: &[usize], vector: &[f64], known: u
             writer.set_states(0, &vector);
         }
         None => {
-            writer.set(0, &[(known, Value::Numbers(numbers.to_vec()))]);
+            writer.set_numbers(0, known, numbers);
         }
     }
+}
+
+/// Returns the numbers of each known, and the vector of states, in the middle of a trajectory.
+pub fn middle_values(
+    checker: &Checker,
+    trajectory: &Trajectory,
+    knowns: &[usize],
+    states: &[usize],
+) -> anyhow::Result<(Vec<Vec<f64>>, Vec<f64>)> {
+    let mut writer = checker.writer(trajectory);
+    writer.play(0, &to_middle(trajectory));
+    let read = writer.read_these(0, knowns);
+    let vector = (!states.is_empty()).then(|| writer.vector(0, "GetContinuousStates", states.len()));
+    let run = checker.play(&writer.sequence)?;
+    let numbers = |values: Option<Values>| values.map(|values| values.numbers()).unwrap_or_default();
+    let values = knowns.iter().map(|known| numbers(value_of(&run, &read, *known))).collect();
+    Ok((values, numbers(vector.and_then(|id| run.written(id)).cloned())))
 }
 
 /// Checks each derivative against differences with two step sizes, whose disagreement estimates their error.
@@ -234,16 +249,10 @@ fn differences(
     if !trajectory.is_stepped() && states.len() != description.states_count().unwrap_or(0) {
         return Ok(());
     }
-    // The current values are the base of the differences.
-    let mut writer = checker.writer(trajectory);
-    writer.play(0, &amid(trajectory));
-    let read = writer.read_these(0, knowns);
-    let of_states = (!states.is_empty()).then(|| writer.vector(0, "GetContinuousStates", states.len()));
-    let run = checker.play(&writer.sequence)?;
-    let vector = of_states.and_then(|id| run.written(id)).map(|of| of.numbers()).unwrap_or_default();
-    for known in knowns {
+    let (values, vector) = middle_values(checker, trajectory, knowns, &states)?;
+    for (known, value) in knowns.iter().zip(values) {
         let variable = &description.variables[*known];
-        let value = value_of(&run, &read, *known).and_then(|value| value.numbers().first().copied());
+        let value = value.first().copied();
         let Some(value) = value.filter(|value| value.is_finite() && !variable.once_per_instant) else {
             continue;
         };
@@ -255,7 +264,7 @@ fn differences(
             continue;
         }
         let mut writer = checker.writer(trajectory);
-        writer.play(0, &amid(trajectory));
+        writer.play(0, &to_middle(trajectory));
         let analytic = column(&mut writer, &references(description, unknowns), variable.reference, by_column);
         let reads = [step, -step, step / 2.0, -step / 2.0, 0.0].map(|by| {
             set_known(&mut writer, &states, &vector, *known, &[value + by]);
@@ -320,14 +329,14 @@ impl Differences {
             };
             let values: Vec<f64> = self.reads.iter().map(number).collect::<Option<_>>()?;
             let (id, index) = self.analytic[row];
-            let answer = numbers(run, id)?.get(index).copied()?;
+            let derivative = numbers(run, id)?.get(index).copied()?;
             let (step, here) = (self.step, values[4]);
             let (wide, narrow) = ((values[0] - values[1]) / (2.0 * step), (values[2] - values[3]) / step);
             // One-sided differences show a kink, where there is no derivative to compare with.
             let (left, right) = ((here - values[3]) / (step / 2.0), (values[2] - here) / (step / 2.0));
             let rounding = 1e-13 * here.abs().max(values[0].abs()) / step;
             let doubt = (wide - narrow).abs() * 10.0 + rounding * 100.0;
-            let scale = narrow.abs().max(answer.abs());
+            let scale = narrow.abs().max(derivative.abs());
             let kink = (left - right).abs() > 0.05 * scale + rounding * 100.0;
             // An output that changes only in the next step has no difference here.
             let silent = self.is_stepped && narrow == 0.0 && wide == 0.0;
@@ -335,9 +344,9 @@ impl Differences {
                 continue;
             }
             let enough = tolerance * (scale + 1e-5);
-            if !answer.is_finite() || (answer - narrow).abs() > enough + doubt {
+            if !derivative.is_finite() || (derivative - narrow).abs() > enough + doubt {
                 return Some(format!(
-                    "of {} by {}: {answer:?}, differences give {narrow:?}",
+                    "the derivative of {} with respect to {} is {derivative:?}, differences give {narrow:?}",
                     self.names[row], self.known
                 ));
             }
@@ -358,17 +367,17 @@ pub fn vectors(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
     let derivatives_name = writer.derivatives_name();
-    let (mut asked, mut nominals) = (Vec::new(), None);
+    let (mut vectors, mut nominals) = (Vec::new(), None);
     for point in &trajectory.points {
         writer.point(0, point);
         nominals = Some(writer.vector(0, "GetNominalsOfContinuousStates", count));
         for (name, indices) in [("GetContinuousStates", &states), (derivatives_name, &derivatives)] {
-            asked.push((writer.vector(0, name, count), writer.read_these(0, indices), indices.clone()));
+            vectors.push((writer.vector(0, name, count), writer.read_these(0, indices), indices.clone()));
         }
     }
     let model = description.clone();
     let run = checker.judge("derivatives.vectors", writer.sequence.clone(), move |run| {
-        asked.iter().filter(|(vector, ..)| run.succeeds(*vector)).find_map(|(vector, reads, indices)| {
+        vectors.iter().filter(|(vector, ..)| run.succeeds(*vector)).find_map(|(vector, reads, indices)| {
             let numbers = run.written(*vector)?.numbers();
             let values = indices.iter().filter_map(|index| value_of(run, reads, *index));
             let values: Vec<f64> = values.flat_map(|value| value.numbers()).collect();

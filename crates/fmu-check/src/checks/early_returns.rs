@@ -2,11 +2,12 @@
 
 use crate::call_sequence::Run;
 use crate::checker::Checker;
+use crate::values::is_other_time;
 use crate::writer::{Read, Trajectory, Writer, value_of};
 use std::sync::Arc;
 
 /// Checks the outputs of steps over events in FMI 3.0: for importers that handle events, that allow early returns, or both.
-pub fn told(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let time = checker.description.variables.iter().position(|variable| variable.causality == "independent");
     let has_events = checker.can(trajectory.interface, &["hasEventMode"]);
     for (event_mode, early_return) in [(true, true), (true, false), (false, true)] {
@@ -23,12 +24,13 @@ pub fn told(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
                     return Some("a step returns early, where earlyReturnAllowed is false".to_owned());
                 }
                 if event && !event_mode {
-                    return Some("a step says eventHandlingNeeded, where eventModeUsed is false".to_owned());
+                    return Some(
+                        "a step reports eventHandlingNeeded, where eventModeUsed is false".to_owned(),
+                    );
                 }
                 let now = *value_of(run, &step.values, time?)?.numbers().first()?;
-                let off = (now - reached).abs() > 1e-9 * (1.0 + now.abs());
                 let end = step.end;
-                off.then(|| {
+                is_other_time(reached, now).then(|| {
                     format!("lastSuccessfulTime is {reached:?} of a step to {end:?}, and the time is {now:?}")
                 })
             })
@@ -37,9 +39,11 @@ pub fn told(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
             steps.iter().find_map(|step| {
                 let (event, early, reached) = ended(&steps, run, step.id)?;
                 let end = step.end;
-                let short = reached < end - 1e-9 * (1.0 + end.abs());
+                let short = reached < end && is_other_time(reached, end);
                 (short && event && !early).then(|| {
-                    format!("a step to {end:?} ends at an event at {reached:?} and does not say earlyReturn")
+                    format!(
+                        "a step to {end:?} ends at an event at {reached:?} and does not report earlyReturn"
+                    )
                 })
             })
         });
@@ -57,7 +61,7 @@ struct Stepped {
 
 /// The outputs eventHandlingNeeded, terminateSimulation, earlyReturn and lastSuccessfulTime of a step that succeeded.
 fn outputs(run: &Run, id: u32) -> Option<([bool; 3], f64)> {
-    let outcome = run.of(id).filter(|_| run.succeeds(id))?;
+    let outcome = run.outcome(id).filter(|_| run.succeeds(id))?;
     let reached = outcome.written.get(3)?.numbers()[0];
     Some(([0, 1, 2].map(|index| outcome.written[index].numbers() == [1.0]), reached))
 }
@@ -113,8 +117,9 @@ fn play(
 /// `None` if an event before the step was not handled.
 fn ended(steps: &[Stepped], run: &Run, id: u32) -> Option<(bool, bool, f64)> {
     let mut before = steps.iter().take_while(|step| step.id != id);
-    let is_skipped =
-        |step: &Stepped| run.of(step.id).is_some() && step.event.is_some_and(|event| run.of(event).is_none());
+    let is_skipped = |step: &Stepped| {
+        run.outcome(step.id).is_some() && step.event.is_some_and(|event| run.outcome(event).is_none())
+    };
     let ([event, _, early], reached) = outputs(run, id)?;
     (!before.any(is_skipped)).then_some((event, early, reached))
 }

@@ -3,13 +3,13 @@
 use super::derivatives::{derivative, pair, references};
 use crate::call_sequence::{End, Run, Setting, Step};
 use crate::checker::Checker;
-use crate::finding::refused;
+use crate::finding::fails;
 use crate::writer::{Part, Trajectory};
 use fmi_abi::calls::{fmi2, fmi3, signatures};
 use fmi_abi::{Interface, Mode, Standard};
 use std::sync::Arc;
 
-/// Whether all that the library needs is found, also what is needed late.
+/// Checks that the loader finds all symbols that the library needs, including those that it looks up late.
 fn symbols(checker: &Checker) -> anyhow::Result<()> {
     let sequence = checker.step(checker.version(), false);
     let [late, now] = [false, true].map(|now| {
@@ -17,16 +17,13 @@ fn symbols(checker: &Checker) -> anyhow::Result<()> {
         checker.workers.play(&setting, &sequence, checker.limit)
     });
     if let (End::Done, End::Unloadable(why)) = (late?.end, now?.end) {
-        checker.add(checker.claim("package.symbols").finding(
-            why,
-            sequence,
-            Arc::new(|_: &Run| -> Option<String> { None }),
-        ));
+        let judge = Arc::new(|_: &Run| -> Option<String> { None });
+        checker.add(checker.broken("package.symbols", why).shown_by(sequence, judge));
     }
     Ok(())
 }
 
-/// Whether every function that must be there is there.
+/// Checks that the library exports all functions of its interface types.
 pub fn present(checker: &Checker) -> anyhow::Result<()> {
     let modes: Vec<Mode> = (0..9).filter_map(|bit| Mode::from_number(1 << bit)).collect();
     let standard = checker.description.standard;
@@ -34,14 +31,14 @@ pub fn present(checker: &Checker) -> anyhow::Result<()> {
     for (index, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
         let Some(path) = &checker.setting.libraries[index] else { continue };
         let Some(symbols) = super::package::exported(path) else { continue };
-        let of_all = if standard == Standard::Fmi2 { fmi2::FREE } else { fmi3::FREE };
-        let wanted = of_all.iter().copied().filter(|name| match *name {
+        let free = if standard == Standard::Fmi2 { fmi2::FREE } else { fmi3::FREE };
+        let wanted = free.iter().copied().filter(|name| match *name {
             "fmi3InstantiateModelExchange" => interface == Interface::ModelExchange,
             "fmi3InstantiateCoSimulation" => interface == Interface::CoSimulation,
             name => name != "fmi3InstantiateScheduledExecution",
         });
         let on_instances = signatures(standard).iter().map(|signature| signature.rule).filter(|rule| {
-            // fmi2CancelStep is of Co-Simulation, and allowed in no state of the table.
+            // fmi2CancelStep belongs to Co-Simulation; the table allows it in no state.
             rule.name == "fmi2CancelStep" && interface == Interface::CoSimulation
                 || modes.iter().any(|mode| rule.standard.contain(standard, interface, *mode))
         });
@@ -53,7 +50,7 @@ pub fn present(checker: &Checker) -> anyhow::Result<()> {
     }
     if !missing.is_empty() {
         let observed = format!("the library lacks {}", missing.join(", "));
-        checker.add(checker.claim("functions.missing").of_files(observed));
+        checker.add(checker.broken("functions.missing", observed));
     }
     symbols(checker)?;
     version(checker)
@@ -69,26 +66,26 @@ fn version(checker: &Checker) -> anyhow::Result<()> {
     let name = if checker.fmi3() { "fmi3GetVersion" } else { "fmi2GetVersion" };
     let declared = checker.description.version.clone();
     checker.check("functions.version", sequence, move |run| {
-        // NULL if there is no text; nothing if there is no function.
+        // "NULL" for a null pointer, None if the library lacks the function.
         let text = |id: u32| {
-            let of = run.of(id).filter(|of| !of.missing)?;
-            let text = of.text.as_ref().map(|text| String::from_utf8_lossy(text).into_owned());
+            let outcome = run.outcome(id).filter(|outcome| !outcome.missing)?;
+            let text = outcome.text.as_ref().map(|text| String::from_utf8_lossy(text).into_owned());
             Some(text.unwrap_or_else(|| "NULL".to_owned()))
         };
-        if let Some(answer) = text(0)
-            && answer != declared
-            && !(declared.starts_with("3.") && answer.starts_with("3."))
+        if let Some(version) = text(0)
+            && version != declared
+            && !(declared.starts_with("3.") && version.starts_with("3."))
         {
-            return Some(format!("{name} returns {answer}, and fmiVersion is {declared}"));
+            return Some(format!("{name} returns {version}, and fmiVersion is {declared}"));
         }
-        let answer = text(1)?;
-        (answer != "default").then(|| format!("fmi2GetTypesPlatform returns {answer}"))
+        let platform = text(1)?;
+        (platform != "default").then(|| format!("fmi2GetTypesPlatform returns {platform}"))
     })
 }
 
-/// Each declared function returns.
+/// Checks that the functions of declared capabilities succeed.
 pub fn capabilities(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let (interface, mut asked) = (trajectory.interface, Vec::new());
+    let (interface, mut calls) = (trajectory.interface, Vec::new());
     if checker.saves(interface) {
         let mut writer = checker.writer(trajectory);
         let mut ids = writer.play(0, &[Part::Begin, Part::Save(0), Part::Restore(0)]).ids;
@@ -97,7 +94,7 @@ pub fn capabilities(checker: &Checker, trajectory: &Trajectory) -> anyhow::Resul
             ids.push(writer.deserialize(0, 0, 1));
         }
         ids.extend(writer.play(0, &[Part::Drop(0)]).ids);
-        asked.push(("canGetAndSetFMUstate and canSerializeFMUstate", ids, writer.sequence));
+        calls.push(("canGetAndSetFMUstate and canSerializeFMUstate", ids, writer.sequence));
     }
     let pair = pair(&checker.description, interface);
     for (name, flags, function) in [
@@ -116,15 +113,14 @@ pub fn capabilities(checker: &Checker, trajectory: &Trajectory) -> anyhow::Resul
             "GetAdjointDerivative" => (size(unknown), size(known)),
             _ => (size(known), size(unknown)),
         };
-        let [unknowns, knowns] = [unknown, known].map(|of| references(&checker.description, &[of]));
+        let [unknowns, knowns] = [unknown, known].map(|index| references(&checker.description, &[index]));
         ids.push(derivative(&mut writer, function, &unknowns, &knowns, &vec![1.0; seed], results));
-        asked.push((name, ids, writer.sequence));
+        calls.push((name, ids, writer.sequence));
     }
-    for (flag, ids, sequence) in asked {
-        let copy = sequence.clone();
+    for (flag, ids, sequence) in calls {
+        let fails = fails(&sequence, ids);
         checker.check("functions.capability", sequence, move |run| {
-            let why = refused(&copy, run, &ids)?;
-            Some(format!("declared by {flag}, but {why}"))
+            Some(format!("declared by {flag}, but {}", fails(run)?))
         })?;
     }
     Ok(())

@@ -1,17 +1,16 @@
-//! Calls that importers should not make, but some do. A crash or a hang is fragile if the standard does not forbid it.
+//! Malformed calls, as faulty importers make them. A crash or a hang is fragile.
 
 use super::refusals::unknown_reference;
-use crate::call_sequence::{Arg, CallSequence, End, Kind, Written};
+use crate::call_sequence::{Arg, CallSequence, End, Kind, Values};
 use crate::checker::{Checker, Random};
 use crate::description::{kind_of, type_name};
-use crate::values::Value;
 use crate::writer::{Part, Point, Trajectory, Writer, access};
 use fmi_abi::calls::{Signature, signatures};
 use fmi_abi::{BaseType, Mode};
 
-/// Crashes after which further sequences would only repeat what is known.
+/// Crashes after which no further call sequences of a rule are played.
 const CRASHES: usize = 40;
-/// Hangs after which it is not worth while to wait for more.
+/// Hangs after which no further call sequences of a rule are played.
 const HANGS: usize = 2;
 
 type Sequences = anyhow::Result<Vec<CallSequence>>;
@@ -32,7 +31,7 @@ pub fn all(checker: &Checker, name: &str, sequences: Vec<CallSequence>) -> anyho
     Ok(())
 }
 
-/// A sequence that is forbidden from the end of its legal parts on.
+/// Returns a call sequence of legal parts and, after them, forbidden calls.
 fn after(
     checker: &Checker,
     trajectory: &Trajectory,
@@ -70,18 +69,18 @@ fn callable(
 
 /// NULL for the instance, and zero or NULL for every argument.
 pub fn null_instances(checker: &Checker, trajectory: &Trajectory) -> Sequences {
-    let of_null = callable(checker, trajectory).map(|(signature, name, _)| {
+    let sequences = callable(checker, trajectory).map(|(signature, name, _)| {
         let args = signature.arguments.iter().map(|argument| harmless(argument.of)).collect();
         after(checker, trajectory, &[], |writer| {
             writer.forbidden(None, name, args);
         })
     });
-    Ok(of_null.collect())
+    Ok(sequences.collect())
 }
 
 /// NULL for one array of a call.
 pub fn nulls(checker: &Checker, trajectory: &Trajectory) -> Sequences {
-    let of_array = callable(checker, trajectory).flat_map(|(signature, name, parts)| {
+    let sequences = callable(checker, trajectory).flat_map(|(signature, name, parts)| {
         let arrays = signature.arguments.iter().filter(|argument| argument.of.starts_with('*')).count();
         (0..arrays).map(move |null| {
             let args = with_null(checker, signature, null);
@@ -90,14 +89,16 @@ pub fn nulls(checker: &Checker, trajectory: &Trajectory) -> Sequences {
             })
         })
     });
-    Ok(of_array.collect())
+    Ok(sequences.collect())
 }
 
 /// An argument of a type: zero, or NULL.
-fn harmless(of: &str) -> Arg {
-    match of.trim_start_matches("fmi2").trim_start_matches("fmi3") {
+fn harmless(name: &str) -> Arg {
+    match name.trim_start_matches("fmi2").trim_start_matches("fmi3") {
         "Real" | "Float64" => Arg::real(0.0),
-        of if of.starts_with('*') || of.to_lowercase().contains("state") || of == "String" => Arg::Null,
+        name if name.starts_with('*') || name.to_lowercase().contains("state") || name == "String" => {
+            Arg::Null
+        }
         _ => Arg::Whole(0),
     }
 }
@@ -118,11 +119,11 @@ fn with_null(checker: &Checker, signature: &Signature, null: usize) -> Vec<Arg> 
         match argument.pointee() {
             _ if at - 1 == null => Arg::Null,
             Some(("ValueReference", true)) => {
-                let of_type = checker.description.variables.iter().find(|variable| {
+                let variable = checker.description.variables.iter().find(|variable| {
                     variable.size == Some(1)
                         && variable.base.is_some_and(|base| name.ends_with(type_name(standard, base)))
                 });
-                let reference = of_type.map_or(0, |variable| u64::from(variable.reference));
+                let reference = variable.map_or(0, |variable| u64::from(variable.reference));
                 Arg::In(Kind::U32, vec![reference])
             }
             Some((_, true)) => Arg::In(Kind::F64, vec![0]),
@@ -208,19 +209,15 @@ pub fn sizes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
 }
 
 /// Extreme values of a type that is not floating-point. A large count asks for much memory, which the machine may not have.
-fn extreme_values(name: &str, kind: Kind, size: usize) -> Vec<Value> {
+fn extreme_values(name: &str, kind: Kind, size: usize) -> Vec<Values> {
     let numbers: &[f64] = match kind {
         Kind::Pointer => {
-            let texts = match name {
-                "String" => vec![
-                    Vec::new(),
-                    b"%s%n%s%n%s%n".to_vec(),
-                    b"\xff\xfe no UTF-8".to_vec(),
-                    vec![b'x'; 100_000],
-                ],
-                _ => vec![Vec::new(), vec![7; 100_000]],
+            let long = vec![b'x'; 100_000];
+            let texts: &[&[u8]] = match name {
+                "String" => &[b"", b"%s%n%s%n%s%n", b"\xff\xfe no UTF-8", &long],
+                _ => &[b"", &long],
             };
-            return texts.into_iter().map(|text| Value::Texts(vec![text; size])).collect();
+            return texts.iter().map(|text| Values::texts(text, size)).collect();
         }
         kind if kind.is_float() => &[],
         Kind::I8 | Kind::U8 => &[0.0, 127.0],
@@ -228,7 +225,7 @@ fn extreme_values(name: &str, kind: Kind, size: usize) -> Vec<Value> {
         Kind::U32 | Kind::U64 | Kind::Size => &[0.0, 4294967295.0],
         _ => &[0.0, -1.0, 2147483647.0, -2147483648.0],
     };
-    numbers.iter().map(|number| Value::Numbers(vec![*number; size])).collect()
+    numbers.iter().map(|number| Values::new(kind, vec![*number; size])).collect()
 }
 
 /// Sets NaN, infinite, extreme and malformed values of parameters and inputs.
@@ -244,14 +241,14 @@ pub fn values(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let is_input = |index: usize| description.variables[index].causality == "input";
     let size = |index: usize| description.variables[index].size.unwrap_or(1);
     // Inputs are set again at every point.
-    let mut play = |values: Vec<(usize, Value)>, again: bool| {
+    let mut play = |values: Vec<(usize, Values)>, again: bool| {
         sequences.push(after(checker, trajectory, &[Part::Make, Part::Enter], |writer| {
             writer.set(0, &values);
             writer.leave(0);
             for point in trajectory.points.iter().take(3) {
                 let inputs = if again { values.clone() } else { Vec::new() };
                 writer.point(0, &Point { inputs, ..point.clone() });
-                writer.ask(0);
+                writer.read_all(0);
             }
             writer.free(0);
         }));
@@ -261,8 +258,9 @@ pub fn values(checker: &Checker, trajectory: &Trajectory) -> Sequences {
             let chosen = settable.iter().copied();
             let chosen =
                 chosen.filter(|index| description.variables[*index].is_float() && is_input(*index) == input);
-            let values: Vec<_> =
-                chosen.map(|index| (index, Value::Numbers(vec![number; size(index)]))).collect();
+            let values: Vec<_> = chosen
+                .map(|index| (index, Values::new(description.kind(index), vec![number; size(index)])))
+                .collect();
             if !values.is_empty() {
                 play(values, input);
             }
@@ -279,12 +277,12 @@ pub fn values(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     Ok(sequences)
 }
 
-/// Times and steps that are none, too great or too small.
+/// Passes times and step sizes that are NaN, infinite, negative, zero, tiny or huge.
 pub fn times(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let start = checker.description.start_time;
     let size = trajectory.points.first().map_or(1e-3, |point| point.size).max(1e-9);
     let mut sequences = Vec::new();
-    // Importers with a mistaken unit of time take steps of 2000 s.
+    // 2e3: an importer that takes milliseconds for seconds makes steps of 2000 s.
     let numbers = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308, 1e12 * size, -size, 0.0, 5e-324, 2e3];
     for number in numbers {
         sequences.push(after(checker, trajectory, &[Part::Begin], |writer| {
@@ -292,7 +290,7 @@ pub fn times(checker: &Checker, trajectory: &Trajectory) -> Sequences {
                 writer.step(0, start, number);
             } else {
                 writer.call(0, "SetTime", vec![Arg::real(number)]);
-                writer.play(0, &[Part::Ask, Part::Call("EnterEventMode"), Part::Update(1)]);
+                writer.play(0, &[Part::ReadAll, Part::Call("EnterEventMode"), Part::Update(1)]);
             }
             writer.play(0, &[Part::Read, Part::Free]);
         }));
@@ -308,13 +306,13 @@ pub fn times(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     Ok(sequences)
 }
 
-/// Bytes that are no state, and some that almost are.
+/// Passes malformed bytes as a serialized state: empty, constant, cut, doubled and damaged ones.
 pub fn bytes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let mut writer = checker.writer(trajectory);
     writer.play(0, &[Part::Begin, Part::Save(0)]);
     let [_, saved] = writer.serialize(0, 0);
     let run = checker.play(&writer.sequence)?;
-    let Some(Written::Numbers(_, bytes)) = run.written(saved) else { return Ok(Vec::new()) };
+    let Some(Values::Numbers(_, bytes)) = run.written(saved) else { return Ok(Vec::new()) };
     let mut tries: Vec<Vec<u64>> = vec![
         Vec::new(),
         vec![0; 8],
@@ -337,7 +335,7 @@ pub fn bytes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
             let count = Arg::Whole(bytes.len() as i64);
             let args = vec![Arg::In(Kind::U8, bytes), count, Arg::StateOut(1)];
             writer.call(0, "DeserializeFMUState", args);
-            writer.play(0, &[Part::Restore(1), Part::Ask]);
+            writer.play(0, &[Part::Restore(1), Part::ReadAll]);
             if let Some(point) = trajectory.points.first().filter(|_| trajectory.is_stepped()) {
                 writer.step(0, point.time, point.size);
             }

@@ -1,28 +1,30 @@
-//! The life of an instance in every order that the standard allows.
+//! Checks that instances accept every order of calls that the standard allows.
 
 use super::Fits::{self, Always, Integrated, Several, Stepped};
-use crate::call_sequence::{Arg, NOBODY, Step};
+use crate::call_sequence::{Arg, NULL_INSTANCE, Step};
 use crate::checker::{Checker, Random};
-use crate::finding::{event, refused_any};
-use crate::writer::Part::{self, Ask, Begin, Call, Drop, Enter, Free, Leave, Make, Points, Restore, Save};
+use crate::finding::{event, first_failure};
+use crate::writer::Part::{
+    self, Begin, Call, Drop, Enter, Free, Leave, Make, Points, ReadAll, Restore, Save,
+};
 use crate::writer::{Point, Trajectory, Writer};
 
 fn play(checker: &Checker, writer: Writer) -> anyhow::Result<()> {
     let copy = writer.sequence.clone();
-    // Discard is an answer for what needs a smaller step.
-    checker.check("life_cycle.refused", writer.sequence, move |run| refused_any(&copy, run, 2))
+    // Discard is allowed: the FMU may need a smaller step.
+    checker.check("life_cycle.refused", writer.sequence, move |run| first_failure(&copy, run, 2))
 }
 
 const ALL: Part = Points(usize::MAX);
 const TERMINATE: Part = Call("Terminate");
 const RESET: Part = Call("Reset");
 
-/// Orders of the calls of one instance that importers are observed to use, and those at the edges.
+/// Orders of the calls of one instance: those that importers use, and edge cases.
 const ORDERS: &[&[Part]] = &[
     &[Make, Free],
-    &[Make, Enter, Ask, Free],
-    &[Begin, TERMINATE, Ask, Free],
-    &[Begin, ALL, TERMINATE, Ask, RESET, Enter, Leave, ALL, Ask, Free],
+    &[Make, Enter, ReadAll, Free],
+    &[Begin, TERMINATE, ReadAll, Free],
+    &[Begin, ALL, TERMINATE, ReadAll, RESET, Enter, Leave, ALL, ReadAll, Free],
     &[Make, RESET, Enter, RESET, RESET, Enter, Leave, RESET, Enter, Leave, Points(2), Free],
 ];
 
@@ -39,33 +41,33 @@ const OTHER_ORDERS: &[(Fits, Order)] = &[
     (Fits::EventMode, event_mode),
 ];
 
-/// More instances than a pool may have, and four that are freed in another order.
+/// Twenty instances, more than a fixed pool may have; four of them are freed in another order.
 fn many(writer: &mut Writer, _: &Trajectory) {
-    (4..20).for_each(|of| drop(writer.play(of, &[Make])));
-    (0..4).for_each(|of| drop(writer.play(of, &[Begin])));
-    (4..20).for_each(|of| drop(writer.play(of, &[Free])));
+    (4..20).for_each(|instance| drop(writer.play(instance, &[Make])));
+    (0..4).for_each(|instance| drop(writer.play(instance, &[Begin])));
+    (4..20).for_each(|instance| drop(writer.play(instance, &[Free])));
     let two = Points(2);
-    for (of, part) in [(0, Free), (1, two), (3, Free), (2, two), (2, Free), (1, Free)] {
-        writer.play(of, &[part]);
+    for (instance, part) in [(0, Free), (1, two), (3, Free), (2, two), (2, Free), (1, Free)] {
+        writer.play(instance, &[part]);
     }
 }
 
 /// A name with spaces and letters beyond ASCII; a stop time and a tolerance.
 fn long_name(writer: &mut Writer, trajectory: &Trajectory) {
-    writer.make_with(0, |how| how.name = Some("a long name, with Gödel in it %s #1#".to_owned()));
+    writer.make_with(0, |how| how.name = "a long name, with Gödel in it %s #1#".to_owned());
     let stop = trajectory.end + 1.0 + trajectory.end.abs();
     writer.enter_with(0, Some(1e-6), writer.description.start_time, Some(stop));
     writer.play(0, &[Leave, Points(3), Free]);
 }
 
-/// The last step meets the stop time.
+/// The last step ends at the stop time.
 fn up_to_the_stop(writer: &mut Writer, trajectory: &Trajectory) {
     writer.make(0);
     writer.enter_with(0, None, writer.description.start_time, Some(trajectory.end));
     writer.play(0, &[Leave, ALL, Free]);
 }
 
-/// Categories, all and each, in every mode.
+/// Enables all log categories together and one at a time, in each mode.
 fn logging(writer: &mut Writer, _: &Trajectory) {
     let categories: Vec<Option<Vec<u8>>> =
         writer.description.log_categories.iter().map(|name| Some(name.clone().into_bytes())).collect();
@@ -87,11 +89,11 @@ fn events_everywhere(writer: &mut Writer, trajectory: &Trajectory) {
     for point in &trajectory.points {
         writer.point(0, point);
         if point.updates == 0 {
-            // Whether more are needed is not known here: as many as an event needs.
+            // The number of updates that the event needs is not known here; three are enough for most.
             writer.event(0, 3);
         }
     }
-    writer.play(0, &[Ask, Free]);
+    writer.play(0, &[ReadAll, Free]);
 }
 
 fn event_mode(writer: &mut Writer, trajectory: &Trajectory) {
@@ -100,10 +102,10 @@ fn event_mode(writer: &mut Writer, trajectory: &Trajectory) {
     let size = trajectory.points.first().map_or(1e-3, |point| point.size);
     writer.step(0, writer.description.start_time, size);
     writer.event(0, 3);
-    writer.play(0, &[Ask, TERMINATE, Free]);
+    writer.play(0, &[ReadAll, TERMINATE, Free]);
 }
 
-/// All orders of the tables, and the edges of a life.
+/// Checks all orders of the tables, another token, unloading and steps beyond the stop time.
 pub fn orders(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for order in ORDERS {
         let mut writer = checker.writer(trajectory);
@@ -120,12 +122,12 @@ pub fn orders(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     beyond(checker, trajectory)
 }
 
-/// NULL for the instance that is to be freed, which is allowed.
+/// Checks that FreeInstance ignores NULL.
 pub fn free_null(checker: &Checker) -> anyhow::Result<()> {
-    checker.check("life_cycle.free-null", checker.step(Step::Free(NOBODY), true), |_| None)
+    checker.check("life_cycle.free-null", checker.step(Step::Free(NULL_INSTANCE), true), |_| None)
 }
 
-/// A step that goes beyond the stop time fails.
+/// Checks that a step beyond the stop time fails.
 fn beyond(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let Some(last) = trajectory.points.last().filter(|_| trajectory.is_stepped()) else { return Ok(()) };
     let mut writer = checker.writer(trajectory);
@@ -141,7 +143,7 @@ fn beyond(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     })
 }
 
-/// After all instances were freed, the library can be unloaded and loaded again, and the process can exit.
+/// Checks that the library can be unloaded and loaded again, and the process can exit, after all instances were freed.
 fn unload(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for (name, step, times) in [("life_cycle.unload", Step::Unload, 2), ("life_cycle.exit", Step::Quit, 1)] {
         let mut writer = checker.writer(trajectory);
@@ -154,22 +156,22 @@ fn unload(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The library of another description is not this one's.
+/// Checks that instantiation fails for a wrong guid or instantiationToken.
 fn token(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.forbidden = true;
-    let id = writer.make_with(0, |how| how.token = Some("no token of this FMU".to_owned()));
+    let id = writer.make_with(0, |how| how.token = "no token of this FMU".to_owned());
     checker.check("life_cycle.token", writer.sequence, move |run| {
         (run.status(id) == Some(1)).then(|| "an instance is made for another one".to_owned())
     })
 }
 
-/// Calls in an order that chance chooses among what is allowed.
+/// Checks random orders of allowed calls.
 pub fn random(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut random = Random::new(checker.seed);
     for _ in 0..checker.most(20) {
         let mut writer = checker.writer(trajectory);
-        // Instantiated, in Initialization Mode, at a point of the trajectory, terminated.
+        // Mode: 0 instantiated, 1 initialization, 2 at a point of the trajectory, 3 terminated.
         let (mut mode, mut at) = (0, 0);
         let mut saved: Option<(i32, usize)> = None;
         writer.make(0);
@@ -204,7 +206,7 @@ pub fn random(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
                     (mode, at) = saved.unwrap_or((mode, at));
                     Restore(0)
                 }
-                (1..=3, _) => Ask,
+                (1..=3, _) => ReadAll,
                 _ => continue,
             };
             writer.play(0, &[part]);
@@ -218,29 +220,29 @@ pub fn random(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     Ok(())
 }
 
-/// Time events lie ahead, and come to an end.
+/// Checks that the next time event is in the future, also for a late importer, and that event iterations end.
 pub fn events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     changed_states(checker, trajectory)?;
     let fmi3 = checker.fmi3();
     let mut writer = checker.writer(trajectory);
     let ids = writer.begin(0);
-    let mut asked = vec![(ids, checker.description.start_time)];
+    let mut points = vec![(ids, checker.description.start_time)];
     for point in &trajectory.points {
         let mut ids = writer.point(0, point);
         if point.updates == 0 {
             ids.extend(writer.event(0, 3));
         }
-        asked.push((ids, point.time));
+        points.push((ids, point.time));
     }
     checker.check("life_cycle.next-event-time", writer.sequence, move |run| {
-        let mut all = asked.iter().flat_map(|(ids, time)| ids.iter().map(move |id| (*id, *time)));
+        let mut all = points.iter().flat_map(|(ids, time)| ids.iter().map(move |id| (*id, *time)));
         all.find_map(|(id, time)| {
             let event = event(run, id, fmi3)?;
             let past = !event.again && event.next? <= time;
             past.then(|| format!("at {time:?} the next event is at {:?}", event.next.unwrap_or_default()))
         })
     })?;
-    // An importer that comes late, too, gets an event that lies ahead.
+    // An importer that has skipped time events.
     let late = trajectory.end.abs() * 10.0 + 10.0;
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
@@ -252,7 +254,7 @@ pub fn events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
         let next = event.next.filter(|next| !event.again && *next <= late)?;
         Some(format!("after events were passed by, at {late:?} the next event is at {next:?}"))
     })?;
-    // An event that needs more and more updates never ends.
+    // An event iteration that does not end.
     let mut writer = checker.writer(trajectory);
     writer.play(0, &[Make, Enter, Call("ExitInitializationMode")]);
     let ids = writer.update(0, 100);
@@ -262,7 +264,7 @@ pub fn events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     })
 }
 
-/// An event that changes states says so: else importers go on with those that they have.
+/// Checks that an event that changes states reports it; otherwise importers continue with the old states.
 fn changed_states(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let count = checker.description.states_count().unwrap_or(0);
     if count == 0 {
@@ -270,24 +272,24 @@ fn changed_states(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<
     }
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
-    let mut asked = Vec::new();
+    let mut points = Vec::new();
     for point in &trajectory.points {
         writer.point(0, &Point { updates: 0, ..point.clone() });
         let before = writer.vector(0, "GetContinuousStates", count);
-        // Entering Event Mode where nothing happens is allowed, too.
+        // Event Mode may be entered without an event.
         let updates = writer.event(0, point.updates.max(3));
         let after = writer.vector(0, "GetContinuousStates", count);
-        asked.push((point.time, before, updates, after));
+        points.push((point.time, before, updates, after));
     }
     let fmi3 = checker.fmi3();
     checker.check("life_cycle.states-changed", writer.sequence, move |run| {
-        asked.iter().find_map(|(time, before, updates, after)| {
+        points.iter().find_map(|(time, before, updates, after)| {
             // A call that fails is a separate finding.
             let updates = &updates[1..updates.len() - 1];
-            let said = |id: &u32| event(run, *id, fmi3).is_none_or(|event| event.states_changed);
+            let is_reported = |id: &u32| event(run, *id, fmi3).is_none_or(|event| event.states_changed);
             let (was, is) = (run.written(*before)?, run.written(*after)?);
             let good = [before, after].iter().all(|id| run.succeeds(**id));
-            let index = was.differ(is).filter(|_| good && !updates.iter().any(said))?;
+            let index = was.differ(is).filter(|_| good && !updates.iter().any(is_reported))?;
             let (was, is) = (was.show(index), is.show(index));
             Some(format!("at {time:?} state {} was {was}, after the event it is {is}", index + 1))
         })

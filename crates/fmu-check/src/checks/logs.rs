@@ -1,11 +1,11 @@
-//! Messages with logging off and on.
+//! Checks that there are no messages while logging is off.
 
 use crate::call_sequence::Arg;
 use crate::checker::Checker;
-use crate::writer::Part::{Ask, Call, Enter, Free, Leave, Points};
+use crate::writer::Part::{Call, Enter, Free, Leave, Points, ReadAll};
 use crate::writer::Trajectory;
 
-/// With logging off there is no message; logging can be switched at any time.
+/// Checks that no message is logged if logging is off from the start or was switched off.
 pub fn switches(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let fmi3 = checker.fmi3();
     for by_call in [false, true] {
@@ -15,15 +15,16 @@ pub fn switches(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()
             writer.call(0, "SetDebugLogging", vec![Arg::Whole(0), Arg::Whole(0), Arg::Null]);
             ids.clear();
         }
-        let played = writer.play(0, &[Enter, Leave, Points(usize::MAX), Ask, Call("Terminate"), Free]);
+        let played = writer.play(0, &[Enter, Leave, Points(usize::MAX), ReadAll, Call("Terminate"), Free]);
         ids.extend(played.ids);
         ids.extend(played.reads.iter().map(|read| read.id));
         checker.check("logs.off", writer.sequence, move |run| {
             let message = ids.iter().find_map(|id| {
-                // For a rejected call, FMI 3.0 requires a message in one place and forbids it in another.
-                let of = run.of(*id).filter(|of| of.status.is_none_or(|status| status < 2))?;
-                // In FMI 2.0 it is debug messages that are off.
-                of.log.iter().find(|message| fmi3 || message.status < 2)
+                // For a rejected call, one section of FMI 3.0 requires a message and another forbids it.
+                let outcome =
+                    run.outcome(*id).filter(|outcome| outcome.status.is_none_or(|status| status < 2))?;
+                // FMI 2.0 switches off only debug messages.
+                outcome.log.iter().find(|message| fmi3 || message.status < 2)
             })?;
             let text = String::from_utf8_lossy(message.text.as_deref().unwrap_or_default()).into_owned();
             Some(format!("{text:?}"))

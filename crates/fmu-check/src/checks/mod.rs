@@ -21,10 +21,9 @@ use crate::writer::Trajectory;
 use Check::{Each, Malformed, Once};
 use Fits::{Always, Integrated, Saves, Serializes, Several, Stepped, Stepped3};
 
-/// What a check does.
+/// A check.
 #[derive(Clone, Copy)]
 pub enum Check {
-    /// Runs once.
     Once(fn(&Checker) -> anyhow::Result<()>),
     /// Runs for each simulation that fits.
     Each(Fits, fn(&Checker, &Trajectory) -> anyhow::Result<()>),
@@ -35,21 +34,20 @@ pub enum Check {
 /// The simulations that a check or an order of calls fits.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Fits {
-    /// All of them.
     Always,
-    /// Those of Co-Simulation.
+    /// Simulations of Co-Simulation.
     Stepped,
-    /// Those of Co-Simulation in FMI 3.0.
+    /// Simulations of Co-Simulation in FMI 3.0.
     Stepped3,
-    /// Those of Co-Simulation with Event Mode.
+    /// Simulations of Co-Simulation with Event Mode.
     EventMode,
-    /// Those of Model Exchange.
+    /// Simulations of Model Exchange.
     Integrated,
-    /// Those of FMUs of which there may be several instances.
+    /// Simulations of FMUs that allow several instances in a process.
     Several,
-    /// Those of FMUs that save states.
+    /// Simulations of FMUs that save states.
     Saves,
-    /// Those of FMUs that serialize states.
+    /// Simulations of FMUs that serialize states.
     Serializes,
 }
 
@@ -92,7 +90,7 @@ pub const ALL: &[(&str, Check)] = &[
     ("results", Each(Several, results::instances)),
     ("results", Each(Always, results::reading)),
     ("results", Each(Always, results::name)),
-    ("results", Each(Stepped3, early_returns::told)),
+    ("results", Each(Stepped3, early_returns::steps)),
     ("results", Each(Several, results::threads)),
     ("results", Each(Stepped, results::cut)),
     ("results", Each(Always, results::time)),

@@ -1,4 +1,4 @@
-//! The ZIP, its directories, the names of the libraries, and what these need.
+//! Checks the ZIP file, its directories, and the names and requirements of the libraries.
 
 use crate::description::{Description, Offer};
 use crate::rules::Observation;
@@ -11,10 +11,10 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-/// Unpacks an FMU of at most so many bytes. The findings in its ZIP file.
+/// Unpacks an FMU of at most `most` bytes; returns the findings in its ZIP file.
 ///
 /// # Errors
-/// When it cannot be unpacked.
+/// Fails if the FMU cannot be unpacked.
 pub fn unpack(path: &Path, directory: &Path, most: u64) -> anyhow::Result<Vec<Observation>> {
     let at = path.display();
     let file = File::open(path).map_err(|error| anyhow::anyhow!("{at}: cannot be opened ({error})"))?;
@@ -55,26 +55,26 @@ pub fn unpack(path: &Path, directory: &Path, most: u64) -> anyhow::Result<Vec<Ob
     Ok(found)
 }
 
-/// Looks at an entry of a ZIP file. The path within the FMU's directory, if it has one.
+/// Inspects an entry of a ZIP file; returns its path below the FMU's directory, `None` if it is outside.
 fn entry(
     archive: &mut zip::ZipArchive<File>,
     index: usize,
     names: &mut BTreeSet<String>,
     found: &mut Vec<Observation>,
 ) -> anyhow::Result<Option<PathBuf>> {
-    let mut tell = |name: &'static str, observed: String| found.push((name, observed));
+    let mut add = |name: &'static str, observed: String| found.push((name, observed));
     let entry = archive.by_index_raw(index)?;
     let name = entry.name()?.into_owned();
     let inside = entry.enclosed_name();
     if inside.is_none() || name.contains('\\') {
-        tell("package.paths", name.clone());
+        add("package.paths", name.clone());
     }
     if !matches!(entry.compression(), zip::CompressionMethod::Stored | zip::CompressionMethod::Deflated) {
         let observed = format!("{name} is compressed by {}", entry.compression());
-        tell("package.compression", observed);
+        add("package.compression", observed);
     }
     if !names.insert(name.to_lowercase()) {
-        tell("package.names", name);
+        add("package.names", name);
     }
     Ok(inside)
 }
@@ -94,7 +94,7 @@ fn directories(standard: Standard) -> Vec<String> {
 /// The library for this machine.
 ///
 /// # Errors
-/// The reason for which there is none.
+/// Fails with the reason if there is none.
 pub fn library(directory: &Path, standard: Standard, offer: &Offer) -> Result<PathBuf, String> {
     let name = format!("{}{DLL_SUFFIX}", offer.identifier);
     let wanted = directories(standard);
@@ -133,18 +133,18 @@ fn machine(file: &object::File) -> Option<&'static str> {
 pub fn exported(library: &Path) -> Option<Vec<String>> {
     let bytes = std::fs::read(library).ok()?;
     let file = object::File::parse(bytes.as_slice()).ok()?;
-    let of_exports = file.exports().ok()?;
+    let exports = file.exports().ok()?;
     let strip = |name: &[u8]| {
         let name = String::from_utf8_lossy(name).into_owned();
         if OS == "macos" { name.trim_start_matches('_').to_owned() } else { name }
     };
-    Some(of_exports.flatten().filter_map(|export| export.name().name().map(strip)).collect())
+    Some(exports.flatten().filter_map(|export| export.name().name().map(strip)).collect())
 }
 
 /// Checks directories and libraries.
 pub fn look(directory: &Path, description: &Description) -> Vec<Observation> {
     let mut found = Vec::new();
-    let mut tell = |name: &'static str, observed: String| found.push((name, observed));
+    let mut add = |name: &'static str, observed: String| found.push((name, observed));
     let known: &[&str] = match description.standard {
         Standard::Fmi2 => &["win32", "win64", "linux32", "linux64", "darwin32", "darwin64"],
         Standard::Fmi3 => &[],
@@ -154,35 +154,35 @@ pub fn look(directory: &Path, description: &Description) -> Vec<Observation> {
         let name = platform.file_name().to_string_lossy().into_owned();
         let tuple = name.split_once('-');
         if description.standard == Standard::Fmi3 && tuple.is_none() {
-            tell("package.platforms", format!("binaries/{name}"));
+            add("package.platforms", format!("binaries/{name}"));
         }
         let ends = [("darwin", ".dylib"), ("win", ".dll"), ("", ".so")];
         let end = ends.into_iter().find(|(system, _)| name.contains(system)).map_or("", |(_, end)| end);
-        let of_fmi2 = known.contains(&name.as_str());
+        let is_fmi2 = known.contains(&name.as_str());
         let standard_directory =
-            (tuple.is_some() || of_fmi2) && (description.standard == Standard::Fmi2) == of_fmi2;
+            (tuple.is_some() || is_fmi2) && (description.standard == Standard::Fmi2) == is_fmi2;
         for offer in [&description.co_simulation, &description.model_exchange].into_iter().flatten() {
             let file = platform.path().join(format!("{}{end}", offer.identifier));
             if standard_directory && !file.is_file() {
                 let observed = format!("binaries/{name} has no {}{end}", offer.identifier);
-                tell("package.library", observed);
+                add("package.library", observed);
             }
         }
         for file in std::fs::read_dir(platform.path()).into_iter().flatten().flatten() {
-            needs(&file.path(), &name, &mut tell);
+            needs(&file.path(), &name, &mut add);
         }
     }
     found.dedup();
     found
 }
 
-/// How the names of the libraries of Linux, Windows and macOS begin.
-const OF_SYSTEM: &str = "libc.so libm.so libdl.so libpthread.so librt.so libgcc_s.so libstdc++.so ld-linux libutil.so \
+/// Prefixes of the names of the libraries of Linux, Windows and macOS.
+const SYSTEM_LIBRARIES: &str = "libc.so libm.so libdl.so libpthread.so librt.so libgcc_s.so libstdc++.so ld-linux libutil.so \
     kernel32 kernelbase ntdll msvcrt api-ms-win user32 advapi32 ws2_32 shell32 ole32 bcrypt shlwapi ucrtbase \
     /usr/lib/ /system/library/";
 
-/// System requirements of a library.
-fn needs(path: &Path, platform: &str, tell: &mut impl FnMut(&'static str, String)) {
+/// Checks the system requirements of a library.
+fn needs(path: &Path, platform: &str, add: &mut impl FnMut(&'static str, String)) {
     let Ok(bytes) = std::fs::read(path) else { return };
     let Ok(file) = object::File::parse(bytes.as_slice()) else { return };
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -194,10 +194,10 @@ fn needs(path: &Path, platform: &str, tell: &mut impl FnMut(&'static str, String
     };
     let universal = platform.contains("darwin");
     if !universal && !wanted.contains(&machine) && platform.contains(['-', '6', '3']) {
-        tell("package.machine", format!("binaries/{platform}/{name} is for {machine}"));
+        add("package.machine", format!("binaries/{platform}/{name} is for {machine}"));
     }
     if matches!(file, object::File::Elf64(_) | object::File::Elf32(_)) {
-        glibc(&bytes, platform, &name, tell);
+        glibc(&bytes, platform, &name, add);
     }
     let libraries: BTreeSet<String> = file
         .import_libraries()
@@ -206,26 +206,26 @@ fn needs(path: &Path, platform: &str, tell: &mut impl FnMut(&'static str, String
         })
         .unwrap_or_default();
     let directory = path.parent().unwrap_or(path);
-    let of_system = |library: &str| {
+    let is_system = |library: &str| {
         let lower = library.to_lowercase();
-        OF_SYSTEM.split_whitespace().any(|known| lower.starts_with(known)) || lower.is_empty()
+        SYSTEM_LIBRARIES.split_whitespace().any(|known| lower.starts_with(known)) || lower.is_empty()
     };
     let foreign: Vec<&String> =
-        libraries.iter().filter(|library| !of_system(library) && !directory.join(library).exists()).collect();
+        libraries.iter().filter(|library| !is_system(library) && !directory.join(library).exists()).collect();
     let unlinked = unlinked(&bytes).unwrap_or_default();
-    if libraries.iter().all(|library| of_system(library)) && !unlinked.is_empty() {
+    if libraries.iter().all(|library| is_system(library)) && !unlinked.is_empty() {
         let list = unlinked.join(", ");
         let observed =
             format!("binaries/{platform}/{name} needs {list}, which none of the libraries that it names has");
-        tell("package.symbols", observed);
+        add("package.symbols", observed);
     }
     if !foreign.is_empty() {
         let list: Vec<&str> = foreign.iter().map(|name| name.as_str()).collect();
-        tell("package.needs", format!("binaries/{platform}/{name} needs {}", list.join(", ")));
+        add("package.needs", format!("binaries/{platform}/{name} needs {}", list.join(", ")));
     }
 }
 
-/// Functions that a library for Linux needs from no library in particular: those without a version, where others have one.
+/// Returns the functions without a version that a library for Linux needs, if others have a version: no library provides them.
 /// The program that loads the library may happen to have them.
 fn unlinked(bytes: &[u8]) -> object::Result<Vec<String>> {
     use object::read::elf::{FileHeader as _, Sym as _};
@@ -239,7 +239,7 @@ fn unlinked(bytes: &[u8]) -> object::Result<Vec<String>> {
         if !symbol.is_undefined(endian) || symbol.st_bind() != object::elf::STB_GLOBAL {
             continue;
         }
-        // 0 and 1 are no versions.
+        // 0 and 1 mean that the symbol has no version.
         if versions.version_index(endian, index).index() > object::elf::VER_NDX_GLOBAL {
             versioned = true;
         } else {
@@ -250,15 +250,15 @@ fn unlinked(bytes: &[u8]) -> object::Result<Vec<String>> {
     Ok(found)
 }
 
-/// The newest version of glibc that it needs.
-fn glibc(bytes: &[u8], platform: &str, name: &str, tell: &mut impl FnMut(&'static str, String)) {
+/// Reports the newest version of glibc that a library needs.
+fn glibc(bytes: &[u8], platform: &str, name: &str, add: &mut impl FnMut(&'static str, String)) {
     let marker = b"GLIBC_2.";
-    let of_marker = bytes.windows(marker.len()).enumerate().filter(|(_, window)| window == marker);
-    let minors = of_marker.map(|(index, _)| {
+    let markers = bytes.windows(marker.len()).enumerate().filter(|(_, window)| window == marker);
+    let minors = markers.map(|(index, _)| {
         let digits = bytes[index + marker.len()..].iter().take_while(|byte| byte.is_ascii_digit());
         digits.map(|byte| char::from(*byte)).collect::<String>().parse::<u32>().unwrap_or(0)
     });
     if let Some(minor) = minors.max().filter(|minor| *minor >= 29) {
-        tell("package.glibc", format!("binaries/{platform}/{name} needs glibc 2.{minor}"));
+        add("package.glibc", format!("binaries/{platform}/{name} needs glibc 2.{minor}"));
     }
 }

@@ -1,4 +1,4 @@
-//! A rejected call changes nothing.
+//! Checks that a rejected call changes nothing.
 
 use crate::call_sequence::{Arg, Kind, Run};
 use crate::checker::Checker;
@@ -9,11 +9,16 @@ use crate::writer::{Part, Played, Point, Read, Trajectory, Writer, access, diffe
 use fmi_abi::Interface;
 use std::sync::Arc;
 
-/// A call that ought to be rejected: the function, its arguments, what is wrong with them, and the rule that is broken if
+/// A call that ought to be rejected: the function, its arguments, a description, and the rule that is broken if
 /// the call is accepted.
 type Attack = (String, Vec<Arg>, String, Option<&'static str>);
 
 const TOLERATED: Option<&str> = Some("refusals.tolerated");
+const ACCEPTED: Option<&str> = Some("refusals.accepted");
+
+fn attack(function: &str, args: Vec<Arg>, what: &str, rule: Option<&'static str>) -> Attack {
+    (function.to_owned(), args, what.to_owned(), rule)
+}
 
 /// A value reference that no variable has.
 pub fn unknown_reference(checker: &Checker) -> u64 {
@@ -22,14 +27,14 @@ pub fn unknown_reference(checker: &Checker) -> u64 {
     u64::from(most.checked_add(1000).unwrap_or_else(|| (0..).find(|free| !used.contains(free)).unwrap_or(0)))
 }
 
-/// Values for a call that sets some.
+/// Returns the arguments of a setter.
 fn set(checker: &Checker, references: Vec<u64>, kind: Kind, bits: Vec<u64>) -> Vec<Arg> {
     let total = bits.len();
     access(checker.description.standard, references, [Arg::In(kind, bits)], total)
 }
 
-/// Values of variables that cannot be set, or together with one that cannot.
-fn of_variables(checker: &Checker, interface: Interface) -> Vec<Attack> {
+/// Returns calls that set variables that cannot be set, alone or together with an input that can.
+fn variable_attacks(checker: &Checker, interface: Interface) -> Vec<Attack> {
     let description = &checker.description;
     let unknown = unknown_reference(checker);
     let (mut attacks, mut observed, mut inputs_tried) = (Vec::new(), Vec::new(), 0);
@@ -53,9 +58,9 @@ fn of_variables(checker: &Checker, interface: Interface) -> Vec<Attack> {
         let input = variable.causality == "input"
             && !variable.clocked
             && (stepped || variable.variability == "continuous");
-        let mut once = |of: &'static str| {
-            !observed.contains(&of) && {
-                observed.push(of);
+        let mut once = |group: &'static str| {
+            !observed.contains(&group) && {
+                observed.push(group);
                 true
             }
         };
@@ -66,25 +71,25 @@ fn of_variables(checker: &Checker, interface: Interface) -> Vec<Attack> {
         }
         if input && kind.is_float() && inputs_tried < 3 {
             inputs_tried += 1;
-            attacks.extend(of_input(checker, variable, &function, kind, other));
+            attacks.extend(input_attacks(checker, variable, &function, kind, other));
         }
-        let (of, rule, what) = if variable.variability == "constant" {
+        let (group, rule, what) = if variable.variability == "constant" {
             ("constant", Some("refusals.constant"), format!("a value for the constant {}", variable.name))
         } else if variable.causality == "output" && variable.initial == "calculated" {
             ("output", TOLERATED, format!("a value for the output {}", variable.name))
         } else if is("parameter", "fixed") {
             let what = format!("a value for the fixed parameter {} after the initialization", variable.name);
-            let of = match name {
+            let group = match name {
                 "Real" | "Float64" => "fixed",
                 "Integer" | "Int32" => "fixed whole",
                 _ => "fixed other",
             };
-            (of, TOLERATED, what)
+            (group, TOLERATED, what)
         } else {
             continue;
         };
-        if once(of) {
-            let first = input_of(checker, kind).filter(|_| of != "constant");
+        if once(group) {
+            let first = input_of(checker, kind).filter(|_| group != "constant");
             let references: Vec<u64> = first.into_iter().chain([reference]).collect();
             let bits = vec![other; references.len()];
             attacks.push((function, set(checker, references, kind, bits), what, rule));
@@ -93,8 +98,14 @@ fn of_variables(checker: &Checker, interface: Interface) -> Vec<Attack> {
     attacks
 }
 
-/// Values that an input cannot have, together with one that it can.
-fn of_input(checker: &Checker, variable: &Variable, function: &str, kind: Kind, other: u64) -> Vec<Attack> {
+/// Returns calls that set an input to a valid value and another to an invalid one.
+fn input_attacks(
+    checker: &Checker,
+    variable: &Variable,
+    function: &str,
+    kind: Kind,
+    other: u64,
+) -> Vec<Attack> {
     let reference = u64::from(variable.reference);
     let another = checker.description.variables.iter().find(|other| {
         other.causality == "input"
@@ -105,15 +116,15 @@ fn of_input(checker: &Checker, variable: &Variable, function: &str, kind: Kind, 
     let second = another.map_or(reference, |other| u64::from(other.reference));
     let beyond = variable.max.map(|max| ([second, reference], max + 1.0 + max.abs(), "beyond its max"));
     let values = [([reference, second], f64::NAN, "and NaN for a second")].into_iter().chain(beyond);
-    let attack = |(references, number, what): ([u64; 2], f64, &str)| {
+    let invalid = |(references, number, what): ([u64; 2], f64, &str)| {
         let args = set(checker, references.to_vec(), kind, vec![other, kind.bits(number)]);
-        (function.to_owned(), args, format!("a value for {} {what}", variable.name), None)
+        attack(function, args, &format!("a value for {} {what}", variable.name), None)
     };
-    values.map(attack).collect()
+    values.map(invalid).collect()
 }
 
-/// Unknown references, calls of other modes, and bytes that are no state.
-fn of_calls(checker: &Checker, interface: Interface, time: f64) -> Vec<Attack> {
+/// Returns calls with unknown references, calls of other modes, and malformed states.
+fn call_attacks(checker: &Checker, interface: Interface, time: f64) -> Vec<Attack> {
     let (unknown, fmi3) = (unknown_reference(checker), checker.fmi3());
     let (get_float, set_float) = if fmi3 { ("GetFloat64", "SetFloat64") } else { ("GetReal", "SetReal") };
     let get = access(checker.description.standard, vec![unknown], [Arg::Out(Kind::F64, 1)], 1);
@@ -121,33 +132,29 @@ fn of_calls(checker: &Checker, interface: Interface, time: f64) -> Vec<Attack> {
     let experiment =
         vec![Arg::Whole(0), Arg::real(0.0), Arg::real(time + 7.0), Arg::Whole(0), Arg::real(0.0)];
     let (experiment, nothing) = if fmi3 { (vec![], experiment) } else { (experiment, vec![]) };
-    let bytes = Arg::In(Kind::U8, (0..64).map(|byte| byte * 37 % 256).collect());
-    let bytes = vec![bytes, Arg::Whole(64), Arg::StateOut(90)];
-    let (accepted, serializes) = (Some("refusals.accepted"), checker.serializes(interface));
-    let enter = "EnterInitializationMode";
-    let attacks = [
-        (true, get_float, get, "the value of a reference that no variable has", accepted),
-        (true, set_float, set, "a value for a reference that no variable has", accepted),
-        (
-            true,
-            "ExitInitializationMode",
-            vec![],
-            "leaving Initialization Mode, which it is not in",
-            TOLERATED,
-        ),
-        (true, enter, nothing, "entering Initialization Mode amid the simulation", TOLERATED),
-        (!fmi3, "SetupExperiment", experiment, "another experiment amid the simulation", TOLERATED),
-        (serializes, "DeserializeFMUState", bytes, "bytes that are no state", TOLERATED),
+    let (exit, enter) = ("ExitInitializationMode", "EnterInitializationMode");
+    let mut attacks = vec![
+        attack(get_float, get, "the value of a reference that no variable has", ACCEPTED),
+        attack(set_float, set, "a value for a reference that no variable has", ACCEPTED),
+        attack(exit, vec![], "leaving Initialization Mode, which it is not in", TOLERATED),
+        attack(enter, nothing, "entering Initialization Mode amid the simulation", TOLERATED),
     ];
-    let wanted = attacks.into_iter().filter(|(wanted, ..)| *wanted);
-    wanted.map(|(_, name, args, what, rule)| (name.to_owned(), args, what.to_owned(), rule)).collect()
+    if !fmi3 {
+        let what = "another experiment amid the simulation";
+        attacks.push(attack("SetupExperiment", experiment, what, TOLERATED));
+    }
+    if checker.serializes(interface) {
+        let bytes = Arg::In(Kind::U8, (0..64).map(|byte| byte * 37 % 256).collect());
+        let bytes = vec![bytes, Arg::Whole(64), Arg::StateOut(90)];
+        attacks.push(attack("DeserializeFMUState", bytes, "bytes that are no state", TOLERATED));
+    }
+    attacks
 }
 
-/// Steps that are impossible, and derivatives of inputs that are none.
-fn of_steps(checker: &Checker, time: f64, size: f64) -> Vec<Attack> {
+/// Returns impossible steps and invalid derivatives of inputs.
+fn step_attacks(checker: &Checker, time: f64, size: f64) -> Vec<Attack> {
     let step = |(time, size, what): (f64, f64, &str)| {
-        let args = step_args(checker.description.standard, time, size);
-        ("DoStep".to_owned(), args, what.to_owned(), TOLERATED)
+        attack("DoStep", step_args(checker.description.standard, time, size), what, TOLERATED)
     };
     let steps = [
         (time, 0.0, "a step of no size"),
@@ -174,18 +181,18 @@ fn of_steps(checker: &Checker, time: f64, size: f64) -> Vec<Attack> {
                 Arg::In(Kind::I32, vec![1, order]),
                 Arg::In(Kind::F64, vec![3_f64.to_bits(); 2]),
             ];
-            ("SetRealInputDerivatives".to_owned(), args, what.to_owned(), None)
+            attack("SetRealInputDerivatives", args, what, None)
         })
     });
     steps.map(step).into_iter().chain(derivatives).collect()
 }
 
-/// Times and states that are impossible in Model Exchange.
-fn of_integration(states: &[f64]) -> Vec<Attack> {
+/// Returns calls of Model Exchange with invalid times and states.
+fn integration_attacks(states: &[f64]) -> Vec<Attack> {
     let mode = "entering Continuous-Time Mode, which it is in";
     let mut attacks = vec![
-        ("SetTime", vec![Arg::real(f64::NAN)], "a time of NaN", None),
-        ("EnterContinuousTimeMode", vec![], mode, TOLERATED),
+        attack("SetTime", vec![Arg::real(f64::NAN)], "a time of NaN", None),
+        attack("EnterContinuousTimeMode", vec![], mode, TOLERATED),
     ];
     if let Some(last) = states.len().checked_sub(1) {
         let other: Vec<u64> = states.iter().map(|state| (state + 0.125).to_bits()).collect();
@@ -195,64 +202,61 @@ fn of_integration(states: &[f64]) -> Vec<Attack> {
             [(more, "one state too many", TOLERATED), (bad, "states one of which is NaN", None)]
         {
             let count = Arg::Whole(states.len() as i64);
-            attacks.push(("SetContinuousStates", vec![Arg::In(Kind::F64, states), count], what, rule));
+            attacks.push(attack("SetContinuousStates", vec![Arg::In(Kind::F64, states), count], what, rule));
         }
     }
     attacks
-        .into_iter()
-        .map(|(name, args, what, rule)| (name.to_owned(), args, what.to_owned(), rule))
-        .collect()
 }
 
-/// An input of this type, which a call changes before it comes to the value that it cannot set.
+/// Returns an input of this type. A call that is not atomic sets it before it reaches the invalid value.
 fn input_of(checker: &Checker, kind: Kind) -> Option<u64> {
-    let of = checker.description.variables.iter().find(|variable| {
+    let input = checker.description.variables.iter().find(|variable| {
         variable.causality == "input"
             && variable.size == Some(1)
             && !variable.clocked
             && variable.variability != "discrete"
             && variable.base.is_some_and(|base| kind_of(checker.description.standard, base) == kind)
     });
-    of.map(|variable| u64::from(variable.reference))
+    input.map(|variable| u64::from(variable.reference))
 }
 
 /// A trajectory, with an attack in its middle or without: the attack, the reads after it, and the rest.
-fn play(writer: &mut Writer, of: usize, attack: Option<&Attack>) -> (Option<u32>, Vec<Read>, Played) {
+fn play(writer: &mut Writer, instance: usize, attack: Option<&Attack>) -> (Option<u32>, Vec<Read>, Played) {
     let trajectory = writer.trajectory;
     let to = trajectory.points.len() / 2;
-    writer.play(of, &[Part::Begin, Part::Points(to)]);
-    let attack = attack.map(|(function, args, ..)| writer.forbidden(Some(of), function, args.clone()));
-    let at_once = writer.ask(of);
+    writer.play(instance, &[Part::Begin, Part::Points(to)]);
+    let attack = attack.map(|(function, args, ..)| writer.forbidden(Some(instance), function, args.clone()));
+    let at_once = writer.read_all(instance);
     let mut later = Played::default();
     for (number, point) in trajectory.points[to..].iter().enumerate() {
-        // A value that was set has most effect where no other is set.
+        // The first two steps set no inputs, so that a value that the attack has set takes effect.
         let inputs = if number < 2 { Vec::new() } else { point.inputs.clone() };
-        later.ids.extend(writer.point(of, &Point { inputs, ..point.clone() }));
-        later.reads.extend(writer.ask(of));
+        later.ids.extend(writer.point(instance, &Point { inputs, ..point.clone() }));
+        later.reads.extend(writer.read_all(instance));
     }
-    writer.free(of);
+    writer.free(instance);
     (attack, at_once, later)
 }
 
-/// Each attack amid a trajectory; the simulation continues as it does without the attack.
+/// Checks each attack in the middle of a trajectory: the simulation must continue as without the attack.
 pub fn change_nothing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let interface = trajectory.interface;
     let to = trajectory.points.len() / 2;
     let Some(here) = trajectory.points.get(to) else { return Ok(()) };
     let before = trajectory.points[..to].last();
-    let mut attacks = of_variables(checker, interface);
+    let mut attacks = variable_attacks(checker, interface);
     if trajectory.is_stepped() {
-        attacks.extend(of_calls(checker, interface, here.time));
-        attacks.extend(of_steps(checker, here.time, here.size));
+        attacks.extend(call_attacks(checker, interface, here.time));
+        attacks.extend(step_attacks(checker, here.time, here.size));
     } else {
-        attacks.extend(of_calls(checker, interface, before.unwrap_or(here).time));
-        attacks.extend(of_integration(before.map_or(&[], |point| &point.states)));
+        attacks.extend(call_attacks(checker, interface, before.unwrap_or(here).time));
+        attacks.extend(integration_attacks(before.map_or(&[], |point| &point.states)));
     }
     attacks.into_iter().try_for_each(|attack| attacked(checker, trajectory, attack))?;
     after_end(checker, trajectory)
 }
 
-/// A value for an input after the end, where neither version of the standard allows it.
+/// Checks that an input is not set after Terminate, where neither FMI version allows it.
 fn after_end(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let is_input = |index: &&usize| {
@@ -275,7 +279,7 @@ fn after_end(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     })
 }
 
-/// An attack is rejected and changes nothing.
+/// Checks that an attack is rejected and changes nothing.
 fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let (_, alone_at_once, alone) = play(&mut writer, 0, None);
@@ -286,7 +290,7 @@ fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyho
     let description = checker.description.clone();
     let changed = Arc::new(move |run: &Run, rejected: i32| -> Option<String> {
         let status = run.status(id).filter(|status| *status == rejected)?;
-        // After an error an instance may reject everything.
+        // After Error, an instance may reject all calls.
         let rejects = |reads: &[Read]| !reads.iter().all(|read| run.succeeds(read.id));
         if rejects(&at_once) {
             return None;
@@ -294,10 +298,10 @@ fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyho
         let ends = rejects(&later.reads) || !later.ids.iter().all(|id| run.succeeds(*id));
         let at_once = difference(&description, run, &alone_at_once, &at_once);
         let later = || difference(&description, run, &alone.reads, &later.reads).filter(|_| !ends);
-        let (variable, was, is) = at_once.or_else(later)?;
+        let [variable, was, is] = at_once.or_else(later)?;
         Some(format!("{named} {}, and {variable} is {is} after it instead of {was}", status_name(status)))
     });
-    // In FMI 2.0 a step that is discarded may have gone part of the way.
+    // In FMI 2.0, a discarded step may have advanced the time.
     let discarded = match checker.fmi3() {
         true => Some("refusals.discarded"),
         false => Some("refusals.changed").filter(|_| function != "DoStep"),

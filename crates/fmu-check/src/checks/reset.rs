@@ -1,12 +1,13 @@
-//! Reset equals new.
+//! Checks that an instance after a reset behaves like a new one.
 
+use crate::call_sequence::Values;
 use crate::checker::Checker;
-use crate::finding::refused;
-use crate::values::{Value, other_values};
+use crate::finding::{any, fails};
+use crate::values::other_values;
 use crate::writer::Part::{Call, Enter, Leave, Make, Read, Run};
 use crate::writer::Trajectory;
 
-/// After a trajectory and a reset, what is read and what the trajectory gives are those of a new instance.
+/// Checks that the values and the simulation after a reset are the values and the simulation of a new instance.
 pub fn reset(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for end in [&[Call("Terminate")][..], &[]] {
         let mut writer = checker.writer(trajectory);
@@ -14,18 +15,14 @@ pub fn reset(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         writer.play(0, end);
         let ids = writer.play(0, &[Call("Reset"), Enter]).ids;
         let second = writer.play(0, &[Read, Leave, Run(0)]).reads;
-        let sequence = writer.sequence.clone();
-        let differ = checker.differ(first, second, |name, before, after| {
-            format!("{name} of the new instance was {before}, after the reset it is {after}")
-        });
-        checker.check("reset.incomplete", writer.sequence, move |run| {
-            refused(&sequence, run, &ids).or_else(|| differ(run))
-        })?;
+        let message = "{} of the new instance was {}, after the reset it is {}";
+        let judges = [fails(&writer.sequence, ids), checker.differ(&first, &second, message)];
+        checker.check("reset.incomplete", writer.sequence, any(judges))?;
     }
     changed(checker, trajectory)
 }
 
-/// Values that were set before the reset have their start values after it.
+/// Checks that variables that were set have their start values after a reset.
 fn changed(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let (mut values, mut others) = (Vec::new(), Vec::new());
@@ -47,7 +44,7 @@ fn changed(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
 fn after_values(
     checker: &Checker,
     trajectory: &Trajectory,
-    values: &[(usize, Value)],
+    values: &[(usize, Values)],
     initialized: bool,
 ) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
@@ -57,8 +54,6 @@ fn after_values(
         writer.play(0, &[Enter, Leave]);
     }
     let second = writer.play(0, &[Call("Reset"), Enter, Read]).reads;
-    let differ = checker.differ(first, second, |name, before, after| {
-        format!("{name} of the new instance was {before}, after values were set and a reset it is {after}")
-    });
-    checker.check("reset.values", writer.sequence, differ)
+    let message = "{} of the new instance was {}, after values were set and a reset it is {}";
+    checker.check("reset.values", writer.sequence, checker.differ(&first, &second, message))
 }

@@ -1,14 +1,13 @@
 //! Resources that remain after many simulations, and settings of the process.
 
-use crate::call_sequence::{End, Measured, Run, Step};
+use crate::call_sequence::{End, Measured, Run, Step, Values};
 use crate::checker::Checker;
-use crate::finding::refused;
-use crate::values::Value;
-use crate::writer::Part::{Ask, Begin, Call, Drop, Enter, Free, Leave, Make, Points, Restore, Save};
+use crate::finding::failure;
+use crate::writer::Part::{Begin, Call, Drop, Enter, Free, Leave, Make, Points, ReadAll, Restore, Save};
 use crate::writer::{Part, Trajectory, Writer};
 use fmi_abi::BaseType;
 
-/// Simulations, states and calls again and again.
+/// Checks the resources after many simulations, resets, states and strings.
 pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let measured = |what: &'static str, before: &[Part], cycle: &dyn Fn(&mut Writer)| {
         let mut writer = checker.writer(trajectory);
@@ -16,13 +15,17 @@ pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
         measured(checker, writer, what, cycle)
     };
     measured("instances made, run and freed", &[], &|writer| {
-        writer.play(0, &[Begin, Points(3), Ask, Call("Terminate"), Free]);
+        writer.play(0, &[Begin, Points(3), ReadAll, Call("Terminate"), Free]);
     })?;
     let variables = checker.description.variables.iter().enumerate();
-    let texts: Vec<(usize, Value)> = variables
-        .filter(|(_, of)| of.base == Some(BaseType::String) && of.size == Some(1) && !of.clocked)
-        .filter(|(_, of)| of.causality == "input" || of.causality == "parameter" && of.initial == "exact")
-        .filter_map(|(index, of)| Some((index, Value::Texts(vec![of.start.first()?.clone().into_bytes()]))))
+    let texts: Vec<(usize, Values)> = variables
+        .filter(|(_, variable)| {
+            variable.base == Some(BaseType::String) && variable.size == Some(1) && !variable.clocked
+        })
+        .filter(|(_, variable)| {
+            variable.causality == "input" || variable.causality == "parameter" && variable.initial == "exact"
+        })
+        .filter_map(|(index, variable)| Some((index, Values::texts(variable.start.first()?.as_bytes(), 1))))
         .collect();
     if !texts.is_empty() {
         measured("texts set", &[Make], &|writer| {
@@ -30,7 +33,7 @@ pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
         })?;
     }
     measured("resets", &[Make], &|writer| {
-        writer.play(0, &[Enter, Leave, Points(2), Ask, Call("Reset")]);
+        writer.play(0, &[Enter, Leave, Points(2), ReadAll, Call("Reset")]);
     })?;
     if checker.saves(trajectory.interface) {
         measured("states saved and freed", &[Begin, Points(2)], &|writer| {
@@ -40,7 +43,7 @@ pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
                 writer.deserialize(0, 0, 1);
                 writer.play(0, &[Restore(1), Drop(1)]);
             }
-            writer.play(0, &[Ask, Drop(0)]);
+            writer.play(0, &[ReadAll, Drop(0)]);
         })?;
     }
     settings(checker, trajectory)
@@ -68,52 +71,54 @@ fn measured(
     checker.keep_always(&sequence, &run);
     // The resources before and after enough cycles, and the number of these.
     let done = move |run: &Run| -> Option<(Measured, Measured, usize)> {
-        let measured = |id| run.of(id)?.measured.clone();
+        let measured = |id| run.outcome(id)?.measured.clone();
         let (before, times) = (measured(warm)?.times, measured(many)?.times);
         (before >= 50 && times >= 50).then_some((measured(first)?, measured(last)?, times))
     };
     checker.keep("resources.memory", &run, &sequence, move |run| {
         let (one, two, times) = done(run)?;
         let grown = two.memory.saturating_sub(one.memory);
-        // Where the C library counts, a block is 32 bytes at least, and a few may stay for itself; elsewhere pages are all that can be observed.
+        // The smallest block of glibc is 32 bytes, and glibc may keep a few blocks. Other C libraries are measured in pages.
         let enough = if one.exact { 16 * times as u64 + 4096 } else { 64 * times as u64 + (4 << 20) };
         (grown > enough).then(|| {
             format!("{grown} bytes are left after {times} {what}: {} for each", grown / times as u64)
         })
     });
-    checker.keep("resources.threads", &run, &sequence, move |run| {
-        let (one, two, times) = done(run)?;
-        let more = two.threads.checked_sub(one.threads).filter(|more| *more > 2)?;
-        Some(format!("{more} threads are left after {times} {what}"))
-    });
-    checker.keep("resources.files", &run, &sequence, move |run| {
-        let (one, two, times) = done(run)?;
-        let more = two.files.checked_sub(one.files).filter(|more| *more > 2)?;
-        Some(format!("{more} files are left open after {times} {what}"))
-    });
+    type Count = fn(&Measured) -> usize;
+    let counts: [(&str, Count, &str); 2] = [
+        ("resources.threads", |measured| measured.threads, "threads are left"),
+        ("resources.files", |measured| measured.files, "files are left open"),
+    ];
+    for (name, count, are_left) in counts {
+        checker.keep(name, &run, &sequence, move |run| {
+            let (one, two, times) = done(run)?;
+            let more = count(&two).checked_sub(count(&one)).filter(|more| *more > 2)?;
+            Some(format!("{more} {are_left} after {times} {what}"))
+        });
+    }
     let ids: Vec<u32> = steps.iter().map(|numbered| numbered.id).collect();
     checker.keep("resources.cycles", &run, &sequence, move |run| {
-        let times = run.of(many)?.measured.as_ref()?.times;
-        let why = refused(&steps, run, &ids)?;
+        let times = run.outcome(many)?.measured.as_ref()?.times;
+        let why = failure(&steps, run, &ids)?;
         (times > 1).then(|| format!("after {} {what}: {why}", times - 1))
     });
     Ok(())
 }
 
-/// Rounding, locale, directory, signals: as before.
+/// Checks that a simulation does not change settings of the process and prints nothing.
 fn settings(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.add(checker.version());
     let first = writer.add(Step::Measure);
-    writer.play(0, &[Begin, Points(usize::MAX), Ask]);
+    writer.play(0, &[Begin, Points(usize::MAX), ReadAll]);
     let last = writer.add(Step::Measure);
     let run = checker.judge("resources.settings", writer.sequence.clone(), move |run| {
-        let (one, two) = (run.of(first)?.measured.as_ref()?, run.of(last)?.measured.as_ref()?);
+        let (one, two) = (run.outcome(first)?.measured.as_ref()?, run.outcome(last)?.measured.as_ref()?);
         let (was, is) = one.settings.iter().zip(&two.settings).find(|(was, is)| was != is)?;
         Some(format!("{was} has become {is}"))
     })?;
     checker.keep("logs.printed", &run, &writer.sequence, |run| {
-        let line = run.said.lines().find(|line| !line.trim().is_empty())?;
+        let line = run.output.lines().find(|line| !line.trim().is_empty())?;
         (run.end == End::Done).then(|| format!("{:?}", line.chars().take(80).collect::<String>()))
     });
     Ok(())

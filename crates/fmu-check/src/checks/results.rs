@@ -1,19 +1,16 @@
-//! Results depend on the calls alone: not on the process, on other instances, on threads, on what was read.
+//! Checks that results depend only on the calls: not on the process, other instances, threads or reads.
 
 use crate::call_sequence::{Arg, Kind, Numbered, Run, Step};
 use crate::checker::Checker;
 use crate::description::Description;
-use crate::finding::{Judges, status_name};
+use crate::finding::{Judges, any, status_name};
 use crate::trajectory::steps;
-use crate::writer::Part::{Ask, Begin, Points, Read as ReadAll, Run as RunFrom};
+use crate::values::is_other_time;
+use crate::writer::Part::{Begin, Points, ReadAll, Run as RunFrom};
 use crate::writer::{Part, Point, Read, Trajectory, Writer, access, value_of};
 
 /// The whole trajectory with all that can be read.
-const WHOLE: &[Part] = &[Begin, Ask, RunFrom(0)];
-
-fn differ(checker: &Checker, one: Vec<Read>, other: Vec<Read>, what: &'static str) -> Box<dyn Judges> {
-    checker.differ(one, other, move |name, first, second| format!("{name} is {first}, {what} {second}"))
-}
+const WHOLE: &[Part] = &[Begin, ReadAll, RunFrom(0)];
 
 /// Repeats the calls in another process with other addresses and other memory contents.
 pub fn repeat(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
@@ -21,37 +18,37 @@ pub fn repeat(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     let one = writer.play(0, WHOLE).reads;
     writer.add(Step::FreshProcess);
     let other = writer.play(0, WHOLE).reads;
-    let differ = differ(checker, one, other, "in another process");
-    checker.check("results.process", writer.sequence, differ)
+    let judge = checker.differ(&one, &other, "{} is {}, in another process {}");
+    checker.check("results.process", writer.sequence, judge)
 }
 
 /// Repeats the calls with an instance of another name. Strings may contain the name.
 pub fn name(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let mut runs = ["instance", "an instance of another name"].map(|name| {
-        writer.make_with(0, |how| how.name = Some(name.to_owned()));
-        let reads = writer.play(0, &[Part::Enter, Part::Leave, Ask, RunFrom(0)]).reads;
+        writer.make_with(0, |how| how.name = name.to_owned());
+        let reads = writer.play(0, &[Part::Enter, Part::Leave, ReadAll, RunFrom(0)]).reads;
         writer.free(0);
         reads
     });
     let is_number = |(index, _): &(usize, usize)| checker.description.variables[*index].is_number();
-    runs.iter_mut().for_each(|reads| reads.retain(|read| read.of.iter().all(is_number)));
+    runs.iter_mut().for_each(|reads| reads.retain(|read| read.variables.iter().all(is_number)));
     let [one, other] = runs;
-    let differ = differ(checker, one, other, "of an instance of another name");
-    checker.check("results.name", writer.sequence, differ)
+    let judge = checker.differ(&one, &other, "{} is {}, of an instance of another name {}");
+    checker.check("results.name", writer.sequence, judge)
 }
 
-/// A second instance before, meanwhile, and in turns.
+/// Checks an instance next to a second one, which is called in turns with it.
 pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let alone = writer.play(0, WHOLE).reads;
     writer.free(0);
-    let (mut one, mut other) = (writer.play(1, &[Begin, Ask]).reads, Vec::new());
-    // The other is two points behind, so that both are not in the same state.
+    let (mut one, mut other) = (writer.play(1, &[Begin, ReadAll]).reads, Vec::new());
+    // The second instance is two points behind, so that the states of both differ.
     let count = trajectory.points.len();
     for number in 0..count + 2 {
         if number == 1 {
-            other.extend(writer.play(2, &[Begin, Ask]).reads);
+            other.extend(writer.play(2, &[Begin, ReadAll]).reads);
         }
         if let Some(point) = trajectory.points.get(number) {
             writer.point(1, point);
@@ -60,85 +57,84 @@ pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<(
             writer.point(2, &trajectory.points[number - 2]);
         }
         if number < count {
-            one.extend(writer.ask(1));
+            one.extend(writer.read_all(1));
         }
         if number >= 2 {
-            other.extend(writer.ask(2));
+            other.extend(writer.read_all(2));
         }
     }
-    let first = differ(checker, alone.clone(), one, "beside another instance");
-    let second = differ(checker, alone, other, "of a second instance beside the first");
-    checker.check("results.instances", writer.sequence, move |run| first(run).or_else(|| second(run)))
+    let judges = [
+        checker.differ(&alone, &one, "{} is {}, next to another instance {}"),
+        checker.differ(&alone, &other, "{} is {}, of a second instance next to the first {}"),
+    ];
+    checker.check("results.instances", writer.sequence, any(judges))
 }
 
-/// The first of these variables whose value in a read of its own is another one than in the others.
+/// Returns a message for the first variable that has one value read separately and another read with others.
 fn unlike(
-    description: &Description,
-    run: &Run,
-    singly: &[(usize, Vec<Read>)],
-    together: &[Read],
-    tell: impl Fn(&str, String, String) -> String,
-) -> Option<String> {
-    singly.iter().find_map(|(index, reads)| {
-        let (one, other) = (value_of(run, reads, *index)?, value_of(run, together, *index)?);
-        let at = one.differ(&other)?;
-        Some(tell(&description.variables[*index].name, one.show(at), other.show(at)))
+    checker: &Checker,
+    singly: Vec<(usize, Vec<Read>)>,
+    together: Vec<Read>,
+    message: fn(&str, String, String) -> String,
+) -> Box<dyn Judges> {
+    let description = checker.description.clone();
+    Box::new(move |run: &Run| {
+        singly.iter().find_map(|(index, reads)| {
+            let (one, other) = (value_of(run, reads, *index)?, value_of(run, &together, *index)?);
+            let at = one.differ(&other)?;
+            Some(message(&description.variables[*index].name, one.show(at), other.show(at)))
+        })
     })
 }
 
-/// Reading changes nothing, regardless of the variables, their grouping and the number of reads.
+/// Checks that reading changes nothing, regardless of the variables, their grouping and the number of reads.
 pub fn reading(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let silent = writer.play(0, &[Begin, Points(usize::MAX), Ask, Part::Free]).reads;
+    let silent = writer.play(0, &[Begin, Points(usize::MAX), ReadAll, Part::Free]).reads;
     let all = &checker.readable;
-    writer.play(1, &[Begin, Ask]);
+    writer.play(1, &[Begin, ReadAll]);
     for point in &trajectory.points {
         writer.point(1, point);
         for index in all.iter().rev().take(200) {
             writer.read_these(1, &[*index]);
         }
-        writer.ask(1);
+        writer.read_all(1);
     }
-    let [read, again] = [(); 2].map(|()| writer.ask(1));
+    let [read, again] = [(); 2].map(|()| writer.read_all(1));
     let mut single = |index: &usize| (*index, writer.read_these(1, &[*index]));
     let singly: Vec<_> = all.iter().take(400).map(&mut single).collect();
-    let changed = differ(checker, silent, read.clone(), "after more was read meanwhile");
-    let twice = differ(checker, read.clone(), again, "read a second time");
-    let description = checker.description.clone();
-    let alone = move |run: &Run| {
-        let tell =
-            |name: &str, one, together| format!("{name} is {together} read with others and {one} read alone");
-        unlike(&description, run, &singly, &read, tell)
-    };
-    checker.check("results.reading", writer.sequence, move |run| {
-        twice(run).or_else(|| alone(run)).or_else(|| changed(run))
-    })?;
+    let judges = [
+        checker.differ(&read, &again, "{} is {}, read a second time {}"),
+        unlike(checker, singly, read.clone(), |name, one, together| {
+            format!("{name} is {together} read with others and {one} read separately")
+        }),
+        checker.differ(&silent, &read, "{} is {}, after more was read meanwhile {}"),
+    ];
+    checker.check("results.reading", writer.sequence, any(judges))?;
     repeated(checker, trajectory, all)?;
     first(checker, trajectory)
 }
 
-/// Each output read first after a step, in a separate instance.
+/// Checks each output when it is read first after a step, in a separate instance.
 fn first(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let variables = &checker.description.variables;
     let outputs = checker.readable.iter().copied();
     let outputs = outputs.filter(|index| variables[*index].causality == "output").take(checker.most(16));
     let mut writer = checker.writer(trajectory);
-    let together = writer.play(0, &[Begin, Points(3), ReadAll, Part::Free]).reads;
+    let together = writer.play(0, &[Begin, Points(3), Part::Read, Part::Free]).reads;
     let mut alone = Vec::new();
     for output in outputs {
         writer.play(0, &[Begin, Points(3)]);
         alone.push((output, writer.read_these(0, &[output])));
         writer.free(0);
     }
-    let description = checker.description.clone();
-    checker.check("results.reading", writer.sequence, move |run| {
-        let tell =
-            |name: &str, one, other| format!("{name} is {one} read first and {other} read after others");
-        unlike(&description, run, &alone, &together, tell)
-    })
+    let judge = unlike(checker, alone, together, |name, one, other| {
+        format!("{name} is {one} read first and {other} read after others")
+    });
+    checker.check("results.reading", writer.sequence, judge)
 }
 
-/// A variable twice in one call, and none at all.
+/// Checks a call that reads each variable twice, and a call that reads none.
 fn repeated(checker: &Checker, trajectory: &Trajectory, all: &[usize]) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
@@ -156,21 +152,19 @@ fn repeated(checker: &Checker, trajectory: &Trajectory, all: &[usize]) -> anyhow
             if [single, double].iter().any(|read| !run.succeeds(read.id)) {
                 return None;
             }
-            let mut at = 0;
-            single.of.iter().find_map(|(index, size)| {
-                at += 2 * size;
-                let once = value_of(run, std::slice::from_ref(single), *index)?;
-                let second = run.written(double.id)?.part(at - size, *size)?;
+            single.parts().find_map(|(index, begin, size)| {
+                let once = run.written(single.id)?.part(begin, size)?;
+                let second = run.written(double.id)?.part(2 * begin + size, size)?;
                 let element = once.differ(&second)?;
-                let name = &description.variables[*index].name;
+                let name = &description.variables[index].name;
                 let (once, second) = (once.show(element), second.show(element));
-                Some(format!("{name} is {once}, asked for twice in a call {second} the second time"))
+                Some(format!("{name} is {once}, and {second} when it is read a second time in a call"))
             })
         })
     })
 }
 
-/// Instances in threads of their own.
+/// Checks instances in four threads.
 pub fn threads(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let alone = writer.play(0, WHOLE).reads;
@@ -179,20 +173,20 @@ pub fn threads(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     let mut judges = Vec::new();
     for number in 1..=4 {
         let mut thread = Writer { next: writer.next, ..checker.writer(trajectory) };
-        // More than one simulation, so that they meet.
+        // Twenty simulations for each thread, so that simulations overlap.
         for _ in 0..20 {
             let reads = thread.play(number, WHOLE).reads;
-            judges.push(differ(checker, alone.clone(), reads, "on a thread beside others"));
+            judges.push(checker.differ(&alone, &reads, "{} is {}, on a thread next to others {}"));
             thread.free(number);
         }
         writer.next = thread.next;
         sequences.push(thread.sequence);
     }
     writer.add(Step::Parallel(sequences));
-    checker.check("results.threads", writer.sequence, move |run| judges.iter().find_map(|judge| judge(run)))
+    checker.check("results.threads", writer.sequence, any(judges))
 }
 
-/// Covers the same time in steps of another size, with constant inputs.
+/// Checks simulations to the same time with other step sizes and constant inputs.
 pub fn cut(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     if !checker.can(trajectory.interface, &["canHandleVariableCommunicationStepSize"])
         || trajectory.points.len() < 4
@@ -209,12 +203,12 @@ pub fn cut(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let sizes = [(size, 8), (2.0 * size, 4), (size / 2.0, 16), (size / 3.0, 24)];
     let sizes = if fixed.is_some() { &sizes[..3] } else { &sizes };
     let mut ends = Vec::new();
-    for (of, (size, count)) in sizes.iter().enumerate() {
-        writer.begin(of);
+    for (instance, (size, count)) in sizes.iter().enumerate() {
+        writer.begin(instance);
         for point in steps(&checker.description, start, &vec![*size; *count], false) {
-            writer.point(of, &Point { inputs: Vec::new(), ..point });
+            writer.point(instance, &Point { inputs: Vec::new(), ..point });
         }
-        ends.push(writer.play(of, &[ReadAll, Part::Free]).reads);
+        ends.push(writer.play(instance, &[Part::Read, Part::Free]).reads);
     }
     let description = checker.description.clone();
     checker.check("results.cut", writer.sequence, move |run| {
@@ -230,7 +224,7 @@ pub fn cut(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
 fn unlike_in_steps(description: &Description, index: usize, values: &[Vec<f64>]) -> Option<String> {
     let variable = &description.variables[index];
     let name = &variable.name;
-    // An error that each step adds, and not what a solver gets wrong, grows like this.
+    // An error that each step adds is proportional to the number of steps; the error of a solver is not.
     if let [eight, four, sixteen, more] = values
         && variable.is_float()
         && let ([eight, ..], [four, ..], [sixteen, ..], [more, ..]) =
@@ -257,14 +251,14 @@ fn unlike_in_steps(description: &Description, index: usize, values: &[Vec<f64>])
     })
 }
 
-/// The independent variable is the time, and a step ends where it was to end.
+/// Checks that the independent variable is the time at the end of each step.
 pub fn time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let is_time = |index: &usize| description.variables[*index].causality == "independent";
     let Some(index) = (0..description.variables.len()).find(is_time) else { return Ok(()) };
     let mut runs = vec![(0.0, trajectory.points.clone())];
     if let (true, Some(first)) = (trajectory.is_stepped(), trajectory.points.first()) {
-        // From another start time, which an FMU may reject, and in steps of another size than the solver may have.
+        // From another start time, which an FMU may reject, and with a step size that is no multiple of the solver's.
         runs.push((trajectory.end - description.start_time, trajectory.points.clone()));
         let offer = description.co_simulation.as_ref();
         if offer.is_some_and(|offer| {
@@ -279,44 +273,44 @@ pub fn time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         writer.make(0);
         writer.enter_with(0, None, description.start_time + by, None);
         writer.leave(0);
-        let mut asked = Vec::new();
+        let mut reads = Vec::new();
         for point in points {
             let point = Point { time: point.time + by, ..point };
             let ids = writer.point(0, &point);
             let stepped = trajectory.is_stepped();
             let time = if stepped { point.time + point.size } else { point.time };
             let id = ids.last().copied().filter(|_| stepped && checker.fmi3());
-            asked.push((writer.read_these(0, &[index]), time, id));
+            reads.push((writer.read_these(0, &[index]), time, id));
         }
         checker.check("results.time", writer.sequence, move |run| {
-            asked.iter().find_map(|(reads, time, step)| {
+            reads.iter().find_map(|(reads, time, step)| {
                 let value = *value_of(run, reads, index)?.numbers().first()?;
-                // Section 4.2.1 of FMI 3.0: a step may end elsewhere, and says where.
-                let reached = step.and_then(|id| run.of(id)?.written.get(3)?.numbers().first().copied());
+                // Section 4.2.1 of FMI 3.0: a step may end early and returns lastSuccessfulTime.
+                let reached = step.and_then(|id| run.outcome(id)?.written.get(3)?.numbers().first().copied());
                 let time = reached.unwrap_or(*time);
-                let off = (value - time).abs() > 1e-9 * (1.0 + time.abs());
-                off.then(|| format!("the independent variable is {value:?} at {time:?}"))
+                is_other_time(value, time)
+                    .then(|| format!("the independent variable is {value:?} at {time:?}"))
             })
         })?;
     }
     Ok(())
 }
 
-/// In FMI 3.0 a step says where it has come to, which may be elsewhere where its end cannot be met.
+/// Checks lastSuccessfulTime of FMI 3.0; it may differ from the end of the step if the solver cannot reach it.
 pub fn last_successful(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
-    let mut asked = Vec::new();
+    let mut points = Vec::new();
     for point in &trajectory.points {
         let ids = writer.point(0, point);
-        asked.extend(ids.last().map(|id| (*id, point.time + point.size)));
+        points.extend(ids.last().map(|id| (*id, point.time + point.size)));
     }
     checker.check("results.last-successful-time", writer.sequence, move |run| {
-        asked.iter().find_map(|(id, time)| {
-            let outcome = run.of(*id).filter(|of| of.status == Some(0))?;
+        points.iter().find_map(|(id, time)| {
+            let outcome = run.outcome(*id).filter(|outcome| outcome.status == Some(0))?;
             let reached = *outcome.written.get(3)?.numbers().first()?;
-            let off = (reached - time).abs() > 1e-9 * (1.0 + time.abs());
-            off.then(|| format!("lastSuccessfulTime is {reached:?}, the step ends at {time:?}"))
+            is_other_time(reached, *time)
+                .then(|| format!("lastSuccessfulTime is {reached:?}, the step ends at {time:?}"))
         })
     })
 }

@@ -1,20 +1,21 @@
-//! Start values are what the description says; what is set is what is read; values are of their types and within their
+//! Checks start values, that values that are set are read, and that values have their types and
 //! ranges.
 
-use crate::call_sequence::{Run, Written};
+use crate::call_sequence::{Run, Values};
 use crate::checker::Checker;
 use crate::description::Variable;
-use crate::values::{Value, is_read, other_values};
+use crate::finding::{Judges, any};
+use crate::values::other_values;
 use crate::worker::FILL;
 use crate::writer::Part::{Begin, Enter, Free, Leave, Make, Points};
 use crate::writer::{Part, Read, Trajectory, Writer, sample, value_of, values_of};
 use fmi_abi::BaseType;
 use std::sync::Arc;
 
-/// The values of the variables in Initialization Mode, before anything is set.
+/// Checks the values of the variables in Initialization Mode, before any are set.
 pub fn starts(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let model = Arc::clone(&checker.description);
-    // FMI 2.0 has no values before Initialization Mode. In FMI 3.0 they are the start values (section 2.3.2).
+    // FMI 2.0 has no values before Initialization Mode. FMI 3.0 has the start values there (section 2.3.2).
     let situations = [&[Make, Enter][..], &[Make]];
     for parts in situations.into_iter().take(if checker.fmi3() { 2 } else { 1 }) {
         let (model, mut writer) = (Arc::clone(&model), checker.writer(trajectory));
@@ -22,11 +23,11 @@ pub fn starts(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
         let reads = writer.read_these(0, &sample(&model, 10_000));
         checker.check("start_values.start", writer.sequence, move |run| {
             values_of(run, &reads).find_map(|(index, value)| {
-                // A parameter may be the start of a state that has the same reference: a start value for each is not known.
+                // Only the variables that must have their start values are compared.
                 let variable =
                     Some(&model.variables[index]).filter(|variable| !is_start(variable, &value))?;
                 let (name, starts) = (&variable.name, variable.start.join(" "));
-                Some(format!("{name} starts with {}, the description says {starts}", value.show(0)))
+                Some(format!("{name} starts with {}, the model description has {starts}", value.show(0)))
             })
         })?;
     }
@@ -35,22 +36,22 @@ pub fn starts(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
 }
 
 /// Whether a value is the start value, for variables that must have it.
-fn is_start(variable: &Variable, value: &Written) -> bool {
+fn is_start(variable: &Variable, value: &Values) -> bool {
     let fixed = variable.initial == "exact" || variable.causality == "input";
     if !fixed || variable.start.is_empty() || variable.clocked || variable.base.is_none() {
         return true;
     }
     match value {
-        Written::Texts(texts) => {
+        Values::Texts(texts) => {
             let mut pairs = texts.iter().zip(&variable.start);
             variable.base != Some(BaseType::String)
                 || pairs.all(|(text, start)| text.as_deref() == Some(start.as_bytes()))
         }
-        Written::Numbers(kind, bits) => {
+        Values::Numbers(kind, bits) => {
             let starts = variable.starts();
             let wrong = |(bits, start): (&u64, &f64)| {
                 let (is, must) = (kind.number(*bits), kind.number(kind.bits(*start)));
-                // The text may have fewer digits than the number.
+                // The model description may have fewer digits than the value.
                 (is - must).abs() > 1e-9 * must.abs() || is.is_nan() != must.is_nan()
             };
             starts.len() != bits.len() || !bits.iter().zip(&starts).any(wrong)
@@ -59,12 +60,12 @@ fn is_start(variable: &Variable, value: &Written) -> bool {
 }
 
 /// Tests a value of a variable; returns a description of the error.
-type ValueTest = fn(&Variable, &Written) -> Option<String>;
+type ValueTest = fn(&Variable, &Values) -> Option<String>;
 
 /// The rules for each value that is read.
 const VALUE_TESTS: [(&str, ValueTest); 5] = [
     ("start_values.unwritten", |_, value| {
-        let Written::Numbers(kind, bits) = value else { return None };
+        let Values::Numbers(kind, bits) = value else { return None };
         let untouched = u64::from_ne_bytes([FILL; 8]) >> (64 - 8 * kind.size());
         (kind.size() >= 4 && bits.contains(&untouched)).then(|| "has not been written".to_owned())
     }),
@@ -82,7 +83,7 @@ const VALUE_TESTS: [(&str, ValueTest); 5] = [
     }),
     ("start_values.text", |variable, value| {
         let wrong = variable.base == Some(BaseType::String)
-            && matches!(value, Written::Texts(texts) if texts.contains(&None));
+            && matches!(value, Values::Texts(texts) if texts.contains(&None));
         wrong.then(|| "is NULL".to_owned())
     }),
     ("results.not-finite", |variable, value| {
@@ -91,7 +92,7 @@ const VALUE_TESTS: [(&str, ValueTest); 5] = [
     }),
 ];
 
-/// Each value that is read along the trajectory is written, valid for its type and within its range.
+/// Checks that each value that is read along the trajectory is written, valid for its type and within its range.
 fn values(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
@@ -114,7 +115,7 @@ fn values(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Constants and fixed parameters do not change while time goes on.
+/// Checks that constants and fixed parameters do not change while time advances.
 fn constants(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let variables = &checker.description.variables;
     let tunable = variables.iter().any(|other| {
@@ -135,12 +136,11 @@ fn constants(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let first = writer.read_these(0, &fixed);
     writer.play(0, &[Points(usize::MAX)]);
     let last = writer.read_these(0, &fixed);
-    let differ = checker
-        .differ(first, last, |name, before, after| format!("{name} was {before} and has become {after}"));
-    checker.check("start_values.fixed", writer.sequence, differ)
+    let judge = checker.differ(&first, &last, "{} was {} and has become {}");
+    checker.check("start_values.fixed", writer.sequence, judge)
 }
 
-/// Values that are set are read back: before and in Initialization Mode, during the simulation and after it.
+/// Checks that values that are set are read: before and in Initialization Mode, and at a communication point.
 pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let variable = |index: &usize| &description.variables[*index];
@@ -153,11 +153,11 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let with_other = |index: &usize| Some((*index, other_values(description, *index)?));
     let (floats, others): (Vec<usize>, Vec<usize>) =
         indices.iter().partition(|index| variable(index).is_float());
-    let near: Vec<(usize, Value)> = floats.iter().filter_map(with_other).collect();
-    // Together what every model takes; alone what it may refuse.
+    let near: Vec<(usize, Values)> = floats.iter().filter_map(with_other).collect();
+    // Real values near the start values are set together. A model may reject others, so they are set one at a time.
     let alone = others.iter().take(checker.most(40)).flat_map(|index| {
-        // Longer than buffers are.
-        let long = Value::Texts(vec![b"long ".repeat(100); variable(index).start.len()]);
+        // Longer than usual buffers.
+        let long = Values::texts(&b"long ".repeat(100), variable(index).start.len());
         let long = (variable(index).base == Some(BaseType::String)).then_some((*index, long));
         with_other(index).into_iter().chain(long).map(|value| vec![value])
     });
@@ -166,23 +166,23 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     }
     for values in std::iter::once(near.clone()).filter(|near| !near.is_empty()).chain(alone) {
         for (before, after) in [(&[Make, Enter][..], &[][..]), (&[Make][..], &[Enter][..])] {
-            what_was_set(checker, trajectory, before, values.clone(), after)?;
+            read_back(checker, trajectory, before, values.clone(), after)?;
         }
     }
-    // At a communication point, where event modes are not needed for it.
+    // At a communication point: the variables that can be set there without Event Mode.
     for index in indices.iter().take(checker.most(400)) {
         let of = variable(index);
         let late = of.causality == "input" || of.variability == "tunable" && trajectory.is_stepped();
         let late = late && (of.is_float() || of.variability != "discrete" && trajectory.is_stepped());
         if let Some(value) = with_other(index).filter(|_| late && !of.once_per_instant) {
-            what_was_set(checker, trajectory, &[Begin, Points(2)], vec![value], &[])?;
+            read_back(checker, trajectory, &[Begin, Points(2)], vec![value], &[])?;
         }
     }
     inputs(checker, trajectory)
 }
 
-/// Start values count, whether they are set before Initialization Mode or in it, and whatever is read in between.
-fn when(checker: &Checker, trajectory: &Trajectory, values: &[(usize, Value)]) -> anyhow::Result<()> {
+/// Checks that start values have the same effect before Initialization Mode and in it, regardless of reads in between.
+fn when(checker: &Checker, trajectory: &Trajectory, values: &[(usize, Values)]) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let mut sets = Vec::new();
     let [before, within] =
@@ -190,41 +190,40 @@ fn when(checker: &Checker, trajectory: &Trajectory, values: &[(usize, Value)]) -
             writer.play(0, before);
             sets.extend(writer.set(0, values));
             writer.play(0, after);
-            writer.play(0, &[Part::Read, Leave, Part::Ask, Free]).reads
+            writer.play(0, &[Part::Read, Leave, Part::ReadAll, Free]).reads
         });
-    let differ = checker.differ(before, within, |name, one, other| {
-        format!("{name} is {one} with values set before Initialization Mode, {other} with those set in it")
-    });
+    let message = "{} is {} with values set before Initialization Mode, {} with values set in it";
+    let differ = checker.differ(&before, &within, message);
     checker.check("start_values.when", writer.sequence, move |run| {
         let good = sets.iter().all(|id| run.succeeds(*id));
         if good { differ(run) } else { None }
     })
 }
 
-/// Values that were set by calls and read by others: the first that was not read as it was set.
+/// Judges whether all values that were set are read; describes the first that is not.
 fn lost(
     checker: &Checker,
     ids: Vec<u32>,
     reads: Vec<Read>,
-    values: Vec<(usize, Value)>,
+    values: Vec<(usize, Values)>,
     has: &'static str,
-) -> impl Fn(&Run) -> Option<String> + use<> {
+) -> Box<dyn Judges> {
     let description = checker.description.clone();
-    move |run| {
+    Box::new(move |run: &Run| {
         let good = ids.iter().all(|id| run.succeeds(*id));
         values.iter().filter(|_| good).find_map(|(index, value)| {
-            let read = value_of(run, &reads, *index).filter(|read| !is_read(read, value))?;
+            let read = value_of(run, &reads, *index).filter(|read| read.differ(value).is_some())?;
             let name = &description.variables[*index].name;
-            Some(format!("{name} was set to {} and {has} {}", value.show(), read.show(0)))
+            Some(format!("{name} was set to {} and {has} {}", value.show(0), read.show(0)))
         })
-    }
+    })
 }
 
-fn what_was_set(
+fn read_back(
     checker: &Checker,
     trajectory: &Trajectory,
     before: &[Part],
-    values: Vec<(usize, Value)>,
+    values: Vec<(usize, Values)>,
     after: &[Part],
 ) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
@@ -236,11 +235,11 @@ fn what_was_set(
 }
 
 /// Reads the variables that were set.
-fn read_again(writer: &mut Writer, values: &[(usize, Value)]) -> Vec<Read> {
+fn read_again(writer: &mut Writer, values: &[(usize, Values)]) -> Vec<Read> {
     writer.read_these(0, &values.iter().map(|(index, _)| *index).collect::<Vec<_>>())
 }
 
-/// Inputs keep their values through steps and events.
+/// Checks that inputs keep their values through steps and events.
 fn inputs(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
@@ -250,6 +249,5 @@ fn inputs(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         let reads = read_again(&mut writer, &point.inputs);
         judges.push(lost(checker, ids, reads, point.inputs.clone(), "has become"));
     }
-    checker
-        .check("start_values.inputs", writer.sequence, move |run| judges.iter().find_map(|judge| judge(run)))
+    checker.check("start_values.inputs", writer.sequence, any(judges))
 }

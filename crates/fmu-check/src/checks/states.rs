@@ -1,11 +1,11 @@
-//! Saved states: what follows a restored one is what followed the first time, in the same instance, after a reset, from
+//! Checks that a simulation from a restored state repeats the first one: in the same instance, from serialized
 //! bytes, and in a fresh process.
 
-use crate::call_sequence::{Step, Written};
+use crate::call_sequence::{Step, Values};
 use crate::checker::Checker;
-use crate::finding::{Judges, refused};
-use crate::writer::Part::{Ask, Begin, Call, Drop, Enter, Free, Leave, Make, Points, Restore, Run, Save};
-use crate::writer::{Read, Trajectory};
+use crate::finding::{any, fails};
+use crate::writer::Part::{Begin, Call, Drop, Enter, Free, Leave, Make, Points, ReadAll, Restore, Run, Save};
+use crate::writer::Trajectory;
 
 /// The points at which states are saved: the first, one in the middle, one near the end.
 fn indices(trajectory: &Trajectory) -> Vec<usize> {
@@ -17,52 +17,47 @@ fn indices(trajectory: &Trajectory) -> Vec<usize> {
     indices
 }
 
-fn same(checker: &Checker, what: &'static str, one: Vec<Read>, other: Vec<Read>) -> Box<dyn Judges> {
-    checker
-        .differ(one, other, move |name, before, after| format!("{name} was {before}, {what} it is {after}"))
-}
-
-/// Saved, gone on, restored, gone on: the same; twice; and saving changes nothing.
+/// Checks that saving changes nothing, and that a simulation can be repeated from a restored state, twice.
 pub fn restore(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for index in indices(trajectory) {
         let mut writer = checker.writer(trajectory);
-        let before = writer.play(0, &[Begin, Points(index), Ask]).reads;
-        let after = writer.play(0, &[Save(0), Ask]).reads;
-        let first = writer.play(0, &[Run(index)]).reads;
-        let at_once = writer.play(0, &[Restore(0), Ask]).reads;
-        let second = writer.play(0, &[Run(index)]).reads;
-        let third = writer.play(0, &[Restore(0), Run(index)]).reads;
+        let [before, after, first] =
+            writer.groups(0, &[Begin, Points(index), ReadAll, Save(0), ReadAll, Run(index)]);
+        let [at_once, second, third] =
+            writer.groups(0, &[Restore(0), ReadAll, Run(index), Restore(0), Run(index)]);
         let sequence = writer.sequence;
-        let saving = same(checker, "after the state was saved", before.clone(), after);
+        let saving = checker.differ(&before, &after, "{} was {}, after the state was saved it is {}");
         let run = checker.judge("states.changed-by-saving", sequence.clone(), saving)?;
-        let judges = [
-            ("states.restore-values", same(checker, "after the state was restored", before, at_once)),
-            ("states.restore", same(checker, "from the restored state", first.clone(), second)),
-            ("states.twice", same(checker, "from the state restored a second time", first, third)),
+        let pairs = [
+            ("states.restore-values", &before, &at_once, "{} was {}, after the state was restored it is {}"),
+            ("states.restore", &first, &second, "{} was {}, from the restored state it is {}"),
+            ("states.twice", &first, &third, "{} was {}, from the state restored a second time it is {}"),
         ];
-        judges.into_iter().any(|(name, judge)| checker.keep(name, &run, &sequence, judge));
+        pairs.into_iter().any(|(name, one, other, message)| {
+            checker.keep(name, &run, &sequence, checker.differ(one, other, message))
+        });
     }
     modes(checker, trajectory)?;
     reused(checker, trajectory)?;
     free_null(checker, trajectory)
 }
 
-/// A state of one mode, restored in another.
+/// Checks states that are saved in one mode and restored in another.
 fn modes(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let first = writer.play(0, &[Make, Save(0), Enter, Save(1), Leave, Run(0), Call("Terminate")]).reads;
-    // Back to the initialization, then to the beginning.
+    // Back to Initialization Mode, then to the new instance.
     let back = writer.play(0, &[Restore(1), Leave, Run(0)]);
     let again = writer.play(0, &[Restore(0), Enter, Leave, Run(0)]);
-    let one = same(checker, "from the state of Initialization Mode", first.clone(), back.reads);
-    let two = same(checker, "from the state of the new instance", first, again.reads);
-    let (sequence, ids) = (writer.sequence.clone(), [back.ids, again.ids].concat());
-    checker.check("states.modes", writer.sequence, move |run| {
-        refused(&sequence, run, &ids).or_else(|| one(run)).or_else(|| two(run))
-    })
+    let judges = [
+        fails(&writer.sequence, [back.ids, again.ids].concat()),
+        checker.differ(&first, &back.reads, "{} was {}, from the state of Initialization Mode it is {}"),
+        checker.differ(&first, &again.reads, "{} was {}, from the state of the new instance it is {}"),
+    ];
+    checker.check("states.modes", writer.sequence, any(judges))
 }
 
-/// A handle that is used for another state, and two states side by side.
+/// Checks a handle that is used again for another state, and two saved states.
 fn reused(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     if trajectory.points.len() < 3 {
         return Ok(());
@@ -70,21 +65,20 @@ fn reused(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.play(0, &[Begin, Points(1), Save(0), Save(1)]);
     writer.point(0, &trajectory.points[1]);
-    let values = writer.ask(0);
-    let first = writer.play(0, &[Save(1), Run(2)]).reads;
-    let again = writer.play(0, &[Restore(0), Restore(1), Ask]).reads;
-    let second = writer.play(0, &[Run(2), Restore(0)]).reads;
+    let [values, first] = writer.groups(0, &[ReadAll, Save(1), Run(2)]);
+    let [again, second] = writer.groups(0, &[Restore(0), Restore(1), ReadAll, Run(2), Restore(0)]);
     writer.point(0, &trajectory.points[1]);
-    let from_first = writer.play(0, &[Ask, Drop(0), Drop(1)]).reads;
+    let from_first = writer.play(0, &[ReadAll, Drop(0), Drop(1)]).reads;
+    let used = "{} was {}, from the state in a used handle it is {}";
     let judges = [
-        same(checker, "from the state in a used handle", values.clone(), again),
-        same(checker, "from the state in a used handle", first, second),
-        same(checker, "from the other state", values, from_first),
+        checker.differ(&values, &again, used),
+        checker.differ(&first, &second, used),
+        checker.differ(&values, &from_first, "{} was {}, from the other state it is {}"),
     ];
-    checker.check("states.several", writer.sequence, move |run| judges.iter().find_map(|judge| judge(run)))
+    checker.check("states.several", writer.sequence, any(judges))
 }
 
-/// NULL is ignored, and a freed state leaves NULL.
+/// Checks that freeing NULL is ignored and that freeing a state sets its handle to NULL.
 fn free_null(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.play(0, &[Begin, Save(0)]);
@@ -92,7 +86,7 @@ fn free_null(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     checker.check("states.free", writer.sequence, move |run| {
         let (freed, nothing) = (ids[0], ids[1]);
         if run.status(nothing).is_some_and(|status| status > 1) {
-            return Some("freeing a state that is NULL is refused".to_owned());
+            return Some("freeing a state that is NULL is rejected".to_owned());
         }
         let left = run.status(freed) == Some(0) && run.written(freed)?.numbers() != [0.0];
         left.then(|| "the handle of a freed state is not NULL".to_owned())
@@ -103,7 +97,7 @@ fn free_null(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
 pub fn serialized(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for (index, fresh) in indices(trajectory).into_iter().flat_map(|index| [(index, false), (index, true)]) {
         let mut writer = checker.writer(trajectory);
-        let before = writer.play(0, &[Begin, Points(index), Ask, Save(0)]).reads;
+        let before = writer.play(0, &[Begin, Points(index), ReadAll, Save(0)]).reads;
         let [size, bytes] = writer.serialize(0, 0);
         let first = writer.play(0, &[Run(index)]).reads;
         if fresh {
@@ -114,23 +108,23 @@ pub fn serialized(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<
         // States may be set in two situations that importers use: after instantiation and after initialization.
         writer.play(1, &[if index == 0 && fresh { Make } else { Begin }]);
         let read = writer.deserialize(1, 0, 1);
-        let set = writer.play(1, &[Restore(1), Ask]);
+        let set = writer.play(1, &[Restore(1), ReadAll]);
         let second = writer.play(1, &[Run(index)]).reads;
-        let sequence = writer.sequence.clone();
         let name = if fresh { "states.fresh-process" } else { "states.serialized" };
-        let one = same(checker, "from the bytes", before, set.reads);
-        let two = same(checker, "from the bytes", first, second);
+        let message = "{} was {}, from the bytes it is {}";
+        let judge = any([
+            fails(&writer.sequence, vec![read, set.ids[0]]),
+            checker.differ(&before, &set.reads, message),
+            checker.differ(&first, &second, message),
+        ]);
         checker.check(name, writer.sequence, move |run| {
-            if ![bytes, size].iter().all(|id| run.succeeds(*id)) {
-                return None;
-            }
-            refused(&sequence, run, &[read, set.ids[0]]).or_else(|| one(run)).or_else(|| two(run))
+            [bytes, size].iter().all(|id| run.succeeds(*id)).then(|| judge(run))?
         })?;
     }
     again(checker, trajectory)
 }
 
-/// Serializing twice gives the same bytes, and serializing what was read gives them, too.
+/// Checks that a deserialized state is serialized to the same bytes.
 fn again(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.play(0, &[Begin, Points(trajectory.points.len() / 2), Save(0)]);
@@ -140,7 +134,7 @@ fn again(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     checker.check("states.bytes", writer.sequence, move |run| {
         let (one, two) = (run.written(first)?, run.written(second)?);
         match (one, two) {
-            (Written::Numbers(_, one), Written::Numbers(_, two)) if one.len() != two.len() => {
+            (Values::Numbers(_, one), Values::Numbers(_, two)) if one.len() != two.len() => {
                 Some(format!("{} bytes, and {} of the same state", one.len(), two.len()))
             }
             _ => one.differ(two).map(|index| format!("byte {index} of {} differs", one.numbers().len())),

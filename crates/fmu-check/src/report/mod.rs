@@ -6,14 +6,14 @@ mod sarif;
 use crate::baseline::Baseline;
 use crate::checker::{Checker, Unchecked};
 use crate::finding::{Finding, Severity};
-use crate::{FailOn, Options};
+use crate::options::{FailOn, Options};
 use std::fmt::Write as _;
 use std::path::Path;
 
 /// The report on an FMU.
 #[derive(Clone, serde::Serialize)]
 pub struct Report {
-    /// The version of the report's structure: 1. It changes when a field changes or goes.
+    /// The version of the report's structure: 1. It changes when a field is changed or removed.
     pub schema: u32,
     /// The version of this tool.
     pub version: &'static str,
@@ -31,7 +31,7 @@ pub struct Report {
     pub sequences: u64,
     /// How long it took.
     pub seconds: f64,
-    /// Chose what was chosen at random.
+    /// Seed of random choices.
     pub seed: u64,
     /// How many variables there are, and how many of them most checks read.
     pub variables: [usize; 2],
@@ -77,11 +77,11 @@ impl Report {
         };
         self.unused = baseline.unused(&self.findings, &self.unreached);
         for finding in &mut self.findings {
-            finding.accepted = baseline.of_finding(finding);
+            finding.accepted = baseline.reason(finding);
             finding.fails = finding.accepted.is_none() && from.is_some_and(|from| finding.severity >= from);
         }
         for unchecked in self.unreached.iter_mut().filter(|unchecked| !unchecked.allowed) {
-            let reason = baseline.of_unchecked(&unchecked.name);
+            let reason = baseline.unchecked_reason(&unchecked.name);
             if let Some(reason) = reason {
                 unchecked.why = format!("{} (accepted: {reason})", unchecked.why);
             }
@@ -105,7 +105,7 @@ impl Report {
         if self.interfaces.is_empty() { "no interface".to_owned() } else { self.interfaces.join(" and ") }
     }
 
-    /// In a sentence.
+    /// Returns the numbers of findings by severity in a sentence.
     fn summary(&self) -> String {
         let many =
             |count: usize, one: &str, more: &str| format!("{count} {}", if count == 1 { one } else { more });
@@ -175,11 +175,11 @@ impl Report {
         let case = |class: &str, name: &str, body: &str| {
             format!("  <testcase classname=\"fmu-check{class}\" name=\"{name}\">{body}</testcase>\n")
         };
-        let of_unchecked = |Unchecked { name, why, allowed }: &Unchecked| {
+        let unchecked_case = |Unchecked { name, why, allowed }: &Unchecked| {
             let kind = if *allowed { "skipped" } else { "error" };
             case("", name, &format!("<{kind} message=\"not checked: {}\"/>", escape(why)))
         };
-        let of_finding = |finding: &Finding| {
+        let finding_case = |finding: &Finding| {
             let Finding { observed, section, requirement, .. } = finding;
             let body = format!("{observed}\n{section}: {requirement}\n{}", finding.more.join("\n"));
             let accepted = finding.accepted.as_ref().map(|reason| format!("\nAccepted: {reason}"));
@@ -192,8 +192,8 @@ impl Report {
             };
             case(&format!(".{}", finding.topic()), &finding.name, &format!("\n    {body}\n  "))
         };
-        let mut cases: Vec<String> = self.unreached.iter().map(of_unchecked).collect();
-        cases.extend(self.findings.iter().map(of_finding));
+        let mut cases: Vec<String> = self.unreached.iter().map(unchecked_case).collect();
+        cases.extend(self.findings.iter().map(finding_case));
         if self.findings.is_empty() {
             cases.push(case("", "no findings", ""));
         }

@@ -1,4 +1,4 @@
-//! The report as one page that needs nothing else.
+//! The report as an HTML page without other files.
 
 use super::Report;
 use crate::finding::Severity;
@@ -9,35 +9,12 @@ pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// The page.
 pub fn page(report: &Report) -> String {
-    let mut text = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\n\
-         <title>fmu-check: {}</title>\n<style>\n\
-         body {{ font: 16px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 60rem; padding: 0 1rem; color: #222; background: #fff }}\n\
-         h1 {{ font-size: 1.5rem }} h2 {{ font-size: 1.05rem; margin: 0 }} code, pre {{ font: 13px/1.4 ui-monospace, monospace }}\n\
-         pre {{ overflow: auto; background: #f4f4f4; padding: .8rem; max-height: 30rem }}\n\
-         section {{ border-left: .4rem solid; padding: .2rem 0 .2rem 1rem; margin: 1.2rem 0 }} p {{ margin: .3rem 0 }}\n\
-         .violation {{ border-color: #b3261e }} .fragile {{ border-color: #b26a00 }} .note {{ border-color: #3567a8 }}\n\
-         .severity {{ float: right; font-weight: 600 }}\n\
-         @media (prefers-color-scheme: dark) {{ body {{ color: #ddd; background: #181818 }} pre {{ background: #242424 }} }}\n\
-         </style></head><body>\n<h1>{}</h1>\n<p>{}, {}, {}: <strong>{}</strong></p>\n",
-        escape(&report.model),
-        escape(&report.model),
-        escape(&report.fmu),
-        report.standard,
-        report.offers(),
-        report.summary()
-    );
-    let _ = writeln!(
-        text,
-        "<p>{} call sequences were played in separate processes, in {:.1} s, with seed {}.</p>",
-        report.sequences, report.seconds, report.seed
-    );
+    let mut text = String::new();
     for (severity, what) in [
-        (Severity::Violation, "Violation: the standard says must."),
-        (Severity::Fragile, "Fragile: nothing forbids it, but it hurts."),
-        (Severity::Note, "Note: good to know."),
+        (Severity::Violation, "Violation: the standard requires it."),
+        (Severity::Fragile, "Fragile: no rule forbids it, but importers fail."),
+        (Severity::Note, "Note: information."),
     ] {
         let findings: Vec<_> =
             report.findings.iter().filter(|finding| finding.severity == severity).collect();
@@ -86,6 +63,18 @@ pub fn page(report: &Report) -> String {
         }
         text.push_str("</ul>\n");
     }
-    text.push_str("</body></html>\n");
-    text
+    let values = [
+        ("{model}", escape(&report.model)),
+        ("{fmu}", escape(&report.fmu)),
+        ("{standard}", report.standard.clone()),
+        ("{interfaces}", report.offers()),
+        ("{summary}", report.summary()),
+        ("{sequences}", report.sequences.to_string()),
+        ("{seconds}", format!("{:.1}", report.seconds)),
+        ("{seed}", report.seed.to_string()),
+        ("{findings}", text),
+    ];
+    values
+        .into_iter()
+        .fold(include_str!("page.html").to_owned(), |page, (name, value)| page.replace(name, &value))
 }

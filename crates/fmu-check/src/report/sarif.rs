@@ -12,7 +12,6 @@ const fn level(severity: Severity) -> &'static str {
     }
 }
 
-/// The report.
 pub fn sarif(report: &Report) -> Value {
     let rules: Vec<Value> = report
         .findings

@@ -1,14 +1,13 @@
 //! A sequence as a program in C.
 
 use super::evidence::{Evidence, Measure, Proof};
-use crate::call_sequence::{Arg, CallSequence, Kind, Make, NOBODY, Numbered, Setting, Step};
+use crate::call_sequence::{Arg, CallSequence, Kind, Make, NULL_INSTANCE, Numbered, Setting, Step};
 use crate::description::Description;
 use crate::finding::Finding;
 use fmi_abi::calls::signature;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-/// The program.
 pub fn program(
     finding: &Finding,
     sequence: &CallSequence,
@@ -47,8 +46,8 @@ pub fn program(
     let save = each(bytes, &|slot| format!("    pass_on({slot}, b{slot}, *n{slot});\n"));
     let list: Vec<String> = (0..parts.len()).map(|number| format!("phase{number}")).collect();
     format!(
-        "/*\n{} * cc repro.c -o repro -ldl -lpthread && ./repro FOLDER_OF_THE_UNPACKED_FMU\n *\n \
-         * Exit status: 1 if the finding shows, 0 if it does not, 3 if that cannot be told.\n */\n\
+        "/*\n{} * cc repro.c -o repro -ldl -lpthread && ./repro DIRECTORY_OF_THE_UNPACKED_FMU\n *\n \
+         * Exit status: 1 if the finding shows, 0 if it does not, 3 if that is not known.\n */\n\
          #define FMI {}\n{}{declared}\n{threads}{}static void (*const phases[])(void) = {{{}}};\n\
          static const char library_name[] = \"{}\";\n\nstatic void load(void) {{\n{load}}}\n\n\
          static void save(void) {{\n{save}}}\n\n{}{}",
@@ -87,7 +86,7 @@ fn library(setting: &Setting, sequence: &CallSequence) -> String {
     path.strip_prefix(directory).unwrap_or(&path).to_string_lossy().replace('\\', "/")
 }
 
-/// The function that tells whether the results of the calls are those of the finding.
+/// Returns the C function that compares the results of the calls with the results of the finding.
 fn shows(evidence: &Evidence) -> String {
     let results = match evidence {
         Evidence::None | Evidence::End | Evidence::Left => None,
@@ -135,13 +134,11 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    /// The next number.
     fn number(&mut self) -> usize {
         self.next += 1;
         self.next - 1
     }
 
-    /// The steps in C.
     fn block(&mut self, sequence: &[Numbered], indent: &str) -> String {
         let lines = sequence.iter().map(|numbered| self.step(numbered)).collect::<String>();
         lines.lines().fold(String::new(), |text, line| text + indent + line + "\n")
@@ -159,11 +156,11 @@ impl Writer<'_> {
     fn step(&mut self, Numbered { id, step, .. }: &Numbered) -> String {
         match step {
             Step::Make(index, make) => self.make(*id, *index, make),
-            Step::Call { of, function, args } => self.call(*id, *of, function, args),
+            Step::Call { instance, function, args } => self.call(*id, *instance, function, args),
             Step::Version(name) => format!("version({id}, \"{name}\");\n"),
             Step::Free(index) => {
                 let name = if self.fmi3 { "fmi3FreeInstance" } else { "fmi2FreeInstance" };
-                let instance = if *index == NOBODY { "NULL".to_owned() } else { format!("c{index}") };
+                let instance = if *index == NULL_INSTANCE { "NULL".to_owned() } else { format!("c{index}") };
                 format!("((void (*)(void *))function(\"{name}\"))({instance});\n")
             }
             Step::Measure => format!("measure({id});\n"),
@@ -197,44 +194,42 @@ impl Writer<'_> {
 
     fn make(&mut self, id: u32, index: usize, make: &Make) -> String {
         self.instances.insert(index);
-        let of =
-            |text: &Option<String>| text.as_ref().map_or("NULL".to_owned(), |text| literal(text.as_bytes()));
-        let (name, token) = (of(&make.name), of(&make.token));
-        let flags = [make.co_simulation, make.resources, make.logging, make.event_mode, make.early_return];
+        let (name, token) = (literal(make.name.as_bytes()), literal(make.token.as_bytes()));
+        let flags = [make.co_simulation, make.logging, make.event_mode, make.early_return];
         let flags = flags.map(|flag| flag.to_string()).join(", ");
         let made = format!("c{index} = make({index}, {name}, {token}, {flags});\n");
         let [_, log] = self.matters(id).unwrap_or_default();
-        let log = if log { "said" } else { "\"\"" };
+        let log = if log { "messages" } else { "\"\"" };
         let result = format!("{{ FILE *file = begin({id}, c{index} != NULL); end(file, {log}); }}\n");
         made + if self.matters(id).is_some() { result.as_str() } else { "" }
     }
 
-    fn call(&mut self, id: u32, of: Option<usize>, name: &str, args: &[Arg]) -> String {
+    fn call(&mut self, id: u32, instance: Option<usize>, name: &str, args: &[Arg]) -> String {
         let Some(signature) = signature(name) else { return String::new() };
-        self.instances.extend(of);
+        self.instances.extend(instance);
         let mut parts = Parts::default();
         let (mut types, mut passed) = (String::new(), String::new());
         for (arg, argument) in args.iter().zip(signature.arguments) {
             let _ = write!(types, ", {}", type_of(argument.of));
             let _ = write!(passed, ", {}", self.argument(&mut parts, arg, name));
         }
-        let instance = of.map_or("NULL".to_owned(), |index| format!("c{index}"));
-        let guard = of.map_or(String::new(), |index| format!("if (c{index}) "));
+        let handle = instance.map_or("NULL".to_owned(), |index| format!("c{index}"));
+        let guard = instance.map_or(String::new(), |index| format!("if (c{index}) "));
         let comment =
             comment(args, self.description).map_or(String::new(), |names| format!(" /* {names} */"));
         let mut after = parts.after;
         if let Some([written, log]) = self.matters(id) {
             after.push(format!("FILE *file = begin({id}, status);"));
             after.extend(parts.proofs.into_iter().filter(|_| written));
-            after.push(format!("end(file, {});", if log { "said" } else { "\"\"" }));
+            after.push(format!("end(file, {});", if log { "messages" } else { "\"\"" }));
         }
         if *self.evidence == Evidence::Damage {
             after.extend(parts.checks);
         }
         let lines = |lines: Vec<String>| lines.iter().map(|line| format!("    {line}\n")).collect::<String>();
         format!(
-            "{guard}{{{comment}\n    size_t before = arrays;\n{}    *said = 0;\n\
-             \x20   int status = ((int (*)(void *{types}))function(\"{name}\"))({instance}{passed});\n\
+            "{guard}{{{comment}\n    size_t before = arrays;\n{}    *messages = 0;\n\
+             \x20   int status = ((int (*)(void *{types}))function(\"{name}\"))({handle}{passed});\n\
              \x20   print(\"{name}: %d\", status);\n{}    print(\"\\n\"); release(before);\n}}\n",
             lines(parts.before),
             lines(after)
@@ -256,14 +251,13 @@ impl Writer<'_> {
             Arg::Real(bits) => number_of(Kind::F64, *bits),
             Arg::Whole(number) => number.to_string(),
             Arg::Null => "NULL".to_owned(),
-            Arg::Misaligned => "(char *)guarded(NULL, 64) + 1".to_owned(),
             Arg::In(kind, bits) => {
                 parts.array(number, kind.c_name(), bits.iter().map(|bits| number_of(*kind, *bits)))
             }
             Arg::Texts(texts) => {
-                let of =
+                let pointer =
                     |text: &Option<Vec<u8>>| text.as_ref().map_or("NULL".to_owned(), |text| string(text, 1));
-                parts.array(number, "void *", texts.iter().map(of))
+                parts.array(number, "void *", texts.iter().map(pointer))
             }
             Arg::Blobs(blobs) => parts.array(number, "void *", blobs.iter().map(|blob| string(blob, 0))),
             Arg::Out(kind, count) => parts.out(name, *kind, *count, number),
@@ -276,20 +270,19 @@ impl Writer<'_> {
             Arg::SavedSize(slot) => format!("*n{slot}"),
             Arg::SizeOut(slot) => {
                 parts.after.push(format!("print(\" -> %zu bytes\", *n{slot});"));
-                parts.proofs.push(format!("put_words(file, n{slot}, 1, 8);"));
+                parts.proofs.push(format!("put_numbers(file, n{slot}, 1, 8);"));
                 format!("n{slot}")
             }
             Arg::SavedOut(slot) => {
                 parts.before.push(format!("void *a{number} = guarded(NULL, *n{slot});"));
                 parts.after.push(format!("memcpy(b{slot}, a{number}, *n{slot});"));
-                parts.proofs.push(format!("put_words(file, a{number}, *n{slot}, 1);"));
+                parts.proofs.push(format!("put_numbers(file, a{number}, *n{slot}, 1);"));
                 format!("a{number}")
             }
         }
     }
 }
 
-/// The lines of a call.
 #[derive(Default)]
 struct Parts {
     before: Vec<String>,
@@ -301,18 +294,17 @@ struct Parts {
 }
 
 impl Parts {
-    /// An array for reading.
-    fn array(&mut self, number: usize, of: &str, list: impl Iterator<Item = String>) -> String {
+    fn array(&mut self, number: usize, element: &str, list: impl Iterator<Item = String>) -> String {
         let list: Vec<String> = list.collect();
         let (count, list) = (list.len(), if list.is_empty() { "0".to_owned() } else { list.join(", ") });
         let size = format!("{count} * sizeof *v{number}");
-        self.before
-            .push(format!("{of} v{number}[] = {{{list}}}; void *a{number} = guarded(v{number}, {size});"));
+        self.before.push(format!(
+            "{element} v{number}[] = {{{list}}}; void *a{number} = guarded(v{number}, {size});"
+        ));
         self.checks.push(format!("look_at(a{number}, v{number}, {size});"));
         format!("a{number}")
     }
 
-    /// An array that is written.
     fn out(&mut self, name: &str, kind: Kind, count: usize, number: usize) -> String {
         let (c, width) = (kind.c_name(), kind.size());
         self.before.push(format!("void *a{number} = guarded(NULL, {count} * sizeof({c}));"));
@@ -334,33 +326,35 @@ impl Parts {
         if name != "fmi3GetBinary" {
             self.proofs.push(match letter {
                 's' => format!("if (status < 2) put_texts(file, a{number}, {count});"),
-                _ => format!("put_words(file, a{number}, {count}, {width});"),
+                _ => format!("put_numbers(file, a{number}, {count}, {width});"),
             });
         }
         format!("a{number}")
     }
 }
 
-/// The names of the variables that a call is about.
+/// Returns the names of the variables whose value references are the first argument.
 fn comment(args: &[Arg], description: &Description) -> Option<String> {
     let Some(Arg::In(Kind::U32, references)) = args.first() else { return None };
     let names: Vec<&str> = references
         .iter()
         .take(8)
-        .filter_map(|reference| description.variables.iter().find(|of| u64::from(of.reference) == *reference))
+        .filter_map(|reference| {
+            description.variables.iter().find(|variable| u64::from(variable.reference) == *reference)
+        })
         .map(|variable| variable.name.as_str())
         .collect();
     let more = if references.len() > 8 { ", ..." } else { "" };
     (!names.is_empty()).then(|| format!("{}{more}", names.join(", ").replace("*/", "* /")))
 }
 
-fn type_of(of: &str) -> &'static str {
-    match of {
+fn type_of(name: &str) -> &'static str {
+    match name {
         "usize" => "size_t",
         "fmi2Real" | "fmi3Float64" => "double",
         "fmi3Boolean" => "bool",
         "fmi2ValueReference" | "fmi3ValueReference" => "uint32_t",
-        of if of.starts_with('*') || of.to_lowercase().contains("fmustate") => "void *",
+        name if name.starts_with('*') || name.to_lowercase().contains("fmustate") => "void *",
         _ => "int",
     }
 }

@@ -1,14 +1,14 @@
 //! The results that show a finding, found by leaving out those that the judge does not need. A program that reproduces a
 //! finding compares them.
 
-use crate::call_sequence::{CallSequence, End, Numbered, Outcome, Run, Step, Written};
-use crate::finding::{Finding, Judge};
+use crate::call_sequence::{Arg, CallSequence, End, Numbered, Outcome, Run, Step, Values, step_of};
+use crate::finding::{Finding, Judge, step_name};
 use std::fmt::Write as _;
 
-/// How a program finds out whether a finding shows.
+/// Comparison by which a program decides whether a finding shows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Evidence {
-    /// No program can.
+    /// No comparison is known.
     #[default]
     None,
     /// A process does not end as it should, or the library cannot be loaded.
@@ -27,7 +27,7 @@ pub enum Evidence {
     Grown(Measure, u32, u32, u64),
 }
 
-/// Repetitions in a program, which has as long as it needs, but not for thousands.
+/// Maximum number of repetitions in a program, which should end in seconds.
 const REPETITIONS: usize = 500;
 
 /// The quantity of a measurement.
@@ -63,10 +63,10 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     if without(&|run| run.left.clear()) {
         return Evidence::Left;
     }
-    if without(&|run| run.said.clear()) {
+    if without(&|run| run.output.clear()) {
         return Evidence::Printed;
     }
-    if without(&|run| run.outcomes.values_mut().for_each(|of| of.damage.clear())) {
+    if without(&|run| run.outcomes.values_mut().for_each(|outcome| outcome.damage.clear())) {
         return Evidence::Damage;
     }
     let pairs = pairs(&finding.sequence);
@@ -74,12 +74,12 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
         return Evidence::Differ(pairs);
     }
     let needed = needed(judge, run);
-    let measured = |of: &&Outcome| of.measured.as_ref().is_some_and(|measured| measured.times == 0);
-    if needed.outcomes.values().any(|of| measured(&of)) {
+    let measured = |outcome: &&Outcome| outcome.measured.as_ref().is_some_and(|measured| measured.times == 0);
+    if needed.outcomes.values().any(|outcome| measured(&outcome)) {
         return grown(finding, &needed);
     }
-    let calls = needed.outcomes.values().filter(|of| of.measured.is_none());
-    let mut ids: Vec<u32> = calls.map(|of| of.id).collect();
+    let calls = needed.outcomes.values().filter(|outcome| outcome.measured.is_none());
+    let mut ids: Vec<u32> = calls.map(|outcome| outcome.id).collect();
     ids.sort_unstable();
     let proofs: Vec<Proof> = ids.iter().map(|id| proof(judge, &needed, *id)).collect();
     let calls: Vec<_> = proofs.iter().filter_map(|proof| function(&finding.sequence, proof.id)).collect();
@@ -92,7 +92,7 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     }
 }
 
-/// The queries of threads, each with the one in the simulation before them that it is compared with. Which of them differ
+/// Returns each read of a thread with the corresponding read of the simulation before the threads. Which of them differ
 /// depends on chance.
 fn pairs(sequence: &CallSequence) -> Vec<[u32; 2]> {
     let queries = |sequence: &[Numbered]| -> Vec<u32> {
@@ -138,11 +138,12 @@ fn proof(judge: &Judge, run: &Run, id: u32) -> Proof {
         judge(&changed).is_none()
     };
     let matters = [
-        without(&|of| of.written.clear()) || run.of(id).is_some_and(|of| of.text.is_some()),
-        without(&|of| of.log.clear())
-            || run.of(id).is_some_and(|of| of.log.is_empty() && of.status > Some(1)),
+        without(&|outcome| outcome.written.clear())
+            || run.outcome(id).is_some_and(|outcome| outcome.text.is_some()),
+        without(&|outcome| outcome.log.clear())
+            || run.outcome(id).is_some_and(|outcome| outcome.log.is_empty() && outcome.status > Some(1)),
     ];
-    Proof { id, matters, observed: run.of(id).map_or(String::new(), |of| shown(of, matters)) }
+    Proof { id, matters, observed: run.outcome(id).map_or(String::new(), |outcome| shown(outcome, matters)) }
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -161,13 +162,13 @@ fn shown(outcome: &Outcome, [written, log]: [bool; 2]) -> String {
     }
     for array in outcome.written.iter().filter(|_| written) {
         match array {
-            Written::Numbers(kind, bits) => {
+            Values::Numbers(kind, bits) => {
                 for bits in bits {
                     let mask = u64::MAX >> (64 - 8 * kind.size());
                     let _ = write!(text, "{:x},", bits & mask);
                 }
             }
-            Written::Texts(texts) => texts.iter().for_each(|string| {
+            Values::Texts(texts) => texts.iter().for_each(|string| {
                 let _ = write!(text, "{},", or_null(string));
             }),
         }
@@ -182,29 +183,29 @@ fn shown(outcome: &Outcome, [written, log]: [bool; 2]) -> String {
     text
 }
 
-/// The function of a step at any depth, and what it reads.
+/// Returns the function of a step and its arguments except saved states, to find calls that read the same values.
 fn function(sequence: &[Numbered], id: u32) -> Option<String> {
-    sequence.iter().find_map(|numbered| match &numbered.step {
-        Step::Call { function, args, .. } if numbered.id == id => {
-            let outputs = args.iter().filter(|arg| !matches!(arg, crate::call_sequence::Arg::State(_)));
-            Some(format!("{function} {:?}", outputs.collect::<Vec<_>>()))
+    Some(match &step_of(sequence, id)?.step {
+        Step::Call { function, args, .. } => {
+            let outputs: Vec<_> = args.iter().filter(|arg| !matches!(arg, Arg::State(_))).collect();
+            format!("{function} {outputs:?}")
         }
-        other if numbered.id == id => Some(crate::finding::step_name(other)),
-        Step::Repeat(_, steps) => function(steps, id),
-        Step::Parallel(sequences) => sequences.iter().find_map(|sequence| function(sequence, id)),
-        _ => None,
+        other => step_name(other),
     })
 }
 
 /// A growth between two measurements.
 fn grown(finding: &Finding, needed: &Run) -> Evidence {
-    let mut ids: Vec<(u32, bool)> =
-        needed.outcomes.values().filter_map(|of| Some((of.id, of.measured.as_ref()?.times > 0))).collect();
+    let mut ids: Vec<(u32, bool)> = needed
+        .outcomes
+        .values()
+        .filter_map(|outcome| Some((outcome.id, outcome.measured.as_ref()?.times > 0)))
+        .collect();
     ids.sort_unstable();
     let times = ids.iter().rev().find(|(_, repeated)| *repeated);
     let times = times
-        .and_then(|(id, _)| needed.of(*id)?.measured.as_ref())
-        .map_or(0, |of| of.times.min(REPETITIONS) as u64);
+        .and_then(|(id, _)| needed.outcome(*id)?.measured.as_ref())
+        .map_or(0, |outcome| outcome.times.min(REPETITIONS) as u64);
     let measures: Vec<u32> = ids.iter().filter(|(_, repeated)| !repeated).map(|(id, _)| *id).collect();
     let known = [
         ("resources.memory", Measure::Memory, 16 * times + 4096),
@@ -223,7 +224,7 @@ pub fn as_repeated(sequence: &CallSequence, run: &Run) -> CallSequence {
     let mut sequence = sequence.clone();
     for numbered in &mut sequence {
         if let (Step::Repeat(times, _), Some(measured)) =
-            (&mut numbered.step, run.of(numbered.id).and_then(|of| of.measured.as_ref()))
+            (&mut numbered.step, run.outcome(numbered.id).and_then(|outcome| outcome.measured.as_ref()))
         {
             *times = measured.times.min(REPETITIONS);
         }
@@ -234,36 +235,34 @@ pub fn as_repeated(sequence: &CallSequence, run: &Run) -> CallSequence {
 #[cfg(test)]
 mod tests {
     use super::{Evidence, evidence};
-    use crate::call_sequence::{Arg, End, Kind, Message, Numbered, Outcome, Run, Step, Written};
-    use crate::finding::{Finding, Judge, Severity};
+    use crate::call_sequence::{Arg, End, Kind, Message, Numbered, Outcome, Run, Step, Values};
+    use crate::finding::{Finding, Judge};
     use std::sync::Arc;
 
     fn finding(judge: Judge) -> Finding {
-        let mut finding = Finding::new("topic.name", Severity::Note, String::new(), "", String::new());
         let call = |id: u32, function: &str| {
             let args = vec![Arg::Out(Kind::F64, 1)];
             Numbered {
                 id,
                 forbidden: false,
-                step: Step::Call { of: Some(0), function: function.to_owned(), args },
+                step: Step::Call { instance: Some(0), function: function.to_owned(), args },
             }
         };
-        finding.sequence = vec![call(1, "fmi2GetReal"), call(2, "fmi2DoStep"), call(3, "fmi2GetReal")];
-        finding.judge = Some(judge);
-        finding
+        let sequence = vec![call(1, "fmi2GetReal"), call(2, "fmi2DoStep"), call(3, "fmi2GetReal")];
+        Finding::default().shown_by(sequence, judge)
     }
 
     fn run() -> Run {
         let outcome = |id: u32, status: i32, value: f64| {
-            let written = vec![Written::Numbers(Kind::F64, vec![value.to_bits()])];
+            let written = vec![Values::Numbers(Kind::F64, vec![value.to_bits()])];
             (id, Outcome { id, status: Some(status), written, ..Outcome::default() })
         };
         let mut run = Run {
             outcomes: [outcome(1, 0, 1.0), outcome(2, 3, 0.0), outcome(3, 0, 2.0)].into(),
             ..Run::default()
         };
-        let message = Message { status: 3, category: None, text: Some(b"no".to_vec()), at_home: true };
-        run.outcomes.entry(2).and_modify(|of| of.log.push(message));
+        let message = Message { status: 3, category: None, text: Some(b"no".to_vec()) };
+        run.outcomes.entry(2).and_modify(|outcome| outcome.log.push(message));
         run
     }
 
@@ -286,7 +285,7 @@ mod tests {
 
     #[test]
     fn messages_are_compared_where_they_matter() {
-        let judge: Judge = Arc::new(|run| run.of(2)?.log.first().map(|_| "a message".to_owned()));
+        let judge: Judge = Arc::new(|run| run.outcome(2)?.log.first().map(|_| "a message".to_owned()));
         let Evidence::Same(proofs) = evidence(&finding(judge), &run()) else { panic!("a call") };
         assert_eq!(proofs[0].observed, "3;3 - 6e6f;");
     }

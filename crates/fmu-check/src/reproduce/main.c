@@ -3,12 +3,12 @@
 #define PATIENCE 20
 #endif
 
-/* Each phase in a process of its own, so that a crash does not end this one. */
+/* Each phase runs in a separate process, so that a crash does not end this one. */
 static void phase(int number) {
     char path[5100];
     out = fdopen(dup(1), "w");
     setvbuf(out, NULL, _IOLBF, 0);
-    snprintf(path, sizeof path, "%s/printed0", folder);
+    snprintf(path, sizeof path, "%s/printed0", scratch);
     if (!freopen(path, "a", stdout)) _exit(3);
     alarm(PATIENCE);
     open_library();
@@ -19,7 +19,7 @@ static void phase(int number) {
     _exit(0);
 }
 
-/* Ends the processes that this one has adopted, and tells whether there were any. */
+/* Ends the processes that this one has adopted; returns whether there were any. */
 static bool orphans(void) {
     bool found = false;
     struct dirent *entry;
@@ -47,13 +47,13 @@ static bool orphans(void) {
 static void clear(void) {
     struct dirent *entry;
     char path[5300];
-    DIR *files = opendir(folder);
+    DIR *files = opendir(scratch);
     while (files && (entry = readdir(files))) {
-        snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
+        snprintf(path, sizeof path, "%s/%s", scratch, entry->d_name);
         unlink(path);
     }
     if (files) closedir(files);
-    rmdir(folder);
+    rmdir(scratch);
 }
 
 int main(int count, char **arguments) {
@@ -61,13 +61,13 @@ int main(int count, char **arguments) {
     size_t i;
     int status;
     bool found;
-    if (!full) { perror("the folder of the unpacked FMU"); return 3; }
+    if (!full) { perror("the directory of the unpacked FMU"); return 3; }
     at_once = EVIDENCE == END;
     snprintf(resources, sizeof resources, FMI == 3 ? "%s/resources/" : "file://%s/resources", full);
     snprintf(library_path, sizeof library_path, "%s/%s", full, library_name);
-    if (count > 3) { folder = arguments[3]; phase(atoi(arguments[2])); }
+    if (count > 3) { scratch = arguments[3]; phase(atoi(arguments[2])); }
     if (!mkdtemp(temporary)) { perror("mkdtemp"); return 3; }
-    folder = temporary;
+    scratch = temporary;
 #if defined(__linux__)
     prctl(PR_SET_CHILD_SUBREAPER, 1);
 #endif
@@ -79,11 +79,11 @@ int main(int count, char **arguments) {
         child = fork();
         if (child == 0) {
             setsid();
-            /* Memory that was not written differs between the processes. */
+            /* Uninitialized memory differs between the processes. */
             snprintf(path, sizeof path, "%zu", 1 + 90 * i);
             setenv("MALLOC_PERTURB_", path, 1);
             setenv("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0", 1);
-            execlp(arguments[0], arguments[0], full, number, folder, (char *)NULL);
+            execlp(arguments[0], arguments[0], full, number, scratch, (char *)NULL);
             perror(arguments[0]);
             _exit(3);
         }

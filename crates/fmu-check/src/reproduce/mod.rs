@@ -7,7 +7,7 @@ use crate::call_sequence::{Run, Setting};
 use crate::description::Description;
 use crate::finding::Finding;
 
-/// Writes the program of a finding, which compares its results with those of the last run of the call sequence.
+/// Writes the program of a finding, which compares its results with the results of the last run.
 pub fn program(finding: &mut Finding, run: &Run, setting: &Setting, description: &Description) {
     let evidence = evidence::evidence(finding, run);
     let sequence = evidence::as_repeated(&finding.sequence, run);

@@ -36,17 +36,17 @@ static char library_path[5000];
 /* The output of this program; the standard output is the library's. */
 static FILE *out;
 static bool quiet, at_once;
-/* Where the results of calls are kept, for other processes. */
-static const char *folder = ".";
+/* The directory for the results of calls, which other processes read. */
+static const char *scratch = ".";
 /* The messages since the last call. */
-static __thread char said[1 << 16];
+static __thread char messages[1 << 16];
 
 #define print(...) (quiet ? 0 : fprintf(out ? out : stdout, __VA_ARGS__))
 
 static FILE *results(const char *kind, int number, const char *mode) {
     char path[5100];
     FILE *file;
-    snprintf(path, sizeof path, "%s/%s%d", folder, kind, number);
+    snprintf(path, sizeof path, "%s/%s%d", scratch, kind, number);
     file = fopen(path, mode);
     if (!file) exit(3);
     return file;
@@ -72,7 +72,7 @@ static __attribute__((unused)) bool any_differ(const int (*pairs)[2], size_t cou
     return found;
 }
 
-static __attribute__((unused)) void put_words(FILE *file, const void *array, size_t count, size_t width) {
+static __attribute__((unused)) void put_numbers(FILE *file, const void *array, size_t count, size_t width) {
     size_t i;
     for (i = 0; i < count; i++) {
         uint64_t word = 0;
@@ -107,7 +107,6 @@ static void open_library(void) {
     if (!library) { print("%s\n", dlerror()); fflush(out); _exit(4); }
 }
 
-/* A function of the library. */
 static void *function(const char *name) {
     void *found = dlsym(library, name);
     if (!found) { print("%s is not in the library\n", name); exit(3); }
@@ -137,7 +136,7 @@ static void release(size_t before) {
     while (arrays > before) { arrays--; munmap(maps[arrays].map, maps[arrays].length); }
 }
 
-/* Whether bytes before an array have changed, or those of one that is for reading. */
+/* Reports bytes that have changed before an array or in an array that is for reading. */
 static __attribute__((unused)) void look_at(const void *array, const void *before, size_t size) {
     size_t page = (size_t)sysconf(_SC_PAGESIZE);
     const char *at = (const char *)((uintptr_t)array / page * page) - page;
@@ -148,14 +147,14 @@ static __attribute__((unused)) void look_at(const void *array, const void *befor
 
 static __attribute__((unused)) bool damaged(void) {
     char path[5100];
-    snprintf(path, sizeof path, "%s/damage0", folder);
+    snprintf(path, sizeof path, "%s/damage0", scratch);
     return access(path, F_OK) == 0;
 }
 
-static void keep(int status, const char *category, const char *text) {
-    size_t length = strlen(said);
-    if (length + 2 * (strlen(category ? category : "") + strlen(text ? text : "")) + 64 > sizeof said) return;
-    char *to = said + length;
+static void keep_message(int status, const char *category, const char *text) {
+    size_t length = strlen(messages);
+    if (length + 2 * (strlen(category ? category : "") + strlen(text ? text : "")) + 64 > sizeof messages) return;
+    char *to = messages + length;
     to += sprintf(to, "%d ", status);
     to = hexes(to, category);
     *to++ = ' ';
@@ -163,44 +162,43 @@ static void keep(int status, const char *category, const char *text) {
     strcpy(to, ";");
 }
 
-static __attribute__((unused)) void say2(void *environment, const char *name, int status, const char *category, const char *text, ...) {
+static __attribute__((unused)) void logger2(void *environment, const char *name, int status, const char *category, const char *text, ...) {
     char whole[8000] = "";
     va_list list;
     (void)environment;
     va_start(list, text);
     if (text) vsnprintf(whole, sizeof whole, text, list);
     va_end(list);
-    keep(status, category, text ? whole : NULL);
+    keep_message(status, category, text ? whole : NULL);
     print("    log of %s: status %d, category %s: %s\n", name ? name : "NULL", status, category ? category : "NULL", whole);
 }
 
-static __attribute__((unused)) void say3(void *environment, int status, const char *category, const char *text) {
+static __attribute__((unused)) void logger3(void *environment, int status, const char *category, const char *text) {
     (void)environment;
-    keep(status, category, text);
+    keep_message(status, category, text);
     print("    log: status %d, category %s: %s\n", status, category ? category : "NULL", text ? text : "NULL");
 }
 
 static char resources[5000];
-static __attribute__((unused)) Callbacks callbacks = {say2, calloc, free, NULL, NULL};
+static __attribute__((unused)) Callbacks callbacks = {logger2, calloc, free, NULL, NULL};
 
-static void *copy(const char *text) { return text ? guarded(text, strlen(text) + 1) : NULL; }
+static void *copy(const char *text) { return guarded(text, strlen(text) + 1); }
 
-/* Instantiates. */
-static __attribute__((unused)) void *make(int index, const char *name, const char *token, bool co_simulation, bool in_resources, bool logging, bool events, bool early) {
+static __attribute__((unused)) void *make(int index, const char *name, const char *token, bool co_simulation, bool logging, bool events, bool early) {
     size_t before = arrays;
     void *made;
-    const char *where = in_resources ? copy(resources) : NULL;
+    const char *location = copy(resources);
     name = copy(name);
     token = copy(token);
-    *said = 0;
+    *messages = 0;
     (void)events; (void)early;
 #if FMI == 2
-    made = ((void *(*)(const char *, int, const char *, const char *, const Callbacks *, int, int))function("fmi2Instantiate"))(name, co_simulation, token, where, &callbacks, 0, logging);
+    made = ((void *(*)(const char *, int, const char *, const char *, const Callbacks *, int, int))function("fmi2Instantiate"))(name, co_simulation, token, location, &callbacks, 0, logging);
 #else
     if (co_simulation)
-        made = ((void *(*)(const char *, const char *, const char *, bool, bool, bool, bool, const uint32_t *, size_t, void *, void *, void *))function("fmi3InstantiateCoSimulation"))(name, token, where, false, logging, events, early, NULL, 0, NULL, (void *)say3, NULL);
+        made = ((void *(*)(const char *, const char *, const char *, bool, bool, bool, bool, const uint32_t *, size_t, void *, void *, void *))function("fmi3InstantiateCoSimulation"))(name, token, location, false, logging, events, early, NULL, 0, NULL, (void *)logger3, NULL);
     else
-        made = ((void *(*)(const char *, const char *, const char *, bool, bool, void *, void *))function("fmi3InstantiateModelExchange"))(name, token, where, false, logging, NULL, (void *)say3);
+        made = ((void *(*)(const char *, const char *, const char *, bool, bool, void *, void *))function("fmi3InstantiateModelExchange"))(name, token, location, false, logging, NULL, (void *)logger3);
 #endif
     release(before);
     print("instance %d: %s\n", index, made ? "made" : "NULL");
@@ -278,10 +276,10 @@ static __attribute__((unused)) void measure(int number) {
     fclose(file);
 }
 
-static __attribute__((unused)) long measured(int number, int place) {
+static __attribute__((unused)) long measured(int number, int index) {
     long numbers[3] = {0, 0, 0};
     if (sscanf(result("r", number), "%ld %ld %ld", &numbers[0], &numbers[1], &numbers[2]) != 3) exit(3);
-    return numbers[place];
+    return numbers[index];
 }
 
 /* Bytes of a saved state, from one process to the next. */

@@ -60,7 +60,7 @@ mod linux {
 
     /// A process that adopts the orphans among its descendants, in a separate session.
     pub fn adopt_descendants() {
-        // SAFETY: concern this process only.
+        // SAFETY: both calls concern only this process.
         unsafe {
             libc::setsid();
             libc::prctl(libc::PR_SET_CHILD_SUBREAPER, 1);
@@ -68,8 +68,8 @@ mod linux {
     }
 
     /// Waits up to 50 ms for data or the end of data.
-    pub fn readable(of: &impl AsRawFd) -> std::io::Result<bool> {
-        let mut poll = libc::pollfd { fd: of.as_raw_fd(), events: libc::POLLIN, revents: 0 };
+    pub fn readable(file: &impl AsRawFd) -> std::io::Result<bool> {
+        let mut poll = libc::pollfd { fd: file.as_raw_fd(), events: libc::POLLIN, revents: 0 };
         // SAFETY: one descriptor, which is open.
         match unsafe { libc::poll(&raw mut poll, 1, 50) } {
             -1 if std::io::Error::last_os_error().kind() != std::io::ErrorKind::Interrupted => {
@@ -105,7 +105,7 @@ mod linux {
             }
         }
         let mut found: Vec<(libc::pid_t, String)> = Vec::new();
-        // SAFETY: asks for a number.
+        // SAFETY: only returns a number.
         let mut next = vec![unsafe { libc::getpid() }];
         while let Some(parent) = next.pop() {
             for child in children.remove(&parent).into_iter().flatten() {
@@ -116,7 +116,7 @@ mod linux {
         found
     }
 
-    /// Waits for children that have ended. Whether there are others.
+    /// Waits for children that have ended; returns whether there are others.
     fn reap() -> bool {
         loop {
             // SAFETY: waits for no child that others wait for.
@@ -128,7 +128,7 @@ mod linux {
         }
     }
 
-    /// Ends all descendants, the group of `leader` first. The names of those that were alive after `grace`.
+    /// Ends all descendants, the group of `leader` first; returns the names of those that were alive after `grace`.
     pub fn end_descendants(leader: libc::pid_t, grace: Duration) -> Vec<String> {
         let begin = Instant::now();
         while reap() {
@@ -163,7 +163,7 @@ mod linux {
     /// A session for this process, from which it cannot send signals to the processes of the checker or to all processes:
     /// the attempt ends it with SIGSYS.
     pub fn isolate(checker: libc::pid_t) {
-        // SAFETY: asks for numbers, and makes a session.
+        // SAFETY: starts a session; the other calls only return numbers.
         let (keeper, group, caller) = unsafe {
             libc::setsid();
             let keeper = libc::getppid();

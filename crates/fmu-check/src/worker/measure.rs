@@ -2,7 +2,6 @@
 
 use crate::call_sequence::Measured;
 
-/// Measures now.
 pub fn now() -> Measured {
     let (memory, exact) = memory();
     let entries = |directory: &str| std::fs::read_dir(directory).map_or(0, Iterator::count);
@@ -16,38 +15,20 @@ pub fn now() -> Measured {
     }
 }
 
-#[cfg(unix)]
+/// The bytes in use, and whether the C library has counted them. It does from glibc 2.33 on.
 fn memory() -> (u64, bool) {
-    /// Layout as in `malloc.h` of glibc 2.33.
-    #[repr(C)]
-    struct Info {
-        arena: usize,
-        free_chunks: usize,
-        fast_blocks: usize,
-        mapped: usize,
-        mapped_bytes: usize,
-        most: usize,
-        fast_bytes: usize,
-        used_bytes: usize,
-        free_bytes: usize,
-        keep: usize,
-    }
-    let this = libloading::os::unix::Library::this();
-    // SAFETY: the function of this name has this type; older libraries lack it.
-    let info = unsafe { this.get::<unsafe extern "C" fn() -> Info>(b"mallinfo2") };
-    if let Ok(function) = info {
-        // SAFETY: see above.
-        let info = unsafe { function() };
-        return ((info.used_bytes + info.mapped_bytes) as u64, true);
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    {
+        type Info = unsafe extern "C" fn() -> libc::mallinfo2;
+        let this = libloading::os::unix::Library::this();
+        // SAFETY: the function of this name has this type.
+        if let Ok(info) = unsafe { this.get::<Info>(b"mallinfo2") }.map(|info| unsafe { info() }) {
+            return ((info.uordblks + info.hblkhd) as u64, true);
+        }
     }
     let statm = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
     let pages: u64 = statm.split_whitespace().nth(1).and_then(|pages| pages.parse().ok()).unwrap_or(0);
     (pages * 4096, false)
-}
-
-#[cfg(not(unix))]
-fn memory() -> (u64, bool) {
-    (0, false)
 }
 
 /// Rounding, locale, directory and signals: an FMU must leave them as they are.
@@ -64,7 +45,7 @@ fn settings() -> Vec<String> {
     }
     #[cfg(unix)]
     {
-        // SAFETY: asks for the name.
+        // SAFETY: only returns the name.
         let locale = unsafe { super::text_at(libc::setlocale(libc::LC_ALL, std::ptr::null())) };
         found.push(format!("locale {}", String::from_utf8_lossy(&locale.unwrap_or_default())));
         for (name, signal) in [
@@ -73,7 +54,7 @@ fn settings() -> Vec<String> {
             ("SIGINT", libc::SIGINT),
             ("SIGABRT", libc::SIGABRT),
         ] {
-            // SAFETY: asks for what is set.
+            // SAFETY: only returns the current handler.
             let handler = unsafe {
                 let mut action: libc::sigaction = std::mem::zeroed();
                 libc::sigaction(signal, std::ptr::null(), &mut action);

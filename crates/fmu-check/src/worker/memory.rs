@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 
-/// How many bytes after an array may be touched: none, so that it is a crash, or some, so that it is observed.
+/// Number of accessible bytes after an array: 0 if an access beyond it should crash, more if it should be detected.
 pub static AFTER: AtomicUsize = AtomicUsize::new(0);
 
 /// Whether freed arrays stay mapped for reuse. Mapping takes time in repetitions and makes threads wait for each other.
@@ -12,50 +12,32 @@ pub static KEEP: AtomicBool = AtomicBool::new(false);
 /// The byte that fills memory before a call.
 pub const FILL: u8 = 0x5a;
 
-/// One page of it.
+/// A page of this byte.
 static FILLED: [u8; 4096] = [FILL; 4096];
 
-/// The number of functions of the FMU that have not returned, in memory that a forked process shares with its parent.
-pub struct Inside(OnceLock<&'static AtomicU32>);
+/// Returns the number of functions of the FMU that have not returned, in memory that a forked process shares with its parent.
+pub fn calls_under_way() -> &'static AtomicU32 {
+    static COUNT: OnceLock<&AtomicU32> = OnceLock::new();
+    COUNT.get_or_init(|| {
+        #[cfg(unix)]
+        // SAFETY: new memory, which is zero and is never unmapped.
+        unsafe {
+            let (access, flags) = (libc::PROT_READ | libc::PROT_WRITE, libc::MAP_SHARED | libc::MAP_ANON);
+            let map = libc::mmap(std::ptr::null_mut(), 4, access, flags, -1, 0);
+            assert!(map != libc::MAP_FAILED, "no memory");
+            &*map.cast::<AtomicU32>()
+        }
+        #[cfg(not(unix))]
+        Box::leak(Box::default())
+    })
+}
 
-/// The one of this process.
-pub static INSIDE: Inside = Inside(OnceLock::new());
-
-impl Inside {
-    fn count(&self) -> &AtomicU32 {
-        self.0.get_or_init(|| {
-            #[cfg(unix)]
-            // SAFETY: new memory, which is zero and is never unmapped.
-            unsafe {
-                let (access, flags) = (libc::PROT_READ | libc::PROT_WRITE, libc::MAP_SHARED | libc::MAP_ANON);
-                let map = libc::mmap(std::ptr::null_mut(), 4, access, flags, -1, 0);
-                assert!(map != libc::MAP_FAILED, "no memory");
-                &*map.cast::<AtomicU32>()
-            }
-            #[cfg(not(unix))]
-            Box::leak(Box::default())
-        })
-    }
-
-    /// A function of the FMU is called.
-    pub fn enter(&self) {
-        self.count().fetch_add(1, Ordering::Relaxed);
-    }
-
-    /// The call has returned.
-    pub fn leave(&self) {
-        self.count().fetch_sub(1, Ordering::Relaxed);
-    }
-
-    /// The number.
-    pub fn get(&self) -> u32 {
-        self.count().load(Ordering::Relaxed)
-    }
-
-    /// Sets the number before a process is forked.
-    pub fn set(&self, number: u32) {
-        self.count().store(number, Ordering::Relaxed);
-    }
+/// Runs code of the FMU, and counts it while it has not returned.
+pub fn in_fmu<T>(run: impl FnOnce() -> T) -> T {
+    calls_under_way().fetch_add(1, Ordering::Relaxed);
+    let result = run();
+    calls_under_way().fetch_sub(1, Ordering::Relaxed);
+    result
 }
 
 fn untouched(bytes: &[u8]) -> bool {
@@ -68,7 +50,7 @@ mod pages {
     use std::ptr::null_mut;
     use std::sync::{Mutex, PoisonError};
 
-    /// Lengths and addresses of what is kept.
+    /// Lengths and addresses of the pages that are kept for reuse.
     static KEPT: Mutex<Vec<(usize, usize)>> = Mutex::new(Vec::new());
 
     /// Pages of which the last may not be touched.
@@ -78,7 +60,7 @@ mod pages {
     }
 
     fn page() -> usize {
-        // SAFETY: asks for a number.
+        // SAFETY: only returns a number.
         usize::try_from(unsafe { libc::sysconf(libc::_SC_PAGESIZE) }).unwrap_or(4096)
     }
 
@@ -119,7 +101,7 @@ mod pages {
             if KEEP.load(Ordering::Relaxed) {
                 KEPT.lock().unwrap_or_else(PoisonError::into_inner).push((self.length, self.map as usize));
             } else if AFTER.load(Ordering::Relaxed) == 0 {
-                // SAFETY: mapped in `new`, and nobody is given it for longer than a call.
+                // SAFETY: mapped in `new`; no pointer to it is used after the call.
                 unsafe { libc::munmap(self.map.cast(), self.length) };
             }
         }
@@ -157,7 +139,7 @@ impl Guarded {
             true => AFTER.load(Ordering::Relaxed),
             false => 64,
         };
-        // A page more than needed, so that there is something before an array, too.
+        // At least 64 bytes before the array are filled, to detect writes there.
         let pages = pages::Pages::new(bytes.len() + after + 64);
         let (map, open) = pages.open();
         let begin = open - bytes.len() - after;
@@ -174,7 +156,6 @@ impl Guarded {
         Self::new(&vec![FILL; size])
     }
 
-    /// Address of the first byte.
     pub fn address(&self) -> u64 {
         self.pages.open().0.wrapping_add(self.begin) as u64
     }
@@ -185,7 +166,6 @@ impl Guarded {
         unsafe { std::slice::from_raw_parts(map, open) }
     }
 
-    /// Its bytes now.
     pub fn bytes(&self) -> &[u8] {
         &self.all()[self.begin..self.begin + self.size]
     }

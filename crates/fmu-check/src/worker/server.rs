@@ -1,30 +1,18 @@
-//! A process that is forked for every call sequence, because starting a program again takes several times as long. It adopts
+//! A process that forks for every call sequence, because starting a program takes several times as long. It adopts
 //! and ends the descendants that a call sequence leaves.
 
 use super::contain::{MOST_PROCESSES, abandoned, adopt_descendants, descendants, end_descendants, isolate};
-use super::{File, SCRATCH, work};
-use serde::{Deserialize, Serialize};
+use super::memory::calls_under_way;
+use super::{Ended, File, SCRATCH, work};
 use std::io::{Read as _, Seek as _, Write as _};
+use std::os::unix::process::ExitStatusExt as _;
 use std::path::Path;
+use std::process::ExitStatus;
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-/// Messages of a library on its standard output that are kept, in bytes.
-const SAID: u64 = 1 << 20;
-
-/// The answer to a job, a line of JSON; the messages and the outcomes follow it.
-#[derive(Serialize, Deserialize)]
-pub struct Answer {
-    /// The wait status of the process; `None` if it did not end in time.
-    pub ended: Option<i32>,
-    /// The lengths of the messages and of the outcomes.
-    pub lengths: [usize; 2],
-    /// Names of the processes that it has left.
-    pub left: Vec<String>,
-    /// The number of its processes, if they were too many.
-    pub flood: Option<usize>,
-    /// Whether it ended in a function of the FMU.
-    pub inside: bool,
-}
+/// Bytes of the standard output and standard error of a process that are kept.
+const MOST_OUTPUT: u64 = 1 << 20;
 
 /// Plays the jobs of the standard input, in lines with the limit of each in seconds, until it ends.
 pub fn serve() -> Result<(), String> {
@@ -42,13 +30,13 @@ pub fn serve() -> Result<(), String> {
 
 fn jobs() -> std::io::Result<()> {
     let mut files = [tempfile::tempfile()?, tempfile::tempfile()?];
-    // SAFETY: asks for a number.
+    // SAFETY: only returns a number.
     let checker = unsafe { libc::getppid() };
     let mut times_left = 0;
     for line in std::io::stdin().lines() {
         let line = line?;
         let Some((limit, job)) = line.split_once(' ') else { continue };
-        super::INSIDE.set(0);
+        calls_under_way().store(0, Ordering::Relaxed);
         // SAFETY: this process has one thread.
         match unsafe { libc::fork() } {
             -1 => return Err(std::io::Error::last_os_error()),
@@ -58,15 +46,16 @@ fn jobs() -> std::io::Result<()> {
             }
             child => {
                 let (ended, flood) = wait(child, limit.parse().unwrap_or_default());
-                // Processes that end together with the FMU are not left. If they are left every time, waiting is in vain.
+                // Processes that end soon after the instance are no finding. After three sequences with others, the server does not wait.
                 let patient = ended.is_some() && times_left < 3;
                 let left = end_descendants(child, Duration::from_millis(if patient { 300 } else { 0 }));
                 times_left += usize::from(ended.is_some() && !left.is_empty());
                 if abandoned() {
                     return Ok(());
                 }
-                let inside = super::INSIDE.get() > 0;
-                answer(Answer { ended, lengths: [0; 2], left, flood, inside }, &mut files)?;
+                let inside = calls_under_way().load(Ordering::Relaxed) > 0;
+                let ended = ended.map(Ended::from).unwrap_or_default();
+                pass_on(Ended { left, flood, inside, ..ended }, &mut files)?;
             }
         }
     }
@@ -74,29 +63,29 @@ fn jobs() -> std::io::Result<()> {
 }
 
 /// Plays a job in the process that was forked for it.
-fn play(job: &str, [said, outcomes]: [File; 2]) -> ! {
+fn play(job: &str, [output, outcomes]: [File; 2]) -> ! {
     use std::os::fd::AsRawFd as _;
     let nothing = File::open("/dev/null");
-    for (file, number) in [(nothing.as_ref().unwrap_or(&said), 0), (&said, 1), (&said, 2)] {
+    for (file, number) in [(nothing.as_ref().unwrap_or(&output), 0), (&output, 1), (&output, 2)] {
         // SAFETY: `file` is open; the descriptor that is replaced stays open in the parent process.
         unsafe { libc::dup2(file.as_raw_fd(), number) };
     }
-    drop((nothing, said));
+    drop((nothing, output));
     let read = serde_json::from_str(job).map_err(|error| error.to_string());
     super::end(read.map(|job| work(job, outcomes)))
 }
 
 /// The wait status of a process that ends within so many seconds. Any other is ended, as is one with too many processes or
 /// whose checker has ended.
-fn wait(child: libc::pid_t, limit: f64) -> (Option<i32>, Option<usize>) {
+fn wait(child: libc::pid_t, limit: f64) -> (Option<ExitStatus>, Option<usize>) {
     let (begin, mut status, mut looked) = (Instant::now(), 0, Instant::now());
     loop {
         // SAFETY: no other code waits for children of this process.
         match unsafe { libc::waitpid(-1, &raw mut status, libc::WNOHANG) } {
             -1 => return (None, None),
-            pid if pid == child => return (Some(status), None),
+            pid if pid == child => return (Some(ExitStatus::from_raw(status)), None),
             0 => {}
-            // An orphan.
+            // An adopted orphan has ended.
             _ => continue,
         }
         if looked.elapsed() > Duration::from_millis(20) {
@@ -116,20 +105,20 @@ fn wait(child: libc::pid_t, limit: f64) -> (Option<i32>, Option<usize>) {
     }
 }
 
-/// Passes on the results of a process, and clears its files for the next one.
-fn answer(mut answer: Answer, files: &mut [File; 2]) -> std::io::Result<()> {
-    let mut results = [Vec::new(), Vec::new()];
-    for ((file, bytes), most) in files.iter_mut().zip(&mut results).zip([SAID, u64::MAX]) {
+/// Writes the results of a process to the standard output, as a line of JSON, and clears its files for the next one.
+fn pass_on(mut ended: Ended, files: &mut [File; 2]) -> std::io::Result<()> {
+    let results = [(&mut ended.output, MOST_OUTPUT), (&mut ended.outcomes, u64::MAX)];
+    for (file, (text, most)) in files.iter_mut().zip(results) {
+        let mut bytes = Vec::new();
         file.rewind()?;
-        file.take(most).read_to_end(bytes)?;
+        file.take(most).read_to_end(&mut bytes)?;
+        *text = String::from_utf8_lossy(&bytes).into_owned();
         file.set_len(0)?;
         file.rewind()?;
     }
-    answer.lengths = [results[0].len(), results[1].len()];
-    let line = serde_json::to_string(&answer)?;
     let mut output = std::io::stdout().lock();
-    output.write_all(format!("{line}\n").as_bytes())?;
-    results.iter().try_for_each(|bytes| output.write_all(bytes))?;
+    serde_json::to_writer(&mut output, &ended)?;
+    output.write_all(b"\n")?;
     for entry in std::fs::read_dir(".")?.flatten() {
         let path = entry.path();
         let _ = if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };

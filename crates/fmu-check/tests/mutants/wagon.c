@@ -17,36 +17,12 @@
 #define FMI 2
 #endif
 
-#define FAULTS(X) \
-    X(half_set) X(getter_changes) X(lossy_state) X(state_without_event) X(bytes_with_address) X(bytes_without_input)   \
-    X(restore_consumes) X(save_changes) X(handle_not_reused) X(freed_handle_stays) X(adjoint_off)                      \
-    X(directional_sign) X(directional_not_linear) X(derivative_changes) X(write_past) X(write_before) X(read_past)     \
-    X(write_const) X(shared_static) X(racing_static) X(leak_instance) X(leak_state) X(leak_step) X(file_left)          \
-    X(thread_left) X(reset_without_count) X(reset_keeps_parameter) X(address_in_result) X(unwritten_memory)            \
-    X(event_in_the_past) X(events_without_end) X(start_value) X(set_ignored) X(boolean_two) X(output_unwritten)        \
-    X(whole_out_of_range) X(parameter_drifts) X(version_wrong) X(state_not_supported) X(status_unknown)                \
-    X(free_null_crashes) X(terminate_refused) X(reset_refused) X(get_after_end_refused) X(second_run_refused)          \
-    X(category_unknown) X(log_latin1) X(silent) X(log_when_off) X(endless_step) X(null_crashes) X(bytes_crash)         \
-    X(reference_crashes) X(reference_exits) X(vector_swapped) X(nominal_zero) X(time_lags) X(last_time_wrong)          \
-    X(name_kept) X(rounding_changed) X(locale_changed) X(discard_changes) X(step_refused_halfway) X(reading_once)      \
-    X(text_latin1) X(token_ignored) X(crash_amid) X(text_cut) X(text_leaks) X(reset_keeps_text)                        \
-    X(directional_imprecise) X(directional_added) X(event_moves_silently) X(event_loses_input) X(early_time_wrong)     \
-    X(early_unsaid) X(name_in_result) X(reference_once) X(start_time_ignored) X(last_step_refused)                     \
-    X(step_overshoots) X(step_adds) X(lossy_when_late) X(step_prints) X(start_in_mode_ignored) X(event_again_now)      \
-    X(name_gone) X(forks) X(daemon_left) X(forks_without_end) X(duplicates_itself) X(kills_group) X(kills_parent)       \
-    X(kills_all) X(stops_parent) X(unload_crashes) X(exit_hangs) X(make_hangs) X(stop_ignored) X(order_ignored)    \
-    X(pool_of_eight) X(output_stale) X(early_read_wrong) X(set_after_end) X(set_after_end_crashes) X(long_step_hangs)
-#define NUMBER(name) M_##name,
-#define NAME(name) #name,
-enum { M_none, FAULTS(NUMBER) M_all };
-static int fault;
-#define IS(name) (fault == M_##name)
+/* The fault that the environment names. */
+static const char *fault = "none";
+#define IS(name) (strcmp(fault, #name) == 0)
 
 __attribute__((constructor)) static void choose(void) {
-    static const char *const names[] = { "none", FAULTS(NAME) };
-    const char *name = getenv("WAGON_FAULT");
-    if (!name) return;
-    while (strcmp(name, names[fault])) if (++fault == M_all) abort();
+    if (getenv("WAGON_FAULT")) fault = getenv("WAGON_FAULT");
 }
 
 #if FMI == 3
@@ -111,9 +87,9 @@ static void start(State *s) {
     if (IS(reset_without_count)) s->count = count;
 }
 
-static int say(Model *m, int status, const char *text) {
+static int report(Model *m, int status, const char *text) {
     const char *category = IS(category_unknown) ? "unheard of" : "logStatusError";
-    if (IS(log_latin1)) text = "refus\xe9";
+    if (IS(log_latin1)) text = "rejet\xe9";
     if (!m->log || !m->logging || IS(silent)) return status;
 #if FMI == 3
     m->log(m->environment, status, category, text);
@@ -123,7 +99,7 @@ static int say(Model *m, int status, const char *text) {
     return status;
 }
 
-static int no(Model *m, const char *text) { return say(m, 3, text); }
+static int no(Model *m, const char *text) { return report(m, 3, text); }
 
 #define ALLOW(modes)                                                                  \
     Model *m = c;                                                                     \
@@ -137,7 +113,7 @@ __attribute__((destructor)) static void unloaded(void) {
     if (IS(exit_hangs)) pause();
 }
 
-/* What a process must survive that starts others, and signals that are not for it. */
+/* Starts processes and sends signals that the checker must survive. */
 static void attack(void) {
     if (IS(forks) && fork() == 0) for (;;) pause();
     if (IS(daemon_left) && fork() == 0) {
@@ -149,7 +125,7 @@ static void attack(void) {
     if (IS(duplicates_itself)) fork();
     if (IS(kills_group)) kill(0, SIGKILL);
     if (IS(kills_parent)) kill(getppid(), SIGKILL);
-    /* No signal is sent, in case nothing stops it. */
+    /* Signal 0 only tests the permission, in case the checker does not prevent it. */
     if (IS(kills_all)) kill(-1, 0);
     if (IS(stops_parent)) kill(getppid(), SIGSTOP);
     if (IS(make_hangs)) for (;;) pause();
@@ -177,11 +153,11 @@ static void *make(const char *name, const char *token, int cs, int logging, Logg
     if (IS(thread_left)) { pthread_t thread; if (!pthread_create(&thread, NULL, idle, NULL)) pthread_detach(thread); }
     if (IS(pool_of_eight) && ++alive > 8) { free(m->scratch); free(m); m = NULL; alive--; }
     if (!m) return NULL;
-    if (IS(second_run_refused) && runs++ > 300) { free(m->scratch); free(m); return NULL; }
+    if (IS(second_run_rejected) && runs++ > 300) { free(m->scratch); free(m); return NULL; }
     return m;
 }
 
-/* A real variable, or NaN for a reference that is none. */
+/* The value of a real variable; sets `known`. */
 static double get(Model *m, uint32_t vr, bool *known) {
     const State *s = &m->s;
     double y = 2 * s->force + s->x + *m->scratch * 1e-3;
@@ -216,7 +192,7 @@ static int get_reals(void *c, const uint32_t *vr, size_t n, double *value) {
     ALLOW(INSTANTIATED | INITIALIZATION | STEP | EVENT | CONTINUOUS | TERMINATED)
     size_t i;
     bool known;
-    if (IS(get_after_end_refused) && m->s.mode == TERMINATED) return no(m, "it is over");
+    if (IS(get_after_end_rejected) && m->s.mode == TERMINATED) return no(m, "it is over");
     if (n && (!vr || !value) && !IS(null_crashes)) return no(m, "an array is NULL");
     if (IS(crash_amid) && m->s.steps == 7) abort();
     for (i = 0; i < n; i++) {
@@ -242,7 +218,7 @@ static int set_reals(void *c, const uint32_t *vr, size_t n, const double *value)
         if (!settable(m, vr[i])) return no(m, "it cannot be set");
         if (vr[i] != FORCE && !(m->s.mode & (INSTANTIATED | INITIALIZATION))) return no(m, "a fixed parameter");
         if (!isfinite(value[i]) || (vr[i] == MASS && value[i] <= 0)) {
-            if (IS(discard_changes)) { m->s.x += 1; return say(m, 2, "no such value"); }
+            if (IS(discard_changes)) { m->s.x += 1; return report(m, 2, "no such value"); }
             return no(m, "no such value");
         }
     }
@@ -305,7 +281,7 @@ static int set_none(void *c, const uint32_t *vr, size_t n, const void *value) {
     return n ? no(m, "it cannot be set") : 0;
 }
 
-/* Runge and Kutta's method, in steps that events and ends cut. */
+/* Integrates by the Runge-Kutta method; steps end at events and at the end. */
 static void integrate(Model *m, double end) {
     State *s = &m->s;
     while (s->time < end - 1e-12) {
@@ -336,10 +312,10 @@ static int step(void *c, double point, double size) {
     ALLOW(STEP)
     if (IS(endless_step) && !(size < 1e9)) for (;;) usleep(1000);
     if (IS(long_step_hangs) && size > 1e3 && size < 1e4) for (;;) usleep(1000);
-    if (IS(step_refused_halfway) && !(size > 0)) m->s.x += 0.01;
+    if (IS(step_rejected_halfway) && !(size > 0)) m->s.x += 0.01;
     if (!isfinite(point) || !isfinite(size) || !(size > 0) || size > 1e4) return no(m, "no such step");
     if (fabs(point - m->s.time) > 1e-9 * (1 + fabs(point))) return no(m, "another time");
-    if (IS(last_step_refused) && point + size >= m->s.stop) return no(m, "it is over");
+    if (IS(last_step_rejected) && point + size >= m->s.stop) return no(m, "it is over");
     if (!IS(stop_ignored) && point + size > m->s.stop * (1 + 1e-12) + 1e-12) return no(m, "beyond the stop time");
     if (IS(step_prints)) puts("a step");
 #ifdef SYMBOL_MISSING
@@ -409,6 +385,8 @@ void *fmi3InstantiateCoSimulation(const char *name, const char *token, const cha
 }
 void *fmi3InstantiateScheduledExecution(void) { return NULL; }
 #define FREE fmi3FreeInstance
+#define STATE(verb, end) int fmi3##verb##FMUState##end
+#define DESERIALIZE int fmi3DeserializeFMUState
 #define SIZES , size_t nvalues
 #define SIZES_RIGHT if (c && nvalues != n) return no(c, "sizes that differ");
 #else
@@ -421,9 +399,16 @@ void *fmi2Instantiate(const char *name, int type, const char *token, const char 
     return callbacks ? make(name, token, type == 1, logging, callbacks->logger, callbacks->environment) : NULL;
 }
 #define FREE fmi2FreeInstance
+#define STATE(verb, end) int fmi2##verb##FMUstate##end
+#define DESERIALIZE int fmi2DeSerializeFMUstate
 #define SIZES
 #define SIZES_RIGHT
 #endif
+typedef const char *Text;
+#define ACCESS(name, type, get, set)                                                                                          \
+    EXPORT(Get##name)(void *c, const uint32_t *vr, size_t n, type *value SIZES) { SIZES_RIGHT return get(c, vr, n, value); } \
+    EXPORT(Set##name)(void *c, const uint32_t *vr, size_t n, const type *value SIZES) { SIZES_RIGHT return set(c, vr, n, value); }
+#define REJECTED(name) EXPORT(name)(void *c) { return c ? no(c, "not supported") : 3; }
 
 void FREE(void *c) {
     Model *m = c;
@@ -449,14 +434,14 @@ EXPORT(ExitInitializationMode)(void *c) {
 }
 EXPORT(Terminate)(void *c) {
     ALLOW(STEP | EVENT | CONTINUOUS)
-    if (IS(name_gone)) say(m, 0, "the end");
-    if (IS(terminate_refused) && m->s.steps > 1) return no(m, "not yet");
+    if (IS(name_gone)) report(m, 0, "the end");
+    if (IS(terminate_rejected) && m->s.steps > 1) return no(m, "not yet");
     m->s.mode = TERMINATED;
     return 0;
 }
 EXPORT(Reset)(void *c) {
     ALLOW(63)
-    if (IS(reset_refused) && m->s.mode == TERMINATED) return no(m, "it is over");
+    if (IS(reset_rejected) && m->s.mode == TERMINATED) return no(m, "it is over");
     start(&m->s);
     return 0;
 }
@@ -519,11 +504,10 @@ EXPORT(GetNominalsOfContinuousStates)(void *c, double *x, size_t n) {
 }
 #endif
 
-/* States. */
 static char *secret[4096];
 static unsigned secrets;
 
-static int save(void *c, void **state) {
+STATE(Get, )(void *c, void **state) {
     ALLOW(63)
     State *saved;
     if (!state) return no(m, "a handle is NULL");
@@ -537,7 +521,7 @@ static int save(void *c, void **state) {
     *state = saved;
     return 0;
 }
-static int restore(void *c, void *state) {
+STATE(Set, )(void *c, void *state) {
     ALLOW(63)
     double next = m->s.next;
     if (!state) return no(m, "a state is NULL");
@@ -547,20 +531,20 @@ static int restore(void *c, void *state) {
     shared = m->s;
     return 0;
 }
-static int drop(void *c, void **state) {
+STATE(Free, )(void *c, void **state) {
     ALLOW(63)
     if (!state) return 0;
     free(*state);
     if (!IS(freed_handle_stays)) *state = NULL;
     return 0;
 }
-static int size_of(void *c, void *state, size_t *size) {
+STATE(Serialized, Size)(void *c, void *state, size_t *size) {
     ALLOW(63)
     if (!state || !size) return no(m, "NULL");
     *size = sizeof(State) + 8;
     return 0;
 }
-static int serialize(void *c, void *state, char *bytes, size_t size) {
+STATE(Serialize, )(void *c, void *state, char *bytes, size_t size) {
     ALLOW(63)
     State copy;
     if (!state || !bytes || size < sizeof copy + 8) return no(m, "no room");
@@ -576,7 +560,7 @@ static int serialize(void *c, void *state, char *bytes, size_t size) {
     } else memcpy(bytes + 8, &copy, sizeof copy);
     return 0;
 }
-static int deserialize(void *c, const char *bytes, size_t size, void **state) {
+DESERIALIZE(void *c, const char *bytes, size_t size, void **state) {
     ALLOW(63)
     State copy;
     if (!state || !bytes || (size != sizeof copy + 8 && !IS(bytes_crash))) return no(m, "no state");
@@ -584,7 +568,7 @@ static int deserialize(void *c, const char *bytes, size_t size, void **state) {
     if (memcmp(bytes, "wagon001", 8)) return no(m, "no state");
     if (IS(bytes_with_address)) { char *from; memcpy(&from, bytes + 8, sizeof from); memcpy(&copy, from, sizeof copy); }
     else memcpy(&copy, bytes + 8, sizeof copy);
-    /* Only what can be is taken. */
+    /* Only possible values are accepted. */
     copy.label[sizeof copy.label - 1] = 0;
     if (!isfinite(copy.time) || !isfinite(copy.x) || !isfinite(copy.v) || !(copy.next > copy.time - 1) || !(copy.next < 1e9) ||
         !(copy.mass > 0) || !(fabs(copy.time) < 1e9)) return no(m, "no state");
@@ -640,18 +624,12 @@ EXPORT(EnterInitializationMode)(void *c, bool defined, double tolerance, double 
     (void)defined; (void)tolerance;
     return enter(c, from, stops ? stop : INFINITY);
 }
-EXPORT(GetFloat64)(void *c, const uint32_t *vr, size_t n, double *value, size_t nvalues) { SIZES_RIGHT return get_reals(c, vr, n, value); }
-EXPORT(SetFloat64)(void *c, const uint32_t *vr, size_t n, const double *value, size_t nvalues) { SIZES_RIGHT return set_reals(c, vr, n, value); }
-EXPORT(GetInt32)(void *c, const uint32_t *vr, size_t n, int32_t *value, size_t nvalues) { SIZES_RIGHT return get_count(c, vr, n, value); }
-EXPORT(GetBoolean)(void *c, const uint32_t *vr, size_t n, bool *value, size_t nvalues) { SIZES_RIGHT return get_fast(c, vr, n, value); }
-EXPORT(GetString)(void *c, const uint32_t *vr, size_t n, const char **value, size_t nvalues) { SIZES_RIGHT return get_label(c, vr, n, value); }
-EXPORT(SetString)(void *c, const uint32_t *vr, size_t n, const char *const *value, size_t nvalues) { SIZES_RIGHT return set_label(c, vr, n, value); }
 #define NONE(type)                                                                                                                   \
     EXPORT(Get##type)(void *c, const uint32_t *vr, size_t n, void *value, size_t nvalues) { ALLOW(63) (void)vr; (void)value; (void)nvalues; return n ? no(m, "there are none") : 0; } \
     EXPORT(Set##type)(void *c, const uint32_t *vr, size_t n, const void *value, size_t nvalues) { (void)nvalues; return set_none(c, vr, n, value); }
+ACCESS(Float64, double, get_reals, set_reals) ACCESS(Int32, int32_t, get_count, set_none)
+ACCESS(Boolean, bool, get_fast, set_none) ACCESS(String, Text, get_label, set_label)
 NONE(Float32) NONE(Int8) NONE(UInt8) NONE(Int16) NONE(UInt16) NONE(UInt32) NONE(Int64) NONE(UInt64)
-EXPORT(SetInt32)(void *c, const uint32_t *vr, size_t n, const int32_t *value, size_t nvalues) { (void)nvalues; return set_none(c, vr, n, value); }
-EXPORT(SetBoolean)(void *c, const uint32_t *vr, size_t n, const bool *value, size_t nvalues) { (void)nvalues; return set_none(c, vr, n, value); }
 EXPORT(UpdateDiscreteStates)(void *c, bool *again, bool *terminate, bool *nominals, bool *values, bool *defined, double *next) {
     ALLOW(EVENT)
     if (!again || !terminate || !nominals || !values || !defined || !next) return no(m, "a flag is NULL");
@@ -673,12 +651,6 @@ EXPORT(DoStep)(void *c, double point, double size, bool no_set, bool *event, boo
     *last = IS(last_time_wrong) ? point : stops && !IS(early_time_wrong) ? m->s.next : point + size;
     return 0;
 }
-EXPORT(GetFMUState)(void *c, void **state) { return save(c, state); }
-EXPORT(SetFMUState)(void *c, void *state) { return restore(c, state); }
-EXPORT(FreeFMUState)(void *c, void **state) { return drop(c, state); }
-EXPORT(SerializedFMUStateSize)(void *c, void *state, size_t *size) { return size_of(c, state, size); }
-EXPORT(SerializeFMUState)(void *c, void *state, char *bytes, size_t size) { return serialize(c, state, bytes, size); }
-EXPORT(DeserializeFMUState)(void *c, const char *bytes, size_t size, void **state) { return deserialize(c, bytes, size, state); }
 EXPORT(GetDirectionalDerivative)(void *c, const uint32_t *u, size_t nu, const uint32_t *k, size_t nk, const double *seed, size_t ns, double *out, size_t no_) {
     if (c && (ns != nk || no_ != nu)) return no(c, "sizes that differ");
     return directional(c, u, nu, k, nk, seed, out, false);
@@ -690,12 +662,11 @@ EXPORT(GetAdjointDerivative)(void *c, const uint32_t *u, size_t nu, const uint32
 EXPORT(GetNumberOfContinuousStates)(void *c, size_t *n) { ALLOW(63) if (!n) return no(m, "NULL"); *n = 2; return 0; }
 EXPORT(GetNumberOfEventIndicators)(void *c, size_t *n) { ALLOW(63) if (!n) return no(m, "NULL"); *n = 1; return 0; }
 EXPORT(EnterStepMode)(void *c) { ALLOW(EVENT) if (!m->cs) return no(m, "not in Model Exchange"); m->s.mode = STEP; return 0; }
-#define REFUSED(name) EXPORT(name)(void *c) { return c ? no(c, "not supported") : 3; }
-REFUSED(GetBinary) REFUSED(SetBinary) REFUSED(GetClock) REFUSED(SetClock) REFUSED(GetNumberOfVariableDependencies)
-REFUSED(GetVariableDependencies) REFUSED(EnterConfigurationMode) REFUSED(ExitConfigurationMode) REFUSED(GetIntervalDecimal)
-REFUSED(GetIntervalFraction) REFUSED(GetShiftDecimal) REFUSED(GetShiftFraction) REFUSED(SetIntervalDecimal)
-REFUSED(SetIntervalFraction) REFUSED(SetShiftDecimal) REFUSED(SetShiftFraction) REFUSED(EvaluateDiscreteStates)
-REFUSED(GetOutputDerivatives) REFUSED(ActivateModelPartition)
+REJECTED(GetBinary) REJECTED(SetBinary) REJECTED(GetClock) REJECTED(SetClock) REJECTED(GetNumberOfVariableDependencies)
+REJECTED(GetVariableDependencies) REJECTED(EnterConfigurationMode) REJECTED(ExitConfigurationMode) REJECTED(GetIntervalDecimal)
+REJECTED(GetIntervalFraction) REJECTED(GetShiftDecimal) REJECTED(GetShiftFraction) REJECTED(SetIntervalDecimal)
+REJECTED(SetIntervalFraction) REJECTED(SetShiftDecimal) REJECTED(SetShiftFraction) REJECTED(EvaluateDiscreteStates)
+REJECTED(GetOutputDerivatives) REJECTED(ActivateModelPartition)
 #else
 EXPORT(SetupExperiment)(void *c, int defined, double tolerance, double from, int stops, double stop) {
     ALLOW(INSTANTIATED)
@@ -706,14 +677,8 @@ EXPORT(SetupExperiment)(void *c, int defined, double tolerance, double from, int
     return 0;
 }
 EXPORT(EnterInitializationMode)(void *c) { return enter(c, c ? ((Model *)c)->s.time : 0, c ? ((Model *)c)->s.stop : 0); }
-EXPORT(GetReal)(void *c, const uint32_t *vr, size_t n, double *value) { return get_reals(c, vr, n, value); }
-EXPORT(SetReal)(void *c, const uint32_t *vr, size_t n, const double *value) { return set_reals(c, vr, n, value); }
-EXPORT(GetInteger)(void *c, const uint32_t *vr, size_t n, int32_t *value) { return get_count(c, vr, n, value); }
-EXPORT(SetInteger)(void *c, const uint32_t *vr, size_t n, const int32_t *value) { return set_none(c, vr, n, value); }
-EXPORT(GetBoolean)(void *c, const uint32_t *vr, size_t n, int *value) { return get_fast(c, vr, n, value); }
-EXPORT(SetBoolean)(void *c, const uint32_t *vr, size_t n, const int *value) { return set_none(c, vr, n, value); }
-EXPORT(GetString)(void *c, const uint32_t *vr, size_t n, const char **value) { return get_label(c, vr, n, value); }
-EXPORT(SetString)(void *c, const uint32_t *vr, size_t n, const char *const *value) { return set_label(c, vr, n, value); }
+ACCESS(Real, double, get_reals, set_reals) ACCESS(Integer, int32_t, get_count, set_none)
+ACCESS(Boolean, int, get_fast, set_none) ACCESS(String, Text, get_label, set_label)
 EXPORT(NewDiscreteStates)(void *c, Event *event) {
     ALLOW(EVENT)
     if (!event) return no(m, "NULL");
@@ -723,16 +688,9 @@ EXPORT(NewDiscreteStates)(void *c, Event *event) {
 }
 EXPORT(DoStep)(void *c, double point, double size, int no_set) { (void)no_set; return step(c, point, size); }
 EXPORT(CancelStep)(void *c) { return c ? no(c, "no step is under way") : 3; }
-EXPORT(GetFMUstate)(void *c, void **state) { return save(c, state); }
-EXPORT(SetFMUstate)(void *c, void *state) { return restore(c, state); }
-EXPORT(FreeFMUstate)(void *c, void **state) { return drop(c, state); }
-EXPORT(SerializedFMUstateSize)(void *c, void *state, size_t *size) { return size_of(c, state, size); }
-EXPORT(SerializeFMUstate)(void *c, void *state, char *bytes, size_t size) { return serialize(c, state, bytes, size); }
-EXPORT(DeSerializeFMUstate)(void *c, const char *bytes, size_t size, void **state) { return deserialize(c, bytes, size, state); }
 EXPORT(GetDirectionalDerivative)(void *c, const uint32_t *u, size_t nu, const uint32_t *k, size_t nk, const double *seed, double *out) {
     return directional(c, u, nu, k, nk, seed, out, false);
 }
-#define REFUSED(name) EXPORT(name)(void *c) { return c ? no(c, "not supported") : 3; }
-REFUSED(SetRealInputDerivatives) REFUSED(GetRealOutputDerivatives) REFUSED(GetStatus) REFUSED(GetRealStatus)
-REFUSED(GetIntegerStatus) REFUSED(GetBooleanStatus) REFUSED(GetStringStatus)
+REJECTED(SetRealInputDerivatives) REJECTED(GetRealOutputDerivatives) REJECTED(GetStatus) REJECTED(GetRealStatus)
+REJECTED(GetIntegerStatus) REJECTED(GetBooleanStatus) REJECTED(GetStringStatus)
 #endif

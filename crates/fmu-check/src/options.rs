@@ -1,0 +1,75 @@
+//! Options of a check.
+
+use crate::rules;
+use std::path::PathBuf;
+
+/// How an FMU is checked.
+#[derive(Clone, Debug, clap::Args)]
+pub struct Options {
+    /// Checks only these topics, with commas between: description, package, functions, start_values, life_cycle,
+    /// states, derivatives, dependencies, results, reset, refusals, logs, resources, hostile.
+    #[arg(long, value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(rules::TOPICS))]
+    pub only: Vec<String>,
+    /// Succeeds without these topics and interfaces (co-simulation, model-exchange, scheduled-execution), with commas between.
+    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(
+        rules::TOPICS.iter().chain(&INTERFACES)))]
+    pub allow_unchecked: Vec<String>,
+    /// Seconds for all of it.
+    #[arg(long, default_value_t = 120.0)]
+    pub time: f64,
+    /// Seconds for one sequence; longer is a hang.
+    #[arg(long, default_value_t = 10.0)]
+    pub limit: f64,
+    /// Megabytes of memory that the FMU may use.
+    #[arg(long, default_value_t = 8192)]
+    pub memory: u64,
+    /// Megabytes that the FMU may have when it is unpacked.
+    #[arg(long, default_value_t = 1000)]
+    pub unpacked: u64,
+    /// Seed of the random orders of calls.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Checks a part in 30 seconds at most: neither malformed calls nor resources, and fewer values and orders of calls.
+    #[arg(long, conflicts_with = "time")]
+    pub quick: bool,
+    /// Accepts the findings in this file, which has a line for each: NAME: REASON.
+    #[arg(long, value_name = "FILE")]
+    pub baseline: Option<PathBuf>,
+    /// Prints a rule, its severity and its section of the standard, or all rules as a page.
+    #[arg(long, value_name = "RULE")]
+    pub explain: Option<String>,
+    /// Writes report.html, report.json, junit.xml, report.sarif and a program in C for each finding to this directory.
+    #[arg(long, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
+    /// Writes the report as JSON to the standard output.
+    #[arg(long)]
+    pub json: bool,
+    /// Fails for findings of this severity and worse.
+    #[arg(long, value_enum, default_value_t = FailOn::Violation)]
+    pub fail_on: FailOn,
+    /// Seconds of each simulation that is repeated to find leaks.
+    #[arg(long, default_value_t = 1.5)]
+    pub repeat: f64,
+    /// Leaves sequences as long as they are.
+    #[arg(long)]
+    pub no_shrink: bool,
+    /// Runs an FMU that starts another program, which must be installed.
+    #[arg(long)]
+    pub execution_tool: bool,
+}
+
+/// Lowest severity that fails the check.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum FailOn {
+    /// The standard requires it.
+    Violation,
+    /// Fragile findings and violations.
+    Fragile,
+    /// Information.
+    Note,
+    /// Not at all.
+    Never,
+}
+
+/// The interfaces that an FMU may offer.
+pub const INTERFACES: [&str; 3] = ["co-simulation", "model-exchange", "scheduled-execution"];
