@@ -2,7 +2,7 @@
 #![cfg(unix)]
 #![allow(unsafe_code)]
 
-use fmu_package::{Fmi, Platform};
+use fmu_package::{Platform, Standard};
 use std::env::consts::DLL_SUFFIX;
 use std::fs;
 use std::io::Read;
@@ -22,7 +22,7 @@ const ROUNDS: u32 = 20;
 /// Packs a library that exists: within the limits of these tests none can be compiled.
 fn build_fmu(out: &Path) -> Command {
     static LIBRARY: OnceLock<Vec<u8>> = OnceLock::new();
-    let platform = Platform::host().unwrap().folder(Fmi::V2);
+    let platform = Platform::host().unwrap().directory(Standard::Fmi2);
     let library = LIBRARY.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();
         let mut command = Command::new(env!("CARGO_BIN_EXE_build_fmu"));
@@ -135,6 +135,6 @@ fn an_impossible_destination_is_named() {
     let out = folder.path().join("out");
     fs::write(&out, "a file").unwrap();
     let text = complaint(&build_fmu(&out).output().unwrap());
-    assert!(text.contains(&format!("cannot make the folder {}", out.display())), "{text}");
+    assert!(text.contains(&format!("cannot make the directory {}", out.display())), "{text}");
     assert_eq!(fs::read(&out).unwrap(), b"a file");
 }

@@ -2,7 +2,7 @@
 #![allow(unsafe_code)]
 
 use anyhow::{Result, bail};
-use fmu_package::{Changes, Fmi, Library, LoadedModel, Parts, Platform, fmi2, fmi3, pack};
+use fmu_package::{Changes, Library, LoadedModel, Parts, Platform, Standard, describe, pack};
 use std::path::Path;
 
 fn main() -> Result<()> {
@@ -12,9 +12,8 @@ fn main() -> Result<()> {
     let model = unsafe { LoadedModel::load(Path::new(library), None) }?;
     let libraries = [Library { platform: Platform::host()?, path: library.into() }];
     let (changes, identifier) = (Changes::default(), model.identifier());
-    for (fmi, description) in
-        [(Fmi::V2, fmi2::describe(&model, &changes)?), (Fmi::V3, fmi3::describe(&model, &changes)?)]
-    {
+    for fmi in [Standard::Fmi2, Standard::Fmi3] {
+        let description = describe(&model, fmi, &changes)?;
         let parts = Parts {
             fmi,
             identifier,
@@ -24,7 +23,7 @@ fn main() -> Result<()> {
             sources: &[],
             content: &[],
         };
-        let version = if fmi == Fmi::V2 { 2 } else { 3 };
+        let version = if fmi == Standard::Fmi2 { 2 } else { 3 };
         pack(&Path::new(folder).join(format!("{identifier}{version}.fmu")), &parts)?;
     }
     Ok(())

@@ -2,7 +2,7 @@
 
 use anyhow::bail;
 use fmu_package::files::write_atomically;
-use fmu_package::{ContentFile, Fmi, Library, Parts, Platform, pack};
+use fmu_package::{ContentFile, Library, Parts, Platform, Standard, pack};
 use std::fs;
 use std::io::{Cursor, Read, Write};
 use std::path::{Path, PathBuf};
@@ -28,7 +28,7 @@ impl Sources {
     }
 
     fn library(&self, platform: &str, name: &str) -> Library {
-        Library { platform: Platform::of_folder(platform).unwrap(), path: self.path(name) }
+        Library { platform: Platform::of_directory(platform).unwrap(), path: self.path(name) }
     }
 
     fn content(&self, names: &[&str]) -> Vec<ContentFile> {
@@ -37,10 +37,10 @@ impl Sources {
 
     fn pack(&self, destination: &Path, libraries: &[Library]) -> anyhow::Result<u64> {
         let content = self.content(&["documentation/index.html"]);
-        pack(destination, &self.parts(Fmi::V2, libraries, &content))
+        pack(destination, &self.parts(Standard::Fmi2, libraries, &content))
     }
 
-    fn parts<'a>(&self, fmi: Fmi, libraries: &'a [Library], content: &'a [ContentFile]) -> Parts<'a> {
+    fn parts<'a>(&self, fmi: Standard, libraries: &'a [Library], content: &'a [ContentFile]) -> Parts<'a> {
         Parts {
             fmi,
             identifier: "toy",
@@ -99,7 +99,7 @@ fn in_fmi_3_folders_and_icon_have_other_names() {
     let libraries = [sources.library("win64", "lib.dll"), sources.library("x86_64-linux", "lib.so")];
     let names = |content: &[&str]| {
         let content = sources.content(content);
-        let parts = sources.parts(Fmi::V3, &libraries, &content);
+        let parts = sources.parts(Standard::Fmi3, &libraries, &content);
         pack(&fmu, &Parts { terminals: Some("<terminals/>"), ..parts }).unwrap();
         let zip = ZipArchive::new(Cursor::new(fs::read(&fmu).unwrap())).unwrap();
         zip.file_names().map(|name| name.unwrap().into_owned()).collect::<Vec<_>>()
@@ -146,7 +146,7 @@ fn what_cannot_be_packed_is_named_and_leaves_nothing() {
 
     let blocked = sources.path("lib.so/toy.fmu");
     let error = format!("{:#}", sources.pack(&blocked, &[sources.library("linux64", "lib.so")]).unwrap_err());
-    assert!(error.contains("cannot make the folder") && error.contains("lib.so"), "{error}");
+    assert!(error.contains("cannot make the directory") && error.contains("lib.so"), "{error}");
 }
 
 #[test]

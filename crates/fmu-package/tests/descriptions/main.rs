@@ -12,14 +12,14 @@ use fmi_abi::Category;
 use fmi_schema::fmi2::Fmi2ModelDescription;
 use fmi_schema::traits::FmiModelDescription;
 use fmu_export::{Exported, info};
-use fmu_package::{Changes, Fmi, LoadedModel, NO_GUID, fmi2, fmi3};
+use fmu_package::{Changes, LoadedModel, NO_GUID, Standard, describe};
 use models::breakpoints::{BREAKPOINTS, Breakpoints, LENGTH};
 use models::{branches::Branches, chain::Chain, factors::Factors, room::Room, types::Types};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-const BOTH: [Fmi; 2] = [Fmi::V2, Fmi::V3];
+const BOTH: [Standard; 2] = [Standard::Fmi2, Standard::Fmi3];
 
 fn model<M: Exported>() -> LoadedModel {
     changed::<M>("")
@@ -47,14 +47,7 @@ fn changed<M: Exported>(changes: &str) -> LoadedModel {
     unsafe { LoadedModel::new(&description.to_string(), fmi2, fmi3) }.unwrap()
 }
 
-fn describe(model: &LoadedModel, fmi: Fmi, changes: &Changes) -> anyhow::Result<String> {
-    match fmi {
-        Fmi::V2 => fmi2::describe(model, changes),
-        Fmi::V3 => fmi3::describe(model, changes),
-    }
-}
-
-fn described(model: &LoadedModel, fmi: Fmi) -> String {
+fn described(model: &LoadedModel, fmi: Standard) -> String {
     describe(model, fmi, &Changes::default()).unwrap()
 }
 
@@ -108,9 +101,9 @@ fn is_expected_in_both<M: Exported>(name: &str) {
     let model = model::<M>();
     for fmi in BOTH {
         let text = described(&model, fmi);
-        is_expected(&format!("{name}-{}.xml", if fmi == Fmi::V2 { 2 } else { 3 }), &text);
+        is_expected(&format!("{name}-{}.xml", if fmi == Standard::Fmi2 { 2 } else { 3 }), &text);
     }
-    let read = Fmi2ModelDescription::deserialize(&described(&model, Fmi::V2)).unwrap();
+    let read = Fmi2ModelDescription::deserialize(&described(&model, Standard::Fmi2)).unwrap();
     let names: Vec<_> =
         read.model_variables.variables.iter().map(|variable| variable.name.as_str()).collect();
     assert_eq!(names, M::TABLE.iter().map(|variable| variable.name()).collect::<Vec<_>>());
@@ -134,8 +127,8 @@ fn kinds_of_factors() {
 #[test]
 fn types_that_fmi_2_lacks() {
     let model = model::<Types>();
-    is_expected("types-3.xml", &described(&model, Fmi::V3));
-    let error = describe(&model, Fmi::V2, &Changes::default()).unwrap_err().to_string();
+    is_expected("types-3.xml", &described(&model, Standard::Fmi3));
+    let error = describe(&model, Standard::Fmi2, &Changes::default()).unwrap_err().to_string();
     assert_eq!(error, "single is Float32, which FMI 2.0 lacks; add --fmi 3 to make an FMU for FMI 3.0 only");
 }
 
@@ -203,7 +196,7 @@ fn changes() {
         assert_eq!(text.matches(r#"variability="fixed""#).count(), 1, "{text}");
     }
     let source_files = vec!["a.c".to_owned(), "b.c".to_owned()];
-    let text = describe(&model::<Factors>(), Fmi::V2, &Changes { source_files, ..changes }).unwrap();
+    let text = describe(&model::<Factors>(), Standard::Fmi2, &Changes { source_files, ..changes }).unwrap();
     let list =
         "      <File name=\"a.c\"/>\n      <File name=\"b.c\"/>\n    </SourceFiles>\n  </CoSimulation>";
     assert!(text.contains(list), "{text}");

@@ -4,13 +4,13 @@
 use crate::models::faulty::{FAULT, Faulty};
 use crate::models::room::{Name, Room};
 use crate::models::{chain::Chain, factors::Factors, types::Types};
-use crate::{BOTH, changed, describe};
+use crate::{BOTH, changed};
 use fmu_export::Exported;
-use fmu_package::{Changes, Fmi};
+use fmu_package::{Changes, Standard, describe};
 
 /// Checks the messages on a model with changes; the message is empty if the model is accepted.
 #[track_caller]
-fn results<M: Exported>(versions: &[Fmi], changes: &[(&str, &str)]) {
+fn results<M: Exported>(versions: &[Standard], changes: &[(&str, &str)]) {
     for (change, message) in changes {
         for fmi in versions {
             let error = describe(&changed::<M>(change), *fmi, &Changes::default()).err();
@@ -111,7 +111,7 @@ fn types_and_units() {
         ],
     );
     results::<Types>(
-        &[Fmi::V3],
+        &[Standard::Fmi3],
         &[
             (
                 r#"variables/image/type/mimeType="""#,
@@ -175,12 +175,12 @@ fn names() {
     for (change, name) in [("0/name", "time"), ("byte/array", "eventIndicator[1]")] {
         let change = format!("variables/{change}={name:?}; variables/0/array={name:?}");
         let message = format!(
-            "{name} is the name of a variable that FMI 3.0 asks for; declare the time as independent, rename what else has \
-             the name"
+            "{name} is the name of a variable that FMI 3.0 needs; declare the time as independent, rename any other variable \
+             of this name"
         );
-        results::<Types>(&[Fmi::V3], &[(&change, &message)]);
+        results::<Types>(&[Standard::Fmi3], &[(&change, &message)]);
     }
-    results::<Factors>(&[Fmi::V2], &[(r#"variables/u/name="time""#, "")]);
+    results::<Factors>(&[Standard::Fmi2], &[(r#"variables/u/name="time""#, "")]);
 }
 
 #[test]
@@ -225,12 +225,12 @@ fn models_that_cannot_be_made() {
         ("broken", "the model cannot be made for Co-Simulation: it is broken"),
         ("panic", "the model cannot be made for Co-Simulation: it is mad"),
         ("two-faced", "u starts with 1 in Co-Simulation and with 0 in Model Exchange"),
-        ("unwritable", "the start value of label has a character that XML has not: \"a\\u{1}\""),
+        ("unwritable", "the start value of label has a character that XML lacks: \"a\\u{1}\""),
         ("rejects itself", "these start values make no model: no is no"),
         (
             "unreadable",
-            "y cannot be read from a new model: what stands behind its `in` or `by` panics, as with an index that is not \
-             there",
+            "y cannot be read from a new model: the code behind its `in` or `by` panics, for example because of an index out \
+             of bounds",
         ),
         ("indicator", "Faulty: indicators() does not fill in indicator 1"),
         ("", ""),
@@ -257,7 +257,7 @@ fn derivatives_that_differ_from_the_values() {
             let error = describe(&changed::<Faulty>(interface), fmi, &Changes::default()).err();
             let text = error.map(|error| error.to_string()).unwrap_or_default();
             // Time is no variable of the model, so FMI 2.0 has no derivatives with respect to it.
-            let is_accepted = fault == "partial_by_time" && fmi == Fmi::V2;
+            let is_accepted = fault == "partial_by_time" && fmi == Standard::Fmi2;
             let is_named =
                 text.starts_with(&format!("the derivative of {beginning}")) && text.contains(function);
             assert!(if is_accepted { text.is_empty() } else { is_named }, "{fault}, {fmi}: {text}");

@@ -1,8 +1,8 @@
 //! A field that is missing in the `memory` of a model would be missing in saved states: the model is rejected.
 
-use crate::{BOTH, describe, described, model};
+use crate::{BOTH, described, model};
 use fmu_export::*;
-use fmu_package::Changes;
+use fmu_package::{Changes, describe};
 
 /// A model that remembers the integral of its input, the last input, its output, the step size and the number of events. It also
 /// has a copy of the gain, which `update` restores.
@@ -99,7 +99,7 @@ fn missing_fields_are_found() {
     rejected::<without_last::Memory>("Co-Simulation, there are other values after 1 more: y");
     rejected::<without_sum::Memory>("Co-Simulation, there are other values after 1 more: y");
     rejected::<without_shown::Memory>("Co-Simulation, there are other values at once: y");
-    rejected::<without_size::Memory>("Co-Simulation, it is refused: there is no step size");
+    rejected::<without_size::Memory>("Co-Simulation, it is rejected: there is no step size");
     rejected::<without_ticks::Memory>("Model Exchange, there are other values at once: n");
 }
 

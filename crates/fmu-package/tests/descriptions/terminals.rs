@@ -46,7 +46,10 @@ fn terminals_that_cannot_be_are_rejected() {
             vec![door().icon("door", [0.0; 4])],
             "the terminal door: its icon terminalsAndIcons/door.png is missing",
         ),
-        (vec![door().icon("door", [f64::NAN; 4])], "the terminal door: its icon has no place"),
+        (
+            vec![door().icon("door", [f64::NAN; 4])],
+            "the terminal door: the corners of its icon are not finite",
+        ),
     ] {
         let error = terminals(&model::<Room>(), &all, &[icon("door.svg")]).unwrap_err();
         assert_eq!(format!("{error:#}"), message);
