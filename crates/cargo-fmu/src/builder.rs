@@ -2,7 +2,7 @@
 
 use crate::project::Project;
 use anyhow::{Context, Result};
-use fmu_package::{BuildOptions, Builder};
+use fmu_package::{BuildOptions, Builder, cargo};
 use std::env;
 use std::ffi::OsString;
 use std::fs;
@@ -60,11 +60,6 @@ pub fn arguments_of_build() -> Vec<OsString> {
         }
     }
     kept
-}
-
-/// Returns the cargo that has started this program.
-pub fn cargo() -> OsString {
-    env::var_os("CARGO").unwrap_or_else(|| "cargo".into())
 }
 
 /// Returns the `Cargo.lock` that this command was tested with, if it comes from a clone.

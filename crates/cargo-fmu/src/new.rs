@@ -1,7 +1,8 @@
 //! Makes a new crate from one of the models that this command contains.
 
-use crate::builder::{cargo, tested, write};
+use crate::builder::{tested, write};
 use anyhow::{Context, Result, bail, ensure};
+use fmu_package::cargo;
 use fmu_package::terminal::short;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,10 +1,10 @@
 //! The metadata of the package that makes an FMU, from cargo.
 
-use crate::builder::cargo;
 use anyhow::{Context, Result, bail};
+use fmu_package::metadata;
 use serde_json::Value;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 /// The options that name the package of the model.
 #[derive(clap::Args, Clone, Debug)]
@@ -32,7 +32,9 @@ pub struct Project {
 impl Project {
     /// Finds the package with `cargo metadata`.
     pub fn find(options: &Package) -> Result<Self> {
-        let metadata = metadata(options)?;
+        let manifest =
+            options.manifest_path.iter().flat_map(|path| [OsStr::new("--manifest-path"), path.as_ref()]);
+        let metadata = metadata(manifest)?;
         let package = chosen(&metadata, options.package.as_deref())?;
         let name = text(&package["name"]);
         let targets = list(&package["targets"]);
@@ -56,20 +58,6 @@ impl Project {
                 .map(str::to_owned),
         })
     }
-}
-
-/// Returns the output of `cargo metadata`.
-fn metadata(options: &Package) -> Result<Value> {
-    let mut command = Command::new(cargo());
-    command.args(["metadata", "--format-version", "1"]);
-    if let Some(path) = &options.manifest_path {
-        command.arg("--manifest-path").arg(path);
-    }
-    let output = command.output().context("cannot start cargo")?;
-    if !output.status.success() {
-        bail!("{}", String::from_utf8_lossy(&output.stderr).trim().trim_start_matches("error: "));
-    }
-    serde_json::from_slice(&output.stdout).context("cargo metadata returns no JSON")
 }
 
 fn text(value: &Value) -> &str {

@@ -1,5 +1,6 @@
 //! Compiling for other systems: cargo-zigbuild links for all of them.
 
+use crate::packages::cargo;
 use crate::platform::Platform;
 use anyhow::{Result, bail};
 use std::ffi::OsString;
@@ -51,8 +52,7 @@ pub fn rustc_for(target: Option<&str>) -> (OsString, Option<String>) {
     match target.filter(|target| needs_zigbuild(target) && runs(ZIGBUILD)) {
         Some(target) if target.contains("-linux-gnu") => (ZIGBUILD.into(), Some(format!("{target}.{GLIBC}"))),
         Some(target) => (ZIGBUILD.into(), Some(target.to_owned())),
-        // In `cargo run`, this variable names the running cargo.
-        None => (std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()), target.map(str::to_owned)),
+        None => (cargo(), target.map(str::to_owned)),
     }
 }
 

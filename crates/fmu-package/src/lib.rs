@@ -59,6 +59,7 @@ pub use {
     fmi_abi::Standard,
     model::LoadedModel,
     pack::{Library, Parts, pack},
+    packages::{cargo, metadata},
     platform::Platform,
     sources::Sources,
     variant::{NO_GUID, Variant},

@@ -3,6 +3,7 @@
 use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -49,23 +50,31 @@ impl Neighbourhood {
 fn find(known: &mut BTreeMap<PathBuf, LocalPackage>, directory: &Path) -> Result<LocalPackage> {
     if !known.contains_key(directory) {
         let failed = || format!("cannot find the packages that {} uses", directory.display());
-        let packages = metadata(directory).and_then(|metadata| packages(&metadata)).with_context(failed)?;
+        let manifest = directory.join("Cargo.toml");
+        let arguments = ["--no-deps", "--offline", "--manifest-path"].map(OsStr::new);
+        let metadata = metadata(arguments.into_iter().chain([manifest.as_os_str()]));
+        let packages = metadata.and_then(|metadata| packages(&metadata)).with_context(failed)?;
         known.extend(packages.into_iter().map(|package| (package.directory.clone(), package)));
     }
     known.get(directory).cloned().with_context(|| format!("{} is no package", directory.display()))
 }
 
-fn metadata(directory: &Path) -> Result<Value> {
-    // In `cargo run` and build scripts, this variable names the running cargo.
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let output = Command::new(&cargo)
-        .args(["metadata", "--no-deps", "--offline", "--format-version", "1", "--manifest-path"])
-        .arg(directory.join("Cargo.toml"))
-        .stdin(Stdio::null())
-        .output()
-        .with_context(|| format!("cannot start cargo ({})", cargo.to_string_lossy()))?;
+/// Returns the cargo that has started this program, or the cargo of the system.
+pub fn cargo() -> OsString {
+    std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into())
+}
+
+/// Returns the output of `cargo metadata` with these arguments.
+///
+/// # Errors
+/// When cargo cannot be started or fails; the message is one line.
+pub fn metadata(arguments: impl IntoIterator<Item: AsRef<OsStr>>) -> Result<Value> {
+    let cargo = cargo();
+    let mut command = Command::new(&cargo);
+    command.args(["metadata", "--format-version", "1"]).args(arguments).stdin(Stdio::null());
+    let output = command.output().with_context(|| format!("cannot start {}", cargo.to_string_lossy()))?;
     let errors = String::from_utf8_lossy(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
-    ensure!(output.status.success(), "{errors}");
+    ensure!(output.status.success(), "{}", errors.trim_start_matches("error: "));
     serde_json::from_slice(&output.stdout).context("cargo metadata returns no JSON")
 }
 

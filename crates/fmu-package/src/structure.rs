@@ -93,9 +93,9 @@ impl ModelStructure {
 
         let mut sampler = Sampler::new(model, starts.clone(), tunable_parameters);
         sampler.running = true;
-        let running = by_derivative(&mut sampler, &unknowns, &knowns)?;
+        let running = found(&mut sampler, &unknowns, &knowns)?;
         sampler.running = false;
-        let initial = by_value(&mut sampler, &initial_unknowns, &initial_knowns)?;
+        let initial = found(&mut sampler, &initial_unknowns, &initial_knowns)?;
         let running = running.into_iter().enumerate().map(|(number, unknown)| {
             // As an output, a state has the value that was set, or that the last step has calculated.
             if number < outputs.len() && table.variables[unknown.index as usize].state {
@@ -207,20 +207,22 @@ fn with_declared(table: &Table, found: Unknown, knowns: &[u32]) -> Result<Unknow
     Ok(Unknown { dependencies, ..found })
 }
 
-/// Dependencies at communication points and in Continuous-Time Mode: from the partial derivatives, or from the values if the model
-/// has none.
-fn by_derivative(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<Unknown>> {
+/// Returns the unknowns with the dependencies that trials find: from the partial derivatives while running, else from the values.
+fn found(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<Unknown>> {
     let table = &sampler.model.table;
-    let mut samples = if table.partials { sampler.factor_samples()? } else { Vec::new() };
     let is_real =
         |index: u32| table.variable(index).is_some_and(|variable| variable.base() == BaseType::Real);
+    let reals: Vec<u32> = unknowns.iter().copied().filter(|index| is_real(*index)).collect();
+    // During initialization, the kinds `fixed` and `tunable` are not allowed.
+    let with_partials = table.partials && sampler.running;
+    let mut samples = if with_partials { sampler.factor_samples()? } else { Vec::new() };
     // Derivatives with respect to parameters are available in Initialization Mode.
     let is_differentiable = |index: u32| {
         let causality = table.variable(index).map(|variable| variable.causality);
         is_real(index) && !matches!(causality, Some(Causality::Independent | Causality::Parameter))
     };
-    let reals: Vec<u32> = unknowns.iter().copied().filter(|index| is_real(*index)).collect();
-    let mut list: Vec<Unknown> = unknowns.iter().map(independent).collect();
+    let unknown = |index: &u32| Unknown { index: *index, dependencies: Vec::new() };
+    let mut list: Vec<Unknown> = unknowns.iter().map(unknown).collect();
     let bases = if list.is_empty() { Vec::new() } else { sampler.bases()? };
     for &known in knowns {
         let differentiable = is_differentiable(known) && !reals.is_empty();
@@ -243,17 +245,16 @@ fn by_derivative(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Res
         let indices: Vec<u32> = others.iter().map(|unknown| unknown.index).collect();
         let reactions = sampler.reactions(&bases, known, &indices)?;
         for (number, unknown) in others.into_iter().enumerate() {
-            if reactions.of(number).is_some() {
-                unknown.dependencies.push((known, DependencyKind::Dependent));
-            }
+            let Some(ratios) = reactions.of(number) else { continue };
+            let is_constant = |ratios: Vec<f64>| ratios.iter().all(|ratio| close(*ratio, ratios[0], 1e-7));
+            let kind = match ratios.is_some_and(is_constant) && !sampler.running {
+                true => DependencyKind::Constant,
+                false => DependencyKind::Dependent,
+            };
+            unknown.dependencies.push((known, kind));
         }
     }
     Ok(list)
-}
-
-/// An unknown without dependencies.
-fn independent(index: &u32) -> Unknown {
-    Unknown { index: *index, dependencies: Vec::new() }
 }
 
 /// The kind of a dependency with these factors; `None` if they are all zero. Each factor has the numbers of its sample's fixed and
@@ -278,23 +279,6 @@ fn factor_kind(factors: &[((usize, usize), f64)]) -> Option<DependencyKind> {
     } else {
         DependencyKind::Dependent
     })
-}
-
-/// Dependencies during initialization, from the values. The kinds `fixed` and `tunable` are not allowed there.
-fn by_value(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<Unknown>> {
-    let mut list: Vec<Unknown> = unknowns.iter().map(independent).collect();
-    let bases = if list.is_empty() { Vec::new() } else { sampler.bases()? };
-    for &known in knowns {
-        let reactions = sampler.reactions(&bases, known, unknowns)?;
-        for (number, unknown) in list.iter_mut().enumerate() {
-            let Some(ratios) = reactions.of(number) else { continue };
-            let constant =
-                ratios.is_some_and(|ratios| ratios.iter().all(|ratio| close(*ratio, ratios[0], 1e-7)));
-            let kind = if constant { DependencyKind::Constant } else { DependencyKind::Dependent };
-            unknown.dependencies.push((known, kind));
-        }
-    }
-    Ok(list)
 }
 
 /// Changes of unknowns when a known was changed, at several points.

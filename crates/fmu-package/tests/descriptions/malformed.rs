@@ -49,6 +49,20 @@ fn start_values() {
             (r#"variables/wave/type/min="3"; variables/wave/type/name="""#, ""),
         ],
     );
+    // In single precision, 0.1 is larger than in double precision, but in the range up to 0.1.
+    results::<Types>(
+        &[Standard::Fmi3],
+        &[
+            (
+                r#"variables/single/type/max="0.05""#,
+                "the start value of single must be <= 0.05, it is 0.10000000149011612",
+            ),
+            (
+                r#"variables/byte/type/largest="2""#,
+                "the start value of byte must be between 0 and 2, it is 3",
+            ),
+        ],
+    );
 }
 
 #[test]
