@@ -80,7 +80,7 @@ impl Description<'_> {
             table.model_exchange.as_ref().map(|offer| self.model_exchange(offer)),
             table.co_simulation.as_ref().map(|offer| self.co_simulation(offer)),
             unit_definitions(&types)?,
-            type_definitions(&types, &names, |of| self.type_definition(of))?,
+            type_definitions(&types, &names, |definition| self.type_definition(definition))?,
             list("LogCategories", Category::ALL.map(log_category)),
             Some(default_experiment(table)),
             Some(Element::new("ModelVariables").containing(variables)),
@@ -284,24 +284,24 @@ impl Description<'_> {
         let element = Element::new("ModelStructure");
         if self.fmi == Standard::Fmi2 {
             let lists = ["Outputs", "Derivatives", "InitialUnknowns"].into_iter().zip(lists);
-            let unknowns = |unknowns: &[Unknown]| {
-                unknowns.iter().map(|of| unknown("Unknown", "index", of)).collect::<Vec<_>>()
-            };
-            return element.containing(lists.filter_map(|(name, of)| list(name, unknowns(of))));
+            return element.containing(lists.filter_map(|(name, unknowns)| {
+                list(name, unknowns.iter().map(|unknown| with_dependencies("Unknown", "index", unknown)))
+            }));
         }
         let lists = ["Output", "ContinuousStateDerivative", "InitialUnknown"].into_iter().zip(lists);
+        let unknowns = lists.flat_map(|(name, unknowns)| {
+            unknowns.iter().map(move |unknown| with_dependencies(name, "valueReference", unknown))
+        });
         // An element without a list of dependencies depends on everything.
         let indicator = |number| {
             Element::new("EventIndicator").with("valueReference", position(self.table.indicator(number)))
         };
-        element
-            .containing(lists.flat_map(|(name, of)| of.iter().map(|of| unknown(name, "valueReference", of))))
-            .containing((0..self.table.indicators()).map(indicator))
+        element.containing(unknowns).containing((0..self.table.indicators()).map(indicator))
     }
 }
 
 /// The element of an unknown. Empty lists state that it depends on nothing; without a list it would depend on everything.
-fn unknown(name: &str, reference: &str, unknown: &Unknown) -> Element {
+fn with_dependencies(name: &str, reference: &str, unknown: &Unknown) -> Element {
     let (known, kinds): (Vec<_>, Vec<_>) = unknown
         .dependencies
         .iter()

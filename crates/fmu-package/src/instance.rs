@@ -337,23 +337,27 @@ impl<'a> Instance<'a> {
     /// Returns the values of all variables; NaN for a value that the model does not return.
     pub fn values(&mut self) -> Vec<Value> {
         let mut all = vec![Value::Real(f64::NAN); self.model.table.variables.len()];
-        for Group { base, indices, first } in &self.model.groups {
-            let of_standard = if self.standard == Standard::Fmi2 { indices } else { first };
-            if let Ok(values) = self.get_values(*base, &self.references(of_standard), indices.len()) {
+        for Group { base, indices } in &self.model.groups {
+            let mut read = |indices: &[u32]| {
+                let values = self.get_values(*base, &self.references(indices), indices.len())?;
                 indices.iter().zip(values).for_each(|(index, value)| all[*index as usize] = value);
-                continue;
-            }
-            for index in of_standard {
-                let length = match self.standard {
-                    Standard::Fmi2 => 1,
-                    Standard::Fmi3 => self.model.table.variables[*index as usize].length(),
-                };
-                if let Ok(values) = self.get_values(*base, &self.references(&[*index]), length) {
-                    (*index as usize..).zip(values).for_each(|(index, value)| all[index] = value);
+                Outcome::Ok(())
+            };
+            if read(indices).is_err() {
+                for index in indices.iter().filter(|index| !self.references(&[**index]).is_empty()) {
+                    let _ = read(&self.array(*index));
                 }
             }
         }
         all
+    }
+
+    /// The variables that are read and set together: the elements of an array in FMI 3.0.
+    fn array(&self, index: u32) -> Vec<u32> {
+        match self.standard {
+            Standard::Fmi2 => vec![index],
+            Standard::Fmi3 => self.model.table.array(index),
+        }
     }
 
     fn get_values(&self, base: BaseType, vr: &[u32], count: usize) -> Outcome<Vec<Value>> {
@@ -428,10 +432,7 @@ impl<'a> Instance<'a> {
         }
         let mut found = Vec::with_capacity(unknowns.len());
         while let Some(index) = unknowns.get(found.len()) {
-            let array = match self.standard {
-                Standard::Fmi2 => vec![*index],
-                Standard::Fmi3 => self.model.table.array(*index),
-            };
+            let array = self.array(*index);
             match self.all_partials(&array, known) {
                 Ok(all) => found.extend(all.into_iter().map(Some)),
                 Err(message) => {

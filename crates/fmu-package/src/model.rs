@@ -30,12 +30,11 @@ pub struct LoadedModel {
     _library: Option<libloading::Library>,
 }
 
-/// The variables of a type: the indices of all elements, and of the first elements, which have a reference in FMI 3.0.
+/// The variables of a type.
 #[derive(Debug)]
 pub(crate) struct Group {
     pub base: BaseType,
     pub indices: Vec<u32>,
-    pub first: Vec<u32>,
 }
 
 impl LoadedModel {
@@ -103,11 +102,7 @@ impl LoadedModel {
         library: Option<libloading::Library>,
     ) -> Result<Self> {
         let table = Table::read(description)?;
-        let group = |base| {
-            let indices = table.find(|variable| variable.base() == base);
-            let first = table.find(|variable| variable.base() == base && variable.element == 0);
-            Group { base, indices, first }
-        };
+        let group = |base| Group { base, indices: table.find(|variable| variable.base() == base) };
         let groups = BaseType::ALL.into_iter().map(group).filter(|group| !group.indices.is_empty()).collect();
         Ok(Self { table, fmi2, fmi3, groups, starts: OnceLock::new(), resources, _library: library })
     }

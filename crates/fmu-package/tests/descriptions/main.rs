@@ -52,11 +52,12 @@ fn described(model: &LoadedModel, fmi: Standard) -> String {
 }
 
 /// The files in `expected`.
-const EXPECTED: [&str; 9] = [
+const EXPECTED: [&str; 10] = [
     "chain-2.xml",
     "chain-3.xml",
     "factors-2.xml",
     "factors-3.xml",
+    "malformed.txt",
     "room-2.xml",
     "room-3.xml",
     "structures.xml",
@@ -64,31 +65,34 @@ const EXPECTED: [&str; 9] = [
     "types-3.xml",
 ];
 
-fn folder() -> PathBuf {
+fn directory() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/descriptions/expected")
+}
+
+fn read_expected(file: &str) -> String {
+    fs::read_to_string(directory().join(file)).unwrap_or_default()
 }
 
 /// Compares a document with its file.
 #[track_caller]
 fn is_expected(file: &str, text: &str) {
     assert!(EXPECTED.contains(&file));
-    let path = folder().join(file);
     // A new version of this crate, or another text in fmi-abi, changes no file.
     let mut text = text.replace(concat!("fmu-package ", env!("CARGO_PKG_VERSION")), "fmu-package");
     for category in Category::ALL {
         text = text.replace(category.description(), &category.name().to_string_lossy());
     }
     if env::var_os("UPDATE_EXPECTED").is_some() {
-        fs::write(&path, &text).unwrap();
+        fs::write(directory().join(file), &text).unwrap();
     }
-    let expected = fs::read_to_string(&path).unwrap_or_default();
+    let expected = read_expected(file);
     let different = text.lines().zip(expected.lines()).find(|(line, expected)| line != expected);
     assert!(text == expected, "{file} is out of date (UPDATE_EXPECTED=1 writes it): {different:?}");
 }
 
 #[test]
 fn every_expected_file_is_compared() {
-    let mut files: Vec<_> = fs::read_dir(folder())
+    let mut files: Vec<_> = fs::read_dir(directory())
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
