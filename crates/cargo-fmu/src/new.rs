@@ -99,7 +99,7 @@ pub fn new(options: &Options) -> Result<()> {
     // The names have other lengths now. Without rustfmt, the lines are not wrapped again.
     let _ = Command::new(&cargo).args(["fmt", "--quiet"]).current_dir(directory).output();
     println!(
-        "{0} begins with {model}: change {0}/src/{1}, then\n  cd {0}\n  cargo test        # the model as it is\n  {2:<16}  # the FMU, a table and a picture",
+        "{0} begins with {model}: change {0}/src/{1}, then\n  cd {0}\n  cargo test        # the model before changes\n  {2:<16}  # the FMU, a table and a plot",
         short(directory),
         if files.len() > 2 { format!("{model}.rs") } else { "lib.rs".to_owned() },
         match options.from {

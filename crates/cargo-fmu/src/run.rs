@@ -320,10 +320,7 @@ fn shown<'a>(names: &[String], description: &'a Description) -> Result<Vec<&'a V
             .filter(|variable| variable.causality == "output")
             .filter(is_number)
             .collect();
-        ensure!(
-            !outputs.is_empty(),
-            "the model has no outputs that are numbers; name what to show with --show"
-        );
+        ensure!(!outputs.is_empty(), "the model has no outputs that are numbers; name variables with --show");
         return Ok(outputs);
     }
     let mut shown = Vec::new();

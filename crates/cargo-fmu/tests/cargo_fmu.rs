@@ -89,8 +89,8 @@ fn develop(from: &str, arguments: &[&str], columns: &str, trajectory: &str) -> D
     directory
 }
 
-/// The observations of a report, without the names of functions, which depend on the FMI version. The version of glibc that
-/// a library needs is that of the system.
+/// Returns the observations of a report, without the names of functions, which depend on the FMI version, and without the version
+/// of glibc, which depends on the system.
 fn findings(report: &Value) -> BTreeSet<String> {
     let all = report["findings"].as_array().unwrap().iter();
     let all = all.filter(|finding| finding["name"] != "package.glibc");
@@ -332,7 +332,7 @@ fn a_model_is_built_in_another_directory() {
     fs::rename(directory.path("from-git"), directory.path("elsewhere")).unwrap();
     assert!(source("elsewhere").contains("/git/checkouts/"));
 
-    let output = directory.prints("", &["new", "alone"]);
+    let output = directory.prints("", &["new", "outside"]);
     assert!(output.contains("only on this machine; --git URL"), "{output}");
 }
 

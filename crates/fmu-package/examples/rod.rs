@@ -1,4 +1,4 @@
-//! The FMUs of a library that describes itself, for tests: rod LIBRARY FOLDER.
+//! Makes the FMUs of a library that describes itself, for tests: rod LIBRARY DIRECTORY.
 #![allow(unsafe_code)]
 
 use anyhow::{Result, bail};
@@ -7,8 +7,8 @@ use std::path::Path;
 
 fn main() -> Result<()> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
-    let [library, folder] = arguments.as_slice() else { bail!("usage: rod LIBRARY FOLDER") };
-    // SAFETY: the test's library.
+    let [library, directory] = arguments.as_slice() else { bail!("usage: rod LIBRARY DIRECTORY") };
+    // SAFETY: the library is made by the test with fmu-export.
     let model = unsafe { LoadedModel::load(Path::new(library), None) }?;
     let libraries = [Library { platform: Platform::host()?, path: library.into() }];
     let (changes, identifier) = (Changes::default(), model.identifier());
@@ -24,7 +24,7 @@ fn main() -> Result<()> {
             content: &[],
         };
         let version = if fmi == Standard::Fmi2 { 2 } else { 3 };
-        pack(&Path::new(folder).join(format!("{identifier}{version}.fmu")), &parts)?;
+        pack(&Path::new(directory).join(format!("{identifier}{version}.fmu")), &parts)?;
     }
     Ok(())
 }

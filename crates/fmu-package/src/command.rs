@@ -31,16 +31,16 @@ use zip::ZipArchive;
 /// The options that every `build_fmu` has. A program with more options flattens these into its own.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct BuildOptions {
-    /// Declare the parameters tunable instead of fixed (OpenModelica does not let users change those)
+    /// Declare the parameters tunable instead of fixed (OpenModelica does not let users change tunable parameters)
     #[arg(long)]
     pub tunable: bool,
     /// Make the FMU for FMI 2.0 or for FMI 3.0 only
     #[arg(long, value_parser = fmi_version, value_name = "2|3")]
     pub fmi: Option<Standard>,
-    /// Folder for the FMU of FMI 2.0; the FMU of FMI 3.0 goes into its folder fmi3 [default: target/fmu of the workspace]
+    /// Directory for the FMU of FMI 2.0, with a directory fmi3 for the FMU of FMI 3.0 [default: target/fmu of the workspace]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Write only modelDescription.xml of FMI 2.0, into the folder modelDescription of the sources or DIR
+    /// Write only modelDescription.xml of FMI 2.0, into the directory modelDescription of the sources or DIR
     #[arg(long, conflicts_with_all = ["target", "binary"])]
     pub describe: bool,
     /// Print only the guid, which libraries that are compiled elsewhere get from the environment variable FMU_GUID
@@ -55,7 +55,7 @@ pub struct BuildOptions {
     /// Add this compiled library, for example win64=model.dll, or the one in an FMU, x86_64-windows=model.fmu; repeat it for several
     #[arg(long, value_name = "PLATFORM=PATH", value_parser = binary)]
     pub binary: Vec<(String, PathBuf)>,
-    /// Make the FMU of C sources instead, for targets with no Rust (FMI 2.0, in the folder source; needs wasm2c)
+    /// Make the FMU of C sources instead, for targets with no Rust (FMI 2.0, in the directory source; needs wasm2c)
     #[arg(long, conflicts_with_all = ["target", "binary", "describe"])]
     pub c_sources: bool,
     /// Leave out the page documentation/index.html that runs the FMU in a browser (as with --c-sources)

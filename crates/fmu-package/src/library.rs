@@ -75,11 +75,11 @@ mod tests {
 
     /// A universal library of macOS with empty parts.
     fn universal(processors: &[u32]) -> Vec<u8> {
-        let mut words = vec![0xcafe_babe, processors.len() as u32];
+        let mut numbers = vec![0xcafe_babe, processors.len() as u32];
         for &processor in processors {
-            words.extend([processor, 0, 0x1000, 0, 12]);
+            numbers.extend([processor, 0, 0x1000, 0, 12]);
         }
-        words.iter().flat_map(|word: &u32| word.to_be_bytes()).collect()
+        numbers.iter().flat_map(|number: &u32| number.to_be_bytes()).collect()
     }
 
     fn check(library: &[u8], directory: &str, any_processor: bool) -> Result<(), String> {

@@ -26,12 +26,12 @@ pub(crate) fn check(model: &LoadedModel, starts: &Starts) -> Result<()> {
     let table = &model.table;
     let info = &table.info;
     let variable = table.co_simulation.as_ref().is_none_or(|offer| offer.variable_step_size);
-    let whole = (info.stop_time - info.start_time) / STEPS as f64;
-    let sizes = [Some(info.step_size), Some(whole).filter(|size| *size > info.step_size && variable)];
+    let size_to_end = (info.stop_time - info.start_time) / STEPS as f64;
+    let sizes = [Some(info.step_size), Some(size_to_end).filter(|size| *size > info.step_size && variable)];
     let inputs = inputs(model, starts);
     // Both differ from the times of a new instance.
     let start_time = info.start_time + info.step_size;
-    let stop_time = start_time + f64::max(whole, info.step_size) * STEPS as f64;
+    let stop_time = start_time + f64::max(size_to_end, info.step_size) * STEPS as f64;
     for interface in table.interfaces() {
         let with_rates = table.input_derivatives && interface == Interface::CoSimulation;
         for size in sizes.into_iter().flatten() {

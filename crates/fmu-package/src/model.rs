@@ -53,8 +53,8 @@ impl LoadedModel {
     /// if it exists.
     ///
     /// # Safety
-    /// The file is the library of an FMU that was made with `fmu-export`, or no library; what the library does when it is
-    /// loaded and called is sound.
+    /// The file is the library of an FMU that was made with `fmu-export`, or no library. It is sound to load the library and to
+    /// call its functions.
     ///
     /// # Errors
     /// When the library cannot be loaded, or does not describe itself.
