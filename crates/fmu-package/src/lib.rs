@@ -15,8 +15,8 @@
 //! | files | `xml`, `files` |
 //! | the model | `table`, `model`, `instance` |
 //! | the description | `check`, `sample`, `memory`, `derivatives`, `structure`, `definitions`, `describe` |
-//! | the FMU | `connectors`, `platform`, `cargo`, `pack` |
-//! | the command | `library`, `universal`, `cross`, `c_sources`, `live`, `terminal`, `command` |
+//! | the FMU | `connectors`, `platform`, `pack` |
+//! | the command | `cross`, `c_sources`, `cargo`, `library`, `universal`, `live`, `terminal`, `command` |
 
 mod c_sources;
 mod cargo;
