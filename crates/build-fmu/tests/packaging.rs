@@ -272,7 +272,7 @@ fn two_builds_give_the_same_fmu_with_the_committed_description() {
     }
 }
 
-/// The packages that are compiled into the library are those whose licenses the FMU names.
+/// The FMU names the licenses of exactly the packages that are compiled into its library.
 #[test]
 fn the_licenses_of_all_packages_are_listed() {
     let cargo = env!("CARGO");

@@ -178,7 +178,7 @@ fn a_failed_run_fails(directory: &Directory) {
     }
 }
 
-/// Without `--fmu` both FMUs are made first.
+/// Without `--fmu`, the check makes both FMUs.
 fn check_makes_the_fmus(directory: &Directory) {
     let output = directory.prints("my-lag", &["check", "--only", "dependencies", "--out", "report"]);
     assert!(
@@ -213,7 +213,7 @@ fn inputs_come_from_a_table(directory: &Directory) {
     }
 }
 
-/// Options of `build_fmu`, with the package named from elsewhere.
+/// The options of a build in another directory than the package.
 fn options_reach_the_program_that_packs(directory: &Directory) {
     let manifest = "my-lag/Cargo.toml";
     let output = directory

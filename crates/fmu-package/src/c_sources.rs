@@ -94,7 +94,7 @@ struct Names<'a> {
 }
 
 impl Names<'_> {
-    /// Returns the generated code without the runtime of wasm2c, which another one replaces, and without unused functions.
+    /// Returns the generated code without the runtime of wasm2c, which another one replaces, and without the unused get_func_type.
     fn code(&self, code: &str) -> Result<String> {
         let Names { identifier, prefix } = self;
         let declaration = format!(" w2c_{prefix}_f");

@@ -146,7 +146,7 @@ impl<'a> Rehearsal<'a> {
         Ok(())
     }
 
-    /// FMI 3.0 has no derivatives of inputs.
+    /// Makes an instance: of FMI 2.0 if it gets derivatives of inputs, which FMI 3.0 lacks.
     fn instance(&self) -> Outcome<Instance<'a>> {
         let standard = if self.rates { Standard::Fmi2 } else { Standard::Fmi3 };
         Instance::new(self.model, self.interface, standard, false)

@@ -48,7 +48,7 @@ fn changed_descriptions() {
 fn models_that_cannot_be_made() {
     for (fault, message) in [
         ("broken", "the model cannot be made for Co-Simulation: it is broken"),
-        ("panic", "the model cannot be made for Co-Simulation: it is mad"),
+        ("panic", "the model cannot be made for Co-Simulation: it panics"),
         ("two-faced", "u starts with 1 in Co-Simulation and with 0 in Model Exchange"),
         ("unwritable", "the start value of label has a character that XML lacks: \"a\\u{1}\""),
         ("rejects itself", "these start values make no model: no is no"),

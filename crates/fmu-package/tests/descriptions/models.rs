@@ -168,7 +168,7 @@ pub mod room {
     offer!(Room: ModelExchange + CoSimulation + InputDerivatives + OutputDerivatives);
 }
 
-/// The types that only FMI 3.0 has, and a time that is no variable of the model.
+/// The types that only FMI 3.0 has, a time that is no variable of the model, and a derivative that is a state.
 pub mod types {
     use super::*;
 
@@ -194,6 +194,8 @@ pub mod types {
         long: i64,
         huge: u64,
         image: Vec<u8>,
+        angle: f64,
+        speed: f64,
     }
 
     variables! { for Types;
@@ -221,6 +223,12 @@ pub mod types {
         copy = output(&IMAGE) by |model| model.image.clone();
         /// Sine of the time
         wave = output(&NUMBER) by |model| model.time.sin();
+        /// Angle
+        angle = local(&NUMBER).state() in angle;
+        /// Its derivative, which is also a state
+        speed = output(&NUMBER).state().derivative_of(angle) in speed;
+        /// The derivative of the speed
+        acceleration = local(&NUMBER).derivative_of(speed) by |model| -model.angle;
     }
 
     impl Model for Types {
@@ -238,6 +246,8 @@ pub mod types {
                 long: i64::MIN,
                 huge: u64::MAX,
                 image: vec![0, 0xAB],
+                angle: 1.0,
+                speed: 0.0,
             })
         }
 
@@ -623,7 +633,7 @@ pub mod faulty {
             if has("broken") {
                 return Err(Error::new("it is broken"));
             }
-            assert!(!has("panic"), "it is mad");
+            assert!(!has("panic"), "it panics");
             let u = if has("two-faced") { f64::from(setup.interface as u8) } else { 0.0 };
             let label = if has("unwritable") { "a\u{1}" } else { "" };
             Ok(Self { u, label: label.to_owned(), time: 0.0 })
