@@ -57,6 +57,7 @@ fn models_that_cannot_be_made() {
             "y cannot be read from a new model: the code behind its `in` or `by` panics, for example because of an index out \
              of bounds",
         ),
+        ("not finite", "y is not finite near the start values"),
         ("indicator", "Faulty: indicators() does not fill in indicator 1"),
         ("", ""),
     ] {

@@ -622,7 +622,8 @@ pub mod faulty {
         /// Square of the input, plus the time
         y = output(&NUMBER).depends_on(&[u, Index::TIME]) by |model| {
             assert!(!has("unreadable"));
-            model.u * model.u + model.time
+            let offset = if has("not finite") { f64::NAN } else { model.time };
+            model.u * model.u + offset
         };
     }
 
