@@ -81,7 +81,7 @@ fn project() -> &'static Path {
 /// The files that the library and its description are made from. The guid is a hash of them.
 fn sources(project: &Path) -> Sources {
     Sources {
-        folder: project.to_owned(),
+        directory: project.to_owned(),
         code: vec!["Cargo.toml", "build.rs", "build_fmu.rs", "src"],
         content: Some("modelDescription"),
         // The description is generated, and the parameters are compiled in.

@@ -8,8 +8,8 @@ use crate::{TABLE, new, vr};
 use fmu_export::Causality::Parameter;
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::{self, *};
-use fmu_package::LoadedModel;
 use fmu_package::structure::ModelStructure;
+use fmu_package::{LoadedModel, Standard};
 use fmu_test_kit::checks::output_derivatives_fit_steps;
 use fmu_test_kit::{Either, Importer as Fmu, Random, fmi3};
 use prw_testbed::TestbedFmu;
@@ -22,7 +22,7 @@ static STRUCTURE: LazyLock<ModelStructure> = LazyLock::new(|| {
         (fmu_export::fmi2::functions::<TestbedFmu>(), fmu_export::fmi3::functions::<TestbedFmu>());
     // SAFETY: the functions belong to the same model.
     let model = unsafe { LoadedModel::new(&fmu_export::describe::<TestbedFmu>(), fmi2, fmi3) };
-    ModelStructure::of(&model.unwrap(), false).unwrap()
+    ModelStructure::of(&model.unwrap(), Standard::Fmi2, false).unwrap()
 });
 
 /// Returns central differences of the values that getters return, each with a bound of its rounding error.
@@ -58,7 +58,7 @@ fn fit_differences<F: Either>(fmu: &F, mode: Mode, started: bool, label: &str) {
         _ => (UNKNOWNS.to_vec(), vec![&structure.outputs, &structure.derivatives]),
     };
     let declares = |unknown: u32, known: u32| {
-        let mut listed = listed.iter().copied().flatten().filter(|of| of.vr == unknown);
+        let mut listed = listed.iter().copied().flatten().filter(|of| of.index == unknown);
         listed.any(|of| of.dependencies.iter().any(|(vr, _)| *vr == known))
     };
     // No function sets states in Co-Simulation.

@@ -1,6 +1,6 @@
-//! What `build_fmu` makes: the description, its variants, the FMU.
+//! The output of `build_fmu`: the description, its variants, the FMU.
 
-use fmi_schema::fmi2::{DependenciesKind, Fmi2ModelDescription, Fmi2VariableDependency};
+use fmi_schema::fmi2::{Fmi2ModelDescription, Fmi2VariableDependency};
 use fmi_schema::traits::FmiModelDescription;
 use fmu_export::Variables;
 use prw_testbed::TestbedFmu;
@@ -25,18 +25,18 @@ fn errors(output: &Output) -> String {
 
 /// The description that `build_fmu` writes with these arguments.
 fn description(arguments: &[&str]) -> String {
-    let folder = tempfile::tempdir().unwrap();
-    let output = build_fmu(&[&["--describe"], arguments].concat(), folder.path());
+    let directory = tempfile::tempdir().unwrap();
+    let output = build_fmu(&[&["--describe"], arguments].concat(), directory.path());
     assert!(output.status.success(), "{output:?}");
-    fs::read_to_string(folder.path().join("modelDescription.xml")).unwrap()
+    fs::read_to_string(directory.path().join("modelDescription.xml")).unwrap()
 }
 
-/// Table 1 with some text replaced.
-fn parameter_file(folder: &Path, from: &str, to: &str) -> String {
+/// Writes Table 1 with a string replaced.
+fn parameter_file(directory: &Path, old: &str, new: &str) -> String {
     let table = fs::read_to_string(TABLE_1).unwrap();
-    assert!(table.contains(from));
-    let path = folder.join("mine.json");
-    fs::write(&path, table.replace(from, to)).unwrap();
+    assert!(table.contains(old));
+    let path = directory.join("mine.json");
+    fs::write(&path, table.replace(old, new)).unwrap();
     path.to_str().unwrap().to_owned()
 }
 
@@ -44,7 +44,7 @@ fn parameter_file(folder: &Path, from: &str, to: &str) -> String {
 fn the_committed_description_is_up_to_date() {
     assert!(
         fs::read_to_string(COMMITTED).unwrap_or_default() == description(&[]),
-        "modelDescription/modelDescription.xml is out of date; write it anew with\n    \
+        "modelDescription/modelDescription.xml is out of date; update it with\n    \
          cargo run --release --bin build_fmu -- --describe"
     );
 }
@@ -52,7 +52,7 @@ fn the_committed_description_is_up_to_date() {
 #[test]
 fn it_reads_back_as_the_model_that_was_compiled() {
     let read = Fmi2ModelDescription::deserialize(&description(&[])).unwrap();
-    // What is kept with the sources does not change with them.
+    // The description that is kept with the sources has no guid, which would change with them.
     assert_eq!(read.guid, fmu_package::NO_GUID);
     assert_eq!(read.model_name, "PitchRollWristTestbed");
     assert_eq!(read.num_states(), 6);
@@ -61,14 +61,13 @@ fn it_reads_back_as_the_model_that_was_compiled() {
     assert_eq!(names, table);
 }
 
-/// The non-zeros of a row of a matrix over the states and one over the inputs.
+/// Returns the names of the non-zeros in the rows of a matrix over the states and a matrix over the inputs.
 fn knowns(names: [&[&'static str]; 2], rows: [Vec<f64>; 2]) -> BTreeSet<&'static str> {
     let pairs = names.into_iter().zip(rows).flat_map(|(names, row)| names.iter().zip(row));
     pairs.filter(|(_, factor)| *factor != 0.0).map(|(name, _)| *name).collect()
 }
 
-/// The dependencies are found from the model's partial derivatives; the matrices of eq. (11) come from
-/// other code.
+/// The dependencies are found from the model's partial derivatives; independent code calculates the matrices of eq. (11).
 #[test]
 fn dependencies_are_the_sparsity_of_the_matrices() {
     let read = Fmi2ModelDescription::deserialize(&description(&[])).unwrap();
@@ -111,7 +110,7 @@ fn dependencies_are_the_sparsity_of_the_matrices() {
         assert_eq!(listed(&structure.outputs.unknowns, output), owned(expected.into()));
     }
     for (unknown, expected) in [
-        // What a state starts from, then what starts from states.
+        // The start values of states, then variables that depend on states.
         ("theta3", &["theta1", "theta3_start"][..]),
         ("theta4", &["theta2", "theta4_start"]),
         ("theta5", &["theta1", "theta5_start"]),
@@ -160,29 +159,15 @@ fn dependencies_are_the_sparsity_of_the_matrices() {
 
 #[test]
 fn tunable_parameters_make_another_fmu() {
-    let (fixed, tunable) = (description(&[]), description(&["--tunable"]));
-    let [fixed, tunable] = [fixed, tunable].map(|text| Fmi2ModelDescription::deserialize(&text).unwrap());
-    let kinds = |read: &Fmi2ModelDescription, kind: &DependenciesKind| {
-        let lists = [&read.model_structure.outputs.unknowns, &read.model_structure.derivatives.unknowns];
-        lists
-            .into_iter()
-            .flatten()
-            .flat_map(|unknown| &unknown.dependencies_kind)
-            .filter(|k| *k == kind)
-            .count()
-    };
-    use DependenciesKind::{Constant, Fixed, Tunable};
-    assert_eq!(kinds(&fixed, &Tunable), 0);
-    assert_eq!(kinds(&tunable, &Fixed), 0);
-    assert_eq!(kinds(&fixed, &Fixed), kinds(&tunable, &Tunable));
-    assert_eq!(kinds(&fixed, &Constant), kinds(&tunable, &Constant));
+    // The description has this word only as a variability and as a kind of dependencies.
+    assert_eq!(description(&["--tunable"]), description(&[]).replace("fixed", "tunable"));
 }
 
 #[test]
 fn other_parameters_are_other_start_values() {
-    let folder = tempfile::tempdir().unwrap();
+    let directory = tempfile::tempdir().unwrap();
     let file = parameter_file(
-        folder.path(),
+        directory.path(),
         "\"value\": 2.11, \"unit\": \"N.m/deg\"",
         "\"value\": 99.5, \"unit\": \"N.m/rad\"",
     );
@@ -195,16 +180,16 @@ fn other_parameters_are_other_start_values() {
         "{changed:?}"
     );
     // The same values from another file are the same FMU.
-    let copy = parameter_file(folder.path(), "meaning", "meaning");
+    let copy = parameter_file(directory.path(), "meaning", "meaning");
     assert_eq!(description(&["--parameters", &copy]), before);
 }
 
 /// The guid depends on the options and on every digit of the parameters, but not on the format of their file.
 #[test]
 fn every_variant_has_a_separate_guid() {
-    let folder = tempfile::tempdir().unwrap();
+    let directory = tempfile::tempdir().unwrap();
     let file =
-        |value: &str| parameter_file(folder.path(), "\"value\": 2.11,", &format!("\"value\": {value},"));
+        |value: &str| parameter_file(directory.path(), "\"value\": 2.11,", &format!("\"value\": {value},"));
     let same = guid(&["--parameters", &file("2.110")]);
     let other = guid(&["--parameters", &file("2.1100000000000003")]);
     assert_eq!(same, guid(&[]));
@@ -212,16 +197,16 @@ fn every_variant_has_a_separate_guid() {
 }
 
 #[test]
-fn wrong_requests_are_refused_in_one_line() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("out");
-    let file = parameter_file(folder.path(), "\"value\": 2.11", "\"value\": -2.11");
+fn wrong_requests_are_rejected_in_one_line() {
+    let directory = tempfile::tempdir().unwrap();
+    let out = directory.path().join("out");
+    let file = parameter_file(directory.path(), "\"value\": 2.11", "\"value\": -2.11");
     let extreme = tempfile::tempdir().unwrap();
     let extreme = parameter_file(extreme.path(), "\"value\": 2.11", "\"value\": 1e306");
-    // The header of a universal library of macOS, for Intel alone, with nothing else or a function of FMI.
+    // The header of a universal library of macOS, only for Intel, with or without a function of FMI.
     let header = [0xcafe_babe_u32, 1, 0x0100_0007, 3, 0x1000, 0, 12].map(u32::to_be_bytes).concat();
     let [empty, library] = [("empty", &b""[..]), ("a", b"fmi2Instantiate")].map(|(name, content)| {
-        let library = folder.path().join(name).with_extension("dylib");
+        let library = directory.path().join(name).with_extension("dylib");
         fs::write(&library, [&header, content].concat()).unwrap();
         library.to_str().unwrap().to_owned()
     });
@@ -246,7 +231,7 @@ fn wrong_requests_are_refused_in_one_line() {
         (&["--target", "sparc"], "no FMU platform is known for the target 'sparc'"),
     ] {
         let text = errors(&build_fmu(arguments, &out));
-        // What cargo says of its progress may come before.
+        // Lines that report the progress of cargo may come before.
         let last = text.lines().last().unwrap_or_default();
         assert!(last.starts_with("error: ") && last.contains(message), "{text}");
     }
@@ -266,9 +251,9 @@ fn guid(arguments: &[&str]) -> String {
 
 #[test]
 fn two_builds_give_the_same_fmu_with_the_committed_description() {
-    let (folder, guid) = (tempfile::tempdir().unwrap(), guid(&[]));
+    let (directory, guid) = (tempfile::tempdir().unwrap(), guid(&[]));
     let build = |name: &str| {
-        let out = folder.path().join(name);
+        let out = directory.path().join(name);
         let output = build_fmu(&[], &out);
         assert!(output.status.success(), "{output:?}");
         let text = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -287,9 +272,9 @@ fn two_builds_give_the_same_fmu_with_the_committed_description() {
     }
 }
 
-/// The packages that are compiled into the library are those whose licenses the FMU names.
+/// The FMU names the licenses of exactly the packages that are compiled into its library.
 #[test]
-fn the_licenses_of_all_packages_are_there() {
+fn the_licenses_of_all_packages_are_listed() {
     let cargo = env!("CARGO");
     let arguments = [
         "tree",

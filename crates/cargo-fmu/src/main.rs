@@ -2,8 +2,8 @@
 //!
 //! ## Inside
 //!
-//! `new` writes a model to grow, `project` asks cargo about the package, `builder` compiles, describes and packs it, `run`
-//! simulates what came of it, `plot` draws that.
+//! `new` writes a new model, `project` gets the metadata of the package from cargo, `builder` compiles, describes and packs it, `run`
+//! simulates the FMU, `plot` draws the results.
 
 mod builder;
 mod new;
@@ -15,12 +15,12 @@ use anyhow::Result;
 use builder::Purpose;
 use clap::Parser;
 use fmu_package::{BuildOptions, terminal};
-use project::{Place, Project};
+use project::{Package, Project};
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// What cargo starts with `fmu` as its first argument.
+/// The command line, with `fmu` as the first argument of cargo.
 #[derive(Parser)]
 #[command(name = "cargo", bin_name = "cargo", disable_help_subcommand = true)]
 enum Cargo {
@@ -36,20 +36,20 @@ enum Command {
     /// Make the FMUs, for FMI 2.0 and for FMI 3.0
     Build {
         #[command(flatten)]
-        place: Place,
+        package: Package,
         #[command(flatten)]
         build: BuildOptions,
-        /// Behind `--`: options that only the package's own build_fmu has
+        /// After `--`: options of the package's own build_fmu
         #[arg(last = true, value_name = "OPTIONS")]
         _own: Vec<OsString>,
     },
-    /// Make the FMUs and simulate one: a table (CSV) and a picture (SVG) of the outputs
+    /// Make the FMUs and simulate one: a table (CSV) and a plot (SVG) of the outputs
     Run(run::Options),
-    /// Make the FMUs and attack them: which promises of the standard do they break?
+    /// Make the FMUs and attack them: which requirements of the standard do they violate?
     Check {
         #[command(flatten)]
-        place: Place,
-        /// Check this FMU, of whatever origin, instead of making any; repeat it for several
+        package: Package,
+        /// Check this FMU, of any origin, instead of making FMUs; repeat it for several
         #[arg(long)]
         fmu: Vec<PathBuf>,
         #[command(flatten)]
@@ -62,20 +62,20 @@ fn main() -> ExitCode {
     let Cargo::Fmu(command) = Cargo::parse();
     match carry_out(&command) {
         Ok(true) => ExitCode::SUCCESS,
-        // It has been said why.
+        // The reason has been printed.
         Ok(false) => ExitCode::FAILURE,
         Err(error) => terminal::exit(Err(error)),
     }
 }
 
-/// Tells whether all went well.
+/// Carries out a command. Returns false if it failed and has printed the reason.
 fn carry_out(command: &Command) -> Result<bool> {
     match command {
         Command::New(options) => new::new(options).map(|()| true),
-        Command::Build { place, build, .. } => {
-            builder::build(&Project::find(place)?, build, Purpose::Use, &builder::words_of_build())
+        Command::Build { package, build, .. } => {
+            builder::build(&Project::find(package)?, build, Purpose::Use, &builder::arguments_of_build())
         }
         Command::Run(options) => run::run(options),
-        Command::Check { place, fmu, check } => run::check(place, fmu, check),
+        Command::Check { package, fmu, check } => run::check(package, fmu, check),
     }
 }

@@ -1,25 +1,26 @@
-//! Begins a model: a crate of its own, from one of those that come with this command.
+//! Makes a new crate from one of the models that this command contains.
 
-use crate::builder::{cargo, tested, write};
+use crate::builder::{tested, write};
 use anyhow::{Context, Result, bail, ensure};
+use fmu_package::cargo;
 use fmu_package::terminal::short;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What to begin with.
+/// The options of `new`.
 #[derive(clap::Args, Clone, Debug)]
 pub struct Options {
-    /// Its folder, which is made
+    /// The directory of the new model
     path: PathBuf,
-    /// Its name [default: that of the folder]
+    /// Its name [default: the name of the directory]
     #[arg(long)]
     name: Option<String>,
-    /// What to begin with: lag (the least there is), ball (events where a sign changes, an end), motor (events at times),
-    /// house (a file, texts, units with an offset)
+    /// The model to begin with: lag (the smallest), ball (events where a sign changes, an end), motor (events at times),
+    /// house (a file, strings, units with an offset)
     #[arg(long, value_enum, value_name = "MODEL", default_value_t, hide_possible_values = true)]
     from: Begin,
-    /// Take fmu-export from this git repository, as a URL, so that others can build the model
+    /// Take fmu-export from this git repository, a URL, so that others can build the model
     #[arg(long, value_name = "URL")]
     git: Option<String>,
 }
@@ -34,7 +35,7 @@ enum Begin {
     House,
 }
 
-/// The files of a model, all but those that every crate has.
+/// The files of a model, except the files that every crate has.
 macro_rules! files {
     ($model:literal: $($file:literal)+) => {
         ($model, &[$(($file, include_str!(concat!("../models/", $model, "/", $file)))),+])
@@ -56,16 +57,16 @@ impl Begin {
 
 /// Makes the crate.
 pub fn new(options: &Options) -> Result<()> {
-    let folder = &options.path;
-    ensure!(!folder.exists(), "{} is there already; name a new folder", folder.display());
+    let directory = &options.path;
+    ensure!(!directory.exists(), "{} exists already; name a new directory", directory.display());
     let name = match &options.name {
         Some(name) => name.clone(),
-        None => folder.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        None => directory.file_name().unwrap_or_default().to_string_lossy().into_owned(),
     };
-    // Cargo knows what may be a name, and of the workspace and the repository around.
+    // Cargo checks the name, and adds the crate to the workspace and the repository above it.
     let cargo = cargo();
     let mut command = Command::new(&cargo);
-    command.args(["new", "--quiet", "--lib", "--edition", "2024", "--name", &name]).arg(folder);
+    command.args(["new", "--quiet", "--lib", "--edition", "2024", "--name", &name]).arg(directory);
     let output =
         command.output().with_context(|| format!("cannot start cargo ({})", cargo.to_string_lossy()))?;
     if !output.status.success() {
@@ -75,11 +76,11 @@ pub fn new(options: &Options) -> Result<()> {
     let crate_name = name.replace('-', "_");
     let (model, files) = options.from.files();
     for (file, text) in files {
-        let path = folder.join(file.replace("lag", &crate_name));
-        let parent = path.parent().context("a file is in a folder")?;
+        let path = directory.join(file.replace("lag", &crate_name));
+        let parent = path.parent().context("a file is in a directory")?;
         fs::create_dir_all(parent).with_context(|| format!("cannot make {}", parent.display()))?;
         let text = match options.from {
-            // The least there is becomes what it is called; others keep what they are.
+            // The smallest model gets the name of the crate; others keep their names.
             Begin::Lag => renamed(&renamed(text, "lag", &crate_name), "Lag", &camel(&crate_name)),
             _ if file.starts_with("tests/") => {
                 text.replace(&format!("use {model}::"), &format!("use {crate_name}::"))
@@ -88,25 +89,25 @@ pub fn new(options: &Options) -> Result<()> {
         };
         write(&path, &text)?;
     }
-    let in_workspace = in_workspace(folder);
-    let export = Dependency::of(folder, options.git.as_deref())?;
-    write(&folder.join("Cargo.toml"), &manifest(&name, &export, !in_workspace))?;
+    let in_workspace = in_workspace(directory);
+    let export = Dependency::of(directory, options.git.as_deref())?;
+    write(&directory.join("Cargo.toml"), &manifest(&name, &export, !in_workspace))?;
     let lock = tested();
     if !lock.is_empty() && !in_workspace {
-        write(&folder.join("Cargo.lock"), &lock)?;
+        write(&directory.join("Cargo.lock"), &lock)?;
     }
-    // With the width of its new place; without rustfmt it stays as it is.
-    let _ = Command::new(&cargo).args(["fmt", "--quiet"]).current_dir(folder).output();
+    // The names have other lengths now. Without rustfmt, the lines are not wrapped again.
+    let _ = Command::new(&cargo).args(["fmt", "--quiet"]).current_dir(directory).output();
     println!(
-        "{0} begins with {model}: change {0}/src/{1}, then\n  cd {0}\n  cargo test        # the model as it is\n  {2:<16}  # the FMU, a table and a picture",
-        short(folder),
+        "{0} begins with {model}: change {0}/src/{1}, then\n  cd {0}\n  cargo test        # the model before changes\n  {2:<16}  # the FMU, a table and a plot",
+        short(directory),
         if files.len() > 2 { format!("{model}.rs") } else { "lib.rs".to_owned() },
         match options.from {
             Begin::Lag => "cargo fmu run --set u=1",
             _ => "cargo fmu run",
         },
     );
-    if let Dependency::Here(path) = export {
+    if let Dependency::Local(path) = export {
         println!(
             "Its Cargo.toml names {}, which is only on this machine; --git URL names a repository for everyone",
             path.display()
@@ -115,34 +116,34 @@ pub fn new(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// Whether another folder's `Cargo.lock` is in force.
-fn in_workspace(folder: &Path) -> bool {
+/// Whether the `Cargo.lock` in another directory is in force.
+fn in_workspace(directory: &Path) -> bool {
     let mut command = Command::new(cargo());
-    command.args(["locate-project", "--workspace", "--message-format", "plain"]).current_dir(folder);
+    command.args(["locate-project", "--workspace", "--message-format", "plain"]).current_dir(directory);
     let root = command.output().map(|output| String::from_utf8_lossy(&output.stdout).trim().to_owned());
-    let own = fs::canonicalize(folder.join("Cargo.toml"));
+    let own = fs::canonicalize(directory.join("Cargo.toml"));
     !matches!((root.and_then(fs::canonicalize), own), (Ok(root), Ok(own)) if root == own)
 }
 
 /// The source of fmu-export in a model's `Cargo.toml`.
 enum Dependency {
-    /// A registry has it.
+    /// The registry.
     Registry,
     /// A commit of a git repository: URL and revision.
     Git(String, String),
-    /// A path from the model, which is in the same git repository.
-    Beside(String),
+    /// A relative path within one git repository.
+    Relative(String),
     /// A path on this machine.
-    Here(PathBuf),
+    Local(PathBuf),
 }
 
 impl Dependency {
-    /// fmu-export of the version of this command.
-    fn of(folder: &Path, git: Option<&str>) -> Result<Self> {
+    /// Returns the source of fmu-export in the version of this command.
+    fn of(directory: &Path, repository: Option<&str>) -> Result<Self> {
         let package = Path::new(env!("CARGO_MANIFEST_DIR")).with_file_name("fmu-export");
         let is_there = package.join("Cargo.toml").is_file();
-        if let Some(url) = git {
-            let revision = git_says(&package, &["rev-parse", "HEAD"]);
+        if let Some(url) = repository {
+            let revision = git(&package, &["rev-parse", "HEAD"]);
             let revision = revision.with_context(|| {
                 format!("{} is in no git repository, so there is no revision to name", package.display())
             })?;
@@ -151,13 +152,13 @@ impl Dependency {
         if !is_there {
             return Ok(Self::Registry);
         }
-        let folder = fs::canonicalize(folder).with_context(|| short(folder))?;
+        let directory = fs::canonicalize(directory).with_context(|| short(directory))?;
         // cargo may have made the directory itself a repository.
-        let around = folder.parent().unwrap_or(&folder);
-        let root = git_says(around, &["rev-parse", "--show-toplevel"]).map(PathBuf::from);
+        let parent = directory.parent().unwrap_or(&directory);
+        let root = git(parent, &["rev-parse", "--show-toplevel"]).map(PathBuf::from);
         Ok(match root.filter(|root| package.starts_with(root)) {
-            Some(_) => Self::Beside(relative(&folder, &package)),
-            None => Self::Here(package),
+            Some(_) => Self::Relative(relative(&directory, &package)),
+            None => Self::Local(package),
         })
     }
 
@@ -166,17 +167,17 @@ impl Dependency {
         match self {
             Self::Registry => format!("{version:?}"),
             Self::Git(url, revision) => format!("{{ git = {url:?}, rev = {revision:?} }}"),
-            Self::Beside(path) => format!("{{ version = {version:?}, path = {path:?} }}"),
-            Self::Here(path) => {
+            Self::Relative(path) => format!("{{ version = {version:?}, path = {path:?} }}"),
+            Self::Local(path) => {
                 format!("{{ version = {version:?}, path = {:?} }}", path.display().to_string())
             }
         }
     }
 }
 
-/// What git prints in a directory, if it succeeds there.
-fn git_says(folder: &Path, arguments: &[&str]) -> Option<String> {
-    let output = Command::new("git").arg("-C").arg(folder).args(arguments).output().ok()?;
+/// Returns the output of git in a directory, if it succeeds.
+fn git(directory: &Path, arguments: &[&str]) -> Option<String> {
+    let output = Command::new("git").arg("-C").arg(directory).args(arguments).output().ok()?;
     let text = String::from_utf8(output.stdout).ok()?;
     output.status.success().then(|| text.trim().to_owned())
 }
@@ -194,7 +195,7 @@ fn manifest(name: &str, export: &Dependency, with_profile: bool) -> String {
     // A workspace has profiles in its own Cargo.toml only.
     let profile = match with_profile {
         true => {
-            "# A small library, which asks for little of the system it runs on.\n[profile.release]\nlto = true\nstrip = true\n\n"
+            "# A small library, which needs little of the system.\n[profile.release]\nlto = true\nstrip = true\n\n"
         }
         false => "",
     };
@@ -204,7 +205,7 @@ name = {name:?}
 version = "0.1.0"
 edition = "2024"
 
-# cdylib is what goes into the FMU; rlib what tests use.
+# The cdylib goes into the FMU; tests use the rlib.
 [lib]
 crate-type = ["cdylib", "rlib"]
 
@@ -218,23 +219,23 @@ unsafe_code = "deny"
     )
 }
 
-/// Replaces a word where it is one.
-fn renamed(text: &str, word: &str, by: &str) -> String {
+/// Replaces whole words.
+fn renamed(text: &str, word: &str, replacement: &str) -> String {
     let mut result = String::new();
     let mut rest = text;
-    while let Some(place) = rest.find(word) {
+    while let Some(position) = rest.find(word) {
         let is_part =
             |letter: Option<char>| letter.is_some_and(|letter| letter.is_alphanumeric() || letter == '_');
-        let (before, after) = (&rest[..place], &rest[place + word.len()..]);
+        let (before, after) = (&rest[..position], &rest[position + word.len()..]);
         result.push_str(before);
         let part = is_part(result.chars().last()) || is_part(after.chars().next());
-        result.push_str(if part { word } else { by });
+        result.push_str(if part { word } else { replacement });
         rest = after;
     }
     result + rest
 }
 
-/// As Rust names types.
+/// Returns the name of a type in Rust.
 fn camel(name: &str) -> String {
     let capital = |word: &str| {
         let mut letters = word.chars();

@@ -1,4 +1,4 @@
-//! Draws what an FMU did: an SVG with a panel for each unit.
+//! Draws the results of a simulation: an SVG with a panel for each unit.
 
 use anyhow::{Result, anyhow};
 use plotters::prelude::*;
@@ -9,14 +9,14 @@ use std::path::Path;
 pub struct Trajectory<'a> {
     pub name: &'a str,
     pub unit: &'a str,
-    /// Whether it stays as it is until it jumps.
+    /// Whether it is constant between jumps.
     pub jumps: bool,
-    /// Whether 0 and 1 stand for false and true.
+    /// Whether its values 0 and 1 are false and true.
     pub is_boolean: bool,
     pub values: &'a [f64],
 }
 
-/// Colours that stay apart for colour-blind eyes (Okabe and Ito).
+/// Colours that colour-blind people can distinguish (Okabe and Ito).
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -27,11 +27,11 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 
-/// Draws the courses over time; those of one unit share a panel.
+/// Draws the trajectories. Trajectories of one unit share a panel.
 pub fn plot(path: &Path, title: &str, time: &[f64], trajectories: &[Trajectory]) -> Result<()> {
     let mut svg = String::new();
     draw(&mut svg, title, time, trajectories).map_err(|error| anyhow!("{error}"))?;
-    // The backend knows whole numbers only: it draws on a large paper, which is then shown smaller.
+    // The backend has integer coordinates: it draws a large image, which the SVG then scales down.
     let (begin, rest) = svg.split_once('>').unwrap_or_default();
     let size = |name: &str| {
         let (_, value) = begin.split_once(&format!(" {name}=\""))?;
@@ -45,7 +45,7 @@ pub fn plot(path: &Path, title: &str, time: &[f64], trajectories: &[Trajectory])
     Ok(fs::write(path, format!("{begin}>{rest}"))?)
 }
 
-/// How much larger the paper is.
+/// Factor by which the image is larger.
 const FINE: u32 = 10;
 
 fn draw(
@@ -121,7 +121,7 @@ fn draw(
     Ok(())
 }
 
-/// A number at an axis of this length, with as many digits as tell the numbers there apart, and without a sign of 0.
+/// Returns a label at an axis of this length, with enough digits to distinguish the labels, and without a sign of 0.
 fn label(value: f64, range: f64) -> String {
     let value = if value.abs() < 1e-6 * range { 0.0 } else { value };
     let digits = 4.0 - range.log10().ceil();

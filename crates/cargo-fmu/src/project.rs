@@ -1,18 +1,18 @@
-//! What cargo knows of the package that is to be an FMU.
+//! The metadata of the package that makes an FMU, from cargo.
 
-use crate::builder::cargo;
 use anyhow::{Context, Result, bail};
+use fmu_package::metadata;
 use serde_json::Value;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
-/// Where the model is.
+/// The options that name the package of the model.
 #[derive(clap::Args, Clone, Debug)]
-pub struct Place {
+pub struct Package {
     /// The model's package, in a workspace with several
     #[arg(short, long)]
     pub package: Option<String>,
-    /// Its Cargo.toml [default: that of this folder, or of the next one around it]
+    /// Its Cargo.toml [default: the one in this directory, or in the nearest directory above]
     #[arg(long, value_name = "FILE")]
     pub manifest_path: Option<PathBuf>,
 }
@@ -21,19 +21,21 @@ pub struct Place {
 pub struct Project {
     /// Its name.
     pub name: String,
-    /// The folder of its `Cargo.toml`.
-    pub folder: PathBuf,
-    /// The folder of its workspace, with `Cargo.lock`.
+    /// The directory of its `Cargo.toml`.
+    pub directory: PathBuf,
+    /// The directory of its workspace, with `Cargo.lock`.
     pub workspace: PathBuf,
     /// Its own program that builds the FMU, if it has one.
     pub own_builder: Option<String>,
 }
 
 impl Project {
-    /// Asks cargo.
-    pub fn find(place: &Place) -> Result<Self> {
-        let metadata = metadata(place)?;
-        let package = chosen(&metadata, place.package.as_deref())?;
+    /// Finds the package with `cargo metadata`.
+    pub fn find(options: &Package) -> Result<Self> {
+        let manifest =
+            options.manifest_path.iter().flat_map(|path| [OsStr::new("--manifest-path"), path.as_ref()]);
+        let metadata = metadata(manifest)?;
+        let package = chosen(&metadata, options.package.as_deref())?;
         let name = text(&package["name"]);
         let targets = list(&package["targets"]);
         if !targets.iter().any(|target| list(&target["crate_types"]).contains(&"cdylib".into())) {
@@ -41,35 +43,21 @@ impl Project {
                 "{name} makes no shared library; its Cargo.toml needs\n\n  [lib]\n  crate-type = [\"cdylib\", \"rlib\"]\n"
             );
         }
-        if !list(&package["dependencies"]).iter().any(|of| of["name"] == "fmu-export") {
+        if !list(&package["dependencies"]).iter().any(|used| used["name"] == "fmu-export") {
             bail!("{name} does not use fmu-export: cargo fmu new begins a model that does");
         }
         let programs = targets.iter().filter(|target| list(&target["kind"]).contains(&"bin".into()));
         let mut programs = programs.map(|target| text(&target["name"]));
-        let folder = Path::new(text(&package["manifest_path"])).parent();
+        let directory = Path::new(text(&package["manifest_path"])).parent();
         Ok(Self {
             name: name.to_owned(),
-            folder: folder.context("cargo names no Cargo.toml")?.to_owned(),
+            directory: directory.context("cargo names no Cargo.toml")?.to_owned(),
             workspace: text(&metadata["workspace_root"]).into(),
             own_builder: programs
                 .find(|name| *name == "build_fmu" || name.starts_with("build_fmu_"))
                 .map(str::to_owned),
         })
     }
-}
-
-/// Returns the output of `cargo metadata`.
-fn metadata(place: &Place) -> Result<Value> {
-    let mut command = Command::new(cargo());
-    command.args(["metadata", "--format-version", "1"]);
-    if let Some(path) = &place.manifest_path {
-        command.arg("--manifest-path").arg(path);
-    }
-    let output = command.output().context("cannot start cargo")?;
-    if !output.status.success() {
-        bail!("{}", String::from_utf8_lossy(&output.stderr).trim().trim_start_matches("error: "));
-    }
-    serde_json::from_slice(&output.stdout).context("cargo metadata returns no JSON")
 }
 
 fn text(value: &Value) -> &str {

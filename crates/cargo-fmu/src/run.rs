@@ -2,10 +2,10 @@
 
 use crate::builder::{self, Purpose};
 use crate::plot::{Trajectory as Curve, plot};
-use crate::project::{Place, Project};
+use crate::project::{Package, Project};
 use anyhow::{Context, Result, bail, ensure};
-use fmu_package::terminal::short;
-use fmu_package::{BuildOptions, Fmi};
+use fmu_package::terminal::{fmi_version, short};
+use fmu_package::{BuildOptions, Standard};
 use fmu_run::{
     BaseType, Batch, Description, Fmu, Interface, Runs, Start, Status, Trajectory, Variable, Watch, nearest,
 };
@@ -16,11 +16,11 @@ use std::process::ExitCode;
 use std::thread::sleep;
 use std::time::{Duration, Instant, SystemTime};
 
-/// How to simulate.
+/// The options of `run`.
 #[derive(clap::Args, Clone, Debug)]
 pub struct Options {
     #[command(flatten)]
-    place: Place,
+    package: Package,
     /// A start value: a number, true, false, a name of an enumeration, or a string; of an array one for each element, with
     /// commas; repeat it for several
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
@@ -28,28 +28,28 @@ pub struct Options {
     /// Inputs over time: a table (CSV) with a column time and one for each input
     #[arg(long, value_name = "FILE")]
     input: Option<PathBuf>,
-    /// When it ends, s [default: as the model proposes]
+    /// Stop time, s [default: the proposal of the model]
     #[arg(long, value_name = "S")]
     stop: Option<f64>,
-    /// How long a step is, s [default: as the model proposes]
+    /// Step size, s [default: the proposal of the model]
     #[arg(long, value_name = "S")]
     step: Option<f64>,
-    /// What to show, with commas between the names [default: all outputs]
+    /// Variables to show, with commas between the names [default: all outputs]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     show: Vec<String>,
-    /// Simulate the FMU for FMI 2.0 or that for FMI 3.0 [default: 2, if the model has only what that has]
-    #[arg(long, value_enum, value_name = "2|3", hide_possible_values = true)]
-    fmi: Option<Fmi>,
+    /// Simulate the FMU for FMI 2.0 or for FMI 3.0 [default: 2, if it has all types of the model]
+    #[arg(long, value_parser = fmi_version, value_name = "2|3")]
+    fmi: Option<Standard>,
     /// Show all messages of the model, not only its warnings
     #[arg(long)]
     log: bool,
-    /// Stay, and do it again whenever a file of the model changes
+    /// Repeat it after every change of a file of the model
     #[arg(long)]
     watch: bool,
 }
 
-fn assignment(text: &str) -> Result<(String, String), String> {
-    let (name, value) = text.split_once('=').ok_or("write NAME=VALUE, for example gain=2.5")?;
+fn assignment(argument: &str) -> Result<(String, String), String> {
+    let (name, value) = argument.split_once('=').ok_or("write NAME=VALUE, for example gain=2.5")?;
     Ok((name.trim().to_owned(), value.trim().to_owned()))
 }
 
@@ -58,8 +58,8 @@ pub fn run(options: &Options) -> Result<bool> {
     if !options.watch {
         return once(options);
     }
-    let project = Project::find(&options.place)?;
-    let names = ["Cargo.toml", "src", "modelDescription"].map(|name| project.folder.join(name));
+    let project = Project::find(&options.package)?;
+    let names = ["Cargo.toml", "src", "modelDescription"].map(|name| project.directory.join(name));
     let watched: Vec<_> = names.into_iter().chain(options.input.clone()).collect();
     loop {
         let begin = Instant::now();
@@ -91,24 +91,28 @@ fn changes(mut open: Vec<PathBuf>) -> BTreeMap<PathBuf, Option<SystemTime>> {
 }
 
 /// Checks the given FMUs, or builds and checks those of the project. Returns false if a check failed.
-pub fn check(place: &Place, given: &[PathBuf], options: &fmu_check::Options) -> Result<bool> {
+pub fn check(package: &Package, given: &[PathBuf], options: &fmu_check::Options) -> Result<bool> {
     let mut fmus = given.to_vec();
     if fmus.is_empty() {
-        let project = Project::find(place)?;
-        let folder = project.workspace.join("target/fmu");
+        let project = Project::find(package)?;
+        let directory = project.workspace.join("target/fmu");
         let begin = SystemTime::now();
-        let build = BuildOptions { out: Some(folder.clone()), ..BuildOptions::default() };
-        if !builder::build(&project, &build, Purpose::Use, &["--out".into(), folder.clone().into()])? {
+        let build = BuildOptions { out: Some(directory.clone()), ..BuildOptions::default() };
+        if !builder::build(&project, &build, Purpose::Use, &["--out".into(), directory.clone().into()])? {
             return Ok(false);
         }
-        fmus.extend([folder.clone(), folder.join("fmi3")].iter().filter_map(|folder| newest(folder, begin)));
+        fmus.extend(
+            [directory.clone(), directory.join("fmi3")]
+                .iter()
+                .filter_map(|directory| newest(directory, begin)),
+        );
     }
-    // All are checked, whatever is found in the first.
+    // All are checked, regardless of the findings in the first.
     let mut good = true;
     for fmu in &fmus {
-        let folder = fmu.parent().and_then(Path::file_name).unwrap_or_default();
+        let directory = fmu.parent().and_then(Path::file_name).unwrap_or_default();
         // Reports of several FMUs would have the same names.
-        let out = options.out.as_ref().filter(|_| fmus.len() > 1).map(|out| out.join(folder));
+        let out = options.out.as_ref().filter(|_| fmus.len() > 1).map(|out| out.join(directory));
         let options = fmu_check::Options { out: out.or(options.out.clone()), ..options.clone() };
         good &= fmu_check::command(fmu, &options) == ExitCode::SUCCESS;
     }
@@ -116,44 +120,44 @@ pub fn check(place: &Place, given: &[PathBuf], options: &fmu_check::Options) -> 
 }
 
 fn once(options: &Options) -> Result<bool> {
-    let project = Project::find(&options.place)?;
-    let folder = project.workspace.join("target/fmu");
+    let project = Project::find(&options.package)?;
+    let directory = project.workspace.join("target/fmu");
     let build = BuildOptions {
         fmi: options.fmi,
-        out: Some(folder.clone()),
+        out: Some(directory.clone()),
         no_page: true,
         ..BuildOptions::default()
     };
     let begin = SystemTime::now();
-    let mut words = vec!["--no-page".into(), "--out".into(), folder.clone().into()];
+    let mut arguments = vec!["--no-page".into(), "--out".into(), directory.clone().into()];
     if let Some(fmi) = options.fmi {
-        words.extend(["--fmi".into(), if fmi == Fmi::V2 { "2" } else { "3" }.into()]);
+        arguments.extend(["--fmi".into(), if fmi == Standard::Fmi2 { "2" } else { "3" }.into()]);
     }
-    if !builder::build(&project, &build, Purpose::Trial, &words)? {
+    if !builder::build(&project, &build, Purpose::Trial, &arguments)? {
         return Ok(false);
     }
-    let fmu = newest(&folder, begin).or_else(|| newest(&folder.join("fmi3"), begin));
-    let fmu = fmu.with_context(|| format!("there is no new FMU in {}", short(&folder)))?;
-    simulate(options, &fmu, &folder)
+    let fmu = newest(&directory, begin).or_else(|| newest(&directory.join("fmi3"), begin));
+    let fmu = fmu.with_context(|| format!("there is no new FMU in {}", short(&directory)))?;
+    simulate(options, &fmu, &directory)
 }
 
-/// The FMU in a folder that was just made.
-fn newest(folder: &Path, since: SystemTime) -> Option<PathBuf> {
+/// Returns the FMU in a directory that was just made.
+fn newest(directory: &Path, since: SystemTime) -> Option<PathBuf> {
     let made = |path: &PathBuf| {
         let is_new = |data: fs::Metadata| {
-            // Files may know whole seconds only.
+            // File systems may round times to seconds.
             data.modified().is_ok_and(|time| time + Duration::from_secs(2) > since)
         };
         path.extension().is_some_and(|suffix| suffix == "fmu") && fs::metadata(path).is_ok_and(is_new)
     };
     let mut made: Vec<_> =
-        fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path()).filter(made).collect();
+        fs::read_dir(directory).ok()?.flatten().map(|entry| entry.path()).filter(made).collect();
     made.sort_by_key(|path| fs::metadata(path).and_then(|data| data.modified()).ok());
     made.pop()
 }
 
 /// Simulates an FMU, and writes the table and the plot. Returns false if the run failed.
-fn simulate(options: &Options, path: &Path, folder: &Path) -> Result<bool> {
+fn simulate(options: &Options, path: &Path, directory: &Path) -> Result<bool> {
     // SAFETY: the FMU is the user's own model, which was just compiled.
     #[allow(unsafe_code)]
     let fmu = unsafe { Fmu::open(path) }?;
@@ -176,13 +180,13 @@ fn simulate(options: &Options, path: &Path, folder: &Path) -> Result<bool> {
     let mut time = times(options, description, table.as_ref())?;
     let (runs, watch) = follow(&fmu, &time, table.as_ref(), &starts, &shown)?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let (csv, svg) = (folder.join(format!("{name}.csv")), folder.join(format!("{name}.svg")));
+    let (csv, svg) = (directory.join(format!("{name}.csv")), directory.join(format!("{name}.svg")));
     let ended = watch.ended().pop();
     let failed = ended.is_none() && !runs.errors.is_empty();
     for (_, reason) in runs.errors.iter().filter(|_| failed) {
         eprintln!("error: {reason}");
     }
-    say(&watch, options.log);
+    print_messages(&watch, options.log);
     // A failed run has values up to its failure, or none.
     let unreached =
         runs.trajectories.chunks(time.len()).map(unreached).min().filter(|_| !runs.errors.is_empty());
@@ -255,8 +259,8 @@ fn follow(
     Ok((runs, watch))
 }
 
-/// Shows the messages of the FMU: warnings and worse, or all.
-fn say(watch: &Watch, all: bool) {
+/// Prints the messages of the FMU: warnings, or all.
+fn print_messages(watch: &Watch, all: bool) {
     for (_, time, message) in watch.messages() {
         // Errors are the reason of a failure, which is shown first.
         if all || message.status == Status::Warning {
@@ -290,7 +294,7 @@ fn summarize(curves: &[Curve], shown: &[&Variable]) {
     }
 }
 
-/// From the proposed start on, or the times of the inputs if nothing else is said.
+/// Returns the communication points, from the options, the times of the inputs, or the default experiment.
 fn times(options: &Options, description: &Description, table: Option<&Table>) -> Result<Vec<f64>> {
     let [start, stop, step] = description.default_experiment;
     let start = table.and_then(|table| table.time.first().copied()).or(start).unwrap_or(0.0);
@@ -303,7 +307,7 @@ fn times(options: &Options, description: &Description, table: Option<&Table>) ->
         (1.0..=1e7).contains(&steps),
         "{steps} steps of {step} s are too few or too many; see --stop and --step"
     );
-    // Not a sum of steps, which would run away.
+    // A sum of steps would accumulate rounding errors.
     Ok((0..=steps as u32).map(|number| start + f64::from(number) * step).collect())
 }
 
@@ -316,10 +320,7 @@ fn shown<'a>(names: &[String], description: &'a Description) -> Result<Vec<&'a V
             .filter(|variable| variable.causality == "output")
             .filter(is_number)
             .collect();
-        ensure!(
-            !outputs.is_empty(),
-            "the model has no outputs that are numbers; name what to show with --show"
-        );
+        ensure!(!outputs.is_empty(), "the model has no outputs that are numbers; name variables with --show");
         return Ok(outputs);
     }
     let mut shown = Vec::new();
@@ -331,13 +332,13 @@ fn shown<'a>(names: &[String], description: &'a Description) -> Result<Vec<&'a V
     Ok(shown)
 }
 
-/// The variable of this name, or the elements of the array.
+/// Returns the variable of this name, or the elements of the array.
 fn named<'a>(description: &'a Description, name: &str) -> Vec<&'a Variable> {
     if let Some(variable) = description.variable(name) {
         return vec![variable];
     }
-    let is_element = |of: &&Variable| {
-        of.name.strip_prefix(name).is_some_and(|index| index.starts_with('[') && index.ends_with(']'))
+    let is_element = |variable: &&Variable| {
+        variable.name.strip_prefix(name).is_some_and(|index| index.starts_with('[') && index.ends_with(']'))
     };
     description.variables.iter().filter(is_element).collect()
 }
@@ -348,7 +349,7 @@ fn hint(description: &Description, name: &str) -> String {
     near.map_or(String::new(), |near| format!("; did you mean {near}?"))
 }
 
-/// Start values as the variable's type has them: one, or one for each element of an array.
+/// Returns the start value of a variable, or of each element of an array.
 fn starts<'a>(description: &'a Description, name: &str, value: &'a str) -> Result<Vec<(&'a str, Start<'a>)>> {
     let found = named(description, name);
     ensure!(!found.is_empty(), "there is no variable {name} to set{}", hint(description, name));
@@ -394,33 +395,34 @@ struct Table {
 
 impl Table {
     fn read(file: &Path) -> Result<Self> {
-        let of = || short(file);
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(file).with_context(of)?;
-        let names: Vec<String> = reader.headers().with_context(of)?.iter().map(str::to_owned).collect();
+        let path = || short(file);
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(file).with_context(path)?;
+        let names: Vec<String> = reader.headers().with_context(path)?.iter().map(str::to_owned).collect();
         let mut columns = vec![Vec::new(); names.len()];
         for (row, record) in reader.records().enumerate() {
-            for (place, field) in record.with_context(of)?.iter().enumerate() {
+            for (column, field) in record.with_context(path)?.iter().enumerate() {
                 let value = match field {
                     "true" => Ok(1.0),
                     "false" => Ok(0.0),
                     number => number.parse::<f64>(),
                 };
-                let value = value
-                    .with_context(|| format!("{}, line {}: {} is {field:?}", of(), row + 2, names[place]))?;
-                columns[place].push(value);
+                let value = value.with_context(|| {
+                    format!("{}, line {}: {} is {field:?}", path(), row + 2, names[column])
+                })?;
+                columns[column].push(value);
             }
         }
         let mut columns: Vec<_> = names.into_iter().zip(columns).collect();
         let Some(time) = columns.iter().position(|(name, _)| name == "time") else {
-            bail!("{} has no column time", of());
+            bail!("{} has no column time", path());
         };
         let (_, time) = columns.remove(time);
-        ensure!(time.len() > 1, "{} needs two times at least", of());
-        ensure!(time.is_sorted_by(|a, b| a < b), "{}: its times must rise", of());
+        ensure!(time.len() > 1, "{} needs at least two times", path());
+        ensure!(time.is_sorted_by(|a, b| a < b), "{}: its times must rise", path());
         Ok(Self { time, inputs: columns })
     }
 
-    /// The inputs at these times, straight lines between the given ones.
+    /// Returns the inputs at these times, linearly interpolated.
     fn at(&self, times: &[f64]) -> Vec<(String, Vec<f64>)> {
         let value = |values: &[f64], time: f64| {
             let after = self.time.partition_point(|given| *given <= time).clamp(1, self.time.len() - 1);

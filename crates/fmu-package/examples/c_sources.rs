@@ -1,4 +1,4 @@
-//! C sources of a model in one file, which uses fmu-export only; for tests: c_sources FILE.rs IDENTIFIER FOLDER.
+//! Makes the C sources of a model in one file, which only uses fmu-export, for tests: c_sources FILE.rs IDENTIFIER DIRECTORY.
 //! The variable WASM2C names wasm2c.
 
 use anyhow::{Context, Result, bail, ensure};
@@ -8,8 +8,8 @@ use std::process::Command;
 
 fn main() -> Result<()> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
-    let [file, identifier, folder] = arguments.as_slice() else {
-        bail!("usage: c_sources FILE.rs IDENTIFIER FOLDER");
+    let [file, identifier, directory] = arguments.as_slice() else {
+        bail!("usage: c_sources FILE.rs IDENTIFIER DIRECTORY");
     };
     let wasm2c = std::env::var_os("WASM2C").unwrap_or_else(|| "wasm2c".into());
     check_tools(&wasm2c)?;
@@ -30,7 +30,7 @@ fn main() -> Result<()> {
         .arg(&module)
         .arg(absolute(file)?))?;
     for (name, content) in c_sources(&wasm2c, &module, identifier)? {
-        std::fs::write(Path::new(folder).join(name), content)?;
+        std::fs::write(Path::new(directory).join(name), content)?;
     }
     Ok(())
 }

@@ -1,20 +1,19 @@
-//! The FMUs of a library that describes itself, for tests: rod LIBRARY FOLDER.
+//! Makes the FMUs of a library that describes itself, for tests: rod LIBRARY DIRECTORY.
 #![allow(unsafe_code)]
 
 use anyhow::{Result, bail};
-use fmu_package::{Changes, Fmi, Library, LoadedModel, Parts, Platform, fmi2, fmi3, pack};
+use fmu_package::{Changes, Library, LoadedModel, Parts, Platform, Standard, describe, pack};
 use std::path::Path;
 
 fn main() -> Result<()> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
-    let [library, folder] = arguments.as_slice() else { bail!("usage: rod LIBRARY FOLDER") };
-    // SAFETY: the test's library.
+    let [library, directory] = arguments.as_slice() else { bail!("usage: rod LIBRARY DIRECTORY") };
+    // SAFETY: the library is made by the test with fmu-export.
     let model = unsafe { LoadedModel::load(Path::new(library), None) }?;
     let libraries = [Library { platform: Platform::host()?, path: library.into() }];
     let (changes, identifier) = (Changes::default(), model.identifier());
-    for (fmi, description) in
-        [(Fmi::V2, fmi2::describe(&model, &changes)?), (Fmi::V3, fmi3::describe(&model, &changes)?)]
-    {
+    for fmi in [Standard::Fmi2, Standard::Fmi3] {
+        let description = describe(&model, fmi, &changes)?;
         let parts = Parts {
             fmi,
             identifier,
@@ -24,8 +23,8 @@ fn main() -> Result<()> {
             sources: &[],
             content: &[],
         };
-        let version = if fmi == Fmi::V2 { 2 } else { 3 };
-        pack(&Path::new(folder).join(format!("{identifier}{version}.fmu")), &parts)?;
+        let version = if fmi == Standard::Fmi2 { 2 } else { 3 };
+        pack(&Path::new(directory).join(format!("{identifier}{version}.fmu")), &parts)?;
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! An FMU's sources in C: the library, compiled to WebAssembly, made into C by wasm2c, and the functions of FMI around it.
+//! An FMU's sources in C: wasm2c translates the library from WebAssembly to C, and C functions of FMI call it.
 
 use crate::cross::check_targets;
 use anyhow::{Context, Result, bail, ensure};
@@ -9,10 +9,10 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// What the library is compiled for, to be made into C.
+/// The target of a library that is translated to C.
 pub const WEBASSEMBLY: &str = "wasm32-unknown-unknown";
 
-/// Linking for it: the stack of an instance has 64 KiB. When it overflows, that is noticed, because it comes first.
+/// Arguments of its linker. The stack of an instance has 64 KiB, and is first in memory, so that an overflow is detected.
 pub const LINKING: [&str; 2] = ["-Clink-arg=-zstack-size=65536", "-Clink-arg=--stack-first"];
 
 /// The version of wasm2c whose output is known here.
@@ -21,23 +21,23 @@ const WASM2C: &str = "1.0.42";
 const RUNTIME: &str = include_str!("c/runtime.h");
 const FMI2: &str = include_str!("c/fmi2.c");
 
-/// What is generated need not all be used.
+/// Turns off warnings on unused code, as generated code need not be used.
 const UNUSED: &str = "#ifdef __GNUC__\n#pragma GCC diagnostic ignored \"-Wunused-parameter\"\n\
                       #pragma GCC diagnostic ignored \"-Wunused-const-variable\"\n#endif\n";
 
-/// The files of the FMU's folder `sources`: those to compile come first.
+/// The files in the FMU's directory `sources`; the files to compile are first.
 pub type CSources = Vec<(String, Vec<u8>)>;
 
-/// How many of them are to be compiled.
+/// Number of files to compile.
 pub const COMPILED: usize = 2;
 
-/// Makes C of a WebAssembly module.
+/// Translates a WebAssembly module to C.
 ///
 /// # Errors
-/// When wasm2c is missing or of another version, or makes something else of the module than is known here.
+/// When wasm2c is missing or has another version, or its output has an unknown form.
 pub fn c_sources(wasm2c: &OsStr, module: &Path, identifier: &str) -> Result<CSources> {
-    let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
-    let output = folder.path().join("module.c");
+    let directory = tempfile::tempdir().context("cannot make a temporary directory")?;
+    let output = directory.path().join("module.c");
     let mut command = Command::new(wasm2c);
     command.arg("--no-debug-names").args(["--module-name", identifier]).arg("--output").args([&output]);
     for unused in ["tail-call", "simd", "exceptions", "multi-memory", "memory64"] {
@@ -51,7 +51,7 @@ pub fn c_sources(wasm2c: &OsStr, module: &Path, identifier: &str) -> Result<CSou
         String::from_utf8_lossy(&done.stderr)
     );
     let read =
-        |name: &str| fs::read_to_string(folder.path().join(name)).context("wasm2c has written nothing");
+        |name: &str| fs::read_to_string(directory.path().join(name)).context("wasm2c has written nothing");
     let (header, code) = (read("module.h")?, read("module.c")?);
     let names = Names { identifier, prefix: identifier.replace('_', "__") };
     let file = |name: &str, text: String| (format!("{identifier}{name}"), text.into_bytes());
@@ -67,10 +67,10 @@ pub fn c_sources(wasm2c: &OsStr, module: &Path, identifier: &str) -> Result<CSou
     ])
 }
 
-/// Fails where `wasm2c`, of the version whose output is known here, or Rust's library for WebAssembly is missing.
+/// Checks that `wasm2c`, of the version whose output is known here, and Rust's library for WebAssembly are installed.
 ///
 /// # Errors
-/// What is missing, and how to install it.
+/// The missing tool, and how to install it.
 pub fn check_tools(wasm2c: &OsStr) -> Result<()> {
     check_version(wasm2c)?;
     check_targets(&[WEBASSEMBLY.to_owned()], false)
@@ -86,16 +86,15 @@ fn check_version(wasm2c: &OsStr) -> Result<()> {
     Ok(())
 }
 
-/// How the module calls its functions and types.
+/// The names of the module's functions and types.
 struct Names<'a> {
     identifier: &'a str,
-    /// The identifier, as wasm2c spells it inside names.
+    /// The identifier in the names that wasm2c generates.
     prefix: String,
 }
 
 impl Names<'_> {
-    /// The generated code without what wasm2c puts before it, in whose place is the runtime, and without what nobody
-    /// calls.
+    /// Returns the generated code without the runtime of wasm2c, which another one replaces, and without the unused get_func_type.
     fn code(&self, code: &str) -> Result<String> {
         let Names { identifier, prefix } = self;
         let declaration = format!(" w2c_{prefix}_f");
@@ -123,7 +122,7 @@ impl Names<'_> {
         ))
     }
 
-    /// The generated header, with names for what the functions of FMI use.
+    /// Returns the generated header, with names for the items that the functions of FMI use.
     fn header(&self, header: &str, code: &str) -> Result<String> {
         let Names { identifier, prefix } = self;
         for expected in ["u32 w2c_g0;", "wasm_rt_memory_t w2c_memory;", "wasm_rt_funcref_table_t w2c_T0;"] {
@@ -137,7 +136,7 @@ impl Names<'_> {
         let pages = number("wasm_rt_allocate_memory(&instance->w2c_memory, ")?;
         let functions = number("wasm_rt_allocate_funcref_table(&instance->w2c_T0, ")?;
         let mut names = String::new();
-        // A little more than it starts with, for saved states.
+        // Additional memory for saved states.
         let memory = pages + 2;
         writeln!(names, "#ifndef FMU_MEMORY_PAGES\n#define FMU_MEMORY_PAGES {memory}\n#endif")?;
         let mut define = |name: &str, value: &str| writeln!(names, "#define {name} {value}");
@@ -146,7 +145,7 @@ impl Names<'_> {
         define("FMU_STACK", "w2c_g0")?;
         define("FMU_TABLE", &functions.to_string())?;
         define("FMU_INITIAL_PAGES", &pages.to_string())?;
-        // The import, whose name would be every model's.
+        // The import would have the same name in every model.
         define("w2c_fmu_fmu_log", &format!("{identifier}_log"))?;
         define("FMU_log", &format!("{identifier}_log"))?;
         let instantiate = format!("wasm2c_{prefix}_instantiate");
@@ -173,7 +172,7 @@ impl Names<'_> {
     }
 }
 
-/// Without `return` of what is no value, which C forbids.
+/// Removes `return` before calls without value, which C forbids.
 fn strict(code: &str) -> String {
     let mut in_void = false;
     let lines = code.lines().map(|line| {
@@ -184,8 +183,8 @@ fn strict(code: &str) -> String {
     lines.collect()
 }
 
-/// With an instruction's address in two parts, which is less to check: several have the same first one. And without
-/// variables for where the memory is and ends, which are constants here.
+/// Splits the address of each instruction into base and offset: fewer checks are needed, as several instructions share a base.
+/// Removes the variables for the position and size of the memory, which are constants here.
 fn checked_by_the_base(code: &str) -> Result<String> {
     let call =
         "_default32(wasm_rt_local_memory_base, wasm_rt_local_memory_size, &instance->w2c_memory, (u64)(";
@@ -204,12 +203,12 @@ fn checked_by_the_base(code: &str) -> Result<String> {
         "uint64_t wasm_rt_local_memory_size",
         "(void)wasm_rt_local",
     ];
-    let is_of_them = |line: &str| {
+    let is_removed = |line: &str| {
         let line = line.trim_start();
         line.starts_with("wasm_rt_local_memory_size = ")
             || declares.iter().any(|start| line.starts_with(start))
     };
-    let lines: String = checked.split_inclusive('\n').filter(|line| !is_of_them(line)).collect();
+    let lines: String = checked.split_inclusive('\n').filter(|line| !is_removed(line)).collect();
     ensure!(!lines.contains("wasm_rt_local_memory"), "{} another use of its memory", unknown());
     Ok(lines)
 }
@@ -218,16 +217,16 @@ fn unknown() -> String {
     format!("wasm2c {WASM2C} has made something unknown of the module, with")
 }
 
-/// The names that are called in C code.
+/// Returns the names that are called in C code.
 fn used(code: &str) -> impl Iterator<Item = &str> {
     let part = |c: char| c.is_ascii_alphanumeric() || c == '_';
     code.match_indices('(').filter_map(move |(end, _)| {
-        let start = code[..end].rfind(|c| !part(c)).map_or(0, |place| place + 1);
+        let start = code[..end].rfind(|c| !part(c)).map_or(0, |position| position + 1);
         Some(&code[start..end]).filter(|name| name.starts_with(|c: char| c.is_ascii_alphabetic()))
     })
 }
 
-/// Whether C, the runtime or the code itself has it.
+/// Whether C, the runtime or the code itself defines a name.
 fn is_known(name: &str, code: &str) -> bool {
     const C: [&str; 9] =
         ["if", "switch", "return", "sizeof", "assert", "memcpy", "copysign", "copysignf", "void"];
@@ -257,7 +256,7 @@ mod tests {
         );
     }
 
-    /// Cargo says another version than wasm2c's, too.
+    /// Cargo also prints a version, which differs from that of wasm2c.
     #[test]
     fn another_version_is_named() {
         let text = error(check_version(OsStr::new(env!("CARGO"))));
@@ -270,7 +269,7 @@ mod tests {
     fn a_missing_target_is_named() {
         assert_eq!(
             error(check_targets(&["wasm64-unknown-unknown".to_owned()], false)),
-            "to compile for other systems, there is still to be installed:
+            "to compile for other systems, install:
   Rust's library for wasm64-unknown-unknown: rustup target add \
              wasm64-unknown-unknown"
         );
@@ -278,7 +277,7 @@ mod tests {
 
     const NAMES: fn() -> Names<'static> = || Names { identifier: "m_m", prefix: "m__m".to_owned() };
 
-    /// What wasm2c makes of a module with one function, as far as it is looked at.
+    /// The parts of the output of wasm2c that are read, for a module with one function.
     const CODE: &str = "#include \"module.h\"\n\
         static u32 w2c_m__m_f1(w2c_m__m*, u32);\n\
         \nwasm_rt_func_type_t wasm2c_m__m_get_func_type(u32 count) {\n  return NULL;\n}\n\
@@ -304,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn code_of_another_kind_is_refused() {
+    fn code_of_another_kind_is_rejected() {
         for (from, to, message) in [
             ("static u32", "extern u32", "no declaration of a function"),
             ("get_func_type(", "func_type_of(", "no function get_func_type"),
@@ -321,9 +320,9 @@ mod tests {
         }
     }
 
-    /// What a header is asked for, and what it lacks.
+    /// The names in a header, and the errors if one is missing.
     #[test]
-    fn a_header_without_what_is_called_is_refused() {
+    fn a_header_that_lacks_a_name_is_rejected() {
         let names = ["fmi2Instantiate", "fmi2FreeInstance", "fmu_room", "fmu_broken"];
         let names = names.into_iter().chain(ALLOWED.iter().map(|rule| rule.name));
         let functions: String = names.map(|name| format!("u32 w2c_m__m_{name}(w2c_m__m*);\n")).collect();

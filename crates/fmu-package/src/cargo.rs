@@ -12,24 +12,24 @@ use std::process::{Command, Stdio};
 /// A run of cargo that makes a package's shared library.
 #[derive(Clone, Debug)]
 pub struct LibraryBuild<'a> {
-    /// The folder with the `Cargo.toml` of the package or its workspace.
-    pub folder: PathBuf,
+    /// The directory with the `Cargo.toml` of the package or its workspace.
+    pub directory: PathBuf,
     /// The package.
     pub package: &'a str,
     /// The profile.
     pub profile: &'a str,
-    /// The target; `None` for the machine this runs on.
+    /// The target; `None` for this machine.
     pub target: Option<&'a str>,
     /// Settings of cargo, such as `profile.release.lto=false`.
-    pub settings: &'a [&'a str],
+    pub settings: Vec<String>,
     /// Arguments for the compiler.
     pub arguments: &'a [&'a str],
-    /// Environment variables to set, or to remove where the value is `None`.
+    /// Environment variables to set, or to remove if the value is `None`.
     pub environment: Vec<(&'a str, Option<OsString>)>,
 }
 
 impl LibraryBuild<'_> {
-    /// Runs cargo, which shows its progress, and tells where the library is.
+    /// Runs cargo, which shows its progress, and returns the path of the library.
     ///
     /// The package is built without its default features and exactly as `Cargo.lock` says.
     ///
@@ -39,25 +39,25 @@ impl LibraryBuild<'_> {
         let (cargo, target) = rustc_for(self.target);
         let mut command = Command::new(&cargo);
         command
-            // Where a package makes an rlib, too, cargo leaves link-time optimization out.
+            // If a package also makes an rlib, cargo leaves link-time optimization out.
             .args(["rustc", "--lib", "--crate-type", "cdylib", "--locked", "--no-default-features"])
             .args(["--message-format", "json-render-diagnostics"])
             .args(["--profile", self.profile, "--package", self.package])
-            .current_dir(&self.folder)
+            .current_dir(&self.directory)
             .stdin(Stdio::null())
             .stdout(Stdio::piped());
         if let Some(target) = &target {
             command.args(["--target", target]);
         }
         if self.target == Some(WEBASSEMBLY) {
-            command.args(["--config", &remap_standard_library(&self.folder)?]);
+            command.args(["--config", &remap_standard_library(&self.directory)?]);
         }
-        // Nobody debugs there; for macOS its linker has no tool to strip.
+        // The library needs no debug information; for macOS, this linker has no tool to strip it.
         if cargo == ZIGBUILD {
             let strip = !target.is_some_and(|target| target.contains("-apple-"));
             command.env(format!("CARGO_PROFILE_{}_STRIP", self.profile.to_uppercase()), strip.to_string());
         }
-        for setting in self.settings {
+        for setting in &self.settings {
             command.args(["--config", setting]);
         }
         if !self.arguments.is_empty() {
@@ -74,7 +74,7 @@ impl LibraryBuild<'_> {
         let stdout = child.stdout.take().context("cargo has no output")?;
         let mut library = None;
         for line in BufReader::new(stdout).lines() {
-            let line = line.context("cannot read what cargo says")?;
+            let line = line.context("cannot read the output of cargo")?;
             // A dependency may be a shared library, too; the package itself comes last.
             library = library_in(&line).or(library);
         }
@@ -84,8 +84,8 @@ impl LibraryBuild<'_> {
                 bail!("cargo could not build the library of {}; its messages are above", self.package)
             };
             bail!(
-                "cargo could not build the library of {} for {target}; its messages are above (if it is the linker \
-                 that is missing, {ZIGBUILD} has one for every system: pip install {ZIGBUILD})",
+                "cargo could not build the library of {} for {target}; its messages are above (if the linker is \
+                 missing, {ZIGBUILD} has one for every system: pip install {ZIGBUILD})",
                 self.package
             );
         }
@@ -95,11 +95,11 @@ impl LibraryBuild<'_> {
     }
 }
 
-/// The configuration that gives the sources of the standard library the same paths on every machine. Where the component
+/// Returns the configuration that gives the sources of the standard library the same paths on every machine. If the component
 /// rust-src is installed, a module would contain the path of rustup's directory.
-fn remap_standard_library(folder: &Path) -> Result<String> {
+fn remap_standard_library(directory: &Path) -> Result<String> {
     let output = |arguments: &[&str]| {
-        let done = Command::new("rustc").args(arguments).current_dir(folder).output();
+        let done = Command::new("rustc").args(arguments).current_dir(directory).output();
         done.context("cannot start rustc").map(|done| String::from_utf8_lossy(&done.stdout).into_owned())
     };
     let version = output(&["-vV"])?;
@@ -110,7 +110,7 @@ fn remap_standard_library(folder: &Path) -> Result<String> {
     Ok(format!("target.{WEBASSEMBLY}.rustflags=[{}]", Value::from(flag)))
 }
 
-/// The shared library that this line of cargo's JSON is about, if any.
+/// Returns the shared library that this line of cargo's JSON reports, if any.
 fn library_in(line: &str) -> Option<PathBuf> {
     let message: Value = serde_json::from_str(line).ok()?;
     if message["reason"] != "compiler-artifact" {
@@ -128,7 +128,7 @@ mod tests {
     use super::library_in;
 
     #[test]
-    fn the_library_is_found_in_what_cargo_says() {
+    fn the_library_is_found_in_the_output_of_cargo() {
         let line = |kind: &str| {
             format!(
                 r#"{{"reason":"compiler-artifact","target":{{"name":"m","crate_types":["{kind}","rlib"]}},

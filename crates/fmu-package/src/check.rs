@@ -1,6 +1,6 @@
-//! What a model says of itself must make sense before it is tried and described.
+//! Rejects malformed models before they are tried and described.
 //!
-//! What concerns a single variable's causality, variability and place has been refused when the model was compiled.
+//! The compiler has already checked the causality, variability and field of each variable.
 
 use crate::instance::Instance;
 use crate::model::LoadedModel;
@@ -9,10 +9,10 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use fmi_abi::{BaseType, Causality, Standard, Value, Variability};
 use std::collections::HashSet;
 
-/// Start values by place; `None` for what has none.
+/// Start values by index; `None` for a variable without start value.
 pub(crate) type Starts = Vec<Option<Value>>;
 
-/// Checks the model and tells its start values.
+/// Checks the model and returns its start values.
 pub(crate) fn check(model: &LoadedModel) -> Result<Starts> {
     let table = &model.table;
     check_info(&table.info)?;
@@ -31,13 +31,13 @@ pub(crate) fn check(model: &LoadedModel) -> Result<Starts> {
              write names as in Modelica, such as motor.torque, der(x), or 'any text' (section 2.2.9 of FMI 2.0)",
             name.escape_debug()
         );
-        let of = &variable.of;
-        let named = if of.name.is_empty() {
+        let variable_type = &variable.variable_type;
+        let named = if variable_type.name.is_empty() {
             "its type".to_owned()
         } else {
-            format!("the type {}", of.name.escape_debug())
+            format!("the type {}", variable_type.name.escape_debug())
         };
-        check_type(of).with_context(|| format!("{name} cannot have {named}"))?;
+        check_type(variable_type).with_context(|| format!("{name} cannot have {named}"))?;
         check_references(table, variable)?;
     }
     let is_time = |variable: &Variable| variable.causality == Causality::Independent;
@@ -61,12 +61,12 @@ fn is_identifier(text: &str) -> bool {
     text.starts_with(is_letter) && text.chars().all(|c| is_letter(c) || c.is_ascii_digit())
 }
 
-/// Section 2.2.9 of FMI 2.0, 2.4.7.5 of FMI 3.0: `a.'b c'[1,2].d`, `der(a[1])`, `der(a, 2)`.
+/// Whether a name is structured (section 2.2.9 of FMI 2.0, 2.4.7.5 of FMI 3.0): `a.'b c'[1,2].d`, `der(a[1])`, `der(a, 2)`.
 fn is_structured(name: &str) -> bool {
     if let Some(differentiated) = name.strip_prefix("der(").and_then(|name| name.strip_suffix(')')) {
         // A comma within brackets separates indices.
         return match differentiated.rsplit_once(',') {
-            Some((of, order)) if is_number(order.trim()) => is_path(of),
+            Some((name, order)) if is_number(order.trim()) => is_path(name),
             _ => is_path(differentiated),
         };
     }
@@ -77,7 +77,7 @@ fn is_number(text: &str) -> bool {
     !text.is_empty() && text.bytes().all(|digit| digit.is_ascii_digit())
 }
 
-/// Names with indices or without, with dots between them.
+/// Whether this is a list of names, with or without indices, with dots between them.
 fn is_path(mut rest: &str) -> bool {
     loop {
         rest = match rest.strip_prefix('\'') {
@@ -131,39 +131,38 @@ fn check_info(info: &Info) -> Result<()> {
         info.identifier.escape_debug()
     );
     ensure!(is_text(&info.guid), "{} has no guid", info.name);
-    for (what, text) in [
+    for (fact, text) in [
         ("description", &info.description),
         ("author", &info.author),
         ("version", &info.version),
         ("license", &info.license),
         ("copyright", &info.copyright),
     ] {
-        ensure!(is_line(text), "the {what} of {} is more than one line", info.name);
+        ensure!(is_line(text), "the {fact} of {} is more than one line", info.name);
     }
-    let of = info;
-    for (name, value) in [("start time", of.start_time), ("stop time", of.stop_time)] {
+    for (name, value) in [("start time", info.start_time), ("stop time", info.stop_time)] {
         ensure!(value.is_finite(), "the {name} of the default experiment must be finite, it is {value}");
     }
-    for (name, value) in [("step size", of.step_size), ("tolerance", of.tolerance)] {
+    for (name, value) in [("step size", info.step_size), ("tolerance", info.tolerance)] {
         ensure!(is_positive(value), "the {name} of the default experiment must be > 0, it is {value}");
     }
     ensure!(
-        of.stop_time >= of.start_time,
+        info.stop_time >= info.start_time,
         "the default experiment ends at {}, before its start at {}",
-        of.stop_time,
-        of.start_time
+        info.stop_time,
+        info.start_time
     );
     Ok(())
 }
 
-fn check_type(of: &Type) -> Result<()> {
-    ensure!(is_line(&of.name), "its name is more than one line");
-    match &of.attributes {
+fn check_type(variable_type: &Type) -> Result<()> {
+    ensure!(is_line(&variable_type.name), "its name is more than one line");
+    match &variable_type.attributes {
         Attributes::Real { quantity, unit, min, max, nominal } => {
             ensure!(is_line(quantity), "its quantity '{}' is more than one line", quantity.escape_debug());
-            for (what, limit) in [("min", min), ("max", max)] {
-                let limit = limit.map(|limit| rounded(of.base, limit));
-                ensure!(limit.is_none_or(f64::is_finite), "{what} must be a finite number");
+            for (name, limit) in [("min", min), ("max", max)] {
+                let limit = limit.map(|limit| rounded(variable_type.base, limit));
+                ensure!(limit.is_none_or(f64::is_finite), "{name} must be a finite number");
             }
             if let (Some(min), Some(max)) = (min, max) {
                 ensure!(min <= max, "its range is empty: min {min} is above max {max}");
@@ -178,7 +177,7 @@ fn check_type(of: &Type) -> Result<()> {
             Ok(())
         }
         Attributes::Enumeration(items) => {
-            ensure!(!of.name.is_empty(), "an Enumeration needs a name (section 2.2.7)");
+            ensure!(!variable_type.name.is_empty(), "an Enumeration needs a name (section 2.2.7)");
             ensure!(!items.is_empty(), "it has no items");
             let (mut names, mut values) = (HashSet::new(), HashSet::new());
             for item in items {
@@ -209,7 +208,7 @@ fn check_type(of: &Type) -> Result<()> {
     }
 }
 
-/// The number as variables of the type have it.
+/// The number in the precision of the type.
 pub(crate) fn rounded(base: BaseType, number: f64) -> f64 {
     match base {
         BaseType::Float32 => f64::from(number as f32),
@@ -221,30 +220,32 @@ fn check_unit(unit: &Unit) -> Result<()> {
     let display =
         unit.display.as_ref().map(|(name, factor, offset)| ("display unit", name, *factor, *offset));
     let own = ("unit", &unit.name, unit.factor, unit.offset);
-    for (what, name, factor, offset) in [own].into_iter().chain(display) {
+    for (kind, name, factor, offset) in [own].into_iter().chain(display) {
         ensure!(
             is_text(name),
-            "the name '{}' of its {what} is empty or more than one line",
+            "the name '{}' of its {kind} is empty or more than one line",
             name.escape_debug()
         );
         ensure!(
             factor.is_finite() && factor != 0.0,
-            "the factor of the {what} {name} must be finite and not 0, it is {factor}"
+            "the factor of the {kind} {name} must be finite and not 0, it is {factor}"
         );
-        ensure!(offset.is_finite(), "the offset of the {what} {name} must be finite, it is {offset}");
+        ensure!(offset.is_finite(), "the offset of the {kind} {name} must be finite, it is {offset}");
     }
     Ok(())
 }
 
-/// What the variable differentiates, and what it depends on.
+/// Checks the variables that the variable differentiates and depends on.
 fn check_references(table: &Table, variable: &Variable) -> Result<()> {
     let name = &variable.name;
-    if let Some(of) = variable.differentiates {
-        let of = &table.variables[of as usize];
+    if let Some(index) = variable.differentiates {
+        let other = &table.variables[index as usize];
         ensure!(
-            of.base() == BaseType::Real && of.variability == Variability::Continuous && of.name != *name,
+            other.base() == BaseType::Real
+                && other.variability == Variability::Continuous
+                && other.name != *name,
             "{name} cannot be the derivative of {}",
-            of.name
+            other.name
         );
     }
     let mut before = HashSet::new();
@@ -261,17 +262,17 @@ fn check_references(table: &Table, variable: &Variable) -> Result<()> {
     Ok(())
 }
 
-/// A state without derivative is refused when the model is compiled.
+/// Checks that each state has one derivative.
 fn check_derivatives(table: &Table) -> Result<()> {
     for &(state, _) in &table.states {
-        let count = table.find(|of| of.differentiates == Some(state)).len();
+        let count = table.find(|variable| variable.differentiates == Some(state)).len();
         let name = table.name(state);
         ensure!(count == 1, "the state {name} has {count} derivatives among the variables");
     }
     Ok(())
 }
 
-/// The start values are those of a new model, the same for each interface type.
+/// Checks the start values of a new model, which must be the same for each interface type.
 fn check_starts(table: &Table) -> Result<Starts> {
     let (mut all, mut forgotten) = (Vec::new(), None);
     for (interface, start) in &table.starts {
@@ -280,10 +281,10 @@ fn check_starts(table: &Table) -> Result<Starts> {
                 all.push((interface, values));
                 forgotten = forgotten.or(*forgotten_indicator);
             }
-            Start::Unreadable(place) => bail!(
-                "{} cannot be read from a new model: what stands behind its `in` or `by` panics, as with an index that \
-                 is not there",
-                table.variables[*place].name
+            Start::Unreadable(index) => bail!(
+                "{} cannot be read from a new model: the code behind its `in` or `by` panics, for example because of an \
+                 index out of bounds",
+                table.variables[*index].name
             ),
             Start::Error(error) => bail!("the model cannot be made for {interface}: {error}"),
         }
@@ -291,7 +292,11 @@ fn check_starts(table: &Table) -> Result<Starts> {
     for (_, starts) in &all {
         for (variable, start) in table.variables.iter().zip(*starts) {
             if let Some(start) = start {
-                check_value(&format!("the start value of {}", variable.name), &variable.of, start)?;
+                check_value(
+                    &format!("the start value of {}", variable.name),
+                    &variable.variable_type,
+                    start,
+                )?;
             }
         }
     }
@@ -306,96 +311,57 @@ fn check_starts(table: &Table) -> Result<Starts> {
             }
         }
     }
-    // One that is never filled in would be an event that never happens.
+    // An indicator that is never written would be an event that never happens.
     if let Some(number) = forgotten {
         bail!("{}: indicators() does not fill in indicator {number}", table.info.name);
     }
     Ok(all.swap_remove(0).1.clone())
 }
 
-/// Whether the type has the value.
-fn check_value(what: &str, of: &Type, value: &Value) -> Result<()> {
-    match (&of.attributes, value) {
+/// Checks that a value is in the range of its type.
+fn check_value(label: &str, variable_type: &Type, value: &Value) -> Result<()> {
+    match (&variable_type.attributes, value) {
         (Attributes::Real { min, max, .. }, Value::Real(real)) => {
-            ensure!(real.is_finite(), "{what} must be a finite number, it is {value}");
+            ensure!(real.is_finite(), "{label} must be a finite number, it is {value}");
             if let Some(min) = min {
-                let fits = *real >= rounded(of.base, *min);
-                ensure!(fits, "{what} must be >= {}, it is {value}", Value::Real(*min));
+                let fits = *real >= rounded(variable_type.base, *min);
+                ensure!(fits, "{label} must be >= {}, it is {value}", Value::Real(*min));
             }
             if let Some(max) = max {
-                let fits = *real <= rounded(of.base, *max);
-                ensure!(fits, "{what} must be <= {}, it is {value}", Value::Real(*max));
+                let fits = *real <= rounded(variable_type.base, *max);
+                ensure!(fits, "{label} must be <= {}, it is {value}", Value::Real(*max));
             }
         }
         (Attributes::Integer { min, max }, Value::Integer(value)) => {
-            ensure!((min..=max).contains(&value), "{what} must be between {min} and {max}, it is {value}");
+            ensure!((min..=max).contains(&value), "{label} must be between {min} and {max}, it is {value}");
         }
         (Attributes::Enumeration(items), Value::Integer(value)) => {
             let known: Vec<_> = items.iter().map(|item| format!("{} ({})", item.value, item.name)).collect();
             let is_known = items.iter().any(|item| i128::from(item.value) == *value);
-            ensure!(is_known, "{what} must be one of {}, it is {value}", known.join(", "));
+            ensure!(is_known, "{label} must be one of {}, it is {value}", known.join(", "));
         }
         (Attributes::Binary { max_size, .. }, Value::Binary(bytes)) => {
             let size = bytes.len();
-            ensure!(size <= *max_size, "{what} must have at most {max_size} bytes, it has {size}");
+            ensure!(size <= *max_size, "{label} must have at most {max_size} bytes, it has {size}");
         }
         (Attributes::Other, Value::String(text)) => {
-            // Lines and tabs are all that XML 1.0 has of them.
+            // XML 1.0 has no other control characters.
             let is_possible = |c: char| !c.is_control() || matches!(c, '\t' | '\n' | '\r');
-            ensure!(text.chars().all(is_possible), "{what} has a character that XML has not: {text:?}");
+            ensure!(text.chars().all(is_possible), "{label} has a character that XML lacks: {text:?}");
         }
         _ => {}
     }
     Ok(())
 }
 
-/// The start values together must make a model, or the FMU could not be instantiated.
+/// Checks that the model accepts its start values, or the FMU could not be instantiated.
 fn check_model(model: &LoadedModel, starts: &Starts) -> Result<()> {
     for interface in model.table.interfaces() {
         let mut instance =
             Instance::new(model, interface, Standard::Fmi3, false).map_err(|error| anyhow!("{error}"))?;
-        let is_set = |of: &Variable| of.has_start() && of.variability != Variability::Constant;
+        let is_set =
+            |variable: &Variable| variable.has_start() && variable.variability != Variability::Constant;
         instance.set(starts, is_set).map_err(|error| anyhow!("these start values make no model: {error}"))?;
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::table::Item;
-
-    /// The message on a value of a type.
-    fn message(base: BaseType, attributes: Attributes, value: Value) -> String {
-        let of = Type { name: String::new(), base, attributes };
-        check_value("it", &of, &value).err().map(|error| error.to_string()).unwrap_or_default()
-    }
-
-    #[test]
-    fn values_outside_of_their_type_are_named() {
-        let unit =
-            || Unit { name: "1".into(), exponents: vec![0; 8], factor: 1.0, offset: 0.0, display: None };
-        let real =
-            |min, max| Attributes::Real { quantity: String::new(), unit: unit(), min, max, nominal: None };
-        let single =
-            |value: f32| message(BaseType::Float32, real(None, Some(0.1)), Value::Real(value.into()));
-        // In single precision 0.1 is larger than in double precision.
-        assert_eq!(single(0.1), "");
-        assert_eq!(single(0.2), "it must be <= 0.1, it is 0.20000000298023224");
-        let double = |value| message(BaseType::Real, real(Some(-1.0), None), Value::Real(value));
-        assert_eq!(double(-1.5), "it must be >= -1, it is -1.5");
-        assert_eq!(double(f64::INFINITY), "it must be a finite number, it is inf");
-        let byte =
-            |value| message(BaseType::UInt8, Attributes::Integer { min: 0, max: 200 }, Value::Integer(value));
-        assert_eq!([byte(200), byte(201)], ["", "it must be between 0 and 200, it is 201"]);
-        let items = || vec![Item { name: "Off".into(), value: 0, description: String::new() }];
-        let item =
-            |value| message(BaseType::Enumeration, Attributes::Enumeration(items()), Value::Integer(value));
-        assert_eq!([item(0), item(3)], ["", "it must be one of 0 (Off), it is 3"]);
-        let binary = || Attributes::Binary { mime_type: "a/b".into(), max_size: 4 };
-        let bytes = |count| message(BaseType::Binary, binary(), Value::Binary(vec![0; count]));
-        assert_eq!([bytes(4), bytes(5)], ["", "it must have at most 4 bytes, it has 5"]);
-        let text = |text: &str| message(BaseType::String, Attributes::Other, Value::String(text.into()));
-        assert_eq!([text("a\n"), text("\u{1}")], ["", "it has a character that XML has not: \"\\u{1}\""]);
-    }
 }

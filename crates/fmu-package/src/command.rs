@@ -1,11 +1,11 @@
-//! The command `build_fmu`, the same for every model.
+//! The command `build_fmu`, which is the same for every model.
 
 use crate::c_sources::{COMPILED, CSources, LINKING, WEBASSEMBLY, c_sources, check_tools};
 use crate::cargo::LibraryBuild;
-use crate::changes::Changes;
 use crate::connectors::{Terminal, terminals};
 use crate::content::ContentFile;
 use crate::cross::{GLIBC, TARGETS, ZIGBUILD, check_targets, has_std};
+use crate::describe::{Changes, describe};
 use crate::files::write_atomically;
 use crate::library::{check_platform, needed_glibc};
 use crate::live::{self, Runnable};
@@ -14,13 +14,12 @@ use crate::pack::{Library, Parts, pack};
 use crate::packages::Neighbourhood;
 use crate::platform::Platform;
 use crate::sources::Sources;
-use crate::terminal::{exit, short};
+use crate::terminal::{exit, fmi_version, short};
 use crate::universal::join_for_macos;
 use crate::variant::{NO_GUID, Variant};
-use crate::version::Fmi;
-use crate::{fmi2, fmi3};
 use anyhow::{Context, Result, bail, ensure};
 use clap::{CommandFactory, FromArgMatches};
+use fmi_abi::Standard;
 use std::ffi::OsString;
 use std::fs;
 use std::io::Write;
@@ -29,19 +28,19 @@ use std::process::ExitCode;
 use tempfile::TempDir;
 use zip::ZipArchive;
 
-/// The options that every `build_fmu` has. A model with more flattens them into its own.
+/// The options that every `build_fmu` has. A program with more options flattens these into its own.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct BuildOptions {
-    /// Declare the parameters tunable instead of fixed (OpenModelica does not let users change those)
+    /// Declare the parameters tunable instead of fixed (OpenModelica does not let users change tunable parameters)
     #[arg(long)]
     pub tunable: bool,
     /// Make the FMU for FMI 2.0 or for FMI 3.0 only
-    #[arg(long, value_enum, value_name = "2|3", hide_possible_values = true)]
-    pub fmi: Option<Fmi>,
-    /// Folder for what is made, with a folder fmi3 for FMI 3.0 [default: target/fmu of the workspace]
+    #[arg(long, value_parser = fmi_version, value_name = "2|3")]
+    pub fmi: Option<Standard>,
+    /// Directory for the FMU of FMI 2.0, with a directory fmi3 for the FMU of FMI 3.0 [default: target/fmu of the workspace]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Write only modelDescription.xml of FMI 2.0, into the folder modelDescription of the sources or DIR
+    /// Write only modelDescription.xml of FMI 2.0, into the directory modelDescription of the sources or DIR
     #[arg(long, conflicts_with_all = ["target", "binary"])]
     pub describe: bool,
     /// Print only the guid, which libraries that are compiled elsewhere get from the environment variable FMU_GUID
@@ -53,13 +52,13 @@ pub struct BuildOptions {
     /// Compile for Linux, Windows and macOS, Intel and ARM (needs Rust's libraries for them and cargo-zigbuild)
     #[arg(long, conflicts_with_all = ["target", "describe", "c_sources"])]
     pub all_targets: bool,
-    /// Put in this compiled library, for example win64=model.dll or x86_64-windows=model.fmu, which has it; repeat it for several
+    /// Add this compiled library, for example win64=model.dll, or the one in an FMU, x86_64-windows=model.fmu; repeat it for several
     #[arg(long, value_name = "PLATFORM=PATH", value_parser = binary)]
     pub binary: Vec<(String, PathBuf)>,
-    /// Make the FMU of C sources instead, for targets with no Rust (FMI 2.0, in the folder source; needs wasm2c)
+    /// Make the FMU of C sources instead, for targets with no Rust (FMI 2.0, in the directory source; needs wasm2c)
     #[arg(long, conflicts_with_all = ["target", "binary", "describe"])]
     pub c_sources: bool,
-    /// Leave out what lets documentation/index.html run the FMU in a browser (as with --c-sources)
+    /// Leave out the page documentation/index.html that runs the FMU in a browser (as with --c-sources)
     #[arg(long)]
     pub no_page: bool,
     /// Accept a library for another processor than its platform names (with FMI 2.0, importers on ARM look in linux64)
@@ -74,7 +73,7 @@ fn binary(text: &str) -> Result<(String, PathBuf), String> {
         .ok_or_else(|| "write PLATFORM=PATH, for example linux64=libmodel.so".to_owned())
 }
 
-/// The `main` of a `build_fmu`: does what the arguments of the program say.
+/// The `main` of a `build_fmu`: reads the arguments of the program and builds the FMUs.
 pub fn build(builder: &Builder) -> ExitCode {
     #[derive(clap::Parser)]
     struct Options {
@@ -86,58 +85,57 @@ pub fn build(builder: &Builder) -> ExitCode {
     exit(options.and_then(|options| builder.run(&options)))
 }
 
-/// How a model's FMU is built.
+/// The settings with which a model's FMU is built.
 #[derive(Clone, Debug)]
 pub struct Builder {
     /// The package of the model: `env!("CARGO_PKG_NAME")`.
     pub package: String,
-    /// The command that starts this program, for messages; options come behind it.
+    /// The command that starts this program, to which messages append options.
     pub command: &'static str,
-    /// What the FMU is made from.
+    /// The files that the FMU is made from.
     pub sources: Sources,
-    /// The versions that FMUs are made for if nothing else is said. The description of the first is kept with the
-    /// sources.
-    pub fmi: Vec<Fmi>,
+    /// The versions that FMUs are made for by default. The description of the first is kept with the sources.
+    pub fmi: Vec<Standard>,
     /// The terminals of the FMU for FMI 3.0.
     pub terminals: Vec<Terminal>,
     /// The cargo profile of the library.
     pub profile: &'static str,
     /// Settings of cargo for this build, such as `profile.release.lto=false`.
-    pub settings: Vec<&'static str>,
-    /// Start values that the library is compiled with from elsewhere, see [`Variant::start`].
+    pub settings: Vec<String>,
+    /// Start values that the library reads from another file when it is compiled, see [`Variant::start`].
     pub start: Vec<(String, String)>,
-    /// The file that those start values are from, for messages.
+    /// The file with those start values, for messages.
     pub start_from: Option<PathBuf>,
-    /// Whether they are the ones of the description that is kept with the sources.
+    /// Whether the description that is kept with the sources has those start values.
     pub is_default: bool,
-    /// Scripts for the page that runs the FMU, besides those of every model (see the README in the folder `page`).
+    /// Additional scripts for the page that runs the FMU (see the README in the directory `page`).
     pub page_scripts: Vec<&'static str>,
-    /// FMUs that these scripts run beside the model's, each by its package and what it is made from. They are described as
-    /// is kept with their sources.
+    /// The packages and sources of FMUs that these scripts run next to the model's FMU. Each has the description that is kept with
+    /// its sources.
     pub page_fmus: Vec<(&'static str, Sources)>,
-    /// Environment variables for the compilation of the library; removed where the value is `None`.
+    /// Environment variables for the compilation of the library; a variable without value is removed.
     pub environment: Vec<(&'static str, Option<OsString>)>,
 }
 
-/// The profile of a library that is compiled only to be asked, and the usual one of those that are packed.
+/// The profile of a library that is only described, and the default profile of a library that is packed.
 const DESCRIBED_IN: &str = "release";
 
-/// The description of a model as it is built by default, where it is kept with the sources.
+/// The description of the default FMU, which is kept with the sources.
 const DESCRIPTION: &str = "modelDescription/modelDescription.xml";
 
 /// The files that the model reads.
 const RESOURCES: &str = "modelDescription/resources";
 
 impl Builder {
-    /// For a package in the usual layout, started as `cargo run --release --bin build_fmu`.
+    /// The settings for a package in the usual layout, whose program is started with `cargo run --release --bin build_fmu`.
     ///
     /// The arguments are `env!("CARGO_PKG_NAME")` and `env!("CARGO_MANIFEST_DIR")`.
-    pub fn new(package: impl Into<String>, folder: impl Into<PathBuf>) -> Self {
+    pub fn new(package: impl Into<String>, directory: impl Into<PathBuf>) -> Self {
         Self {
             package: package.into(),
             command: "cargo run --release --bin build_fmu --",
-            sources: Sources::of_package(folder),
-            fmi: vec![Fmi::V2, Fmi::V3],
+            sources: Sources::of_package(directory),
+            fmi: vec![Standard::Fmi2, Standard::Fmi3],
             terminals: Vec::new(),
             profile: DESCRIBED_IN,
             settings: Vec::new(),
@@ -150,38 +148,39 @@ impl Builder {
         }
     }
 
-    /// Does what the options say, and says on stdout what was made: compiles the libraries, asks the one for this machine
-    /// what its model is, tries that, writes the descriptions, packs.
+    /// Compiles the libraries, tries the model of the library for this machine, writes the descriptions and packs the FMUs, and
+    /// reports them on stdout.
     ///
     /// # Errors
     /// When the model contradicts itself, a library cannot be compiled or does not belong to the sources, or a file cannot
     /// be written.
     pub fn run(&self, options: &BuildOptions) -> Result<()> {
-        let guid = self.variant(options.tunable)?.guid();
+        let start = self.start.clone();
+        let guid = Variant { sources: self.sources.fingerprint()?, start, tunable: options.tunable }.guid();
         if options.guid {
             println!("{guid}");
             return Ok(());
         }
         let is_default = self.is_default && !options.tunable;
-        let kept = self.sources.folder.join(DESCRIPTION);
+        let kept = self.sources.directory.join(DESCRIPTION);
         let described_in = match &options.out {
             _ if !options.describe => None,
-            Some(folder) => Some(folder.join("modelDescription.xml")),
+            Some(directory) => Some(directory.join("modelDescription.xml")),
             None if is_default => Some(kept.clone()),
-            None => bail!("{DESCRIPTION} is for the defaults; name another folder with --out"),
+            None => bail!("{DESCRIPTION} is for the defaults; name another directory with --out"),
         };
         self.check_versions(options)?;
         let content = self.sources.content_files()?;
-        let workspace = Neighbourhood::of(&self.sources.folder)?.workspace;
-        // Another build would put its library in the place of this one's.
+        let workspace = Neighbourhood::of(&self.sources.directory)?.workspace;
+        // Another build would overwrite the library of this one.
         let _alone = lock(&workspace.join("target"));
         let mut libraries = self.libraries(options, &guid)?;
-        let model = self.model(options.tunable, &libraries, &guid)?;
+        let model = self.model(&libraries, &guid)?;
         let sources = match options.c_sources {
-            true => self.c_sources(options.tunable, model.identifier())?,
+            true => self.c_sources(&guid, model.identifier())?,
             false => CSources::new(),
         };
-        let describe = |fmi: Fmi, guid: &str| {
+        let describe = |fmi: Standard, guid: &str| {
             let source_files = sources.iter().take(COMPILED).map(|(name, _)| name.clone()).collect();
             let guid = Some(guid.to_owned());
             self.describe(&model, fmi, &Changes { guid, tunable_parameters: options.tunable, source_files })
@@ -190,30 +189,30 @@ impl Builder {
         let versions = self.versions(options, &model);
         if let Some(path) = described_in {
             let fmi = versions.first().context("there is no version to describe it for")?;
-            // Kept with the sources, it must not change whenever they do.
+            // The description that is kept with the sources has no guid, which would change with them.
             return write_description(&path, &describe(*fmi, NO_GUID)?);
         }
         let mut descriptions = Vec::new();
         for &fmi in &versions {
             descriptions.push((fmi, describe(fmi, &guid)?));
         }
-        if versions.contains(&Fmi::V2) {
+        if versions.contains(&Standard::Fmi2) {
             join_for_macos(&mut libraries)?;
         }
         // The page runs the FMU for FMI 2.0.
         let can_have_page = model.table.variables.iter().all(|variable| variable.base().is_in_fmi2());
         let with_page = match options.no_page || options.c_sources || !can_have_page {
             true => None,
-            false => self.live_page(options.tunable, &guid, &model, describe(Fmi::V2, &guid)?, &content)?,
+            false => self.live_page(&guid, &model, describe(Standard::Fmi2, &guid)?, &content)?,
         };
         let content = with_page.as_ref().map_or(&content, |(_, content)| content);
-        let folder = options.out.clone().unwrap_or_else(|| workspace.join("target/fmu"));
+        let out = options.out.clone().unwrap_or_else(|| workspace.join("target/fmu"));
         for (fmi, description) in &descriptions {
-            // FMI Library calls those of FMI 2.0 a fatal mismatch (and goes on).
-            let terminals = terminals.as_deref().filter(|_| *fmi == Fmi::V3);
+            // FMI Library reports terminals in an FMU of FMI 2.0 as a fatal mismatch (and goes on).
+            let terminals = terminals.as_deref().filter(|_| *fmi == Standard::Fmi3);
             let (identifier, libraries, sources) = (model.identifier(), &libraries[..], &sources[..]);
             let parts = Parts { fmi: *fmi, identifier, description, terminals, libraries, sources, content };
-            pack_in(&folder, &parts)?;
+            pack_in(&out, &parts)?;
         }
         let start = match &self.start_from {
             Some(file) => format!(", parameters from {}", short(file)),
@@ -228,20 +227,16 @@ impl Builder {
         Ok(())
     }
 
-    fn describe(&self, model: &LoadedModel, fmi: Fmi, changes: &Changes) -> Result<String> {
-        let text = match fmi {
-            Fmi::V2 => fmi2::describe(model, changes),
-            Fmi::V3 => fmi3::describe(model, changes),
-        };
-        text.with_context(|| match &self.start_from {
+    fn describe(&self, model: &LoadedModel, fmi: Standard, changes: &Changes) -> Result<String> {
+        describe(model, fmi, changes).with_context(|| match &self.start_from {
             Some(file) if !self.is_default => short(file),
             _ => model.identifier().to_owned(),
         })
     }
 
-    /// Tells the user if the library, compiled for this machine, needs a newer glibc than those compiled for a target.
+    /// Notes that the library for this machine needs a newer glibc than a library that is compiled for a target.
     fn warn_of_glibc(&self, options: &BuildOptions, libraries: &[Library]) {
-        // A library that is compiled with other settings is only tried here.
+        // A library that is compiled with other settings is only for trials on this machine.
         let is_shipped = self.settings.is_empty() && options.target.is_empty() && options.binary.is_empty();
         let needed = |library: &Library| needed_glibc(&fs::read(&library.path).ok()?);
         if let Some((major, minor)) = libraries.first().filter(|_| is_shipped).and_then(needed)
@@ -249,57 +244,58 @@ impl Builder {
         {
             let target = format!("{}-unknown-linux-gnu", std::env::consts::ARCH);
             eprintln!(
-                "note: the library needs glibc {major}.{minor}, as this system has it; for glibc {GLIBC}, add --target {target} \
+                "note: the library needs glibc {major}.{minor}, the version on this system; for glibc {GLIBC}, add --target {target} \
                  (with {ZIGBUILD}: pip install {ZIGBUILD})"
             );
         }
     }
 
-    /// Tells the user if the description that is kept with the sources is another one.
-    fn compare_with_kept(&self, kept: &Path, descriptions: &[(Fmi, String)], guid: &str) {
+    /// Notes that the description that is kept with the sources is out of date.
+    fn compare_with_kept(&self, kept: &Path, descriptions: &[(Standard, String)], guid: &str) {
         if let Some((fmi, description)) = descriptions.first()
             && self.fmi.first() == Some(fmi)
             && let Ok(text) = fs::read_to_string(kept)
             && text != description.replace(guid, NO_GUID)
         {
             eprintln!(
-                "note: {DESCRIPTION} in the sources is out of date; write it anew with\n      {} --describe",
+                "note: {DESCRIPTION} in the sources is out of date; update it with\n      {} --describe",
                 self.command
             );
         }
     }
 
-    /// Whether the options go together with the versions that FMUs are made for.
+    /// Checks that the options fit the versions that FMUs are made for.
     fn check_versions(&self, options: &BuildOptions) -> Result<()> {
-        let only_fmi2 = options.fmi.map_or(self.fmi == [Fmi::V2], |fmi| fmi == Fmi::V2);
-        ensure!(!options.c_sources || options.fmi != Some(Fmi::V3), "C sources are made for FMI 2.0 only");
+        let only_fmi2 = options.fmi.map_or(self.fmi == [Standard::Fmi2], |fmi| fmi == Standard::Fmi2);
+        ensure!(
+            !options.c_sources || options.fmi != Some(Standard::Fmi3),
+            "C sources are made for FMI 2.0 only"
+        );
         ensure!(
             !options.any_processor || only_fmi2,
-            "FMI 3.0 has a folder for every processor; --any-processor goes with --fmi 2 only"
+            "FMI 3.0 has a directory for every processor; --any-processor goes with --fmi 2 only"
         );
         Ok(())
     }
 
-    /// The versions that are asked for, or those that have all the types of the model's variables.
-    fn versions(&self, options: &BuildOptions, model: &LoadedModel) -> Vec<Fmi> {
-        if let Some(fmi) = options.fmi.or(options.c_sources.then_some(Fmi::V2)) {
+    /// The version in the options, or the default versions that have all types of the model's variables.
+    fn versions(&self, options: &BuildOptions, model: &LoadedModel) -> Vec<Standard> {
+        if let Some(fmi) = options.fmi.or(options.c_sources.then_some(Standard::Fmi2)) {
             return vec![fmi];
         }
         let lacking = model.table.variables.iter().find(|variable| !variable.base().is_in_fmi2());
-        let Some(variable) = lacking.filter(|_| self.fmi.contains(&Fmi::V3)) else { return self.fmi.clone() };
+        let Some(variable) = lacking.filter(|_| self.fmi.contains(&Standard::Fmi3)) else {
+            return self.fmi.clone();
+        };
         println!("{} is {}, which FMI 2.0 lacks: for FMI 3.0 only", variable.name, variable.base());
-        vec![Fmi::V3]
-    }
-
-    fn variant(&self, tunable: bool) -> Result<Variant> {
-        Ok(Variant { sources: self.sources.fingerprint()?, start: self.start.clone(), tunable })
+        vec![Standard::Fmi3]
     }
 
     /// The libraries that are packed.
     fn libraries(&self, options: &BuildOptions, guid: &str) -> Result<Vec<Library>> {
         let mut libraries = Vec::new();
         for (platform, path) in &options.binary {
-            let platform = Platform::of_folder(platform)?;
+            let platform = Platform::of_directory(platform)?;
             let is_fmu = path.extension().is_some_and(|suffix| suffix == "fmu");
             let path = if is_fmu { self.unpack_library(path, platform)? } else { path.clone() };
             let library = Library { platform, path };
@@ -310,7 +306,7 @@ impl Builder {
             true => TARGETS.map(str::to_owned).to_vec(),
             false => options.target.clone(),
         };
-        // What cannot be meant or is missing is said before anything is compiled.
+        // Wrong targets and missing tools are reported before anything is compiled.
         let platforms: Vec<_> =
             targets.iter().map(|target| Platform::of_target(target)).collect::<Result<_>>()?;
         check_targets(&targets, options.all_targets)?;
@@ -318,64 +314,63 @@ impl Builder {
             check_tools(&wasm2c())?;
         }
         for (platform, target) in platforms.into_iter().zip(&targets) {
-            let path = self.compile(self.profile, options.tunable, Some(target), &[])?;
+            let path = LibraryBuild { target: Some(target), ..self.build(guid) }.run()?;
             let library = Library { platform, path };
             check_library(&library, guid, options.any_processor)?;
             libraries.push(library);
         }
         if libraries.is_empty() && !options.describe && !options.c_sources {
-            let path = self.compile(self.profile, options.tunable, None, &[])?;
+            let path = self.build(guid).run()?;
             libraries.push(Library { platform: Platform::host()?, path });
         }
         Ok(libraries)
     }
 
-    /// The model of a library for this machine: of one that is packed, or of one that is compiled for this.
-    fn model(&self, tunable: bool, libraries: &[Library], guid: &str) -> Result<LoadedModel> {
+    /// Loads the model from a library for this machine: one that is packed, or one that is compiled for this purpose.
+    fn model(&self, libraries: &[Library], guid: &str) -> Result<LoadedModel> {
         let host = Platform::host()?;
         let is_for_here = |library: &&Library| {
             fs::read(&library.path).is_ok_and(|bytes| check_platform(&bytes, host, false).is_ok())
         };
         let path = match libraries.iter().find(is_for_here) {
             Some(library) => library.path.clone(),
-            None => self.compile(DESCRIBED_IN, tunable, None, &[])?,
+            None => LibraryBuild { profile: DESCRIBED_IN, ..self.build(guid) }.run()?,
         };
-        // SAFETY: cargo has made it of the author's model just now, or it has the guid of its sources.
+        // SAFETY: cargo has just compiled it from the author's model, or it has the guid of these sources.
         #[allow(unsafe_code)]
-        let model = unsafe { LoadedModel::load(&path, Some(&self.sources.folder.join(RESOURCES))) }?;
+        let model = unsafe { LoadedModel::load(&path, Some(&self.sources.directory.join(RESOURCES))) }?;
         check_guid(&fs::read(&path)?, guid, &path)?;
         Ok(model)
     }
 
-    /// The library for a platform that is in an FMU, as another machine has made it.
+    /// Extracts the library for a platform from an FMU.
     fn unpack_library(&self, fmu: &Path, platform: Platform) -> Result<PathBuf> {
-        let of = || format!("cannot take the library for {platform} out of {}", fmu.display());
-        let mut archive = ZipArchive::new(fs::File::open(fmu).with_context(of)?).with_context(of)?;
-        let in_folder = |name: &String| {
+        let failed = || format!("cannot take the library for {platform} out of {}", fmu.display());
+        let mut archive = ZipArchive::new(fs::File::open(fmu).with_context(failed)?).with_context(failed)?;
+        let is_library = |name: &String| {
             let mut parts = name.split('/');
             parts.next() == Some("binaries")
-                && parts.next().and_then(|folder| Platform::of_folder(folder).ok()) == Some(platform)
+                && parts.next().and_then(|part| Platform::of_directory(part).ok()) == Some(platform)
         };
-        let name = archive.file_names().flatten().map(|name| name.into_owned()).find(in_folder);
-        let name = name.context("it has none").with_context(of)?;
-        let folder = Neighbourhood::of(&self.sources.folder)?.workspace.join("target/binaries");
-        let path = folder.join(platform.to_string()).join(name.rsplit('/').next().unwrap_or_default());
-        let mut entry = archive.by_name(&name).with_context(of)?;
+        let name = archive.file_names().flatten().map(|name| name.into_owned()).find(is_library);
+        let name = name.context("it has none").with_context(failed)?;
+        let directory = Neighbourhood::of(&self.sources.directory)?.workspace.join("target/binaries");
+        let path = directory.join(platform.to_string()).join(name.rsplit('/').next().unwrap_or_default());
+        let mut entry = archive.by_name(&name).with_context(failed)?;
         write_atomically(&path, |file| Ok(std::io::copy(&mut entry, file).map(|_| ())?))?;
         Ok(path)
     }
 
-    /// The sources in C, for every platform.
-    fn c_sources(&self, tunable: bool, identifier: &str) -> Result<CSources> {
-        let module = self.compile(self.profile, tunable, Some(WEBASSEMBLY), &LINKING)?;
-        c_sources(&wasm2c(), &module, identifier)
+    /// Makes the C sources, which are for every platform.
+    fn c_sources(&self, guid: &str, identifier: &str) -> Result<CSources> {
+        let build = LibraryBuild { target: Some(WEBASSEMBLY), arguments: &LINKING, ..self.build(guid) };
+        c_sources(&wasm2c(), &build.run()?, identifier)
     }
 
-    /// The content with the page that runs the FMU, and the directory of that page. `None`, with a note, if the model cannot be
-    /// compiled for WebAssembly.
+    /// Returns the content with the page that runs the FMU, and the directory of that page. Returns `None`, with a note, if the
+    /// model cannot be compiled for WebAssembly.
     fn live_page(
         &self,
-        tunable: bool,
         guid: &str,
         model: &LoadedModel,
         description: String,
@@ -385,14 +380,16 @@ impl Builder {
             eprintln!("note: no page runs the FMU in a browser; that needs: rustup target add {WEBASSEMBLY}");
             return Ok(None);
         }
-        let small = format!("profile.{}.opt-level=\"z\"", self.profile);
-        let settings: Vec<_> = self.settings.iter().copied().chain([small.as_str()]).collect();
+        let mut settings = self.settings.clone();
+        settings.push(format!("profile.{}.opt-level=\"z\"", self.profile));
+        let build =
+            LibraryBuild { target: Some(WEBASSEMBLY), settings, arguments: &LINKING, ..self.build(guid) };
         let runnable = |description, path: PathBuf, guid: &str| {
             let module = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
             check_guid(&module, guid, &path)?;
             anyhow::Ok(Runnable { description, module })
         };
-        let path = match self.build(self.profile, tunable, Some(WEBASSEMBLY), &settings, &LINKING) {
+        let path = match build.run() {
             Ok(path) => path,
             Err(error) => {
                 eprintln!("note: no page runs the FMU in a browser (--no-page does not try that): {error:#}");
@@ -402,17 +399,14 @@ impl Builder {
         let mut runnables = vec![runnable(description, path, guid)?];
         for (package, sources) in &self.page_fmus {
             let guid = Variant { sources: sources.fingerprint()?, start: Vec::new(), tunable: false }.guid();
-            let kept = sources.folder.join(DESCRIPTION);
+            let kept = sources.directory.join(DESCRIPTION);
             let kept =
                 fs::read_to_string(&kept).with_context(|| format!("cannot read {}", kept.display()))?;
             let build = LibraryBuild {
-                folder: sources.folder.clone(),
+                directory: sources.directory.clone(),
                 package,
-                profile: self.profile,
-                target: Some(WEBASSEMBLY),
-                settings: &settings,
-                arguments: &LINKING,
                 environment: vec![("FMU_GUID", Some(guid.clone().into()))],
+                ..build.clone()
             };
             runnables.push(runnable(kept.replace(NO_GUID, &guid), build.run()?, &guid)?);
         }
@@ -420,50 +414,33 @@ impl Builder {
         live::with_page(content, (&info.name, &info.description), &runnables, &self.page_scripts).map(Some)
     }
 
-    fn compile(
-        &self,
-        profile: &str,
-        tunable: bool,
-        target: Option<&str>,
-        arguments: &[&str],
-    ) -> Result<PathBuf> {
-        self.build(profile, tunable, target, &self.settings, arguments)
-    }
-
-    fn build(
-        &self,
-        profile: &str,
-        tunable: bool,
-        target: Option<&str>,
-        settings: &[&str],
-        arguments: &[&str],
-    ) -> Result<PathBuf> {
+    /// The build of the library for this machine. The library gets the guid.
+    fn build(&self, guid: &str) -> LibraryBuild<'_> {
         let mut environment = self.environment.clone();
-        environment.push(("FMU_GUID", Some(self.variant(tunable)?.guid().into())));
-        let build = LibraryBuild {
-            folder: self.sources.folder.clone(),
+        environment.push(("FMU_GUID", Some(guid.into())));
+        LibraryBuild {
+            directory: self.sources.directory.clone(),
             package: &self.package,
-            profile,
-            target,
-            settings,
-            arguments,
+            profile: self.profile,
+            target: None,
+            settings: self.settings.clone(),
+            arguments: &[],
             environment,
-        };
-        build.run()
+        }
     }
 }
 
-/// Writes an FMU into the folder of its version, and says so.
-fn pack_in(folder: &Path, parts: &Parts) -> Result<()> {
-    let folder = match parts.fmi {
-        Fmi::V2 if !parts.sources.is_empty() => folder.join("source"),
-        Fmi::V2 => folder.to_owned(),
-        Fmi::V3 => folder.join("fmi3"),
+/// Writes an FMU into the directory of its version, and reports it.
+fn pack_in(out: &Path, parts: &Parts) -> Result<()> {
+    let directory = match parts.fmi {
+        Standard::Fmi2 if !parts.sources.is_empty() => out.join("source"),
+        Standard::Fmi2 => out.to_owned(),
+        Standard::Fmi3 => out.join("fmi3"),
     };
-    let fmu = folder.join(format!("{}.fmu", parts.identifier));
+    let fmu = directory.join(format!("{}.fmu", parts.identifier));
     let size = pack(&fmu, parts)?;
     let mut platforms: Vec<_> =
-        parts.libraries.iter().map(|library| library.platform.folder(parts.fmi)).collect();
+        parts.libraries.iter().map(|library| library.platform.directory(parts.fmi)).collect();
     platforms.sort_unstable();
     if !parts.sources.is_empty() {
         platforms.push("C sources");
@@ -472,10 +449,10 @@ fn pack_in(folder: &Path, parts: &Parts) -> Result<()> {
     Ok(())
 }
 
-/// Waits until no other build of the same workspace runs. Without a place for the lock there is none.
-fn lock(folder: &Path) -> Option<fs::File> {
-    fs::create_dir_all(folder).ok()?;
-    let file = fs::File::create(folder.join(".fmu-package.lock")).ok()?;
+/// Waits until no other build of the same workspace runs, unless the lock cannot be made.
+fn lock(directory: &Path) -> Option<fs::File> {
+    fs::create_dir_all(directory).ok()?;
+    let file = fs::File::create(directory.join(".fmu-package.lock")).ok()?;
     file.lock().ok()?;
     Some(file)
 }
@@ -484,7 +461,7 @@ fn wasm2c() -> OsString {
     std::env::var_os("WASM2C").unwrap_or_else(|| "wasm2c".into())
 }
 
-/// A library for another machine would not load, one with another guid refuse every instance.
+/// Checks that a library is for its platform and from these sources. Another one would not load, or reject every instance.
 fn check_library(library: &Library, guid: &str, any_processor: bool) -> Result<()> {
     let Library { platform, path } = library;
     let bytes = fs::read(path)
@@ -494,7 +471,7 @@ fn check_library(library: &Library, guid: &str, any_processor: bool) -> Result<(
 }
 
 fn check_guid(library: &[u8], guid: &str, path: &Path) -> Result<()> {
-    let has = |text: &str| library.windows(text.len()).any(|window| window == text.as_bytes());
+    let has = |part: &str| library.windows(part.len()).any(|window| window == part.as_bytes());
     let path = path.display();
     ensure!(
         has(guid) || has("fmi2Instantiate"),
@@ -511,7 +488,7 @@ fn check_guid(library: &[u8], guid: &str, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A file that is right already stays untouched, so that cargo sees no change.
+/// Writes a description, unless the file is up to date: cargo then sees no change.
 fn write_description(path: &Path, description: &str) -> Result<()> {
     if fs::read(path).ok().as_deref() == Some(description.as_bytes()) {
         println!("{} is up to date", short(path));

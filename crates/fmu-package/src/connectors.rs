@@ -1,5 +1,4 @@
-//! Terminals: variables that belong together where an FMU is connected (section 2.4.9 of FMI 3.0; FMI 2.0 may have the same
-//! since 2.0.4, section 2.3).
+//! Terminals: groups of variables that are connected together (section 2.4.9 of FMI 3.0; section 2.3 of FMI 2.0.4 allows them).
 
 use crate::content::ContentFile;
 use crate::definitions::{filled, list};
@@ -39,17 +38,17 @@ struct Member {
 }
 
 impl Terminal {
-    /// A terminal that is connected to one with the same members, by their names.
+    /// A terminal whose members are connected by name to the same members of another terminal.
     pub fn plug(name: &'static str) -> Self {
         Self::new(name, "plug")
     }
 
-    /// A terminal that may be connected to one with some of its members, by their names.
+    /// A terminal whose members are connected by name to those members that another terminal has.
     pub fn bus(name: &'static str) -> Self {
         Self::new(name, "bus")
     }
 
-    /// A terminal that is connected to one with as many members, by their order.
+    /// A terminal whose members are connected in order to the members of another terminal.
     pub fn sequence(name: &'static str) -> Self {
         Self::new(name, "sequence")
     }
@@ -58,48 +57,48 @@ impl Terminal {
         Self { name, rule, kind: "", description: "", members: Vec::new(), icon: None }
     }
 
-    /// With a kind, which others may have defined: a reversed domain name, as `org.example.Shaft`.
+    /// Sets the kind, which third parties may define: a reversed domain name, such as `org.example.Shaft`.
     #[must_use]
     pub fn kind(self, kind: &'static str) -> Self {
         Self { kind, ..self }
     }
 
-    /// With one sentence for the user.
+    /// Sets the description, a sentence for the user.
     #[must_use]
     pub fn description(self, description: &'static str) -> Self {
         Self { description, ..self }
     }
 
-    /// With a variable as member: connected ones are equal.
+    /// Adds a variable as a member. Connected members are equal.
     #[must_use]
     pub fn signal(self, member: &'static str, variable: &'static str) -> Self {
         self.member(member, variable, "signal")
     }
 
-    /// With a variable as member that flows into the FMU: connected flows add up to nothing.
+    /// Adds a variable as a member that flows into the FMU. Connected flows add up to zero.
     #[must_use]
     pub fn inflow(self, member: &'static str, variable: &'static str) -> Self {
         self.member(member, variable, "inflow")
     }
 
-    /// With a variable as member that flows out of the FMU.
+    /// Adds a variable as a member that flows out of the FMU.
     #[must_use]
     pub fn outflow(self, member: &'static str, variable: &'static str) -> Self {
         self.member(member, variable, "outflow")
     }
 
-    /// With a variable as member, of a kind that others have defined.
+    /// Adds a variable as a member of a third-party kind.
     #[must_use]
     pub fn member(mut self, member: &'static str, variable: &'static str, kind: &'static str) -> Self {
         self.members.push(Member { name: member, variable, kind });
         self
     }
 
-    /// With a picture: `terminalsAndIcons/NAME.png` of what goes into the FMU, and `NAME.svg` if that is there; and
-    /// where it is, as x1, y1, x2, y2 of the FMU's own icon, which reaches from -100 to 100.
+    /// Sets the icon: the image `terminalsAndIcons/NAME.png` in the FMU, and `NAME.svg` if that exists. Its corners x1, y1, x2, y2 are
+    /// in the coordinates of the icon of the FMU, which reaches from -100 to 100.
     #[must_use]
-    pub fn icon(self, name: &'static str, place: [f64; 4]) -> Self {
-        Self { icon: Some((name, place)), ..self }
+    pub fn icon(self, name: &'static str, corners: [f64; 4]) -> Self {
+        Self { icon: Some((name, corners)), ..self }
     }
 
     fn check(&self, model: &LoadedModel, content: &[ContentFile]) -> Result<()> {
@@ -112,21 +111,25 @@ impl Terminal {
                 ensure!(is_name(text), "'{}' is empty or more than one line", text.escape_debug());
             }
             ensure!(names.insert(name), "it has two members with the name {name}");
-            let of = model.table.variables.iter().find(|of| of.name == *variable);
-            let of = of.with_context(|| format!("its member {name} is {variable}, which is no variable"))?;
+            let found = model.table.variables.iter().find(|known| known.name == *variable);
+            let found =
+                found.with_context(|| format!("its member {name} is {variable}, which is no variable"))?;
             ensure!(
-                of.dimensions.is_empty(),
+                found.dimensions.is_empty(),
                 "its member {name} is {variable}, an element of an array, which terminals cannot have"
             );
             use Causality::*;
             ensure!(
                 !["signal", "inflow", "outflow"].contains(kind)
-                    || matches!(of.causality, Input | Output | Parameter | CalculatedParameter),
+                    || matches!(found.causality, Input | Output | Parameter | CalculatedParameter),
                 "its member {name} is {variable}, which is no input, output or parameter"
             );
         }
-        if let Some((icon, place)) = self.icon {
-            ensure!(place.iter().all(|number| number.is_finite()), "its icon has no place");
+        if let Some((icon, corners)) = self.icon {
+            ensure!(
+                corners.iter().all(|number| number.is_finite()),
+                "the corners of its icon are not finite"
+            );
             let file = format!("terminalsAndIcons/{icon}.png");
             ensure!(content.iter().any(|known| known.name == file), "its icon {file} is missing");
         }
@@ -162,8 +165,7 @@ fn is_name(text: &str) -> bool {
     !text.is_empty() && !text.contains(char::is_control)
 }
 
-/// The text of `terminalsAndIcons.xml` for a model with these terminals, in an FMU with these files; `None` if there are
-/// no terminals.
+/// Returns `terminalsAndIcons.xml` of a model with these terminals, in an FMU with these files; `None` if there are no terminals.
 ///
 /// # Errors
 /// When two terminals, or two members of one, share a name, a member is no variable that can be connected, or an icon is
@@ -181,7 +183,7 @@ pub fn terminals(
         terminal.check(model, content).with_context(|| format!("the terminal {name}"))?;
     }
     let Some(list) = list("Terminals", terminals.iter().map(Terminal::element)) else { return Ok(None) };
-    // In an FMU for FMI 2.0, too: there it is the version that defines this file (section 2.4.9 of FMI 3.0).
+    // FMI 3.0 defines this file, so an FMU for FMI 2.0 would have this version as well (section 2.4.9 of FMI 3.0).
     let root = Element::new("fmiTerminalsAndIcons").with("fmiVersion", "3.0");
     root.containing([list]).document().map(Some)
 }

@@ -1,5 +1,6 @@
 //! Compiling for other systems: cargo-zigbuild links for all of them.
 
+use crate::packages::cargo;
 use crate::platform::Platform;
 use anyhow::{Result, bail};
 use std::ffi::OsString;
@@ -12,7 +13,7 @@ pub const ZIGBUILD: &str = "cargo-zigbuild";
 /// The linker for Windows that Debian and others have.
 const MINGW: &str = "x86_64-w64-mingw32-gcc";
 
-/// What `--all-targets` compiles for.
+/// The targets of `--all-targets`.
 pub const TARGETS: [&str; 5] = [
     "x86_64-unknown-linux-gnu",
     "aarch64-unknown-linux-gnu",
@@ -21,10 +22,10 @@ pub const TARGETS: [&str; 5] = [
     "aarch64-apple-darwin",
 ];
 
-/// The oldest glibc that libraries for Linux ask for: that of Enterprise Linux 7 and of everything since.
+/// The glibc that libraries for Linux need: the version of Enterprise Linux 7, which all later systems have.
 pub const GLIBC: &str = "2.17";
 
-/// Fails with all that is missing to compile for these targets, and where to get it; only `all` of them need
+/// Checks that the tools for these targets are installed, or names all missing tools and their sources. Only `all` targets need
 /// cargo-zigbuild, as cargo's configuration may have a linker for one.
 pub fn check_targets(targets: &[String], all: bool) -> Result<()> {
     let mut missing = Vec::new();
@@ -39,25 +40,24 @@ pub fn check_targets(targets: &[String], all: bool) -> Result<()> {
         );
     }
     if !missing.is_empty() {
-        bail!("to compile for other systems, there is still to be installed:\n  {}", missing.join("\n  "));
+        bail!("to compile for other systems, install:\n  {}", missing.join("\n  "));
     }
     Ok(())
 }
 
-/// The cargo that compiles for this target, and how it writes the target.
+/// Returns the cargo that compiles for this target, and its name of the target.
 ///
-/// What cargo can link by itself, as its configuration may say, is left to it where there is no cargo-zigbuild.
+/// Without cargo-zigbuild, this is the plain cargo, whose configuration may have a linker for the target.
 pub fn rustc_for(target: Option<&str>) -> (OsString, Option<String>) {
     match target.filter(|target| needs_zigbuild(target) && runs(ZIGBUILD)) {
         Some(target) if target.contains("-linux-gnu") => (ZIGBUILD.into(), Some(format!("{target}.{GLIBC}"))),
         Some(target) => (ZIGBUILD.into(), Some(target.to_owned())),
-        // Inside `cargo run` this names the cargo that is running.
-        None => (std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()), target.map(str::to_owned)),
+        None => (cargo(), target.map(str::to_owned)),
     }
 }
 
-/// For another system or processor than this machine's, or for an old glibc; but for what every compiler can make, and
-/// where MinGW is, whose libraries ask for less of Windows.
+/// Whether a target needs cargo-zigbuild: targets for another system or processor, or for an old glibc. WebAssembly needs no other
+/// linker. MinGW is preferred for Windows, because its libraries need less of the system.
 fn needs_zigbuild(target: &str) -> bool {
     match target {
         "x86_64-pc-windows-gnu" => !runs(MINGW),
@@ -67,14 +67,14 @@ fn needs_zigbuild(target: &str) -> bool {
     }
 }
 
-/// Whether the compiler has the standard library of a target. Where that cannot be asked, cargo will say it.
+/// Whether the compiler has the standard library of a target. If this is unknown, cargo will report it.
 pub fn has_std(target: &str) -> bool {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
-    let asked = Command::new(rustc).args(["--print", "target-libdir", "--target", target]).output();
-    let Ok(asked) = asked else { return true };
-    let folder = String::from_utf8_lossy(&asked.stdout).trim().to_owned();
-    asked.status.success()
-        && Path::new(&folder).read_dir().is_ok_and(|files| {
+    let output = Command::new(rustc).args(["--print", "target-libdir", "--target", target]).output();
+    let Ok(output) = output else { return true };
+    let directory = String::from_utf8_lossy(&output.stdout).trim().to_owned();
+    output.status.success()
+        && Path::new(&directory).read_dir().is_ok_and(|files| {
             files.flatten().any(|file| file.file_name().to_string_lossy().starts_with("libstd-"))
         })
 }

@@ -5,13 +5,14 @@ use crate::xml::Element;
 use anyhow::{Result, ensure};
 use fmi_abi::Value;
 
-/// The units of these types, in the order of their first use.
+/// Returns the units of these types, in the order of their first use.
 ///
-/// Fails when two different units share a name.
+/// # Errors
+/// When two different units share a name.
 pub(crate) fn unit_definitions(types: &[&Type]) -> Result<Option<Element>> {
     let mut units: Vec<&Unit> = Vec::new();
-    for of in types {
-        let Attributes::Real { unit, .. } = &of.attributes else { continue };
+    for definition in types {
+        let Attributes::Real { unit, .. } = &definition.attributes else { continue };
         match units.iter().find(|known| known.name == unit.name) {
             Some(known) => {
                 ensure!(*known == unit, "there are two different units with the name {}", unit.name)
@@ -39,32 +40,33 @@ fn not_zero(offset: f64) -> Option<f64> {
     (offset != 0.0).then_some(offset)
 }
 
-/// Those of these types that have a name, in the order of their first use.
+/// Returns the types that have a name, in the order of their first use.
 ///
-/// Fails when two different types share a name, or a type and a variable do.
+/// # Errors
+/// When two different types share a name, or a type and a variable do.
 pub(crate) fn type_definitions(
     types: &[&Type],
     variables: &[&str],
-    definition: fn(&Type) -> Element,
+    to_element: impl Fn(&Type) -> Element,
 ) -> Result<Option<Element>> {
     let mut named: Vec<&Type> = Vec::new();
-    for of in types.iter().filter(|of| !of.name.is_empty()) {
-        let name = of.name.as_str();
+    for definition in types.iter().filter(|definition| !definition.name.is_empty()) {
+        let name = definition.name.as_str();
         ensure!(
             !variables.contains(&name),
             "{name} is a variable and a type; rename one of them (section 2.2.3)"
         );
         match named.iter().find(|known| known.name == name) {
-            Some(known) => ensure!(known == of, "there are two different types with the name {name}"),
-            None => named.push(of),
+            Some(known) => ensure!(known == definition, "there are two different types with the name {name}"),
+            None => named.push(definition),
         }
     }
-    Ok(list("TypeDefinitions", named.into_iter().map(definition)))
+    Ok(list("TypeDefinitions", named.into_iter().map(to_element)))
 }
 
-/// The items of an Enumeration.
-pub(crate) fn items(of: &Type) -> impl Iterator<Item = Element> {
-    let items: &[_] = if let Attributes::Enumeration(items) = &of.attributes { items } else { &[] };
+/// Returns the items of an Enumeration.
+pub(crate) fn items(definition: &Type) -> impl Iterator<Item = Element> {
+    let items: &[_] = if let Attributes::Enumeration(items) = &definition.attributes { items } else { &[] };
     items.iter().map(|item| {
         Element::new("Item")
             .with("name", &item.name)
@@ -73,22 +75,22 @@ pub(crate) fn items(of: &Type) -> impl Iterator<Item = Element> {
     })
 }
 
-/// The element with what its type says: quantity, unit, range, nominal value, kind of bytes.
-pub(crate) fn with_attributes(element: Element, of: &Type) -> Element {
-    let Attributes::Real { quantity, unit, nominal, .. } = &of.attributes else {
-        return with_range(element, of);
+/// Adds the attributes of a type: quantity, unit, range, nominal value, kind of bytes.
+pub(crate) fn with_attributes(element: Element, definition: &Type) -> Element {
+    let Attributes::Real { quantity, unit, nominal, .. } = &definition.attributes else {
+        return with_range(element, definition);
     };
     let element = element
         .with_some("quantity", filled(quantity))
         .with("unit", &unit.name)
         .with_some("displayUnit", unit.display.as_ref().map(|(name, ..)| name));
-    with_range(element, of).with_some("nominal", *nominal)
+    with_range(element, definition).with_some("nominal", *nominal)
 }
 
-/// The element with the values that its type has: their range, or the kind of bytes.
-pub(crate) fn with_range(element: Element, of: &Type) -> Element {
-    let range = of.base.range();
-    match &of.attributes {
+/// Adds the range of a type, or the kind of bytes.
+pub(crate) fn with_range(element: Element, definition: &Type) -> Element {
+    let range = definition.base.range();
+    match &definition.attributes {
         Attributes::Real { min, max, .. } => {
             element.with_some("min", min.map(Value::Real)).with_some("max", max.map(Value::Real))
         }
@@ -102,12 +104,12 @@ pub(crate) fn with_range(element: Element, of: &Type) -> Element {
     }
 }
 
-/// The text, unless it is empty.
-pub(crate) fn filled(text: &str) -> Option<&str> {
-    Some(text).filter(|text| !text.is_empty())
+/// Returns a string unless it is empty.
+pub(crate) fn filled(string: &str) -> Option<&str> {
+    Some(string).filter(|string| !string.is_empty())
 }
 
-/// An element with these in it; `None` if there are none: the schema has no empty lists.
+/// Returns an element with children; `None` if there are none, as the schema has no empty lists.
 pub(crate) fn list(name: &str, elements: impl IntoIterator<Item = Element>) -> Option<Element> {
     Some(Element::new(name).containing(elements)).filter(|list| !list.children.is_empty())
 }

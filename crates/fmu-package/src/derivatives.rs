@@ -1,4 +1,4 @@
-//! The partial derivatives that a model offers, compared with differences of its values.
+//! The partial derivatives that a model provides, compared with differences of its values.
 
 use crate::check::Starts;
 use crate::instance::{Instance, Saved};
@@ -8,11 +8,11 @@ use crate::table::Attributes;
 use anyhow::{Result, bail};
 use fmi_abi::{BaseType, Interface, Standard};
 
-/// So many points are tried; a derivative must be wrong at two of them, one may lie at a kink.
+/// Number of points that are tried. A derivative must be wrong at two of them, as one may lie at a kink.
 const POINTS: usize = 16;
 
-/// Refuses a model whose partial derivatives are not those of its values, at a communication point or in Continuous-Time
-/// Mode if `running`, else in Initialization Mode.
+/// Rejects a model whose partial derivatives differ from differences of its values: at communication points and in
+/// Continuous-Time Mode if `running`, else in Initialization Mode.
 pub(crate) fn check(
     model: &LoadedModel,
     starts: &Starts,
@@ -29,17 +29,17 @@ pub(crate) fn check(
     let mut points = Vec::new();
     for _ in 0..POINTS {
         let (mut point, mut instance) = sampler.draw(None, true, |_| true)?;
-        // What is set in Co-Simulation may act in the step that follows.
+        // A value that is set in Co-Simulation may act in the step that follows.
         if running && table.model_exchange.is_some() && point.interface != Interface::ModelExchange {
             point.interface = Interface::ModelExchange;
             let Ok(same) = model_at(model, &point, running, Standard::Fmi3) else { continue };
             instance = same;
         }
         if let Ok(saved) = instance.save() {
-            points.push(Base { saved, time: instance.time, instance, point });
+            points.push(Base { saved, instance, point });
         }
     }
-    let is_real = |place: &u32| table.variable(*place).is_none_or(|of| of.base() == BaseType::Real);
+    let is_real = |index: &u32| table.variable(*index).is_none_or(|known| known.base() == BaseType::Real);
     let unknowns: Vec<u32> = unknowns.iter().copied().filter(is_real).collect();
     let knowns: Vec<u32> = knowns.iter().copied().filter(is_real).collect();
     if unknowns.is_empty() {
@@ -50,10 +50,10 @@ pub(crate) fn check(
     for (number, known) in knowns.iter().enumerate() {
         let check = Check { model, running, unknowns: &unknowns, known: *known };
         let found = check.wrong(&mut points, &sizes).into_iter().enumerate();
-        wrong.extend(found.filter_map(|(place, pair)| Some((place, number, pair?))));
+        wrong.extend(found.filter_map(|(unknown, pair)| Some((unknown, number, pair?))));
     }
-    let Some((unknown, known, (said, found))) =
-        wrong.into_iter().min_by_key(|(place, number, _)| (*place, *number))
+    let Some((unknown, known, (provided, found))) =
+        wrong.into_iter().min_by_key(|(unknown, known, _)| (*unknown, *known))
     else {
         return Ok(());
     };
@@ -64,24 +64,23 @@ pub(crate) fn check(
         (_, false) => ("initial_partial", " in Initialization Mode"),
     };
     bail!(
-        "the derivative of {} with respect to {}{mode} is {said:.6e} by Partials::{function}, but {found:.6e} by \
+        "the derivative of {} with respect to {}{mode} is {provided:.6e} by Partials::{function}, but {found:.6e} by \
          differences of the values",
         table.name(unknowns[unknown]),
         table.name(known)
     );
 }
 
-/// A model at a point, and its saved state, to which it returns after a change.
+/// An instance at a point, and its saved state, which is restored after each change.
 struct Base<'a> {
     point: Point,
     instance: Instance<'a>,
-    time: f64,
     saved: Saved,
 }
 
 /// The largest absolute value of each unknown.
 fn sizes(model: &LoadedModel, unknowns: &[u32], points: &mut [Base]) -> Vec<f64> {
-    let nominal = |place: &u32| match model.table.variables[*place as usize].of.attributes {
+    let nominal = |index: &u32| match model.table.variables[*index as usize].variable_type.attributes {
         Attributes::Real { nominal, .. } => nominal.unwrap_or_default(),
         _ => 0.0,
     };
@@ -102,16 +101,16 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    /// For each unknown the derivative that the model offers and the one of its values, if they differ.
+    /// Returns for each unknown the derivative that the model provides, and the difference quotient of its values, if they differ.
     fn wrong(&self, points: &mut [Base], sizes: &[f64]) -> Vec<Option<(f64, f64)>> {
         let mut wrong: Vec<Vec<(f64, f64)>> = vec![Vec::new(); self.unknowns.len()];
-        let mut provided = vec![true; self.unknowns.len()];
+        let mut always = vec![true; self.unknowns.len()];
         let variable =
             self.model.table.variable(self.known).filter(|_| self.known != self.model.table.time());
         for base in points {
-            let said = base.instance.partials(self.unknowns, self.known);
-            provided.iter_mut().zip(&said).for_each(|(provided, said)| *provided &= said.is_some());
-            if said.iter().all(Option::is_none) {
+            let partials = base.instance.partials(self.unknowns, self.known);
+            always.iter_mut().zip(&partials).for_each(|(always, partial)| *always &= partial.is_some());
+            if partials.iter().all(Option::is_none) {
                 continue;
             }
             let at = match variable {
@@ -122,48 +121,43 @@ impl Check<'_> {
                 continue;
             }
             let scale = match at.abs() {
-                0.0 => variable.map_or(1.0, |known| known.of.nominal_or_one()),
+                0.0 => variable.map_or(1.0, |known| known.variable_type.nominal_or_one()),
                 size => size,
             };
-            // Central differences of two widths: how far they are apart tells what they are worth.
+            // Central differences of two widths: their distance bounds their error.
             let mut slopes = |width: f64| -> Option<Vec<f64>> {
-                let [above, below] = [self.values(base, at + width)?, self.values(base, at - width)?];
-                Some(
-                    above
-                        .into_iter()
-                        .zip(below)
-                        .map(|(above, below)| (above - below) / (2.0 * width))
-                        .collect(),
-                )
+                let pairs = self.values(base, at + width)?.into_iter().zip(self.values(base, at - width)?);
+                Some(pairs.map(|(above, below)| (above - below) / (2.0 * width)).collect())
             };
             let (Some(wide), Some(narrow)) = (slopes(1e-3 * scale), slopes(5e-4 * scale)) else { continue };
-            for (place, said) in said.iter().enumerate() {
-                let (Some(said), wide, narrow) = (*said, wide[place], narrow[place]) else { continue };
+            for (number, partial) in partials.iter().enumerate() {
+                let (Some(partial), wide, narrow) = (*partial, wide[number], narrow[number]) else {
+                    continue;
+                };
                 // The time of Co-Simulation is varied by the start time, from which some models count.
-                let unseen =
+                let is_unknown =
                     variable.is_none() && base.point.interface == Interface::CoSimulation && narrow == 0.0;
-                if !(wide - narrow).is_finite() || unseen {
+                if !(wide - narrow).is_finite() || is_unknown {
                     continue;
                 }
-                let tolerance = 1e-5 * said.abs().max(narrow.abs())
+                let tolerance = 1e-5 * partial.abs().max(narrow.abs())
                     + 10.0 * (wide - narrow).abs()
-                    + 1e-7 * sizes[place] / scale;
-                if said.is_nan() || (said - narrow).abs() > tolerance {
-                    wrong[place].push((said, narrow));
+                    + 1e-7 * sizes[number] / scale;
+                if partial.is_nan() || (partial - narrow).abs() > tolerance {
+                    wrong[number].push((partial, narrow));
                 }
             }
         }
-        let first = |(wrong, provided): (Vec<_>, bool)| {
-            wrong.first().copied().filter(|_| provided && wrong.len() > 1)
-        };
-        wrong.into_iter().zip(provided).map(first).collect()
+        let first =
+            |(wrong, always): (Vec<_>, bool)| wrong.first().copied().filter(|_| always && wrong.len() > 1);
+        wrong.into_iter().zip(always).map(first).collect()
     }
 
     /// The unknowns at a point where the known has another value; `None` if the model rejects it.
     fn values(&self, base: &mut Base, value: f64) -> Option<Vec<f64>> {
         let is_time = self.known == self.model.table.time();
         if is_time && base.point.interface == Interface::CoSimulation {
-            // No function sets the time there. Where the FMU also offers Model Exchange, the time is varied in that.
+            // No function sets the time there. If the FMU also offers Model Exchange, the time is varied in that.
             if self.model.table.model_exchange.is_some() {
                 return None;
             }
@@ -177,7 +171,7 @@ impl Check<'_> {
             false => self.change(instance, value),
         };
         let values = changed.map(|()| instance.reals(self.unknowns));
-        instance.restore(base.saved, base.time).ok()?;
+        instance.restore(base.saved).ok()?;
         values
     }
 
@@ -185,7 +179,7 @@ impl Check<'_> {
         let table = &self.model.table;
         let variable = table.variable(self.known)?;
         if self.running && instance.interface == Interface::ModelExchange {
-            // Where everything can be set.
+            // Any known can be set there.
             instance.enter_event_mode().ok()?;
         }
         if self.running && variable.state {

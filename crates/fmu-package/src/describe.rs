@@ -1,79 +1,328 @@
-//! What the model descriptions of all versions have in common.
+//! The model description (section 2.2 of FMI 2.0, 2.4 of FMI 3.0).
+//!
+//! Variables that only FMI 3.0 needs follow the table: the time, if it is no variable of the model, and the event indicators.
+//! Value references of FMI 3.0 count from 1 in this order, and an array takes as many as it has elements.
 
-use crate::changes::Changes;
-use crate::definitions::{filled, list};
-use crate::structure::Unknown;
-use crate::table::{Table, Variable};
+use crate::definitions::{
+    filled, items, list, type_definitions, unit_definitions, with_attributes, with_range,
+};
+use crate::model::LoadedModel;
+use crate::structure::{ModelStructure, Unknown, checked_starts};
+use crate::table::{CoSimulation, ModelExchange, Table, Type, Variable};
 use crate::xml::Element;
-use fmi_abi::{Category, Causality, Variability};
+use anyhow::{Result, bail, ensure};
+use fmi_abi::{BaseType, Category, Causality, Standard, Value, Variability};
 
-/// The root of the description, with the facts about the model.
-pub(crate) fn root(table: &Table, version: &str, guid: &str, changes: &Changes) -> Element {
-    let info = &table.info;
-    // The time of generation would make every build a different file.
-    Element::new("fmiModelDescription")
-        .with("fmiVersion", version)
-        .with("modelName", &info.name)
-        .with(guid, changes.guid.as_ref().unwrap_or(&info.guid))
-        .with_some("description", filled(&info.description))
-        .with_some("author", filled(&info.author))
-        .with_some("version", filled(&info.version))
-        .with_some("copyright", filled(&info.copyright))
-        .with_some("license", filled(&info.license))
-        .with("generationTool", concat!("fmu-package ", env!("CARGO_PKG_VERSION")))
-        .with("variableNamingConvention", if table.arrays { "structured" } else { "flat" })
+/// Differences between the description and the model as it was compiled.
+#[derive(Clone, Debug, Default)]
+pub struct Changes {
+    /// Another guid.
+    pub guid: Option<String>,
+    /// Parameters are `tunable` instead of `fixed`.
+    pub tunable_parameters: bool,
+    /// The files in the directory `sources` that an importer compiles (FMI 2.0).
+    pub source_files: Vec<String>,
 }
 
-pub(crate) fn log_categories() -> Option<Element> {
-    let category = |category: Category| {
-        Element::new("Category")
-            .with("name", category.name().to_string_lossy())
-            .with("description", category.description())
-    };
-    list("LogCategories", Category::ALL.map(category))
+/// Returns `modelDescription.xml` of the model's FMU for this version of FMI.
+///
+/// # Errors
+/// When the model contradicts itself (two variables of one name, an empty range, a start value outside its range or other
+/// than through the other interface type, a dependency that it has not declared), has a variable of a type that FMI 2.0
+/// lacks, or has a variable with a name that FMI 3.0 needs.
+pub fn describe(model: &LoadedModel, fmi: Standard, changes: &Changes) -> Result<String> {
+    let table = &model.table;
+    let lacking = table.variables.iter().find(|variable| !variable.base().is_in_fmi2());
+    if let (Some(variable), Standard::Fmi2) = (lacking, fmi) {
+        bail!(
+            "{} is {}, which FMI 2.0 lacks; add --fmi 3 to make an FMU for FMI 3.0 only",
+            variable.name,
+            variable.base()
+        );
+    }
+    let starts = checked_starts(model)?;
+    let structure = ModelStructure::of(model, fmi, changes.tunable_parameters)?;
+    Description { table, fmi, changes }.document(starts, &structure)
 }
 
-pub(crate) fn default_experiment(table: &Table) -> Element {
+/// The position that counts from 1: an index in FMI 2.0, a value reference in FMI 3.0.
+fn position(index: u32) -> u32 {
+    index + 1
+}
+
+struct Description<'a> {
+    table: &'a Table,
+    fmi: Standard,
+    changes: &'a Changes,
+}
+
+impl Description<'_> {
+    fn document(&self, starts: &[Option<Value>], structure: &ModelStructure) -> Result<String> {
+        let Self { table, fmi, .. } = self;
+        let is_fmi2 = *fmi == Standard::Fmi2;
+        let described: Vec<_> =
+            (0..).zip(&table.variables).filter(|(_, variable)| is_fmi2 || variable.element == 0).collect();
+        let types: Vec<_> = described.iter().map(|(_, variable)| &variable.variable_type).collect();
+        let names: Vec<_> = described.iter().map(|(_, variable)| self.name(variable)).collect();
+        let generated = self.generated();
+        for name in generated.iter().filter_map(|variable| variable.attribute("name")) {
+            ensure!(
+                !names.contains(&name),
+                "{name} is the name of a variable that FMI 3.0 needs; declare the time as independent, rename any other \
+                 variable of this name"
+            );
+        }
+        let variables = described
+            .iter()
+            .map(|(index, variable)| self.variable(*index, variable, starts))
+            .chain(generated);
+        let children = [
+            table.model_exchange.as_ref().map(|offer| self.model_exchange(offer)),
+            table.co_simulation.as_ref().map(|offer| self.co_simulation(offer)),
+            unit_definitions(&types)?,
+            type_definitions(&types, &names, |definition| self.type_definition(definition))?,
+            list("LogCategories", Category::ALL.map(log_category)),
+            Some(default_experiment(table)),
+            Some(Element::new("ModelVariables").containing(variables)),
+            Some(self.structure(structure)),
+        ];
+        self.root().containing(children.into_iter().flatten()).document()
+    }
+
+    /// The root, with the facts about the model.
+    fn root(&self) -> Element {
+        let Self { table: Table { info, arrays, .. }, fmi, changes } = self;
+        let (version, guid) = match fmi {
+            Standard::Fmi2 => ("2.0", "guid"),
+            Standard::Fmi3 => ("3.0", "instantiationToken"),
+        };
+        let indicators = self.table.model_exchange.as_ref().map(|offer| offer.indicators);
+        // The time of generation would make every build a different file.
+        Element::new("fmiModelDescription")
+            .with("fmiVersion", version)
+            .with("modelName", &info.name)
+            .with(guid, changes.guid.as_ref().unwrap_or(&info.guid))
+            .with_some("description", filled(&info.description))
+            .with_some("author", filled(&info.author))
+            .with_some("version", filled(&info.version))
+            .with_some("copyright", filled(&info.copyright))
+            .with_some("license", filled(&info.license))
+            .with("generationTool", concat!("fmu-package ", env!("CARGO_PKG_VERSION")))
+            .with("variableNamingConvention", if *arrays { "structured" } else { "flat" })
+            .with_some("numberOfEventIndicators", indicators.filter(|_| *fmi == Standard::Fmi2))
+    }
+
+    /// The element of Model Exchange (section 3.3.1 of FMI 2.0, 2.4.2 of FMI 3.0).
+    fn model_exchange(&self, offer: &ModelExchange) -> Element {
+        let element = self.interface("ModelExchange");
+        match self.fmi {
+            Standard::Fmi2 => self
+                .with_capabilities(element.with("completedIntegratorStepNotNeeded", !offer.step_completed)),
+            Standard::Fmi3 => {
+                self.with_capabilities(element).with("needsCompletedIntegratorStep", offer.step_completed)
+            }
+        }
+    }
+
+    /// The element of Co-Simulation (section 4.3.1 of FMI 2.0, 4.4 of FMI 3.0).
+    fn co_simulation(&self, offer: &CoSimulation) -> Element {
+        let element = self.interface("CoSimulation");
+        let (step_size, order) = ("canHandleVariableCommunicationStepSize", "maxOutputDerivativeOrder");
+        match self.fmi {
+            Standard::Fmi2 => self.with_capabilities(
+                element
+                    .with(step_size, offer.variable_step_size)
+                    .with("canInterpolateInputs", self.table.input_derivatives)
+                    .with(order, self.table.output_derivatives),
+            ),
+            Standard::Fmi3 => self
+                .with_capabilities(element)
+                .with(step_size, offer.variable_step_size)
+                .with(order, self.table.output_derivatives)
+                .with("providesIntermediateUpdate", false)
+                .with("canReturnEarlyAfterIntermediateUpdate", false)
+                .with("mightReturnEarlyFromDoStep", offer.ends_early)
+                .with("hasEventMode", offer.event_mode),
+        }
+    }
+
+    fn interface(&self, name: &str) -> Element {
+        Element::new(name).with("modelIdentifier", &self.table.info.identifier)
+    }
+
+    /// The element of an interface type with the capabilities that both types have.
+    fn with_capabilities(&self, element: Element) -> Element {
+        let file = |name: &String| Element::new("File").with("name", name);
+        match self.fmi {
+            Standard::Fmi2 => element
+                .with("canNotUseMemoryManagementFunctions", true)
+                .with("canGetAndSetFMUstate", true)
+                .with("canSerializeFMUstate", true)
+                .with("providesDirectionalDerivative", self.table.partials)
+                .containing(list("SourceFiles", self.changes.source_files.iter().map(file))),
+            Standard::Fmi3 => element
+                .with("canGetAndSetFMUState", true)
+                .with("canSerializeFMUState", true)
+                .with("providesDirectionalDerivatives", self.table.partials)
+                .with("providesAdjointDerivatives", self.table.partials),
+        }
+    }
+
+    /// The name of the element of a type.
+    fn name_of_type(&self, base: BaseType) -> String {
+        match (base, self.fmi) {
+            (BaseType::Real, Standard::Fmi3) => "Float64".to_owned(),
+            (BaseType::Integer, Standard::Fmi3) => "Int32".to_owned(),
+            _ => base.to_string(),
+        }
+    }
+
+    fn type_definition(&self, definition: &Type) -> Element {
+        let (element, name) = (self.name_of_type(definition.base), &definition.name);
+        match self.fmi {
+            Standard::Fmi2 => {
+                let element = with_attributes(Element::new(element), definition);
+                Element::new("SimpleType")
+                    .with("name", name)
+                    .containing([element.containing(items(definition))])
+            }
+            Standard::Fmi3 => {
+                let element = Element::new(format!("{element}Type")).with("name", name);
+                // FMPy 0.3 does not read a BinaryType with more attributes; the variables have them.
+                let is_read = definition.base != BaseType::Binary;
+                let element = if is_read { with_attributes(element, definition) } else { element };
+                element.containing(items(definition))
+            }
+        }
+    }
+
+    /// The name of a variable, which is an array in FMI 3.0.
+    fn name<'v>(&self, variable: &'v Variable) -> &'v str {
+        if self.fmi == Standard::Fmi2 { &variable.name } else { &variable.name_of_array }
+    }
+
+    /// The element of a variable; in FMI 3.0, of an array with the start values of its elements.
+    fn variable(&self, index: u32, variable: &Variable, starts: &[Option<Value>]) -> Element {
+        let Self { table, fmi, changes } = self;
+        // A parameter that is calculated from tunable parameters is tunable.
+        let variability = match variable.causality {
+            Causality::Parameter | Causality::CalculatedParameter if changes.tunable_parameters => {
+                Variability::Tunable
+            }
+            _ => variable.variability,
+        };
+        let with_facts = |name: String| {
+            Element::new(name)
+                .with("name", self.name(variable))
+                .with("valueReference", fmi.reference(index))
+                .with_some("description", filled(&variable.description))
+                .with("causality", variable.causality)
+                .with("variability", variability)
+                .with_some("initial", variable.initial)
+        };
+        // Only importers that integrate need to know whether events may change the variable.
+        let reinit = (table.model_exchange.is_some() && variable.reinit).then_some(true);
+        let with_value = |element: Element, start: Option<String>| {
+            element
+                .with_some("declaredType", filled(&variable.variable_type.name))
+                .with_some("start", start)
+                .with_some("derivative", variable.differentiates.map(position))
+                .with_some("reinit", reinit)
+        };
+        let name = self.name_of_type(variable.base());
+        let count = if *fmi == Standard::Fmi2 { 1 } else { variable.length() };
+        let starts = starts[index as usize..][..count].iter().flatten();
+        if *fmi == Standard::Fmi2 {
+            // Many importers do not look types up, so the attributes of the type are repeated.
+            let value = with_value(Element::new(name), starts.map(Value::to_string).next());
+            return with_facts("ScalarVariable".to_owned())
+                .containing([with_attributes(value, &variable.variable_type)]);
+        }
+        let starts = starts.map(|start| match start {
+            // As short as single precision allows.
+            Value::Real(value) if variable.base() == BaseType::Float32 => (*value as f32).to_string(),
+            other => other.to_string(),
+        });
+        let is_element = matches!(variable.base(), BaseType::String | BaseType::Binary);
+        let (children, list): (Vec<_>, Vec<_>) = starts.partition(|_| is_element);
+        let element = with_value(with_facts(name), (!list.is_empty()).then(|| list.join(" ")));
+        // Only the range of the type is repeated: fmi-sim 0.7 reads no FMU whose variables have a quantity, a unit or a nominal
+        // value, although they may (section 2.4.7.3).
+        let with = if variable.variable_type.name.is_empty() { with_attributes } else { with_range };
+        with(element, &variable.variable_type)
+            .containing(variable.dimensions.iter().map(|size| Element::new("Dimension").with("start", size)))
+            .containing(children.into_iter().map(|start| Element::new("Start").with("value", start)))
+    }
+
+    /// The variables of FMI 3.0 that are not in the table. Every FMU has a time (section 2.4.7.4), and every event indicator
+    /// is a variable (section 2.4.8).
+    fn generated(&self) -> Vec<Element> {
+        let table = self.table;
+        if self.fmi == Standard::Fmi2 {
+            return Vec::new();
+        }
+        let variable = |name: String, index: u32, description: &str, causality: &str| {
+            Element::new("Float64")
+                .with("name", name)
+                .with("valueReference", self.fmi.reference(index))
+                .with("description", description)
+                .with("causality", causality)
+                .with("variability", "continuous")
+        };
+        let time = Some(table.time()).filter(|time| table.variable(*time).is_none());
+        let time = time.map(|time| variable("time".to_owned(), time, "Simulation time", "independent"));
+        let indicator = |number: usize| {
+            let name = format!("eventIndicator[{}]", number + 1);
+            let description = "An event happens where it changes its sign";
+            variable(name, table.indicator(number), description, "local").with("initial", "calculated")
+        };
+        time.into_iter().chain((0..table.indicators()).map(indicator)).collect()
+    }
+
+    fn structure(&self, structure: &ModelStructure) -> Element {
+        let lists = [&structure.outputs, &structure.derivatives, &structure.initial_unknowns];
+        let element = Element::new("ModelStructure");
+        if self.fmi == Standard::Fmi2 {
+            let lists = ["Outputs", "Derivatives", "InitialUnknowns"].into_iter().zip(lists);
+            return element.containing(lists.filter_map(|(name, unknowns)| {
+                list(name, unknowns.iter().map(|unknown| with_dependencies("Unknown", "index", unknown)))
+            }));
+        }
+        let lists = ["Output", "ContinuousStateDerivative", "InitialUnknown"].into_iter().zip(lists);
+        let unknowns = lists.flat_map(|(name, unknowns)| {
+            unknowns.iter().map(move |unknown| with_dependencies(name, "valueReference", unknown))
+        });
+        // An element without a list of dependencies depends on everything.
+        let indicator = |number| {
+            Element::new("EventIndicator").with("valueReference", position(self.table.indicator(number)))
+        };
+        element.containing(unknowns).containing((0..self.table.indicators()).map(indicator))
+    }
+}
+
+/// The element of an unknown. Empty lists state that it depends on nothing; without a list it would depend on everything.
+fn with_dependencies(name: &str, reference: &str, unknown: &Unknown) -> Element {
+    let (known, kinds): (Vec<_>, Vec<_>) = unknown
+        .dependencies
+        .iter()
+        .map(|(known, kind)| (position(*known).to_string(), kind.to_string()))
+        .unzip();
+    Element::new(name)
+        .with(reference, position(unknown.index))
+        .with("dependencies", known.join(" "))
+        .with("dependenciesKind", kinds.join(" "))
+}
+
+fn log_category(category: Category) -> Element {
+    Element::new("Category")
+        .with("name", category.name().to_string_lossy())
+        .with("description", category.description())
+}
+
+fn default_experiment(table: &Table) -> Element {
     Element::new("DefaultExperiment")
         .with("startTime", table.info.start_time)
         .with("stopTime", table.info.stop_time)
         .with("tolerance", table.info.tolerance)
         .with("stepSize", table.info.step_size)
-}
-
-/// The element with what a variable of this name is, whatever its type.
-pub(crate) fn with_facts(
-    element: Element,
-    name: &str,
-    variable: &Variable,
-    vr: u32,
-    tunable_parameters: bool,
-) -> Element {
-    // What follows from tunable parameters is tunable as well.
-    let variability = match variable.causality {
-        Causality::Parameter | Causality::CalculatedParameter if tunable_parameters => Variability::Tunable,
-        _ => variable.variability,
-    };
-    element
-        .with("name", name)
-        .with("valueReference", vr)
-        .with_some("description", filled(&variable.description))
-        .with("causality", variable.causality)
-        .with("variability", variability)
-        .with_some("initial", variable.initial)
-}
-
-/// Whether events may change the variable; only importers that integrate need to know.
-pub(crate) fn is_reinit(table: &Table, variable: &Variable) -> Option<bool> {
-    (table.model_exchange.is_some() && variable.reinit).then_some(true)
-}
-
-/// The element with what the unknown depends on, given by `place`.
-///
-/// Empty lists say that it depends on nothing; without a list it would depend on everything.
-pub(crate) fn with_dependencies(element: Element, unknown: &Unknown, place: fn(u32) -> u32) -> Element {
-    let dependencies: Vec<_> =
-        unknown.dependencies.iter().map(|(known, _)| place(*known).to_string()).collect();
-    let kinds: Vec<_> = unknown.dependencies.iter().map(|(_, kind)| kind.to_string()).collect();
-    element.with("dependencies", dependencies.join(" ")).with("dependenciesKind", kinds.join(" "))
 }

@@ -1,4 +1,4 @@
-//! Zip files, and files that are whole or not there.
+//! Zip files, and files that are written atomically.
 
 use anyhow::{Context, Result, ensure};
 use std::fs::{self, File};
@@ -7,15 +7,15 @@ use std::path::Path;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, System, ZipArchive, ZipWriter};
 
-/// A zip file of these entries (name, content), in this order. The same entries give the same bytes, on every machine.
+/// Returns a zip file of these entries (name, content), in this order. The same entries give the same bytes, on every machine.
 ///
 /// # Errors
-/// When two entries have one name and stand beside each other, as they do in a sorted list.
+/// When two consecutive entries have the same name.
 pub fn zip(entries: &[(String, Vec<u8>)]) -> Result<Vec<u8>> {
     for pair in entries.windows(2) {
         ensure!(pair[0].0 != pair[1].0, "{} is there twice", pair[0].0);
     }
-    // Everything that would come from the clock or the machine is fixed here.
+    // These settings would otherwise depend on the clock or the machine.
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .compression_level(Some(9))
@@ -34,10 +34,10 @@ pub fn zip(entries: &[(String, Vec<u8>)]) -> Result<Vec<u8>> {
     Ok(zip.finish().context("cannot make the zip file")?.into_inner())
 }
 
-/// The content of an entry of a zip file.
+/// Returns the content of an entry of a zip file.
 ///
 /// # Errors
-/// When it is no zip file, or has no such entry.
+/// When it is no zip file, or lacks the entry.
 pub fn unzip(zip: &[u8], name: &str) -> Result<Vec<u8>> {
     let mut archive = ZipArchive::new(Cursor::new(zip))?;
     let mut content = Vec::new();
@@ -45,25 +45,25 @@ pub fn unzip(zip: &[u8], name: &str) -> Result<Vec<u8>> {
     Ok(content)
 }
 
-/// Writes a file under a temporary name beside `destination` and gives it its name when it is complete.
-/// Tells its size in bytes.
+/// Writes a file under a temporary name next to `destination`, renames it when it is complete, and returns its size in bytes.
 ///
 /// # Errors
-/// When the folder cannot be made, or the file not be written; the destination is then untouched.
+/// When the directory or the file cannot be written; the destination then does not change.
 pub fn write_atomically(destination: &Path, write: impl FnOnce(&mut File) -> Result<()>) -> Result<u64> {
-    let folder = match destination.parent() {
-        Some(folder) if folder != Path::new("") => folder,
+    let directory = match destination.parent() {
+        Some(directory) if directory != Path::new("") => directory,
         _ => Path::new("."),
     };
-    fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    fs::create_dir_all(directory)
+        .with_context(|| format!("cannot make the directory {}", directory.display()))?;
     let mut builder = tempfile::Builder::new();
-    // Temporary files are private by default; the result is as public as the user's umask says.
+    // Temporary files are private by default; the result has the permissions of the user's umask.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut file = builder
         .prefix(".unfinished-")
-        .tempfile_in(folder)
-        .with_context(|| format!("cannot write in the folder {}", folder.display()))?;
+        .tempfile_in(directory)
+        .with_context(|| format!("cannot write in the directory {}", directory.display()))?;
     let failed = || format!("cannot write {}", destination.display());
     write(file.as_file_mut()).with_context(failed)?;
     let size = file.as_file().metadata().with_context(failed)?.len();

@@ -1,11 +1,10 @@
-//! The guid as a hash of what it stands for.
+//! The guid, a hash of the content that it identifies.
 
 use sha2::{Digest, Sha256};
 
-/// Collects named pieces of content and makes a guid of them.
+/// Collects named pieces of content and hashes them to a guid.
 ///
-/// Some importers keep unpacked FMUs by guid, so different content must have a different guid; and two
-/// builds of the same content must agree on it.
+/// Some importers keep unpacked FMUs by guid, so different content must have a different guid, and the same content the same guid.
 ///
 /// ```
 /// use fmu_package::Fingerprint;
@@ -18,12 +17,12 @@ use sha2::{Digest, Sha256};
 pub struct Fingerprint(Sha256);
 
 impl Fingerprint {
-    /// Of nothing yet.
+    /// A fingerprint without pieces.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Adds a piece. Lengths are hashed as well, so that no two lists of pieces look alike.
+    /// Adds a piece. Lengths are hashed as well, so that different lists of pieces differ.
     pub fn add(&mut self, name: &str, content: &[u8]) {
         for bytes in [name.as_bytes(), content] {
             self.0.update((bytes.len() as u64).to_le_bytes());
@@ -62,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn neither_names_nor_borders_get_lost() {
+    fn names_and_borders_count() {
         let all = [
             guid(&[("a", "bc")]),
             guid(&[("ab", "c")]),

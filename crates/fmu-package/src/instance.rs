@@ -1,75 +1,78 @@
 //! An instance of a model, used as an importer does.
 //!
-//! It is one of FMI 3.0, which has all types; but for derivatives of inputs, which FMI 2.0 has for importers that step a
-//! model, and FMI 3.0 has not.
+//! Instances are of FMI 3.0, which has all types. Only derivatives of inputs, which FMI 3.0 lacks, need an instance of FMI 2.0.
 #![allow(unsafe_code, reason = "C functions are called")]
 
 use crate::model::{Group, LoadedModel};
 use crate::table::Variable;
 use fmi_abi::c_types::{c_char, c_int, c_void};
 use fmi_abi::fmi2::types::fmi2CallbackFunctions;
+use fmi_abi::fmi3::types::fmi3LogMessageCallback;
 use fmi_abi::{BaseType, Interface, Standard, Status, Value};
 use std::cell::RefCell;
 use std::ffi::{CStr, CString};
 use std::ptr::{null, null_mut};
 
-/// What the model rejects, with its message.
+/// The result of a call, with the message of the model if it rejects the call.
 pub(crate) type Outcome<T = ()> = Result<T, String>;
 
-/// An instance; it frees its saved states with itself.
+/// An instance, which owns its saved states.
 pub(crate) struct Instance<'a> {
-    of: &'a LoadedModel,
+    model: &'a LoadedModel,
     pub interface: Interface,
     standard: Standard,
     event_mode: bool,
     handle: *mut c_void,
-    /// The last message, which the model logs.
+    /// The last message that the model logged.
     message: Box<RefCell<String>>,
     pub time: f64,
 }
 
-/// A saved state of an instance.
+/// A saved state of an instance, and its time.
 #[derive(Clone, Copy)]
-pub(crate) struct Saved(*mut c_void);
+pub(crate) struct Saved {
+    state: *mut c_void,
+    pub time: f64,
+}
 
-/// Rounds of an event; more are an endless loop.
+/// Maximum number of iterations of an event. A model that needs more is in an endless loop.
 const MOST_ROUNDS: usize = 10_000;
 
-/// Calls the function of the instance's standard, with the same arguments or with others.
+/// Calls a function of the library: of the FMI version of the instance, with the same arguments or with others, or of one version.
 macro_rules! call {
     ($self:ident, $fmi2:ident, $fmi3:ident ($($argument:expr),*)) => {
         call!($self, $fmi2($($argument),*), $fmi3($($argument),*))
     };
-    ($self:ident, $fmi2:ident($($two:expr),*), $fmi3:ident($($three:expr),*)) => {{
-        // SAFETY: a living instance of this library, and arguments as the standard has them: pointers to values of this
+    ($self:ident, $fmi2:ident($($two:expr),*), $fmi3:ident($($three:expr),*)) => {
+        match $self.standard {
+            Standard::Fmi2 => call!($self, fmi2.$fmi2($($two),*)),
+            Standard::Fmi3 => call!($self, fmi3.$fmi3($($three),*)),
+        }
+    };
+    ($self:ident, $version:ident.$function:ident($($argument:expr),*)) => {{
+        // SAFETY: a living instance of this library, and arguments as the standard requires: pointers to values of the calling
         // function, arrays with their lengths.
-        let code = unsafe {
-            match $self.standard {
-                Standard::Fmi2 => ($self.of.fmi2.$fmi2)($self.handle, $($two),*),
-                Standard::Fmi3 => ($self.of.fmi3.$fmi3)($self.handle, $($three),*),
-            }
-        };
+        let code = unsafe { ($self.model.$version.$function)($self.handle, $($argument),*) };
         $self.outcome(code)
     }};
-    ($self:ident, $fmi3:ident($($three:expr),*)) => {{
-        // SAFETY: as above.
-        let code = unsafe { ($self.of.fmi3.$fmi3)($self.handle, $($three),*) };
-        $self.outcome(code)
-    }};
+    ($self:ident, $fmi3:ident($($three:expr),*)) => {
+        call!($self, fmi3.$fmi3($($three),*))
+    };
 }
 
 impl<'a> Instance<'a> {
-    /// An instance; one of FMI 3.0 may have an event mode in Co-Simulation.
+    /// Makes an instance. In Co-Simulation of FMI 3.0, it may have an event mode.
     pub fn new(
-        of: &'a LoadedModel,
+        model: &'a LoadedModel,
         interface: Interface,
         standard: Standard,
         event_mode: bool,
     ) -> Outcome<Self> {
-        let token = CString::new(of.guid()).map_err(|_| "its guid has a NUL".to_owned())?;
+        let token = CString::new(model.guid()).map_err(|_| "its guid has a NUL".to_owned())?;
         let (name, token) = (c"instance".as_ptr(), token.as_ptr());
         let message = Box::new(RefCell::new(String::new()));
         let environment = (&raw const *message).cast_mut().cast();
+        let log: Option<fmi3LogMessageCallback> = Some(remember);
         let callbacks = fmi2CallbackFunctions {
             logger: None,
             allocate_memory: None,
@@ -77,47 +80,28 @@ impl<'a> Instance<'a> {
             step_finished: None,
             component_environment: null_mut(),
         };
+        let (kind, resources, events) = (interface as c_int, model.resources(), event_mode.into());
         // SAFETY: strings and a callback that live as long as the instance, or NULL.
         let handle = unsafe {
             match (standard, interface) {
-                (Standard::Fmi2, _) => (of.fmi2.fmi2Instantiate)(
-                    name,
-                    interface as c_int,
-                    token,
-                    of.resources(),
-                    &raw const callbacks,
-                    0,
-                    0,
-                ),
-                (Standard::Fmi3, Interface::ModelExchange) => (of.fmi3.fmi3InstantiateModelExchange)(
-                    name,
-                    token,
-                    of.resources(),
-                    0,
-                    0,
-                    environment,
-                    Some(remember),
-                ),
-                (Standard::Fmi3, Interface::CoSimulation) => (of.fmi3.fmi3InstantiateCoSimulation)(
-                    name,
-                    token,
-                    of.resources(),
-                    0,
-                    0,
-                    event_mode.into(),
-                    1,
-                    null(),
-                    0,
-                    environment,
-                    Some(remember),
-                    None,
-                ),
+                (Standard::Fmi2, _) => {
+                    let callbacks = &raw const callbacks;
+                    (model.fmi2.fmi2Instantiate)(name, kind, token, resources, callbacks, 0, 0)
+                }
+                (Standard::Fmi3, Interface::ModelExchange) => {
+                    let instantiate = model.fmi3.fmi3InstantiateModelExchange;
+                    instantiate(name, token, resources, 0, 0, environment, log)
+                }
+                (Standard::Fmi3, Interface::CoSimulation) => {
+                    let instantiate = model.fmi3.fmi3InstantiateCoSimulation;
+                    instantiate(name, token, resources, 0, 0, events, 1, null(), 0, environment, log, None)
+                }
             }
         };
         if handle.is_null() {
             return Err(message.take());
         }
-        Ok(Self { of, interface, standard, event_mode, handle, message, time: 0.0 })
+        Ok(Self { model, interface, standard, event_mode, handle, message, time: 0.0 })
     }
 
     fn outcome(&self, code: c_int) -> Outcome {
@@ -128,8 +112,8 @@ impl<'a> Instance<'a> {
     }
 
     pub fn initialize(&mut self, start: f64, stop: Option<f64>, tolerance: Option<f64>) -> Outcome {
-        let (with_stop, stop) = (stop.is_some(), stop.unwrap_or_default());
-        let (with_tolerance, tolerance) = (tolerance.is_some(), tolerance.unwrap_or_default());
+        let given = [stop, tolerance].map(|value| (value.is_some(), value.unwrap_or_default()));
+        let [(with_stop, stop), (with_tolerance, tolerance)] = given;
         self.time = start;
         if self.standard == Standard::Fmi3 {
             return call!(
@@ -137,27 +121,18 @@ impl<'a> Instance<'a> {
                 fmi3EnterInitializationMode(with_tolerance.into(), tolerance, start, with_stop.into(), stop)
             );
         }
-        let Self { of: LoadedModel { fmi2, .. }, handle, .. } = *self;
-        // SAFETY: as in `call!`.
-        self.outcome(unsafe {
-            (fmi2.fmi2SetupExperiment)(
-                handle,
-                with_tolerance.into(),
-                tolerance,
-                start,
-                with_stop.into(),
-                stop,
-            )
-        })?;
-        // SAFETY: as in `call!`.
-        self.outcome(unsafe { (fmi2.fmi2EnterInitializationMode)(handle) })
+        call!(
+            self,
+            fmi2.fmi2SetupExperiment(with_tolerance.into(), tolerance, start, with_stop.into(), stop)
+        )?;
+        call!(self, fmi2.fmi2EnterInitializationMode())
     }
 
     pub fn initialized(&mut self) -> Outcome {
         call!(self, fmi2ExitInitializationMode, fmi3ExitInitializationMode())
     }
 
-    /// Leaves the event mode after the initialization without an event, on which discrete variables would depend.
+    /// Leaves Event Mode after the initialization, without an event, which would change discrete variables.
     pub fn run(&mut self) -> Outcome {
         match self.interface {
             Interface::ModelExchange => call!(self, fmi3EnterContinuousTimeMode()),
@@ -166,7 +141,7 @@ impl<'a> Instance<'a> {
         }
     }
 
-    /// The event iteration of Model Exchange, and Continuous-Time Mode.
+    /// Iterates the event in Model Exchange, and enters Continuous-Time Mode.
     pub fn handle_event(&mut self) -> Outcome {
         let mut again = 1;
         for _ in 0..MOST_ROUNDS {
@@ -203,7 +178,7 @@ impl<'a> Instance<'a> {
         Ok(())
     }
 
-    /// A step of Co-Simulation; whether the model goes on.
+    /// Makes a step of Co-Simulation. Returns false if the model ends the simulation.
     pub fn step(&mut self, size: f64) -> Outcome<bool> {
         let (point, mut end) = (self.time, self.time + size);
         let (mut event, mut terminate, mut early) = (0, 0, 0);
@@ -221,45 +196,44 @@ impl<'a> Instance<'a> {
         call!(self, fmi3CompletedIntegratorStep(0, &raw mut event, &raw mut terminate))
     }
 
-    /// First time derivatives of inputs; of FMI 2.0.
-    pub fn set_input_derivatives(&mut self, places: &[u32], values: &[f64]) -> Outcome {
-        if self.standard != Standard::Fmi2 || places.is_empty() {
+    /// Sets first time derivatives of inputs, in FMI 2.0 only.
+    pub fn set_input_derivatives(&mut self, indices: &[u32], values: &[f64]) -> Outcome {
+        if self.standard != Standard::Fmi2 || indices.is_empty() {
             return Ok(());
         }
-        let orders = vec![1; places.len()];
-        // SAFETY: as in `call!`.
-        self.outcome(unsafe {
-            (self.of.fmi2.fmi2SetRealInputDerivatives)(
-                self.handle,
-                places.as_ptr(),
-                places.len(),
-                orders.as_ptr(),
-                values.as_ptr(),
-            )
-        })
+        let orders = vec![1; indices.len()];
+        let (orders, values) = (orders.as_ptr(), values.as_ptr());
+        call!(self, fmi2.fmi2SetRealInputDerivatives(indices.as_ptr(), indices.len(), orders, values))
     }
 
-    /// Sets the variables of which this holds, arrays as a whole, those of a type together; the types in another order if the
-    /// model rejects one, since values must fit together after each call.
-    pub fn set(&mut self, values: &[Option<Value>], which: impl Fn(&Variable) -> bool) -> Outcome {
-        let variables = &self.of.table.variables;
-        let mut chosen: Vec<bool> =
-            variables.iter().zip(values).map(|(of, value)| value.is_some() && which(of)).collect();
-        for (first, of) in variables.iter().enumerate().filter(|(_, of)| of.element == 0 && of.length() > 1) {
-            let array = &mut chosen[first..first + of.length()];
+    /// Sets the variables that are selected and have a value, arrays as a whole. Variables of a type are set together. Values must
+    /// fit together after each call, so a type that the model rejects is set again after the others.
+    pub fn set(&mut self, values: &[Option<Value>], is_selected: impl Fn(&Variable) -> bool) -> Outcome {
+        let variables = &self.model.table.variables;
+        let mut chosen: Vec<bool> = variables
+            .iter()
+            .zip(values)
+            .map(|(variable, value)| value.is_some() && is_selected(variable))
+            .collect();
+        for (first, variable) in variables
+            .iter()
+            .enumerate()
+            .filter(|(_, variable)| variable.element == 0 && variable.length() > 1)
+        {
+            let array = &mut chosen[first..first + variable.length()];
             let any = array.contains(&true);
             array.fill(any);
         }
-        let is_set = |place: &u32| chosen[*place as usize];
+        let is_set = |index: &u32| chosen[*index as usize];
         let mut open: Vec<_> =
-            self.of.groups.iter().filter(|group| group.places.iter().any(&is_set)).collect();
+            self.model.groups.iter().filter(|group| group.indices.iter().any(&is_set)).collect();
         loop {
             let before = open.len();
             let mut rejected = None;
             open.retain(|group| {
-                let places: Vec<u32> = group.places.iter().copied().filter(&is_set).collect();
-                let values: Vec<&Value> = places.iter().flat_map(|place| &values[*place as usize]).collect();
-                let outcome = self.set_values(group.base, &self.references(&places), &values);
+                let indices: Vec<u32> = group.indices.iter().copied().filter(&is_set).collect();
+                let values: Vec<&Value> = indices.iter().flat_map(|index| &values[*index as usize]).collect();
+                let outcome = self.set_values(group.base, &self.references(&indices), &values);
                 let is_rejected = outcome.is_err();
                 rejected = outcome.err().or(rejected.take());
                 is_rejected
@@ -272,47 +246,39 @@ impl<'a> Instance<'a> {
         }
     }
 
-    /// The value references of variables, of arrays of FMI 3.0 the one of the first element.
-    fn references(&self, places: &[u32]) -> Vec<u32> {
-        let has_reference = |place: &&u32| {
+    /// Returns the value references of variables; in FMI 3.0, an array has the reference of its first element.
+    fn references(&self, indices: &[u32]) -> Vec<u32> {
+        let has_reference = |index: &&u32| {
             self.standard == Standard::Fmi2
-                || self.of.table.variable(**place).is_none_or(|of| of.element == 0)
+                || self.model.table.variable(**index).is_none_or(|variable| variable.element == 0)
         };
-        places.iter().filter(has_reference).map(|place| self.standard.reference(*place)).collect()
+        indices.iter().filter(has_reference).map(|index| self.standard.reference(*index)).collect()
     }
 
     fn set_values(&self, base: BaseType, vr: &[u32], values: &[&Value]) -> Outcome {
         let (vr, count) = ((vr.as_ptr(), vr.len()), values.len());
-        macro_rules! set {
-            ($kind:ident as $of:ty, $fmi3:ident) => {{
-                let values: Vec<$of> = values
+        macro_rules! array {
+            ($kind:ident as $type:ty) => {
+                values
                     .iter()
-                    .map(
-                        |value| {
-                            if let Value::$kind(value) = value { *value as $of } else { <$of>::default() }
-                        },
-                    )
-                    .collect();
-                call!(self, $fmi3(vr.0, vr.1, values.as_ptr(), count))
-            }};
+                    .map(|value| match value {
+                        Value::$kind(value) => *value as $type,
+                        _ => <$type>::default(),
+                    })
+                    .collect::<Vec<$type>>()
+                    .as_ptr()
+            };
+        }
+        macro_rules! set {
+            ($kind:ident as $type:ty, $fmi3:ident) => {
+                call!(self, $fmi3(vr.0, vr.1, array!($kind as $type), count))
+            };
             ($kind:ident as $two:ty, $fmi2:ident, $three:ty, $fmi3:ident) => {
-                if self.standard == Standard::Fmi2 {
-                    let values: Vec<$two> =
-                        values
-                            .iter()
-                            .map(|value| {
-                                if let Value::$kind(value) = value {
-                                    *value as $two
-                                } else {
-                                    <$two>::default()
-                                }
-                            })
-                            .collect();
-                    // SAFETY: as in `call!`.
-                    self.outcome(unsafe { (self.of.fmi2.$fmi2)(self.handle, vr.0, vr.1, values.as_ptr()) })
-                } else {
-                    set!($kind as $three, $fmi3)
-                }
+                call!(
+                    self,
+                    $fmi2(vr.0, vr.1, array!($kind as $two)),
+                    $fmi3(vr.0, vr.1, array!($kind as $three), count)
+                )
             };
         }
         match base {
@@ -335,7 +301,7 @@ impl<'a> Instance<'a> {
     }
 
     fn set_strings(&self, vr: (*const u32, usize), values: &[&Value]) -> Outcome {
-        // A NUL is rejected before.
+        // Strings with NUL are rejected before.
         let string = |value: &&Value| CString::new(value.to_string()).unwrap_or_default();
         let strings: Vec<CString> = values.iter().map(string).collect();
         let pointers: Vec<*const c_char> = strings.iter().map(|string| string.as_ptr()).collect();
@@ -352,63 +318,65 @@ impl<'a> Instance<'a> {
     }
 
     /// Sets variables of type Real, arrays as a whole.
-    pub fn set_reals(&mut self, places: &[u32], values: &[f64]) -> Outcome {
+    pub fn set_reals(&mut self, indices: &[u32], values: &[f64]) -> Outcome {
         let values: Vec<Value> = values.iter().copied().map(Value::Real).collect();
-        self.set_values(BaseType::Real, &self.references(places), &values.iter().collect::<Vec<_>>())
+        self.set_values(BaseType::Real, &self.references(indices), &values.iter().collect::<Vec<_>>())
     }
 
-    /// The values of variables of type Real, arrays as a whole; NaN for a value that the model does not return.
-    pub fn reals(&mut self, places: &[u32]) -> Vec<f64> {
-        match self.get_values(BaseType::Real, &self.references(places), places.len()) {
+    /// Returns the values of variables of type Real, arrays as a whole; NaN for a value that the model does not return.
+    pub fn reals(&mut self, indices: &[u32]) -> Vec<f64> {
+        match self.get_values(BaseType::Real, &self.references(indices), indices.len()) {
             Ok(values) => values.iter().map(Value::real).collect(),
             Err(_) => {
                 let all = self.values();
-                places.iter().map(|place| all[*place as usize].real()).collect()
+                indices.iter().map(|index| all[*index as usize].real()).collect()
             }
         }
     }
 
-    /// The values of all variables; NaN for a value that the model does not return.
+    /// Returns the values of all variables; NaN for a value that the model does not return.
     pub fn values(&mut self) -> Vec<Value> {
-        let mut all = vec![Value::Real(f64::NAN); self.of.table.variables.len()];
-        for Group { base, places, first } in &self.of.groups {
-            let of_standard = if self.standard == Standard::Fmi2 { places } else { first };
-            if let Ok(values) = self.get_values(*base, &self.references(of_standard), places.len()) {
-                places.iter().zip(values).for_each(|(place, value)| all[*place as usize] = value);
-                continue;
-            }
-            for place in of_standard {
-                let length = match self.standard {
-                    Standard::Fmi2 => 1,
-                    Standard::Fmi3 => self.of.table.variables[*place as usize].length(),
-                };
-                if let Ok(values) = self.get_values(*base, &self.references(&[*place]), length) {
-                    (*place as usize..).zip(values).for_each(|(place, value)| all[place] = value);
+        let mut all = vec![Value::Real(f64::NAN); self.model.table.variables.len()];
+        for Group { base, indices } in &self.model.groups {
+            let mut read = |indices: &[u32]| {
+                let values = self.get_values(*base, &self.references(indices), indices.len())?;
+                indices.iter().zip(values).for_each(|(index, value)| all[*index as usize] = value);
+                Outcome::Ok(())
+            };
+            if read(indices).is_err() {
+                for index in indices.iter().filter(|index| !self.references(&[**index]).is_empty()) {
+                    let _ = read(&self.array(*index));
                 }
             }
         }
         all
     }
 
+    /// The variables that are read and set together: the elements of an array in FMI 3.0.
+    fn array(&self, index: u32) -> Vec<u32> {
+        match self.standard {
+            Standard::Fmi2 => vec![index],
+            Standard::Fmi3 => self.model.table.array(index),
+        }
+    }
+
     fn get_values(&self, base: BaseType, vr: &[u32], count: usize) -> Outcome<Vec<Value>> {
         let vr = (vr.as_ptr(), vr.len());
-        let truth = |value: &mut Value| *value = Value::Boolean(*value != Value::Integer(0));
+        let to_boolean = |value: &mut Value| *value = Value::Boolean(*value != Value::Integer(0));
         macro_rules! get {
-            ($kind:ident, $of:ty, $fmi3:ident) => {{
-                let mut values = vec![<$of>::default(); count];
-                call!(self, $fmi3(vr.0, vr.1, values.as_mut_ptr(), count))?;
-                values.into_iter().map(|value| Value::$kind(value.into())).collect::<Vec<_>>()
+            ($kind:ident, $type:ty, |$values:ident| $call:expr) => {{
+                let mut array = vec![<$type>::default(); count];
+                let $values = array.as_mut_ptr();
+                $call?;
+                array.into_iter().map(|value| Value::$kind(value.into())).collect::<Vec<_>>()
             }};
+            ($kind:ident, $type:ty, $fmi3:ident) => {
+                get!($kind, $type, |values| call!(self, $fmi3(vr.0, vr.1, values, count)))
+            };
             ($kind:ident, $two:ty, $fmi2:ident, $three:ty, $fmi3:ident) => {
-                if self.standard == Standard::Fmi2 {
-                    let mut values = vec![<$two>::default(); count];
-                    // SAFETY: as in `call!`.
-                    self.outcome(unsafe {
-                        (self.of.fmi2.$fmi2)(self.handle, vr.0, vr.1, values.as_mut_ptr())
-                    })?;
-                    values.into_iter().map(|value| Value::$kind(value.into())).collect()
-                } else {
-                    get!($kind, $three, $fmi3)
+                match self.standard {
+                    Standard::Fmi2 => get!($kind, $two, |values| call!(self, fmi2.$fmi2(vr.0, vr.1, values))),
+                    Standard::Fmi3 => get!($kind, $three, $fmi3),
                 }
             };
         }
@@ -418,11 +386,11 @@ impl<'a> Instance<'a> {
             BaseType::Enumeration => get!(Integer, i32, fmi2GetInteger, i64, fmi3GetInt64),
             BaseType::Boolean => {
                 let mut values = get!(Integer, i32, fmi2GetBoolean, u8, fmi3GetBoolean);
-                values.iter_mut().for_each(truth);
+                values.iter_mut().for_each(to_boolean);
                 values
             }
             BaseType::String => self.get_strings(vr, count)?,
-            // The same everywhere.
+            // Constant, as FMI 2.0 lacks these types.
             _ if self.standard == Standard::Fmi2 => vec![Value::Boolean(false); count],
             BaseType::Binary => self.get_bytes(vr, count)?,
             BaseType::Float32 => get!(Real, f32, fmi3GetFloat32),
@@ -440,9 +408,9 @@ impl<'a> Instance<'a> {
         let mut strings = vec![null::<c_char>(); count];
         let values = strings.as_mut_ptr();
         call!(self, fmi2GetString(vr.0, vr.1, values), fmi3GetString(vr.0, vr.1, values, count))?;
-        // SAFETY: strings, until the next call.
-        let text = |string| unsafe { CStr::from_ptr(string) }.to_string_lossy().into_owned();
-        Ok(strings.into_iter().map(|string| Value::String(text(string))).collect())
+        // SAFETY: the strings exist until the next call.
+        let owned = |string| unsafe { CStr::from_ptr(string) }.to_string_lossy().into_owned();
+        Ok(strings.into_iter().map(|string| Value::String(owned(string))).collect())
     }
 
     fn get_bytes(&self, vr: (*const u32, usize), count: usize) -> Outcome<Vec<Value>> {
@@ -450,28 +418,25 @@ impl<'a> Instance<'a> {
         call!(self, fmi3GetBinary(vr.0, vr.1, sizes.as_mut_ptr(), values.as_mut_ptr(), count))?;
         let bytes = |(value, size): (*const u8, usize)| match size {
             0 => Vec::new(),
-            // SAFETY: so many bytes, until the next call.
+            // SAFETY: the model returned this size; the bytes exist until the next call.
             _ => unsafe { std::slice::from_raw_parts(value, size) }.to_vec(),
         };
         Ok(values.into_iter().zip(sizes).map(|pair| Value::Binary(bytes(pair))).collect())
     }
 
-    /// The partial derivatives of Reals, arrays as a whole, with respect to one Real: `None` where the model has none, NaN
-    /// where it returns no finite number.
+    /// Returns the partial derivatives of Reals, arrays as a whole, with respect to one Real: `None` if the model provides none, NaN
+    /// if it returns no finite number.
     pub fn partials(&mut self, unknowns: &[u32], known: u32) -> Vec<Option<f64>> {
         if let Ok(all) = self.all_partials(unknowns, known) {
             return all.into_iter().map(Some).collect();
         }
         let mut found = Vec::with_capacity(unknowns.len());
-        while let Some(place) = unknowns.get(found.len()) {
-            let array = match self.standard {
-                Standard::Fmi2 => vec![*place],
-                Standard::Fmi3 => self.of.table.array(*place),
-            };
+        while let Some(index) = unknowns.get(found.len()) {
+            let array = self.array(*index);
             match self.all_partials(&array, known) {
                 Ok(all) => found.extend(all.into_iter().map(Some)),
                 Err(message) => {
-                    // Without a message in FMI 2.0.
+                    // FMI 2.0 gives no message.
                     let has_none = message.is_empty() || message.ends_with("is not provided");
                     found.extend(array.iter().map(|_| (!has_none).then_some(f64::NAN)));
                 }
@@ -480,10 +445,10 @@ impl<'a> Instance<'a> {
         found
     }
 
-    /// The unknowns have all elements of their arrays.
+    /// Returns the partial derivatives of unknowns, which have all elements of their arrays.
     fn all_partials(&self, unknowns: &[u32], known: u32) -> Outcome<Vec<f64>> {
-        let (length, element) = match self.of.table.variable(known) {
-            Some(of) if self.standard == Standard::Fmi3 => (of.length(), of.element),
+        let (length, element) = match self.model.table.variable(known) {
+            Some(variable) if self.standard == Standard::Fmi3 => (variable.length(), variable.element),
             _ => (1, 0),
         };
         let mut seed = vec![0.0; length];
@@ -510,7 +475,7 @@ impl<'a> Instance<'a> {
     }
 
     pub fn states(&mut self) -> Outcome<Vec<f64>> {
-        let mut states = vec![0.0; self.of.table.states.len()];
+        let mut states = vec![0.0; self.model.table.states.len()];
         call!(self, fmi3GetContinuousStates(states.as_mut_ptr(), states.len()))?;
         Ok(states)
     }
@@ -520,15 +485,15 @@ impl<'a> Instance<'a> {
     }
 
     pub fn derivatives(&mut self) -> Outcome<Vec<f64>> {
-        let mut derivatives = vec![0.0; self.of.table.states.len()];
+        let mut derivatives = vec![0.0; self.model.table.states.len()];
         call!(self, fmi3GetContinuousStateDerivatives(derivatives.as_mut_ptr(), derivatives.len()))?;
         Ok(derivatives)
     }
 
-    /// The event indicators, and the nominal values of the states.
+    /// Returns the event indicators, and the nominal values of the states.
     pub fn indicators_and_nominals(&mut self) -> Vec<f64> {
-        let mut indicators = vec![0.0; self.of.table.indicators()];
-        let mut nominals = vec![1.0; self.of.table.states.len()];
+        let mut indicators = vec![0.0; self.model.table.indicators()];
+        let mut nominals = vec![1.0; self.model.table.states.len()];
         if call!(self, fmi3GetEventIndicators(indicators.as_mut_ptr(), indicators.len())).is_err() {
             indicators.fill(f64::NAN);
         }
@@ -541,59 +506,59 @@ impl<'a> Instance<'a> {
     pub fn save(&mut self) -> Outcome<Saved> {
         let mut state = null_mut();
         call!(self, fmi2GetFMUstate, fmi3GetFMUState(&raw mut state))?;
-        Ok(Saved(state))
+        Ok(Saved { state, time: self.time })
     }
 
-    pub fn restore(&mut self, saved: Saved, time: f64) -> Outcome {
-        call!(self, fmi2SetFMUstate, fmi3SetFMUState(saved.0))?;
-        self.time = time;
+    pub fn restore(&mut self, saved: Saved) -> Outcome {
+        call!(self, fmi2SetFMUstate, fmi3SetFMUState(saved.state))?;
+        self.time = saved.time;
         Ok(())
     }
 
-    /// A saved state as bytes.
+    /// Returns a saved state as bytes.
     pub fn serialize(&mut self, saved: Saved) -> Outcome<Vec<u8>> {
         let mut size = 0;
-        call!(self, fmi2SerializedFMUstateSize, fmi3SerializedFMUStateSize(saved.0, &raw mut size))?;
+        call!(self, fmi2SerializedFMUstateSize, fmi3SerializedFMUStateSize(saved.state, &raw mut size))?;
         let mut bytes = vec![0_u8; size];
         let start = bytes.as_mut_ptr();
         call!(
             self,
-            fmi2SerializeFMUstate(saved.0, start.cast(), size),
-            fmi3SerializeFMUState(saved.0, start, size)
+            fmi2SerializeFMUstate(saved.state, start.cast(), size),
+            fmi3SerializeFMUState(saved.state, start, size)
         )?;
         Ok(bytes)
     }
 
-    /// Goes to the state that these bytes hold.
-    pub fn read(&mut self, bytes: &[u8], time: f64) -> Outcome {
+    /// Restores a state from bytes.
+    pub fn deserialize(&mut self, bytes: &[u8], time: f64) -> Outcome {
         let (mut state, start, size) = (null_mut(), bytes.as_ptr(), bytes.len());
         call!(
             self,
             fmi2DeSerializeFMUstate(start.cast(), size, &raw mut state),
             fmi3DeserializeFMUState(start, size, &raw mut state)
         )?;
-        self.restore(Saved(state), time)
+        self.restore(Saved { state, time })
     }
 }
 
 impl Drop for Instance<'_> {
     fn drop(&mut self) {
-        // SAFETY: the instance is living, and nobody else has it.
+        // SAFETY: the instance exists, and this is its last use.
         unsafe {
             match self.standard {
-                Standard::Fmi2 => (self.of.fmi2.fmi2FreeInstance)(self.handle),
-                Standard::Fmi3 => (self.of.fmi3.fmi3FreeInstance)(self.handle),
+                Standard::Fmi2 => (self.model.fmi2.fmi2FreeInstance)(self.handle),
+                Standard::Fmi3 => (self.model.fmi3.fmi3FreeInstance)(self.handle),
             }
         }
     }
 }
 
-/// Keeps a message of an instance without the name of the function that rejects a call.
+/// Stores a message of an instance, without the name of the function that rejects a call.
 ///
 /// # Safety
 /// The environment is the message of an instance; the text is a string.
 unsafe extern "C" fn remember(environment: *mut c_void, _: c_int, _: *const c_char, text: *const c_char) {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees it.
     let (message, text) = unsafe { (&*environment.cast::<RefCell<String>>(), CStr::from_ptr(text)) };
     let text = text.to_string_lossy();
     let (function, rest) = text.split_once(": ").unwrap_or_default();

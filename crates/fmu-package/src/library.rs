@@ -1,11 +1,11 @@
-//! What a compiled library runs on, as its headers say.
+//! The platforms of a compiled library, which its headers name.
 
 use crate::platform::Platform;
 use anyhow::{Context, Result, bail, ensure};
 use object::read::macho::{FatArch, MachOFatFile32};
 use object::{Architecture, BinaryFormat, File, FileKind, Object, ObjectKind, ObjectSection};
 
-/// The platforms that a library is for: one, or several if it is a universal library of macOS.
+/// The platforms of a library: one, or several if it is a universal library of macOS.
 fn platforms(library: &[u8]) -> Result<Vec<Platform>> {
     const NONE: &str = "it is no shared library";
     match FileKind::parse(library).context(NONE)? {
@@ -32,7 +32,7 @@ fn platform(architecture: Architecture, format: BinaryFormat) -> Result<Platform
         Architecture::X86_64 => "x86_64",
         Architecture::I386 => "x86",
         Architecture::Aarch64 => "aarch64",
-        other => bail!("it is for the processor {other:?}, for which FMI 2.0 has no folder"),
+        other => bail!("it is for the processor {other:?}, for which FMI 2.0 has no directory"),
     };
     let system = match format {
         BinaryFormat::Elf => "linux",
@@ -43,22 +43,21 @@ fn platform(architecture: Architecture, format: BinaryFormat) -> Result<Platform
     Platform::of(architecture, system)
 }
 
-/// Fails unless a library runs on the platform; with `any_processor`, on its system is enough.
+/// Checks that a library runs on the platform; with `any_processor`, on the operating system of the platform.
 pub fn check_platform(library: &[u8], wanted: Platform, any_processor: bool) -> Result<()> {
     let found = platforms(library)?;
     let names = || found.iter().map(Platform::to_string).collect::<Vec<_>>().join(" and ");
-    let on_the_system = found.iter().any(|platform| platform.same_system(wanted));
-    ensure!(on_the_system, "it is for {}, not for {wanted}", names());
+    let on_system = found.iter().any(|platform| platform.same_system(wanted));
+    ensure!(on_system, "it is for {}, not for {wanted}", names());
     ensure!(
         any_processor || found.contains(&wanted),
-        "it is for {}, not for {wanted}; if that is meant, for importers that look there on any processor, \
-         add --any-processor",
+        "it is for {}, not for {wanted}; if importers on any processor are to load it from there, add --any-processor",
         names()
     );
     Ok(())
 }
 
-/// The newest version of glibc that a library for Linux needs, if it needs any.
+/// Returns the newest version of glibc that a library for Linux needs, if it needs any.
 pub fn needed_glibc(library: &[u8]) -> Option<(u32, u32)> {
     let file = File::parse(library).ok().filter(|file| file.format() == BinaryFormat::Elf)?;
     let strings = file.section_by_name(".dynstr")?.data().ok()?;
@@ -74,17 +73,17 @@ mod tests {
     use super::{check_platform, needed_glibc};
     use crate::platform::Platform;
 
-    /// A universal library of macOS with nothing in its parts.
+    /// A universal library of macOS with empty parts.
     fn universal(processors: &[u32]) -> Vec<u8> {
-        let mut words = vec![0xcafe_babe, processors.len() as u32];
+        let mut numbers = vec![0xcafe_babe, processors.len() as u32];
         for &processor in processors {
-            words.extend([processor, 0, 0x1000, 0, 12]);
+            numbers.extend([processor, 0, 0x1000, 0, 12]);
         }
-        words.iter().flat_map(|word: &u32| word.to_be_bytes()).collect()
+        numbers.iter().flat_map(|number: &u32| number.to_be_bytes()).collect()
     }
 
-    fn check(library: &[u8], folder: &str, any_processor: bool) -> Result<(), String> {
-        let wanted = Platform::of_folder(folder).unwrap();
+    fn check(library: &[u8], directory: &str, any_processor: bool) -> Result<(), String> {
+        let wanted = Platform::of_directory(directory).unwrap();
         check_platform(library, wanted, any_processor).map_err(|error| error.to_string())
     }
 
@@ -105,8 +104,8 @@ mod tests {
     fn a_program_is_for_its_machine_only() {
         let program = std::fs::read(std::env::current_exe().unwrap()).unwrap();
         let host = Platform::host().unwrap().to_string();
-        for folder in ["linux64", "win64", "darwin64"].into_iter().filter(|folder| *folder != host) {
-            assert!(check(&program, folder, false).is_err(), "{folder}");
+        for directory in ["linux64", "win64", "darwin64"].into_iter().filter(|name| *name != host) {
+            assert!(check(&program, directory, false).is_err(), "{directory}");
         }
     }
 
@@ -114,13 +113,13 @@ mod tests {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     fn the_glibc_of_a_program_is_found() {
         let program = std::fs::read(std::env::current_exe().unwrap()).unwrap();
-        // Rust itself asks for 2.17.
+        // The standard library of Rust needs 2.17.
         assert!(needed_glibc(&program).is_some_and(|version| version >= (2, 17)));
         assert_eq!(needed_glibc(b"GLIBC_2.34"), None);
     }
 
     #[test]
-    fn what_is_no_library_is_refused() {
+    fn other_files_are_rejected() {
         for bytes in [&b""[..], b"\x7fELF", b"MZ", b"<html>", &[0xca, 0xfe, 0xba, 0xbe, 0, 0, 0, 9]] {
             let error = check(bytes, "linux64", false).unwrap_err();
             assert_eq!(error, "it is no shared library", "{bytes:?}");

@@ -1,5 +1,4 @@
-//! The page that runs the FMU: `documentation/index.html` with the library as WebAssembly in it, and the scripts in the folder
-//! `page`.
+//! The page that runs the FMU: `documentation/index.html` with the library as WebAssembly, and the scripts in the directory `page`.
 
 use crate::content::ContentFile;
 use anyhow::{Context, Result};
@@ -13,12 +12,12 @@ use std::fs;
 use std::io::Write as _;
 use tempfile::TempDir;
 
-/// The page's place in an FMU.
+/// Name of the page in an FMU.
 const PAGE: &str = "documentation/index.html";
 
-/// The page where a model has none.
+/// The page of a model without page.
 const PLAIN: &str = include_str!("../page/page.html");
-/// Stands where the scripts put the section that runs the FMU.
+/// Replaced by the scripts with the section that runs the FMU.
 const WITHOUT_SCRIPTS: &str = "<noscript><p class=\"note\">With scripts, this page runs the FMU here. All else on it is complete.</p></noscript>";
 const BEGIN: &str = include_str!("../page/begin.js");
 const STYLE: &str = include_str!("../page/live.css");
@@ -35,15 +34,15 @@ const SCRIPTS: [&str; 7] = [
 /// Largest sum of the sizes of the resources that a page contains, bytes.
 const MOST_OF_RESOURCES: u64 = 4 << 20;
 
-/// What a browser needs to run an FMU.
+/// The parts of an FMU that a browser runs.
 pub(crate) struct Runnable {
-    /// The text of `modelDescription.xml` of FMI 2.0.
+    /// The content of `modelDescription.xml` of FMI 2.0.
     pub description: String,
     /// The library, as a WebAssembly module.
     pub module: Vec<u8>,
 }
 
-/// The content with the page that runs the FMU, which is in the folder as long as that is there.
+/// Returns the content with the page that runs the FMU, and the temporary directory of the page.
 pub(crate) fn with_page(
     content: &[ContentFile],
     (title, about): (&str, &str),
@@ -57,13 +56,13 @@ pub(crate) fn with_page(
         }
         None => PLAIN.replace("{{ title }}", &escape(title)).replace("{{ description }}", &escape(about)),
     };
-    let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
-    let path = folder.path().join("index.html");
+    let directory = tempfile::tempdir().context("cannot make a temporary directory")?;
+    let path = directory.path().join("index.html");
     let script = script(runnables, &Resources::of(content)?, scripts)?;
     fs::write(&path, live(&page, &script)?).context("cannot write the page")?;
     let mut content: Vec<_> = content.iter().filter(|file| file.name != PAGE).cloned().collect();
     content.push(ContentFile { name: PAGE.to_owned(), path });
-    Ok((folder, content))
+    Ok((directory, content))
 }
 
 /// The files in the FMU's directory `resources`.
@@ -76,7 +75,7 @@ struct Resources {
 }
 
 impl Resources {
-    /// Reads the files, the smallest first, as long as there is room for them.
+    /// Reads the files, the smallest first, until the page is full.
     fn of(content: &[ContentFile]) -> Result<Self> {
         let mut files = Vec::new();
         for file in content {
@@ -102,7 +101,7 @@ impl Resources {
     }
 }
 
-/// The script that runs the FMU, and those that the model's scripts run beside it.
+/// Returns the script that runs the FMU, and the FMUs that the model's scripts run next to it.
 fn script(runnables: &[Runnable], resources: &Resources, scripts: &[&str]) -> Result<String> {
     let mut text = "(() => {\n\"use strict\";\n".to_owned();
     for script in SCRIPTS.iter().chain(scripts) {
@@ -119,26 +118,26 @@ fn script(runnables: &[Runnable], resources: &Resources, scripts: &[&str]) -> Re
     Ok(text.replace("\r\n", "\n"))
 }
 
-/// The page with a script, which runs compressed.
+/// Adds a script to the page, in compressed form.
 fn live(page: &str, script: &str) -> Result<String> {
     let packed = base64(&deflated(script.as_bytes())?);
     let text = format!(
         "<style>\n{STYLE}</style>\n<script>\n{BEGIN}begin(\"{packed}\").catch(showFailure);\n</script>\n"
     );
-    // At the end, when the elements exist that the scripts change.
+    // At the end, where the elements exist that the scripts change.
     let end = page.rfind("</body>").unwrap_or(page.len());
     let begin = ["<main>", "<body>"].iter().find_map(|tag| Some(page.find(tag)? + tag.len())).unwrap_or(end);
     let (head, content, tail) = (&page[..begin], &page[begin..end], &page[end..]);
     Ok(with_policy(&format!("{head}{WITHOUT_SCRIPTS}{content}{text}{tail}"), script))
 }
 
-/// The page with a Content-Security-Policy: the scripts and the style sheets of the page run, by their hashes, and so does the
-/// script that is compressed. Nothing is loaded but images from beside the page.
+/// Adds a Content-Security-Policy to the page. It allows the scripts and style sheets of the page and the compressed script, by their
+/// hashes. Only images next to the page are loaded.
 fn with_policy(page: &str, compressed: &str) -> String {
     let hashes = |tag: &str, others: &[&str]| {
         let elements = elements(page, tag);
         let contents = elements.iter().chain(others);
-        // Browsers read line ends so.
+        // Browsers normalize line ends.
         let hash = |content: &str| base64(&Sha256::digest(content.replace("\r\n", "\n")));
         contents.map(|content| format!(" 'sha256-{}'", hash(content))).collect::<String>()
     };
@@ -148,18 +147,18 @@ fn with_policy(page: &str, compressed: &str) -> String {
         hashes("script", &[compressed]),
         hashes("style", &[]),
     );
-    let place = ["<meta charset=\"utf-8\">\n", "<head>\n", "<head>"].iter();
-    let place = place.filter_map(|tag| Some(page.find(tag)? + tag.len())).next().unwrap_or(0);
-    format!("{}{policy}{}", &page[..place], &page[place..])
+    let position = ["<meta charset=\"utf-8\">\n", "<head>\n", "<head>"].iter();
+    let position = position.filter_map(|tag| Some(page.find(tag)? + tag.len())).next().unwrap_or(0);
+    format!("{}{policy}{}", &page[..position], &page[position..])
 }
 
-/// The contents of all elements of this name.
+/// Returns the contents of all elements of this name.
 fn elements<'a>(page: &'a str, tag: &str) -> Vec<&'a str> {
     let (begin, end) = (format!("<{tag}"), format!("</{tag}>"));
     let mut found = Vec::new();
     let mut rest = page;
-    while let Some(place) = rest.find(&begin) {
-        let after = &rest[place + begin.len()..];
+    while let Some(position) = rest.find(&begin) {
+        let after = &rest[position + begin.len()..];
         let is_tag = after.starts_with(|c: char| c == '>' || c.is_ascii_whitespace());
         let content = after.find('>').map(|open| &after[open + 1..]).filter(|_| is_tag);
         let Some((content, length)) = content.and_then(|text| Some((text, text.find(&end)?))) else {
@@ -172,23 +171,23 @@ fn elements<'a>(page: &'a str, tag: &str) -> Vec<&'a str> {
     found
 }
 
-/// Compressed, as browsers call `deflate-raw`.
+/// Compresses bytes in the format that browsers call `deflate-raw`.
 fn deflated(bytes: &[u8]) -> Result<Vec<u8>> {
     let mut encoder = DeflateEncoder::new(Vec::new(), Compression::best());
     encoder.write_all(bytes)?;
     Ok(encoder.finish()?)
 }
 
-/// The bytes in base 64 (RFC 4648, section 4).
+/// Encodes bytes in base 64 (RFC 4648, section 4).
 fn base64(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for chunk in bytes.chunks(3) {
         let word =
-            (0..3).fold(0, |word, place| word << 8 | u32::from(chunk.get(place).copied().unwrap_or(0)));
-        for place in 0..4 {
-            let digit = DIGITS[(word >> (18 - 6 * place) & 63) as usize];
-            text.push(if place <= chunk.len() { char::from(digit) } else { '=' });
+            (0..3).fold(0, |word, index| word << 8 | u32::from(chunk.get(index).copied().unwrap_or(0)));
+        for index in 0..4 {
+            let digit = DIGITS[(word >> (18 - 6 * index) & 63) as usize];
+            text.push(if index <= chunk.len() { char::from(digit) } else { '=' });
         }
     }
     text
@@ -223,8 +222,8 @@ mod tests {
             missing: vec!["b".to_owned()],
         };
         let script = script(&[runnable(), runnable()], &resources, &["const ownScript = 1;\n"]).unwrap();
-        let places = ["async function live(", "const ownScript", "live([\n{ description: \""];
-        assert!(places.map(|part| script.find(part).unwrap()).is_sorted());
+        let parts = ["async function live(", "const ownScript", "live([\n{ description: \""];
+        assert!(parts.map(|part| script.find(part).unwrap()).is_sorted());
         assert_eq!(script.matches("\n{ description: \"").count(), 2);
         assert!(script.contains("\n], ...[{\"a.csv\":\"AA\"},[\"b\"]]).catch("));
 
@@ -253,7 +252,7 @@ mod tests {
         ));
         // printf a | openssl dgst -sha256 -binary | base64
         assert!(page.contains("style-src-elem 'sha256-ypeBEsobvcr6wjGzmiPcTaeG7/gUfE5yuYB3ha/uSLs=' "));
-        // The same of nothing.
+        // The hash of an empty script.
         assert!(page.contains(
             "script-src 'wasm-unsafe-eval' 'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU=' \
              'sha256-ypeBEsobvcr6wjGzmiPcTaeG7/gUfE5yuYB3ha/uSLs=';"
@@ -262,9 +261,9 @@ mod tests {
 
     #[test]
     fn the_page_contains_the_resources_that_are_small() {
-        let folder = tempfile::tempdir().unwrap();
+        let directory = tempfile::tempdir().unwrap();
         let file = |name: &str, size: u64| {
-            let path = folder.path().join(name.replace('/', "-"));
+            let path = directory.path().join(name.replace('/', "-"));
             fs::File::create(&path).unwrap().set_len(size).unwrap();
             ContentFile { name: name.to_owned(), path }
         };
@@ -280,7 +279,7 @@ mod tests {
 
     #[test]
     fn a_model_without_a_page_gets_one() {
-        let (_folder, content) = with_page(&[], ("A & B", "Two <models>"), &[], &[]).unwrap();
+        let (_directory, content) = with_page(&[], ("A & B", "Two <models>"), &[], &[]).unwrap();
         let page = fs::read_to_string(&content[0].path).unwrap();
         assert_eq!(content[0].name, PAGE);
         assert!(page.contains("<h1>A &amp; B</h1>\n<p>Two &lt;models&gt;</p>") && page.contains("<script>"));

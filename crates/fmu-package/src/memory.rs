@@ -1,36 +1,37 @@
-//! Whether a saved state holds all that a model remembers.
+//! Checks that saved states are complete.
 //!
-//! The compiler cannot see that a field is missing in the `memory` of `variables!` of fmu-export: saved states
-//! would silently lack it. So the model is simulated, now and then read into another instance from what is saved of it,
-//! and both go on with the same inputs.
+//! The compiler cannot detect that a field is missing in the `memory` of `variables!` of fmu-export: saved states would silently
+//! lack it. So the model is simulated, some of its saved states are read into another instance, and both go on with the same
+//! inputs.
 
 use crate::check::Starts;
 use crate::instance::{Instance, Outcome, Saved};
 use crate::model::LoadedModel;
-use crate::sample::draw_value;
+use crate::sample::{draw_value, is_finite};
+use crate::table::Variable;
 use anyhow::{Result, bail};
-use fmi_abi::{Causality, Interface, Standard, Value, Variability};
+use fmi_abi::{BaseType, Causality, Interface, Standard, Value, Variability};
 
-/// The steps, counted from 0, before which states are saved, and how many of them follow each.
+/// The steps, counted from 0, before which states are saved, and the number of steps that follow each of them.
 const SAVED_BEFORE: [usize; 5] = [0, 1, 2, 5, 12];
 const FOLLOWED: usize = 8;
-/// Steps of the default size, and as many that reach the end of the default experiment.
+/// Number of steps: a simulation has the default step size, another one reaches the end of the default experiment.
 const STEPS: usize = SAVED_BEFORE[SAVED_BEFORE.len() - 1] + FOLLOWED;
-/// Of the largest value of a variable: less may be rounding, if the model calculates in another way where it has just been
-/// read.
+/// Tolerance relative to the largest value of a variable. A smaller difference may be rounding, if the model calculates in another
+/// way after it was read.
 const TOLERANCE: f64 = 1e-6;
 
-/// Refuses a model of whose state something is missing when it is saved.
+/// Rejects a model whose saved states are incomplete.
 pub(crate) fn check(model: &LoadedModel, starts: &Starts) -> Result<()> {
     let table = &model.table;
-    let of = &table.info;
+    let info = &table.info;
     let variable = table.co_simulation.as_ref().is_none_or(|offer| offer.variable_step_size);
-    let whole = (of.stop_time - of.start_time) / STEPS as f64;
-    let sizes = [Some(of.step_size), Some(whole).filter(|size| *size > of.step_size && variable)];
+    let size_to_end = (info.stop_time - info.start_time) / STEPS as f64;
+    let sizes = [Some(info.step_size), Some(size_to_end).filter(|size| *size > info.step_size && variable)];
     let inputs = inputs(model, starts);
-    // None of these is what a new instance has.
-    let start_time = of.start_time + of.step_size;
-    let stop_time = start_time + f64::max(whole, of.step_size) * STEPS as f64;
+    // Both differ from the times of a new instance.
+    let start_time = info.start_time + info.step_size;
+    let stop_time = start_time + f64::max(size_to_end, info.step_size) * STEPS as f64;
     for interface in table.interfaces() {
         let with_rates = table.input_derivatives && interface == Interface::CoSimulation;
         for size in sizes.into_iter().flatten() {
@@ -43,7 +44,8 @@ pub(crate) fn check(model: &LoadedModel, starts: &Starts) -> Result<()> {
     Ok(())
 }
 
-/// What is set before each step: values near the start values, always the same ones; in the end they stand still. By place.
+/// The values that are set before each step, by index. They are near the start values, the same in every run, and constant after
+/// the first steps.
 type Inputs = Vec<Starts>;
 
 fn inputs(model: &LoadedModel, starts: &Starts) -> Inputs {
@@ -52,10 +54,12 @@ fn inputs(model: &LoadedModel, starts: &Starts) -> Inputs {
     let mut now = starts.clone();
     let mut draw = || {
         let mut drawn = vec![None; variables.len()];
-        for (place, of) in variables.iter().enumerate().filter(|(_, of)| of.causality == Causality::Input) {
-            let Some(start) = &starts[place] else { continue };
-            drawn[place] = draw_value(&mut random, &of.of, start, now[place].as_ref(), 1.0);
-            now[place] = drawn[place].clone().or(now[place].take());
+        for (index, variable) in
+            variables.iter().enumerate().filter(|(_, variable)| variable.causality == Causality::Input)
+        {
+            let Some(start) = &starts[index] else { continue };
+            drawn[index] = draw_value(&mut random, &variable.variable_type, start, now[index].as_ref(), 1.0);
+            now[index] = drawn[index].clone().or(now[index].take());
         }
         drawn
     };
@@ -64,8 +68,7 @@ fn inputs(model: &LoadedModel, starts: &Starts) -> Inputs {
     all
 }
 
-/// What can be read at a point: all variables, then for importers that integrate the event indicators and the nominal values
-/// of the states.
+/// The values of all variables; in Model Exchange, then the event indicators and the nominal values of the states.
 type Values = Vec<Value>;
 
 fn values(instance: &mut Instance) -> Values {
@@ -86,44 +89,47 @@ struct Rehearsal<'a> {
     /// Whether steps may have any size.
     variable: bool,
     inputs: &'a Inputs,
-    /// Whether the importer knows time derivatives of inputs.
+    /// Whether the importer sets time derivatives of inputs.
     rates: bool,
 }
 
-/// The state before a step, and what was read there.
+/// The state before a step, and the values that were read there.
 struct Point {
     step: usize,
-    time: f64,
-    state: Saved,
+    saved: Saved,
     values: Values,
 }
 
 impl<'a> Rehearsal<'a> {
     fn run(&self) -> Result<()> {
-        // What the model refuses, it is not judged by.
+        // A model is not judged by the calls that it rejects.
         let Ok(mut trial) = self.initialized() else { return Ok(()) };
-        let mut saved: Vec<Point> = Vec::new();
+        let mut points: Vec<Point> = Vec::new();
         let mut path: Vec<Values> = Vec::new();
         for step in 0..STEPS {
             let _ = self.set(&mut trial, step);
             if SAVED_BEFORE.contains(&step)
-                && let Ok(state) = trial.save()
+                && let Ok(saved) = trial.save()
             {
-                saved.push(Point { step, time: trial.time, state, values: values(&mut trial) });
+                points.push(Point { step, saved, values: values(&mut trial) });
             }
             let Some(values) = self.step(&mut trial, step) else { break };
             path.push(values);
         }
         let mut scales = vec![0.0; values(&mut trial).len()];
-        for (scale, value) in saved.iter().map(|point| &point.values).chain(&path).flat_map(scales_of) {
-            scales[scale] = f64::max(scales[scale], value);
+        for values in points.iter().map(|point| &point.values).chain(&path) {
+            for (scale, value) in scales.iter_mut().zip(values) {
+                if let Value::Real(value) = value {
+                    *scale = f64::max(*scale, value.abs());
+                }
+            }
         }
-        for point in &saved {
-            let Ok(bytes) = trial.serialize(point.state) else { continue };
+        for point in &points {
+            let Ok(bytes) = trial.serialize(point.saved) else { continue };
             let Ok(mut other) = self.instance() else { continue };
-            let consequence = match other.read(&bytes, point.time) {
+            let consequence = match other.deserialize(&bytes, point.saved.time) {
                 Ok(()) => self.difference(point, &mut trial, &mut other, &path, &scales),
-                Err(message) => Some(format!("it is refused: {message}")),
+                Err(message) => Some(format!("it is rejected: {message}")),
             };
             if let Some(consequence) = consequence {
                 bail!(
@@ -140,13 +146,13 @@ impl<'a> Rehearsal<'a> {
         Ok(())
     }
 
-    /// FMI 3.0 has no derivatives of inputs.
+    /// Makes an instance: of FMI 2.0 if it gets derivatives of inputs, which FMI 3.0 lacks.
     fn instance(&self) -> Outcome<Instance<'a>> {
         let standard = if self.rates { Standard::Fmi2 } else { Standard::Fmi3 };
         Instance::new(self.model, self.interface, standard, false)
     }
 
-    /// As an importer has it before the first step.
+    /// An instance before the first step.
     fn initialized(&self) -> Outcome<Instance<'a>> {
         let mut instance = self.instance()?;
         let [start, stop] = self.times;
@@ -155,11 +161,11 @@ impl<'a> Rehearsal<'a> {
         Ok(instance)
     }
 
-    /// What a value is of.
-    fn name(&self, place: usize) -> String {
+    /// The name of a value.
+    fn name(&self, number: usize) -> String {
         let table = &self.model.table;
-        match place.checked_sub(table.variables.len()) {
-            None => table.variables[place].name.clone(),
+        match number.checked_sub(table.variables.len()) {
+            None => table.variables[number].name.clone(),
             Some(number) if number < table.indicators() => format!("event indicator {number}"),
             Some(number) => {
                 let (state, _) = table.states[number - table.indicators()];
@@ -168,10 +174,10 @@ impl<'a> Rehearsal<'a> {
         }
     }
 
-    /// How another instance goes on otherwise than the one whose state it has read.
+    /// Returns how another instance differs from the one whose state it has read.
     fn difference(
         &self,
-        from: &Point,
+        point: &Point,
         own: &mut Instance,
         other: &mut Instance,
         path: &[Values],
@@ -180,40 +186,40 @@ impl<'a> Rehearsal<'a> {
         let read = other.save().ok()?;
         // Importers set the inputs of the next step before they save, or after they have read.
         [false, true].into_iter().find_map(|again| {
-            other.restore(read, from.time).ok()?;
-            let (steps, places) = self.first_difference(other, from, again, path, scales)?;
-            own.restore(from.state, from.time).ok()?;
-            // A model that plays dice differs from itself as well.
-            if self.first_difference(own, from, again, path, scales).is_some() {
+            other.restore(read).ok()?;
+            let (steps, numbers) = self.first_difference(other, point, again, path, scales)?;
+            own.restore(point.saved).ok()?;
+            // A random model differs from itself as well.
+            if self.first_difference(own, point, again, path, scales).is_some() {
                 return None;
             }
-            let names: Vec<_> = places.into_iter().map(|place| self.name(place)).collect();
+            let names: Vec<_> = numbers.into_iter().map(|number| self.name(number)).collect();
             let when = if steps == 0 { "at once".to_owned() } else { format!("after {steps} more") };
             Some(format!("there are other values {when}: {}", names.join(", ")))
         })
     }
 
-    /// After how many steps values are first others than on the path, and their places.
+    /// Returns the number of steps after which values first differ from the path, and the numbers of these values.
     fn first_difference(
         &self,
         trial: &mut Instance,
-        from: &Point,
+        point: &Point,
         again: bool,
         path: &[Values],
         scales: &[f64],
     ) -> Option<(usize, Vec<usize>)> {
-        let path = path.iter().skip(from.step).take(FOLLOWED);
-        for (steps, expected) in std::iter::once(&from.values).chain(path).enumerate() {
+        let path = path.iter().skip(point.step).take(FOLLOWED);
+        for (steps, expected) in std::iter::once(&point.values).chain(path).enumerate() {
             if steps > usize::from(!again) {
-                let _ = self.set(trial, from.step + steps - 1);
+                let _ = self.set(trial, point.step + steps - 1);
             }
             if steps > 0 {
-                self.step(trial, from.step + steps - 1);
+                self.step(trial, point.step + steps - 1);
             }
             let found = values(trial);
             let pairs = expected.iter().zip(&found).zip(scales).enumerate();
             let different = pairs.filter(|(_, ((expected, found), scale))| differ(expected, found, **scale));
-            let different: Vec<_> = different.map(|(place, _)| place).collect();
+            let different: Vec<_> = different.map(|(number, _)| number).collect();
             if !different.is_empty() {
                 return Some((steps, different));
             }
@@ -221,7 +227,7 @@ impl<'a> Rehearsal<'a> {
         None
     }
 
-    /// What an importer sets before a step; what the model refuses, stays as it was. In Model Exchange it is an event.
+    /// Sets the inputs before a step, in Model Exchange at an event. Inputs that the model rejects keep their values.
     fn set(&self, trial: &mut Instance, step: usize) -> Outcome {
         let inputs = &self.inputs[step];
         if self.interface == Interface::ModelExchange {
@@ -229,17 +235,19 @@ impl<'a> Rehearsal<'a> {
         }
         trial.set(inputs, |_| true)?;
         let variables = &self.model.table.variables;
-        let rate = |(place, of): (u32, &crate::table::Variable)| match inputs[place as usize] {
-            Some(Value::Real(value)) if of.variability == Variability::Continuous => Some((place, value)),
+        let rate = |(index, variable): (u32, &Variable)| match inputs[index as usize] {
+            Some(Value::Real(value)) if variable.variability == Variability::Continuous => {
+                Some((index, value))
+            }
             _ => None,
         };
-        let is_real = |of: &crate::table::Variable| of.base() == fmi_abi::BaseType::Real;
-        let rates = (0..).zip(variables).filter(|(_, of)| self.rates && is_real(of)).filter_map(rate);
-        let (places, rates): (Vec<u32>, Vec<f64>) = rates.unzip();
-        trial.set_input_derivatives(&places, &rates)
+        let is_set = |variable: &Variable| self.rates && variable.base() == BaseType::Real;
+        let rates = (0..).zip(variables).filter(|(_, variable)| is_set(variable)).filter_map(rate);
+        let (indices, rates): (Vec<u32>, Vec<f64>) = rates.unzip();
+        trial.set_input_derivatives(&indices, &rates)
     }
 
-    /// The values after a step; `None` if the model refuses it, or ends the simulation.
+    /// Returns the values after a step; `None` if the model rejects the step, or ends the simulation.
     fn step(&self, trial: &mut Instance, step: usize) -> Option<Values> {
         let size = if self.variable && step % 3 == 1 { 0.5 * self.size } else { self.size };
         let goes_on = match self.interface {
@@ -250,12 +258,11 @@ impl<'a> Rehearsal<'a> {
             return None;
         }
         let values = values(trial);
-        let is_finite = |value: &Value| !matches!(value, Value::Real(value) if !value.is_finite());
         values.iter().all(is_finite).then_some(values)
     }
 }
 
-/// A step by Euler's rule with an event at its begin.
+/// Makes a step by Euler's rule, with an event at its begin.
 fn integrate(trial: &mut Instance, size: f64) -> Outcome<bool> {
     trial.enter_event_mode()?;
     trial.handle_event()?;
@@ -265,14 +272,6 @@ fn integrate(trial: &mut Instance, size: f64) -> Outcome<bool> {
     trial.set_states(&states)?;
     trial.step_completed()?;
     Ok(true)
-}
-
-/// The sizes of the Reals among values, with their places.
-fn scales_of(values: &Values) -> impl Iterator<Item = (usize, f64)> {
-    values.iter().enumerate().filter_map(|(place, value)| match value {
-        Value::Real(value) => Some((place, value.abs())),
-        _ => None,
-    })
 }
 
 fn differ(expected: &Value, found: &Value, scale: f64) -> bool {

@@ -1,4 +1,4 @@
-//! A model with its functions: of a shared library, or of this program.
+//! A model with its functions, which are in a shared library or in this program.
 #![allow(unsafe_code, reason = "C functions of a library are found by their names")]
 
 use crate::table::Table;
@@ -10,7 +10,7 @@ use std::path::Path;
 use std::ptr::null;
 use std::sync::OnceLock;
 
-/// The function of a library that describes its model, as `fmu-export` declares it.
+/// The function of a library that describes its model; `fmu-export` declares it.
 const DESCRIPTION: &str = "fmu_export_describe";
 type Describe = unsafe extern "C" fn(resources: *const c_char, receive: Receive, context: *mut c_void);
 type Receive = unsafe extern "C" fn(context: *mut c_void, text: *const u8, length: usize);
@@ -30,19 +30,18 @@ pub struct LoadedModel {
     _library: Option<libloading::Library>,
 }
 
-/// The variables of a type: the places of all elements, and of these the ones that FMI 3.0 has a reference for.
+/// The variables of a type.
 #[derive(Debug)]
 pub(crate) struct Group {
     pub base: BaseType,
-    pub places: Vec<u32>,
-    pub first: Vec<u32>,
+    pub indices: Vec<u32>,
 }
 
 impl LoadedModel {
-    /// A model in this program: the text of `fmu_export::describe`, and its functions.
+    /// A model in this program: the result of `fmu_export::describe`, and its functions.
     ///
     /// # Safety
-    /// The functions are those of the model that is described.
+    /// The functions belong to the model that is described.
     ///
     /// # Errors
     /// When the description cannot be read.
@@ -54,23 +53,23 @@ impl LoadedModel {
     /// if it exists.
     ///
     /// # Safety
-    /// The file is the library of an FMU that was made with `fmu-export`, or no library; what the library does when it is
-    /// loaded and called is sound.
+    /// The file is the library of an FMU that was made with `fmu-export`, or no library. It is sound to load the library and to
+    /// call its functions.
     ///
     /// # Errors
     /// When the library cannot be loaded, or does not describe itself.
     pub unsafe fn load(path: &Path, resources: Option<&Path>) -> Result<Self> {
-        let of = || path.display().to_string();
-        // SAFETY: the caller's promise, here and below.
-        let library = unsafe { libloading::Library::new(path) }.with_context(of)?;
+        let path_of = || path.display().to_string();
+        // SAFETY: the caller guarantees it, here and below.
+        let library = unsafe { libloading::Library::new(path) }.with_context(path_of)?;
         let resources = resources.and_then(|path| path.canonicalize().ok());
         let resources = resources
             .map(|path| CString::new(path.to_string_lossy().into_owned()))
             .transpose()
-            .with_context(of)?;
+            .with_context(path_of)?;
         let mut description = Vec::new();
-        // SAFETY: the functions have the types of the standards, and the description that of fmu-export; `keep` gets a
-        // pointer to a vector, which lives; `directory` is a string or NULL.
+        // SAFETY: the functions have the types of the standards, and the function that describes has its type in fmu-export;
+        // `keep` receives a pointer to a vector, which exists during the call; `directory` is a string or NULL.
         let (fmi2, fmi3) = unsafe {
             let symbol = |name: &str| library.get::<*const c_void>(name).ok().map(|found| *found);
             let mut names = fmi2::Functions::NAMES.iter().chain(fmi3::Functions::NAMES);
@@ -91,7 +90,8 @@ impl LoadedModel {
             describe(directory, keep, (&raw mut description).cast());
             (fmi2, fmi3)
         };
-        Self::with(std::str::from_utf8(&description)?, fmi2, fmi3, resources, Some(library)).with_context(of)
+        Self::with(std::str::from_utf8(&description)?, fmi2, fmi3, resources, Some(library))
+            .with_context(path_of)
     }
 
     fn with(
@@ -102,12 +102,8 @@ impl LoadedModel {
         library: Option<libloading::Library>,
     ) -> Result<Self> {
         let table = Table::read(description)?;
-        let group = |base| {
-            let places = table.find(|of| of.base() == base);
-            let first = table.find(|of| of.base() == base && of.element == 0);
-            Group { base, places, first }
-        };
-        let groups = BaseType::ALL.into_iter().map(group).filter(|group| !group.places.is_empty()).collect();
+        let group = |base| Group { base, indices: table.find(|variable| variable.base() == base) };
+        let groups = BaseType::ALL.into_iter().map(group).filter(|group| !group.indices.is_empty()).collect();
         Ok(Self { table, fmi2, fmi3, groups, starts: OnceLock::new(), resources, _library: library })
     }
 
@@ -128,9 +124,9 @@ impl LoadedModel {
 }
 
 /// # Safety
-/// The context is that of [`LoadedModel::load`], and the text has this length.
+/// The context is the vector in [`LoadedModel::load`], and the text has this length.
 unsafe extern "C" fn keep(context: *mut c_void, text: *const u8, length: usize) {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees it.
     let (description, text) =
         unsafe { (&mut *context.cast::<Vec<u8>>(), std::slice::from_raw_parts(text, length)) };
     description.extend_from_slice(text);

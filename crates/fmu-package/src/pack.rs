@@ -3,8 +3,8 @@
 use crate::content::ContentFile;
 use crate::files::{write_atomically, zip};
 use crate::platform::Platform;
-use crate::version::Fmi;
 use anyhow::{Context, Result, ensure};
+use fmi_abi::Standard;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -12,33 +12,32 @@ use std::path::{Path, PathBuf};
 /// A compiled library.
 #[derive(Clone, Debug)]
 pub struct Library {
-    /// What it runs on.
+    /// The platform that it is for.
     pub platform: Platform,
     /// The file, under any name.
     pub path: PathBuf,
 }
 
-/// What an FMU is made of.
+/// The parts that an FMU is made of.
 #[derive(Clone, Copy, Debug)]
 pub struct Parts<'a> {
     /// The version that the description is for.
-    pub fmi: Fmi,
+    pub fmi: Standard,
     /// The `modelIdentifier`.
     pub identifier: &'a str,
-    /// The text of `modelDescription.xml`.
+    /// The content of `modelDescription.xml`.
     pub description: &'a str,
-    /// The text of `terminalsAndIcons/terminalsAndIcons.xml`, if there is one.
+    /// The content of `terminalsAndIcons/terminalsAndIcons.xml`, if there are terminals.
     pub terminals: Option<&'a str>,
     /// The libraries, one for each platform.
     pub libraries: &'a [Library],
-    /// The folder `sources`: names and content.
+    /// The files in the directory `sources`: names and contents.
     pub sources: &'a [(String, Vec<u8>)],
-    /// What goes in as it is, under the names of FMI 2.0.
+    /// Other files, with their names in FMI 2.0.
     pub content: &'a [ContentFile],
 }
 
-/// Writes the FMU to `destination` and tells its size in bytes. If anything goes wrong, a file that was
-/// there before stays as it was.
+/// Writes the FMU to `destination` and returns its size in bytes. If anything fails, an existing file does not change.
 ///
 /// # Errors
 /// When there is neither library nor sources, there are two for one platform, a file cannot be read, or the destination
@@ -49,22 +48,22 @@ pub fn pack(destination: &Path, parts: &Parts) -> Result<u64> {
     let mut entries = vec![("modelDescription.xml".to_owned(), description.as_bytes().to_vec())];
     entries.extend(terminals.map(|text| (TERMINALS.to_owned(), text.as_bytes().to_vec())));
     for Library { platform, path } in libraries {
-        let folder = platform.folder(fmi);
-        let name = format!("binaries/{folder}/{}", platform.library_name(identifier));
-        entries.push((name, read(path).with_context(|| format!("the library for {folder} is missing"))?));
+        let directory = platform.directory(fmi);
+        let name = format!("binaries/{directory}/{}", platform.library_name(identifier));
+        entries.push((name, read(path).with_context(|| format!("the library for {directory} is missing"))?));
     }
     entries.extend(sources.iter().map(|(name, bytes)| (format!("sources/{name}"), bytes.clone())));
     let has_icon = content.iter().any(|file| file.name == ICON);
     for ContentFile { name, path } in content {
         let name = match (fmi, name.as_str()) {
-            // FMI 3.0 has another place for it.
-            (Fmi::V3, "model.png") if has_icon => continue,
-            (Fmi::V3, "model.png") => ICON,
+            // In FMI 3.0, the icon has another name.
+            (Standard::Fmi3, "model.png") if has_icon => continue,
+            (Standard::Fmi3, "model.png") => ICON,
             (_, name) => name,
         };
         entries.push((name.to_owned(), read(path)?));
     }
-    // The description first, where tools that stream look for it; the rest by name.
+    // The description is first, for tools that read the file as a stream; other entries are sorted by name.
     entries[1..].sort();
     let zip = zip(&entries)?;
     write_atomically(destination, |file| Ok(file.write_all(&zip)?))

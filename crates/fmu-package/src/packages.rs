@@ -1,80 +1,88 @@
-//! The packages that a package is made of by path, as cargo knows them.
+//! The packages that a package uses by path, from the metadata of cargo.
 
 use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// A package on this machine, not from a registry.
+/// A package that is used by path.
 #[derive(Clone, Debug)]
 pub(crate) struct LocalPackage {
     pub name: String,
-    pub folder: PathBuf,
-    /// The folder of the library's sources, and the build script.
+    pub directory: PathBuf,
+    /// The directory of the library's sources, and the build script.
     pub code: Vec<PathBuf>,
     dependencies: Vec<PathBuf>,
     workspace: PathBuf,
 }
 
-/// A package with its workspace and what it uses by path.
+/// The workspace of a package, and the packages that it uses by path.
 #[derive(Clone, Debug)]
 pub(crate) struct Neighbourhood {
-    /// The folder of the workspace, or of the package if there is none.
+    /// The directory of the workspace, or of the package if there is none.
     pub workspace: PathBuf,
-    /// The packages that this one needs to be compiled, directly or through each other, and that are used by
-    /// path; by name.
+    /// The packages that this one uses by path, directly or through each other, without development dependencies; by name.
     pub used: Vec<LocalPackage>,
 }
 
 impl Neighbourhood {
-    /// Of the package in this folder.
-    pub fn of(folder: &Path) -> Result<Self> {
+    /// The neighbourhood of the package in this directory.
+    pub fn of(directory: &Path) -> Result<Self> {
         let mut known = BTreeMap::new();
-        let own = find(&mut known, folder)?;
+        let own = find(&mut known, directory)?;
         let mut used: Vec<LocalPackage> = Vec::new();
         let mut open = own.dependencies;
-        while let Some(folder) = open.pop() {
-            if folder != own.folder && used.iter().all(|package| package.folder != folder) {
-                let package = find(&mut known, &folder)?;
+        while let Some(directory) = open.pop() {
+            if directory != own.directory && used.iter().all(|package| package.directory != directory) {
+                let package = find(&mut known, &directory)?;
                 open.extend(package.dependencies.iter().cloned());
                 used.push(package);
             }
         }
-        used.sort_by(|a, b| (&a.name, &a.folder).cmp(&(&b.name, &b.folder)));
+        used.sort_by(|a, b| (&a.name, &a.directory).cmp(&(&b.name, &b.directory)));
         Ok(Self { workspace: own.workspace, used })
     }
 }
 
-/// The package in this folder; one question to cargo tells all about a workspace.
-fn find(known: &mut BTreeMap<PathBuf, LocalPackage>, folder: &Path) -> Result<LocalPackage> {
-    if !known.contains_key(folder) {
-        let of = || format!("cannot find out what {} is made of", folder.display());
-        let packages = metadata(folder).and_then(|metadata| packages(&metadata)).with_context(of)?;
-        known.extend(packages.into_iter().map(|package| (package.folder.clone(), package)));
+/// Returns the package in this directory. One call of cargo returns all packages of a workspace.
+fn find(known: &mut BTreeMap<PathBuf, LocalPackage>, directory: &Path) -> Result<LocalPackage> {
+    if !known.contains_key(directory) {
+        let failed = || format!("cannot find the packages that {} uses", directory.display());
+        let manifest = directory.join("Cargo.toml");
+        let arguments = ["--no-deps", "--offline", "--manifest-path"].map(OsStr::new);
+        let metadata = metadata(arguments.into_iter().chain([manifest.as_os_str()]));
+        let packages = metadata.and_then(|metadata| packages(&metadata)).with_context(failed)?;
+        known.extend(packages.into_iter().map(|package| (package.directory.clone(), package)));
     }
-    known.get(folder).cloned().with_context(|| format!("{} is no package", folder.display()))
+    known.get(directory).cloned().with_context(|| format!("{} is no package", directory.display()))
 }
 
-fn metadata(folder: &Path) -> Result<Value> {
-    // Inside `cargo run` and a build script this names the cargo that is running.
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let output = Command::new(&cargo)
-        .args(["metadata", "--no-deps", "--offline", "--format-version", "1", "--manifest-path"])
-        .arg(folder.join("Cargo.toml"))
-        .stdin(Stdio::null())
-        .output()
-        .with_context(|| format!("cannot start cargo ({})", cargo.to_string_lossy()))?;
+/// Returns the cargo that has started this program, or the cargo of the system.
+pub fn cargo() -> OsString {
+    std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into())
+}
+
+/// Returns the output of `cargo metadata` with these arguments.
+///
+/// # Errors
+/// When cargo cannot be started or fails; the message is one line.
+pub fn metadata(arguments: impl IntoIterator<Item: AsRef<OsStr>>) -> Result<Value> {
+    let cargo = cargo();
+    let mut command = Command::new(&cargo);
+    command.args(["metadata", "--format-version", "1"]).args(arguments).stdin(Stdio::null());
+    let output = command.output().with_context(|| format!("cannot start {}", cargo.to_string_lossy()))?;
     let errors = String::from_utf8_lossy(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
-    ensure!(output.status.success(), "{errors}");
-    serde_json::from_slice(&output.stdout).context("cargo metadata answers in a language of its own")
+    ensure!(output.status.success(), "{}", errors.trim_start_matches("error: "));
+    serde_json::from_slice(&output.stdout).context("cargo metadata returns no JSON")
 }
 
 fn packages(metadata: &Value) -> Result<Vec<LocalPackage>> {
     let path = |value: &Value| value.as_str().map(PathBuf::from);
     let workspace = path(&metadata["workspace_root"]).context("cargo names no workspace")?;
     let package = |package: &Value| {
-        let folder = path(&package["manifest_path"])?.parent()?.to_owned();
+        let directory = path(&package["manifest_path"])?.parent()?.to_owned();
         let mut code = Vec::new();
         for target in package["targets"].as_array()? {
             let source = path(&target["src_path"])?;
@@ -91,11 +99,11 @@ fn packages(metadata: &Value) -> Result<Vec<LocalPackage>> {
             code,
             dependencies: dependencies.filter_map(|dependency| path(&dependency["path"])).collect(),
             workspace: workspace.clone(),
-            folder,
+            directory,
         })
     };
     let packages = metadata["packages"].as_array().context("cargo names no packages")?;
-    packages.iter().map(|value| package(value).context("cargo describes a package in another way")).collect()
+    packages.iter().map(|value| package(value).context("cargo metadata has an unknown format")).collect()
 }
 
 #[cfg(test)]
@@ -103,17 +111,17 @@ mod tests {
     use super::Neighbourhood;
     use std::fs;
 
-    /// Where `build_fmu` puts the FMU: beside what cargo makes, also for a member of a workspace.
+    /// The FMU of a member of a workspace goes into the `target` of the workspace.
     #[test]
     fn a_member_knows_its_workspace() {
-        let folder = tempfile::tempdir().unwrap();
-        let model = folder.path().join("models/model");
+        let directory = tempfile::tempdir().unwrap();
+        let model = directory.path().join("models/model");
         fs::create_dir_all(model.join("src")).unwrap();
         fs::write(model.join("src/lib.rs"), "").unwrap();
         fs::write(model.join("Cargo.toml"), "[package]\nname = \"model\"\n").unwrap();
         let workspace = || Neighbourhood::of(&model).unwrap().workspace;
         assert_eq!(workspace(), model);
-        fs::write(folder.path().join("Cargo.toml"), "[workspace]\nmembers = [\"models/*\"]\n").unwrap();
-        assert_eq!(workspace(), folder.path());
+        fs::write(directory.path().join("Cargo.toml"), "[workspace]\nmembers = [\"models/*\"]\n").unwrap();
+        assert_eq!(workspace(), directory.path());
     }
 }

@@ -1,4 +1,4 @@
-//! Points at which a model is asked.
+//! Points at which a model is evaluated.
 
 use crate::check::{Starts, rounded};
 use crate::instance::{Instance, Outcome};
@@ -8,20 +8,20 @@ use anyhow::{Result, anyhow};
 use fmi_abi::{Causality, Interface, Standard, Value, Variability};
 use std::collections::BTreeMap;
 
-/// Values of everything that an importer can set before the simulation, and how it uses the model.
+/// Values of all variables that an importer can set before the simulation, the start time, and the interface type.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Point {
-    /// By place; `None` for what stays as it is.
+    /// By index; `None` for a variable that is not set.
     pub values: Vec<Option<Value>>,
     pub time: f64,
     pub interface: Interface,
 }
 
-/// A model at a point. Samples with the same number have the same parameters of that variability.
+/// An instance at a point. Samples with the same number have the same parameters of that variability.
 pub(crate) struct FactorSample<'a> {
     pub fixed: usize,
     pub tunable: usize,
-    pub model: Instance<'a>,
+    pub instance: Instance<'a>,
 }
 
 /// The point that a draw begins at, whether it has a new time, and the variables that it moves.
@@ -33,13 +33,13 @@ struct Draw<'d> {
 
 /// Draws points.
 pub(crate) struct Sampler<'a> {
-    /// Whether the models are at a communication point or in Continuous-Time Mode, not in Initialization Mode.
+    /// Whether the instances are at a communication point or in Continuous-Time Mode, not in Initialization Mode.
     pub running: bool,
-    pub of: &'a LoadedModel,
+    pub model: &'a LoadedModel,
     random: fastrand::Rng,
     starts: Starts,
     tunable_parameters: bool,
-    /// The messages on the variables that could not be moved from a point, by place.
+    /// The messages on the variables that could not be moved from a point, by index.
     pub stuck: BTreeMap<u32, String>,
 }
 
@@ -68,14 +68,14 @@ impl Reach {
 }
 
 impl<'a> Sampler<'a> {
-    /// Around these start values.
-    pub fn new(of: &'a LoadedModel, starts: Starts, tunable_parameters: bool) -> Self {
+    /// A sampler of points near these start values.
+    pub fn new(model: &'a LoadedModel, starts: Starts, tunable_parameters: bool) -> Self {
         // The seed is fixed: the same model always gets the same description.
         let random = fastrand::Rng::with_seed(2);
-        Self { running: false, of, random, starts, tunable_parameters, stuck: BTreeMap::new() }
+        Self { running: false, model, random, starts, tunable_parameters, stuck: BTreeMap::new() }
     }
 
-    /// Models that differ in fixed parameters, in tunable ones, and in inputs, states and time.
+    /// Instances that differ in fixed parameters, in tunable ones, and in inputs, states and time.
     pub fn factor_samples(&mut self) -> Result<Vec<FactorSample<'a>>> {
         let is_parameter = |variable: &Variable| variable.causality == Causality::Parameter;
         let tunable_parameters = self.tunable_parameters;
@@ -88,16 +88,18 @@ impl<'a> Sampler<'a> {
             for tunable in 0..3 {
                 let (point, _) = self.draw(Some(&point), false, is_tunable)?;
                 for steps in 0..3 {
-                    let (point, model) = self.draw(Some(&point), true, |variable| !is_parameter(variable))?;
-                    samples.push(FactorSample { fixed, tunable, model: self.go_on(model, &point, steps) });
+                    let (point, instance) =
+                        self.draw(Some(&point), true, |variable| !is_parameter(variable))?;
+                    let instance = self.go_on(instance, &point, steps);
+                    samples.push(FactorSample { fixed, tunable, instance });
                 }
             }
         }
         Ok(samples)
     }
 
-    /// Draws new values for some variables, and a new time or not, the rest being as before, until the model accepts
-    /// them. A variable that the model accepts no new value of stays where it is, and is [`stuck`](Self::stuck).
+    /// Draws new values for some variables, and a new time or not, until the model accepts them; all others are as before. If the
+    /// model accepts no new value of a variable, the variable keeps its value and is [`stuck`](Self::stuck).
     pub fn draw(
         &mut self,
         before: Option<&Point>,
@@ -105,7 +107,7 @@ impl<'a> Sampler<'a> {
         which: impl Fn(&Variable) -> bool,
     ) -> Result<(Point, Instance<'a>)> {
         let mut point = before.cloned().unwrap_or_else(|| Point {
-            values: vec![None; self.of.table.variables.len()],
+            values: vec![None; self.model.table.variables.len()],
             time: 0.0,
             interface: self.draw_interface(),
         });
@@ -116,17 +118,17 @@ impl<'a> Sampler<'a> {
         for number in 0..REACHES {
             for _ in 0..ATTEMPTS {
                 self.move_values(&mut point, &draw, Reach::of(number), &which);
-                if let Ok(model) = self.accepted(&point, &draw) {
-                    return Ok((point, model));
+                if let Ok(instance) = self.accepted(&point, &draw) {
+                    return Ok((point, instance));
                 }
             }
         }
         self.draw_one_by_one(point, &draw)
     }
 
-    /// Moves one variable or array after the other, each as far as the model accepts it, the others being as before.
+    /// Moves one variable or array after the other, each as far as the model accepts it.
     fn draw_one_by_one(&mut self, at: Point, draw: &Draw) -> Result<(Point, Instance<'a>)> {
-        let table = &self.of.table;
+        let table = &self.model.table;
         let values = match draw.before {
             Some(before) => before.values.clone(),
             // Strings and bytes are not moved.
@@ -134,38 +136,39 @@ impl<'a> Sampler<'a> {
                 let is_moved = |value: &&Value| !matches!(value, Value::String(_) | Value::Binary(_));
                 let starts = table.variables.iter().zip(&self.starts);
                 starts
-                    .map(|(of, start)| start.as_ref().filter(is_moved).filter(|_| of.is_moved()).cloned())
+                    .map(|(variable, start)| {
+                        start.as_ref().filter(is_moved).filter(|_| variable.is_moved()).cloned()
+                    })
                     .collect()
             }
         };
         let mut point = Point { values, ..at };
-        let mut model = self.accepted(&point, draw).map_err(|message| {
+        let mut instance = self.accepted(&point, draw).map_err(|message| {
             let Point { time, interface, .. } = point;
             anyhow!(
                 "the model rejects its own start values in {interface} at t = {time:.3} s, where it is tried: {message}"
             )
         })?;
-        for place in 0..table.variables.len() {
-            let of = &table.variables[place];
-            let array = table.array(place as u32);
-            let whole = array.iter().all(|place| (draw.which)(&table.variables[*place as usize]));
-            if !(draw.which)(of) || whole && of.element > 0 || !of.is_moved() {
+        for (index, variable) in table.variables.iter().enumerate() {
+            let array = table.array(index as u32);
+            let whole = array.iter().all(|index| (draw.which)(&table.variables[*index as usize]));
+            if !(draw.which)(variable) || whole && variable.element > 0 || !variable.is_moved() {
                 continue;
             }
-            let first = if whole { array[0] as usize } else { place };
-            let places = first..first + if whole { array.len() } else { 1 };
+            let moved = index..index + if whole { array.len() } else { 1 };
             let mut message = String::new();
             let reaches = (1..REACHES).map(Reach::of);
             // Elements that cannot change separately may still change together.
             let together = reaches.clone().map(|reach| Reach { single: 0.0, ..reach });
-            for reach in reaches.chain(together.filter(|_| places.len() > 1)) {
-                let mut moved = point.clone();
-                let is_here =
-                    |of: &Variable| places.clone().any(|place| table.variables[place].name == of.name);
-                self.move_values(&mut moved, draw, reach, &is_here);
-                match self.accepted(&moved, draw) {
+            for reach in reaches.chain(together.filter(|_| moved.len() > 1)) {
+                let mut next = point.clone();
+                let is_moved = |other: &Variable| {
+                    table.variables[moved.clone()].iter().any(|variable| variable.name == other.name)
+                };
+                self.move_values(&mut next, draw, reach, &is_moved);
+                match self.accepted(&next, draw) {
                     Ok(accepted) => {
-                        (point, model) = (moved, accepted);
+                        (point, instance) = (next, accepted);
                         message.clear();
                         break;
                     }
@@ -173,10 +176,10 @@ impl<'a> Sampler<'a> {
                 }
             }
             if !message.is_empty() {
-                self.stuck.insert(place as u32, message);
+                self.stuck.insert(index as u32, message);
             }
         }
-        Ok((point, model))
+        Ok((point, instance))
     }
 
     /// Draws new values for some variables of a point.
@@ -187,110 +190,120 @@ impl<'a> Sampler<'a> {
         reach: Reach,
         which: &dyn Fn(&Variable) -> bool,
     ) {
-        let table = &self.of.table;
+        let table = &self.model.table;
         let mut share = 0.0;
-        for (place, of) in table.variables.iter().enumerate().filter(|(_, of)| which(of) && of.is_moved()) {
-            // States of a running model have been set, however they start.
-            let zero = (self.running && of.state).then_some(&Value::Real(0.0));
-            let Some(start) = self.starts[place].as_ref().or(zero) else { continue };
-            let before = draw.before.and_then(|before| before.values[place].as_ref());
+        for (index, variable) in
+            table.variables.iter().enumerate().filter(|(_, variable)| which(variable) && variable.is_moved())
+        {
+            // States of a running model have been set, whether or not they have start values.
+            let zero = (self.running && variable.state).then_some(&Value::Real(0.0));
+            let Some(start) = self.starts[index].as_ref().or(zero) else { continue };
+            let before = draw.before.and_then(|before| before.values[index].as_ref());
             let around = before.filter(|_| !reach.first).unwrap_or(start);
             let is_array =
-                || table.array(place as u32).iter().all(|place| which(&table.variables[*place as usize]));
-            if of.element == 0 && reach.common > 0.0 {
+                || table.array(index as u32).iter().all(|index| which(&table.variables[*index as usize]));
+            if variable.element == 0 && reach.common > 0.0 {
                 share = 2.0 * self.random.f64() - 1.0;
             }
-            let around = match reach.common > 0.0 && of.length() > 1 && is_array() {
-                true => &moved_in_common(&of.of, around, share * reach.common),
+            let around = match reach.common > 0.0 && variable.length() > 1 && is_array() {
+                true => &moved_in_common(&variable.variable_type, around, share * reach.common),
                 false => around,
             };
-            let value = &mut point.values[place];
-            *value = draw_value(&mut self.random, &of.of, around, value.as_ref(), reach.single);
+            let value = &mut point.values[index];
+            *value =
+                draw_value(&mut self.random, &variable.variable_type, around, value.as_ref(), reach.single);
         }
     }
 
-    /// The model at a point, if it accepts that.
+    /// Returns an instance at a point, if the model accepts the point.
     fn accepted(&self, point: &Point, draw: &Draw) -> Outcome<Instance<'a>> {
-        // No function sets states in Co-Simulation: they must not follow there from what is changed.
+        // No function sets states in Co-Simulation, so they must not depend there on the values that change.
         let is_held = self.running && !draw.time && point.interface == Interface::CoSimulation;
         match draw.before.filter(|_| is_held) {
-            Some(before) => model_at(self.of, before, true, Standard::Fmi3).and_then(|mut model| {
-                model.set(&point.values, |of| (draw.which)(of) && !of.state)?;
-                Ok(model)
-            }),
-            None => model_at(self.of, point, self.running, Standard::Fmi3),
+            Some(before) => {
+                let mut instance = model_at(self.model, before, true, Standard::Fmi3)?;
+                instance.set(&point.values, |variable| (draw.which)(variable) && !variable.state)?;
+                Ok(instance)
+            }
+            None => model_at(self.model, point, self.running, Standard::Fmi3),
         }
     }
 
-    /// The lists serve both interface types, so both are looked at.
+    /// Draws an interface type: the dependencies hold for both.
     fn draw_interface(&mut self) -> Interface {
-        let offered: Vec<Interface> = self.of.table.interfaces().collect();
+        let offered: Vec<Interface> = self.model.table.interfaces().collect();
         offered[self.random.usize(..offered.len())]
     }
 
-    /// Takes steps in Co-Simulation, and gives derivatives of the inputs after the first one: factors may depend on both.
-    fn go_on(&self, model: Instance<'a>, point: &Point, steps: usize) -> Instance<'a> {
+    /// Makes steps in Co-Simulation, and sets derivatives of the inputs after the first step: factors may depend on both.
+    fn go_on(&self, mut instance: Instance<'a>, point: &Point, steps: usize) -> Instance<'a> {
         if point.interface != Interface::CoSimulation {
-            return model;
+            return instance;
         }
-        let table = &self.of.table;
+        let table = &self.model.table;
         let with_rates = table.input_derivatives && steps == 1;
-        let mut model = match model_at(self.of, point, self.running, Standard::Fmi2) {
-            Ok(with_rates_model) if with_rates => with_rates_model,
-            _ => model,
-        };
+        if with_rates && let Ok(of_fmi2) = model_at(self.model, point, self.running, Standard::Fmi2) {
+            instance = of_fmi2;
+        }
         for _ in 0..steps {
-            // A model may reject the step: it is then as it was before.
-            if model.step(table.info.step_size).is_err() {
+            // If the model rejects the step, it is as before.
+            if instance.step(table.info.step_size).is_err() {
                 break;
             }
         }
         if with_rates {
-            let inputs = table
-                .find(|of| of.causality == Causality::Input && of.variability == Variability::Continuous);
-            let _ = model.set_input_derivatives(&inputs, &vec![0.0; inputs.len()]);
+            let inputs = table.find(|variable| {
+                variable.causality == Causality::Input && variable.variability == Variability::Continuous
+            });
+            let _ = instance.set_input_derivatives(&inputs, &vec![0.0; inputs.len()]);
         }
-        model
+        instance
     }
 }
 
-/// A model at a point. An importer may set values before it enters Initialization Mode and in it, and sets states later.
+/// Returns an instance at a point. An importer may set values before it enters Initialization Mode and in it, and sets states
+/// later.
 pub(crate) fn model_at<'a>(
-    of: &'a LoadedModel,
+    model: &'a LoadedModel,
     point: &Point,
     running: bool,
     standard: Standard,
 ) -> Outcome<Instance<'a>> {
-    let offer = of.table.co_simulation.as_ref().filter(|_| point.interface == Interface::CoSimulation);
+    let offer = model.table.co_simulation.as_ref().filter(|_| point.interface == Interface::CoSimulation);
     let event_mode = standard == Standard::Fmi3 && offer.is_some_and(|offer| offer.event_mode);
-    let mut model = Instance::new(of, point.interface, standard, event_mode)?;
-    model.set(&point.values, Variable::has_start)?;
-    model.initialize(point.time, None, None)?;
-    // What is approx has been calculated now.
-    model.set(&point.values, |of| of.causality == Causality::Input || of.is_exact())?;
+    let mut instance = Instance::new(model, point.interface, standard, event_mode)?;
+    instance.set(&point.values, Variable::has_start)?;
+    instance.initialize(point.time, None, None)?;
+    // Variables that are approx have been calculated now.
+    instance.set(&point.values, |variable| variable.causality == Causality::Input || variable.is_exact())?;
     if !running {
-        return Ok(model);
+        return Ok(instance);
     }
-    model.initialized()?;
-    model.run()?;
+    instance.initialized()?;
+    instance.run()?;
     if point.interface == Interface::CoSimulation {
-        // Until then states may follow from inputs and parameters. A model may reject the step: it is then as it was before.
-        let _ = model.step(of.table.info.step_size);
+        // Before the first step, states may depend on inputs and parameters. If the model rejects the step, it is as before.
+        let _ = instance.step(model.table.info.step_size);
     } else {
-        let mut states = model.states()?;
-        for ((place, _), state) in of.table.states.iter().zip(&mut states) {
-            if let Some(Value::Real(value)) = point.values[*place as usize] {
+        let mut states = instance.states()?;
+        for ((index, _), state) in model.table.states.iter().zip(&mut states) {
+            if let Some(Value::Real(value)) = point.values[*index as usize] {
                 *state = value;
             }
         }
-        model.set_states(&states)?;
+        instance.set_states(&states)?;
     }
-    Ok(model)
+    Ok(instance)
+}
+
+/// Whether a value is anything but a Real that is infinite or NaN.
+pub(crate) fn is_finite(value: &Value) -> bool {
+    !matches!(value, Value::Real(value) if !value.is_finite())
 }
 
 /// The value of an array's element when all elements change by a common factor, or integers by a common number.
-fn moved_in_common(of: &Type, value: &Value, share: f64) -> Value {
-    match (&of.attributes, value) {
+fn moved_in_common(variable_type: &Type, value: &Value, share: f64) -> Value {
+    match (&variable_type.attributes, value) {
         (Attributes::Real { .. }, &Value::Real(value)) => Value::Real(value * (1.0 + 0.5 * share)),
         (Attributes::Integer { .. }, &Value::Integer(value)) => {
             Value::Integer(value.saturating_add((3.0 * share).round() as i128))
@@ -299,21 +312,21 @@ fn moved_in_common(of: &Type, value: &Value, share: f64) -> Value {
     }
 }
 
-/// A value in the range of the type, near the start value by a `part` of the usual distance; another one than before where
-/// possible. `None` for strings and bytes, whose other possible values are unknown.
+/// A value in the range of the type, which differs from the start value by at most a `part` of the usual distance, and from the
+/// value before if possible. `None` for strings and bytes, whose other possible values are unknown.
 pub(crate) fn draw_value(
     random: &mut fastrand::Rng,
-    of: &Type,
+    variable_type: &Type,
     start: &Value,
     before: Option<&Value>,
     part: f64,
 ) -> Option<Value> {
-    Some(match (&of.attributes, start) {
+    Some(match (&variable_type.attributes, start) {
         (Attributes::Real { min, max, nominal, .. }, &Value::Real(start)) => {
             let reach = if start == 0.0 { nominal.unwrap_or(1.0) } else { 0.5 * start.abs() };
             let value = start + part * reach * (2.0 * random.f64() - 1.0);
             let value = value.clamp(min.unwrap_or(f64::MIN), max.unwrap_or(f64::MAX));
-            Value::Real(rounded(of.base, value))
+            Value::Real(rounded(variable_type.base, value))
         }
         (Attributes::Integer { min, max }, &Value::Integer(start)) => {
             let reach = (3.0 * part).ceil() as i128;

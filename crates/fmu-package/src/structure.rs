@@ -1,18 +1,18 @@
-//! Which variable depends on which, and how (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
+//! The dependencies between variables, and their kinds (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
 //!
-//! A live model is evaluated at points drawn around its start values, always the same ones. If its equations
-//! are smooth, what does not react at any of them does not depend, and a factor that
-//! never changes is constant. Of other models that proves nothing: there an unknown depends on what it
-//! declares (`depends_on`), else on everything, and trying only finds wrong declarations.
+//! A model is evaluated at points near its start values, always the same ones. If its equations are smooth, an unknown that does
+//! not react to a known at any point does not depend on it, and a factor that never changes is constant. For other models, this
+//! proves nothing: there, an unknown depends on the variables that it declares (`depends_on`), or on all. The trials then only
+//! find wrong declarations.
 
 use crate::check::{Starts, check};
 use crate::derivatives::check as check_derivatives;
 use crate::memory;
 use crate::model::LoadedModel;
-use crate::sample::{Point, Sampler};
+use crate::sample::{Point, Sampler, is_finite};
 use crate::table::{Table, Variable};
 use anyhow::{Result, bail, ensure};
-use fmi_abi::{BaseType, Causality, Initial, Value, Variability};
+use fmi_abi::{BaseType, Causality, Initial, Standard, Value, Variability};
 use std::collections::{HashMap, HashSet};
 use std::fmt;
 
@@ -29,40 +29,40 @@ pub(crate) fn checked_starts(model: &LoadedModel) -> Result<&Starts> {
     Ok(model.starts.get_or_init(|| starts))
 }
 
-/// The lists of unknowns, each unknown with what it depends on.
+/// The unknowns, each with its dependencies.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ModelStructure {
-    /// The outputs, by value reference.
+    /// The outputs, by index.
     pub outputs: Vec<Unknown>,
     /// The derivatives of the states, in the order of the states; empty if no importer can use them.
     pub derivatives: Vec<Unknown>,
-    /// What is calculated during initialization, by value reference.
+    /// The variables that are calculated during initialization, by index.
     pub initial_unknowns: Vec<Unknown>,
 }
 
-/// What depends on others.
+/// A variable that depends on others.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unknown {
-    /// Its place in the table, which is its value reference in FMI 2.0.
-    pub vr: u32,
-    /// The places of what it depends on, and how each of them enters.
+    /// Its index in the table, which is its value reference in FMI 2.0.
+    pub index: u32,
+    /// The indices of the variables that it depends on, each with the kind of dependency.
     pub dependencies: Vec<(u32, DependencyKind)>,
 }
 
-/// How a known enters an unknown.
+/// The kind of a dependency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DependencyKind {
-    /// Times a factor that never changes.
+    /// The known has a factor that never changes.
     Constant,
-    /// Times a factor that does not change after the initialization.
+    /// The known has a factor that does not change after the initialization.
     Fixed,
-    /// Times a factor that changes with tunable parameters.
+    /// The known has a factor that changes with tunable parameters.
     Tunable,
-    /// In some way.
+    /// Any other dependency.
     Dependent,
 }
 
-/// As `dependenciesKind` has it.
+/// The value of `dependenciesKind`.
 impl fmt::Display for DependencyKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
@@ -75,69 +75,49 @@ impl fmt::Display for DependencyKind {
 }
 
 impl ModelStructure {
-    /// The structure of a model whose parameters are `tunable`, or are what its table says.
+    /// The structure of a model, whose parameters are `tunable` or have the variability in its table.
+    ///
+    /// In FMI 3.0, unknowns also depend on parameters, and on the time even if it is no variable of the model. An array is one
+    /// unknown or known there, with the index of its first element, and has the dependencies of all its elements.
     ///
     /// # Errors
-    /// When the model contradicts itself, reacts to what it has not declared, or rejects its start values; if it is
+    /// When the model contradicts itself, reacts to a variable that it has not declared, or rejects its start values; if it is
     /// `smooth`, also when it rejects every change of a variable.
-    pub fn of(model: &LoadedModel, tunable_parameters: bool) -> Result<Self> {
-        Self::with(model, tunable_parameters, None)
-    }
-
-    /// The same as FMI 3.0 wants it: outputs and derivatives of states depend on parameters, too, and everything on
-    /// the time, also where that is no variable of the model; an array is one unknown or known, with the place of its
-    /// first element, and depends on what any of its elements depends on.
-    ///
-    /// # Errors
-    /// As [`of`](Self::of).
-    pub fn of_fmi3(model: &LoadedModel, tunable_parameters: bool) -> Result<Self> {
-        let table = &model.table;
-        let Self { outputs, derivatives, initial_unknowns } =
-            Self::with(model, tunable_parameters, Some(table.time()))?;
-        let [outputs, derivatives, initial_unknowns] =
-            [outputs, derivatives, initial_unknowns].map(|list| of_arrays(table, list));
-        Ok(Self { outputs, derivatives, initial_unknowns })
-    }
-
-    /// With `time`, its place, for FMI 3.0.
-    fn with(model: &LoadedModel, tunable_parameters: bool, time: Option<u32>) -> Result<Self> {
+    pub fn of(model: &LoadedModel, fmi: Standard, tunable_parameters: bool) -> Result<Self> {
         let starts = checked_starts(model)?;
         let table = &model.table;
-        let Lists { outputs, derivatives, knowns, initial_unknowns, initial_knowns } = Lists::of(table, time);
-        check_derivatives(model, starts, true, &[&outputs[..], &derivatives].concat(), &knowns)?;
+        let Lists { outputs, derivatives, knowns, initial_unknowns, initial_knowns } = Lists::of(table, fmi);
+        let unknowns = [&outputs[..], &derivatives].concat();
+        check_derivatives(model, starts, true, &unknowns, &knowns)?;
         check_derivatives(model, starts, false, &initial_unknowns, &initial_knowns)?;
 
         let mut sampler = Sampler::new(model, starts.clone(), tunable_parameters);
         sampler.running = true;
-        let count = outputs.len();
-        let mut outputs = by_derivative(&mut sampler, &[outputs, derivatives].concat(), &knowns)?;
-        let derivatives = outputs.split_off(count);
+        let running = found(&mut sampler, &unknowns, &knowns)?;
         sampler.running = false;
-        let initial_unknowns = by_value(&mut sampler, &initial_unknowns, &initial_knowns)?;
-        let itself = |unknown: Unknown| {
-            // A state is what was set, or what the last step made of it.
-            let dependencies = knowns.iter().filter(|known| **known == unknown.vr);
-            Unknown {
-                dependencies: dependencies.map(|known| (*known, DependencyKind::Constant)).collect(),
-                ..unknown
+        let initial = found(&mut sampler, &initial_unknowns, &initial_knowns)?;
+        let running = running.into_iter().enumerate().map(|(number, unknown)| {
+            // As an output, a state has the value that was set, or that the last step has calculated.
+            if number < outputs.len() && table.variables[unknown.index as usize].state {
+                let itself = knowns.iter().filter(|known| **known == unknown.index);
+                let dependencies = itself.map(|known| (*known, DependencyKind::Constant)).collect();
+                return Ok(Unknown { dependencies, ..unknown });
             }
-        };
-        let outputs = outputs.into_iter().map(|unknown| match table.variables[unknown.vr as usize].state {
-            true => Ok(itself(unknown)),
-            false => with_declared(table, unknown, &knowns),
+            with_declared(table, unknown, &knowns)
         });
-        let derivatives = derivatives.into_iter().map(|unknown| with_declared(table, unknown, &knowns));
-        let initial_unknowns =
-            initial_unknowns.into_iter().map(|unknown| with_declared(table, unknown, &initial_knowns));
-        Ok(Self {
-            outputs: outputs.collect::<Result<_>>()?,
-            derivatives: derivatives.collect::<Result<_>>()?,
-            initial_unknowns: initial_unknowns.collect::<Result<_>>()?,
-        })
+        let mut running = running.collect::<Result<Vec<_>>>()?;
+        let derivatives = running.split_off(outputs.len());
+        let initial = initial.into_iter().map(|unknown| with_declared(table, unknown, &initial_knowns));
+        let lists = [running, derivatives, initial.collect::<Result<_>>()?];
+        let [outputs, derivatives, initial_unknowns] = match fmi {
+            Standard::Fmi2 => lists,
+            Standard::Fmi3 => lists.map(|list| of_arrays(table, list)),
+        };
+        Ok(Self { outputs, derivatives, initial_unknowns })
     }
 }
 
-/// The unknowns and the knowns, by place.
+/// The unknowns and the knowns, by index.
 struct Lists {
     outputs: Vec<u32>,
     derivatives: Vec<u32>,
@@ -147,43 +127,45 @@ struct Lists {
 }
 
 impl Lists {
-    fn of(table: &Table, time: Option<u32>) -> Self {
-        // Others keep their states to themselves.
+    fn of(table: &Table, fmi: Standard) -> Self {
+        let is_fmi3 = fmi == Standard::Fmi3;
+        // Without these capabilities, no importer can use the states.
         let has_states = table.model_exchange.is_some() || table.partials;
-        let outputs = table.find(|of| of.causality == Causality::Output);
+        let outputs = table.find(|variable| variable.causality == Causality::Output);
         let states = if has_states { &table.states[..] } else { &[] };
         let (states, derivatives): (Vec<u32>, Vec<u32>) = states.iter().copied().unzip();
-        let unlisted = time.filter(|time| table.variable(*time).is_none());
-        let mut knowns = table.find(|of| {
-            matches!(of.causality, Causality::Input | Causality::Independent)
-                || has_states && of.state
-                || time.is_some() && of.causality == Causality::Parameter
+        let unlisted = Some(table.time()).filter(|time| is_fmi3 && table.variable(*time).is_none());
+        let mut knowns = table.find(|variable| {
+            matches!(variable.causality, Causality::Input | Causality::Independent)
+                || has_states && variable.state
+                || is_fmi3 && variable.causality == Causality::Parameter
         });
         knowns.extend(unlisted);
-        let calculated = table.find(|of| of.causality == Causality::CalculatedParameter);
+        let calculated = table.find(|variable| variable.causality == Causality::CalculatedParameter);
         let mut initial_unknowns = [&outputs[..], &calculated, &states, &derivatives].concat();
-        initial_unknowns.retain(|place| {
-            matches!(table.variables[*place as usize].initial, Some(Initial::Approx | Initial::Calculated))
+        initial_unknowns.retain(|index| {
+            matches!(table.variables[*index as usize].initial, Some(Initial::Approx | Initial::Calculated))
         });
         initial_unknowns.sort_unstable();
         initial_unknowns.dedup();
-        let mut initial_knowns = table.find(|of| of.is_known() && (!of.state || of.is_exact()));
+        let mut initial_knowns =
+            table.find(|variable| variable.is_known() && (!variable.state || variable.is_exact()));
         initial_knowns.extend(unlisted);
         Self { outputs, derivatives, knowns, initial_unknowns, initial_knowns }
     }
 }
 
-/// The list with each array for its elements.
+/// The list with each array instead of its elements.
 fn of_arrays(table: &Table, unknowns: Vec<Unknown>) -> Vec<Unknown> {
-    let first = |place: u32| table.variable(place).map_or(place, |of| place - of.element as u32);
+    let first = |index: u32| table.variable(index).map_or(index, |variable| index - variable.element as u32);
     let mut list: Vec<Unknown> = Vec::new();
-    for of in unknowns {
-        let vr = first(of.vr);
-        if list.last().is_none_or(|last| last.vr != vr) {
-            list.push(Unknown { vr, dependencies: Vec::new() });
+    for unknown in unknowns {
+        let index = first(unknown.index);
+        if list.last().is_none_or(|last| last.index != index) {
+            list.push(Unknown { index, dependencies: Vec::new() });
         }
         let Some(Unknown { dependencies, .. }) = list.last_mut() else { continue };
-        for (known, kind) in of.dependencies {
+        for (known, kind) in unknown.dependencies {
             let known = first(known);
             match dependencies.iter_mut().find(|(other, _)| *other == known) {
                 Some((_, other)) => *other = kind.max(*other),
@@ -195,24 +177,24 @@ fn of_arrays(table: &Table, unknowns: Vec<Unknown>) -> Vec<Unknown> {
     list
 }
 
-/// Adds to what was found by trying what the model declares, or what cannot be ruled out.
+/// Adds the dependencies that the model declares, or that the trials cannot rule out.
 fn with_declared(table: &Table, found: Unknown, knowns: &[u32]) -> Result<Unknown> {
-    let unknown = &table.variables[found.vr as usize];
+    let unknown = &table.variables[found.index as usize];
     let declared: Option<HashSet<u32>> =
-        unknown.dependencies.as_ref().map(|places| places.iter().copied().collect());
+        unknown.dependencies.as_ref().map(|indices| indices.iter().copied().collect());
     let is_declared = |known: u32| {
         known == table.time() && unknown.depends_on_time
             || declared.as_ref().is_none_or(|declared| declared.contains(&known))
     };
-    if let Some((hidden, _)) = found.dependencies.iter().find(|(place, _)| !is_declared(*place)) {
+    if let Some((hidden, _)) = found.dependencies.iter().find(|(index, _)| !is_declared(*index)) {
         bail!("{} reacts to {}, which its depends_on does not name", unknown.name, table.name(*hidden));
     }
     if unknown.variability == Variability::Constant {
         return Ok(found);
     }
-    // Texts and bytes are not tried.
-    let is_tried = |place: u32| {
-        table.variable(place).is_none_or(|known| !matches!(known.base(), BaseType::String | BaseType::Binary))
+    // Strings and bytes are not tried.
+    let is_tried = |index: u32| {
+        table.variable(index).is_none_or(|known| !matches!(known.base(), BaseType::String | BaseType::Binary))
     };
     let kinds: HashMap<u32, DependencyKind> = found.dependencies.iter().copied().collect();
     let smooth = table.info.smooth;
@@ -225,34 +207,34 @@ fn with_declared(table: &Table, found: Unknown, knowns: &[u32]) -> Result<Unknow
     Ok(Unknown { dependencies, ..found })
 }
 
-/// Dependencies at communication points and in Continuous-Time Mode, from the partial derivatives; where
-/// the model has none, from its values.
-fn by_derivative(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<Unknown>> {
-    let table = &sampler.of.table;
-    let mut samples = if table.partials { sampler.factor_samples()? } else { Vec::new() };
-    let is_real = |place: u32| table.variable(place).is_some_and(|of| of.base() == BaseType::Real);
-    // By parameters, models know their derivatives while initializing.
-    let is_variable = |place: u32| {
-        is_real(place)
-            && !matches!(
-                table.variables[place as usize].causality,
-                Causality::Independent | Causality::Parameter
-            )
+/// Returns the unknowns with the dependencies that trials find: from the partial derivatives while running, else from the values.
+fn found(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<Unknown>> {
+    let table = &sampler.model.table;
+    let is_real =
+        |index: u32| table.variable(index).is_some_and(|variable| variable.base() == BaseType::Real);
+    let reals: Vec<u32> = unknowns.iter().copied().filter(|index| is_real(*index)).collect();
+    // During initialization, the kinds `fixed` and `tunable` are not allowed.
+    let with_partials = table.partials && sampler.running;
+    let mut samples = if with_partials { sampler.factor_samples()? } else { Vec::new() };
+    // Derivatives with respect to parameters are available in Initialization Mode.
+    let is_differentiable = |index: u32| {
+        let causality = table.variable(index).map(|variable| variable.causality);
+        is_real(index) && !matches!(causality, Some(Causality::Independent | Causality::Parameter))
     };
-    let reals: Vec<u32> = unknowns.iter().copied().filter(|place| is_real(*place)).collect();
-    let mut list: Vec<Unknown> = unknowns.iter().map(none_known).collect();
+    let unknown = |index: &u32| Unknown { index: *index, dependencies: Vec::new() };
+    let mut list: Vec<Unknown> = unknowns.iter().map(unknown).collect();
     let bases = if list.is_empty() { Vec::new() } else { sampler.bases()? };
     for &known in knowns {
-        let differentiable = table.partials && is_variable(known) && !reals.is_empty();
+        let differentiable = is_differentiable(known) && !reals.is_empty();
         let partials: Vec<_> = samples
             .iter_mut()
             .filter(|_| differentiable)
-            .map(|sample| ((sample.fixed, sample.tunable), sample.model.partials(&reals, known)))
+            .map(|sample| ((sample.fixed, sample.tunable), sample.instance.partials(&reals, known)))
             .collect();
         let mut others = Vec::new();
         for unknown in &mut list {
-            let place = reals.iter().position(|real| *real == unknown.vr);
-            let factors = partials.iter().map(|(parameters, factors)| Some((*parameters, factors[place?]?)));
+            let position = reals.iter().position(|real| *real == unknown.index);
+            let factors = partials.iter().map(|(numbers, factors)| Some((*numbers, factors[position?]?)));
             match factors.collect::<Option<Vec<_>>>().filter(|factors| !factors.is_empty()) {
                 Some(factors) => {
                     unknown.dependencies.extend(factor_kind(&factors).map(|kind| (known, kind)));
@@ -260,30 +242,31 @@ fn by_derivative(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Res
                 None => others.push(unknown),
             }
         }
-        let places: Vec<u32> = others.iter().map(|unknown| unknown.vr).collect();
-        let reactions = sampler.reactions(&bases, known, &places)?;
-        for (place, unknown) in others.into_iter().enumerate() {
-            let kind = reactions.of(place).map(|_| DependencyKind::Dependent);
-            unknown.dependencies.extend(kind.map(|kind| (known, kind)));
+        let indices: Vec<u32> = others.iter().map(|unknown| unknown.index).collect();
+        let reactions = sampler.reactions(&bases, known, &indices)?;
+        for (number, unknown) in others.into_iter().enumerate() {
+            let Some(ratios) = reactions.of(number) else { continue };
+            let is_constant = |ratios: Vec<f64>| ratios.iter().all(|ratio| close(*ratio, ratios[0], 1e-7));
+            let kind = match ratios.is_some_and(is_constant) && !sampler.running {
+                true => DependencyKind::Constant,
+                false => DependencyKind::Dependent,
+            };
+            unknown.dependencies.push((known, kind));
         }
     }
     Ok(list)
 }
 
-fn none_known(vr: &u32) -> Unknown {
-    Unknown { vr: *vr, dependencies: Vec::new() }
-}
-
-/// The kind of dependency that has these factors, each with the numbers of its sample's fixed and tunable parameters; `None`
-/// if they are all zero.
+/// The kind of a dependency with these factors; `None` if they are all zero. Each factor has the numbers of its sample's fixed and
+/// tunable parameters.
 fn factor_kind(factors: &[((usize, usize), f64)]) -> Option<DependencyKind> {
     if factors.iter().all(|(_, factor)| *factor == 0.0) {
         return None;
     }
-    // Whether the factor is the same wherever the samples have this in common.
+    // Whether samples that have these numbers in common have the same factor.
     let steady = |in_common: fn(&(usize, usize)) -> (usize, usize)| {
-        factors.iter().all(|(parameters, factor)| {
-            let like = |(other, _): &&((usize, usize), f64)| in_common(other) == in_common(parameters);
+        factors.iter().all(|(numbers, factor)| {
+            let like = |(other, _): &&((usize, usize), f64)| in_common(other) == in_common(numbers);
             factors.iter().filter(like).all(|(_, other)| close(*factor, *other, 1e-12))
         })
     };
@@ -291,43 +274,26 @@ fn factor_kind(factors: &[((usize, usize), f64)]) -> Option<DependencyKind> {
         DependencyKind::Constant
     } else if steady(|(fixed, _)| (*fixed, 0)) {
         DependencyKind::Fixed
-    } else if steady(|parameters| *parameters) {
+    } else if steady(|numbers| *numbers) {
         DependencyKind::Tunable
     } else {
         DependencyKind::Dependent
     })
 }
 
-/// Dependencies during initialization, from the values; `fixed` and `tunable` are not allowed there.
-fn by_value(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<Unknown>> {
-    let mut list: Vec<Unknown> = unknowns.iter().map(none_known).collect();
-    let bases = if list.is_empty() { Vec::new() } else { sampler.bases()? };
-    for &known in knowns {
-        let reactions = sampler.reactions(&bases, known, unknowns)?;
-        for (place, unknown) in list.iter_mut().enumerate() {
-            let Some(ratios) = reactions.of(place) else { continue };
-            let constant =
-                ratios.is_some_and(|ratios| ratios.iter().all(|ratio| close(*ratio, ratios[0], 1e-7)));
-            let kind = if constant { DependencyKind::Constant } else { DependencyKind::Dependent };
-            unknown.dependencies.push((known, kind));
-        }
-    }
-    Ok(list)
-}
-
-/// How unknowns changed when a known was changed, at several points.
+/// Changes of unknowns when a known was changed, at several points.
 struct Reactions {
-    /// The change of the known where it is a Real that is set, else `None`.
+    /// The change of the known; `None` unless it is a Real that is set.
     changes: Vec<Option<f64>>,
-    /// Per point and unknown, the value before and after.
+    /// For each point and unknown, the value before and after.
     values: Vec<Vec<[Value; 2]>>,
 }
 
 impl Reactions {
-    /// `None` if the unknown at this place did not react; else the change of the unknown over that of the
-    /// known at every point, if there is such a thing.
-    fn of(&self, place: usize) -> Option<Option<Vec<f64>>> {
-        let pairs = || self.values.iter().map(|values| &values[place]);
+    /// Returns `None` if the unknown with this number did not react, else its change divided by the change of the known at each
+    /// point, if both are Reals.
+    fn of(&self, number: usize) -> Option<Option<Vec<f64>>> {
+        let pairs = || self.values.iter().map(|values| &values[number]);
         let real = |pair: &[Value; 2]| match *pair {
             [Value::Real(before), Value::Real(after)] => Some([before, after]),
             _ => None,
@@ -336,7 +302,7 @@ impl Reactions {
             return pairs().any(|[before, after]| before != after).then_some(None);
         };
         let scale = reals.iter().flatten().fold(0.0, |scale: f64, value| scale.max(value.abs()));
-        // Less is rounding: a model may calculate with terms that cancel.
+        // A smaller change is rounding: a model may calculate with terms that cancel.
         if reals.iter().all(|[before, after]| (after - before).abs() <= 1e-10 * scale) {
             return None;
         }
@@ -346,7 +312,7 @@ impl Reactions {
     }
 }
 
-/// A point, and the values of all variables there.
+/// A point, and the values of all variables at it.
 struct Base {
     point: Point,
     values: Vec<Value>,
@@ -364,10 +330,10 @@ impl Sampler<'_> {
 
     /// Changes one known at many points and reads the unknowns.
     fn reactions(&mut self, bases: &[Base], known: u32, unknowns: &[u32]) -> Result<Reactions> {
-        let table = &self.of.table;
+        let table = &self.model.table;
         let mut reactions = Reactions { changes: Vec::new(), values: Vec::new() };
         let variable = table.variable(known);
-        let is_known = |of: &Variable| variable.is_some_and(|known| known.name == of.name);
+        let is_known = |other: &Variable| variable.is_some_and(|known| known.name == other.name);
         for base in bases.iter().filter(|_| !unknowns.is_empty()) {
             let (changed, mut after) = self.draw(Some(&base.point), known == table.time(), is_known)?;
             if changed == base.point {
@@ -375,11 +341,12 @@ impl Sampler<'_> {
             }
             reactions.changes.push(difference(&base.point, &changed, known));
             let after = after.values();
-            let pair = |place: &u32| [&base.values, &after].map(|values| values[*place as usize].clone());
+            let pair = |index: &u32| [&base.values, &after].map(|values| values[*index as usize].clone());
             reactions.values.push(unknowns.iter().map(pair).collect());
         }
-        if let Some(message) =
-            self.stuck.get(&known).filter(|_| table.info.smooth && reactions.changes.is_empty())
+        if let Some(message) = self.stuck.get(&known)
+            && table.info.smooth
+            && reactions.changes.is_empty()
         {
             let name = table.name(known);
             bail!(
@@ -388,20 +355,19 @@ impl Sampler<'_> {
                  {name} with `depends_on`"
             );
         }
-        for (place, unknown) in unknowns.iter().enumerate() {
-            let values = reactions.values.iter().flat_map(|row| &row[place]);
-            let is_finite = |value: &Value| !matches!(value, Value::Real(value) if !value.is_finite());
+        for (number, unknown) in unknowns.iter().enumerate() {
+            let mut values = reactions.values.iter().flat_map(|row| &row[number]);
             let name = table.name(*unknown);
-            ensure!(values.into_iter().all(is_finite), "{name} is not finite near the start values");
+            ensure!(values.all(is_finite), "{name} is not finite near the start values");
         }
         Ok(reactions)
     }
 }
 
-/// By how much a Real that is set differs.
-fn difference(from: &Point, to: &Point, vr: u32) -> Option<f64> {
-    match (from.values.get(vr as usize)?, to.values.get(vr as usize)?) {
-        (Some(Value::Real(from)), Some(Value::Real(to))) => Some(to - from),
+/// The change of a Real that is set.
+fn difference(before: &Point, after: &Point, index: u32) -> Option<f64> {
+    match (before.values.get(index as usize)?, after.values.get(index as usize)?) {
+        (Some(Value::Real(before)), Some(Value::Real(after))) => Some(after - before),
         _ => None,
     }
 }

@@ -1,11 +1,11 @@
-//! A model as its library describes it: the facts, the variables, the start values.
+//! The description of a model that its library returns: the facts, the variables, the start values.
 
 use anyhow::{Context, Result, anyhow, ensure};
 use fmi_abi::{BaseType, Causality, Initial, Interface, Value, Variability};
 use serde_json::Value as Json;
 use std::str::FromStr;
 
-/// The version of the description's form that is read here.
+/// The version of the description's format that is read here.
 const VERSION: u64 = 1;
 
 /// A model.
@@ -20,9 +20,9 @@ pub(crate) struct Table {
     pub input_derivatives: bool,
     /// The highest order of output derivatives.
     pub output_derivatives: u32,
-    /// The states and their derivatives, as places in the list of variables.
+    /// The states and their derivatives, as indices in the list of variables.
     pub states: Vec<(u32, u32)>,
-    /// The variables, of an array each element; a variable's place is its value reference in FMI 2.0.
+    /// The variables, and each element of an array. The index of a variable is its value reference in FMI 2.0.
     pub variables: Vec<Variable>,
     /// The start values for each interface type that the model offers.
     pub starts: Vec<(Interface, Start)>,
@@ -59,10 +59,10 @@ pub(crate) struct ModelExchange {
     pub step_completed: bool,
 }
 
-/// A variable, of an array an element.
+/// A variable, or an element of an array.
 #[derive(Debug)]
 pub(crate) struct Variable {
-    /// The name, of an element of an array with its indices.
+    /// The name; the name of an element of an array has its indices.
     pub name: String,
     /// The name without indices.
     pub name_of_array: String,
@@ -73,10 +73,10 @@ pub(crate) struct Variable {
     pub causality: Causality,
     pub variability: Variability,
     pub initial: Option<Initial>,
-    pub of: Type,
-    /// The place of the variable that this one is the derivative of.
+    pub variable_type: Type,
+    /// The index of the variable whose derivative this is.
     pub differentiates: Option<u32>,
-    /// The places of the variables that it depends on, if the model declares them.
+    /// The indices of the variables that it depends on, if the model declares them.
     pub dependencies: Option<Vec<u32>>,
     pub depends_on_time: bool,
     pub state: bool,
@@ -109,33 +109,33 @@ pub(crate) struct Item {
 #[derive(Debug, PartialEq)]
 pub(crate) struct Unit {
     pub name: String,
-    /// Of kg, m, s, A, K, mol, cd and rad.
+    /// The exponents of kg, m, s, A, K, mol, cd and rad.
     pub exponents: Vec<i64>,
     pub factor: f64,
     pub offset: f64,
-    /// Name, factor and offset of the unit that people prefer.
+    /// Name, factor and offset of the display unit.
     pub display: Option<(String, f64, f64)>,
 }
 
 /// The start values of a new model.
 #[derive(Debug)]
 pub(crate) enum Start {
-    /// By place; `None` for a variable without.
+    /// By index; `None` for a variable without start value.
     Values { values: Vec<Option<Value>>, forgotten_indicator: Option<usize> },
-    /// The place of a variable that cannot be read.
+    /// The index of a variable that cannot be read.
     Unreadable(usize),
-    /// The reason why there is no model.
+    /// The reason why the model cannot be made.
     Error(String),
 }
 
 impl Table {
-    /// The model of a description that a library gives.
+    /// Reads the description that a library returns.
     pub fn read(description: &str) -> Result<Self> {
         let json: Json = serde_json::from_str(description)
-            .context("the library gives no description, as its model panics")?;
+            .context("the library returns no description, as its model panics")?;
         ensure!(
             json["version"].as_u64() == Some(VERSION),
-            "its version of fmu-export is another than that of fmu-package {}",
+            "its version of fmu-export differs from the version of fmu-package, {}",
             env!("CARGO_PKG_VERSION")
         );
         let variables: Vec<_> = list(&json, "variables", variable)?;
@@ -172,26 +172,26 @@ impl Table {
         [co_simulation, model_exchange].into_iter().flatten()
     }
 
-    /// `None` for a time and an event indicator that are no variables of the model.
-    pub fn variable(&self, place: u32) -> Option<&Variable> {
-        self.variables.get(place as usize)
+    /// Returns `None` for a time or an event indicator that is no variable of the model.
+    pub fn variable(&self, index: u32) -> Option<&Variable> {
+        self.variables.get(index as usize)
     }
 
-    /// The place of the independent variable: in the list, or behind it.
+    /// The index of the independent variable, which follows the list if it is no variable of the model.
     pub fn time(&self) -> u32 {
-        let is_time = |of: &Variable| of.causality == Causality::Independent;
+        let is_time = |variable: &Variable| variable.causality == Causality::Independent;
         self.variables.iter().position(is_time).unwrap_or(self.variables.len()) as u32
     }
 
-    /// The places of all elements of the array that a variable of the list is an element of.
-    pub fn array(&self, place: u32) -> Vec<u32> {
-        let of = &self.variables[place as usize];
-        (place - of.element as u32..).take(of.length()).collect()
+    /// The indices of all elements of the array that has this element; of a scalar, its index.
+    pub fn array(&self, index: u32) -> Vec<u32> {
+        let variable = &self.variables[index as usize];
+        (index - variable.element as u32..).take(variable.length()).collect()
     }
 
     /// The name of a variable of the list, or of the time.
-    pub fn name(&self, place: u32) -> &str {
-        self.variable(place).map_or("time", |of| of.name.as_str())
+    pub fn name(&self, index: u32) -> &str {
+        self.variable(index).map_or("time", |variable| variable.name.as_str())
     }
 
     /// The number of event indicators.
@@ -199,43 +199,47 @@ impl Table {
         self.model_exchange.as_ref().map_or(0, |offer| offer.indicators)
     }
 
-    /// The place of an event indicator, counted from 0: behind the list and the time.
+    /// The index of an event indicator, counted from 0: the indicators follow the list and the time.
     pub fn indicator(&self, number: usize) -> u32 {
         (self.variables.len() as u32).max(self.time() + 1) + number as u32
     }
 
-    /// The places of the variables of which this holds.
-    pub fn find(&self, is_it: impl Fn(&Variable) -> bool) -> Vec<u32> {
-        (0..).zip(&self.variables).filter(|(_, of)| is_it(of)).map(|(place, _)| place).collect()
+    /// The indices of the variables that are selected.
+    pub fn find(&self, is_selected: impl Fn(&Variable) -> bool) -> Vec<u32> {
+        (0..)
+            .zip(&self.variables)
+            .filter(|(_, variable)| is_selected(variable))
+            .map(|(index, _)| index)
+            .collect()
     }
 }
 
 impl Variable {
     pub fn base(&self) -> BaseType {
-        self.of.base
+        self.variable_type.base
     }
 
-    /// The number of elements of the array that it is an element of; 1 for a scalar.
+    /// The number of elements of its array; 1 for a scalar.
     pub fn length(&self) -> usize {
         self.dimensions.iter().product()
     }
 
-    /// Whether it begins with a value that is given: inputs, and what is exact or approx (section 2.2.7).
+    /// Whether it has a start value: inputs, and variables that are exact or approx (section 2.2.7).
     pub fn has_start(&self) -> bool {
         self.causality == Causality::Input || matches!(self.initial, Some(Initial::Exact | Initial::Approx))
     }
 
-    /// Whether it has other values than its start value.
+    /// Whether its value can differ from its start value.
     pub fn is_moved(&self) -> bool {
         self.variability != Variability::Constant
     }
 
-    /// Whether it begins with exactly its start value, which may be changed.
+    /// Whether it begins with exactly its start value, and the importer may change that.
     pub fn is_exact(&self) -> bool {
         self.initial == Some(Initial::Exact) && self.variability != Variability::Constant
     }
 
-    /// Whether others may depend on it (section 2.2.8): inputs, states, the time, and what begins with an exact value.
+    /// Whether others may depend on it (section 2.2.8): inputs, states, the time, and variables with an exact start value.
     pub fn is_known(&self) -> bool {
         matches!(self.causality, Causality::Input | Causality::Independent) || self.state || self.is_exact()
     }
@@ -280,7 +284,7 @@ fn variable(json: &Json) -> Result<Variable> {
         causality: Causality::of_name(&text(json, "causality")?).with_context(lacks("causality"))?,
         variability: Variability::of_name(&text(json, "variability")?).with_context(lacks("variability"))?,
         initial: initial.transpose()?,
-        of: variable_type(&json["type"])?,
+        variable_type: variable_type(&json["type"])?,
         differentiates: some(json, "differentiates", count)?,
         dependencies: match json["dependencies"].is_null() {
             true => None,
@@ -336,11 +340,11 @@ fn start(json: &Json, variables: &[Variable]) -> Result<Start> {
         return Ok(Start::Error(error.to_owned()));
     }
     let values = list(json, "values", |json| Ok(json.clone()))?;
-    if let Some(place) = values.iter().position(|value| *value == false) {
-        return Ok(Start::Unreadable(place));
+    if let Some(index) = values.iter().position(|value| *value == false) {
+        return Ok(Start::Unreadable(index));
     }
-    let value = |(of, json): (&Variable, &Json)| {
-        let read = |text| Value::read(of.base(), text).with_context(lacks("values"));
+    let value = |(variable, json): (&Variable, &Json)| {
+        let read = |text| Value::read(variable.base(), text).with_context(lacks("values"));
         json.as_str().map(read).transpose()
     };
     Ok(Start::Values {
@@ -357,7 +361,7 @@ fn text(json: &Json, name: &str) -> Result<String> {
     Ok(json[name].as_str().with_context(lacks(name))?.to_owned())
 }
 
-/// A number that is written as a string, with all its digits.
+/// Reads a number that is written as a string, with all its digits.
 fn number<T: FromStr>(json: &Json, name: &str) -> Result<T> {
     text(json, name)?.parse().map_err(|_| anyhow!(lacks(name)()))
 }

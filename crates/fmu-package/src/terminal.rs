@@ -1,17 +1,30 @@
-//! What programs like `build_fmu` say to their users.
+//! The arguments, messages and exit codes of programs like `build_fmu`.
 
 use anyhow::Result;
+use fmi_abi::Standard;
 use std::env;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// The path as seen from where the user is.
-pub fn short(path: &Path) -> String {
-    let here = env::current_dir().unwrap_or_default();
-    path.strip_prefix(here).unwrap_or(path).display().to_string()
+/// Reads the version of FMI in an argument: 2 or 3.
+///
+/// # Errors
+/// When it is another version.
+pub fn fmi_version(argument: &str) -> Result<Standard, String> {
+    match argument {
+        "2" => Ok(Standard::Fmi2),
+        "3" => Ok(Standard::Fmi3),
+        _ => Err("versions are 2 and 3".to_owned()),
+    }
 }
 
-/// The end of `main`: an error becomes one line and the exit code of failure.
+/// The path relative to the current directory.
+pub fn short(path: &Path) -> String {
+    let current = env::current_dir().unwrap_or_default();
+    path.strip_prefix(current).unwrap_or(path).display().to_string()
+}
+
+/// Prints an error as one line, and returns the exit code.
 pub fn exit(result: Result<()>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,

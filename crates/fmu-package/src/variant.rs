@@ -1,17 +1,17 @@
-//! One FMU among those that can be made from the same sources.
+//! The guid of an FMU: the same sources make several FMUs.
 
 use crate::fingerprint::Fingerprint;
 
-/// The guid of libraries that were compiled without one, and of descriptions that are kept with the sources.
+/// The guid of libraries that were compiled without a guid, and of descriptions that are kept with the sources.
 pub const NO_GUID: &str = "{00000000-0000-0000-0000-000000000000}";
 
-/// What the library and the description must agree on.
+/// The facts that the library and the description must share.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Variant {
     /// The fingerprint of the sources.
     pub sources: String,
-    /// Start values that are read from elsewhere when the library is compiled: the variable's name, and the value as
-    /// the description has it, for example `0.5`, `true`, or the number of an item.
+    /// Start values that are read from another file when the library is compiled: the variable's name, and the value in the
+    /// description, for example `0.5`, `true`, or the number of an item.
     pub start: Vec<(String, String)>,
     /// Whether parameters are `tunable` instead of `fixed`.
     pub tunable: bool,

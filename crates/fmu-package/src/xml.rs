@@ -1,4 +1,4 @@
-//! XML files to be written, as trees of elements.
+//! XML documents as trees of elements.
 
 use anyhow::Result;
 use quick_xml::Writer;
@@ -13,9 +13,9 @@ pub struct Element {
     pub name: String,
     /// Names and values, in the order in which they are written.
     pub attributes: Vec<(String, String)>,
-    /// The elements in it.
+    /// Its children.
     pub children: Vec<Self>,
-    /// The text in it, if it has no children.
+    /// Its text, if it has no children.
     pub text: String,
 }
 
@@ -63,11 +63,11 @@ impl Element {
     /// The document with this element as its root, indented.
     ///
     /// # Errors
-    /// Never in practice: it is written into memory.
+    /// Never in practice, as the document is written into memory.
     pub fn document(&self) -> Result<String> {
         let mut writer = Writer::new_with_indent(Vec::new(), b' ', 2);
         writer.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
-        // The root has many attributes: one on each line.
+        // The root has many attributes, so each is on a separate line.
         let mut root = writer.create_element(self.name.as_str());
         for (name, value) in &self.attributes {
             root = root.new_line().with_attribute((name.as_str(), value.as_str()));

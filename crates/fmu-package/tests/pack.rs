@@ -1,34 +1,34 @@
-//! The FMU as a file.
+//! The FMU as a zip file.
 
 use anyhow::bail;
 use fmu_package::files::write_atomically;
-use fmu_package::{ContentFile, Fmi, Library, Parts, Platform, pack};
+use fmu_package::{ContentFile, Library, Parts, Platform, Standard, pack};
 use std::fs;
 use std::io::{Cursor, Read, Write};
 use std::path::{Path, PathBuf};
 use zip::{CompressionMethod, ZipArchive};
 
 struct Sources {
-    folder: tempfile::TempDir,
+    directory: tempfile::TempDir,
 }
 
 impl Sources {
     fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
+        let directory = tempfile::tempdir().unwrap();
         for (name, content) in
             [("lib.so", "machine code"), ("lib.dll", "other code"), ("index.html", "<html>")]
         {
-            fs::write(folder.path().join(name), content).unwrap();
+            fs::write(directory.path().join(name), content).unwrap();
         }
-        Self { folder }
+        Self { directory }
     }
 
     fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
+        self.directory.path().join(name)
     }
 
     fn library(&self, platform: &str, name: &str) -> Library {
-        Library { platform: Platform::of_folder(platform).unwrap(), path: self.path(name) }
+        Library { platform: Platform::of_directory(platform).unwrap(), path: self.path(name) }
     }
 
     fn content(&self, names: &[&str]) -> Vec<ContentFile> {
@@ -37,13 +37,13 @@ impl Sources {
 
     fn pack(&self, destination: &Path, libraries: &[Library]) -> anyhow::Result<u64> {
         let content = self.content(&["documentation/index.html"]);
-        pack(destination, &self.parts(Fmi::V2, libraries, &content))
+        pack(destination, &self.parts(Standard::Fmi2, libraries, &content))
     }
 
-    fn parts<'a>(&self, fmi: Fmi, libraries: &'a [Library], content: &'a [ContentFile]) -> Parts<'a> {
+    fn parts<'a>(&self, fmi: Standard, libraries: &'a [Library], content: &'a [ContentFile]) -> Parts<'a> {
         Parts {
             fmi,
-            identifier: "toy",
+            identifier: "model",
             description: "<xml/>",
             terminals: None,
             libraries,
@@ -61,7 +61,7 @@ impl Sources {
 #[test]
 fn it_is_the_zip_that_importers_want() {
     let sources = Sources::new();
-    let fmu = sources.path("out/deep/toy.fmu");
+    let fmu = sources.path("out/deep/model.fmu");
     let size = sources.pack_both(&fmu);
     let bytes = fs::read(&fmu).unwrap();
     assert_eq!(bytes.len() as u64, size);
@@ -72,8 +72,8 @@ fn it_is_the_zip_that_importers_want() {
         names,
         [
             "modelDescription.xml",
-            "binaries/linux64/toy.so",
-            "binaries/win64/toy.dll",
+            "binaries/linux64/model.so",
+            "binaries/win64/model.dll",
             "documentation/index.html"
         ]
     );
@@ -82,32 +82,32 @@ fn it_is_the_zip_that_importers_want() {
         assert_eq!(file.compression(), CompressionMethod::Deflated);
         assert_eq!(file.last_modified(), Some(zip::DateTime::default()));
         assert_eq!(file.unix_mode(), Some(0o100_644));
-        // Version 2.0 at most, no flags, no extra fields: section 2.3, and no zip64.
+        // At most version 2.0, no flags, no extra fields and no zip64 (section 2.3).
         let header = usize::try_from(file.header_start()).unwrap();
         assert_eq!(bytes[header + 4..header + 8], [20, 0, 0, 0]);
         assert_eq!(bytes[header + 28..header + 30], [0, 0]);
     }
     let mut text = String::new();
-    zip.by_name("binaries/win64/toy.dll").unwrap().read_to_string(&mut text).unwrap();
+    zip.by_name("binaries/win64/model.dll").unwrap().read_to_string(&mut text).unwrap();
     assert_eq!(text, "other code");
 }
 
 #[test]
-fn in_fmi_3_folders_and_icon_have_other_names() {
+fn in_fmi_3_directories_and_icon_have_other_names() {
     let sources = Sources::new();
-    let fmu = sources.path("toy.fmu");
+    let fmu = sources.path("model.fmu");
     let libraries = [sources.library("win64", "lib.dll"), sources.library("x86_64-linux", "lib.so")];
     let names = |content: &[&str]| {
         let content = sources.content(content);
-        let parts = sources.parts(Fmi::V3, &libraries, &content);
+        let parts = sources.parts(Standard::Fmi3, &libraries, &content);
         pack(&fmu, &Parts { terminals: Some("<terminals/>"), ..parts }).unwrap();
         let zip = ZipArchive::new(Cursor::new(fs::read(&fmu).unwrap())).unwrap();
         zip.file_names().map(|name| name.unwrap().into_owned()).collect::<Vec<_>>()
     };
     let expected = [
         "modelDescription.xml",
-        "binaries/x86_64-linux/toy.so",
-        "binaries/x86_64-windows/toy.dll",
+        "binaries/x86_64-linux/model.so",
+        "binaries/x86_64-windows/model.dll",
         "documentation/licenses/license.txt",
         "terminalsAndIcons/icon.png",
         "terminalsAndIcons/terminalsAndIcons.xml",
@@ -128,15 +128,15 @@ fn the_same_content_gives_the_same_bytes() {
 }
 
 #[test]
-fn what_cannot_be_packed_is_named_and_leaves_nothing() {
+fn errors_name_the_file_and_leave_nothing() {
     let sources = Sources::new();
-    let fmu = sources.path("out/toy.fmu");
+    let fmu = sources.path("out/model.fmu");
     for (libraries, message) in [
         (vec![], "at least one library"),
         (vec![sources.library("linux64", "none.so")], "none.so"),
         (
             vec![sources.library("linux64", "lib.so"), sources.library("linux64", "lib.dll")],
-            "linux64/toy.so is there twice",
+            "linux64/model.so is there twice",
         ),
     ] {
         let error = format!("{:#}", sources.pack(&fmu, &libraries).unwrap_err());
@@ -144,15 +144,15 @@ fn what_cannot_be_packed_is_named_and_leaves_nothing() {
     }
     assert!(!fmu.exists());
 
-    let blocked = sources.path("lib.so/toy.fmu");
+    let blocked = sources.path("lib.so/model.fmu");
     let error = format!("{:#}", sources.pack(&blocked, &[sources.library("linux64", "lib.so")]).unwrap_err());
-    assert!(error.contains("cannot make the folder") && error.contains("lib.so"), "{error}");
+    assert!(error.contains("cannot make the directory") && error.contains("lib.so"), "{error}");
 }
 
 #[test]
 fn an_interrupted_write_leaves_the_old_file_and_no_other() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("toy.fmu");
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("model.fmu");
     let interrupted = |path: &Path| {
         write_atomically(path, |file| {
             file.write_all(b"half")?;
@@ -160,11 +160,11 @@ fn an_interrupted_write_leaves_the_old_file_and_no_other() {
         })
     };
     let error = format!("{:#}", interrupted(&path).unwrap_err());
-    assert!(error.contains("toy.fmu") && error.contains("no space"), "{error}");
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    assert!(error.contains("model.fmu") && error.contains("no space"), "{error}");
+    assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 0);
 
-    write_atomically(&path, |file| Ok(file.write_all(b"whole")?)).unwrap();
+    write_atomically(&path, |file| Ok(file.write_all(b"complete")?)).unwrap();
     interrupted(&path).unwrap_err();
-    assert_eq!(fs::read(&path).unwrap(), b"whole");
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    assert_eq!(fs::read(&path).unwrap(), b"complete");
+    assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
 }

@@ -1,23 +1,23 @@
-//! The guid covers the package and those that it uses by path, and nothing of where they are.
+//! The guid covers the package and the packages that it uses by path, but not their locations.
 
 use fmu_package::Sources;
 use std::fs;
 use std::path::Path;
 
-/// A workspace with a model that uses `near` by path, which uses `far`, outside of the workspace.
-fn project(folder: &Path) {
+/// Makes a workspace with a model that uses `near` by path; `near` uses `far`, outside of the workspace.
+fn project(directory: &Path) {
     let package = |name: &str, dependencies: &str| {
-        let code = folder.join(name).join("src");
+        let code = directory.join(name).join("src");
         fs::create_dir_all(&code).unwrap();
         fs::write(code.join("lib.rs"), "").unwrap();
         let manifest = format!("[package]\nname = \"{}\"\n{dependencies}", name.replace('/', "_"));
-        fs::write(folder.join(name).join("Cargo.toml"), manifest).unwrap();
+        fs::write(directory.join(name).join("Cargo.toml"), manifest).unwrap();
     };
-    fs::create_dir_all(folder.join("all")).unwrap();
+    fs::create_dir_all(directory.join("all")).unwrap();
     let workspace = "[workspace]\nmembers = [\"model\", \"near\", \"tools\"]\n\
                      [workspace.dependencies]\nall_near = { path = \"near\" }\n";
-    fs::write(folder.join("all/Cargo.toml"), workspace).unwrap();
-    fs::write(folder.join("all/Cargo.lock"), "").unwrap();
+    fs::write(directory.join("all/Cargo.toml"), workspace).unwrap();
+    fs::write(directory.join("all/Cargo.lock"), "").unwrap();
     package(
         "all/model",
         "[dependencies]\nall_near.workspace = true\n[dev-dependencies]\nall_tools.path = \"../tools\"\n",
@@ -29,18 +29,18 @@ fn project(folder: &Path) {
     package("all/tools", "");
     package("far", "");
     for file in ["all/model/build.rs", "all/model/build_fmu.rs", "all/near/build.rs"] {
-        fs::write(folder.join(file), "").unwrap();
+        fs::write(directory.join(file), "").unwrap();
     }
 }
 
-fn fingerprint(folder: &Path) -> String {
-    Sources::of_package(folder.join("all/model")).fingerprint().unwrap()
+fn fingerprint(directory: &Path) -> String {
+    Sources::of_package(directory.join("all/model")).fingerprint().unwrap()
 }
 
 #[test]
-fn whatever_is_compiled_makes_another_guid() {
-    let folder = tempfile::tempdir().unwrap();
-    project(folder.path());
+fn any_compiled_file_changes_the_guid() {
+    let directory = tempfile::tempdir().unwrap();
+    project(directory.path());
     for (file, counts) in [
         ("all/model/src/lib.rs", true),
         ("all/model/src/table.csv", true),
@@ -57,16 +57,16 @@ fn whatever_is_compiled_makes_another_guid() {
         ("all/near/README.md", false),
         ("all/tools/src/lib.rs", false),
     ] {
-        let path = folder.path().join(file);
-        let before = fingerprint(folder.path());
+        let path = directory.path().join(file);
+        let before = fingerprint(directory.path());
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(&path, fs::read_to_string(&path).unwrap_or_default() + "\n# more\n").unwrap();
-        assert_eq!(fingerprint(folder.path()) != before, counts, "{file}");
+        assert_eq!(fingerprint(directory.path()) != before, counts, "{file}");
     }
 }
 
 #[test]
-fn where_it_is_does_not_count() {
+fn the_location_does_not_count() {
     let (one, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     project(one.path());
     project(&other.path().join("deep"));
@@ -74,11 +74,11 @@ fn where_it_is_does_not_count() {
 }
 
 #[test]
-fn a_path_to_nowhere_is_named() {
-    let folder = tempfile::tempdir().unwrap();
-    project(folder.path());
-    fs::remove_dir_all(folder.path().join("far")).unwrap();
-    let error = Sources::of_package(folder.path().join("all/model")).fingerprint().unwrap_err();
+fn a_missing_package_is_named() {
+    let directory = tempfile::tempdir().unwrap();
+    project(directory.path());
+    fs::remove_dir_all(directory.path().join("far")).unwrap();
+    let error = Sources::of_package(directory.path().join("all/model")).fingerprint().unwrap_err();
     let text = format!("{error:#}");
     assert!(text.contains("far") && text.lines().count() == 1, "{text}");
 }

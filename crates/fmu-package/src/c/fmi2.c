@@ -1,10 +1,10 @@
-/* The functions of FMI 2.0 around a model that was compiled to WebAssembly and made into C.
+/* The functions of FMI 2.0 of a model that was compiled to WebAssembly and translated to C.
 
-   An instance is one block of memory, with a module of its own in it, which has the functions under their names and
-   decides everything: what is allowed, what is refused, what the log says. Here the importer's arrays and texts are
-   copied into the module's memory and out of it, and a module that traps is told of it. */
+   An instance is one block of memory, which contains a separate module. The module has functions with the same names,
+   which accept or reject each call and write the log. The functions here copy the importer's arrays and strings into
+   the module's memory and out of it, and report traps to the module. */
 
-/* What the module is called, and how much memory it needs. */
+/* The name of the module, and the size of its memory. */
 #include "module.h"
 
 #if !defined(FMI2_FUNCTION_PREFIX) && !defined(FMI2_OVERRIDE_FUNCTION_PREFIX)
@@ -18,19 +18,19 @@ typedef struct {
     fmi2CallbackLogger logger;
     fmi2ComponentEnvironment environment;
     char *name;
-    u32 component; /* the instance, as the module knows it */
-    u32 room;      /* for arguments, in the module's memory */
+    u32 component; /* the instance in the module */
+    u32 room;      /* memory of the module for arguments */
     u32 room_size;
-    bool dead; /* after a failure that the module cannot even tell of */
+    bool dead; /* after a failure that the module cannot report */
 } Instance;
 
-/* A call that is running. */
+/* A running call. */
 typedef struct {
     Instance *instance;
     const char *function;
     jmp_buf trap;
-    volatile u32 stack; /* as it was before the call; set after setjmp, read after longjmp (C99 7.13.2.1) */
-    u32 next;  /* where the next argument goes */
+    volatile u32 stack; /* stack pointer before the call; set after setjmp, read after longjmp (C99 7.13.2.1) */
+    u32 next;  /* address of the next argument */
     bool endless;
 } Call;
 
@@ -41,7 +41,7 @@ static void log_error(const Instance *instance, fmi2Status status, fmi2String me
     }
 }
 
-/* The module has a message for the importer. */
+/* Passes a message of the module to the importer. */
 void FMU_log(struct w2c_fmu *importer, u32 status, u32 category, u32 message) {
     const Instance *instance = (const Instance *)(void *)importer;
     const char *texts = (const char *)instance->module.w2c_memory.data.bytes;
@@ -58,7 +58,7 @@ static void begin(Call *call, Instance *instance, const char *function) {
     call->next = instance->room;
     call->endless = false;
     instance->module.w2c_memory.trap = &call->trap;
-    instance->module.w2c_memory.refused = false;
+    instance->module.w2c_memory.is_full = false;
 }
 
 static fmi2Status end(Call *call, fmi2Status status) {
@@ -66,13 +66,13 @@ static fmi2Status end(Call *call, fmi2Status status) {
     return status;
 }
 
-/* The array's length, as the module is told it. */
+/* Returns the length of an array for the module. */
 static u32 count(const Call *call, size_t n) {
     return call->endless ? UINT32_MAX : (u32)n;
 }
 
-/* Makes room for `n` times `each` bytes of arguments, with `more` for the gaps between them and what else there is.
-   A length that no array can have is left to the module to refuse. */
+/* Allocates `n` times `each` bytes for arguments, and `more` bytes for gaps and other arguments. The module rejects a
+   length that no array can have. */
 static inline bool room(Call *call, size_t n, size_t each, size_t more) {
     Instance *instance = call->instance;
     size_t size;
@@ -96,12 +96,12 @@ static inline bool room(Call *call, size_t n, size_t each, size_t more) {
     return true;
 }
 
-static fmi2Status refuse(Call *call, fmi2String message) {
+static fmi2Status reject(Call *call, fmi2String message) {
     log_error(call->instance, fmi2Error, message);
     return end(call, fmi2Error);
 }
 
-/* How types are aligned here. */
+/* The alignment of types here. */
 #define ALIGNED(type)   \
     typedef struct {    \
         char byte;      \
@@ -119,7 +119,7 @@ ALIGNED(fmi2EventInfo)
 ALIGNED(size_t)
 #define ALIGNMENT(type) offsetof(Aligned_##type, value)
 
-/* The address in the module for an array of the importer's: none for NULL, one that is not aligned if that is so. */
+/* Returns the address in the module for an array of the importer: 0 for NULL, unaligned for an unaligned array. */
 static inline u32 output(Call *call, const void *array, size_t n, size_t size, size_t alignment) {
     u32 address = call->next;
     if (array == NULL) {
@@ -161,7 +161,7 @@ static u32 string(Call *call, fmi2String text) {
     return input(call, text, length(text), 1, 1);
 }
 
-/* The importer's texts, behind an array of the module's. */
+/* Copies the importer's strings behind an array of their addresses. */
 static u32 strings(Call *call, const fmi2String texts[], size_t n) {
     u32 array = output(call, texts, n, sizeof(u32), ALIGNMENT(fmi2String));
     size_t i;
@@ -186,13 +186,13 @@ static size_t length_of_all(const fmi2String texts[], size_t n) {
 }
 
 static const char *reason(const wasm_rt_memory_t *memory) {
-    if (memory->refused) {
+    if (memory->is_full) {
         return "the memory of the instance is used up; compile the FMU with a larger FMU_MEMORY_PAGES";
     }
     return memory->reason == WASM_RT_TRAP_OOB ? "stack overflow" : "no message";
 }
 
-/* The end of a call that has trapped. */
+/* Ends a call that has trapped. */
 static fmi2Status broken(Call *call) {
     Instance *instance = call->instance;
     instance->module.FMU_STACK = call->stack;
@@ -212,7 +212,7 @@ static fmi2Status broken(Call *call) {
     return end(call, fmi2Fatal);
 }
 
-/* What every function of an instance begins with. None can be called while another is running: by the log callback. */
+/* Begins a function of an instance. It rejects calls during another call, which the log callback could make. */
 #define BEGIN(name)                                                     \
     Instance *instance = (Instance *)c;                                 \
     fmi2Status status;                                                  \
@@ -230,11 +230,11 @@ static fmi2Status broken(Call *call) {
 
 #define ROOM(name, n, each, more)                                                               \
     if (!room(&call, n, each, more)) {                                                          \
-        return refuse(&call, name ": the instance has no memory for so many values; compile the " \
+        return reject(&call, name ": the instance has no memory for so many values; compile the " \
                                   "FMU with a larger FMU_MEMORY_PAGES");                        \
     }
 
-/* A function of the module; what it takes first is the instance. */
+/* Calls a function of the module, whose first argument is the instance. */
 #define CALL(function, ...) status = (fmi2Status)function(&instance->module, instance->component, __VA_ARGS__)
 #define END return end(&call, status);
 
@@ -246,12 +246,12 @@ fmi2String fmi2GetVersion(void) {
     return fmi2Version;
 }
 
-/* fmi2CallbackFunctions, as the module has it: all it asks is whether there is a logger. */
+/* fmi2CallbackFunctions of the module, which only checks whether there is a logger. */
 typedef struct {
     u32 logger, allocate_memory, free_memory, step_finished, environment;
 } Callbacks;
 
-/* A block of memory for all that an instance ever needs. */
+/* Allocates all memory of an instance. */
 static Instance *allocate(fmi2String name, const fmi2CallbackFunctions *functions) {
     Instance *instance = (Instance *)calloc(1, sizeof(Instance) + length(name) + 1);
     if (instance == NULL) {
@@ -295,7 +295,7 @@ static bool make(Instance *instance, fmi2String name, fmi2Type type, fmi2String 
     return instance->component != 0;
 }
 
-/* A compiler that is told to fuses products and sums against what the runtime says. */
+/* Whether the compiler fuses products and sums, although the runtime forbids it: its options can override that. */
 static bool fuses(void) {
     volatile double factor = 1 + DBL_EPSILON;
     double product = factor * factor;
@@ -359,7 +359,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real point, fmi2Real size, fmi2Boolea
     END
 }
 
-/* Alike but for a name. FMI's headers make the names macros: `#` and `##` take them before they expand. */
+/* Functions that differ only in their names, which are macros in FMI's headers: `#` and `##` do not expand them. */
 
 #define WITHOUT_ARGUMENTS(name)                                                        \
     fmi2Status name(fmi2Component c) {                                                 \
@@ -419,7 +419,7 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     END
 }
 
-/* A state that the importer keeps lies in the module's memory; what does not is no state there. */
+/* A saved state is in the module's memory. Any other pointer is no state of the module. */
 
 static u32 to_module(const Instance *instance, fmi2FMUstate state) {
     uintptr_t place = (uintptr_t)state - (uintptr_t)instance->module.w2c_memory.data.bytes;
@@ -429,8 +429,8 @@ static u32 to_module(const Instance *instance, fmi2FMUstate state) {
     return place != 0 && place < FMU_MEMORY ? (u32)place : UINT32_MAX;
 }
 
-/* A place for a state; what it holds is looked at only if there is a place. */
-#define STATE_PLACE(name, place, n)                                         \
+/* Copies a pointer to a state, if the argument is a valid pointer. */
+#define STATE_IN(name, place, n)                                         \
     u32 in_place;                                                           \
     ROOM(name, n, 1, 64)                                                    \
     in_place = output(&call, place, 1, sizeof(u32), ALIGNMENT(fmi2FMUstate)); \
@@ -449,7 +449,7 @@ static u32 to_module(const Instance *instance, fmi2FMUstate state) {
 #define STATE_HANDLE(name)                                   \
     fmi2Status name(fmi2Component c, fmi2FMUstate *state) {  \
         BEGIN(#name)                                         \
-        STATE_PLACE(#name, state, 0)                         \
+        STATE_IN(#name, state, 0)                         \
         CALL(FMU_##name, in_place);                          \
         STATE_OUT(state)                                     \
         END                                                  \
@@ -489,7 +489,7 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte b
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte byte[], size_t n, fmi2FMUstate *state) {
     BEGIN("fmi2DeSerializeFMUstate")
-    STATE_PLACE("fmi2DeSerializeFMUstate", state, n)
+    STATE_IN("fmi2DeSerializeFMUstate", state, n)
     CALL(FMU_fmi2DeSerializeFMUstate, IN(byte, n, fmi2Byte), count(&call, n), in_place);
     STATE_OUT(state)
     END
@@ -541,14 +541,14 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
         END                                                                              \
     }
 
-/* The module answers those of a status and a string with no value. */
+/* The module returns no value for a status and a string. */
 STATUS(fmi2GetStatus, fmi2Status)
 STATUS(fmi2GetRealStatus, fmi2Real)
 STATUS(fmi2GetIntegerStatus, fmi2Integer)
 STATUS(fmi2GetBooleanStatus, fmi2Boolean)
 STATUS(fmi2GetStringStatus, fmi2String)
 
-/* fmi2EventInfo, as the module has it. */
+/* fmi2EventInfo of the module. */
 typedef struct {
     u32 flags[6];
     double next_event_time;

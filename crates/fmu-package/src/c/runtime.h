@@ -1,5 +1,5 @@
-/* What the C that wasm2c makes of a WebAssembly module is written in: its memory, its instructions.
-   In place of wasm2c's own runtime: no signals, no mmap, no allocation, and a trap ends the call it happens in. */
+/* The memory and the instructions of C code that wasm2c makes from a WebAssembly module.
+   Unlike the runtime of wasm2c, it has no signals, no mmap and no allocation, and a trap only ends its call. */
 #ifndef FMU_RUNTIME_H
 #define FMU_RUNTIME_H
 
@@ -12,7 +12,7 @@
 #include <stdint.h>
 #include <string.h>
 
-/* The same bits everywhere: each operation rounds to double, in the order that is written. */
+/* Results are bit-identical everywhere: each operation rounds to double, in the order of the code. */
 #if defined(__FAST_MATH__) || defined(_M_FP_FAST) || defined(__ASSOCIATIVE_MATH__) || \
     defined(__RECIPROCAL_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
 #error "compile without -ffast-math (/fp:fast): the results would differ from the model's"
@@ -43,7 +43,7 @@
 #define inline __inline
 #endif
 
-/* Why a module trapped. */
+/* Reasons of a trap. */
 enum {
     WASM_RT_TRAP_OOB = 1,
     WASM_RT_TRAP_INT_OVERFLOW,
@@ -53,8 +53,8 @@ enum {
     WASM_RT_TRAP_CALL_INDIRECT
 };
 
-/* An instance has the most memory that its module can ask for. Behind it are bytes that nobody uses: that a base is in
-   memory is enough to know where an offset is small. */
+/* An instance has the maximum memory that its module can request. Unused bytes follow it, so that for small offsets only
+   the base is checked. */
 #define FMU_PAGE 65536u
 #define FMU_MEMORY (FMU_MEMORY_PAGES * FMU_PAGE)
 #define FMU_SMALL 4096u
@@ -69,9 +69,9 @@ enum {
 
 typedef struct {
     uint64_t pages;
-    bool refused;  /* whether there was no room for more */
-    jmp_buf *trap; /* where the call that is running ends if it traps */
-    int reason;    /* why it did */
+    bool is_full;  /* whether the module has requested more memory than there is */
+    jmp_buf *trap; /* target of the jump if the running call traps */
+    int reason;    /* reason of the trap */
     union {
         double aligned;
         uint8_t bytes[FMU_MEMORY + FMU_SMALL];
@@ -116,14 +116,14 @@ FMU_NO_RETURN static inline void wasm_rt_trap(wasm_rt_memory_t *memory, int reas
 #define TRAP(why) (wasm_rt_trap(&instance->w2c_memory, WASM_RT_TRAP_##why), 0)
 #define UNREACHABLE wasm_rt_trap(&instance->w2c_memory, WASM_RT_TRAP_UNREACHABLE)
 
-/* Memory and tables are part of an instance, which begins as zeros. */
+/* Memory and tables are part of an instance, which is initialized with zeros. */
 
 #define wasm_rt_is_initialized() true
 
 static inline uint64_t wasm_rt_grow_memory(wasm_rt_memory_t *memory, uint64_t pages) {
     uint64_t before = memory->pages;
     if (pages > FMU_MEMORY_PAGES - before) {
-        memory->refused = true;
+        memory->is_full = true;
         return 0xffffffffu;
     }
     memory->pages += pages;
@@ -160,7 +160,7 @@ static inline void funcref_table_init(wasm_rt_funcref_table_t *table, const wasm
     }
 }
 
-/* Two functions have one type if they have the same name for it: there is one module. */
+/* Two functions have the same type if the name of the type is the same, as there is only one module. */
 #define CALL_INDIRECT(table, function, type, i, ...)                                        \
     ((void)(UNLIKELY((i) >= FMU_TABLE || (table).data[i].func_type != (type)) ? TRAP(CALL_INDIRECT) : 0), \
      ((function)(table).data[i].func)(__VA_ARGS__))
@@ -185,7 +185,7 @@ static inline void memory_copy(wasm_rt_memory_t *memory, const wasm_rt_memory_t 
     memmove(&memory->data.bytes[to], &memory->data.bytes[from], count);
 }
 
-/* The place of so many bytes. `offset` is a constant: what is asked of it is answered by the compiler. */
+/* Returns a pointer to `length` bytes. The compiler evaluates conditions on `offset`, which is a constant. */
 static inline uint8_t *fmu_at(wasm_rt_memory_t *memory, uint32_t base, uint32_t offset, uint32_t length) {
     if (UNLIKELY(offset <= FMU_SMALL - length ? base >= FMU_MEMORY : (uint64_t)base + offset + length > FMU_MEMORY)) {
         wasm_rt_trap(memory, WASM_RT_TRAP_OOB);
@@ -306,11 +306,11 @@ FMU_REINTERPRET(f64_reinterpret_i64, uint64_t, double)
 #define wasm_quiet(x) (x)
 #define wasm_quietf(x) (x)
 
-/* NaN if one is, and -0 is less than 0. */
+/* The result is NaN if an argument is NaN, and -0 is less than 0. */
 #define FMIN(x, y) ((x) != (x) || (y) != (y) ? NAN : (x) == (y) ? (signbit(x) ? (x) : (y)) : (x) < (y) ? (x) : (y))
 #define FMAX(x, y) ((x) != (x) || (y) != (y) ? NAN : (x) == (y) ? (signbit(x) ? (y) : (x)) : (x) > (y) ? (x) : (y))
 
-/* To integers: the range is open at both ends where its limits are no numbers of the type. */
+/* Conversions to integers. The range is open at both ends if its limits are no numbers of the type. */
 #define FMU_TRUNC(u, i, x, in_range) \
     ((x) != (x) ? (u)TRAP(INVALID_CONVERSION) : (in_range) ? (u)(i)(x) : (u)TRAP(INT_OVERFLOW))
 #define FMU_TRUNC_SAT(u, i, x, in_range, least, most) \

@@ -2,7 +2,7 @@
 
 use fmu_export::*;
 
-/// Falls, bounces off the floor a little slower each time, and ends the simulation when it has bounced enough.
+/// A ball that falls and bounces off the floor, slower each time, and ends the simulation after some bounces.
 #[derive(Clone)]
 pub struct Ball {
     height: f64,
@@ -11,7 +11,7 @@ pub struct Ball {
     restitution: f64,
     bounces: i32,
     most_bounces: i32,
-    /// How high it flies at the most until the next bounce.
+    /// Greatest height until the next bounce.
     apex: f64,
 }
 
@@ -23,21 +23,21 @@ const RATIO: Type = Type::real("Ratio", &units::ONE).min(0.0).max(1.0);
 const COUNT: Type = Type::integer("Count").min_integer(0);
 
 variables! { for Ball, memory in apex;
-    /// Above the floor
+    /// Height above the floor
     height = output(&HEIGHT).state() in height;
-    /// Upwards
+    /// Upward velocity
     velocity = output(&VELOCITY).state() in velocity;
     /// Rate of the height
     der_height as "der(height)" = local(&VELOCITY).derivative_of(height) by |ball| ball.velocity;
     /// Rate of the velocity
     der_velocity as "der(velocity)" = local(&RATE).derivative_of(velocity) by |ball| -ball.gravity;
-    /// Pull of the earth
+    /// Acceleration by gravity
     gravity = parameter(&ACCELERATION) in gravity;
-    /// What is left of the velocity after a bounce
+    /// Ratio of the velocities after and before a bounce
     restitution = parameter(&RATIO) in restitution;
-    /// How often it has bounced
+    /// Number of bounces
     bounces = output(&COUNT).exact() in bounces;
-    /// After how many bounces the simulation ends
+    /// Number of bounces that ends the simulation
     most_bounces = parameter(&COUNT) in most_bounces;
 }
 
@@ -59,7 +59,7 @@ impl Model for Ball {
 }
 
 impl Ball {
-    /// Turns the ball round; tells whether it has bounced enough.
+    /// Reverses the velocity. Returns whether the simulation ends.
     fn bounce(&mut self) -> bool {
         self.velocity *= -self.restitution;
         self.apex = (0.5 * self.velocity * self.velocity / self.gravity).min(1e6);
@@ -67,7 +67,7 @@ impl Ball {
         self.bounces >= self.most_bounces
     }
 
-    /// How long it flies until it meets the floor, s.
+    /// Returns the time until the ball hits the floor, s.
     fn flight(&self) -> f64 {
         let speed = (self.velocity * self.velocity + 2.0 * self.gravity * self.height.max(0.0)).sqrt();
         (self.velocity + speed) / self.gravity
@@ -80,13 +80,13 @@ impl Ball {
 }
 
 impl CoSimulation for Ball {
-    /// Where it has bounced enough.
+    /// A step ends at the last bounce.
     const ENDS_EARLY: bool = true;
 
-    /// Flights are parabolas: a step goes from bounce to bounce, and none of them is missed or late.
+    /// Flights are parabolas, so a step goes exactly from bounce to bounce.
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         const MOST: usize = 10_000;
-        // A step that fails must leave the model as it was.
+        // A step that fails must not change the model.
         let mut ball = self.clone();
         let mut left = step.size;
         for _ in 0..MOST {
@@ -103,7 +103,7 @@ impl CoSimulation for Ball {
                 *self = ball;
                 return Ok(Stepped::Terminate(step.time + step.size - left));
             }
-            // So low that it lies.
+            // The ball lies on the floor.
             if ball.apex < 1e-12 {
                 ball.velocity = 0.0;
                 *self = ball;
@@ -111,7 +111,7 @@ impl CoSimulation for Ball {
             }
         }
         Err(Error::new(format!(
-            "the ball bounces more than {MOST} times in a step of {} s; make shorter ones",
+            "the ball bounces more than {MOST} times in a step of {} s; make shorter steps",
             step.size
         )))
     }
@@ -121,7 +121,7 @@ impl ModelExchange for Ball {
     const INDICATORS: usize = 1;
     const STEP_COMPLETED: bool = true;
 
-    /// The ball is above the floor or below it.
+    /// The sign changes when the ball hits the floor.
     fn indicators(&self, indicators: &mut [f64]) {
         indicators[0] = self.height;
     }
@@ -134,12 +134,12 @@ impl ModelExchange for Ball {
         Ok(Event { states_changed: true, nominals_changed: true, terminate, ..Event::default() })
     }
 
-    /// An importer that has overlooked the sign is told here; where it is too late, that this must end.
+    /// Requests the event if the importer has missed the change of the sign, or ends the simulation if the ball is too low.
     fn step_completed(&mut self, _: f64) -> StepCompleted {
         StepCompleted { event: self.height < 0.0 && self.velocity < 0.0, terminate: self.height < -100.0 }
     }
 
-    /// Flights get lower and lower, and so should what the integrator takes for small.
+    /// Flights get lower, so the tolerance of the integrator should decrease.
     fn nominals(&self, nominals: &mut [f64]) {
         nominals[0] = self.apex.max(1e-6);
     }

@@ -1,4 +1,4 @@
-//! The model as an importer simulates it.
+//! Simulations of the model.
 
 use ball::Ball;
 use fmu_export::*;

@@ -1,4 +1,4 @@
-//! The house: a table in a file that the FMU brings, texts, units with an offset.
+//! The house: a table in a file in the FMU, strings, units with an offset.
 
 use fmu_export::*;
 
@@ -31,19 +31,19 @@ const LOSS: Type = Type::real("ThermalConductance", &Unit::new("W/K").kg(1).m(2)
     .nominal(100.0);
 
 variables! { for House, memory in table, read;
-    /// Of the heating
+    /// Power of the heating
     heating = input(&POWER) in heating;
-    /// In the room
+    /// Temperature in the room
     room = output(&TEMPERATURE).state() in room;
-    /// Rate of the room's
+    /// Rate of the temperature in the room
     der_room as "der(room)" = local(&RATE).derivative_of(room) by |house| house.rate();
-    /// Outside, after the table
+    /// Temperature outside, from the table
     outside = output(&TEMPERATURE) by |house| house.outside;
-    /// How it feels in the room
+    /// Comfort in the room
     comfort = output(&STRING) by |house| house.comfort().to_owned();
-    /// Of air and walls
+    /// Heat capacity of air and walls
     capacity = parameter(&CAPACITY) in capacity;
-    /// Through the walls, for each kelvin of difference
+    /// Heat flow through the walls per kelvin of difference
     loss = parameter(&LOSS) in loss;
     /// The file in the FMU's resources with the temperatures of a day
     weather = parameter(&STRING) in weather;
@@ -62,7 +62,7 @@ impl House {
         }
     }
 
-    /// Returns the temperature outside; every day is like the first.
+    /// Returns the temperature outside, which repeats every day.
     fn outside_at(&self, time: f64) -> f64 {
         self.table.at((time / 3600.0).rem_euclid(24.0))
     }
@@ -97,7 +97,7 @@ impl Model for House {
         Ok(house)
     }
 
-    /// Rejects a file that is no table; the house then stays as it is.
+    /// Rejects a file that is no table; the house then does not change.
     fn update(&mut self) -> Result<(), Error> {
         if self.weather != self.read {
             self.table = LookupTable::read(&self.setup.resource(&self.weather)?)?;
@@ -118,7 +118,7 @@ impl Model for House {
 }
 
 impl CoSimulation for House {
-    /// The weather is constant in parts of five minutes at most; the rest is exact.
+    /// The weather is constant in intervals of at most five minutes; the equation is solved exactly in each.
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         let mut room = self.room;
         for part in step.parts(300.0)? {

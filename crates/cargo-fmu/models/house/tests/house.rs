@@ -1,4 +1,4 @@
-//! The model as an importer simulates it.
+//! Simulations of the model.
 
 use fmu_export::*;
 use house::House;
@@ -30,7 +30,7 @@ fn what_is_no_table_is_rejected() {
     }
 }
 
-/// Small steps and large ones come to the same day.
+/// Small and large steps give the same temperatures.
 #[test]
 fn a_day_does_not_depend_on_the_steps() {
     let day = |steps: f64| {

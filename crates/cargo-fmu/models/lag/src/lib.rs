@@ -1,4 +1,4 @@
-//! A first-order lag as an FMU: the smallest complete model, to grow.
+//! A first-order lag as an FMU: the smallest complete model, to be extended.
 
 use fmu_export::*;
 
@@ -21,7 +21,7 @@ variables! { for Lag;
 impl Model for Lag {
     const INFO: Info = Info {
         description: "First-order lag with time constant 1 s",
-        // No branches and limits: what depends on what is found by trying.
+        // There are no branches and limits, so dependencies are found by trials.
         smooth: true,
         ..info!("Lag", "lag")
     };

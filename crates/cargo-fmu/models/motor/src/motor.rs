@@ -1,8 +1,8 @@
-//! The motor: its voltage is switched on and off at times that are known before, which are time events.
+//! The motor: its voltage is switched on and off at times that are known in advance (time events).
 
 use fmu_export::*;
 
-/// A DC motor with pulse-width modulation: in each period the supply is on for a part that the duty says.
+/// A DC motor with pulse-width modulation: the duty is the part of each period in which the supply is on.
 #[derive(Clone)]
 pub struct Motor {
     duty: f64,
@@ -16,11 +16,11 @@ pub struct Motor {
     constant: f64,
     inertia: f64,
     period: f64,
-    /// When it is switched next, s.
+    /// Time of the next switching, s.
     next: f64,
-    /// Whether a period begins then.
+    /// Whether the next switching begins a period.
     rises: bool,
-    /// When the last one began, s.
+    /// Begin of the last period, s.
     begin: f64,
 }
 
@@ -40,13 +40,13 @@ const PERIOD: Type = Type::real("Period", &units::S).min(1e-5).max(1.0);
 const RATIO: Type = Type::real("Ratio", &units::ONE).min(0.0).max(1.0);
 
 variables! { for Motor, memory in next, rises, begin;
-    /// Part of each period in which the supply is on; what is below 0 or above 1 counts as these
+    /// Part of each period in which the supply is on, limited to 0 and 1
     duty = input(&RATIO) in duty;
-    /// What brakes the shaft
+    /// Torque that brakes the shaft
     load = input(&TORQUE) in load;
-    /// Through the winding
+    /// Current through the winding
     current = output(&CURRENT).state() in current;
-    /// Of the shaft
+    /// Speed of the shaft
     speed = output(&SPEED).state() in speed;
     /// Whether the supply is on
     on = output(&BOOLEAN).exact() in on;
@@ -56,17 +56,17 @@ variables! { for Motor, memory in next, rises, begin;
     /// Rate of the speed
     der_speed as "der(speed)" = local(&ACCELERATION).derivative_of(speed)
         by |motor| motor.rates([motor.current, motor.speed])[1];
-    /// Of the supply
+    /// Voltage of the supply
     supply = parameter(&VOLTAGE) in supply;
-    /// Of the winding
+    /// Resistance of the winding
     resistance = parameter(&RESISTANCE) in resistance;
-    /// Of the winding
+    /// Inductance of the winding
     inductance = parameter(&INDUCTANCE) in inductance;
-    /// Torque for each ampere, and voltage for each rad/s
+    /// Torque per ampere, and voltage per rad/s
     constant = parameter(&CONSTANT) in constant;
-    /// Of the shaft and what turns with it
+    /// Inertia of the shaft and the load
     inertia = parameter(&INERTIA) in inertia;
-    /// From switching on to switching on
+    /// Time between the begins of two periods
     period = parameter(&PERIOD) in period;
 }
 
@@ -80,7 +80,7 @@ impl Motor {
         ]
     }
 
-    /// Switches on where a period begins, off after its part; tells itself when to come back.
+    /// Switches the supply on or off, and sets the time of the next event.
     fn switch(&mut self) {
         let duty = self.duty.clamp(0.0, 1.0);
         if self.rises {
@@ -91,7 +91,7 @@ impl Motor {
         self.next = self.begin + if self.rises { self.period } else { duty * self.period };
     }
 
-    /// Integrates in parts that are short for the winding.
+    /// Integrates in steps that are short compared with the time constant of the winding.
     fn integrate(&mut self, step: Step) -> Result<(), Error> {
         for part in step.parts(0.2 * (self.inductance / self.resistance).min(self.period))? {
             [self.current, self.speed] = rk4([self.current, self.speed], part, |_, state| self.rates(state));
@@ -139,16 +139,16 @@ impl Model for Motor {
 }
 
 impl CoSimulation for Motor {
-    /// Goes from switching to switching.
+    /// Steps from switching to switching.
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         const MOST: f64 = 10_000.0;
         let end = step.time + step.size;
-        // What begins at the end belongs to the next step, also if rounding has it begin just before.
+        // A period that begins at the end belongs to the next step, even if rounding puts its begin just before the end.
         let last = end - 1e-9 * self.period;
         if (end - self.next) / self.period > MOST || end + self.period == end {
             return Err(Error::new(format!("a step may have {MOST} periods, and they must not vanish")));
         }
-        // A step that fails must leave the model as it was.
+        // A step that fails must not change the model.
         let mut motor = self.clone();
         let mut time = step.time;
         while motor.next < last {

@@ -1,4 +1,4 @@
-//! The model as an importer simulates it.
+//! Simulations of the model.
 
 use fmu_export::*;
 use motor::Motor;
@@ -21,7 +21,7 @@ fn always_on_it_follows_the_exact_solution() {
     assert!((speed - exact).abs() < 1e-3, "{speed} instead of {exact}");
 }
 
-/// Without load it turns as fast as the mean voltage has it, whatever the size of the steps.
+/// Without load, the mean voltage determines the speed, at any step size.
 #[test]
 fn the_duty_sets_the_speed() {
     for (size, time) in [(1e-3, 1.0), (0.3e-3, 0.99), (0.1, 1.0)] {

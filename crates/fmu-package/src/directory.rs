@@ -1,11 +1,11 @@
-//! The files of a folder, in the same order on every machine.
+//! The files in a directory, in the same order on every machine.
 
 use anyhow::{Context, Result, bail};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The file itself, or all files of a folder and the folders in it, but hidden ones: what of the name comes after
-/// the folder's, with forward slashes, and the path.
+/// Returns a file, or all files in a directory and its subdirectories except hidden files. The name of each file begins after the
+/// name of the directory, with forward slashes.
 pub(crate) fn files(path: &Path) -> Result<Vec<(String, PathBuf)>> {
     if !fs::metadata(path).with_context(|| format!("cannot read {}", path.display()))?.is_dir() {
         return Ok(vec![(String::new(), path.to_owned())]);
@@ -18,12 +18,12 @@ pub(crate) fn files(path: &Path) -> Result<Vec<(String, PathBuf)>> {
     Ok(all)
 }
 
-/// The names of what is in a folder, but hidden things, sorted.
-pub(crate) fn names(folder: &Path) -> Result<Vec<String>> {
-    let cannot = || format!("cannot read {}", folder.display());
+/// Returns the sorted names of the entries in a directory, except hidden entries.
+pub(crate) fn names(directory: &Path) -> Result<Vec<String>> {
+    let failed = || format!("cannot read {}", directory.display());
     let mut names = Vec::new();
-    for entry in fs::read_dir(folder).with_context(cannot)? {
-        let entry = entry.with_context(cannot)?;
+    for entry in fs::read_dir(directory).with_context(failed)? {
+        let entry = entry.with_context(failed)?;
         let Ok(name) = entry.file_name().into_string() else {
             bail!("the name of {} is not UTF-8; rename it", entry.path().display());
         };

@@ -1,0 +1,91 @@
+//! Malformed models are rejected with a message that names the fault. The compiler rejects others already: see the tests of
+//! fmu-export.
+
+use crate::models::faulty::{FAULT, Faulty};
+use crate::models::{chain::Chain, factors::Factors, room::Room, types::Types};
+use crate::{BOTH, changed, is_expected, read_expected};
+use fmu_export::Exported;
+use fmu_package::{Changes, Standard, describe};
+
+/// Returns the message on a model with changes, which is empty if the model is accepted.
+fn message<M: Exported>(changes: &str, fmi: Standard) -> String {
+    let error = describe(&changed::<M>(changes), fmi, &Changes::default()).err();
+    error.map(|error| format!("{error:#}")).unwrap_or_default()
+}
+
+/// Returns the message on a model with changes, which must be the same in both FMI versions.
+fn message_in_both<M: Exported>(changes: &str) -> String {
+    let [one, other] = BOTH.map(|fmi| message::<M>(changes, fmi));
+    assert_eq!(one, other, "{changes}");
+    one
+}
+
+#[test]
+fn changed_descriptions() {
+    let mut model = "";
+    let mut text = String::new();
+    let cases = read_expected("malformed.txt");
+    for line in cases.lines().filter(|line| !line.starts_with("    ")) {
+        text += &format!("{line}\n");
+        if let Some(name) = line.strip_prefix("== ") {
+            model = name;
+        } else if line.contains('=') && !line.starts_with('#') {
+            let message = match model {
+                "Room" => message_in_both::<Room>(line),
+                "Chain" => message_in_both::<Chain>(line),
+                "Factors" => message_in_both::<Factors>(line),
+                _ => message::<Types>(line, Standard::Fmi3),
+            };
+            text += &if message.is_empty() { message } else { format!("    {message}\n") };
+        }
+    }
+    is_expected("malformed.txt", &text);
+    // Only FMI 3.0 needs this name.
+    assert_eq!(message::<Factors>("variables/u/name=\"time\"", Standard::Fmi2), "");
+}
+
+#[test]
+fn models_that_cannot_be_made() {
+    for (fault, message) in [
+        ("broken", "the model cannot be made for Co-Simulation: it is broken"),
+        ("panic", "the model cannot be made for Co-Simulation: it panics"),
+        ("two-faced", "u starts with 1 in Co-Simulation and with 0 in Model Exchange"),
+        ("unwritable", "the start value of label has a character that XML lacks: \"a\\u{1}\""),
+        ("rejects itself", "these start values make no model: no is no"),
+        (
+            "unreadable",
+            "y cannot be read from a new model: the code behind its `in` or `by` panics, for example because of an index out \
+             of bounds",
+        ),
+        ("not finite", "y is not finite near the start values"),
+        ("indicator", "Faulty: indicators() does not fill in indicator 1"),
+        ("", ""),
+    ] {
+        FAULT.set(fault);
+        assert_eq!(message_in_both::<Faulty>(""), message);
+    }
+}
+
+#[test]
+fn derivatives_that_differ_from_the_values() {
+    for (fault, beginning, function) in [
+        ("partial", "y with respect to u is ", "by Partials::partial,"),
+        ("no number", "y with respect to u is NaN", "by Partials::partial,"),
+        (
+            "initial_partial",
+            "y with respect to u in Initialization Mode is ",
+            "by Partials::initial_partial,",
+        ),
+        ("partial_by_time", "y with respect to time is ", "by Partials::partial_by_time,"),
+    ] {
+        FAULT.set(fault);
+        for (fmi, interface) in BOTH.into_iter().flat_map(|fmi| [(fmi, ""), (fmi, "modelExchange=null")]) {
+            let text = message::<Faulty>(interface, fmi);
+            // Time is no variable of the model, so FMI 2.0 has no derivatives with respect to it.
+            let is_accepted = fault == "partial_by_time" && fmi == Standard::Fmi2;
+            let is_named =
+                text.starts_with(&format!("the derivative of {beginning}")) && text.contains(function);
+            assert!(if is_accepted { text.is_empty() } else { is_named }, "{fault}, {fmi}: {text}");
+        }
+    }
+}

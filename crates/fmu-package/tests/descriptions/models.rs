@@ -1,0 +1,691 @@
+//! The test models. Together they use everything that a description can contain.
+
+use fmu_export::*;
+use std::cell::RefCell;
+
+/// Models of Co-Simulation whose steps calculate nothing.
+macro_rules! no_step {
+    ($($fact:ident: $type:ty = $value:expr;)*) => {
+        $(const $fact: $type = $value;)*
+
+        fn step(&mut self, _: Step) -> Result<Stepped, Error> {
+            Ok(Stepped::Done)
+        }
+    };
+}
+
+/// Everything that FMI 2.0 and FMI 3.0 have in common.
+pub mod room {
+    use super::*;
+
+    enumeration! {
+        /// Stage of the heater.
+        pub enum Heater {
+            /// Nothing
+            Off = 0,
+            /// Warms <gently>
+            Low = 2,
+            /// Warms
+            High = 5,
+        }
+    }
+
+    const HEATER: Type = Type::enumeration("Heater", <Heater as Enumeration>::ITEMS);
+    const CELSIUS: Unit = Unit::new("degC").K(1).offset(273.15).display("degF", 1.8, 32.0);
+    const TEMPERATURE: Type = Type::real("ThermodynamicTemperature", &CELSIUS).nominal(20.0).min(-273.15);
+    const BASES: Unit = Unit::new("all").kg(1).m(-2).s(3).A(-4).K(5).mol(-6).cd(7).rad(-8).factor(0.001);
+    const STRANGE: Type = Type { name: "", ..Type::real("Strange", &BASES).max(1.0) };
+    const SHARE: Type = Type::integer("Share").max_integer(100);
+    const ALARMS: Type = Type::integer("Alarms").min_integer(0);
+
+    #[derive(Clone)]
+    pub struct Room {
+        time: f64,
+        outside: f64,
+        setpoint: f64,
+        heater: Heater,
+        open: bool,
+        comment: String,
+        temperature: f64,
+        guess: f64,
+        alarms: i32,
+        power: f64,
+        label: String,
+        share: i32,
+    }
+
+    variables! { for Room;
+        /// Time
+        time = independent(&TIME);
+        /// Outside temperature
+        outside = input(&TEMPERATURE) in outside;
+        /// Requested stage
+        heater = input(&HEATER) in heater;
+        /// Whether the window is open
+        open = input(&BOOLEAN) in open;
+        /// Note of the operator
+        comment = input(&STRING) in comment;
+        /// Setpoint that changes at communication points only
+        setpoint = input(&TEMPERATURE).discrete() in setpoint;
+        /// Temperature
+        temperature = output(&TEMPERATURE).state().reinit() in temperature;
+        /// Its rate
+        rate as "der(temperature)" = local(&NUMBER).derivative_of(temperature)
+            by |room| room.power * f64::from(room.heater.number()) - room.temperature + room.outside;
+        /// Temperature of the wall, found from a guess
+        wall = local(&TEMPERATURE).state().approx() in guess;
+        /// Its rate
+        wall_rate as "der(wall)" = local(&NUMBER).derivative_of(wall) by |room| room.temperature - room.guess;
+        /// Alarms so far
+        alarms = output(&ALARMS).exact() in alarms;
+        /// Whether it is too warm
+        warm = output(&BOOLEAN) by |room| room.temperature > 25.0;
+        /// Present stage
+        heater_now = output(&HEATER) by |room| room.heater;
+        /// Text on the display
+        display = output(&STRING) by |room| format!("{} {}", room.label, room.comment);
+        /// Sine of the time
+        wave = output(&NUMBER) by |room| room.time.sin();
+        /// Version of the room
+        version = output(&INTEGER).constant() by |_| 7;
+        /// All base units
+        strange = local(&STRANGE).constant() by |_| 0.5;
+        /// Power per stage
+        power = parameter(&NUMBER) in power;
+        /// Double the power
+        double = calculated_parameter(&NUMBER) by |room| 2.0 * room.power;
+        /// Title of the display
+        label = parameter(&STRING).tunable() in label;
+        /// Half the share, as it was in the beginning
+        half = local(&INTEGER).fixed() by |room| room.share / 2;
+        /// Share of the heat that comes back, %
+        share = parameter(&SHARE) in share;
+    }
+
+    impl Model for Room {
+        const INFO: Info = Info {
+            smooth: true,
+            description: "A \"room\"",
+            author: "A. Uthor",
+            version: "1",
+            license: "MIT",
+            copyright: "(c)",
+            ..Info::new("Room", "room", "{room}")
+        };
+
+        fn new(_: &Setup) -> Result<Self, Error> {
+            Ok(Self {
+                time: 0.0,
+                outside: 10.0,
+                setpoint: 21.0,
+                heater: Heater::Low,
+                open: false,
+                comment: String::new(),
+                temperature: 20.0,
+                guess: 15.0,
+                alarms: 3,
+                power: 1.5,
+                label: "a \"b\"\n< c".into(),
+                share: 50,
+            })
+        }
+
+        fn initialize(&mut self, _: &Experiment) -> Result<(), Error> {
+            self.guess = 0.5 * (self.temperature + self.outside);
+            Ok(())
+        }
+
+        fn calculate(&mut self, time: f64) {
+            self.time = time;
+        }
+    }
+
+    impl ModelExchange for Room {
+        const INDICATORS: usize = 2;
+        const STEP_COMPLETED: bool = true;
+
+        fn indicators(&self, indicators: &mut [f64]) {
+            indicators.fill(0.0);
+        }
+    }
+
+    impl CoSimulation for Room {
+        no_step! { VARIABLE_STEP_SIZE: bool = false; EVENTS: Events = Events::StopIfHandled; }
+    }
+
+    impl InputDerivatives for Room {
+        fn set_input_derivative(&mut self, _: Name, _: u32, _: f64) {}
+    }
+
+    impl OutputDerivatives for Room {
+        const HIGHEST: u32 = 2;
+
+        fn output_derivative(&self, _: Name, _: u32) -> f64 {
+            0.0
+        }
+    }
+
+    offer!(Room: ModelExchange + CoSimulation + InputDerivatives + OutputDerivatives);
+}
+
+/// The types that only FMI 3.0 has, a time that is no variable of the model, and a derivative that is a state.
+pub mod types {
+    use super::*;
+
+    const SINGLE: Type = Type::float32("Single", &units::ONE).max(0.1);
+    const BYTE: Type = Type::whole("Byte", BaseType::UInt8).max_integer(200);
+    const SMALL: Type = Type::whole("", BaseType::Int8);
+    const SHORT: Type = Type::whole("", BaseType::Int16);
+    const PORT: Type = Type::whole("", BaseType::UInt16);
+    const COUNT: Type = Type::whole("", BaseType::UInt32);
+    const LONG: Type = Type::whole("", BaseType::Int64);
+    const HUGE: Type = Type::whole("Huge", BaseType::UInt64).min_integer(1);
+    const IMAGE: Type = Type::binary("Image", "image/png").max_size(4);
+
+    #[derive(Clone)]
+    pub struct Types {
+        time: f64,
+        single: f32,
+        small: i8,
+        byte: u8,
+        short: i16,
+        port: u16,
+        count: u32,
+        long: i64,
+        huge: u64,
+        image: Vec<u8>,
+        angle: f64,
+        speed: f64,
+    }
+
+    variables! { for Types;
+        /// Single precision
+        single = input(&SINGLE) in single;
+        /// Twice that
+        double = output(&SINGLE) by |model| 2.0 * model.single;
+        /// Eight bits
+        small = parameter(&SMALL) in small;
+        /// Eight bits without sign
+        byte = input(&BYTE) in byte;
+        /// Sixteen bits
+        short = parameter(&SHORT) in short;
+        /// Sixteen bits without sign
+        port = parameter(&PORT).tunable() in port;
+        /// 32 bits without sign
+        count = output(&COUNT).exact() in count;
+        /// 64 bits
+        long = parameter(&LONG) in long;
+        /// 64 bits without sign
+        huge = parameter(&HUGE) in huge;
+        /// Bytes
+        image = input(&IMAGE) in image;
+        /// The same bytes
+        copy = output(&IMAGE) by |model| model.image.clone();
+        /// Sine of the time
+        wave = output(&NUMBER) by |model| model.time.sin();
+        /// Angle
+        angle = local(&NUMBER).state() in angle;
+        /// Its derivative, which is also a state
+        speed = output(&NUMBER).state().derivative_of(angle) in speed;
+        /// The derivative of the speed
+        acceleration = local(&NUMBER).derivative_of(speed) by |model| -model.angle;
+    }
+
+    impl Model for Types {
+        const INFO: Info = Info { smooth: true, ..Info::new("Types", "types", "{types}") };
+
+        fn new(_: &Setup) -> Result<Self, Error> {
+            Ok(Self {
+                time: 0.0,
+                single: 0.1,
+                small: -128,
+                byte: 3,
+                short: -5,
+                port: 65535,
+                count: 4_000_000_000,
+                long: i64::MIN,
+                huge: u64::MAX,
+                image: vec![0, 0xAB],
+                angle: 1.0,
+                speed: 0.0,
+            })
+        }
+
+        fn calculate(&mut self, time: f64) {
+            self.time = time;
+        }
+    }
+
+    impl ModelExchange for Types {
+        const INDICATORS: usize = 2;
+
+        fn indicators(&self, indicators: &mut [f64]) {
+            indicators.fill(0.0);
+        }
+    }
+
+    impl CoSimulation for Types {
+        no_step! { EVENTS: Events = Events::Stop; }
+    }
+
+    offer!(Types: ModelExchange + CoSimulation);
+}
+
+/// Dependencies with factors that are constant, fixed, or neither.
+pub mod factors {
+    use super::*;
+
+    const SHARE: Type = Type::real("Share", &units::ONE).min(0.0).max(1.0);
+    const COUNT: Type = Type::integer("Count").min_integer(-9).max_integer(3);
+
+    #[derive(Clone)]
+    pub struct Factors {
+        u: f64,
+        v: f64,
+        x: f64,
+        p: f64,
+        n: i32,
+        b: bool,
+    }
+
+    variables! { for Factors;
+        /// Input
+        u = input(&NUMBER) in u;
+        /// Input with <signs> & "quotes"
+        v = input(&NUMBER) in v;
+        /// State
+        x = output(&NUMBER).state() in x;
+        /// 3 u - p x
+        der_x as "der(x)" = local(&NUMBER).derivative_of(x) by |model| 3.0 * model.u - model.p * model.x;
+        /// 2 u + n x
+        y = output(&NUMBER) by |model| 2.0 * model.u + f64::from(model.n) * model.x;
+        /// x v, or x if not b
+        z = output(&NUMBER) by |model| model.x * if model.b { model.v } else { 1.0 };
+        /// Five; the input cancels, up to rounding
+        five = output(&NUMBER) by |model| (model.u / 3.0 + 5.0) - model.u / 3.0;
+        /// Real parameter
+        p = parameter(&SHARE) in p;
+        /// Integer parameter
+        n = parameter(&COUNT) in n;
+        /// Boolean parameter
+        b = parameter(&BOOLEAN) in b;
+    }
+
+    impl Model for Factors {
+        const INFO: Info = Info {
+            default_experiment: DefaultExperiment {
+                start_time: 0.5,
+                stop_time: 2.0,
+                step_size: 1e-3,
+                tolerance: 1e-7,
+            },
+            smooth: true,
+            ..Info::new("Factors", "factors", "{factors}")
+        };
+
+        fn new(_: &Setup) -> Result<Self, Error> {
+            Ok(Self { u: 0.0, v: 0.0, x: 2.0, p: 0.1, n: 1, b: true })
+        }
+
+        fn update(&mut self) -> Result<(), Error> {
+            match self.p < f64::from(self.n) / 20.0 {
+                true => Err(Error::new("p is too small for n")),
+                false => Ok(()),
+            }
+        }
+    }
+
+    impl CoSimulation for Factors {
+        no_step! { ENDS_EARLY: bool = true; }
+    }
+
+    impl ModelExchange for Factors {}
+
+    impl Partials for Factors {
+        fn partial(&self, unknown: Name, known: Name) -> Option<f64> {
+            let (z_x, z_v) = if self.b { (self.v, self.x) } else { (1.0, 0.0) };
+            Some(match (unknown, known) {
+                (Name::der_x, Name::u) => 3.0,
+                (Name::der_x, Name::x) => -self.p,
+                (Name::der_x, Name::p) => -self.x,
+                (Name::y, Name::u) => 2.0,
+                (Name::y, Name::x) => f64::from(self.n),
+                (Name::z, Name::x) => z_x,
+                (Name::z, Name::v) => z_v,
+                (Name::x, Name::x) => 1.0,
+                _ => 0.0,
+            })
+        }
+    }
+
+    offer!(Factors: CoSimulation + ModelExchange + Partials);
+}
+
+/// Arrays of every kind, whose elements have different dependencies: an array depends as the least constant of its elements.
+pub mod chain {
+    use super::*;
+
+    enumeration! {
+        /// Kind of an end.
+        pub enum End {
+            Free = 0,
+            /// It does not move
+            Fixed = 3,
+        }
+    }
+
+    const END: Type = Type::enumeration("End", <End as Enumeration>::ITEMS);
+    const LIMIT: Type = Type::real("Limit", &units::ONE).min(-50.0);
+    const COUNT: Type = Type::integer("Count").min_integer(0).max_integer(9);
+
+    #[derive(Clone)]
+    pub struct Chain {
+        x: [f64; 2],
+        u: [f64; 2],
+        p: f64,
+        ends: [End; 2],
+        limits: [[f64; 2]; 2],
+        moved: [bool; 2],
+        counted: [i32; 2],
+        labels: [String; 2],
+    }
+
+    variables! { for Chain;
+        /// States
+        x = output(&NUMBER).state() in x;
+        /// The first input; p times the first state plus the sine of the second input
+        der_x as "der(x)" = local(&NUMBER).derivative_of(x) by |c| [c.u[0], c.p * c.x[0] + c.u[1].sin()];
+        /// Inputs
+        u = input(&NUMBER) in u;
+        /// Parameter
+        p = parameter(&NUMBER) in p;
+        /// Kinds of the ends
+        ends = input(&END) in ends;
+        /// Limits of the states
+        limits = parameter(&LIMIT) in limits;
+        /// Whether the states have moved
+        moved = output(&BOOLEAN).exact().depends_on(&[]) in moved;
+        /// Numbers
+        counted = parameter(&COUNT) in counted;
+        /// Labels of the ends
+        labels = parameter(&STRING) in labels;
+        /// Reports on the ends
+        reports = output(&STRING).depends_on(&[ends, labels])
+            by |c| [0, 1].map(|i| format!("{}{}", c.labels[i], c.ends[i] == End::Fixed));
+    }
+
+    impl Model for Chain {
+        const INFO: Info = Info { smooth: true, ..Info::new("Chain", "chain", "{chain}") };
+
+        fn new(_: &Setup) -> Result<Self, Error> {
+            Ok(Self {
+                x: [1.0, 2.0],
+                u: [0.5, 0.25],
+                p: 3.0,
+                ends: [End::Fixed, End::Free],
+                limits: [[10.0, 25.0], [12.5, 30.0]],
+                moved: [true, false],
+                counted: [1, 2],
+                labels: ["the <left> end".to_owned(), "the right end".to_owned()],
+            })
+        }
+
+        fn update(&mut self) -> Result<(), Error> {
+            match self.limits.iter().all(|[low, high]| low <= high) {
+                true => Ok(()),
+                false => Err(Error::new("the limits must be a lower one and an upper one")),
+            }
+        }
+    }
+
+    impl ModelExchange for Chain {
+        const INDICATORS: usize = 1;
+
+        fn indicators(&self, indicators: &mut [f64]) {
+            indicators.fill(self.x[0]);
+        }
+    }
+
+    impl Partials for Chain {
+        fn partial(&self, unknown: Name, known: Name) -> Option<f64> {
+            self.element_partial((unknown, 0), Some((known, 0)), false)
+        }
+
+        fn element_partial(
+            &self,
+            unknown: (Name, usize),
+            known: Option<(Name, usize)>,
+            _: bool,
+        ) -> Option<f64> {
+            Some(match (unknown, known) {
+                ((Name::x, i), Some((Name::x, j))) => f64::from(u8::from(i == j)),
+                ((Name::der_x, 0), Some((Name::u, 0))) => 1.0,
+                ((Name::der_x, 1), Some((Name::x, 0))) => self.p,
+                ((Name::der_x, 1), Some((Name::u, 1))) => self.u[1].cos(),
+                (_, Some((Name::p, _))) => return None,
+                _ => 0.0,
+            })
+        }
+    }
+
+    impl CoSimulation for Chain {
+        no_step! {}
+    }
+
+    offer!(Chain: ModelExchange + CoSimulation + Partials);
+}
+
+/// Branches and memory, which no trial near the start values can find.
+pub mod branches {
+    use super::*;
+
+    #[derive(Clone, Default)]
+    pub struct Branches {
+        u: f64,
+        v: f64,
+        sum: f64,
+        gain: f64,
+        stepped: bool,
+    }
+
+    impl Branches {
+        fn above(&self) -> f64 {
+            if self.u > 10.0 { self.u } else { 0.0 }
+        }
+    }
+
+    variables! { for Branches, memory in sum, stepped;
+        /// Input
+        u = input(&NUMBER) in u;
+        /// Input
+        v = input(&NUMBER) in v;
+        /// u if it is above 10, else 0
+        above = output(&NUMBER) by |model| model.above();
+        /// u within 100, plus v after the first step
+        limited = output(&NUMBER)
+            by |model| model.u.clamp(-100.0, 100.0) + if model.stepped { model.v } else { 0.0 };
+        /// The same as above
+        declared = output(&NUMBER).depends_on(&[u]) by |model| model.above();
+        /// The sum of u at the steps before, times the gain
+        sum = output(&NUMBER).depends_on(&[gain]) by |model| model.gain * (1.0 + model.sum);
+        /// One
+        timed = output(&NUMBER).depends_on(&[Index::TIME]) by |_| 1.0;
+        /// Factor
+        gain = parameter(&NUMBER) in gain;
+    }
+
+    impl Model for Branches {
+        const INFO: Info = Info::new("Branches", "branches", "{branches}");
+
+        fn new(_: &Setup) -> Result<Self, Error> {
+            Ok(Self { gain: 1.0, ..Self::default() })
+        }
+    }
+
+    impl CoSimulation for Branches {
+        fn step(&mut self, _: Step) -> Result<Stepped, Error> {
+            self.sum += self.u;
+            self.stepped = true;
+            Ok(Stepped::Done)
+        }
+    }
+
+    impl Partials for Branches {
+        fn partial(&self, unknown: Name, known: Name) -> Option<f64> {
+            Some(match (unknown, known) {
+                (Name::above | Name::declared, Name::u) => f64::from(self.u > 10.0),
+                (Name::limited, Name::u) => f64::from(self.u.abs() < 100.0),
+                (Name::limited, Name::v) => f64::from(self.stepped),
+                (Name::sum, Name::gain) => 1.0 + self.sum,
+                _ => 0.0,
+            })
+        }
+    }
+
+    offer!(Branches: CoSimulation + Partials);
+}
+
+/// A characteristic with breakpoints that must rise, or be evenly spaced.
+pub mod breakpoints {
+    use super::*;
+
+    pub const LENGTH: usize = 20;
+
+    thread_local! {
+        /// Start values of the breakpoints, and whether their distances must be equal.
+        pub static BREAKPOINTS: RefCell<([f64; LENGTH], bool)> = const { RefCell::new(([0.0; LENGTH], false)) };
+    }
+
+    #[derive(Clone)]
+    pub struct Breakpoints {
+        u: f64,
+        x: [f64; LENGTH],
+    }
+
+    variables! { for Breakpoints;
+        /// Input
+        u = input(&NUMBER) in u;
+        /// Breakpoints
+        x = parameter(&NUMBER) in x;
+        /// Sum of the breakpoints, times the input
+        y = output(&NUMBER) by |model| model.u * model.x.iter().sum::<f64>();
+    }
+
+    impl Model for Breakpoints {
+        const INFO: Info = Info { smooth: true, ..Info::new("Breakpoints", "breakpoints", "{breakpoints}") };
+
+        fn new(_: &Setup) -> Result<Self, Error> {
+            Ok(Self { u: 1.0, x: BREAKPOINTS.with_borrow(|(start, _)| *start) })
+        }
+
+        fn update(&mut self) -> Result<(), Error> {
+            let fits = match BREAKPOINTS.with_borrow(|(_, even)| *even) {
+                true => self.x.windows(3).all(|x| (x[2] - 2.0 * x[1] + x[0]).abs() < 1e-9),
+                false => self.x.is_sorted_by(|one, next| one < next),
+            };
+            if fits { Ok(()) } else { Err(Error::new("the breakpoints do not fit")) }
+        }
+    }
+
+    impl CoSimulation for Breakpoints {
+        no_step! {}
+    }
+
+    offer!(Breakpoints: CoSimulation);
+}
+
+/// Faults that a description in JSON cannot contain, one at a time.
+pub mod faulty {
+    use super::*;
+
+    thread_local! {
+        /// The fault that the model has.
+        pub static FAULT: RefCell<&'static str> = const { RefCell::new("") };
+    }
+
+    fn has(fault: &str) -> bool {
+        FAULT.with_borrow(|present| *present == fault)
+    }
+
+    #[derive(Clone)]
+    pub struct Faulty {
+        u: f64,
+        label: String,
+        time: f64,
+    }
+
+    variables! { for Faulty;
+        /// Input
+        u = input(&NUMBER) in u;
+        /// Label
+        label = parameter(&STRING) in label;
+        /// Square of the input, plus the time
+        y = output(&NUMBER).depends_on(&[u, Index::TIME]) by |model| {
+            assert!(!has("unreadable"));
+            let offset = if has("not finite") { f64::NAN } else { model.time };
+            model.u * model.u + offset
+        };
+    }
+
+    impl Model for Faulty {
+        const INFO: Info = Info::new("Faulty", "faulty", "{faulty}");
+
+        fn new(setup: &Setup) -> Result<Self, Error> {
+            if has("broken") {
+                return Err(Error::new("it is broken"));
+            }
+            assert!(!has("panic"), "it panics");
+            let u = if has("two-faced") { f64::from(setup.interface as u8) } else { 0.0 };
+            let label = if has("unwritable") { "a\u{1}" } else { "" };
+            Ok(Self { u, label: label.to_owned(), time: 0.0 })
+        }
+
+        fn update(&mut self) -> Result<(), Error> {
+            if has("rejects itself") { Err(Error::new("no is no")) } else { Ok(()) }
+        }
+
+        fn calculate(&mut self, time: f64) {
+            self.time = time;
+        }
+    }
+
+    impl CoSimulation for Faulty {
+        no_step! {}
+    }
+
+    impl ModelExchange for Faulty {
+        const INDICATORS: usize = 2;
+
+        fn indicators(&self, indicators: &mut [f64]) {
+            indicators[0] = self.u;
+            if !has("indicator") {
+                indicators[1] = self.u;
+            }
+        }
+    }
+
+    impl Partials for Faulty {
+        fn partial(&self, _: Name, _: Name) -> Option<f64> {
+            Some(
+                self.u
+                    * if has("partial") {
+                        2.001
+                    } else if has("no number") {
+                        f64::NAN
+                    } else {
+                        2.0
+                    },
+            )
+        }
+
+        fn initial_partial(&self, _: Name, _: Name) -> Option<f64> {
+            Some(self.u * if has("initial_partial") { 0.0 } else { 2.0 })
+        }
+
+        fn partial_by_time(&self, _: Name) -> Option<f64> {
+            Some(if has("partial_by_time") { 0.0 } else { 1.0 })
+        }
+    }
+
+    offer!(Faulty: CoSimulation + ModelExchange + Partials);
+}
