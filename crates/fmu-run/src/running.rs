@@ -2,10 +2,10 @@
 
 use crate::instance::{Instance, Saved};
 use crate::rejection::{Message, Rejection};
-use crate::selection::{Place, Selection};
+use crate::selection::{Selection, Target};
 use crate::start::StartValues;
 use crate::system::{Exchange, Order, System};
-use fmi_abi::{BaseType, Interface};
+use fmi_abi::Interface;
 
 /// One instance of each component; each function acts on all of them. A single FMU is a system with one
 /// component and no connections.
@@ -61,18 +61,14 @@ impl Running {
         }
         let numbers: Vec<_> = start.numbers(of).collect();
         // One call sets values that must be consistent, such as the elements of an array that must increase.
-        let is_real = |index: &Place, part: usize| index.part == part && index.base == BaseType::Real;
-        for together in
-            numbers.chunk_by(|(one, _), (next, _)| is_real(one, next.part) && is_real(next, one.part))
-        {
-            let (Place { part, base, reference }, value) = together[0];
-            if together.len() == 1 {
-                self.parts[part].set_number(base, reference, value)?;
-                continue;
-            }
-            let (references, values): (Vec<u32>, Vec<f64>) =
-                together.iter().map(|(index, value)| (index.reference, *value)).unzip();
-            self.parts[part].set_reals(&references, &values)?;
+        let together = |(one, _): &(Target, f64), (next, _): &(Target, f64)| {
+            (one.part, one.base) == (next.part, next.base)
+        };
+        for group in numbers.chunk_by(together) {
+            let Target { part, base, .. } = group[0].0;
+            let (references, values): (Vec<_>, Vec<_>) =
+                group.iter().map(|(target, value)| (target.reference, *value)).unzip();
+            self.parts[part].set_numbers(base, &references, &values)?;
         }
         self.each(|_, instance| instance.enter_initialization_mode(start_time, stop_time))
     }
@@ -186,7 +182,7 @@ impl Running {
         Ok(())
     }
 
-    pub fn get_text(&mut self, index: Place) -> Result<String, Rejection> {
+    pub fn get_text(&mut self, index: Target) -> Result<String, Rejection> {
         self.pass_on()?;
         self.parts[index.part].get_text(index.reference)
     }

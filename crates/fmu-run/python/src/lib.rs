@@ -263,7 +263,9 @@ fn carry_out(
     // `Receiver` is not `Sync`, so `detach` needs a mutex around it.
     let receiver = Mutex::new(receiver);
     std::thread::scope(|scope| {
-        scope.spawn(|| sender.send(planned.run(&watch, trajectories, measures)));
+        let watch = &watch;
+        // A panic drops the sender, which ends the loop.
+        scope.spawn(move || sender.send(planned.run(watch, trajectories, measures)));
         let mut raised = None;
         loop {
             let waited =

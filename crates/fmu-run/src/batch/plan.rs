@@ -26,44 +26,7 @@ pub(super) struct Plan<'a> {
 #[derive(Default)]
 pub(super) struct Inputs<'a> {
     pub variables: Selection,
-    pub values: Vec<Values<'a>>,
-}
-
-/// Values by run and time.
-#[derive(Clone, Copy)]
-pub(super) struct Values<'a> {
-    values: &'a [f64],
-    constant: f64,
-    /// Increments of the index from one run to the next and from one time to the next; 0 if the values are
-    /// equal.
-    of_run: usize,
-    of_time: usize,
-}
-
-impl<'a> Values<'a> {
-    /// Returns the values of a run, by time.
-    pub fn of_run(&self, run: usize) -> ByTime<'a> {
-        let values = &self.values[(run * self.of_run).min(self.values.len())..];
-        match self.of_time {
-            0 => ByTime { values: &[], constant: values.first().copied().unwrap_or(self.constant) },
-            _ => ByTime { values, constant: self.constant },
-        }
-    }
-}
-
-/// Values of one run.
-#[derive(Clone, Copy)]
-pub(super) struct ByTime<'a> {
-    values: &'a [f64],
-    constant: f64,
-}
-
-impl ByTime<'_> {
-    /// Returns the value at the time with this index.
-    #[inline]
-    pub fn at(&self, time: usize) -> f64 {
-        self.values.get(time).copied().unwrap_or(self.constant)
-    }
+    pub values: Vec<Trajectory<'a>>,
 }
 
 impl<'a> Plan<'a> {
@@ -109,44 +72,36 @@ impl<'a> Plan<'a> {
                 ));
             }
             once(&mut seen, name, "inputs")?;
-            self.inputs.values.push(self.trajectory(name, of.base, *trajectory)?);
+            self.inputs.values.push(self.checked(name, of.base, *trajectory)?);
             self.inputs.variables.push(name, &variables);
         }
         let mut seen = Vec::new();
         for (name, trajectory) in &batch.input_derivatives {
             let variables = system.takes_input_derivative(name)?;
             once(&mut seen, name, "input derivatives")?;
-            self.derivatives.values.push(self.trajectory(name, BaseType::Real, *trajectory)?);
+            self.derivatives.values.push(self.checked(name, BaseType::Real, *trajectory)?);
             self.derivatives.variables.push(name, &variables);
         }
         Ok(())
     }
 
-    fn trajectory(
+    /// Checks the values of an input.
+    fn checked(
         &self,
         name: &str,
         base: BaseType,
         trajectory: Trajectory<'a>,
-    ) -> Result<Values<'a>, Error> {
+    ) -> Result<Trajectory<'a>, Error> {
         let times = self.time.len();
-        let shared = Values { values: &[], constant: 0.0, of_run: 0, of_time: 0 };
-        match trajectory {
-            Trajectory::Constant(value) => {
-                fits(name, base, &[value])?;
-                Ok(Values { constant: value, ..shared })
+        let values = match &trajectory {
+            Trajectory::Constant(value) => std::slice::from_ref(value),
+            Trajectory::Shared(values) if values.len() != times => {
+                return request(format!("{name} has {} values for {times} times", values.len()));
             }
-            Trajectory::Shared(values) => {
-                if values.len() != times {
-                    return request(format!("{name} has {} values for {times} times", values.len()));
-                }
-                fits(name, base, values)?;
-                Ok(Values { values, of_time: 1, ..shared })
-            }
-            Trajectory::EachRun(values) => {
-                fits(name, base, values)?;
-                Ok(Values { values, of_run: times, of_time: 1, ..shared })
-            }
-        }
+            Trajectory::Shared(values) | Trajectory::EachRun(values) => values,
+        };
+        fits(name, base, values)?;
+        Ok(trajectory)
     }
 }
 
