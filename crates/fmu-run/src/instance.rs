@@ -1,7 +1,7 @@
 //! An instance of an FMU of any version. Safe functions wrap the C calls: they check lengths, keep the
 //! library loaded, and call nothing after fmi2Fatal.
 
-use crate::arrays::{Arrays, Whole};
+use crate::arrays::{Arrays, Expanded};
 use crate::fmu::Loaded;
 use crate::library::{Functions, Library};
 use crate::log::{Log, log_of_fmi3, logger_of_fmi2};
@@ -71,7 +71,7 @@ pub enum Continuous {
 }
 
 /// Limit of iterations of an event.
-const MOST_ROUNDS: usize = 10_000;
+const MOST_ITERATIONS: usize = 10_000;
 
 // SAFETY: the FMI standards permit use of an instance from any thread, one thread at a time.
 unsafe impl Send for Instance {}
@@ -179,10 +179,11 @@ impl Instance {
         };
         if handle.is_null() {
             let log = log.take();
-            let mute = || format!("{} makes no instance, and logs no message", fmu.description.model_name);
-            let why = reason(&log).map_or_else(mute, |message| message.text.trim().to_owned());
-            let of = if component.is_empty() { String::new() } else { format!("{component}: ") };
-            return Err((of + &why, log.is_empty()));
+            let no_message =
+                || format!("{} makes no instance, and logs no message", fmu.description.model_name);
+            let why = reason(&log).map_or_else(no_message, |message| message.text.trim().to_owned());
+            let prefix = if component.is_empty() { String::new() } else { format!("{component}: ") };
+            return Err((prefix + &why, log.is_empty()));
         }
         let (saved, name) = (Vec::new(), component.to_owned());
         let (arrays, early) = (Arc::clone(&fmu.description.arrays), Some(EarlyValues::default()));
@@ -288,14 +289,14 @@ impl Instance {
     /// Gets time derivatives of outputs, of order 1.
     pub(crate) fn get_output_derivatives(&mut self, vr: &[u32], values: &mut [f64]) -> Result<(), Rejection> {
         assert_eq!(vr.len(), values.len());
-        let Whole { references, count, indices, .. } = self.arrays.whole(vr);
+        let Expanded { references, count, indices, .. } = self.arrays.expanded(vr);
         let (orders, mut all) = (vec![1; references.len()], vec![0.0; count]);
-        let (vr, n, orders, whole) =
+        let (vr, n, orders, all_values) =
             (references.as_ptr(), references.len(), orders.as_ptr(), all.as_mut_ptr());
         call!(
             self,
-            fmi2GetRealOutputDerivatives(vr, n, orders, whole),
-            fmi3GetOutputDerivatives(vr, n, orders, whole, count)
+            fmi2GetRealOutputDerivatives(vr, n, orders, all_values),
+            fmi3GetOutputDerivatives(vr, n, orders, all_values, count)
         )?;
         indices.iter().zip(values).for_each(|(index, value)| *value = all[*index]);
         Ok(())
@@ -328,17 +329,17 @@ impl Instance {
             return rejection;
         }
         // SAFETY: the instance is alive after fmi2Discard; the pointers are live references.
-        let [asked, told] = unsafe {
+        let [terminated, last_time] = unsafe {
             [
                 (functions.fmi2GetBooleanStatus)(self.handle, kinds[0], &mut wanted),
                 (functions.fmi2GetRealStatus)(self.handle, kinds[1], &mut reached),
             ]
         };
-        if asked != Status::Ok as c_int || wanted == fmi2False {
+        if terminated != Status::Ok as c_int || wanted == fmi2False {
             return rejection;
         }
-        let told = told == Status::Ok as c_int && reached.is_finite();
-        rejection.at_end(if told { reached } else { time })
+        let is_known = last_time == Status::Ok as c_int && reached.is_finite();
+        rejection.at_end(if is_known { reached } else { time })
     }
 
     /// Returns the error for a requested end of the simulation, or for an early return, which was not allowed
@@ -422,7 +423,7 @@ impl Instance {
         if !self.arrays.among(unknowns) && !self.arrays.among(knowns) {
             return self.derivative_of_variables(unknowns, knowns, seed, result);
         }
-        let (unknowns, knowns) = (self.arrays.whole(unknowns), self.arrays.whole(knowns));
+        let (unknowns, knowns) = (self.arrays.expanded(unknowns), self.arrays.expanded(knowns));
         // The seed of all other elements is 0.
         let (mut seeds, mut results) = (vec![0.0; knowns.count], vec![0.0; unknowns.count]);
         knowns.indices.iter().zip(seed).for_each(|(index, seed)| seeds[*index] += seed);
@@ -460,7 +461,7 @@ impl Instance {
     /// Updates the discrete states until the event is over. The instance must be in Event Mode.
     pub(crate) fn event(&mut self) -> Result<Event, Rejection> {
         let mut all = Event::default();
-        for _ in 0..MOST_ROUNDS {
+        for _ in 0..MOST_ITERATIONS {
             let mut of_fmi2 = fmi2EventInfo::default();
             let [mut again, mut terminate, mut nominals, mut states, mut is_next] = [fmi3False; 5];
             let mut next = 0.0;
@@ -493,7 +494,7 @@ impl Instance {
                 return Ok(all);
             }
         }
-        let text = format!("the event does not come to an end in {MOST_ROUNDS} rounds");
+        let text = format!("the event does not end within {MOST_ITERATIONS} iterations");
         let message = Message { status: Status::Error, category: String::new(), text };
         Err(self.rejection("event", Status::Error, vec![message]))
     }

@@ -110,7 +110,7 @@ impl System {
         }
         if setup.count > 1 && self.once_per_process(setup.interface) {
             return request(format!(
-                "{} can be there only once in a process (canBeInstantiatedOnlyOncePerProcess)",
+                "{} can have only one instance per process (canBeInstantiatedOnlyOncePerProcess)",
                 self.name()
             ));
         }
@@ -557,8 +557,8 @@ impl Instances {
     /// Returns [`Error::Request`] if the variable is unknown or no string.
     pub fn texts(&mut self, name: &str) -> Result<Vec<Option<String>>, Error> {
         let found = self.system.find_first(name)?;
-        if found.of.base != BaseType::String {
-            return request(format!("{name} is {}, no text", found.of.what()));
+        if found.variable.base != BaseType::String {
+            return request(format!("{name} is {}, not a string", found.variable.kind_in_words()));
         }
         let index = Target::of(found);
         let mut texts = vec![None; self.len()];
@@ -665,7 +665,7 @@ fn each(
     body: impl Fn(usize, &mut One) + Sync,
 ) {
     if let Some(mask) = mask {
-        assert_eq!(mask.len(), all.len(), "a truth value for each instance");
+        assert_eq!(mask.len(), all.len(), "a Boolean for each instance");
     }
     in_parts(pool, all, 0, &mut [], |index, one, _| {
         if mask.is_none_or(|mask| mask[index]) {

@@ -35,4 +35,4 @@ pub use instances::{Instances, Mask, Setup, States};
 pub use rejection::Message;
 pub use selection::Selection;
 pub use start::Start;
-pub use system::{Fmu, Order, StartValue, System, Wiring, nearest};
+pub use system::{Composition, Fmu, Order, StartValue, System, nearest};

@@ -38,7 +38,7 @@ pub(crate) struct Target {
 
 impl Target {
     pub fn of(found: Found) -> Self {
-        Self { part: found.part, base: found.of.base, reference: found.of.reference }
+        Self { part: found.part, base: found.variable.base, reference: found.variable.reference }
     }
 }
 

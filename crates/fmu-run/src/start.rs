@@ -131,18 +131,18 @@ fn one<T>(values: &[T], of: usize) -> Option<&T> {
 
 fn checked<'a>(found: Found, name: &str, numbers: Cow<'a, [f64]>) -> Result<Cow<'a, [f64]>, Error> {
     found.check_number(name)?;
-    fits(name, found.of.base, &numbers)?;
+    fits(name, found.variable.base, &numbers)?;
     Ok(numbers)
 }
 
 /// Returns the number for a string, for a variable that is no string.
 fn number_of(found: Found, name: &str, text: &str) -> Result<f64, Error> {
-    if found.of.base == BaseType::Boolean
-        && let Ok(truth) = text.parse::<bool>()
+    if found.variable.base == BaseType::Boolean
+        && let Ok(boolean) = text.parse::<bool>()
     {
-        return Ok(f64::from(u8::from(truth)));
+        return Ok(f64::from(u8::from(boolean)));
     }
-    match found.description.items(found.of) {
+    match found.description.items(found.variable) {
         Some(items) => {
             let number =
                 items.iter().find(|(item, _)| item == text).and_then(|(_, number)| number.parse().ok());
@@ -150,6 +150,9 @@ fn number_of(found: Found, name: &str, text: &str) -> Result<f64, Error> {
             let why = || format!("{name} is one of {}, its start value cannot be {text:?}", known.join(", "));
             number.ok_or_else(|| Error::Request(why()))
         }
-        None => request(format!("{name} is {}, its start value cannot be {text:?}", found.of.what())),
+        None => request(format!(
+            "{name} is {}, its start value cannot be {text:?}",
+            found.variable.kind_in_words()
+        )),
     }
 }

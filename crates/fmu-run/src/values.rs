@@ -178,30 +178,30 @@ impl Instance {
 
     #[cold]
     fn get_elements(&mut self, base: BaseType, vr: &[u32], values: &mut [f64]) -> Result<(), Rejection> {
-        let whole = self.arrays.whole(vr);
-        let mut all = vec![0.0; whole.count];
-        self.get_variables(base, &whole.references, &mut all)?;
-        whole.indices.iter().zip(values).for_each(|(index, value)| *value = all[*index]);
+        let expanded = self.arrays.expanded(vr);
+        let mut all = vec![0.0; expanded.count];
+        self.get_variables(base, &expanded.references, &mut all)?;
+        expanded.indices.iter().zip(values).for_each(|(index, value)| *value = all[*index]);
         Ok(())
     }
 
     /// Sets variables of which some are array elements; the other elements of the arrays keep their values.
     #[cold]
     fn set_elements(&mut self, base: BaseType, vr: &[u32], values: &[f64]) -> Result<(), Rejection> {
-        let whole = self.arrays.whole(vr);
-        let mut all = vec![0.0; whole.count];
+        let expanded = self.arrays.expanded(vr);
+        let mut all = vec![0.0; expanded.count];
         if self.early.is_some() {
-            for (array, begin) in &whole.arrays {
+            for (array, begin) in &expanded.arrays {
                 let known = self.early_numbers(*array);
                 all[*begin..][..known.len()].copy_from_slice(&known);
             }
-        } else if !whole.is_complete() {
-            self.get_variables(base, &whole.references, &mut all)?;
+        } else if !expanded.is_complete() {
+            self.get_variables(base, &expanded.references, &mut all)?;
         }
-        whole.indices.iter().zip(values).for_each(|(index, value)| all[*index] = *value);
-        self.set_variables(base, &whole.references, &all)?;
+        expanded.indices.iter().zip(values).for_each(|(index, value)| all[*index] = *value);
+        self.set_variables(base, &expanded.references, &all)?;
         if let Some(early) = &mut self.early {
-            for (array, begin) in whole.arrays {
+            for (array, begin) in expanded.arrays {
                 let length = self.arrays.length(self.arrays.all()[array].reference);
                 early.numbers.insert(array, all[begin..][..length].to_vec());
             }

@@ -47,7 +47,7 @@ pub enum Trajectory<'a> {
     Constant(f64),
     /// A value for each time, equal in all runs.
     Shared(&'a [f64]),
-    /// A time series for each run, concatenated: runs times times.
+    /// A time series for each run, concatenated: runs times x times.
     EachRun(&'a [f64]),
 }
 

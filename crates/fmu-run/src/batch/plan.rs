@@ -59,11 +59,11 @@ impl<'a> Plan<'a> {
     }
 
     fn find_inputs(&mut self, system: &System, batch: &'a Batch) -> Result<(), Error> {
-        let mut seen = Vec::new();
+        let mut names = Vec::new();
         for (name, trajectory) in &batch.inputs {
             let variables = system.find_numbers(name)?;
             variables.iter().try_for_each(|found| found.check_own(name))?;
-            let of = variables[0].of;
+            let of = variables[0].variable;
             if !of.is_settable() || of.variability.as_deref() == Some("fixed") {
                 return request(format!(
                     "{name} is no input but {} {}; give it a start value",
@@ -71,14 +71,14 @@ impl<'a> Plan<'a> {
                     of.causality
                 ));
             }
-            once(&mut seen, name, "inputs")?;
+            once(&mut names, name, "inputs")?;
             self.inputs.values.push(self.checked(name, of.base, *trajectory)?);
             self.inputs.variables.push(name, &variables);
         }
-        let mut seen = Vec::new();
+        let mut names = Vec::new();
         for (name, trajectory) in &batch.input_derivatives {
             let variables = system.takes_input_derivative(name)?;
-            once(&mut seen, name, "input derivatives")?;
+            once(&mut names, name, "input derivatives")?;
             self.derivatives.values.push(self.checked(name, BaseType::Real, *trajectory)?);
             self.derivatives.variables.push(name, &variables);
         }
@@ -107,10 +107,7 @@ impl<'a> Plan<'a> {
 
 fn checked_time(time: &[f64]) -> Result<&[f64], Error> {
     if time.len() < 2 {
-        return request(format!(
-            "time has {} values; a run goes from one time to another at least",
-            time.len()
-        ));
+        return request(format!("time has {} values; a run needs at least two", time.len()));
     }
     if let Some(index) = time.iter().position(|time| !time.is_finite()) {
         return request(format!("time[{index}] is {}; times must be finite", time[index]));
@@ -150,10 +147,10 @@ fn runs(batch: &Batch) -> Result<usize, Error> {
     Ok(found.map_or(1, |(_, runs)| runs))
 }
 
-fn once<'a>(seen: &mut Vec<&'a str>, name: &'a str, where_: &str) -> Result<(), Error> {
-    if seen.contains(&name) {
-        return request(format!("{name} is twice among the {where_}"));
+fn once<'a>(names: &mut Vec<&'a str>, name: &'a str, list: &str) -> Result<(), Error> {
+    if names.contains(&name) {
+        return request(format!("{name} is twice among the {list}"));
     }
-    seen.push(name);
+    names.push(name);
     Ok(())
 }

@@ -13,9 +13,9 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{self, Duration};
 
 /// Messages with the number of their run.
-pub(super) type Told = Vec<(usize, String)>;
+pub(super) type Messages = Vec<(usize, String)>;
 
-/// Maximum time for [`ask`], in addition to the time of the runs.
+/// Maximum time for [`repeat_with_logging`], in addition to the time of the runs.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Access for another thread to the progress of [`System::run`].
@@ -64,7 +64,7 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What a run has to fill.
+/// Results of a run, which the run fills.
 struct Row<'a> {
     run: usize,
     trajectories: &'a mut [f64],
@@ -77,11 +77,11 @@ pub(super) fn run(
     plan: &Plan,
     watch: &Watch,
     [trajectories, measures]: [&mut [f64]; 2],
-) -> Result<[Told; 2], Error> {
+) -> Result<[Messages; 2], Error> {
     let begin = time::Instant::now();
     let (trajectory, measured) = (plan.outputs.len() * plan.kept(), plan.outputs.len() * plan.measures.len());
-    let room = trajectories.len() >= plan.runs * trajectory && measures.len() >= plan.runs * measured;
-    assert!(room, "there is too little room for {} runs", plan.runs);
+    let fits = trajectories.len() >= plan.runs * trajectory && measures.len() >= plan.runs * measured;
+    assert!(fits, "there is too little memory for {} runs", plan.runs);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(plan.threads)
         .build()
@@ -117,19 +117,25 @@ pub(super) fn run(
     }
     let (failures, notes): (Vec<_>, Vec<_>) = found.into_iter().unzip();
     let mut failures: Vec<_> = failures.into_iter().flatten().collect();
-    let mut notes: Told = notes.into_iter().flatten().collect();
+    let mut notes: Messages = notes.into_iter().flatten().collect();
     failures.sort_unstable_by_key(|(run, _)| *run);
     notes.sort_unstable_by_key(|(run, _)| *run);
     let until = time::Instant::now() + begin.elapsed() + PATIENCE;
     if failures.iter().any(|(_, failure)| failure.is_silent) {
-        pool.install(|| ask(system, plan, watch, until, &mut failures));
+        pool.install(|| repeat_with_logging(system, plan, watch, until, &mut failures));
     }
     Ok([failures.into_iter().map(|(run, failure)| (run, failure.text)).collect(), notes])
 }
 
 /// Repeats runs that failed without a message, because many FMUs give reasons only with logging on. Repeats
 /// each run up to its failure, after all other runs, and keeps only the message.
-fn ask(system: &System, plan: &Plan, watch: &Watch, until: time::Instant, failures: &mut [(usize, Failure)]) {
+fn repeat_with_logging(
+    system: &System,
+    plan: &Plan,
+    watch: &Watch,
+    until: time::Instant,
+    failures: &mut [(usize, Failure)],
+) {
     let silent = Mutex::new(failures.iter_mut().filter(|(_, failure)| failure.is_silent));
     let next = || silent.lock().unwrap_or_else(PoisonError::into_inner).next();
     rayon::broadcast(|_| {
