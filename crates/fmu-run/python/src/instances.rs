@@ -173,12 +173,7 @@ impl Instances {
     /// list[str | None]: the value of a string variable in each instance; None for an instance that has
     /// dropped out.
     fn texts(&self, py: Python, variable: &str) -> PyResult<Vec<Option<String>>> {
-        let mut texts = Vec::new();
-        self.attempt(py, |all| {
-            texts = all.texts(variable)?;
-            Ok(())
-        })?;
-        Ok(texts)
+        self.attempt(py, |all| all.texts(variable))
     }
 
     /// Perform a step of Co-Simulation: by `size`, or to the time `to`, s.
@@ -235,12 +230,8 @@ impl Instances {
 
     /// Save the state and the time of each instance.
     fn save(&self, py: Python) -> PyResult<States> {
-        let mut states = None;
-        self.attempt(py, |all| {
-            states = Some(all.save()?);
-            Ok(())
-        })?;
-        Ok(States { instances: Arc::clone(&self.instances), states: states.map(Arc::new) })
+        let states = self.attempt(py, fmu_run::Instances::save)?;
+        Ok(States { instances: Arc::clone(&self.instances), states: Some(Arc::new(states)) })
     }
 
     /// Restore states that these instances have saved.
@@ -257,11 +248,7 @@ impl Instances {
     /// without a state.
     fn serialize<'py>(&self, py: Python<'py>, states: &States) -> PyResult<Vec<Option<Bound<'py, PyBytes>>>> {
         let states = self.own(states)?;
-        let mut found = Vec::new();
-        self.attempt(py, |all| {
-            found = all.serialize(&states)?;
-            Ok(())
-        })?;
+        let found = self.attempt(py, |all| all.serialize(&states))?;
         Ok(found.into_iter().map(|bytes| bytes.map(|bytes| PyBytes::new(py, &bytes))).collect())
     }
 
@@ -508,11 +495,11 @@ impl Instances {
     }
 
     /// Runs a call without the GIL; raises FmuError if no instance is left before or after it.
-    fn attempt(
+    fn attempt<T: Send>(
         &self,
         py: Python,
-        body: impl FnOnce(&mut fmu_run::Instances) -> Result<(), Error> + Send,
-    ) -> PyResult<()> {
+        body: impl FnOnce(&mut fmu_run::Instances) -> Result<T, Error> + Send,
+    ) -> PyResult<T> {
         if let Some(why) = lock(&self.instances).none_left() {
             let all = if self.count == 1 { "the instance has" } else { "all instances have" };
             let why = format!(
@@ -524,17 +511,18 @@ impl Instances {
     }
 
     /// Runs a call that may make instances usable again.
-    fn revive(
+    fn revive<T: Send>(
         &self,
         py: Python,
-        body: impl FnOnce(&mut fmu_run::Instances) -> Result<(), Error> + Send,
-    ) -> PyResult<()> {
-        let left = py.detach(|| {
+        body: impl FnOnce(&mut fmu_run::Instances) -> Result<T, Error> + Send,
+    ) -> PyResult<T> {
+        let called = py.detach(|| {
             let mut all = lock(&self.instances);
-            body(&mut all)?;
-            Ok(all.none_left().map(str::to_owned))
+            let result = body(&mut all)?;
+            Ok((result, all.none_left().map(str::to_owned)))
         });
-        left.map_err(python)?.map_or(Ok(()), |why| Err(FmuError::new_err(why)))
+        let (result, none_left) = called.map_err(python)?;
+        none_left.map_or(Ok(result), |why| Err(FmuError::new_err(why)))
     }
 
     /// Sets values of variables: a row for each instance or one for all.
