@@ -235,7 +235,7 @@ impl Instances {
     /// # Panics
     /// Panics if the length of `values` is wrong.
     pub fn get(&mut self, variables: &Selection, values: &mut [f64]) {
-        self.fill(variables.len(), values, |instance, row| instance.get(variables, row));
+        self.fill(variables.len(), values, |_, _, instance, row| instance.get(variables, row));
     }
 
     /// Performs Co-Simulation steps of this size, s.
@@ -290,7 +290,7 @@ impl Instances {
         set.check(values)?;
         check_size(size)?;
         let inputs = rows(values, set.len(), self.len());
-        self.fill_by_index(get.len(), read, |index, own, instance, row| {
+        self.fill(get.len(), read, |index, own, instance, row| {
             instance.set(set, inputs(index))?;
             instance.step(own.time, size)?;
             own.time += size;
@@ -415,7 +415,7 @@ impl Instances {
             ));
         }
         let seed = rows(seed, knowns.len(), self.len());
-        self.fill_by_index(unknowns.len(), values, |index, _, instance, row| {
+        self.fill(unknowns.len(), values, |index, _, instance, row| {
             instance.sole().directional_derivative(unknown, known, seed(index), row)
         });
         Ok(())
@@ -453,7 +453,7 @@ impl Instances {
     /// Panics if the length of `values` is wrong.
     pub fn get_output_derivatives(&mut self, outputs: &Selection, values: &mut [f64]) -> Result<(), Error> {
         let references = self.real(outputs)?;
-        self.fill(outputs.len(), values, |instance, row| {
+        self.fill(outputs.len(), values, |_, _, instance, row| {
             instance.sole().get_output_derivatives(references, row)
         });
         Ok(())
@@ -493,7 +493,9 @@ impl Instances {
     /// # Panics
     /// Panics if the length of `values` is wrong.
     pub fn get_continuous(&mut self, what: Continuous, values: &mut [f64]) {
-        self.fill(self.continuous(what), values, |instance, row| instance.sole().get_continuous(what, row));
+        self.fill(self.continuous(what), values, |_, _, instance, row| {
+            instance.sole().get_continuous(what, row)
+        });
     }
 
     /// Returns the number of values of this quantity.
@@ -531,7 +533,7 @@ impl Instances {
     /// # Panics
     /// Panics if `wanted` does not have two values for each instance.
     pub fn completed_integrator_step(&mut self, wanted: &mut [f64]) {
-        self.fill(2, wanted, |instance, row| {
+        self.fill(2, wanted, |_, _, instance, row| {
             row.copy_from_slice(
                 &instance.sole().completed_integrator_step()?.map(|wanted| f64::from(u8::from(wanted))),
             );
@@ -579,17 +581,8 @@ impl Instances {
         });
     }
 
-    fn fill(
-        &mut self,
-        length: usize,
-        values: &mut [f64],
-        body: impl Fn(&mut Running, &mut [f64]) -> Result<(), Rejection> + Sync,
-    ) {
-        self.fill_by_index(length, values, |_, _, instance, row| body(instance, row));
-    }
-
     /// Fills a row of values for each instance, with NaN for a failed instance.
-    fn fill_by_index(
+    fn fill(
         &mut self,
         length: usize,
         values: &mut [f64],
