@@ -50,21 +50,21 @@ def main(wrists: int = WRISTS) -> tuple[Figure, dict[str, np.ndarray]]:
     best = np.unravel_index(np.argmin(most), most.shape)
     near = np.argmin(np.abs(KI - shipped[0])), np.argmin(np.abs(KD - shipped[1]))
     found = {"as shipped": times[near], "tuned": times[best]}
-    for name, place in (("as shipped", near), ("tuned", best)):
-        gains = f"Ki = {KI[place[0]]:g} 1/s, Kd = {1e3 * KD[place[1]]:g} ms"
-        print(f"{name:<10} {gains:<25} 95 % of the wrists have settled after {most[place]:.3f} s")
-    picture = Figure(figsize=(8, 3.6), layout="constrained")
-    grid, spread = picture.subplots(1, 2)
+    for name, index in (("as shipped", near), ("tuned", best)):
+        gains = f"Ki = {KI[index[0]]:g} 1/s, Kd = {1e3 * KD[index[1]]:g} ms"
+        print(f"{name:<10} {gains:<25} 95 % of the wrists have settled after {most[index]:.3f} s")
+    figure = Figure(figsize=(8, 3.6), layout="constrained")
+    grid, spread = figure.subplots(1, 2)
     image = grid.pcolormesh(1e3 * KD, KI, most, cmap="cividis_r")
-    picture.colorbar(image, ax=grid, label="95 % have settled after (s)")
-    for marker, place in (("o", near), ("*", best)):
-        grid.plot(1e3 * KD[place[1]], KI[place[0]], marker, color="white", markeredgecolor="black", markersize=11)
+    figure.colorbar(image, ax=grid, label="95 % have settled after (s)")
+    for marker, index in (("o", near), ("*", best)):
+        grid.plot(1e3 * KD[index[1]], KI[index[0]], marker, color="white", markeredgecolor="black", markersize=11)
     grid.set(xlabel="Kd (ms)", ylabel="Ki (1/s)", title="o as shipped, \N{BLACK STAR} tuned")
-    for (name, of), colour in zip(found.items(), ("#CC79A7", "#009E73")):
-        spread.ecdf(of, label=name, color=colour)
+    for (name, times), colour in zip(found.items(), ("#CC79A7", "#009E73")):
+        spread.ecdf(times, label=name, color=colour)
     spread.set(xlabel="settling time (s)", ylabel="share of the wrists", xlim=(0, LENGTH))
     spread.legend(frameon=False)
-    return picture, found
+    return figure, found
 
 
 if __name__ == "__main__":

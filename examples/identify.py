@@ -16,7 +16,7 @@ HERE = Path(__file__).parent
 
 
 def record(run: Path) -> str:
-    """Write what the sensors of the pretended rig say of point-to-point moves; returns what the rig is."""
+    """Write the sensor signals of a simulated rig in point-to-point moves; returns its parameters."""
     run.parent.mkdir(parents=True, exist_ok=True)
     paths = map(str, (HERE / "pretend_rig.py", HERE / "point_to_point.csv", run))
     command = [sys.executable, *paths, "--seed", "7", "--noise", "1"]
@@ -24,7 +24,7 @@ def record(run: Path) -> str:
 
 
 def main(out: Path = Path("out/identify")) -> prw.Identification:
-    """Record, estimate, print and write the report; returns what was found."""
+    """Record, estimate, print and write the report; returns the estimate."""
     print(record(out / "run.csv").partition("; ")[2].strip())
     found = prw.identify(out / "run.csv")
     for name, estimate in found.parameters.items():

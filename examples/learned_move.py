@@ -15,11 +15,11 @@ from fmu_run.gymnasium import Task, VectorEnv
 from matplotlib.figure import Figure
 
 STEP, MOVE, AFTER, GOAL = 2e-3, 0.17, 0.3, np.deg2rad(20)  # s, and rad of pitch
-POLE = -9.683 + 34.678j  # of pitch, 1/s: what a shaper must know
+POLE = -9.683 + 34.678j  # of pitch, 1/s: needed by the shapers
 VARIED = {"k1": 2.11 * 180 / np.pi, "J3": 1.275e-2, "H3": 4.236e-2}  # Table 1; each varies by 20 % either way
-NOISE = {"theta1": 0.0, "pitch": np.deg2rad(0.02), "tau1": 0.02}  # what is seen, and its sensors' noise, rad and N.m
+NOISE = {"theta1": 0.0, "pitch": np.deg2rad(0.02), "tau1": 0.02}  # noise of the observed variables, rad and N.m
 RATE = 6.0  # limit of the motors, rad/s
-WRISTS, HATS, ROUNDS = 8, 8, 150  # each candidate meets 8 wrists, and has 8 heights of the motors' course
+WRISTS, HATS, ROUNDS = 8, 8, 150  # each candidate meets 8 wrists, and has 8 heights of the motors' trajectory
 
 
 def shaped(impulses: int, duration: float) -> np.ndarray:
@@ -31,12 +31,12 @@ def shaped(impulses: int, duration: float) -> np.ndarray:
 
 
 def draw(value: float, unlike: int, rng: np.random.Generator, count: int) -> np.ndarray:
-    """So many values, the same again after `unlike`."""
+    """Returns `count` values, of which the first `unlike` are repeated."""
     return np.resize(rng.uniform(0.8 * value, 1.2 * value, unlike), count)
 
 
 def wrists(count: int, unlike: int) -> VectorEnv:
-    """So many of them, of so many kinds. Both motors turn at the rate that is the action; what is left after MOVE counts."""
+    """Environments of `unlike` different wrists. The action is the rate of both motors; the reward is the error after MOVE."""
     task = Task(
         fmu="target/fmu/prw_testbed.fmu",
         actions={"rate": (-RATE, RATE)},
@@ -56,26 +56,26 @@ def wrists(count: int, unlike: int) -> VectorEnv:
 
 def play(envs: VectorEnv, rates: np.ndarray, gains: np.ndarray, unlike: int, seed: int) -> tuple[np.ndarray, ...]:
     """Pitch (times, n) in deg, and the return (n,), of motors' rates (n, times) with gains (n, 3) of the feedback."""
-    noise, (seen, _) = np.random.default_rng(seed), envs.reset(seed=seed)
-    wanted, pitch, total = np.zeros(envs.num_envs), [seen[:, 1]], np.zeros(envs.num_envs)
+    noise, (observed, _) = np.random.default_rng(seed), envs.reset(seed=seed)
+    wanted, pitch, total = np.zeros(envs.num_envs), [observed[:, 1]], np.zeros(envs.num_envs)
     for rate in rates.T:
-        measured = seen + np.resize(noise.normal(0, list(NOISE.values()), (unlike, 3)), seen.shape)
+        measured = observed + np.resize(noise.normal(0, list(NOISE.values()), (unlike, 3)), observed.shape)
         errors = np.column_stack([10 * (wanted - measured[:, 0]), 10 * (wanted - measured[:, 1]), measured[:, 2]])
-        seen, reward, *_ = envs.step(np.clip(rate + (gains * errors).sum(axis=1), -RATE, RATE)[:, None])
+        observed, reward, *_ = envs.step(np.clip(rate + (gains * errors).sum(axis=1), -RATE, RATE)[:, None])
         wanted, total = wanted + STEP * rate, total + reward
-        pitch.append(seen[:, 1])
+        pitch.append(observed[:, 1])
     return np.rad2deg(pitch), total
 
 
 def policy(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The rates (n, times) and gains (n, 3) that candidates (n, 3 + HATS) are."""
+    """The rates (n, times) and gains (n, 3) of candidates (n, 3 + HATS)."""
     time, knots = STEP * np.arange(round((MOVE + AFTER) / STEP)), np.linspace(0, MOVE, HATS + 2)
     rates = numbers[:, 3:] @ [np.interp(time, knots, hat) for hat in np.eye(HATS + 2)[1:-1]]
     return rates * GOAL / (STEP * rates.sum(axis=1, keepdims=True)), numbers[:, :3]
 
 
 def learn(count: int, rounds: int) -> np.ndarray:
-    """The numbers of the policy: the middle of the best quarter of candidates, round by round."""
+    """The numbers of the policy: in each round the mean of the best quarter of the candidates."""
     envs, rng, candidates = wrists(count, WRISTS), np.random.default_rng(1), count // WRISTS
     middle = np.hstack([[0.5, 0, 0], np.sin(np.linspace(0, np.pi, HATS + 2)[1:-1])])
     spread = np.diag(np.hstack([np.ones(3), np.full(HATS, 0.16)]))
@@ -94,8 +94,8 @@ def main(count: int = 1024, rounds: int = ROUNDS, fresh: int = 1000) -> tuple[Fi
     begun, still = perf_counter(), np.zeros((1, 3))
     learned = policy(learn(count, rounds)[None])
     print(f"learned in {perf_counter() - begun:.0f} s, from {count * rounds:,} moves")
-    picture, left, envs = Figure(figsize=(8, 3.6), layout="constrained"), {}, wrists(fresh, fresh)
-    courses, shares = picture.subplots(1, 2)
+    figure, left, envs = Figure(figsize=(8, 3.6), layout="constrained"), {}, wrists(fresh, fresh)
+    motions, shares = figure.subplots(1, 2)
     for name, duration, (rates, gains), colour in (
         ("quintic", MOVE, (shaped(1, MOVE)[None], still), "#D55E00"),
         ("ZV", MOVE, (shaped(2, MOVE)[None], still), "#CC79A7"),
@@ -108,11 +108,11 @@ def main(count: int = 1024, rounds: int = ROUNDS, fresh: int = 1000) -> tuple[Fi
         print(f"{name:<11} in {duration:.2f} s: {middle:.2f} deg left, 95 % below {most:.2f}, at most {worst:.2f}")
         shares.semilogx(left[name], np.linspace(0, 100, fresh), color=colour, label=f"{name} ({duration:.2f} s)")
         band = np.percentile(pitch, [2.5, 97.5], axis=1)
-        courses.fill_between(STEP * np.arange(len(pitch)), *band, color=colour, linewidth=0)
-    courses.set(xlabel="time (s)", ylabel="pitch (deg), 95 % of the wrists", xlim=(0.07, MOVE + AFTER), ylim=(12, 27))
+        motions.fill_between(STEP * np.arange(len(pitch)), *band, color=colour, linewidth=0)
+    motions.set(xlabel="time (s)", ylabel="pitch (deg), 95 % of the wrists", xlim=(0.07, MOVE + AFTER), ylim=(12, 27))
     shares.set(xlabel="vibration left, peak to peak (deg)", ylabel="wrists with less (%)", ylim=(0, 100))
-    picture.legend(*shares.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
-    return picture, left
+    figure.legend(*shares.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+    return figure, left
 
 
 if __name__ == "__main__":

@@ -40,9 +40,9 @@ def design() -> tuple[np.ndarray, ...]:
 
 
 def follow(controller: Any, noise: np.ndarray) -> np.ndarray:
-    """Pitch and roll (n, 2) in rad of the FMU with a controller that turns what is measured into the motors' motion."""
+    """Pitch and roll (n, 2) in rad of the FMU with a controller that calculates the motion of the motors from measurements."""
     rows = []
-    next(controller)  # up to where it waits for what is measured
+    next(controller)  # runs to the first measurement
     with Fmu(prw.default_fmu()) as fmu:
         testbed = fmu.instances(start={"use_omega": True})
         for k in range(STEPS):
@@ -53,10 +53,10 @@ def follow(controller: Any, noise: np.ndarray) -> np.ndarray:
 
 
 def lqr(angle: np.ndarray) -> Any:
-    """State feedback on what the Kalman filter estimates; unlike the PI controller it knows the reference's rate."""
+    """State feedback of the estimate of the Kalman filter; unlike the PI controller it uses the rate of the reference."""
     A, B, C, feedback, gain = design()
     side = angle @ TO_SIDES.T
-    wanted = np.hstack([side, side, rate := np.gradient(side, STEP, axis=0), side, rate])  # as if nothing twisted
+    wanted = np.hstack([side, side, rate := np.gradient(side, STEP, axis=0), side, rate])  # without twist
     estimate, motor, turning, motion = np.zeros(10), np.zeros(2), np.zeros(2), None
     while True:
         k, measured = yield motion
@@ -83,16 +83,16 @@ def main() -> tuple[Figure, dict[str, np.ndarray]]:
     noise = np.random.default_rng(1).normal(0, NOISE, (STEPS, 2))
     with Fmu("target/fmu/prw_controller.fmu") as fmu:
         errors = {"PI": follow(pi(fmu.instances(), angle), noise) - angle, "LQR": follow(lqr(angle), noise) - angle}
-    picture = Figure(figsize=(8, 3.2), layout="constrained")
-    axes = picture.subplots(1, 2, sharex=True)
+    figure = Figure(figsize=(8, 3.2), layout="constrained")
+    axes = figure.subplots(1, 2, sharex=True)
     for (name, error), colour in zip(errors.items(), ("#D55E00", "#0072B2")):
         rms = np.rad2deg(np.sqrt(np.mean(error**2, axis=0)))
         print(f"{name:<4} pitch {rms[0]:.2f} deg, roll {rms[1]:.2f} deg (root mean square of the error)")
         for axis, course, title in zip(axes, np.rad2deg(error).T, ("pitch", "roll")):
             axis.plot(time, course, color=colour, label=name)
             axis.set(title=title, xlabel="time (s)", ylabel="error (deg)")
-    picture.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
-    return picture, errors
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
+    return figure, errors
 
 
 if __name__ == "__main__":

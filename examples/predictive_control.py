@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 STEP, AHEAD, EACH, LENGTH = 0.01, 16, 0.5, 2.0  # s; steps that are planned; s to a goal; s
 GOALS = np.array([(20, 0), (20, 40), (-10, 40), (0, 0)])  # one after the other, pitch and roll, deg
-RATE, SPREAD = 6.0, 2.0  # limit of the motors, and deviation of what is tried, rad/s
+RATE, SPREAD = 6.0, 2.0  # limit of the motors, and deviation of the candidates, rad/s
 MOTORS, WRIST = ("theta1", "theta2", "omega1", "omega2"), ("pitch", "roll")
 TO_SIDES = np.array([[1, 4 / 7], [1, -4 / 7]])  # from pitch and roll to the two motors: eq. (1) solved, M = 4, N = 7
 
@@ -27,7 +27,7 @@ def advance(wrists: Instances, rates: np.ndarray) -> np.ndarray:
 
 
 def planned(wrist: Instances, copies: Instances, goal: np.ndarray, plan: np.ndarray, rng: np.random.Generator) -> Any:
-    """A better plan, the motors' rates (AHEAD, 2): the mean of what is tried, by weights that fall with the cost."""
+    """A better plan, the motors' rates (AHEAD, 2): the mean of the candidates, with weights that fall with the cost."""
     state = [found for found in wrist.serialize(wrist.save()) if found is not None]
     copies.restore(copies.deserialize(state * len(copies)))
     between = [np.interp(np.arange(AHEAD), np.linspace(0, AHEAD - 1, 6), knot) for knot in np.eye(6)]
@@ -60,8 +60,8 @@ def follow(copies: Instances | None, wrist: Instances, length: float) -> tuple[n
 
 def main(rollouts: int = 1024, length: float = LENGTH) -> tuple[Figure, dict[str, np.ndarray]]:
     """Control, print and draw; returns the figure, and by name how far pitch and roll are from the goal (times, 2), deg."""
-    picture, errors = Figure(figsize=(8, 3.2), layout="constrained"), {}
-    axes = picture.subplots(1, 2, sharex=True)
+    figure, errors = Figure(figsize=(8, 3.2), layout="constrained"), {}
+    axes = figure.subplots(1, 2, sharex=True)
     with Fmu("target/fmu/prw_testbed.fmu") as fmu:
         for name, colour in (("straight", "#D55E00"), ("planned", "#0072B2")):
             copies = fmu.instances(rollouts, threads=None) if name == "planned" else None
@@ -79,8 +79,8 @@ def main(rollouts: int = 1024, length: float = LENGTH) -> tuple[Figure, dict[str
         axis.step(
             STEP * np.arange(len(goal)), course, "--", color="0.5", where="post", linewidth=1, label="goal", zorder=0
         )
-    picture.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
-    return picture, errors
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    return figure, errors
 
 
 if __name__ == "__main__":

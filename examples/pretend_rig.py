@@ -1,10 +1,10 @@
-"""A testbed to practise on: writes what sensors would say of a motion, for `prw identify`.
+"""A testbed to practise on: writes simulated sensor signals of a motion, for `prw identify`.
 
     python examples/pretend_rig.py MOTION.csv RUN.csv [--seed N] [--noise N] [--measure tau1,tau2,theta3,theta4,pitch,roll]
 
 It runs the FMU with parameters of its own choice (a seed, a rig), and then spoils its answers: encoders of 10000
 counts, torques with 20 mN.m of noise, an inertial sensor with 0.06 deg, and an unknown offset on each of them:
-others in each experiment, unless --noise says which.
+others in each experiment, unless --noise selects them.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
     pythonfmu build -f examples/python_controller.py -d target/fmu
     cargo run --release -p prw_controller --bin build_closed_loop -- --controller target/fmu/PythonController.fmu --out out/python
 
-wires it to the testbed, because it has the inputs and outputs of prw_controller.fmu. Whoever runs the FMU needs Python.
+connects it to the testbed, because it has the inputs and outputs of prw_controller.fmu. The FMU needs Python.
 """
 
 from typing import Any
@@ -15,7 +15,7 @@ OUTPUTS = ("theta1", "theta2", "omega1", "omega2")
 
 
 class PythonController(Fmi2Slave):
-    """Moves to a new reference on a minimum-jerk path, and integrates what is left of the error once it is there."""
+    """Moves to a new reference on a minimum-jerk path, and integrates the remaining error at its end."""
 
     description = "Point-to-point controller for the pitch-roll wrist testbed, written in Python"
 
@@ -38,7 +38,7 @@ class PythonController(Fmi2Slave):
         if reference != self.goal:
             self.origin, self.goal, self.began = self._plan(current_time)[0], reference, current_time
         at, _ = self._plan(current_time)
-        if current_time - self.began > self.duration + 0.5 * step_size:  # whatever the last digits of time
+        if current_time - self.began > self.duration + 0.5 * step_size:  # regardless of rounding errors of the time
             for axis in range(2):
                 self.correction[axis] += self.gain * step_size * (at[axis] - measured[axis])
         at, rate = self._plan(current_time + step_size)

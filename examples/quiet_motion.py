@@ -34,8 +34,8 @@ def sampled() -> tuple[np.ndarray, np.ndarray]:
     generator = np.zeros((10, 10))
     generator[:6] = np.hstack([np.array(part) for part in derivatives])
     generator[6:8, 8:] = np.eye(2)
-    whole = expm(STEP * generator)
-    return whole[:8, :8], whole[:8, 8:]
+    transition = expm(STEP * generator)
+    return transition[:8, :8], transition[:8, 8:]
 
 
 def quietest() -> np.ndarray:
@@ -59,7 +59,7 @@ def minimum_jerk() -> np.ndarray:
 
 
 def replay(rates: np.ndarray, parameters: dict[str, float] | None = None) -> prw.Run:
-    """The FMU's answer to motors with these rates, and then still."""
+    """The FMU's response to motors with these rates, which then stop."""
     omega = np.vstack([rates, np.zeros((round(AFTER / STEP) + 1, 2))])
     theta = np.vstack([np.zeros(2), np.cumsum(STEP * omega[:-1], axis=0)])
     return prw.simulate(prw.Motion(np.linspace(0, MOVE + AFTER, len(theta)), theta, omega), parameters)
@@ -74,23 +74,23 @@ def left(run: prw.Run) -> float:
 def main() -> tuple[Figure, dict[str, float]]:
     """Find, replay, print and draw; returns the figure, and how far pitch or roll is off after each motion, deg."""
     rates = {"quintic": minimum_jerk(), "quietest": quietest()}
-    runs = {name: replay(course) for name, course in rates.items()}
+    runs = {name: replay(trajectory) for name, trajectory in rates.items()}
     runs["quietest, k2 10 % less"] = replay(rates["quietest"], {"k2": 0.9 * runs["quietest"].parameters["k2"]})
-    picture = Figure(figsize=(8, 4.2), layout="constrained")
-    axes = picture.subplots(2, 2, sharex=True)
+    figure = Figure(figsize=(8, 4.2), layout="constrained")
+    axes = figure.subplots(2, 2, sharex=True)
     for (name, run), style in zip(runs.items(), ("C1-", "C0-", "k:")):
         print(f"{name:<23} {left(run):.2f} deg off after the move")
         for axis, angle in zip(axes[:, 0], ("pitch", "roll")):
             axis.plot(run.time, np.rad2deg(run[angle]), style, label=name)
             axis.set_ylabel(f"{angle} (deg)")
-        for axis, course, motor in zip(axes[:, 1], np.diff(run.motion.theta.T) / STEP, (1, 2)):
-            axis.step(run.time[:-1], course, style, where="post")
+        for axis, trajectory, motor in zip(axes[:, 1], np.diff(run.motion.theta.T) / STEP, (1, 2)):
+            axis.step(run.time[:-1], trajectory, style, where="post")
             axis.set_ylabel(f"motor {motor} (rad/s)")
     for axis in axes.flat:
         axis.axvline(MOVE, color="0.6", linewidth=0.8)
     axes[0, 0].legend(frameon=False, fontsize=8)
-    picture.supxlabel("time (s)", fontsize=10)
-    return picture, {name: left(run) for name, run in runs.items()}
+    figure.supxlabel("time (s)", fontsize=10)
+    return figure, {name: left(run) for name, run in runs.items()}
 
 
 if __name__ == "__main__":

@@ -43,8 +43,8 @@ def errors(runs: int = RUNS) -> tuple[np.ndarray, dict[str, np.ndarray], dict[st
 
 
 def blame(drawn: dict[str, np.ndarray], measure: np.ndarray) -> dict[str, float]:
-    """Each parameter's share in the variance of a measure (runs,), by linear regression on the logarithms. What is
-    missing to 1 is curved, or comes of two together."""
+    """Each parameter's share in the variance of a measure (runs,), by linear regression on the logarithms. The
+    remainder to 1 is nonlinear, or an interaction of two parameters."""
     columns = np.column_stack([np.log(values) for values in drawn.values()])
     columns -= columns.mean(axis=0)
     slopes, *_ = np.linalg.lstsq(columns, measure - measure.mean(), rcond=None)
@@ -54,15 +54,15 @@ def blame(drawn: dict[str, np.ndarray], measure: np.ndarray) -> dict[str, float]
 def main(runs: int = RUNS) -> tuple[Figure, dict[str, dict[str, float]]]:
     """Run, print and draw; returns the figure, and the shares of the parameters in the variance of each peak error."""
     time, drawn, error = errors(runs)
-    picture, shares = Figure(figsize=(8, 4.2), layout="constrained"), {}
-    axes = picture.subplots(2, 2, width_ratios=(2, 1))
-    for (name, course), row, colour in zip(error.items(), axes, ("#009E73", "#CC79A7")):
-        peak = np.rad2deg(np.abs(course).max(axis=1))
+    figure, shares = Figure(figsize=(8, 4.2), layout="constrained"), {}
+    axes = figure.subplots(2, 2, width_ratios=(2, 1))
+    for (name, trajectory), row, colour in zip(error.items(), axes, ("#009E73", "#CC79A7")):
+        peak = np.rad2deg(np.abs(trajectory).max(axis=1))
         shares[name] = blame(drawn, peak)
         low, middle, high = np.percentile(peak, [2.5, 50, 97.5])
         print(f"{name:<6} largest error {middle:.2f} deg, 95 % of {runs} wrists between {low:.2f} and {high:.2f} deg")
         for inner, outer, alpha in ((0, 100, 0.2), (2.5, 97.5, 0.5)):
-            band = np.rad2deg(np.percentile(course, [inner, outer], axis=0))
+            band = np.rad2deg(np.percentile(trajectory, [inner, outer], axis=0))
             row[0].fill_between(time, *band, color=colour, alpha=alpha, linewidth=0, label=f"{outer - inner:g} %")
         row[0].set(ylabel=f"error of {name} (deg)", xlim=(0, LENGTH))
         row[0].legend(frameon=False, fontsize=8)
@@ -71,7 +71,7 @@ def main(runs: int = RUNS) -> tuple[Figure, dict[str, dict[str, float]]]:
         row[1].invert_yaxis()
     axes[1, 0].set_xlabel("time (s)")
     axes[1, 1].set_xlabel("share in the variance\nof the largest error (%)")
-    return picture, shares
+    return figure, shares
 
 
 if __name__ == "__main__":

@@ -5,7 +5,10 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+from pathlib import Path
 
+#: Debian's package wine64 installs it only in this directory.
+WINE = "/usr/lib/wine/wine64"
 #: Programs and their Debian packages.
 PACKAGES = {
     "x86_64-w64-mingw32-gcc": "gcc-mingw-w64-x86-64",
@@ -18,8 +21,15 @@ PACKAGES = {
     "firefox-esr": "firefox-esr",
     "xvfb-run": "xvfb xauth",
     "/usr/lib/x86_64-linux-gnu/webkit2gtk-4.1/MiniBrowser": "libwebkit2gtk-4.1-0",
-    "/usr/lib/wine/wine64": "wine64",
+    WINE: "wine64",
 }
+
+
+def windows(directory: Path) -> dict[str, str]:
+    """Returns the environment of Windows programs under Wine: a separate Windows in a directory, without a display."""
+    environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "PYTHONPATH")}
+    settings = {"WINEDEBUG": "-all", "WINEARCH": "win64", "WINEDLLOVERRIDES": "mscoree,mshtml="}
+    return {**environment, **settings, "WINEPREFIX": str(directory)}
 
 
 def need(*programs: str) -> None:

@@ -1,4 +1,4 @@
-//! Wires controller and testbed to a closed loop, as SSP and for libcosim. See `--help`.
+//! Connects controller and testbed to a closed loop, as SSP and for libcosim. See `--help`.
 
 use anyhow::{Context, Result, ensure};
 use clap::Parser;
@@ -10,7 +10,7 @@ use std::process::ExitCode;
 
 const FOLDER: &str = env!("CARGO_MANIFEST_DIR");
 
-/// Wires the FMUs of controller and testbed to a closed loop: prw_closed_loop.ssp, and the folder
+/// Connects the FMUs of controller and testbed to a closed loop: prw_closed_loop.ssp, and the folder
 /// prw_closed_loop with OspSystemStructure.xml.
 #[derive(Parser)]
 #[command(override_usage = "cargo run --release -p prw_controller --bin build_closed_loop [-- OPTIONS]")]
@@ -18,11 +18,11 @@ struct Options {
     /// The testbed [default: target/fmu/prw_testbed.fmu]
     #[arg(long, value_name = "FMU")]
     testbed: Option<PathBuf>,
-    /// The controller; any FMU with the variables of prw_controller.fmu will do
+    /// The controller: any FMU with the variables of prw_controller.fmu
     /// [default: target/fmu/prw_controller.fmu]
     #[arg(long, value_name = "FMU")]
     controller: Option<PathBuf>,
-    /// The angles to go to, in degrees
+    /// The reference angles, in degrees
     #[arg(long, value_names = ["PITCH", "ROLL"], num_args = 2, default_values_t = [30.0, 60.0],
           allow_negative_numbers = true)]
     go_to: Vec<f64>,
@@ -32,7 +32,7 @@ struct Options {
     /// End of the experiment in s
     #[arg(long, value_name = "S", default_value_t = 1.0)]
     stop_time: f64,
-    /// Folder for what is made [default: target/fmu]
+    /// Folder for the files [default: target/fmu]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -77,7 +77,7 @@ fn run(options: &Options) -> Result<()> {
             ("testbed.tau1", "controller.tau1"),
             ("testbed.tau2", "controller.tau2"),
         ],
-        // The controller tells the motors' rates: the testbed need not differentiate.
+        // The controller provides the motors' rates, so the testbed does not estimate them.
         start: vec![("testbed.use_omega", "true".to_owned())],
         stop_time: options.stop_time,
         step_size: options.step_size,

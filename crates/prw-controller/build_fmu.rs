@@ -27,8 +27,7 @@ fn main() -> ExitCode {
     exit(builder.run(&Options::parse().build))
 }
 
-/// Where the controller is connected: its motors and its sensors go to the terminals of the testbed that are called the
-/// same.
+/// Returns the terminals. Motors and sensors are connected to the terminals of the testbed with the same names.
 fn terminals() -> Vec<Terminal> {
     let motor = |name, theta, omega, tau| {
         Terminal::plug(name).signal("theta", theta).signal("omega", omega).signal("tau", tau)

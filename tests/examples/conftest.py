@@ -1,4 +1,4 @@
-"""The examples as modules, run from the project's folder, beside the oracle."""
+"""Imports the examples as modules and runs them in the repository root."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from built import ROOT, built
 
 @pytest.fixture(autouse=True)
 def in_the_project(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the examples look for the FMUs."""
+    """Changes to the directory in which the examples find the FMUs."""
     monkeypatch.chdir(ROOT)
     for name in ("prw_testbed.fmu", "prw_controller.fmu"):
         built(name)

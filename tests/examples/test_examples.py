@@ -1,4 +1,4 @@
-"""The examples run, and what they find holds by means they do not use: the oracle's equations, the paper's poles."""
+"""Runs the examples, and checks their results by independent means: the oracle's equations and the paper's poles."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ POLES = np.array([-174.87270665, -174.36733032, -18.94465405 + 32.14568305j, -9.
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_it_is_short_and_says_what_it_is_for(name: str) -> None:
+def test_it_is_short_and_has_a_purpose(name: str) -> None:
     lines = (ROOT / "examples" / f"{name}.py").read_text().splitlines()
     assert len(lines) < 120
     assert lines[2].startswith("You learn ")
@@ -123,12 +123,12 @@ def test_blame_is_the_variance_that_a_parameter_makes_alone(tolerances: Any, mon
         _, _, errors = tolerances.errors(runs=2000)
         return {axis: np.abs(course).max(axis=1).var() for axis, course in errors.items()}
 
-    whole = variances()
+    total = variances()
     for name in everything:
         others = {other: everything[other] if other == name else 0.0 for other in everything}
         monkeypatch.setattr(tolerances, "TOLERANCES", others)
-        for axis, alone in variances().items():
-            assert shares[axis][name] == pytest.approx(alone / whole[axis], abs=0.1), (axis, name)
+        for axis, variance in variances().items():
+            assert shares[axis][name] == pytest.approx(variance / total[axis], abs=0.1), (axis, name)
 
 
 def test_tuned_gains_serve_more_wrists() -> None:

@@ -16,7 +16,7 @@ def description(fmu):
 
 @pytest.fixture(scope="session")
 def unpacked(fmu, unpack):
-    """The folder of the unpacked FMU."""
+    """The directory of the unpacked FMU."""
     return unpack(fmu)
 
 

@@ -45,7 +45,7 @@ def page() -> str:
     return text_of(TESTBED)
 
 
-#: For what holds of both pages.
+#: Runs a test for both pages.
 both = pytest.mark.parametrize("page", [pytest.param(text_of(page), id=page.text) for page in PAGES])
 
 
@@ -56,7 +56,7 @@ def found(fmu):
 
 @pytest.mark.parametrize("which", PAGES, ids=lambda page: page.text)
 def test_the_pages_are_up_to_date(which):
-    assert text_of(which) == render(ROOT, which), f"{which.path} is out of date; write it anew with `make docs`"
+    assert text_of(which) == render(ROOT, which), f"{which.path} is out of date; `make docs` updates it"
 
 
 @pytest.mark.parametrize("which", PAGES, ids=lambda page: page.text)
@@ -133,11 +133,11 @@ def rate(t):
     return AMPLITUDE * FREQUENCY * np.sin(FREQUENCY * t)
 
 
-def test_what_is_said_of_model_exchange_in_fmpy(fmu, model):
+def test_reported_errors_of_model_exchange_in_fmpy(fmu, model):
     """The percentages in docs/compatibility.md and on the page: FMPy holds inputs over a step."""
     reported = (ROOT / "docs/compatibility.md").read_text(encoding="utf-8").split("For two sines")[1].split("\n* ")[0]
     percents = [float(number) for number in re.findall(r"([\d.]+) %", reported)]
-    seen = []
+    found = []
     for kind, step in (("ModelExchange", 1e-3), ("ModelExchange", 1e-4), ("CoSimulation", 1e-3)):
         t = np.linspace(0, END, round(END / step) + 1)
         names = ("time", "theta1", "theta2", "omega1", "omega2")
@@ -148,9 +148,9 @@ def test_what_is_said_of_model_exchange_in_fmpy(fmu, model):
         )
         exact = integrate(model, t, angle, rate)
         error = {name: np.max(np.abs(result[name] - exact[name])) / np.max(np.abs(exact[name])) for name in OUTPUTS}
-        seen += [100 * error["roll"], 100 * max(error["tau1"], error["tau2"])]
+        found += [100 * error["roll"], 100 * max(error["tau1"], error["tau2"])]
     # One digit is quoted.
-    assert percents == [float(f"{value:.1g}") for value in seen]
+    assert percents == [float(f"{value:.1g}") for value in found]
 
 
 def test_numbers_are_up_to_date(found):

@@ -94,7 +94,7 @@ def test_rates_from_angles(instance, model):
     assert_close({**after, "tau1": expected_after["tau1"], "tau2": expected_after["tau2"]}, expected_after, 1e-11)
 
 
-def test_omega_is_not_heard_without_use_omega(make_instance):
+def test_omega_has_no_effect_without_use_omega(make_instance):
     rng = np.random.default_rng(8)
     t, theta = 0.01 * np.arange(50), rng.normal(0, 0.1, (50, 2))
     plain, disturbed = make_instance(), make_instance()
@@ -125,7 +125,7 @@ AMPLITUDE, FREQUENCY, PHASE = np.array([0.3, 0.2]), np.array([14.0, 23.0]), np.a
 END = 1.0
 #: Repeated step sizes, in units of their mean.
 SPACING = {"even": [1.0, 1.0, 1.0, 1.0], "uneven": [0.4, 1.5, 0.8, 1.3]}
-#: The first samples know no slope; judged from here on.
+#: Errors are evaluated from this time on, because the first samples have no slope.
 FROM = 0.3
 
 

@@ -114,7 +114,7 @@ def test_far_from_table_1(instance, seed):
     [
         {},
         {"k1": 1e9, "k2": 1e-9, "J2": 1e9, "c2": 1e9},
-        # Next to no damping: what rounding does to a step, a million steps do to the end.
+        # Almost no damping: rounding errors of all steps remain until the end.
         {"c1": 1e-9, "c2": 1e-9, "c3": 1e-9},
     ],
 )
@@ -138,7 +138,7 @@ def test_a_million_steps(instance, factors):
     with mpmath.workdps(DIGITS):
         exact = Exact(parameters, steps * h)
         true_values, size = exact.step(np.zeros(6), np.zeros(2), slope)
-        # Each of the steps rounds the angles, and the springs make velocities of that.
+        # Each step rounds the angles, which the springs turn into velocities.
         rate = mpmath.sqrt(abs(exact.model.a[4:, :4]).max())
         for velocity, angle in (4, 2), (5, 3), (10, 8), (11, 9):
             size[velocity] += rate * size[angle]

@@ -59,16 +59,16 @@ class WebAssembly:
         linker, number = Linker(engine), ValType.i32()
         linker.define_func("fmu", "fmu_log", FuncType([number] * 3, []), lambda *_: self.messages.append(_))
         self.functions = linker.instantiate(self.store, Module(engine, module)).exports(self.store)
-        self.room = self.call("fmu_room", 4096)
+        self.buffer = self.call("fmu_room", 4096)
         self.write(0, b"page\0", guid.encode() + b"\0")
-        self.component = self.call("fmi2Instantiate", self.room, 1, self.room + 5, 0, self.room + 1024, 0, 0)
+        self.component = self.call("fmi2Instantiate", self.buffer, 1, self.buffer + 5, 0, self.buffer + 1024, 0, 0)
         assert self.component
 
     def call(self, name: str, *values: float) -> int:
         return self.functions[name](self.store, *values)
 
     def write(self, offset: int, *parts: bytes) -> None:
-        self.functions["memory"].write(self.store, b"".join(parts), self.room + offset)
+        self.functions["memory"].write(self.store, b"".join(parts), self.buffer + offset)
 
     def does(self, name: str, *values: float) -> None:
         assert self.call(name, self.component, *values) == 0, name
@@ -77,17 +77,17 @@ class WebAssembly:
         self.write(
             0, struct.pack(f"<{len(values)}I", *values), struct.pack(f"<{len(values)}{letter}", *values.values())
         )
-        self.does(f"fmi2Set{kind}", self.room, len(values), self.room + 4 * len(values))
+        self.does(f"fmi2Set{kind}", self.buffer, len(values), self.buffer + 4 * len(values))
 
     def get(self, references: list[int]) -> bytes:
         self.write(0, struct.pack(f"<{len(references)}I", *references))
-        self.does("fmi2GetReal", self.room, len(references), self.room + 1024)
-        start = self.room + 1024
+        self.does("fmi2GetReal", self.buffer, len(references), self.buffer + 1024)
+        start = self.buffer + 1024
         return bytes(self.functions["memory"].read(self.store, start, start + 8 * len(references)))
 
 
-def test_the_page_is_that_of_the_sources_and_the_fmus(testbed, page, packed):
-    """Nothing else is changed in it; the FMU for 3.0 has that for 2.0, whose functions the modules have."""
+def test_the_page_equals_sources_and_fmus(testbed, page, packed):
+    """Only the scripts are added. The page in the FMU for FMI 3.0 runs the module for FMI 2.0."""
     assert LIVE.sub("", page) == (ROOT / TESTBED.path).read_text(encoding="utf-8")
     folder = testbed.parents[testbed.parent.name == "fmi3"]
     for offset, name in enumerate([testbed.name, "prw_controller.fmu"]):
@@ -110,7 +110,7 @@ def test_it_is_small_and_loads_nothing(page):
     assert not re.search(r"https?:|fetch\(|XMLHttp|import\(|@import|url\(|WebSocket| src=", live)
 
 
-def test_the_shaper_knows_the_pole_of_pitch():
+def test_the_shaper_has_the_pole_of_pitch():
     script = (ROOT / "docs" / "fmu-page" / "wrist" / "testbed.js").read_text(encoding="utf-8")
     (pole,) = re.findall(r"const PITCH_POLE = \{ real: (\S+), imaginary: (\S+) \}", script)
     numbers = json.loads((ROOT / "docs" / "fmu-page" / "figures" / "numbers.json").read_text(encoding="utf-8"))
@@ -118,7 +118,7 @@ def test_the_shaper_knows_the_pole_of_pitch():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_module_has_the_librarys_bits(fmu, packed, name):
+def test_the_module_is_bit_identical_to_the_library(fmu, packed, name):
     experiment = next(one for one in read_experiments(fmu) if one.name == name)
     description = read_model_description(str(fmu))
     variables = {one.name: one for one in description.modelVariables}

@@ -25,7 +25,7 @@ def known(testbed):
     return {experiment.name: experiment for experiment in read_experiments(testbed)}
 
 
-def test_the_fmu_brings_them_along(testbed, known):
+def test_the_fmu_contains_them(testbed, known):
     assert list(known) == NAMES
     with zipfile.ZipFile(testbed) as archive:
         inside = {name.removeprefix(f"{FOLDER}/") for name in archive.namelist() if name.startswith(FOLDER)}
@@ -36,7 +36,7 @@ def test_the_fmu_brings_them_along(testbed, known):
 
 @pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: importer.name)
 @pytest.mark.parametrize("name", NAMES)
-def test_the_tolerances_are_honest(testbed, known, importer, name):
+def test_the_tolerances_detect_a_wrong_stiffness(testbed, known, importer, name):
     experiment = known[name]
 
     def share(parameters) -> float:
@@ -49,7 +49,7 @@ def test_the_tolerances_are_honest(testbed, known, importer, name):
     assert share({**right, "k1": 1.01 * right["k1"]}) > FAILS
 
 
-def test_the_folders_for_other_vendors(fmu, tmp_path):
+def test_the_directories_for_the_cross_check(fmu, tmp_path):
     """The directories follow the rules of the FMI Cross-Check, and packing twice gives the same bytes."""
     for name in ("one.zip", "other.zip"):
         cross_check.pack(fmu, tmp_path / name)

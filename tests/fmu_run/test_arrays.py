@@ -1,4 +1,4 @@
-"""A model with arrays, in FMI 2.0 a scalar for each element: the same program runs both FMUs with bit-identical results, as FMPy does."""
+"""A model with arrays, which are scalars in FMI 2.0: one program runs both FMUs, with bit-identical results. They equal FMPy's."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def rods(tmp_path_factory) -> tuple[Path, Path]:
 
 
 def both(rods, run):
-    """The results of `run` with both FMUs."""
+    """Returns the results of `run` for each FMU."""
     found = []
     for path in rods:
         with fmu_run.Fmu(path) as fmu:
@@ -62,20 +62,20 @@ def test_variables_are_elements(rods) -> None:
     assert (of_fmi3["capacities[8]"].start, of_fmi3["labels[2]"].start) == ("2.875", "the far half")
 
 
-def test_runs_are_the_same(rods) -> None:
+def test_runs_are_bit_identical(rods) -> None:
     time = np.linspace(0.0, 2.0, 21)
     start = {"capacities[3]": [1.0, 4.0], "limits[2,1]": 11.0, "limits[1,2]": 20.5, "T[8]": 40.0, "labels[1]": "one"}
     inputs = {"power[2]": 3 + np.sin(time), "switches[2]": np.where(time > 1, 3.0, 0.0)}
-    with_two = both(rods, lambda fmu: fmu.run(time, inputs=inputs, start=start, outputs=OUTPUTS))
+    runs = both(rods, lambda fmu: fmu.run(time, inputs=inputs, start=start, outputs=OUTPUTS))
     for name in OUTPUTS:
-        assert np.array_equal(with_two[0][name], with_two[1][name]), name
-    assert (with_two[0]["limits[2,1]"] == 11).all() and (with_two[0]["switches[1]"] == 3).all()
-    assert (with_two[0]["hot[8]"][:, 1] == 1).all(), "it has begun at 40"
-    assert not np.array_equal(with_two[0]["T[3]"][0], with_two[0]["T[3]"][1]), "the capacity tells"
+        assert np.array_equal(runs[0][name], runs[1][name]), name
+    assert (runs[0]["limits[2,1]"] == 11).all() and (runs[0]["switches[1]"] == 3).all()
+    assert (runs[0]["hot[8]"][:, 1] == 1).all(), "starts at 40"
+    assert not np.array_equal(runs[0]["T[3]"][0], runs[0]["T[3]"][1]), "the capacity has an effect"
 
 
 @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
-def test_runs_are_those_of_fmpy(rods, kind) -> None:
+def test_runs_equal_fmpy(rods, kind) -> None:
     results = [
         fmpy.simulate_fmu(
             str(rod), fmi_type=kind, solver="Euler", step_size=0.01, stop_time=1.0, output_interval=0.1, output=output
@@ -89,12 +89,12 @@ def test_runs_are_those_of_fmpy(rods, kind) -> None:
             assert np.array_equal(np.transpose([runs[name][0] for name in TEMPERATURES]), of_fmi2)
 
 
-def test_fmpy_has_nothing_to_complain_about(rods) -> None:
+def test_fmpy_reports_no_problem(rods) -> None:
     for rod in rods:
         assert fmpy.read_model_description(str(rod), validate=True) and validate_fmu(str(rod)) == []
 
 
-def test_elements_in_the_hand(rods) -> None:
+def test_elements_of_stateful_instances(rods) -> None:
     def use(fmu):
         rod = fmu.instances(2, start={"T[2]": [1.0, 2.0], "T[5]": 3.0, "counted[2]": 7, "labels[2]": "zwei"})
         found = [rod.get(TEMPERATURES), rod.get("counted[1]"), rod.get("counted[2]")]
@@ -117,7 +117,7 @@ def test_elements_in_the_hand(rods) -> None:
     assert of_fmi3[0][1].tolist() == [20.0, 2.0, 22.0, 23.0, 3.0, 25.0, 26.0, 27.0]
     assert of_fmi3[3].tolist() == [[10.0, 5.0, 3.0, 3.0], [10.0, 6.0, 3.0, 3.0]]
     assert of_fmi3[-1][:2] == ["the near half"] * 2 and of_fmi3[-1][2].startswith("zwei is ")
-    # der(T[2]) by T[2]: minus two neighbours' conductance over its capacity; der(T[3]) has one of them.
+    # der(T[2]) with respect to T[2]: minus two neighbours' conductance over its capacity; der(T[3]) has one of them.
     assert np.allclose(of_fmi3[6], [[-1.0 / 2.125, 0.5 / 2.25, 1 / 8]] * 2)
 
 

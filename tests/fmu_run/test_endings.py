@@ -3,28 +3,28 @@
 from __future__ import annotations
 
 import time as clock
-import zipfile
 
 import fmu_run
 import numpy as np
 import pytest
+from unruly import repacked
 
 TIME = np.arange(11) / 10
 
-# By the number of the mood: the number of rows of 11, the error, and the note.
+# By the value of `mood`: the number of rows (of 11), the error, and the note.
 MOODS = {
     "good": (11, None, None),
-    "silent error": (6, "at 0.5 s: fmi2DoStep was answered with Error, without a message", None),
-    "pending": (6, "at 0.5 s: fmi2DoStep was answered with Error, without a message", None),
-    "fatal": (6, "at 0.5 s: fmi2DoStep was answered with Fatal, without a message", None),
+    "silent error": (6, "at 0.5 s: fmi2DoStep returned Error without a message", None),
+    "pending": (6, "at 0.5 s: fmi2DoStep returned Error without a message", None),
+    "fatal": (6, "at 0.5 s: fmi2DoStep returned Fatal without a message", None),
     "discard": (6, "at 0.5 s: fmi2DoStep: no more of this after %s", None),
-    "no status": (6, "at 0.5 s: fmi2DoStep was answered with Error, without a message", None),
+    "no status": (6, "at 0.5 s: fmi2DoStep returned Error without a message", None),
     "no reset": (11, None, None),
     "warning": (11, None, None),
     "ends between": (6, "ended by the FMU at t = 0.525 s: the tank is empty", None),
     "ends at point": (7, "ended by the FMU at t = 0.6 s", None),
-    "no terminate": (11, None, "finished; then fmi2Terminate was answered with Error, without a message"),
-    "no start": (0, "fmi2ExitInitializationMode was answered with Error, without a message", None),
+    "no terminate": (11, None, "finished; then fmi2Terminate returned Error without a message"),
+    "no start": (0, "fmi2ExitInitializationMode returned Error without a message", None),
     "error if asked": (6, "at 0.5 s: fmi2DoStep: the pump ran dry", None),
     "fatal if asked": (6, "at 0.5 s: fmi2DoStep: the pump ran dry", None),
 }
@@ -33,7 +33,7 @@ MOODS3 = {
     "ends between": (6, "ended by the FMU at t = 0.525 s", None),
     "ends at point": (7, "ended by the FMU at t = 0.6 s", None),
     "returns early": (6, "at 0.5 s: fmi3DoStep: the step ended early, at 0.525 s", None),
-    "no terminate": (11, None, "finished; then fmi3Terminate was answered with Fatal, without a message"),
+    "no terminate": (11, None, "finished; then fmi3Terminate returned Fatal without a message"),
     "error if asked": (6, "at 0.5 s: fmi3DoStep: the pump ran dry", None),
 }
 
@@ -56,8 +56,8 @@ def test_moods(request, moods, fixture, first, read_before_set):
         np.testing.assert_allclose(runs["y"][run], signal, atol=1e-15)
         np.testing.assert_allclose(thinned["y"][run], signal[::2], atol=1e-15)
         # If the FMU ends the simulation, there are statistics until then; a failed run has none.
-        whole = runs.ok[run] or runs.errors[run].startswith("ended")
-        measures = [signal[count - 1], signal[:count].mean()] if whole else [np.nan, np.nan]
+        has_measures = runs.ok[run] or runs.errors[run].startswith("ended")
+        measures = [signal[count - 1], signal[:count].mean()] if has_measures else [np.nan, np.nan]
         np.testing.assert_allclose([runs["y", "end"][run], runs["y", "mean"][run]], measures, atol=1e-14)
 
 
@@ -68,7 +68,7 @@ def test_an_end_at_the_last_time(unruly):
     np.testing.assert_allclose(runs["y"][0], 4.0 + TIME[:7], atol=1e-15)
 
 
-def test_the_reason_is_asked_for_once_and_apart_from_the_results(unruly):
+def test_silent_runs_are_repeated_once_with_logging(unruly):
     moods = [
         list(MOODS).index(name) for name in ("error if asked", "good", "silent error", "discard", "error if asked")
     ]
@@ -76,29 +76,28 @@ def test_the_reason_is_asked_for_once_and_apart_from_the_results(unruly):
         runs = fmu.run(TIME, start={"mood": moods}, outputs=["y", "logged", "instances"])
         after = fmu.run(TIME, outputs=["logged", "instances"])
     assert runs.errors.keys() == {0, 2, 3, 4} and np.nanmax(runs["logged"]) == 0
-    # Three failed without a word: the six steps of each were made once more, with never two instances at a time.
+    # Three runs failed without a message. Their six steps were repeated, with at most one instance at a time.
     assert after["logged"].max() == 3 * 6 and after["instances"].max() == 1
 
 
-def test_an_fmu_that_is_slow_to_talk(unruly):
+def test_an_fmu_that_is_slow_with_logging(unruly):
     with fmu_run.Fmu(unruly) as fmu:
         begin = clock.monotonic()
         runs = fmu.run(np.linspace(0, 0.6, 101), start={"mood": len(MOODS)}, outputs=["y"])
     # 76 steps of 0.3 s each would be 23 s.
     assert clock.monotonic() - begin < 10
-    assert runs.errors[0].endswith("fmi2DoStep was answered with Error, without a message")
+    assert runs.errors[0].endswith("fmi2DoStep returned Error without a message")
 
 
 @pytest.mark.parametrize(
     "guid, why",
     [("strange", "the guid is of another FMU"), ("mute", "Unruly makes no instance, and logs no message")],
 )
-def test_an_fmu_that_makes_no_instances(tmp_path, unruly, guid, why):
-    path = tmp_path / "strange.fmu"
-    with zipfile.ZipFile(unruly) as whole, zipfile.ZipFile(path, "w") as archive:
-        for name in whole.namelist():
-            archive.writestr(name, whole.read(name).replace(b'guid="{unruly}"', f'guid="{{{guid}}}"'.encode()))
-    with fmu_run.Fmu(path) as fmu:
+def test_an_fmu_that_cannot_be_instantiated(tmp_path, unruly, guid, why):
+    def change(name, content):
+        return content.replace(b'guid="{unruly}"', f'guid="{{{guid}}}"'.encode())
+
+    with fmu_run.Fmu(repacked(unruly, tmp_path / "strange.fmu", change)) as fmu:
         runs = fmu.run(TIME, start={"slope": [1.0, 2.0]}, outputs=["y"], every=1, measures=["peak"])
     assert runs.errors == dict.fromkeys((0, 1), why)
     assert np.isnan(runs["y"]).all() and np.isnan(runs["y", "peak"]).all()

@@ -1,4 +1,4 @@
-"""Gymnasium's environments of FMUs, compared with instances that the test steps."""
+"""Compares Gymnasium environments with instances that the test steps."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fmu_run.gymnasium import AutoresetMode, Env, Task, VectorEnv
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import SyncVectorEnv
 
-MOTORS, SEEN, STEP = ("theta1", "theta2"), ("pitch", "roll", "tau1"), 2e-3
+MOTORS, OBSERVED, STEP = ("theta1", "theta2"), ("pitch", "roll", "tau1"), 2e-3
 
 
 def effort(before, action, after):
@@ -28,7 +28,7 @@ def task(testbed) -> Task:
     return Task(
         fmu=testbed,
         actions=dict.fromkeys(MOTORS, (-1.0, 1.0)),
-        observations=dict.fromkeys(SEEN, (-50.0, 50.0)),
+        observations=dict.fromkeys(OBSERVED, (-50.0, 50.0)),
         reward=effort,
         step=STEP,
         length=20,
@@ -55,7 +55,7 @@ def test_importing_fmu_run_needs_no_gymnasium() -> None:
     subprocess.run([sys.executable, "-c", program], check=True)
 
 
-def test_gymnasium_finds_no_fault(task) -> None:
+def test_gymnasium_reports_no_fault(task) -> None:
     gymnasium.register("Wrist-v0", Env, vector_entry_point=VectorEnv, kwargs={"task": task})
     try:
         with warnings.catch_warnings():
@@ -82,15 +82,15 @@ def test_a_system_is_an_environment_with_the_bounds_of_its_description(task) -> 
     assert envs.single_observation_space.low[2] == 0.0 and envs.single_observation_space.high[2] == 1e9
     first, _ = envs.reset(seed=4)
     for _ in range(15):
-        seen, _, _, _, infos = envs.step(np.full((3, 1), 0.2))
-    assert (seen[:, 0] > 1e-4).all() and infos == {} and np.array_equal(seen[:, 1], first[:, 1])
-    assert len(set(seen[:, 1])) == 3
+        observed, _, _, _, infos = envs.step(np.full((3, 1), 0.2))
+    assert (observed[:, 0] > 1e-4).all() and infos == {} and np.array_equal(observed[:, 1], first[:, 1])
+    assert len(set(observed[:, 1])) == 3
     envs.close()
 
 
 @pytest.mark.parametrize("mode", AutoresetMode)
-def test_they_are_instances_stepped_by_hand(task, mode) -> None:
-    """Bit-identical over the ends of episodes, with the parameters that the same generator draws."""
+def test_environments_equal_instances(task, mode) -> None:
+    """Results are bit-identical, also after the end of an episode, with parameters of the same generator."""
     count, envs = 4, VectorEnv(task, 4, autoreset_mode=mode)
     rng, actions = np.random.default_rng(3), np.random.default_rng(4).uniform(-1, 1, (50, count, 2))
 
@@ -98,15 +98,15 @@ def test_they_are_instances_stepped_by_hand(task, mode) -> None:
         drawn = {"k1": rng.uniform(100.0, 140.0, count), "J3": 0.0127 * rng.lognormal(0.0, 0.1, count)}
         wrists.reset(start=drawn)
         assert np.array_equal(envs._instances.get(("k1", "J3")).T, [*drawn.values()])
-        return wrists.get(SEEN)
+        return wrists.get(OBSERVED)
 
     with fmu_run.Fmu(task.fmu) as fmu:
         wrists = fmu.instances(count)
-        seen, _ = envs.reset(seed=3)
+        observed, _ = envs.reset(seed=3)
         expected, k = begun(), 0
-        assert np.array_equal(seen, expected)
+        assert np.array_equal(observed, expected)
         for action in actions:
-            seen, rewards, terminated, truncated, infos = envs.step(action)
+            observed, rewards, terminated, truncated, infos = envs.step(action)
             if k == task.length and mode is AutoresetMode.NEXT_STEP:
                 expected, k = begun(), 0
                 assert not (rewards.any() or truncated.any())
@@ -114,7 +114,7 @@ def test_they_are_instances_stepped_by_hand(task, mode) -> None:
                 before, k = expected, k + 1
                 wrists.set(MOTORS, action)
                 wrists.step(STEP)
-                expected = wrists.get(SEEN)
+                expected = wrists.get(OBSERVED)
                 assert np.array_equal(rewards, effort(before, action, expected))
                 assert truncated.all() == truncated.any() == (k == task.length)
             if k == task.length and mode is AutoresetMode.SAME_STEP:
@@ -123,17 +123,17 @@ def test_they_are_instances_stepped_by_hand(task, mode) -> None:
             elif k == task.length and mode is AutoresetMode.DISABLED:
                 with pytest.raises(gymnasium.error.ResetNeeded, match=r"\[0, 1, 2, 3\] are over"):
                     envs.step(action)
-                assert np.array_equal(seen, expected)
-                seen, _ = envs.reset(options={"reset_mask": np.ones(count, dtype=bool)})
+                assert np.array_equal(observed, expected)
+                observed, _ = envs.reset(options={"reset_mask": np.ones(count, dtype=bool)})
                 expected, k = begun(), 0
-            assert np.array_equal(seen, expected) and not terminated.any()
-            seen[:] = np.nan  # is the caller's
+            assert np.array_equal(observed, expected) and not terminated.any()
+            observed[:] = np.nan  # the caller owns the array
     envs.close()
     with pytest.raises(fmu_run.FmuError, match="closed"):
         envs._own.instances()
 
 
-def test_one_is_many_of_one_and_seeds_are_reproducible(task) -> None:
+def test_env_equals_vector_env_and_seeds_are_reproducible(task) -> None:
     one, many = played(SyncVectorEnv([lambda: Env(task)]), 50), played(VectorEnv(task, 1), 50)
     assert same(one, many)
     assert same(many, played(VectorEnv(task, 1), 50))
@@ -142,13 +142,13 @@ def test_one_is_many_of_one_and_seeds_are_reproducible(task) -> None:
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
 @pytest.mark.parametrize("count", [1, 3])
-def test_one_that_fails_ends_its_own_episode(task, mode, count) -> None:
+def test_a_failure_ends_one_episode(task, mode, count) -> None:
     envs = VectorEnv(replace(task, failed_reward=-7.0), count, autoreset_mode=mode)
     other = VectorEnv(task, count, autoreset_mode=mode)
     bad, last = np.zeros((count, 2)), np.arange(count) == count - 1
     for each in (envs, other):
         each.reset(seed=1)
-        seen, *_ = each.step(bad + 0.1)
+        observed, *_ = each.step(bad + 0.1)
     bad[-1, 0] = np.nan
     after, rewards, terminated, _, infos = envs.step(bad)
     expected, good, *_ = other.step(np.nan_to_num(bad))
@@ -159,7 +159,7 @@ def test_one_that_fails_ends_its_own_episode(task, mode, count) -> None:
         final, infos = infos["final_obs"][-1], infos["final_info"]
     else:
         final = after[-1]
-    assert np.array_equal(final, seen[-1]), "what was seen last"
+    assert np.array_equal(final, observed[-1]), "the last observation"
     assert np.array_equal(infos["_error"], last) and "theta1" in infos["error"][-1]
     if mode == "Disabled":
         envs.reset(options={"reset_mask": last})
@@ -177,7 +177,7 @@ def test_one_that_fails_ends_its_own_episode(task, mode, count) -> None:
         (0, np.inf, "an observation is no finite number"),
     ],
 )
-def test_an_fmu_that_ends_or_tells_no_numbers_ends_the_episode(unruly, mood, slope, message) -> None:
+def test_termination_and_infinite_observations_end_the_episode(unruly, mood, slope, message) -> None:
     """The FMU may have one instance in a process, so each environment is closed before the next."""
     task = Task(
         fmu=unruly,
@@ -193,9 +193,9 @@ def test_an_fmu_that_ends_or_tells_no_numbers_ends_the_episode(unruly, mood, slo
         for _ in range(2):
             env.reset()
             for k in range(5):
-                seen, reward, *ended, info = env.step([1.0])
-                assert seen == pytest.approx([reward]) == [4.1 + 0.1 * k] and ended == [False, False] and info == {}
-            assert np.array_equal(env.step([slope])[0], seen)
+                observed, reward, *ended, info = env.step([1.0])
+                assert observed == pytest.approx([reward]) == [4.1 + 0.1 * k] and ended == [False, False] and info == {}
+            assert np.array_equal(env.step([slope])[0], observed)
         env.reset()
         for _ in range(5):
             env.step([1.0])
@@ -203,8 +203,8 @@ def test_an_fmu_that_ends_or_tells_no_numbers_ends_the_episode(unruly, mood, slo
         assert terminated and not truncated and message in info["error"]
 
 
-def test_actions_that_make_inputs(task) -> None:
-    """A rate, integrated by what the inputs were; failures with all gone, too."""
+def test_inputs_from_actions(task) -> None:
+    """Integrates a rate from the previous inputs; also checks that all instances may fail."""
     by_rate = replace(
         task,
         actions={"rate": (-6.0, 6.0)},
@@ -217,11 +217,11 @@ def test_actions_that_make_inputs(task) -> None:
     envs = VectorEnv(by_rate, 2)
     assert np.array_equal(envs.reset()[0][:, :2], [[0.1, 0.0]] * 2)
     for _ in range(3):
-        seen, _, terminated, *_ = envs.step([[5.0], [10.0]])
-    assert np.allclose(seen[:, :2], [[0.13, -0.03], [0.16, -0.06]], atol=1e-15)
+        observed, _, terminated, *_ = envs.step([[5.0], [10.0]])
+    assert np.allclose(observed[:, :2], [[0.13, -0.03], [0.16, -0.06]], atol=1e-15)
     assert terminated.tolist() == [False, True]
-    seen, _, terminated, *_ = envs.step([[np.nan], [0.0]])
-    assert terminated.tolist() == [True, False] and np.allclose(seen[:, 0], [0.13, 0.1])
+    observed, _, terminated, *_ = envs.step([[np.nan], [0.0]])
+    assert terminated.tolist() == [True, False] and np.allclose(observed[:, 0], [0.13, 0.1])
     envs.step([[np.nan], [np.nan]])
     envs.step([[0.0], [0.0]])
     broken = VectorEnv(replace(by_rate, to_inputs=lambda action, motors: action), 2)
@@ -245,12 +245,12 @@ def test_actions_that_make_inputs(task) -> None:
         ({"start": {"k9": 1.0}}, "k9"),
     ],
 )
-def test_what_does_not_fit_is_refused(task, changed, message) -> None:
+def test_invalid_tasks(task, changed, message) -> None:
     with pytest.raises(ValueError, match=message):
         VectorEnv(replace(task, **changed), 2)
 
 
-def test_what_functions_must_return_and_draws_must_be(task) -> None:
+def test_invalid_results_of_functions(task) -> None:
     for name in ("reward", "terminated"):
         envs = VectorEnv(replace(task, **{name: lambda before, action, after: after}), 2)
         with pytest.raises(gymnasium.error.ResetNeeded, match="reset comes before step"):

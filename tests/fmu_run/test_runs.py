@@ -1,4 +1,4 @@
-"""fmu_run against FMPy's bare calls, and against NumPy where it calculates itself."""
+"""Compares runs with FMPy's calls of C functions, and statistics with NumPy."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ INPUTS = ["theta1", "theta2", "omega1", "omega2"]
 
 
 def motion(samples: int = 400, scale: float = 1.0) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Uneven times (samples,) s that begin at 0.3, and what the motors do at them."""
+    """Returns uneven times (samples,) s from 0.3 on, and the motors' angles and rates."""
     time = 0.3 + np.cumsum(np.random.default_rng(3).uniform(2e-4, 3e-3, samples))
     angles = [scale * 0.4 * np.sin(9 * time), -scale * 0.3 * np.cos(14 * time)]
     rates = [scale * 3.6 * np.cos(9 * time), scale * 4.2 * np.sin(14 * time)]
@@ -27,7 +27,7 @@ def motion(samples: int = 400, scale: float = 1.0) -> tuple[np.ndarray, dict[str
 
 
 def by_fmpy(path, time, inputs, start, outputs, slopes=None, read_before_set=False) -> dict[str, np.ndarray]:
-    """One run, call by call, with FMPy's classes for the C functions."""
+    """Performs a run, call by call, with FMPy's classes for the C functions."""
     description = fmpy.read_model_description(str(path))
     by_name = {v.name: v for v in description.modelVariables}
     folder = fmpy.extract(str(path))
@@ -119,10 +119,10 @@ def test_each_run_has_its_own_values(testbed, threads):
         same(runs, by_fmpy(testbed, time, one, start, OUTPUTS), run)
 
 
-def test_measures_and_what_is_kept(testbed):
+def test_measures_and_kept_times(testbed):
     time, inputs = motion()
     with fmu_run.Fmu(testbed) as fmu:
-        whole = fmu.run(time, inputs=inputs, start={"k1": [80.0, 90.0]}, outputs=["roll", "M"])
+        complete = fmu.run(time, inputs=inputs, start={"k1": [80.0, 90.0]}, outputs=["roll", "M"])
         runs = fmu.run(
             time,
             inputs=inputs,
@@ -133,8 +133,8 @@ def test_measures_and_what_is_kept(testbed):
         )
         measured = fmu.run(time, inputs=inputs, start={"k1": [80.0, 90.0]}, outputs=["roll"], measures=["peak"])
     np.testing.assert_array_equal(runs.time, time[::7])
-    np.testing.assert_array_equal(runs["roll"], whole["roll"][:, ::7])
-    signal = whole["roll"]
+    np.testing.assert_array_equal(runs["roll"], complete["roll"][:, ::7])
+    signal = complete["roll"]
     np.testing.assert_array_equal(runs["roll", "min"], signal.min(axis=1))
     np.testing.assert_array_equal(runs["roll", "max"], signal.max(axis=1))
     np.testing.assert_array_equal(runs["roll", "peak"], np.abs(signal).max(axis=1))
@@ -150,7 +150,7 @@ def test_measures_and_what_is_kept(testbed):
 
 
 def test_frames_and_datasets(testbed, monkeypatch):
-    """Every number at its run, its time and the start values of its run; rejected runs have NaN."""
+    """Checks that each number is at its run, time and start values, and that rejected runs have NaN."""
     time, inputs = motion(5)
     start = {"k1": [80.0, -1.0, 90.0], "use_omega": True, "theta1": 0.25}
     with fmu_run.Fmu(testbed) as fmu:
@@ -179,25 +179,25 @@ def test_frames_and_datasets(testbed, monkeypatch):
             call()
 
 
-def test_names_that_were_not_asked_for(testbed):
+def test_names_that_were_not_requested(testbed):
     with fmu_run.Fmu(testbed) as fmu:
         runs = fmu.run([0.0, 1e-3], outputs=["roll", "tau1"], every=1, measures=["peak"])
     for key, message in [
-        ("nix", "no output 'nix' was asked for; there are roll, tau1"),
-        (("roll", "rms"), "no measure 'rms' was asked for; there are peak"),
+        ("nix", "no output 'nix' was requested; there are roll, tau1"),
+        (("roll", "rms"), "no measure 'rms' was requested; there are peak"),
     ]:
         with pytest.raises(KeyError, match=message):
             runs[key]
 
 
-def test_results_that_are_not_a_number_are_announced(testbed, unruly):
+def test_results_that_are_not_a_number_are_reported(testbed, unruly):
     time = np.arange(11) / 10
     with fmu_run.Fmu(testbed) as fmu:
-        ask = {"inputs": {"theta1": np.zeros(11)}, "outputs": ["roll"], "measures": ["peak"], "every": 1}
-        some = fmu.run(time, start={"k1": [100.0, -1.0, 100.0]}, **ask)
-        every = fmu.run(time, start={"k1": -1.0}, **ask)
-        looked = fmu.run(time, start={"k1": -1.0}, **ask)
-    assert looked.errors
+        arguments = {"inputs": {"theta1": np.zeros(11)}, "outputs": ["roll"], "measures": ["peak"], "every": 1}
+        some = fmu.run(time, start={"k1": [100.0, -1.0, 100.0]}, **arguments)
+        every = fmu.run(time, start={"k1": -1.0}, **arguments)
+        checked = fmu.run(time, start={"k1": -1.0}, **arguments)
+    assert checked.errors
     with fmu_run.Fmu(unruly) as fmu:
         endless = fmu.run(time, inputs={"slope": np.where(time < 0.35, 1.0, np.nan)}, outputs=["y"])
     with pytest.warns(RuntimeWarning, match=r"^1 of 3 runs failed, see Runs.errors; run 1: .*k1 must not be below"):
@@ -208,7 +208,7 @@ def test_results_that_are_not_a_number_are_announced(testbed, unruly):
         endless["y"]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        for runs in (some, every, looked):
+        for runs in (some, every, checked):
             runs["roll"], runs["roll", "peak"]
         endless["y"]
 
@@ -220,7 +220,7 @@ def test_many_short_runs_leave_nothing_behind(testbed, tmp_path, monkeypatch):
         assert len(list(tmp_path.iterdir())) == 1
         stiffness = np.tile([50.0, 100.0, 150.0], 2000)
         peaks = fmu.run(time, inputs=inputs, start={"k1": stiffness}, outputs=["tau1"], measures=["peak"])
-        # No run knows of the one before it in its instance.
+        # A run does not depend on the previous run of its instance.
         np.testing.assert_array_equal(np.ptp(peaks["tau1", "peak"].reshape(-1, 3), axis=0), 0.0)
     assert list(tmp_path.iterdir()) == []
 
@@ -235,6 +235,6 @@ def test_the_programs_run(fmu, monkeypatch):
     runs = names["runs"].check()
     assert runs["roll"].shape == (1000, 2001) and abs(runs["roll"]).max() > 0.01
     assert names["torques"].shape == (1000, 2) and names["wrists"].errors == {}
-    assert len({*names["wrists"].time}) == 2, "some have gone back"
+    assert len({*names["wrists"].time}) == 2, "some instances were restored"
     assert names["peaks"]["tau1", "peak"].max() == abs(runs["tau1"]).max()
     assert names["rewards"].shape == (1024,) and (names["envs"].steps == 100).all()

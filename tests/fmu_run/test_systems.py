@@ -13,8 +13,8 @@ from built import built
 
 SENSED = ("pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2")
 MOVED = ("theta1", "theta2", "omega1", "omega2")
-WIRES = {f"testbed.{name}": f"controller.{name}" for name in SENSED}
-WIRES |= {f"controller.{name}": f"testbed.{name}" for name in MOVED}
+CONNECTIONS = {f"testbed.{name}": f"controller.{name}" for name in SENSED}
+CONNECTIONS |= {f"controller.{name}": f"testbed.{name}" for name in MOVED}
 GOAL = {"controller.pitch_ref": 0.3, "controller.roll_ref": -0.4}
 SHOWN = ("testbed.pitch", "testbed.tau1", "testbed.tau2", "controller.theta1", "controller.tau1")
 ORDERS = ("dependencies", "jacobi")
@@ -22,7 +22,7 @@ ORDERS = ("dependencies", "jacobi")
 
 @pytest.fixture(params=[("", ""), ("", "fmi3"), ("fmi3", "")], ids=["2.0", "2.0 and 3.0", "3.0 and 2.0"])
 def fmus(request):
-    """Controller and testbed, of the same edition of the standard or not."""
+    """Controller and testbed, for equal or different FMI versions."""
     names = [
         f"{folder}/{name}".strip("/") for folder, name in zip(request.param, ("prw_controller.fmu", "prw_testbed.fmu"))
     ]
@@ -38,7 +38,7 @@ def by_hand(fmus, order: str, steps: int, k1: float) -> np.ndarray:
     sensed, moved = wrist.get(SENSED), law.get(MOVED)
     for _ in range(steps):
         if order == "dependencies":
-            # Torques depend on the motors at once, nothing else does.
+            # Only the torques depend on the motors without a step.
             wrist.set(MOVED, law.get(MOVED))
             law.set(SENSED, wrist.get(SENSED))
         by_name = {"testbed": wrist, "controller": law}
@@ -53,15 +53,15 @@ def by_hand(fmus, order: str, steps: int, k1: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("order", ORDERS)
-def test_a_system_does_what_its_fmus_do(fmus, order) -> None:
+def test_a_system_equals_connected_instances(fmus, order) -> None:
     stiffness = [80.0, 120.0]
     expected = [by_hand(fmus, order, 150, k1) for k1 in stiffness]
-    loop = fmu_run.System(fmus, WIRES, order=order)
+    loop = fmu_run.System(fmus, CONNECTIONS, order=order)
     pairs = loop.instances(2, start=GOAL | {"testbed.k1": stiffness}, threads=2)
     for k in range(150):
         assert np.array_equal(pairs.get(SHOWN), [run[k] for run in expected]), k
         pairs.step(1e-3)
-    # Times that are multiples of the step to the last bit.
+    # Times that are exact multiples of the step.
     time = np.arange(100) / 1024
     runs = loop.run(time, start=GOAL | {"testbed.k1": stiffness}, outputs=SHOWN, measures=["end"], every=1)
     again = loop.instances(2, start=GOAL | {"testbed.k1": stiffness})
@@ -73,10 +73,10 @@ def test_a_system_does_what_its_fmus_do(fmus, order) -> None:
 
 @pytest.mark.parametrize("order", ORDERS)
 def test_states_of_all_components_are_saved(fmus, order) -> None:
-    loop = fmu_run.System(fmus, WIRES, order=order)
+    loop = fmu_run.System(fmus, CONNECTIONS, order=order)
     pairs = loop.instances(3, start=GOAL | {"testbed.k1": [70.0, 90.0, 110.0]})
 
-    def onwards() -> np.ndarray:
+    def continued() -> np.ndarray:
         rows = []
         for _ in range(30):
             pairs.step(1e-3)
@@ -86,13 +86,13 @@ def test_states_of_all_components_are_saved(fmus, order) -> None:
     for _ in range(40):
         pairs.step(1e-3)
     saved = pairs.save()
-    first = onwards()
+    first = continued()
     texts = pairs.serialize(saved)
     pairs.restore(saved)
-    assert np.array_equal(pairs.time, np.full(3, pairs.time[0])) and np.array_equal(onwards(), first)
+    assert np.array_equal(pairs.time, np.full(3, pairs.time[0])) and np.array_equal(continued(), first)
     pairs.reset()
     pairs.restore(pairs.deserialize(texts))
-    assert np.array_equal(onwards(), first)
+    assert np.array_equal(continued(), first)
     with pytest.raises(fmu_run.FmuError, match=re.escape("the bytes are no state of this system")):
         pairs.deserialize([text[:-9] for text in texts])
     pairs.restore(saved, mask=[False, True, False])
@@ -100,17 +100,17 @@ def test_states_of_all_components_are_saved(fmus, order) -> None:
 
 
 def test_torques_are_passed_on_after_the_motors_are_set(fmus) -> None:
-    stages = fmu_run.System(fmus, WIRES).stages
-    assert [{wire for wire in stage if ".tau" in wire[0]} for stage in stages] == [
+    stages = fmu_run.System(fmus, CONNECTIONS).stages
+    assert [{pair for pair in stage if ".tau" in pair[0]} for stage in stages] == [
         set(),
         {(f"testbed.tau{i}", f"controller.tau{i}") for i in (1, 2)},
     ]
-    assert sorted(sum(stages, [])) == sorted(WIRES.items())
-    assert len(fmu_run.System(fmus, WIRES, order="jacobi").stages) == 1
+    assert sorted(sum(stages, [])) == sorted(CONNECTIONS.items())
+    assert len(fmu_run.System(fmus, CONNECTIONS, order="jacobi").stages) == 1
 
 
 @pytest.mark.parametrize(
-    "wires, order, complaint",
+    "connections, order, message",
     [
         ({"testbed.pich": "controller.pitch"}, "jacobi", 'system has no variable "testbed.pich"; did you mean "testbed.pitch"?'),
         ({"testbed.pitch": "controller.tau1"}, "jacobi", "testbed.pitch cannot feed controller.tau1: the one is in rad, the other in N.m"),
@@ -120,15 +120,15 @@ def test_torques_are_passed_on_after_the_motors_are_set(fmus) -> None:
         ({}, "gauss", "order must be 'dependencies' or 'jacobi', not \"gauss\""),
     ],
 )  # fmt: skip
-def test_what_does_not_fit_together_is_named(wires, order, complaint) -> None:
+def test_invalid_connections(connections, order, message) -> None:
     fmus = {name: fmu_run.Fmu(built(f"prw_{name}.fmu")) for name in ("controller", "testbed")}
-    with pytest.raises(ValueError, match=re.escape(complaint)):
-        fmu_run.System(fmus, wires, order=order)
+    with pytest.raises(ValueError, match=re.escape(message)):
+        fmu_run.System(fmus, connections, order=order)
 
 
-def test_what_is_fed_cannot_be_set() -> None:
+def test_connected_inputs_cannot_be_set() -> None:
     with fmu_run.Fmu(built("prw_controller.fmu")) as controller, fmu_run.Fmu(built("prw_testbed.fmu")) as testbed:
-        loop = fmu_run.System({"controller": controller, "testbed": testbed}, WIRES)
+        loop = fmu_run.System({"controller": controller, "testbed": testbed}, CONNECTIONS)
         pair = loop.instances()
         for call in (
             lambda: pair.set("testbed.theta1", 1.0),
@@ -146,19 +146,19 @@ def test_what_is_fed_cannot_be_set() -> None:
         assert list(runs.errors) == [0] and "testbed: " in runs.errors[0] and "k1" in runs.errors[0]
 
 
-def test_algebraic_loops_are_named(unruly) -> None:
-    """By its description, each output may depend on every input."""
+def test_algebraic_loops(unruly) -> None:
+    """The model description permits that each output depends on every input."""
     with fmu_run.Fmu(unruly) as fmu:
         with pytest.raises(ValueError, match="an algebraic loop: a.instances -> a.count; .* Order Jacobi"):
             fmu_run.System({"a": fmu}, {"a.instances": "a.count"})
         delayed = fmu_run.System({"a": fmu}, {"a.instances": "a.count"}, order="jacobi")
         assert delayed.run([0.0, 1.0], outputs=["a.count"])["a.count"][0, 1] == 1
-        with pytest.raises(fmu_run.FmuError, match="only once in a process"):
+        with pytest.raises(fmu_run.FmuError, match="only one instance per process"):
             fmu_run.System({"a": fmu, "b": fmu})
 
 
 def rewritten(folder, change) -> str:
-    """The closed loop's SSP with another system structure."""
+    """Returns a copy of the closed loop's SSP with a changed system structure."""
     source, to = built("prw_closed_loop.ssp"), folder / "changed.ssp"
     with zipfile.ZipFile(source) as old, zipfile.ZipFile(to, "w") as new:
         for name in old.namelist():
@@ -171,18 +171,18 @@ def rewritten(folder, change) -> str:
 def test_an_ssp_is_the_same_system(order, tmp_path) -> None:
     ssp = fmu_run.System(built("prw_closed_loop.ssp"), order=order)
     with fmu_run.Fmu(built("prw_controller.fmu")) as controller, fmu_run.Fmu(built("prw_testbed.fmu")) as testbed:
-        wired = fmu_run.System({"controller": controller, "testbed": testbed}, WIRES, order=order)
+        connected = fmu_run.System({"controller": controller, "testbed": testbed}, CONNECTIONS, order=order)
         goal = {
             "controller.pitch_ref": np.deg2rad(30.0),
             "controller.roll_ref": np.deg2rad(60.0),
             "testbed.use_omega": "true",
         }
         time = np.linspace(0.0, 0.5, 501)
-        expected = wired.run(time, start=goal, outputs=["testbed.pitch", "testbed.roll"])
+        expected = connected.run(time, start=goal, outputs=["testbed.pitch", "testbed.roll"])
     paths = {name: built(f"prw_{name}.fmu") for name in ("controller", "testbed")}
-    pairs = fmu_run.System(paths, WIRES.items(), order=order)
+    pairs = fmu_run.System(paths, CONNECTIONS.items(), order=order)
     assert [sorted(stage) for stage in pairs.stages] == [sorted(stage) for stage in ssp.stages]
-    # Its connectors have the names that the system gives them, and its start values are there.
+    # Connectors have the names of the system, and start values come from the file.
     found = ssp.run(time, outputs=["pitch", "roll"])
     assert all(np.array_equal(found[name], expected[f"testbed.{name}"]) for name in ("pitch", "roll"))
     assert ssp.stop_time == 1.0 and ssp.variables["pitch_ref"].unit == "rad" and ssp.name == "prw_closed_loop"
@@ -213,7 +213,7 @@ def test_an_ssp_is_the_same_system(order, tmp_path) -> None:
 
 
 @pytest.mark.parametrize(
-    "old, new, complaint",
+    "old, new, message",
     [
         ("</ssd:SystemStructureDescription>", "", "SystemStructure.ssd is no XML"),
         ("resources/prw_testbed.fmu", "resources/other.fmu", "component testbed: resources/other.fmu: cannot be opened"),
@@ -223,8 +223,8 @@ def test_an_ssp_is_the_same_system(order, tmp_path) -> None:
         ("endConnector=\"roll\"/>", "endConnector=\"roll\"><ssc:LinearTransformation factor=\"2\"/></ssd:Connection>", "LinearTransformation"),
     ],
 )  # fmt: skip
-def test_ssps_that_cannot_be_run(old, new, complaint, tmp_path) -> None:
-    with pytest.raises(fmu_run.FmuError, match=complaint):
+def test_unsupported_ssps(old, new, message, tmp_path) -> None:
+    with pytest.raises(fmu_run.FmuError, match=message):
         fmu_run.System(rewritten(tmp_path, lambda text: text.replace(old, new)))
     with pytest.raises(fmu_run.FmuError, match="it is no SSP"):
         fmu_run.System(built("prw_testbed.fmu"))

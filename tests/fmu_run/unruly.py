@@ -1,9 +1,10 @@
-"""The FMUs in C that unruly.c with unruly.xml, and unruly3.c with unruly3.xml make."""
+"""Makes misbehaving FMUs in C, and changed copies of FMUs."""
 
 from __future__ import annotations
 
 import subprocess
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import fmpy
@@ -21,3 +22,11 @@ def build(folder: Path, *flags: str, name: str = "unruly", platform: str = "linu
         archive.write(HERE / f"{name}.xml", "modelDescription.xml")
         archive.write(library, f"binaries/{platform}/{name}.so")
     return fmu
+
+
+def repacked(fmu: Path, path: Path, change: Callable[[str, bytes], bytes]) -> Path:
+    """Copies an FMU to `path`; the content of each file is `change(name, content)`."""
+    with zipfile.ZipFile(fmu) as original, zipfile.ZipFile(path, "w") as archive:
+        for name in original.namelist():
+            archive.writestr(name, change(name, original.read(name)))
+    return path

@@ -17,8 +17,6 @@ HERE = Path(__file__).parent
 #: The FMU for FMI 3.0.
 FMI3 = f"{MODEL}-fmi3.fmu"
 FMUS = (DIST / f"{MODEL}.fmu", DIST / FMI3)
-#: Debian's package wine64 has it in this directory only.
-WINE = "/usr/lib/wine/wine64"
 
 
 def pytest_configure() -> None:
@@ -55,9 +53,7 @@ def prw_wheel() -> Path:
 @pytest.fixture(scope="session")
 def wine(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """The environment of programs for Windows: an empty Windows, without a display."""
-    toolchain.need(WINE)
-    environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "PYTHONPATH")}
-    environment |= {"WINEPREFIX": str(tmp_path_factory.mktemp("wine")), "WINEDEBUG": "-all", "WINEARCH": "win64"}
-    environment["WINEDLLOVERRIDES"] = "mscoree,mshtml="
-    subprocess.run([WINE, "wineboot", "--init"], env=environment, capture_output=True, timeout=300)
+    toolchain.need(toolchain.WINE)
+    environment = toolchain.windows(tmp_path_factory.mktemp("wine"))
+    subprocess.run([toolchain.WINE, "wineboot", "--init"], env=environment, capture_output=True, timeout=300)
     return environment

@@ -19,7 +19,7 @@ import fmpy
 import numpy as np
 import pytest
 import toolchain
-from conftest import DIST, FMUS, HERE, ROOT, WINE, binaries, prw_wheel, wheel
+from conftest import DIST, FMUS, HERE, ROOT, binaries, prw_wheel, wheel
 from targets import LINUX, LINUX_ARM, MODEL, WINDOWS, Target
 
 PINS = ROOT / "dev" / "requirements" / "study.txt"
@@ -150,7 +150,7 @@ def windows(wine: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> S
     (python / "_wmi.pyd").unlink()
     source = HERE / "windows" / "bcryptprimitives.c"
     zig_cc("x86_64-windows-gnu", "-shared", "-o", python / "bcryptprimitives.dll", source, "-ladvapi32")
-    return System((WINE,), python / "python.exe", wine, wine_path, "x86_64-windows-gnu", FMUS[0], "win64")
+    return System((toolchain.WINE,), python / "python.exe", wine, wine_path, "x86_64-windows-gnu", FMUS[0], "win64")
 
 
 @pytest.fixture(scope="session")

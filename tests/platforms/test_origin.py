@@ -1,4 +1,4 @@
-"""Nothing in a release says where it was made."""
+"""A release contains no paths of the machine that built it."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from pathlib import Path
 import pytest
 from conftest import DIST, ROOT
 
-#: This machine's folders, and what those of others are called.
+#: Directories of this machine, and patterns of directories of others.
 FOLDERS = {str(ROOT), str(Path.home()), f"{tempfile.gettempdir()}/", "/.cargo/", "/.rustup/", "rustlib", "/usr/src"}
 FOLDERS |= {os.environ[name] for name in ("CARGO_HOME", "CARGO_TARGET_DIR") if os.environ.get(name)}
 OTHERS = re.compile(rb"/home/\w+/|/Users/\w+/|[A-Z]:\\(?:Users|a)\\", re.IGNORECASE)
 
 
 def contents(name: str, content: bytes) -> Iterator[tuple[str, bytes]]:
-    """A file and, if it is an archive, those in it, and those in these; of C sources also the texts that are numbers."""
+    """Yields a file and all files in nested archives; of C sources also the strings that are written as numbers."""
     yield name, content
     if name.endswith(".c"):
         yield name, bytes(int(number, 16) for number in re.findall(rb"\b0x([0-9a-f]{2})\b", content))
@@ -31,11 +31,11 @@ def contents(name: str, content: bytes) -> Iterator[tuple[str, bytes]]:
 
 
 def origins(name: str, content: bytes) -> list[str]:
-    """The folders that are named in a file, and where."""
+    """Returns the directories that a file names, each with its location."""
     found = []
     for path, text in contents(name, content):
         for folder in FOLDERS:
-            # Windows has texts of two bytes a character.
+            # Windows has strings with two bytes per character.
             if any(folder.encode(encoding) in text for encoding in ("utf-8", "utf-16-le")):
                 found.append(f"{folder} in {path}")
         found += [f"{match.decode()} in {path}" for match in OTHERS.findall(text)]
@@ -48,11 +48,11 @@ def test_no_names_of_folders(path):
 
 
 @pytest.mark.parametrize(
-    "said",
+    "path",
     [f"{ROOT}/src/fmu.rs".encode(), f"{Path.home()}".encode("utf-16-le"), rb"/home/runner/work", rb"D:\a\prw\src"],
 )
-def test_a_name_is_found_in_an_archive_in_an_archive(said):
-    content = b"\0\1" + said + b"\0"
+def test_a_name_is_found_in_an_archive_in_an_archive(path):
+    content = b"\0\1" + path + b"\0"
     for name in ("library.so", "model.fmu"):
         archive = io.BytesIO()
         with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:

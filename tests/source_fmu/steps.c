@@ -1,4 +1,4 @@
-/* Steps with the FMU's C sources, which are part of this program: what they answer, as bits, and what they need. */
+/* Steps with the FMU's C sources, which are part of this program. Prints a hash of the outputs, and the memory use. */
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,7 +18,7 @@ static void *counted(size_t count, size_t size) {
 #define STEPS 2000
 #define OUTPUTS 4
 
-static uint64_t hash(uint64_t before, const void *bytes, size_t count) {
+static uint64_t hashed(uint64_t before, const void *bytes, size_t count) {
     const unsigned char *byte = bytes;
     while (count-- > 0) {
         before = (before ^ *byte++) * 0x100000001b3u;
@@ -54,7 +54,7 @@ static Instance *start(void) {
 
 /* The angles are polynomials of the time: the same bits with every C library. */
 static uint64_t run(Instance *fmu) {
-    uint64_t answers = 0xcbf29ce484222325u;
+    uint64_t value = 0xcbf29ce484222325u;
     int i;
     for (i = 0; i < STEPS; i++) {
         double t = i * 0.001, angles[2], values[OUTPUTS];
@@ -64,39 +64,39 @@ static uint64_t run(Instance *fmu) {
             fmi2GetReal(fmu, outputs, OUTPUTS, values) != fmi2OK) {
             exit(1);
         }
-        answers = hash(answers, values, sizeof values);
+        value = hashed(value, values, sizeof values);
     }
-    return answers;
+    return value;
 }
 
 #ifdef THREADS
 #include <pthread.h>
 
-static void *on_thread(void *answers) {
+static void *on_thread(void *hash) {
     Instance *fmu = start();
-    *(uint64_t *)answers = run(fmu);
+    *(uint64_t *)hash = run(fmu);
     fmi2FreeInstance(fmu);
     return NULL;
 }
 
 static void on_threads(void) {
     pthread_t threads[THREADS];
-    uint64_t answers[THREADS];
+    uint64_t hashes[THREADS];
     int i;
     threads_run = 1;
     for (i = 0; i < THREADS; i++) {
-        pthread_create(&threads[i], NULL, on_thread, &answers[i]);
+        pthread_create(&threads[i], NULL, on_thread, &hashes[i]);
     }
     for (i = 0; i < THREADS; i++) {
         pthread_join(threads[i], NULL);
-        printf("thread %016llx\n", (unsigned long long)answers[i]);
+        printf("thread %016llx\n", (unsigned long long)hashes[i]);
     }
 }
 #else
 static void on_threads(void) {}
 #endif
 
-/* States until there is no memory for another, with which the instance works as before, and all freed again. */
+/* Saves states until the memory is full. The instance still works, and all states are freed. */
 static void fill(Instance *fmu) {
     static fmi2FMUstate states[1000];
     int count = 0;
@@ -109,7 +109,7 @@ static void fill(Instance *fmu) {
         exit(1);
     }
     initialize(fmu);
-    printf("answers %016llx\n", (unsigned long long)run(fmu));
+    printf("hash %016llx\n", (unsigned long long)run(fmu));
     while (count-- > 0) {
         if (fmi2FreeFMUstate(fmu, &states[count]) != fmi2OK) {
             exit(1);
@@ -133,7 +133,7 @@ int main(int count, char **arguments) {
     fmu = start();
     other = start();
     made = allocations;
-    printf("answers %016llx\n", (unsigned long long)run(fmu));
+    printf("hash %016llx\n", (unsigned long long)run(fmu));
     if (fmi2GetFMUstate(fmu, &state) != fmi2OK || fmi2SetFMUstate(fmu, state) != fmi2OK ||
         fmi2FreeFMUstate(fmu, &state) != fmi2OK || fmi2Reset(fmu) != fmi2OK) {
         return 1;
@@ -150,7 +150,7 @@ int main(int count, char **arguments) {
     fill(fmu);
     fill(fmu);
 
-    /* A module that is damaged: its instance can only be freed, the other does not notice. */
+    /* Damages a module: its instance can only be freed; the other instance is not affected. */
     for (i = 0; i < FMU_TABLE; i++) {
         fmu->module.w2c_T0.data[i].func_type = NULL;
     }
@@ -158,7 +158,7 @@ int main(int count, char **arguments) {
     printf("damaged %d\n", fmi2Reset(fmu));
     printf("damaged %d\n", fmi2Reset(fmu));
     fmi2FreeInstance(fmu);
-    printf("answers %016llx\n", (unsigned long long)run(other));
+    printf("hash %016llx\n", (unsigned long long)run(other));
     fmi2FreeInstance(other);
     on_threads();
     return 0;

@@ -1,4 +1,4 @@
-"""The FMU as C sources: every compiler takes them, and what they make answers as the library does."""
+"""The FMU as C sources: every compiler accepts them, and the results are bit-identical to the library."""
 
 from __future__ import annotations
 
@@ -30,13 +30,14 @@ def description() -> fmpy.model_description.ModelDescription:
 
 
 def references(description: fmpy.model_description.ModelDescription) -> list[int]:
-    """Of the motor angles and the outputs."""
+    """Returns the value references of the motor angles and the outputs."""
     by_name = {variable.name: variable.valueReference for variable in description.modelVariables}
     return [by_name[name] for name in ("theta1", "theta2", *OUTPUTS)]
 
 
-def answers_of_the_library(description: fmpy.model_description.ModelDescription) -> str:
-    """What steps.c prints of its answers, from the FMU with the library."""
+@pytest.fixture(scope="module")
+def library_hash(description: fmpy.model_description.ModelDescription) -> str:
+    """The hash of the outputs that steps.c prints, of the FMU with the library."""
     unpacked = fmpy.extract(str(FMU))
     slave = FMU2Slave(
         guid=description.guid, unzipDirectory=unpacked, modelIdentifier="prw_testbed", instanceName="library"
@@ -46,23 +47,17 @@ def answers_of_the_library(description: fmpy.model_description.ModelDescription)
     slave.enterInitializationMode()
     slave.exitInitializationMode()
     vr = references(description)
-    answers = 0xCBF29CE484222325
+    value = 0xCBF29CE484222325
     for i in range(2000):
         t = i * 0.001
         slave.setReal(vr[:2], [t * (1 - t), t * (t - 0.5)])
         slave.doStep(currentCommunicationPoint=t, communicationStepSize=0.001)
         for byte in struct.pack("<4d", *slave.getReal(vr[2:])):
-            answers = (answers ^ byte) * 0x100000001B3 & 0xFFFFFFFFFFFFFFFF
+            value = (value ^ byte) * 0x100000001B3 & 0xFFFFFFFFFFFFFFFF
     slave.terminate()
     slave.freeInstance()
     shutil.rmtree(unpacked, ignore_errors=True)
-    return f"{answers:016x}"
-
-
-@pytest.fixture(scope="module")
-def library_answers(description: fmpy.model_description.ModelDescription) -> str:
-    """The same, once for all tests."""
-    return answers_of_the_library(description)
+    return f"{value:016x}"
 
 
 @pytest.fixture
@@ -72,7 +67,7 @@ def run(
     description: fmpy.model_description.ModelDescription,
     environment: dict[str, str],
 ) -> Callable[..., dict[str, list[str]]]:
-    """Compiles steps.c with the sources and runs it; what it prints, by the first word."""
+    """Compiles steps.c with the sources and runs it; returns the printed lines by their first word."""
 
     def compile_and_run(name: str, *options: str, sources: Path = sources, code: int = 0) -> dict[str, list[str]]:
         compiler = COMPILERS[name]
@@ -100,7 +95,7 @@ def test_the_sources_are_strict_c99(name: str, sources: Path, tmp_path: Path) ->
         compiler.compile(sources, tmp_path / "object.o", *STRICT, "-O1", "-c", str(sources / file))
 
 
-#: What compilers do by themselves, and with all they may: in GNU mode gcc would fuse products and sums.
+#: Default options, and options that permit more optimization; in GNU mode gcc would fuse products and sums.
 OPTIONS = {
     "gcc": [("-std=c99", "-O0"), ("-O2",), ("-O3", "-march=native")],
     "clang": [("-O2",), ("-O3", "-march=native")],
@@ -112,46 +107,48 @@ OPTIONS = {
 
 
 @pytest.mark.parametrize(("name", "options"), [(name, o) for name, several in OPTIONS.items() for o in several])
-def test_every_processor_answers_as_the_library(
-    name: str, options: tuple[str, ...], run: Callable[..., dict[str, list[str]]], library_answers: str
+def test_every_processor_equals_the_library(
+    name: str, options: tuple[str, ...], run: Callable[..., dict[str, list[str]]], library_hash: str
 ) -> None:
     printed = run(name, *options)
-    assert printed["answers"] == [library_answers] * 4
+    assert printed["hash"] == [library_hash] * 4
     assert printed["allocations"] == ["after fmi2Instantiate: 0"]
     # High-water marks of the steps.
     assert 1000 < int(printed["stack"][0]) < 32768
     assert 2 <= int(printed["memory"][0]) < MEMORY
     assert MEMORY * 65536 < int(printed["block"][0]) < (MEMORY + 1) * 65536
-    # 3 is fmi2Error: the instance goes on, and has a place again for each state that is freed.
+    # 3 is fmi2Error. The instance remains usable, and can save a state again for each state that is freed.
     assert printed["full"] == ["3", "3"]
     assert int(printed["states"][0]) > 20 and len(set(printed["states"])) == 1
-    refused = [line for line in printed["log"] if "free one, or compile the FMU with a larger FMU_MEMORY_PAGES" in line]
-    assert len(refused) == 4
-    # 4 is fmi2Fatal, which is what such an instance answers from then on.
+    rejected = [
+        line for line in printed["log"] if "free one, or compile the FMU with a larger FMU_MEMORY_PAGES" in line
+    ]
+    assert len(rejected) == 4
+    # 4 is fmi2Fatal, which such an instance returns from then on.
     assert printed["damaged"] == ["4", "4"]
-    rest = [line for line in printed["log"] if line not in refused]
+    rest = [line for line in printed["log"] if line not in rejected]
     assert rest and all("free this instance" in line for line in rest)
 
 
-def test_what_fuses_products_and_sums_is_refused(
+def test_fused_products_and_sums_are_rejected(
     sources: Path, tmp_path: Path, run: Callable[..., dict[str, list[str]]]
 ) -> None:
-    """By clang, which follows that option against the sources; by gcc, were they not to switch it off."""
+    """clang follows the option despite the sources; gcc would follow it without their pragma."""
     changed = tmp_path / "changed"
     shutil.copytree(sources, changed)
     runtime = changed / "prw_testbed_runtime.h"
     text = runtime.read_text()
     assert text.count('#pragma GCC optimize("fp-contract=off")') == 1
     runtime.write_text(text.replace('#pragma GCC optimize("fp-contract=off")', ""))
-    for name, folder in (("clang for aarch64", sources), ("aarch64", changed)):
-        printed = run(name, "-O3", "-ffp-contract=fast", sources=folder, code=1)
+    for name, directory in (("clang for aarch64", sources), ("aarch64", changed)):
+        printed = run(name, "-O3", "-ffp-contract=fast", sources=directory, code=1)
         assert list(printed) == ["log"] and "add -ffp-contract=off" in printed["log"][0]
 
 
-def test_more_memory_keeps_more_states(run: Callable[..., dict[str, list[str]]], library_answers: str) -> None:
+def test_more_memory_keeps_more_states(run: Callable[..., dict[str, list[str]]], library_hash: str) -> None:
     few, many = (run("gcc", "-O1", f"-DFMU_MEMORY_PAGES={pages}") for pages in (MEMORY, 2 * MEMORY))
     assert int(many["states"][0]) > 2 * int(few["states"][0])
-    assert many["answers"] == few["answers"] == [library_answers] * 4
+    assert many["hash"] == few["hash"] == [library_hash] * 4
 
 
 def test_files_with_different_memories_do_not_link(sources: Path, tmp_path: Path) -> None:
@@ -170,10 +167,10 @@ def test_sanitizers_are_silent(sanitizer: str, run: Callable[..., dict[str, list
     options = (f"-fsanitize={sanitizer}", "-fno-sanitize-recover=all", "-O1", "-DTHREADS=4", "-pthread")
     printed = run("gcc", *options)
     assert len(printed["thread"]) == 4
-    assert set(printed["thread"]) == set(printed["answers"])
+    assert set(printed["thread"]) == set(printed["hash"])
 
 
-def test_other_arithmetic_is_refused(sources: Path, tmp_path: Path) -> None:
+def test_other_arithmetic_is_rejected(sources: Path, tmp_path: Path) -> None:
     file = str(sources / "prw_testbed_fmi2.c")
     for options, message in (
         (("-ffast-math",), "compile without -ffast-math"),
@@ -187,7 +184,7 @@ def test_other_arithmetic_is_refused(sources: Path, tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def prefixing(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """The option for the standard's header in place of FMPy's, which leaves the prefix out."""
+    """The option for the header of the standard; FMPy's header omits the prefix."""
     headers = tmp_path_factory.mktemp("headers")
     text = (HEADERS / "fmi2Functions.h").read_text()
     paste = "#define P_(a, b) a##b\n#define P(a, b) P_(a, b)\n#define fmi2FullName(name) P(FMI2_FUNCTION_PREFIX, name)"
@@ -243,7 +240,7 @@ def test_fmpy_compiles_and_runs_it(tmp_path: Path) -> None:
 
 
 def cargo_test(library: Path, *arguments: str, **environment: str) -> str:
-    """Tests in Rust, on compiled sources; the model in them has the same guid."""
+    """Runs Rust tests on compiled sources, whose model has the same guid; returns their output."""
     command = ["cargo", "test", "--locked", "--release", *arguments]
     guid = fmpy.read_model_description(str(SOURCE_FMU)).guid
     environment = {**os.environ, "FMU_LIBRARY": str(library), "FMU_GUID": guid, **environment}
@@ -253,13 +250,13 @@ def cargo_test(library: Path, *arguments: str, **environment: str) -> str:
 
 
 def test_the_tests_of_the_library_pass(sources: Path, tmp_path: Path) -> None:
-    """Random sessions, with every answer compared; and the tests of the C interface, on the compiled sources."""
+    """Compares all results of random sessions, and runs the tests of the C interface, on the compiled sources."""
     library = tmp_path / "compiled.so"
     files = [str(sources / name) for name in ("prw_testbed.c", "prw_testbed_fmi2.c")]
     # Arrays of 5000 values are among the arguments.
     COMPILERS["gcc"].compile(sources, library, "-O2", "-fPIC", "-shared", "-DFMU_MEMORY_PAGES=64", *files, "-lm")
-    said = cargo_test(library, "--test", "c_sources", "--test", "fmu", "--", "--include-ignored", "--nocapture")
-    assert f"in {os.environ.get('SESSIONS', '300')} sessions" in said
+    output = cargo_test(library, "--test", "c_sources", "--test", "fmu", "--", "--include-ignored", "--nocapture")
+    assert f"in {os.environ.get('SESSIONS', '300')} sessions" in output
 
 
 def test_random_sessions_with_sanitizers(sources: Path, tmp_path: Path) -> None:
@@ -270,15 +267,15 @@ def test_random_sessions_with_sanitizers(sources: Path, tmp_path: Path) -> None:
     asan = subprocess.run(["gcc", "-print-file-name=libasan.so"], check=True, capture_output=True, text=True).stdout
     rustc = subprocess.run(["rustc", "-vV"], check=True, capture_output=True, text=True).stdout
     (host,) = (line.removeprefix("host: ") for line in rustc.splitlines() if line.startswith("host: "))
-    # The program is not instrumented, so it must be given the library that is.
+    # The program is not instrumented, so the sanitizer's library is loaded first.
     runner = {f"CARGO_TARGET_{host.upper().replace('-', '_')}_RUNNER": f"env LD_PRELOAD={asan.strip()}"}
     arguments = ("--test", "c_sources", "--", "--ignored", "--nocapture")
-    said = cargo_test(library, *arguments, SESSIONS="100", ASAN_OPTIONS="detect_leaks=0", **runner)
-    assert "in 100 sessions" in said
+    output = cargo_test(library, *arguments, SESSIONS="100", ASAN_OPTIONS="detect_leaks=0", **runner)
+    assert "in 100 sessions" in output
 
 
 def test_a_panic_ends_its_instance_only(tmp_path: Path) -> None:
-    """A model that panics in whatever its functions call, on several threads."""
+    """A model panics in any called function, on several threads."""
     file = ROOT / "crates" / "fmu-export" / "tests" / "panics" / "library.rs"
     command = ["cargo", "run", "--locked", "--release", "--package", "fmu-package", "--example", "c_sources"]
     environment = {"WASM2C": str(ROOT / ".venv" / "bin" / "wasm2c"), **os.environ}
@@ -289,7 +286,7 @@ def test_a_panic_ends_its_instance_only(tmp_path: Path) -> None:
     assert "1 passed" in cargo_test(library, "--package", "fmu-export", "--test", "panics", "--", "--ignored")
 
 
-def test_made_elsewhere_it_is_the_same_to_the_byte(tmp_path: Path) -> None:
+def test_a_build_in_another_directory_is_identical(tmp_path: Path) -> None:
     copy = tmp_path / "copy"
     rebuild.copy_sources(copy)
     environment = {"WASM2C": str(ROOT / ".venv" / "bin" / "wasm2c"), **os.environ}

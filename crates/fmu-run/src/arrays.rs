@@ -65,19 +65,19 @@ impl Array {
     }
 }
 
-/// Whole arrays, for a call with variables of which some are array elements.
+/// Variables of the FMU for a call that concerns array elements: scalars and complete arrays.
 #[derive(Debug, Default)]
-pub(crate) struct Whole {
+pub(crate) struct Expanded {
     /// Value references of the FMU.
     pub references: Vec<u32>,
-    /// Number of their values. `places` contains the index of each variable's value among them.
+    /// Number of their values. `indices` contains the index of each variable's value among them.
     pub count: usize,
     pub indices: Vec<usize>,
     /// Index of each array and of its first value.
     pub arrays: Vec<(usize, usize)>,
 }
 
-impl Whole {
+impl Expanded {
     /// Returns whether the variables include all elements of their arrays.
     pub fn is_complete(&self) -> bool {
         let mut named = vec![false; self.count];
@@ -128,27 +128,27 @@ impl Arrays {
         !self.elements.is_empty() && references.iter().any(|reference| *reference >= self.first)
     }
 
-    /// Returns the whole arrays of the elements among these variables.
-    pub fn whole(&self, references: &[u32]) -> Whole {
-        let mut whole = Whole::default();
+    /// Returns these variables with each array element replaced by its array.
+    pub fn expanded(&self, references: &[u32]) -> Expanded {
+        let mut expanded = Expanded::default();
         let mut begins = HashMap::new();
         for reference in references {
             let Some((array, number)) = self.find(*reference) else {
-                whole.references.push(*reference);
-                whole.indices.push(whole.count);
-                whole.count += 1;
+                expanded.references.push(*reference);
+                expanded.indices.push(expanded.count);
+                expanded.count += 1;
                 continue;
             };
             let begin = *begins.entry(array).or_insert_with(|| {
-                let begin = whole.count;
-                whole.references.push(self.all[array].reference);
-                whole.arrays.push((array, begin));
-                whole.count += self.all[array].length().unwrap_or_default();
+                let begin = expanded.count;
+                expanded.references.push(self.all[array].reference);
+                expanded.arrays.push((array, begin));
+                expanded.count += self.all[array].length().unwrap_or_default();
                 begin
             });
-            whole.indices.push(begin + number);
+            expanded.indices.push(begin + number);
         }
-        whole
+        expanded
     }
 }
 
@@ -198,16 +198,16 @@ mod tests {
     }
 
     #[test]
-    fn whole_arrays_are_passed() {
+    fn arrays_are_passed_completely() {
         let description = Description::parse(TEXT).unwrap();
         let references: Vec<_> = ["x[3]", "y", "x[1]", "x[3]"]
             .iter()
             .map(|name| description.variable(name).unwrap().reference)
             .collect();
-        let whole = description.arrays.whole(&references);
-        assert_eq!((whole.references.clone(), whole.count), (vec![2, 1], 4));
-        assert_eq!(whole.indices, [2, 3, 0, 2]);
-        assert!(!whole.is_complete() && description.arrays.among(&references));
+        let expanded = description.arrays.expanded(&references);
+        assert_eq!((expanded.references.clone(), expanded.count), (vec![2, 1], 4));
+        assert_eq!(expanded.indices, [2, 3, 0, 2]);
+        assert!(!expanded.is_complete() && description.arrays.among(&references));
         assert!(!description.arrays.among(&[1, 2, 7]));
     }
 }

@@ -159,10 +159,10 @@ impl Variable {
     }
 
     /// Returns the kind of its values, for use in a message.
-    pub(crate) fn what(&self) -> &'static str {
+    pub(crate) fn kind_in_words(&self) -> &'static str {
         match self.kind() {
             "Boolean" => "a Boolean",
-            "String" => "a text",
+            "String" => "a string",
             "Binary" => "binary",
             "Enumeration" => "an enumeration",
             _ => "a number",

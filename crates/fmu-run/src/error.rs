@@ -19,7 +19,7 @@ impl Error {
     /// Returns the error for a batch whose results do not fit in memory.
     pub fn too_much() -> Self {
         Self::Memory(
-            "the trajectories need more memory than there is; take measures, keep fewer times (every), or split the runs"
+            "the trajectories need more memory than there is; request measures, keep fewer times (every), or split the runs"
                 .to_owned(),
         )
     }

@@ -30,14 +30,14 @@ impl Loaded {
     /// The requirement of [`Fmu::open`](crate::Fmu::open); if `execution_tool` is true, the program may be started.
     pub unsafe fn open(path: &Path, execution_tool: bool) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
-        let folder = unpacked(path).map_err(fail)?;
-        let file = folder.path().join("modelDescription.xml");
-        let text = std::fs::read_to_string(&file)
+        let directory = unpacked(path).map_err(fail)?;
+        let file = directory.path().join("modelDescription.xml");
+        let content = std::fs::read_to_string(&file)
             .map_err(|_| fail("there is no readable modelDescription.xml in it; it is no FMU".to_owned()))?;
-        let description = Description::parse(&text).map_err(fail)?;
-        let folder = Arc::new(folder);
+        let description = Description::parse(&content).map_err(fail)?;
+        let directory = Arc::new(directory);
         // SAFETY: the caller guarantees that the library is sound.
-        let load = |offer: &Offer| unsafe { load(&folder, description.standard, offer, execution_tool) };
+        let load = |offer: &Offer| unsafe { load(&directory, description.standard, offer, execution_tool) };
         let co_simulation = description.co_simulation.as_ref().map(load).transpose().map_err(fail)?;
         let same = |offer: &&Offer| {
             description.co_simulation.as_ref().is_some_and(|own| own.identifier == offer.identifier)
@@ -80,7 +80,7 @@ impl Loaded {
 /// # Safety
 /// The requirement of [`Fmu::open`](crate::Fmu::open).
 unsafe fn load(
-    folder: &Arc<TempDir>,
+    directory: &Arc<TempDir>,
     standard: Standard,
     offer: &Offer,
     execution_tool: bool,
@@ -90,10 +90,10 @@ unsafe fn load(
             open it with execution_tool=True, in Rust with open_with_execution_tool";
         return Err(why.to_owned());
     }
-    let file = library_of(folder.path(), standard, offer)?;
-    let resources = standard.resources(&folder.path().join("resources"));
+    let file = library_of(directory.path(), standard, offer)?;
+    let resources = standard.resources(&directory.path().join("resources"));
     // SAFETY: the caller guarantees that the library is sound.
-    let loaded = unsafe { Library::load(&file, standard, resources, Arc::clone(folder)) };
+    let loaded = unsafe { Library::load(&file, standard, resources, Arc::clone(directory)) };
     loaded.map(Arc::new).map_err(|error| {
         // The loader's error names the failed call; its source gives the reason.
         let why = machine::mismatch(&file).unwrap_or_else(|| match error.source() {
@@ -108,18 +108,18 @@ pub(crate) fn unpacked(path: &Path) -> Result<TempDir, String> {
     let file = File::open(path).map_err(|error| format!("cannot be opened ({error})"))?;
     let mut archive =
         zip::ZipArchive::new(file).map_err(|error| format!("is no FMU, which is a zip file ({error})"))?;
-    let folder = tempfile::Builder::new()
+    let directory = tempfile::Builder::new()
         .prefix("fmu-run-")
         .tempdir()
-        .map_err(|error| format!("there is no room to unpack it ({error})"))?;
+        .map_err(|error| format!("no temporary directory can be made ({error})"))?;
     // `extract` rejects entries that would leave the directory.
-    archive.extract(folder.path()).map_err(|error| format!("cannot be unpacked ({error})"))?;
-    Ok(folder)
+    archive.extract(directory.path()).map_err(|error| format!("cannot be unpacked ({error})"))?;
+    Ok(directory)
 }
 
 /// Returns the directories of `binaries/` that may contain a library for this machine. The names of FMI 2.0
 /// do not contain the processor; many FMUs for ARM use them nevertheless.
-fn folders(standard: Standard) -> Vec<String> {
+fn directories(standard: Standard) -> Vec<String> {
     let system = if OS == "macos" { "darwin" } else { OS };
     let tuple = format!("{ARCH}-{system}");
     let short = match (system, usize::BITS) {
@@ -133,12 +133,12 @@ fn folders(standard: Standard) -> Vec<String> {
     }
 }
 
-fn library_of(folder: &Path, standard: Standard, offer: &Offer) -> Result<PathBuf, String> {
+fn library_of(directory: &Path, standard: Standard, offer: &Offer) -> Result<PathBuf, String> {
     let name = format!("{}{DLL_SUFFIX}", offer.identifier);
-    let folders = folders(standard);
-    let binaries = folder.join("binaries");
+    let directories = directories(standard);
+    let binaries = directory.join("binaries");
     if let Some(found) =
-        folders.iter().map(|folder| binaries.join(folder).join(&name)).find(|path| path.is_file())
+        directories.iter().map(|directory| binaries.join(directory).join(&name)).find(|path| path.is_file())
     {
         return Ok(found);
     }
@@ -149,5 +149,5 @@ fn library_of(folder: &Path, standard: Standard, offer: &Offer) -> Result<PathBu
         .collect();
     others.sort();
     let others = if others.is_empty() { "none".to_owned() } else { others.join(", ") };
-    Err(format!("has no library for this platform (binaries/{}/{name}); it has: {others}", folders[0]))
+    Err(format!("has no library for this platform (binaries/{}/{name}); it has: {others}", directories[0]))
 }

@@ -9,7 +9,7 @@ use fmi_abi::BaseType;
 pub(crate) struct Found<'a> {
     /// Index of the component.
     pub part: usize,
-    pub of: &'a Variable,
+    pub variable: &'a Variable,
     pub description: &'a Description,
     /// Name of the output that feeds the variable.
     pub fed_by: Option<&'a str>,
@@ -17,7 +17,7 @@ pub(crate) struct Found<'a> {
 
 impl Found<'_> {
     pub fn check_number(self, name: &str) -> Result<(), Error> {
-        match self.of.base {
+        match self.variable.base {
             BaseType::String | BaseType::Binary => request(format!("{name} is no number")),
             _ => Ok(()),
         }
@@ -34,10 +34,10 @@ impl Found<'_> {
     /// Fails if the variable cannot be set after the initialization.
     pub fn check_settable(self, name: &str) -> Result<(), Error> {
         self.check_own(name)?;
-        if self.of.is_settable() {
+        if self.variable.is_settable() {
             return Ok(());
         }
-        let kind = match self.of.causality.as_str() {
+        let kind = match self.variable.causality.as_str() {
             "output" => "an output".to_owned(),
             other => format!("{} variable", article(other)),
         };
@@ -48,8 +48,8 @@ impl Found<'_> {
     /// outside do (section 2.2.7 of FMI 2.0, 2.4.7.5 of FMI 3.0).
     pub fn check_start(self, name: &str) -> Result<(), Error> {
         self.check_own(name)?;
-        let constant = self.of.variability.as_deref() == Some("constant");
-        if !constant && (self.of.is_settable() || self.of.start.is_some()) {
+        let constant = self.variable.variability.as_deref() == Some("constant");
+        if !constant && (self.variable.is_settable() || self.variable.start.is_some()) {
             return Ok(());
         }
         let kind = if constant { "a constant" } else { "calculated by the FMU and has no start value" };
@@ -57,7 +57,7 @@ impl Found<'_> {
     }
 
     pub fn display_unit(self, name: &str, unit: &str) -> Result<(f64, f64), Error> {
-        let Some(own) = &self.of.unit else {
+        let Some(own) = &self.variable.unit else {
             return request(format!("{name} has no unit, its values cannot be in {unit}"));
         };
         if own == unit {

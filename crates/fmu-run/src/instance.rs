@@ -1,18 +1,18 @@
 //! An instance of an FMU of any version. Safe functions wrap the C calls: they check lengths, keep the
 //! library loaded, and call nothing after fmi2Fatal.
 
-use crate::arrays::{Arrays, Whole};
+use crate::arrays::{Arrays, Expanded};
 use crate::fmu::Loaded;
 use crate::library::{Functions, Library};
 use crate::log::{Log, log_of_fmi3, logger_of_fmi2};
 use crate::rejection::{Message, Rejection, reason};
+use crate::values::EarlyValues;
 use fmi_abi::c_types::{c_int, c_void};
 use fmi_abi::fmi2::types::*;
 use fmi_abi::fmi3::types::*;
-use fmi_abi::{BaseType, Interface, Status};
-use std::collections::HashMap;
-use std::ffi::{CStr, CString};
-use std::ptr::{null, null_mut};
+use fmi_abi::{Interface, Status};
+use std::ffi::CString;
+use std::ptr::null_mut;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -24,21 +24,14 @@ pub struct Instance {
     log: Arc<Log>,
     /// Callbacks, which must live as long as the instance (section 2.1.5 of FMI 2.0).
     _callbacks: Rc<fmi2CallbackFunctions>,
-    library: Arc<Library>,
+    pub(crate) library: Arc<Library>,
     /// States that the instance has saved; NULL marks a free entry.
     saved: Vec<*mut c_void>,
     /// Name of the component; empty if there is only one.
     name: String,
-    arrays: Arc<Arrays>,
+    pub(crate) arrays: Arc<Arrays>,
     /// Values of arrays set before the initialization, when they cannot be read; `None` after its start.
-    early: Option<Early>,
-}
-
-/// Values of arrays that have been set, by array index.
-#[derive(Debug, Default)]
-struct Early {
-    numbers: HashMap<usize, Vec<f64>>,
-    texts: HashMap<usize, Vec<CString>>,
+    pub(crate) early: Option<EarlyValues>,
 }
 
 /// Index of a state that an instance has saved.
@@ -78,7 +71,7 @@ pub enum Continuous {
 }
 
 /// Limit of iterations of an event.
-const MOST_ROUNDS: usize = 10_000;
+const MOST_ITERATIONS: usize = 10_000;
 
 // SAFETY: the FMI standards permit use of an instance from any thread, one thread at a time.
 unsafe impl Send for Instance {}
@@ -104,10 +97,7 @@ impl Drop for Instance {
 /// Calls a function of FMI 2.0 or its counterpart in FMI 3.0; without a counterpart, FMI 3.0 gets an error.
 macro_rules! call {
     ($self:ident, $fmi2:ident ( $($of_fmi2:expr),* ) $(, $fmi3:ident ( $($of_fmi3:expr),* ))?) => {{
-        let handle = $self.handle;
-        if handle.is_null() {
-            return Err($self.rejection(stringify!($fmi2), Status::Fatal, Vec::new()));
-        }
+        let handle = $self.handle(stringify!($fmi2))?;
         // SAFETY: the instance is alive; array arguments are slices with the passed lengths, and single
         // values are live references.
         let (function, code) = unsafe {
@@ -115,106 +105,14 @@ macro_rules! call {
                 Functions::Fmi2(of) => (stringify!($fmi2), (of.$fmi2)(handle $(, $of_fmi2)*)),
                 $(Functions::Fmi3(of) => (stringify!($fmi3), (of.$fmi3)(handle $(, $of_fmi3)*)),)?
                 #[allow(unreachable_patterns, reason = "where FMI 3.0 has the function")]
-                Functions::Fmi3(_) => (stringify!($fmi2), Status::Error as c_int),
+                Functions::Fmi3(_) => (stringify!($fmi2), fmi_abi::Status::Error as c_int),
             }
         };
         $self.check(function, code)
     }};
 }
 
-/// Lists the numeric types with their setters and getters in FMI 2.0 and FMI 3.0.
-macro_rules! numbers {
-    ($with:ident: $($before:tt)*) => { $with! { $($before)*;
-        Real fmi2SetReal fmi2GetReal f64 fmi3SetFloat64 fmi3GetFloat64 f64
-        Float32 fmi2SetReal fmi2GetReal f64 fmi3SetFloat32 fmi3GetFloat32 f32
-        Integer fmi2SetInteger fmi2GetInteger i32 fmi3SetInt32 fmi3GetInt32 i32
-        Int8 fmi2SetInteger fmi2GetInteger i32 fmi3SetInt8 fmi3GetInt8 i8
-        UInt8 fmi2SetInteger fmi2GetInteger i32 fmi3SetUInt8 fmi3GetUInt8 u8
-        Int16 fmi2SetInteger fmi2GetInteger i32 fmi3SetInt16 fmi3GetInt16 i16
-        UInt16 fmi2SetInteger fmi2GetInteger i32 fmi3SetUInt16 fmi3GetUInt16 u16
-        UInt32 fmi2SetInteger fmi2GetInteger i32 fmi3SetUInt32 fmi3GetUInt32 u32
-        Int64 fmi2SetInteger fmi2GetInteger i32 fmi3SetInt64 fmi3GetInt64 i64
-        UInt64 fmi2SetInteger fmi2GetInteger i32 fmi3SetUInt64 fmi3GetUInt64 u64
-        Enumeration fmi2SetInteger fmi2GetInteger i32 fmi3SetInt64 fmi3GetInt64 i64
-    } };
-}
-
-macro_rules! set {
-    ($self:ident $base:ident $vr:ident $value:ident;
-     $($name:ident $set2:ident $get2:ident $type2:ident $set3:ident $get3:ident $type3:ident)+) => {
-        match $base {
-            $(BaseType::$name => {
-                let (of_fmi2, of_fmi3) = ($value as $type2, $value as $type3);
-                call!($self, $set2(&$vr, 1, &of_fmi2), $set3(&$vr, 1, &of_fmi3, 1))
-            })+
-            _ => {
-                let of_fmi2 = fmi2Boolean::from($value != 0.0);
-                let of_fmi3 = fmi3Boolean::from($value != 0.0);
-                call!($self, fmi2SetBoolean(&$vr, 1, &of_fmi2), fmi3SetBoolean(&$vr, 1, &of_fmi3, 1))
-            }
-        }
-    };
-}
-
-macro_rules! get {
-    ($self:ident $base:ident $vr:ident;
-     $($name:ident $set2:ident $get2:ident $type2:ident $set3:ident $get3:ident $type3:ident)+) => {
-        match $base {
-            $(BaseType::$name => {
-                let (mut of_fmi2, mut of_fmi3) = ($type2::default(), $type3::default());
-                call!($self, $get2(&$vr, 1, &mut of_fmi2), $get3(&$vr, 1, &mut of_fmi3, 1))?;
-                Ok(if $self.is_of_fmi2() { of_fmi2 as f64 } else { of_fmi3 as f64 })
-            })+
-            _ => {
-                let (mut of_fmi2, mut of_fmi3) = (fmi2False, fmi3False);
-                call!($self, fmi2GetBoolean(&$vr, 1, &mut of_fmi2), fmi3GetBoolean(&$vr, 1, &mut of_fmi3, 1))?;
-                Ok(f64::from(u8::from(of_fmi2 != fmi2False || of_fmi3 != fmi3False)))
-            }
-        }
-    };
-}
-
-/// Sets all values of an array, which exists only in FMI 3.0.
-macro_rules! set_all {
-    ($self:ident $base:ident $vr:ident $values:ident;
-     $($name:ident $set2:ident $get2:ident $type2:ident $set3:ident $get3:ident $type3:ident)+) => {
-        match $base {
-            $(BaseType::$name => {
-                let of_fmi2: Vec<_> = $values.iter().map(|value| *value as $type2).collect();
-                let of_fmi3: Vec<_> = $values.iter().map(|value| *value as $type3).collect();
-                let (n, of_fmi2, values) = (of_fmi3.len(), of_fmi2.as_ptr(), of_fmi3.as_ptr());
-                call!($self, $set2(&$vr, 1, of_fmi2), $set3(&$vr, 1, values, n))
-            })+
-            _ => {
-                let of_fmi2: Vec<_> = $values.iter().map(|value| fmi2Boolean::from(*value != 0.0)).collect();
-                let of_fmi3: Vec<_> = $values.iter().map(|value| fmi3Boolean::from(*value != 0.0)).collect();
-                let (n, of_fmi2, values) = (of_fmi3.len(), of_fmi2.as_ptr(), of_fmi3.as_ptr());
-                call!($self, fmi2SetBoolean(&$vr, 1, of_fmi2), fmi3SetBoolean(&$vr, 1, values, n))
-            }
-        }
-    };
-}
-
-macro_rules! get_all {
-    ($self:ident $base:ident $vr:ident $length:ident;
-     $($name:ident $set2:ident $get2:ident $type2:ident $set3:ident $get3:ident $type3:ident)+) => {
-        match $base {
-            $(BaseType::$name => {
-                let mut of_fmi2 = vec![$type2::default(); $length];
-                let mut of_fmi3 = vec![$type3::default(); $length];
-                let (of_fmi2, values) = (of_fmi2.as_mut_ptr(), of_fmi3.as_mut_ptr());
-                call!($self, $get2(&$vr, 1, of_fmi2), $get3(&$vr, 1, values, $length))?;
-                Ok(of_fmi3.iter().map(|value| *value as f64).collect::<Vec<f64>>())
-            })+
-            _ => {
-                let (mut of_fmi2, mut of_fmi3) = (vec![fmi2False; $length], vec![fmi3False; $length]);
-                let (of_fmi2, values) = (of_fmi2.as_mut_ptr(), of_fmi3.as_mut_ptr());
-                call!($self, fmi2GetBoolean(&$vr, 1, of_fmi2), fmi3GetBoolean(&$vr, 1, values, $length))?;
-                Ok(of_fmi3.iter().map(|value| f64::from(u8::from(*value != fmi3False))).collect())
-            }
-        }
-    };
-}
+pub(crate) use call;
 
 impl Instance {
     /// Creates an instance for an interface type. The error contains the reason, and whether the FMU gave it.
@@ -281,14 +179,25 @@ impl Instance {
         };
         if handle.is_null() {
             let log = log.take();
-            let mute = || format!("{} makes no instance, and logs no message", fmu.description.model_name);
-            let why = reason(&log).map_or_else(mute, |message| message.text.trim().to_owned());
-            let of = if component.is_empty() { String::new() } else { format!("{component}: ") };
-            return Err((of + &why, log.is_empty()));
+            let no_message =
+                || format!("{} makes no instance, and logs no message", fmu.description.model_name);
+            let why = reason(&log).map_or_else(no_message, |message| message.text.trim().to_owned());
+            let prefix = if component.is_empty() { String::new() } else { format!("{component}: ") };
+            return Err((prefix + &why, log.is_empty()));
         }
         let (saved, name) = (Vec::new(), component.to_owned());
-        let (arrays, early) = (Arc::clone(&fmu.description.arrays), Some(Early::default()));
+        let (arrays, early) = (Arc::clone(&fmu.description.arrays), Some(EarlyValues::default()));
         Ok(Self { handle, log, _callbacks: callbacks, library, saved, name, arrays, early })
+    }
+
+    /// Returns the handle for a call, unless the FMU has returned fmi2Fatal.
+    #[inline]
+    pub(crate) fn handle(&self, function: &'static str) -> Result<*mut c_void, Rejection> {
+        if self.is_alive() {
+            Ok(self.handle)
+        } else {
+            Err(self.rejection(function, Status::Fatal, Vec::new()))
+        }
     }
 
     #[cold]
@@ -298,7 +207,7 @@ impl Instance {
 
     /// Converts the status of a call.
     #[inline]
-    fn check(&mut self, function: &'static str, code: c_int) -> Result<(), Rejection> {
+    pub(crate) fn check(&mut self, function: &'static str, code: c_int) -> Result<(), Rejection> {
         if code == Status::Ok as c_int { Ok(()) } else { self.not_ok(function, Status::from_c(code)) }
     }
 
@@ -364,171 +273,6 @@ impl Instance {
         call!(self, fmi2ExitInitializationMode(), fmi3ExitInitializationMode())
     }
 
-    #[inline]
-    pub(crate) fn set_reals(&mut self, vr: &[u32], values: &[f64]) -> Result<(), Rejection> {
-        assert_eq!(vr.len(), values.len());
-        if self.arrays.among(vr) {
-            return self.set_elements(vr, values);
-        }
-        let (vr, n, values) = (vr.as_ptr(), vr.len(), values.as_ptr());
-        call!(self, fmi2SetReal(vr, n, values), fmi3SetFloat64(vr, n, values, n))
-    }
-
-    #[inline]
-    pub(crate) fn get_reals(&mut self, vr: &[u32], values: &mut [f64]) -> Result<(), Rejection> {
-        assert_eq!(vr.len(), values.len());
-        if self.arrays.among(vr) {
-            let whole = self.arrays.whole(vr);
-            let all = self.get_whole(&whole)?;
-            whole.indices.iter().zip(values).for_each(|(index, value)| *value = all[*index]);
-            return Ok(());
-        }
-        let (vr, n, values) = (vr.as_ptr(), vr.len(), values.as_mut_ptr());
-        call!(self, fmi2GetReal(vr, n, values), fmi3GetFloat64(vr, n, values, n))
-    }
-
-    /// Gets Reals of whole arrays and scalars.
-    fn get_whole(&mut self, whole: &Whole) -> Result<Vec<f64>, Rejection> {
-        let mut all = vec![0.0; whole.count];
-        let (vr, n, values) = (whole.references.as_ptr(), whole.references.len(), all.as_mut_ptr());
-        let count = whole.count;
-        call!(self, fmi2GetReal(vr, n, values), fmi3GetFloat64(vr, n, values, count))?;
-        Ok(all)
-    }
-
-    /// Sets Reals of which some are array elements; the other elements of the arrays keep their values.
-    #[cold]
-    fn set_elements(&mut self, vr: &[u32], values: &[f64]) -> Result<(), Rejection> {
-        let whole = self.arrays.whole(vr);
-        let mut all = if whole.is_complete() {
-            vec![0.0; whole.count]
-        } else if self.early.is_some() {
-            let mut all = vec![0.0; whole.count];
-            for (array, begin) in &whole.arrays {
-                let known = self.early_numbers(*array);
-                all[*begin..][..known.len()].copy_from_slice(&known);
-            }
-            all
-        } else {
-            self.get_whole(&whole)?
-        };
-        whole.indices.iter().zip(values).for_each(|(index, value)| all[*index] = *value);
-        let (vr, n, values) = (whole.references.as_ptr(), whole.references.len(), all.as_ptr());
-        call!(self, fmi2SetReal(vr, n, values), fmi3SetFloat64(vr, n, values, all.len()))?;
-        if let Some(early) = &mut self.early {
-            for (array, begin) in whole.arrays {
-                let length = self.arrays.length(self.arrays.all()[array].reference);
-                early.numbers.insert(array, all[begin..][..length].to_vec());
-            }
-        }
-        Ok(())
-    }
-
-    /// Returns the values of an array before the initialization: the values that were set, or the start
-    /// values.
-    fn early_numbers(&self, array: usize) -> Vec<f64> {
-        if let Some(known) = self.early.as_ref().and_then(|early| early.numbers.get(&array)) {
-            return known.clone();
-        }
-        let of = &self.arrays.all()[array];
-        let number = |number| match of.start(number) {
-            Some("true") => 1.0,
-            start => start.and_then(|start| start.parse().ok()).unwrap_or_default(),
-        };
-        (0..self.arrays.length(of.reference)).map(number).collect()
-    }
-
-    /// Returns all numbers of an array.
-    fn array_numbers(&mut self, array: usize) -> Result<Vec<f64>, Rejection> {
-        let arrays = Arc::clone(&self.arrays);
-        let of = &arrays.all()[array];
-        let (base, vr, length) = (of.base, of.reference, arrays.length(of.reference));
-        numbers!(get_all: self base vr length)
-    }
-
-    /// Sets one number of an array; the others keep their values.
-    fn set_element(&mut self, (array, number): (usize, usize), value: f64) -> Result<(), Rejection> {
-        let arrays = Arc::clone(&self.arrays);
-        let (base, vr) = (arrays.all()[array].base, arrays.all()[array].reference);
-        let mut all =
-            if self.early.is_some() { self.early_numbers(array) } else { self.array_numbers(array)? };
-        all[number] = value;
-        let values = &all;
-        numbers!(set_all: self base vr values)?;
-        if let Some(early) = &mut self.early {
-            early.numbers.insert(array, all);
-        }
-        Ok(())
-    }
-
-    /// Sets a number of any type; 0 or 1 for a Boolean.
-    pub(crate) fn set_number(&mut self, base: BaseType, vr: u32, value: f64) -> Result<(), Rejection> {
-        if let Some(element) = self.arrays.find(vr) {
-            return self.set_element(element, value);
-        }
-        numbers!(set: self base vr value)
-    }
-
-    pub(crate) fn get_number(&mut self, base: BaseType, vr: u32) -> Result<f64, Rejection> {
-        if let Some((array, number)) = self.arrays.find(vr) {
-            return Ok(self.array_numbers(array)?[number]);
-        }
-        numbers!(get: self base vr)
-    }
-
-    /// Returns all strings of an array, in FMI 3.0.
-    fn array_texts(&mut self, array: usize) -> Result<Vec<CString>, Rejection> {
-        let vr = self.arrays.all()[array].reference;
-        let mut texts = vec![null(); self.arrays.length(vr)];
-        let (values, n) = (texts.as_mut_ptr(), texts.len());
-        call!(self, fmi2GetString(&vr, 1, values), fmi3GetString(&vr, 1, values, n))?;
-        // SAFETY: the strings belong to the FMU and are valid until the next call.
-        let owned =
-            |text: &fmi3String| unsafe { (!text.is_null()).then(|| CStr::from_ptr(*text).to_owned()) };
-        Ok(texts.iter().map(owned).map(Option::unwrap_or_default).collect())
-    }
-
-    /// Sets one string of an array; the others keep their values.
-    fn set_text_element(&mut self, (array, number): (usize, usize), value: &CStr) -> Result<(), Rejection> {
-        let (arrays, vr) = (Arc::clone(&self.arrays), self.arrays.all()[array].reference);
-        let start =
-            |number| CString::new(arrays.all()[array].start(number).unwrap_or_default()).unwrap_or_default();
-        let known = self.early.as_ref().map(|early| early.texts.get(&array).cloned());
-        let mut all = match known {
-            Some(set) => set.unwrap_or_else(|| (0..arrays.length(vr)).map(start).collect()),
-            None => self.array_texts(array)?,
-        };
-        all[number] = value.to_owned();
-        let texts: Vec<_> = all.iter().map(|text| text.as_ptr()).collect();
-        let (values, n) = (texts.as_ptr(), texts.len());
-        call!(self, fmi2SetString(&vr, 1, values), fmi3SetString(&vr, 1, values, n))?;
-        if let Some(early) = &mut self.early {
-            early.texts.insert(array, all);
-        }
-        Ok(())
-    }
-
-    pub(crate) fn set_text(&mut self, vr: u32, value: &CStr) -> Result<(), Rejection> {
-        if let Some(element) = self.arrays.find(vr) {
-            return self.set_text_element(element, value);
-        }
-        let text = value.as_ptr();
-        call!(self, fmi2SetString(&vr, 1, &text), fmi3SetString(&vr, 1, &text, 1))
-    }
-
-    pub(crate) fn get_text(&mut self, vr: u32) -> Result<String, Rejection> {
-        if let Some((array, number)) = self.arrays.find(vr) {
-            return Ok(self.array_texts(array)?.swap_remove(number).to_string_lossy().into_owned());
-        }
-        let mut text = null();
-        call!(self, fmi2GetString(&vr, 1, &mut text), fmi3GetString(&vr, 1, &mut text, 1))?;
-        if text.is_null() {
-            return Ok(String::new());
-        }
-        // SAFETY: the string belongs to the FMU and is valid until the next call.
-        Ok(unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned())
-    }
-
     /// Sets time derivatives of inputs, of order 1. FMI 3.0 has no function for this.
     #[inline]
     pub(crate) fn set_input_derivatives(
@@ -543,33 +287,19 @@ impl Instance {
     }
 
     /// Gets time derivatives of outputs, of order 1.
-    pub(crate) fn get_output_derivatives(
-        &mut self,
-        vr: &[u32],
-        orders: &[i32],
-        values: &mut [f64],
-    ) -> Result<(), Rejection> {
-        assert!(vr.len() == values.len() && vr.len() == orders.len());
-        if self.arrays.among(vr) {
-            // All orders are 1.
-            let Whole { references, count, indices, .. } = self.arrays.whole(vr);
-            let (orders, mut all) = (vec![1; references.len()], vec![0.0; count]);
-            let (vr, n, orders, whole) =
-                (references.as_ptr(), references.len(), orders.as_ptr(), all.as_mut_ptr());
-            call!(
-                self,
-                fmi2GetRealOutputDerivatives(vr, n, orders, whole),
-                fmi3GetOutputDerivatives(vr, n, orders, whole, count)
-            )?;
-            indices.iter().zip(values).for_each(|(index, value)| *value = all[*index]);
-            return Ok(());
-        }
-        let (vr, n, orders, values) = (vr.as_ptr(), vr.len(), orders.as_ptr(), values.as_mut_ptr());
+    pub(crate) fn get_output_derivatives(&mut self, vr: &[u32], values: &mut [f64]) -> Result<(), Rejection> {
+        assert_eq!(vr.len(), values.len());
+        let Expanded { references, count, indices, .. } = self.arrays.expanded(vr);
+        let (orders, mut all) = (vec![1; references.len()], vec![0.0; count]);
+        let (vr, n, orders, all_values) =
+            (references.as_ptr(), references.len(), orders.as_ptr(), all.as_mut_ptr());
         call!(
             self,
-            fmi2GetRealOutputDerivatives(vr, n, orders, values),
-            fmi3GetOutputDerivatives(vr, n, orders, values, n)
-        )
+            fmi2GetRealOutputDerivatives(vr, n, orders, all_values),
+            fmi3GetOutputDerivatives(vr, n, orders, all_values, count)
+        )?;
+        indices.iter().zip(values).for_each(|(index, value)| *value = all[*index]);
+        Ok(())
     }
 
     /// Performs a step. Returns an error also if the FMU ends the simulation.
@@ -599,17 +329,17 @@ impl Instance {
             return rejection;
         }
         // SAFETY: the instance is alive after fmi2Discard; the pointers are live references.
-        let [asked, told] = unsafe {
+        let [terminated, last_time] = unsafe {
             [
                 (functions.fmi2GetBooleanStatus)(self.handle, kinds[0], &mut wanted),
                 (functions.fmi2GetRealStatus)(self.handle, kinds[1], &mut reached),
             ]
         };
-        if asked != Status::Ok as c_int || wanted == fmi2False {
+        if terminated != Status::Ok as c_int || wanted == fmi2False {
             return rejection;
         }
-        let told = told == Status::Ok as c_int && reached.is_finite();
-        rejection.at_end(if told { reached } else { time })
+        let is_known = last_time == Status::Ok as c_int && reached.is_finite();
+        rejection.at_end(if is_known { reached } else { time })
     }
 
     /// Returns the error for a requested end of the simulation, or for an early return, which was not allowed
@@ -690,14 +420,20 @@ impl Instance {
         result: &mut [f64],
     ) -> Result<(), Rejection> {
         assert!(knowns.len() == seed.len() && unknowns.len() == result.len());
-        if self.arrays.among(unknowns) || self.arrays.among(knowns) {
-            return self.directional_derivative_of_elements(unknowns, knowns, seed, result);
+        if !self.arrays.among(unknowns) && !self.arrays.among(knowns) {
+            return self.derivative_of_variables(unknowns, knowns, seed, result);
         }
-        self.directional_derivative_of_variables(unknowns, knowns, seed, result)
+        let (unknowns, knowns) = (self.arrays.expanded(unknowns), self.arrays.expanded(knowns));
+        // The seed of all other elements is 0.
+        let (mut seeds, mut results) = (vec![0.0; knowns.count], vec![0.0; unknowns.count]);
+        knowns.indices.iter().zip(seed).for_each(|(index, seed)| seeds[*index] += seed);
+        self.derivative_of_variables(&unknowns.references, &knowns.references, &seeds, &mut results)?;
+        unknowns.indices.iter().zip(result).for_each(|(index, value)| *value = results[*index]);
+        Ok(())
     }
 
-    /// Calls the function with a value for each scalar and each array element.
-    fn directional_derivative_of_variables(
+    /// Calls the function with all elements of arrays.
+    fn derivative_of_variables(
         &mut self,
         unknowns: &[u32],
         knowns: &[u32],
@@ -706,32 +442,12 @@ impl Instance {
     ) -> Result<(), Rejection> {
         let (unknown, m) = (unknowns.as_ptr(), unknowns.len());
         let (known, n) = (knowns.as_ptr(), knowns.len());
-        let (seed, seed_count) = (seed.as_ptr(), seed.len());
-        let (result, count) = (result.as_mut_ptr(), result.len());
+        let (seed, seeds, result, count) = (seed.as_ptr(), seed.len(), result.as_mut_ptr(), result.len());
         call!(
             self,
             fmi2GetDirectionalDerivative(unknown, m, known, n, seed, result),
-            fmi3GetDirectionalDerivative(unknown, m, known, n, seed, seed_count, result, count)
+            fmi3GetDirectionalDerivative(unknown, m, known, n, seed, seeds, result, count)
         )
-    }
-
-    /// Computes directional derivatives if some variables are array elements: the seed of all other elements
-    /// is 0.
-    #[cold]
-    fn directional_derivative_of_elements(
-        &mut self,
-        unknowns: &[u32],
-        knowns: &[u32],
-        seed: &[f64],
-        result: &mut [f64],
-    ) -> Result<(), Rejection> {
-        let (of_unknowns, of_knowns) = (self.arrays.whole(unknowns), self.arrays.whole(knowns));
-        let (mut seeds, mut results) = (vec![0.0; of_knowns.count], vec![0.0; of_unknowns.count]);
-        of_knowns.indices.iter().zip(seed).for_each(|(index, seed)| seeds[*index] += seed);
-        let (unknowns, knowns) = (&of_unknowns.references, &of_knowns.references);
-        self.directional_derivative_of_variables(unknowns, knowns, &seeds, &mut results)?;
-        of_unknowns.indices.iter().zip(result).for_each(|(index, value)| *value = results[*index]);
-        Ok(())
     }
 
     pub(crate) fn enter_event_mode(&mut self) -> Result<(), Rejection> {
@@ -745,7 +461,7 @@ impl Instance {
     /// Updates the discrete states until the event is over. The instance must be in Event Mode.
     pub(crate) fn event(&mut self) -> Result<Event, Rejection> {
         let mut all = Event::default();
-        for _ in 0..MOST_ROUNDS {
+        for _ in 0..MOST_ITERATIONS {
             let mut of_fmi2 = fmi2EventInfo::default();
             let [mut again, mut terminate, mut nominals, mut states, mut is_next] = [fmi3False; 5];
             let mut next = 0.0;
@@ -778,7 +494,7 @@ impl Instance {
                 return Ok(all);
             }
         }
-        let text = format!("the event does not come to an end in {MOST_ROUNDS} rounds");
+        let text = format!("the event does not end within {MOST_ITERATIONS} iterations");
         let message = Message { status: Status::Error, category: String::new(), text };
         Err(self.rejection("event", Status::Error, vec![message]))
     }
@@ -827,7 +543,7 @@ impl Instance {
 
     pub(crate) fn reset(&mut self) -> Result<(), Rejection> {
         call!(self, fmi2Reset(), fmi3Reset())?;
-        self.early = Some(Early::default());
+        self.early = Some(EarlyValues::default());
         Ok(())
     }
 }

@@ -5,7 +5,7 @@ use crate::error::{Error, request};
 use crate::instance::{Continuous, Event, Instance, Saved};
 use crate::rejection::Rejection;
 use crate::running::Running;
-use crate::selection::{Place, Selection};
+use crate::selection::{Selection, Target};
 use crate::start::{Start, StartValues};
 use crate::system::System;
 use fmi_abi::{BaseType, Interface};
@@ -110,7 +110,7 @@ impl System {
         }
         if setup.count > 1 && self.once_per_process(setup.interface) {
             return request(format!(
-                "{} can be there only once in a process (canBeInstantiatedOnlyOncePerProcess)",
+                "{} can have only one instance per process (canBeInstantiatedOnlyOncePerProcess)",
                 self.name()
             ));
         }
@@ -225,8 +225,8 @@ impl Instances {
     /// Panics if the number of values is wrong.
     pub fn set(&mut self, variables: &Selection, values: &[f64], mask: Mask) -> Result<(), Error> {
         variables.check(values)?;
-        let rows = rows(variables.len(), values.len(), self.len());
-        self.alive(mask, |index, _, instance| instance.set(variables, rows.of(values, index)));
+        let row = rows(values, variables.len(), self.len());
+        self.alive(mask, |index, _, instance| instance.set(variables, row(index)));
         Ok(())
     }
 
@@ -235,7 +235,7 @@ impl Instances {
     /// # Panics
     /// Panics if the length of `values` is wrong.
     pub fn get(&mut self, variables: &Selection, values: &mut [f64]) {
-        self.fill(variables.len(), values, |instance, row| instance.get(variables, row));
+        self.fill(variables.len(), values, |_, _, instance, row| instance.get(variables, row));
     }
 
     /// Performs Co-Simulation steps of this size, s.
@@ -289,9 +289,9 @@ impl Instances {
     ) -> Result<(), Error> {
         set.check(values)?;
         check_size(size)?;
-        let rows = rows(set.len(), values.len(), self.len());
-        self.fill_by_index(get.len(), read, |index, own, instance, row| {
-            instance.set(set, rows.of(values, index))?;
+        let inputs = rows(values, set.len(), self.len());
+        self.fill(get.len(), read, |index, own, instance, row| {
+            instance.set(set, inputs(index))?;
             instance.step(own.time, size)?;
             own.time += size;
             instance.get(get, row)
@@ -414,9 +414,9 @@ impl Instances {
                 "{name} cannot be a known; expected an input, a parameter or a continuous state"
             ));
         }
-        let rows = rows(knowns.len(), seed.len(), self.len());
-        self.fill_by_index(unknowns.len(), values, |index, _, instance, row| {
-            instance.sole().directional_derivative(unknown, known, rows.of(seed, index), row)
+        let seed = rows(seed, knowns.len(), self.len());
+        self.fill(unknowns.len(), values, |index, _, instance, row| {
+            instance.sole().directional_derivative(unknown, known, seed(index), row)
         });
         Ok(())
     }
@@ -437,9 +437,9 @@ impl Instances {
     ) -> Result<(), Error> {
         let (references, orders) = (self.real(inputs)?, vec![1; inputs.len()]);
         inputs.names().iter().try_for_each(|name| self.system.takes_input_derivative(name).map(drop))?;
-        let rows = rows(inputs.len(), values.len(), self.len());
+        let row = rows(values, inputs.len(), self.len());
         self.alive(mask, |index, _, instance| {
-            instance.sole().set_input_derivatives(references, &orders, rows.of(values, index))
+            instance.sole().set_input_derivatives(references, &orders, row(index))
         });
         Ok(())
     }
@@ -452,9 +452,9 @@ impl Instances {
     /// # Panics
     /// Panics if the length of `values` is wrong.
     pub fn get_output_derivatives(&mut self, outputs: &Selection, values: &mut [f64]) -> Result<(), Error> {
-        let (references, orders) = (self.real(outputs)?, vec![1; outputs.len()]);
-        self.fill(outputs.len(), values, |instance, row| {
-            instance.sole().get_output_derivatives(references, &orders, row)
+        let references = self.real(outputs)?;
+        self.fill(outputs.len(), values, |_, _, instance, row| {
+            instance.sole().get_output_derivatives(references, row)
         });
         Ok(())
     }
@@ -470,9 +470,9 @@ impl Instances {
         if let Some(time) = times.iter().find(|time| !time.is_finite()) {
             return request(format!("time is {time}; it must be finite"));
         }
-        let rows = rows(1, times.len(), self.len());
+        let row = rows(times, 1, self.len());
         self.alive(mask, |index, own, instance| {
-            own.time = rows.of(times, index)[0];
+            own.time = row(index)[0];
             instance.sole().set_time(own.time)
         });
         Ok(())
@@ -483,9 +483,8 @@ impl Instances {
     /// # Panics
     /// Panics if the number of values is wrong.
     pub fn set_continuous_states(&mut self, values: &[f64], mask: Mask) {
-        let rows =
-            rows(self.description().map_or(0, |description| description.states), values.len(), self.len());
-        self.alive(mask, |index, _, instance| instance.sole().set_continuous_states(rows.of(values, index)));
+        let row = rows(values, self.continuous(Continuous::States), self.len());
+        self.alive(mask, |index, _, instance| instance.sole().set_continuous_states(row(index)));
     }
 
     /// Reads states, derivatives, nominal values or event indicators into a row for each instance, in Model
@@ -494,7 +493,9 @@ impl Instances {
     /// # Panics
     /// Panics if the length of `values` is wrong.
     pub fn get_continuous(&mut self, what: Continuous, values: &mut [f64]) {
-        self.fill(self.continuous(what), values, |instance, row| instance.sole().get_continuous(what, row));
+        self.fill(self.continuous(what), values, |_, _, instance, row| {
+            instance.sole().get_continuous(what, row)
+        });
     }
 
     /// Returns the number of values of this quantity.
@@ -516,10 +517,10 @@ impl Instances {
     /// Panics if the number of values is wrong.
     pub fn handle_events(&mut self, (set, values): (&Selection, &[f64]), mask: Mask) -> Result<(), Error> {
         set.check(values)?;
-        let rows = rows(set.len(), values.len(), self.len());
+        let row = rows(values, set.len(), self.len());
         self.alive(mask, |index, own, instance| {
             instance.sole().enter_event_mode()?;
-            instance.set(set, rows.of(values, index))?;
+            instance.set(set, row(index))?;
             own.event = instance.sole().event()?;
             instance.sole().enter_continuous_time_mode()
         });
@@ -532,7 +533,7 @@ impl Instances {
     /// # Panics
     /// Panics if `wanted` does not have two values for each instance.
     pub fn completed_integrator_step(&mut self, wanted: &mut [f64]) {
-        self.fill(2, wanted, |instance, row| {
+        self.fill(2, wanted, |_, _, instance, row| {
             row.copy_from_slice(
                 &instance.sole().completed_integrator_step()?.map(|wanted| f64::from(u8::from(wanted))),
             );
@@ -558,10 +559,10 @@ impl Instances {
     /// Returns [`Error::Request`] if the variable is unknown or no string.
     pub fn texts(&mut self, name: &str) -> Result<Vec<Option<String>>, Error> {
         let found = self.system.find_first(name)?;
-        if found.of.base != BaseType::String {
-            return request(format!("{name} is {}, no text", found.of.what()));
+        if found.variable.base != BaseType::String {
+            return request(format!("{name} is {}, not a string", found.variable.kind_in_words()));
         }
-        let index = Place::of(found);
+        let index = Target::of(found);
         let mut texts = vec![None; self.len()];
         for (one, text) in self.all.iter_mut().zip(&mut texts) {
             one.with(|_, instance| instance.get_text(index).map(|found| *text = Some(found)));
@@ -580,17 +581,8 @@ impl Instances {
         });
     }
 
-    fn fill(
-        &mut self,
-        length: usize,
-        values: &mut [f64],
-        body: impl Fn(&mut Running, &mut [f64]) -> Result<(), Rejection> + Sync,
-    ) {
-        self.fill_by_index(length, values, |_, _, instance, row| body(instance, row));
-    }
-
     /// Fills a row of values for each instance, with NaN for a failed instance.
-    fn fill_by_index(
+    fn fill(
         &mut self,
         length: usize,
         values: &mut [f64],
@@ -666,7 +658,7 @@ fn each(
     body: impl Fn(usize, &mut One) + Sync,
 ) {
     if let Some(mask) = mask {
-        assert_eq!(mask.len(), all.len(), "a truth value for each instance");
+        assert_eq!(mask.len(), all.len(), "a Boolean for each instance");
     }
     in_parts(pool, all, 0, &mut [], |index, one, _| {
         if mask.is_none_or(|mask| mask[index]) {
@@ -707,25 +699,13 @@ fn in_parts(
     });
 }
 
-/// Access to a row for each instance, or to one row for all.
-#[derive(Clone, Copy)]
-struct Rows {
-    length: usize,
-    step: usize,
-}
-
-fn rows(length: usize, values: usize, instances: usize) -> Rows {
-    let each = values == length * instances;
+/// Returns the row of an instance, from a row for each instance or one row for all.
+fn rows<'v>(values: &'v [f64], length: usize, instances: usize) -> impl Fn(usize) -> &'v [f64] {
+    let each = values.len() == length * instances;
     assert!(
-        each || values == length,
-        "{values} values are no row of {length} for one or {instances} instances"
+        each || values.len() == length,
+        "{} values are no row of {length} for one or {instances} instances",
+        values.len()
     );
-    Rows { length, step: if each { length } else { 0 } }
-}
-
-impl Rows {
-    #[inline]
-    fn of(self, values: &[f64], index: usize) -> &[f64] {
-        &values[index * self.step..index * self.step + self.length]
-    }
+    move |index| &values[if each { index * length } else { 0 }..][..length]
 }

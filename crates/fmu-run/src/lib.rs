@@ -4,8 +4,8 @@
 //!
 //! [`Fmu`] is an unpacked and loaded FMU of FMI 2.0 or 3.0. A [`Batch`] runs it many times on all processors;
 //! [`Instances`] are stateful and controlled by the caller. `description` makes array elements variables,
-//! `library` loads the functions, `instance` calls them, and `log` collects their messages. Only the last
-//! three contain `unsafe` code. A caller needs `unsafe` only to [open](Fmu::open) an FMU.
+//! `library` loads the functions, `instance` and `values` call them, and `log` collects their messages. Only these
+//! four contain `unsafe` code. A caller needs `unsafe` only to [open](Fmu::open) an FMU.
 
 mod arrays;
 mod batch;
@@ -23,6 +23,7 @@ mod running;
 mod selection;
 mod start;
 mod system;
+mod values;
 
 pub use batch::{Batch, Measure, Planned, Runs, Size, Trajectory, Watch};
 pub use description::{Description, Variable};
@@ -34,4 +35,4 @@ pub use instances::{Instances, Mask, Setup, States};
 pub use rejection::Message;
 pub use selection::Selection;
 pub use start::Start;
-pub use system::{Fmu, Order, StartValue, System, Wiring, nearest};
+pub use system::{Composition, Fmu, Order, StartValue, System, nearest};

@@ -15,7 +15,7 @@ pub(crate) struct Library {
     pub resources: CString,
     _loaded: libloading::Library,
     // Removed after the library is unloaded.
-    _folder: Arc<TempDir>,
+    _directory: Arc<TempDir>,
 }
 
 /// Functions of the library, for one FMI version.
@@ -39,7 +39,7 @@ impl Library {
         path: &Path,
         standard: Standard,
         resources: CString,
-        folder: Arc<TempDir>,
+        directory: Arc<TempDir>,
     ) -> Result<Self, libloading::Error> {
         // SAFETY: the caller guarantees that loading is sound.
         let loaded = unsafe { libloading::Library::new(path) }?;
@@ -58,6 +58,6 @@ impl Library {
                 }
             }
         };
-        Ok(Self { functions, resources, _loaded: loaded, _folder: folder })
+        Ok(Self { functions, resources, _loaded: loaded, _directory: directory })
     }
 }

@@ -65,7 +65,7 @@ fn made_for(bytes: &[u8]) -> Option<(&'static str, Vec<&'static str>)> {
         // A file for several processors: their number, then 20 bytes for each.
         [0xca, 0xfe, 0xba, 0xbe] => {
             let count = u32::from_be_bytes(at(4)?).min(16) as usize;
-            let processors = (0..count).map(|of| mach(u32::from_be_bytes(at(8 + 20 * of)?)));
+            let processors = (0..count).map(|index| mach(u32::from_be_bytes(at(8 + 20 * index)?)));
             ("macOS", processors.collect::<Option<_>>()?)
         }
         _ => return None,

@@ -36,9 +36,9 @@ impl Rejection {
 
     /// Creates an error that does not come from an FMU.
     #[cold]
-    pub(crate) fn of_ours(what: &'static str, why: &str) -> Self {
+    pub(crate) fn without_fmu(function: &'static str, why: &str) -> Self {
         let message = Message { status: Status::Error, category: String::new(), text: why.to_owned() };
-        Self::new("", what, Status::Error, vec![message])
+        Self::new("", function, Status::Error, vec![message])
     }
 
     pub(crate) fn status(&self) -> Status {
@@ -77,7 +77,7 @@ impl std::fmt::Display for Rejection {
             // Some FMUs include the function in the message.
             Some(message) if message.text.contains(function) => f.write_str(message.text.trim()),
             Some(message) => write!(f, "{}: {}", function, message.text.trim()),
-            None => write!(f, "{} was answered with {:?}, without a message", function, status),
+            None => write!(f, "{} returned {:?} without a message", function, status),
         }
     }
 }
@@ -87,6 +87,6 @@ impl std::error::Error for Rejection {}
 /// Returns the message that explains an error: the last one with status Discard or worse, otherwise the last
 /// one.
 pub(crate) fn reason(log: &[Message]) -> Option<&Message> {
-    let grave = log.iter().rev().find(|message| message.status as i32 >= Status::Discard as i32);
-    grave.or(log.last())
+    let severe = log.iter().rev().find(|message| message.status as i32 >= Status::Discard as i32);
+    severe.or(log.last())
 }

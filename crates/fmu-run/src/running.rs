@@ -2,10 +2,10 @@
 
 use crate::instance::{Instance, Saved};
 use crate::rejection::{Message, Rejection};
-use crate::selection::{Place, Selection};
+use crate::selection::{Selection, Target};
 use crate::start::StartValues;
 use crate::system::{Exchange, Order, System};
-use fmi_abi::{BaseType, Interface};
+use fmi_abi::Interface;
 
 /// One instance of each component; each function acts on all of them. A single FMU is a system with one
 /// component and no connections.
@@ -53,26 +53,22 @@ impl Running {
         start_time: f64,
         stop_time: Option<f64>,
         start: &StartValues,
-        of: usize,
+        number: usize,
     ) -> Result<(), Rejection> {
         self.each(|_, instance| instance.set_up(start_time, stop_time))?;
-        for (index, text) in start.texts(of) {
-            self.parts[index.part].set_text(index.reference, text)?;
+        for (target, text) in start.texts(number) {
+            self.parts[target.part].set_text(target.reference, text)?;
         }
-        let numbers: Vec<_> = start.numbers(of).collect();
+        let numbers: Vec<_> = start.numbers(number).collect();
         // One call sets values that must be consistent, such as the elements of an array that must increase.
-        let is_real = |index: &Place, part: usize| index.part == part && index.base == BaseType::Real;
-        for together in
-            numbers.chunk_by(|(one, _), (next, _)| is_real(one, next.part) && is_real(next, one.part))
-        {
-            let (Place { part, base, reference }, value) = together[0];
-            if together.len() == 1 {
-                self.parts[part].set_number(base, reference, value)?;
-                continue;
-            }
-            let (references, values): (Vec<u32>, Vec<f64>) =
-                together.iter().map(|(index, value)| (index.reference, *value)).unzip();
-            self.parts[part].set_reals(&references, &values)?;
+        let together = |(one, _): &(Target, f64), (next, _): &(Target, f64)| {
+            (one.part, one.base) == (next.part, next.base)
+        };
+        for group in numbers.chunk_by(together) {
+            let Target { part, base, .. } = group[0].0;
+            let (references, values): (Vec<_>, Vec<_>) =
+                group.iter().map(|(target, value)| (target.reference, *value)).unzip();
+            self.parts[part].set_numbers(base, &references, &values)?;
         }
         self.each(|_, instance| instance.enter_initialization_mode(start_time, stop_time))
     }
@@ -105,9 +101,9 @@ impl Running {
         }
         match order {
             Order::Jacobi => Ok(()),
-            Order::Dependencies => Err(Rejection::of_ours(
+            Order::Dependencies => Err(Rejection::without_fmu(
                 "initialization",
-                "the outputs depend on each other before the first step, so that passing them on does not come to an end",
+                "the outputs depend on each other before the first step, so that the exchange of values does not converge",
             )),
         }
     }
@@ -118,12 +114,12 @@ impl Running {
         if self.is_due { self.pass_all_on(|_| ()) } else { Ok(()) }
     }
 
-    fn pass_all_on(&mut self, mut told: impl FnMut(&[f64])) -> Result<(), Rejection> {
+    fn pass_all_on(&mut self, mut observe: impl FnMut(&[f64])) -> Result<(), Rejection> {
         let Self { parts, system, row, buffer, .. } = self;
         for stage in &system.exchange().stages {
             row.resize(stage.outputs.len(), 0.0);
             stage.outputs.get(parts, buffer, row)?;
-            told(row);
+            observe(row);
             stage.inputs.set(parts, buffer, row)?;
         }
         self.is_due = false;
@@ -186,7 +182,7 @@ impl Running {
         Ok(())
     }
 
-    pub fn get_text(&mut self, index: Place) -> Result<String, Rejection> {
+    pub fn get_text(&mut self, index: Target) -> Result<String, Rejection> {
         self.pass_on()?;
         self.parts[index.part].get_text(index.reference)
     }
@@ -255,7 +251,7 @@ impl Running {
             return self.sole().deserialize(bytes);
         }
         let mut rest = bytes;
-        let short = || Rejection::of_ours("deserialize", "the bytes are no state of this system");
+        let short = || Rejection::without_fmu("deserialize", "the bytes are no state of this system");
         let parts = self.parts.iter().map(|_| {
             let (length, after) = rest.split_first_chunk()?;
             let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
@@ -290,7 +286,7 @@ impl Running {
                 self.parts[..=last].iter_mut().for_each(|instance| _ = instance.forget(saved));
                 return Err(rejection);
             }
-            (kept, None) => return kept.and(Err(Rejection::of_ours("save", "there is no instance"))),
+            (kept, None) => return kept.and(Err(Rejection::without_fmu("save", "there is no instance"))),
         };
         debug_assert_eq!(last + 1, self.parts.len(), "all have kept one");
         if !self.passed.is_empty() {

@@ -18,28 +18,27 @@ pub struct Selection {
     read_only: Option<String>,
 }
 
-/// Variables of one component.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// Variables of one component and one type, which one call sets or reads.
+#[derive(Clone, Debug, PartialEq)]
 struct Group {
     part: usize,
-    /// Value references of the Real variables, which one call sets or reads. `places` are their indices in a
-    /// row.
-    reals: Vec<u32>,
+    base: BaseType,
+    references: Vec<u32>,
+    /// Indices of the values in a row.
     indices: Vec<usize>,
-    others: Vec<(BaseType, u32, usize)>,
 }
 
 /// Target of a value: component, type and value reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Place {
+pub(crate) struct Target {
     pub part: usize,
     pub base: BaseType,
     pub reference: u32,
 }
 
-impl Place {
+impl Target {
     pub fn of(found: Found) -> Self {
-        Self { part: found.part, base: found.of.base, reference: found.of.reference }
+        Self { part: found.part, base: found.variable.base, reference: found.variable.reference }
     }
 }
 
@@ -65,29 +64,24 @@ impl Selection {
         self.names.push(name.to_owned());
         let read_only = found.iter().find_map(|found| found.check_settable(name).err());
         self.read_only = self.read_only.take().or(read_only.map(|error| error.to_string()));
-        for Place { part, base, reference } in found.iter().copied().map(Place::of) {
-            let index = self.groups.iter().position(|group| group.part == part);
+        for Target { part, base, reference } in found.iter().copied().map(Target::of) {
+            let index = self.groups.iter().position(|group| group.part == part && group.base == base);
             let index = index.unwrap_or_else(|| {
-                self.groups.push(Group { part, ..Group::default() });
+                self.groups.push(Group { part, base, references: Vec::new(), indices: Vec::new() });
                 self.groups.len() - 1
             });
-            let group = &mut self.groups[index];
-            match base {
-                BaseType::Real => {
-                    group.reals.push(reference);
-                    group.indices.push(row);
-                }
-                base => group.others.push((base, reference, row)),
-            }
+            self.groups[index].references.push(reference);
+            self.groups[index].indices.push(row);
         }
-        self.is_direct = self.groups.len() == 1 && self.groups[0].indices.len() == self.names.len();
+        let [group] = &*self.groups else { return self.is_direct = false };
+        self.is_direct = group.base == BaseType::Real && group.indices.len() == self.names.len();
     }
 
     /// Returns the value references, if all are Real variables of one component.
     pub(crate) fn references(&self) -> Option<&[u32]> {
         match self.groups.first() {
             None => Some(&[]),
-            Some(group) => self.is_direct.then_some(&group.reals),
+            Some(group) => self.is_direct.then_some(&group.references),
         }
     }
 
@@ -101,9 +95,11 @@ impl Selection {
         if let Some(why) = &self.read_only {
             return request(why.clone());
         }
-        for (base, _, index) in self.groups.iter().flat_map(|group| &group.others) {
-            for row in values.chunks_exact(self.len()) {
-                fits(&self.names[*index], *base, &row[*index..=*index])?;
+        for Group { base, indices, .. } in &self.groups {
+            for (index, row) in
+                indices.iter().flat_map(|index| values.chunks_exact(self.len()).map(move |row| (*index, row)))
+            {
+                fits(&self.names[index], *base, &row[index..=index])?;
             }
         }
         Ok(())
@@ -118,21 +114,13 @@ impl Selection {
         row: &mut [f64],
     ) -> Result<(), Rejection> {
         if self.is_direct {
-            let group = &self.groups[0];
-            return parts[group.part].get_reals(&group.reals, row);
+            let Group { part, references, .. } = &self.groups[0];
+            return parts[*part].get_numbers(BaseType::Real, references, row);
         }
-        for Group { part, reals, indices, others } in &self.groups {
-            let instance = &mut parts[*part];
-            if !reals.is_empty() {
-                buffer.resize(reals.len(), 0.0);
-                instance.get_reals(reals, buffer)?;
-                for (index, value) in indices.iter().zip(&*buffer) {
-                    row[*index] = *value;
-                }
-            }
-            for (base, reference, index) in others {
-                row[*index] = instance.get_number(*base, *reference)?;
-            }
+        for Group { part, base, references, indices } in &self.groups {
+            buffer.resize(references.len(), 0.0);
+            parts[*part].get_numbers(*base, references, buffer)?;
+            indices.iter().zip(&*buffer).for_each(|(index, value)| row[*index] = *value);
         }
         Ok(())
     }
@@ -146,19 +134,13 @@ impl Selection {
         row: &[f64],
     ) -> Result<(), Rejection> {
         if self.is_direct {
-            let group = &self.groups[0];
-            return parts[group.part].set_reals(&group.reals, row);
+            let Group { part, references, .. } = &self.groups[0];
+            return parts[*part].set_numbers(BaseType::Real, references, row);
         }
-        for Group { part, reals, indices, others } in &self.groups {
-            let instance = &mut parts[*part];
-            if !reals.is_empty() {
-                buffer.clear();
-                buffer.extend(indices.iter().map(|index| row[*index]));
-                instance.set_reals(reals, buffer)?;
-            }
-            for (base, reference, index) in others {
-                instance.set_number(*base, *reference, row[*index])?;
-            }
+        for Group { part, base, references, indices } in &self.groups {
+            buffer.clear();
+            buffer.extend(indices.iter().map(|index| row[*index]));
+            parts[*part].set_numbers(*base, references, buffer)?;
         }
         Ok(())
     }
@@ -179,8 +161,6 @@ pub(crate) fn fits(name: &str, base: BaseType, values: &[f64]) -> Result<(), Err
         Some(value) if base == BaseType::Boolean => {
             request(format!("{name} is a Boolean and cannot be {value}"))
         }
-        Some(value) => {
-            request(format!("{name} is a whole number from {low} to {high} and cannot be {value}"))
-        }
+        Some(value) => request(format!("{name} is an integer from {low} to {high} and cannot be {value}")),
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, request};
 use crate::found::Found;
-use crate::selection::{Place, fits};
+use crate::selection::{Target, fits};
 use crate::system::{StartValue, System};
 use fmi_abi::BaseType;
 use std::borrow::Cow;
@@ -36,8 +36,8 @@ impl Start<'_> {
 /// Checked start values. Each variable has one value for all runs or instances, or one for each.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct StartValues<'a> {
-    numbers: Vec<(Place, Cow<'a, [f64]>)>,
-    texts: Vec<(Place, Vec<CString>)>,
+    numbers: Vec<(Target, Cow<'a, [f64]>)>,
+    texts: Vec<(Target, Vec<CString>)>,
 }
 
 impl<'a> StartValues<'a> {
@@ -69,7 +69,7 @@ impl<'a> StartValues<'a> {
 
     /// Adds start values and removes earlier values of the same variables.
     pub fn put(&mut self, new: Self) {
-        let is_new = |index: &Place| {
+        let is_new = |index: &Target| {
             new.numbers.iter().any(|(of, _)| of == index) || new.texts.iter().any(|(of, _)| of == index)
         };
         self.numbers.retain(|(index, _)| !is_new(index));
@@ -79,12 +79,12 @@ impl<'a> StartValues<'a> {
     }
 
     /// Returns the numbers of a run or an instance.
-    pub fn numbers(&self, of: usize) -> impl Iterator<Item = (Place, f64)> {
+    pub fn numbers(&self, of: usize) -> impl Iterator<Item = (Target, f64)> {
         self.numbers.iter().filter_map(move |(index, values)| Some((*index, *one(values, of)?)))
     }
 
     /// Returns the strings of a run or an instance.
-    pub fn texts(&self, of: usize) -> impl Iterator<Item = (Place, &CStr)> {
+    pub fn texts(&self, of: usize) -> impl Iterator<Item = (Target, &CStr)> {
         self.texts.iter().filter_map(move |(index, texts)| Some((*index, one(texts, of)?.as_c_str())))
     }
 
@@ -97,7 +97,7 @@ impl<'a> StartValues<'a> {
     fn found(system: &System, name: &str, start: Start<'a>) -> Result<Self, Error> {
         let mut all = Self::default();
         for found in system.find_startable(name)? {
-            let index = Place::of(found);
+            let index = Target::of(found);
             let texts: Vec<&str> = match start {
                 Start::Same(number) => {
                     all.numbers.push((index, checked(found, name, Cow::Owned(vec![number]))?));
@@ -131,18 +131,18 @@ fn one<T>(values: &[T], of: usize) -> Option<&T> {
 
 fn checked<'a>(found: Found, name: &str, numbers: Cow<'a, [f64]>) -> Result<Cow<'a, [f64]>, Error> {
     found.check_number(name)?;
-    fits(name, found.of.base, &numbers)?;
+    fits(name, found.variable.base, &numbers)?;
     Ok(numbers)
 }
 
 /// Returns the number for a string, for a variable that is no string.
 fn number_of(found: Found, name: &str, text: &str) -> Result<f64, Error> {
-    if found.of.base == BaseType::Boolean
-        && let Ok(truth) = text.parse::<bool>()
+    if found.variable.base == BaseType::Boolean
+        && let Ok(boolean) = text.parse::<bool>()
     {
-        return Ok(f64::from(u8::from(truth)));
+        return Ok(f64::from(u8::from(boolean)));
     }
-    match found.description.items(found.of) {
+    match found.description.items(found.variable) {
         Some(items) => {
             let number =
                 items.iter().find(|(item, _)| item == text).and_then(|(_, number)| number.parse().ok());
@@ -150,6 +150,9 @@ fn number_of(found: Found, name: &str, text: &str) -> Result<f64, Error> {
             let why = || format!("{name} is one of {}, its start value cannot be {text:?}", known.join(", "));
             number.ok_or_else(|| Error::Request(why()))
         }
-        None => request(format!("{name} is {}, its start value cannot be {text:?}", found.of.what())),
+        None => request(format!(
+            "{name} is {}, its start value cannot be {text:?}",
+            found.variable.kind_in_words()
+        )),
     }
 }

@@ -1,4 +1,4 @@
-//! Systems of FMUs: what is wired wrongly is named; what is right comes out as the standards want it.
+//! Systems of FMUs: messages about wrong connections, and the files of correct systems.
 
 use fmu_system::System;
 use std::fs;
@@ -11,17 +11,33 @@ const UNITS: &str = r#"<UnitDefinitions><Unit name="rad"><BaseUnit rad="1"/></Un
 <SimpleType name="Gear"><Enumeration><Item name="Neutral" value="0"/><Item name="Drive" value="3"/></Enumeration></SimpleType>
 <SimpleType name="Other"><Enumeration><Item name="Neutral" value="1"/></Enumeration></SimpleType></TypeDefinitions>"#;
 
-fn fmu(folder: &Path, name: &str, variables: &str) -> PathBuf {
-    let path = folder.join(name);
+/// Writes an FMU that contains only this model description.
+fn packed(path: PathBuf, description: &str) -> PathBuf {
     let mut zip = zip::ZipWriter::new(fs::File::create(&path).unwrap());
     zip.start_file("modelDescription.xml", zip::write::SimpleFileOptions::default()).unwrap();
+    zip.write_all(description.as_bytes()).unwrap();
+    zip.finish().unwrap();
+    path
+}
+
+fn entries(path: &Path) -> Vec<String> {
+    let zip = ZipArchive::new(fs::File::open(path).unwrap()).unwrap();
+    zip.file_names().map(|name| name.unwrap().into_owned()).collect()
+}
+
+fn entry(path: &Path, name: &str) -> String {
+    let mut zip = ZipArchive::new(fs::File::open(path).unwrap()).unwrap();
+    let mut text = String::new();
+    zip.by_name(name).unwrap().read_to_string(&mut text).unwrap();
+    text
+}
+
+fn fmu(folder: &Path, name: &str, variables: &str) -> PathBuf {
     let text = format!(
         "<fmiModelDescription fmiVersion=\"2.0\" modelName=\"m\" guid=\"g\"><CoSimulation modelIdentifier=\"m\"/>{UNITS}\
          <ModelVariables>{variables}</ModelVariables></fmiModelDescription>"
     );
-    zip.write_all(text.as_bytes()).unwrap();
-    zip.finish().unwrap();
-    path
+    packed(folder.join(name), &text)
 }
 
 fn variable(name: &str, causality: &str, kind: &str) -> String {
@@ -31,7 +47,7 @@ fn variable(name: &str, causality: &str, kind: &str) -> String {
     )
 }
 
-/// Two FMUs: the unit of an angle once at the variable, once by its type.
+/// Returns two FMUs. One angle has its unit at the variable, one at the declared type.
 fn fmus(folder: &Path) -> Vec<(&'static str, PathBuf)> {
     let plant = [
         variable("u", "input", r#"Real unit="rad""#),
@@ -71,12 +87,12 @@ fn system<'a>(folder: &Path) -> System<'a> {
 }
 
 #[test]
-fn what_does_not_fit_is_named() {
+fn wrong_systems_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let rejection = |change: fn(&mut System)| {
         let mut system = system(folder.path());
         change(&mut system);
-        format!("{:#}", system.check().err().expect("it does not fit"))
+        format!("{:#}", system.check().err().expect("it is wrong"))
     };
     for (change, message) in [
         ((|s| s.connections.push(("plant.y", "law.x"))) as fn(&mut System), "no FMU has a variable law.x"),
@@ -126,18 +142,18 @@ fn what_does_not_fit_is_named() {
     ] {
         assert_eq!(rejection(change).split(": No such file").next(), Some(message));
     }
-    // A state starts where its FMU lets it.
-    let mut elsewhere = system(folder.path());
-    elsewhere.start.push(("plant.angle", "0.5".into()));
-    elsewhere.check().unwrap();
-    // A unit that nobody tells cannot be wrong.
-    let mut untold = system(folder.path());
-    untold.connections[1].0 = "plant.bare";
-    untold.check().unwrap();
+    // An output with a start value accepts another one.
+    let mut other_start = system(folder.path());
+    other_start.start.push(("plant.angle", "0.5".into()));
+    other_start.check().unwrap();
+    // An undeclared unit fits any unit.
+    let mut without_unit = system(folder.path());
+    without_unit.connections[1].0 = "plant.bare";
+    without_unit.check().unwrap();
 }
 
 #[test]
-fn the_ssp_has_everything_and_is_the_same_every_time() {
+fn the_ssp_is_complete_and_reproducible() {
     let folder = tempfile::tempdir().unwrap();
     let system = system(folder.path());
     let checked = system.check().unwrap();
@@ -146,10 +162,8 @@ fn the_ssp_has_everything_and_is_the_same_every_time() {
     system.check().unwrap().write_ssp(&other).unwrap();
     assert!(fs::read(&one).unwrap() == fs::read(&other).unwrap());
 
-    let mut zip = ZipArchive::new(fs::File::open(&one).unwrap()).unwrap();
-    let names: Vec<String> = zip.file_names().map(|name| name.unwrap().into_owned()).collect();
     assert_eq!(
-        names,
+        entries(&one),
         [
             "SystemStructure.ssd",
             "resources/experiment.ssv",
@@ -158,12 +172,7 @@ fn the_ssp_has_everything_and_is_the_same_every_time() {
             "resources/plant.ssv"
         ]
     );
-    let mut read = |name: &str| {
-        let mut text = String::new();
-        zip.by_name(name).unwrap().read_to_string(&mut text).unwrap();
-        text
-    };
-    let ssd = read("SystemStructure.ssd");
+    let ssd = entry(&one, "SystemStructure.ssd");
     for part in [
         r#"<ssd:Component name="law" type="application/x-fmu-sharedlibrary" source="resources/law.fmu">"#,
         r#"<ssd:Connection startConnector="reference" endElement="law" endConnector="r"/>"#,
@@ -173,54 +182,45 @@ fn the_ssp_has_everything_and_is_the_same_every_time() {
     ] {
         assert_eq!(ssd.matches(part).count(), 1, "{part}\n{ssd}");
     }
-    // What OMSimulator wants to know, the last in the system.
+    // The annotation for OMSimulator is the last element of the system.
     let annotations: String = ssd.lines().map(str::trim).collect();
     let last = r#"<oms:SimulationInformation><oms:FixedStepMaster description="oms-ma" stepSize="0.001" absoluteTolerance="0.0001" relativeTolerance="0.0001"/></oms:SimulationInformation></oms:Annotations></ssc:Annotation></ssd:Annotations></ssd:System>"#;
     assert!(annotations.contains(last), "{ssd}");
-    // Units that are used, and no others.
+    // Only the used units.
     assert!(ssd.contains(r#"<ssc:Unit name="rad">"#) && !ssd.contains(r#"<ssc:Unit name="s">"#), "{ssd}");
-    assert!(read("resources/plant.ssv").contains(r#"<ssv:Boolean value="true"/>"#));
-    assert!(read("resources/experiment.ssv").contains(r#"<ssv:Real value="0.5" unit="rad"/>"#));
+    assert!(entry(&one, "resources/plant.ssv").contains(r#"<ssv:Boolean value="true"/>"#));
+    assert!(entry(&one, "resources/experiment.ssv").contains(r#"<ssv:Real value="0.5" unit="rad"/>"#));
 }
 
-/// The schema wants no empty list of connectors.
+/// The schema permits no empty list of connectors.
 #[test]
 fn a_component_that_is_not_connected_has_no_connectors() {
     let folder = tempfile::tempdir().unwrap();
-    let mut alone = system(folder.path());
-    (alone.inputs, alone.outputs, alone.connections) = (Vec::new(), Vec::new(), Vec::new());
-    let ssp = folder.path().join("alone.ssp");
-    alone.check().unwrap().write_ssp(&ssp).unwrap();
-    let mut ssd = String::new();
-    let mut zip = ZipArchive::new(fs::File::open(&ssp).unwrap()).unwrap();
-    zip.by_name("SystemStructure.ssd").unwrap().read_to_string(&mut ssd).unwrap();
+    let mut unconnected = system(folder.path());
+    (unconnected.inputs, unconnected.outputs, unconnected.connections) = (Vec::new(), Vec::new(), Vec::new());
+    let ssp = folder.path().join("unconnected.ssp");
+    unconnected.check().unwrap().write_ssp(&ssp).unwrap();
+    let ssd = entry(&ssp, "SystemStructure.ssd");
     assert!(!ssd.contains("ssd:Connectors") && !ssd.contains("ssd:Connections"), "{ssd}");
 }
 
-/// Numbers of FMI 3.0 are Reals and Integers to SSP 1.0.
+/// SSP 1.0 has only Real and Integer for the number types of FMI 3.0.
 #[test]
-fn fmus_for_fmi_3_are_wired_as_well() {
+fn fmus_for_fmi_3_are_connected_too() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("new.fmu");
-    let mut zip = zip::ZipWriter::new(fs::File::create(&path).unwrap());
-    zip.start_file("modelDescription.xml", zip::write::SimpleFileOptions::default()).unwrap();
     let text = r#"<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="t">
         <CoSimulation modelIdentifier="m"/><UnitDefinitions><Unit name="rad"><BaseUnit rad="1"/></Unit></UnitDefinitions>
         <TypeDefinitions><Float64Type name="Angle" unit="rad" max="3"/></TypeDefinitions><ModelVariables>
         <Float64 name="u" valueReference="1" causality="input" declaredType="Angle" start="0"/>
         <Int16 name="n" valueReference="2" causality="parameter" start="0"/>
         <Float64 name="y" valueReference="3" causality="output" declaredType="Angle"/></ModelVariables></fmiModelDescription>"#;
-    zip.write_all(text.as_bytes()).unwrap();
-    zip.finish().unwrap();
     let mut new = system(folder.path());
-    new.components.push(("new", path));
+    new.components.push(("new", packed(folder.path().join("new.fmu"), text)));
     new.connections.push(("law.u", "new.u"));
     new.start.push(("new.n", "7".into()));
     let ssp = folder.path().join("new.ssp");
     new.check().unwrap().write_ssp(&ssp).unwrap();
-    let mut ssv = String::new();
-    let mut zip = ZipArchive::new(fs::File::open(&ssp).unwrap()).unwrap();
-    zip.by_name("resources/new.ssv").unwrap().read_to_string(&mut ssv).unwrap();
+    let ssv = entry(&ssp, "resources/new.ssv");
     assert!(ssv.contains(r#"<ssv:Integer value="7"/>"#), "{ssv}");
     for (start, message) in [
         (("new.u", "4"), "the start value of new.u must not be above 3, it is 4"),
@@ -232,7 +232,7 @@ fn fmus_for_fmi_3_are_wired_as_well() {
 }
 
 #[test]
-fn the_folder_for_libcosim_has_the_fmus_and_the_start_values() {
+fn the_directory_for_libcosim_has_the_fmus_and_the_start_values() {
     let folder = tempfile::tempdir().unwrap();
     let system = system(folder.path());
     let out = folder.path().join("osp");
@@ -251,7 +251,7 @@ fn the_folder_for_libcosim_has_the_fmus_and_the_start_values() {
     }
 }
 
-/// Two plants behind one another.
+/// Returns a system of two plants in series.
 fn twins<'a>(components: Vec<(&'a str, PathBuf)>) -> System<'a> {
     System {
         name: "twins",
@@ -274,13 +274,10 @@ fn two_instances_of_one_fmu_share_its_file() {
     let checked = system.check().unwrap();
     let ssp = folder.path().join("twins.ssp");
     checked.write_ssp(&ssp).unwrap();
-    let mut zip = ZipArchive::new(fs::File::open(&ssp).unwrap()).unwrap();
-    let names: Vec<String> = zip.file_names().map(|name| name.unwrap().into_owned()).collect();
     let expected =
         ["experiment.ssv", "one.ssv", "other.ssv", "plant.fmu"].map(|name| format!("resources/{name}"));
-    assert_eq!(names[1..], expected);
-    let mut ssd = String::new();
-    zip.by_name("SystemStructure.ssd").unwrap().read_to_string(&mut ssd).unwrap();
+    assert_eq!(entries(&ssp)[1..], expected);
+    let ssd = entry(&ssp, "SystemStructure.ssd");
     assert_eq!(ssd.matches(r#"source="resources/plant.fmu""#).count(), 2, "{ssd}");
 
     let osp = folder.path().join("osp");
@@ -312,7 +309,7 @@ fn different_fmus_with_the_same_file_name_are_named() {
 }
 
 #[test]
-fn enumerations_and_strings_are_passed_on() {
+fn enumerations_and_strings_are_written() {
     let folder = tempfile::tempdir().unwrap();
     let mut system = system(folder.path());
     system.connections.push(("plant.gear_now", "law.gear"));
@@ -320,13 +317,7 @@ fn enumerations_and_strings_are_passed_on() {
     let checked = system.check().unwrap();
     let (ssp, osp) = (folder.path().join("loop.ssp"), folder.path().join("osp"));
     checked.write_ssp(&ssp).unwrap();
-    let mut zip = ZipArchive::new(fs::File::open(&ssp).unwrap()).unwrap();
-    let mut read = |name: &str| {
-        let mut text = String::new();
-        zip.by_name(name).unwrap().read_to_string(&mut text).unwrap();
-        text
-    };
-    let (ssd, ssv) = (read("SystemStructure.ssd"), read("resources/plant.ssv"));
+    let (ssd, ssv) = (entry(&ssp, "SystemStructure.ssd"), entry(&ssp, "resources/plant.ssv"));
     assert_eq!(ssd.matches(r#"<ssc:Enumeration name="Gear"/>"#).count(), 2, "{ssd}");
     assert_eq!(ssd.matches(r#"<ssc:Enumeration name="Gear">"#).count(), 1, "{ssd}");
     assert!(ssd.contains(r#"<ssc:Item name="Drive" value="3"/>"#) && !ssd.contains("Other"), "{ssd}");

@@ -99,7 +99,6 @@ impl InputDerivatives for Controller {
 impl OutputDerivatives for Controller {
     fn output_derivative(&self, of: Name, order: u32) -> f64 {
         let slopes = &self.slopes;
-        let [motor1, motor2] = self.motion();
         match (of, order) {
             (Name::pitch_ref, 1) => slopes.reference[0],
             (Name::roll_ref, 1) => slopes.reference[1],
@@ -109,10 +108,7 @@ impl OutputDerivatives for Controller {
             (Name::roll_rate, 1) => slopes.rate[1],
             (Name::tau1, 1) => slopes.torque[0],
             (Name::tau2, 1) => slopes.torque[1],
-            (Name::theta1, 1) => motor1.rate,
-            (Name::theta2, 1) => motor2.rate,
-            (Name::omega1, 1) => motor1.acceleration,
-            (Name::omega2, 1) => motor2.acceleration,
+            (_, 1) => self.partial_by_time(of).unwrap_or_default(),
             _ => 0.0,
         }
     }

@@ -4,6 +4,31 @@
 //! The inverse of eq. (1) gives a feed-forward, and a PI control of measured pitch and roll corrects it.
 //! Rate, acceleration and torque of the motors are limited. The table of [`variables`] and `fmu.rs` make the
 //! FMU; the other modules do not depend on FMI.
+//!
+//! ```
+//! use prw_controller::controller::Inputs;
+//! use prw_controller::wrist::Kinematics;
+//! use prw_controller::{Controller, Parameters};
+//!
+//! let mut controller = Controller::new(Parameters { Kp: 0.2, ..Parameters::DEFAULT })?;
+//! // A rigid wrist: pitch and roll follow from the motors at once.
+//! let wrist = Kinematics::new(4, 7);
+//! for sample in 0..2000 {
+//!     let motors = controller.motion();
+//!     controller.inputs = Inputs {
+//!         reference: [0.5, 1.0], // pitch and roll, rad
+//!         angle: wrist.wrist(motors.map(|motor| motor.angle)),
+//!         rate: wrist.wrist(motors.map(|motor| motor.rate)),
+//!         torque: [0.0; 2],
+//!     };
+//!     assert!(controller.step(f64::from(sample) * 1e-3, 1e-3));
+//! }
+//! let motors = controller.motion();
+//! let [pitch, roll] = wrist.wrist(motors.map(|motor| motor.angle));
+//! assert!((pitch - 0.5).abs() < 1e-9 && (roll - 1.0).abs() < 1e-9);
+//! assert!(motors.iter().all(|motor| motor.rate.abs() < 1e-9));
+//! # Ok::<(), prw_controller::parameters::InvalidParameter>(())
+//! ```
 
 pub mod controller;
 mod fmu;

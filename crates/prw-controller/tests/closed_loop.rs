@@ -3,8 +3,8 @@
 use std::process::Command;
 
 #[test]
-fn numbers_that_are_none_are_rejected() {
-    let folder = std::env::temp_dir().join(format!("prw-closed-loop-{}", std::process::id()));
+fn invalid_numbers_are_rejected() {
+    let directory = std::env::temp_dir().join(format!("prw-closed-loop-{}", std::process::id()));
     for (arguments, message) in [
         (&["--go-to", "nan", "60"][..], "--go-to must have finite numbers, not NaN"),
         (&["--go-to", "30", "inf"], "--go-to must have finite numbers, not inf"),
@@ -12,9 +12,9 @@ fn numbers_that_are_none_are_rejected() {
         (&["--step-size", "0"], "--step-size must be > 0, it is 0"),
     ] {
         let program = env!("CARGO_BIN_EXE_build_closed_loop");
-        let output = Command::new(program).args(arguments).arg("--out").arg(&folder).output().unwrap();
+        let output = Command::new(program).args(arguments).arg("--out").arg(&directory).output().unwrap();
         assert!(!output.status.success());
         assert_eq!(String::from_utf8_lossy(&output.stderr), format!("error: {message}\n"));
     }
-    assert!(!folder.exists());
+    assert!(!directory.exists());
 }

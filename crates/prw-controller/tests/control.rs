@@ -1,4 +1,4 @@
-//! The control law, with a rigid wrist, a jammed wrist, or no wrist.
+//! The control law, with sensors that have an offset or are stuck, with a blocked wrist, or without a wrist.
 
 use proptest::prelude::*;
 use prw_controller::controller::{Controller, Inputs};
@@ -40,21 +40,9 @@ fn rigid(reference: PitchRoll) -> impl Fn(f64, [Motor; 2]) -> Inputs {
     }
 }
 
-#[test]
-fn a_rigid_wrist_gets_where_it_shall() {
-    let reference = radians([30.0, 60.0]);
-    let mut c = controller(|_| ());
-    let motions = run(&mut c, 2.0, rigid(reference));
-    let [one, two] = *motions.last().unwrap();
-    // theta1 = pitch + M/N roll, theta2 = pitch - M/N roll.
-    assert!((one.angle - reference[0] - 4.0 / 7.0 * reference[1]).abs() < 1e-9, "{one:?}");
-    assert!((two.angle - reference[0] + 4.0 / 7.0 * reference[1]).abs() < 1e-9, "{two:?}");
-    assert!(one.rate.abs() + two.rate.abs() < 1e-9);
-}
-
 /// Checks a sensor with an offset of 2 degrees, which feed-forward without integral would not remove.
 #[test]
-fn the_integral_removes_what_the_feed_forward_leaves() {
+fn the_integral_removes_a_constant_error() {
     let reference = radians([10.0, -20.0]);
     let offset = radians([2.0, -2.0]);
     let wrist = rigid(reference);
@@ -65,15 +53,15 @@ fn the_integral_removes_what_the_feed_forward_leaves() {
     };
     let mut c = controller(|_| ());
     let motions = run(&mut c, 6.0, measured);
-    let seen = measured(0.0, *motions.last().unwrap()).angle;
+    let angle = measured(0.0, *motions.last().unwrap()).angle;
     for axis in 0..2 {
-        assert!((seen[axis] - reference[axis]).to_degrees().abs() < 1e-3, "{seen:?}");
+        assert!((angle[axis] - reference[axis]).to_degrees().abs() < 1e-3, "{angle:?}");
     }
 }
 
 /// Checks constant measurements: the correction reaches its limit, and the motors stop.
 #[test]
-fn stuck_sensors_leave_everything_bounded() {
+fn stuck_sensors_keep_motors_and_correction_bounded() {
     let reference = radians([30.0, 60.0]);
     let mut c = controller(|_| ());
     let motions = run(&mut c, 10.0, |_, _| Inputs { reference, ..Inputs::default() });
@@ -88,16 +76,16 @@ fn stuck_sensors_leave_everything_bounded() {
 /// Checks a blocked wrist. The couplings (32 N.m/rad, as the controller assumes) take the whole twist, and
 /// the torque never exceeds the limit. After the release there is no error to correct.
 #[test]
-fn motors_back_off_from_a_jammed_wrist() {
+fn motors_back_off_from_a_blocked_wrist() {
     let reference = radians([120.0, 0.0]);
     let p = Parameters::DEFAULT;
-    let jammed = |_, motors: [Motor; 2]| Inputs {
+    let blocked = |_, motors: [Motor; 2]| Inputs {
         reference,
         torque: motors.map(|motor| -p.stiffness * motor.angle),
         ..Inputs::default()
     };
     let mut c = controller(|_| ());
-    let motions = run(&mut c, 3.0, jammed);
+    let motions = run(&mut c, 3.0, blocked);
     for motor in motions.iter().flatten() {
         assert!(p.stiffness * motor.angle <= p.max_torque * (1.0 + 1e-9), "{motor:?}");
     }
@@ -113,7 +101,7 @@ fn motors_back_off_from_a_jammed_wrist() {
 
 /// Checks that torque above the limit, from any source, drives the motor back.
 #[test]
-fn torque_beyond_the_limit_turns_the_motor_round() {
+fn torque_beyond_the_limit_reverses_the_motor() {
     let mut c = controller(|_| ());
     let pushed = |_, _| Inputs { reference: [1.0, 0.0], torque: [-12.0, -12.0], ..Inputs::default() };
     for motor in run(&mut c, 0.5, pushed).iter().flatten() {
@@ -164,7 +152,7 @@ fn input_slopes_reach_the_samples_inside_a_step() {
 }
 
 #[test]
-fn a_new_sample_time_holds_from_the_next_sample_on() {
+fn a_new_sample_time_applies_from_the_next_sample_on() {
     let mut c = controller(|_| ());
     assert!(c.step(0.0, 0.0025));
     c.parameters.sample_time = 0.01;
@@ -177,7 +165,7 @@ fn a_new_sample_time_holds_from_the_next_sample_on() {
 }
 
 #[test]
-fn parameters_that_make_no_controller_are_rejected() {
+fn invalid_parameters_are_rejected() {
     let with = |change: fn(&mut Parameters)| {
         let mut p = Parameters::DEFAULT;
         change(&mut p);
@@ -208,7 +196,7 @@ fn any_input() -> impl Strategy<Value = f64> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
 
-    /// Whatever the inputs and steps: within the limits, finite, and omega is the derivative of theta.
+    /// Checks limits and finite values for any inputs and steps, and that omega is the derivative of theta.
     #[test]
     fn limits_hold_and_rates_are_derivatives(
         inputs in prop::collection::vec(prop::array::uniform8(any_input()), 1..20),

@@ -96,7 +96,7 @@ fn without_event_mode() {
 /// Checks steps of one sample, which end at an event, and long steps, which end early.
 #[test]
 fn in_event_mode() {
-    for (early_return_allowed, samples_a_step) in [(fmi3False, 1), (fmi3True, 1), (fmi3True, 1000)] {
+    for (early_return_allowed, samples_per_step) in [(fmi3False, 1), (fmi3True, 1), (fmi3True, 1000)] {
         let fmu = with(fmi3True, early_return_allowed);
         for (sample, expected) in (0..).zip(steps_of_fmi2()) {
             let (time, next) = (time_of(sample), time_of(sample + 1));
@@ -106,10 +106,10 @@ fn in_event_mode() {
             let stepped = Stepped {
                 event_handling_needed: true,
                 terminate: false,
-                early_return: samples_a_step > 1,
+                early_return: samples_per_step > 1,
                 last_successful_time: next,
             };
-            assert_eq!(fmu.do_step(time, time_of(sample + samples_a_step) - time), Ok(stepped));
+            assert_eq!(fmu.do_step(time, time_of(sample + samples_per_step) - time), Ok(stepped));
             assert_eq!(bits(fmu.get(OUTPUTS)), bits(expected), "at {next}");
             fmu.ok(fmu.fmi3EnterEventMode());
         }
@@ -151,7 +151,7 @@ fn too_many_samples_within_a_step() {
 
 /// Checks that the next step handles an event at the end of a step if the importer does not.
 #[test]
-fn an_event_that_nobody_handles() {
+fn an_event_that_the_importer_does_not_handle() {
     let (fmu, unaware) = (with(fmi3True, fmi3False), with(fmi3False, fmi3False));
     fmu.set(&INPUTS, &inputs(START));
     fmu.ok(fmu.fmi3EnterStepMode());
@@ -203,7 +203,7 @@ fn too_many_samples_at_once() {
 /// Checks partial derivatives with respect to time, which FMI 3.0 counts among the knowns, against
 /// differences. Between samples, the motion of the motors is a function of time.
 #[test]
-fn partial_derivatives_by_the_time() {
+fn partial_derivatives_with_respect_to_time() {
     const WIDTH: f64 = 1.0 / 65_536.0;
     let fmu = fmu_test_kit::fmi3::Importer::of::<Controller>(ModelExchange);
     fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
@@ -233,5 +233,5 @@ fn partial_derivatives_by_the_time() {
         }
         fmu.ok(fmu.fmi3EnterEventMode());
     }
-    assert_eq!(moves, [true, true, true, true, false, false], "corrections are held");
+    assert_eq!(moves, [true, true, true, true, false, false], "corrections are constant");
 }

@@ -77,8 +77,8 @@ class _Model:
 
     def __init__(self, loaded: _Loaded):
         self._loaded = loaded
-        #: dict[str, Variable]: the variables by name, in the order of the model description. Of an array of FMI 3.0
-        #: each element is one, as in FMI 2.0: T[3]. Clocks are left out.
+        #: dict[str, Variable]: the variables by name, in the order of the model description. Each element
+        #: of an array of FMI 3.0 is a variable, as in FMI 2.0: T[3]. Clocks are omitted.
         self.variables = {fields[0]: Variable(*fields) for fields in loaded.variables()}
 
     def __enter__(self) -> Self:
@@ -252,8 +252,8 @@ class _Model:
         FmuError
             If the FMU has no such interface type, or rejects all instances.
         """
-        asked, threads = _count("count", count) or 1, _count("threads", threads)
-        return Instances(self._loaded, asked, interface, dict(start or {}), start_time, stop_time, threads)
+        instances, threads = _count("count", count) or 1, _count("threads", threads)
+        return Instances(self._loaded, instances, interface, dict(start or {}), start_time, stop_time, threads)
 
 
 class Fmu(_Model):
@@ -328,9 +328,9 @@ class System(_Model):
     ):
         if isinstance(source, Mapping):
             given = connections.items() if isinstance(connections, Mapping) else connections or ()
-            wires = [(output, to) for output, ends in given for to in ([ends] if isinstance(ends, str) else ends)]
+            pairs = [(output, to) for output, ends in given for to in ([ends] if isinstance(ends, str) else ends)]
             fmus = [(name, (fmu if isinstance(fmu, Fmu) else Fmu(fmu))._loaded) for name, fmu in source.items()]
-            super().__init__(_Loaded.wired("system", fmus, wires, order))
+            super().__init__(_Loaded.connected("system", fmus, pairs, order))
         elif connections is not None:
             raise ValueError("an SSP has its own connections; give connections with FMUs only")
         else:
@@ -359,10 +359,12 @@ def _array(name: str, values: ArrayLike) -> _Array:
     try:
         array = np.asarray(values)
     except ValueError as error:
-        raise ValueError(f"{name}: these are no numbers ({error})") from None
+        raise ValueError(f"{name}: the values are no numbers ({error})") from None
     # numpy converts None to NaN, and strings to numbers.
     if array.dtype.kind not in "biuf":
-        raise ValueError(f"{name}: {values!r} is no number" if array.ndim == 0 else f"{name}: these are no numbers")
+        raise ValueError(
+            f"{name}: {values!r} is no number" if array.ndim == 0 else f"{name}: the values are no numbers"
+        )
     return np.ascontiguousarray(array, dtype=np.float64).reshape(array.shape)
 
 

@@ -192,12 +192,12 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         terminated[list(errors)] = True
         truncated = self.steps >= self.task.length
         if self._mode is AutoresetMode.NEXT_STEP and renew.any():
-            errors = {place: why for place, why in errors.items() if not renew[place]}
+            errors = {index: why for index, why in errors.items() if not renew[index]}
             rewards[renew], terminated[renew], truncated[renew] = 0.0, False, False
             self._begin(renew, after)
         infos: _Info = {}
-        for place, why in errors.items():
-            self._add_info(infos, {"error": why}, place)
+        for index, why in errors.items():
+            self._add_info(infos, {"error": why}, index)
         self._observation, self._over = after, terminated | truncated
         if self._mode is AutoresetMode.SAME_STEP and self._over.any():
             over, final = self._over.copy(), np.full(self.num_envs, None, dtype=object)
@@ -229,8 +229,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         if not failed.any():
             return after, {}
         after[failed], why = before[failed], self._instances.errors
-        places = np.flatnonzero(failed).tolist()
-        return after, {place: why.get(place, "an observation is no finite number") for place in places}
+        indices = np.flatnonzero(failed).tolist()
+        return after, {index: why.get(index, "an observation is no finite number") for index in indices}
 
     def _begin(self, which: _Bools, observation: _Array) -> None:
         """New episodes for some instances, and their observations."""
@@ -244,10 +244,10 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         except fmu_run.FmuError:
             if not self._instances.errors:
                 raise
-        for place, why in self._instances.errors.items():
-            if which[place]:
-                drawn = ", ".join(f"{name} = {values[place]:g}" for name, values in self._drawn.items())
-                raise fmu_run.FmuError(f"instance {place} cannot begin an episode with {drawn or 'its start'}: {why}")
+        for index, why in self._instances.errors.items():
+            if which[index]:
+                drawn = ", ".join(f"{name} = {values[index]:g}" for name, values in self._drawn.items())
+                raise fmu_run.FmuError(f"instance {index} cannot begin an episode with {drawn or 'its start'}: {why}")
         observation[which] = self._instances.get(self._observed)[which]
         self.steps[which], self._over[which] = 0, False
 
@@ -281,8 +281,8 @@ class Env(gymnasium.Env[_Array, _Array]):
     def step(self, action: ArrayLike) -> tuple[_Array, SupportsFloat, bool, bool, _Info]:
         """Take a step; `info["error"]` contains the message if the FMU rejects it."""
         observation, reward, terminated, truncated, info = self._one.step(np.asarray(action)[None])
-        said = {name: values[0] for name, values in info.items() if not name.startswith("_")}
-        return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), said
+        details = {name: values[0] for name, values in info.items() if not name.startswith("_")}
+        return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), details
 
     def close(self) -> None:
         """Free the instance, and the FMU if it was opened here."""

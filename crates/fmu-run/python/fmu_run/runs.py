@@ -49,13 +49,13 @@ class Runs(Mapping[str, _Array]):
         start: Mapping[str, float | str | _Array],
     ):
         self.time, self._errors, self.notes = time, errors, notes
-        self._told, self._checked = not errors, set[str | tuple[str, str]]()
+        self._reported, self._checked = not errors, set[str | tuple[str, str]]()
         runs = trajectories.shape[0]
         self.start = {
             name: value if isinstance(value, str) else np.broadcast_to(value, runs) for name, value in start.items()
         }
-        self._outputs = {name: place for place, name in enumerate(outputs)}
-        self._measures = {name: place for place, name in enumerate(measures)}
+        self._outputs = {name: index for index, name in enumerate(outputs)}
+        self._measures = {name: index for index, name in enumerate(measures)}
         self._trajectories, self._measured = trajectories, measured
 
     @property
@@ -67,7 +67,7 @@ class Runs(Mapping[str, _Array]):
     def errors(self) -> dict[int, str]:
         """Messages of the FMU, by index, on runs that it rejected or ended before the last time, with the time reached
         ("at 0.5 s: ...", "ended by the FMU at t = 0.5 s: ...")."""
-        self._told = True
+        self._reported = True
         return self._errors
 
     @property
@@ -88,21 +88,21 @@ class Runs(Mapping[str, _Array]):
     def __getitem__(self, key: str | tuple[str, str]) -> _Array:
         output, *measure = [key] if isinstance(key, str) else key
         if output not in self._outputs:
-            raise KeyError(f"no output {output!r} was asked for; there are {', '.join(self._outputs)}")
+            raise KeyError(f"no output {output!r} was requested; there are {', '.join(self._outputs)}")
         if not measure and not self._trajectories.shape[2]:
-            raise KeyError(f"{key}: no trajectories were kept; ask for them with every=1, or for [output, measure]")
+            raise KeyError(f"{key}: no trajectories were kept; request them with every=1, or read [output, measure]")
         if measure and measure[0] not in self._measures:
             known = ", ".join(self._measures) or "none"
-            raise KeyError(f"no measure {measure[0]!r} was asked for; there are {known}")
-        of_output = (self._measured if measure else self._trajectories)[:, self._outputs[output]]
-        found: _Array = of_output[:, self._measures[measure[0]]] if measure else of_output
+            raise KeyError(f"no measure {measure[0]!r} was requested; there are {known}")
+        values = (self._measured if measure else self._trajectories)[:, self._outputs[output]]
+        found: _Array = values[:, self._measures[measure[0]]] if measure else values
         self._announce(key, found)
         return found
 
     def _announce(self, key: str | tuple[str, str], values: _Array) -> None:
         """Warn about failed runs, unless the caller has read `errors`, and about other results with NaN."""
         lines = []
-        if not self._told:
+        if not self._reported:
             number, why = next(iter(self._errors.items()))
             count = "all" if len(self._errors) == self.count else f"{len(self._errors)} of {self.count}"
             lines.append(f"{count} runs failed, see Runs.errors; run {number}: {why}")
@@ -111,7 +111,7 @@ class Runs(Mapping[str, _Array]):
             bad[list(self._errors)] = False
             if bad.any():
                 lines.append(f"{key} is not a number in {bad.sum()} finished runs, run {bad.argmax()} among them")
-        self._told = True
+        self._reported = True
         self._checked.add(key)
         for line in lines:
             warnings.warn(line, RuntimeWarning, stacklevel=3)
@@ -137,8 +137,10 @@ class Runs(Mapping[str, _Array]):
         if len(self):
             index, repeat = pandas.MultiIndex.from_product([runs, self.time], names=["run", "time"]), len(self.time)
         by_run = {**self._starts(), **self._by_name()}
-        columns = {name: v if isinstance(v, str) else np.repeat(v, repeat) for name, v in by_run.items()}
-        return pandas.DataFrame({**columns, **{name: course.ravel() for name, course in self.items()}}, index=index)
+        columns = {
+            name: value if isinstance(value, str) else np.repeat(value, repeat) for name, value in by_run.items()
+        }
+        return pandas.DataFrame({**columns, **{name: series.ravel() for name, series in self.items()}}, index=index)
 
     def to_xarray(self) -> xarray.Dataset:
         """Return outputs over the dimensions run and time, measures as `roll_peak` over run, start values as coordinates of run. A
@@ -148,7 +150,7 @@ class Runs(Mapping[str, _Array]):
         measures = {name: ("run", values) for name, values in self._by_name().items()}
         times = {"time": self.time} if len(self) else {}
         dataset: xarray.Dataset = needed.Dataset(
-            {**{name: (("run", "time"), course) for name, course in self.items()}, **measures},
+            {**{name: (("run", "time"), series) for name, series in self.items()}, **measures},
             {"run": np.arange(self.count), **times, **starts},
         )
         return dataset

@@ -29,7 +29,7 @@ impl Numbers {
         // NumPy would convert None to NaN and strings to numbers.
         if !"biuf".contains(&array.getattr("dtype")?.getattr("kind")?.extract::<String>()?) {
             return Err(PyValueError::new_err(format!(
-                "{} is no number, nor an array of such",
+                "{} is no number and no array of numbers",
                 values.repr()?
             )));
         }
@@ -62,16 +62,16 @@ fn read(buffer: &PyBuffer<f64>) -> &[f64] {
     match buffer.item_count() {
         0 => &[],
         // SAFETY: PyO3 has checked type, alignment and size. The memory is contiguous (`Numbers::of`) and
-        // stays valid while the buffer is held.
+        // stays valid while the buffer exists.
         #[allow(unsafe_code)]
         count => unsafe { std::slice::from_raw_parts(buffer.buf_ptr().cast(), count) },
     }
 }
 
 /// An output array.
-pub struct Room(PyBuffer<f64>);
+pub struct Output(PyBuffer<f64>);
 
-impl Room {
+impl Output {
     /// Creates a NumPy array of this shape, or checks the array that the caller passes.
     pub fn of<'py>(
         py: Python<'py>,
@@ -102,14 +102,14 @@ impl Room {
     pub fn apart_from(&self, read: &Numbers) -> PyResult<()> {
         let (own, other) = (self.0.buf_ptr().addr(), read.values().as_ptr_range());
         let apart = own + 8 * self.0.item_count() <= other.start.addr() || other.end.addr() <= own;
-        let why = "out shares memory with the values that are set";
-        if apart { Ok(()) } else { Err(PyValueError::new_err(why)) }
+        let message = "out shares memory with the values that are set";
+        if apart { Ok(()) } else { Err(PyValueError::new_err(message)) }
     }
 
     pub fn values(&mut self) -> &mut [f64] {
         match self.0.item_count() {
             0 => &mut [],
-            // SAFETY: the conditions of `read` hold, and `Room::of` has checked that the array is writable.
+            // SAFETY: the conditions of `read` hold, and `Output::of` has checked that the array is writable.
             #[allow(unsafe_code)]
             count => unsafe { std::slice::from_raw_parts_mut(self.0.buf_ptr().cast(), count) },
         }

@@ -1,6 +1,6 @@
 //! The class `fmu_run.Instances`.
 
-use crate::buffers::{Numbers, Room};
+use crate::buffers::{Numbers, Output};
 use crate::start::Start;
 use crate::{FmuError, python};
 use fmu_run::{Continuous, Error, Interface, Selection, Setup, System};
@@ -24,7 +24,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub struct Instances {
     system: System,
     count: usize,
-    held: Arc<Mutex<fmu_run::Instances>>,
+    instances: Arc<Mutex<fmu_run::Instances>>,
     /// Cache of looked-up names, by the objects that named them.
     known: Mutex<Vec<(Py<PyAny>, Arc<Named>)>>,
 }
@@ -39,14 +39,14 @@ struct Named {
 /// Saved states of instances; freed with this object.
 #[pyclass(frozen, module = "fmu_run")]
 pub struct States {
-    held: Arc<Mutex<fmu_run::Instances>>,
+    instances: Arc<Mutex<fmu_run::Instances>>,
     states: Option<Arc<fmu_run::States>>,
 }
 
 impl Drop for States {
     fn drop(&mut self) {
         if let Some(states) = self.states.take().and_then(Arc::into_inner) {
-            lock(&self.held).forget(states);
+            lock(&self.instances).forget(states);
         }
     }
 }
@@ -56,7 +56,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// Mask: a sequence of n Booleans, true for the selected instances.
-type Given<'py> = Option<Bound<'py, PyAny>>;
+type Optional<'py> = Option<Bound<'py, PyAny>>;
 
 #[pymethods]
 impl Instances {
@@ -84,7 +84,7 @@ impl Instances {
         let start = Start::of(&system, start.as_ref())?;
         let setup = Setup { interface, count, start: start.values(), start_time, stop_time, threads };
         let made = py.detach(|| system.instances(&setup)).map_err(python)?;
-        Ok(Self { system, count, held: Arc::new(Mutex::new(made)), known: Mutex::default() })
+        Ok(Self { system, count, instances: Arc::new(Mutex::new(made)), known: Mutex::default() })
     }
 
     fn __len__(&self) -> usize {
@@ -92,7 +92,7 @@ impl Instances {
     }
 
     fn __repr__(&self) -> String {
-        let failed = lock(&self.held).errors().count();
+        let failed = lock(&self.instances).errors().count();
         let failed = if failed == 0 { String::new() } else { format!(", {failed} dropped out") };
         format!("<Instances: {} of {}{failed}>", self.count, self.system.name())
     }
@@ -102,9 +102,10 @@ impl Instances {
     fn errors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let errors = PyDict::new(py);
         // Calls no Python code while the lock is held: dropping a States object takes the lock, too.
-        let found: Vec<_> = lock(&self.held).errors().map(|(place, why)| (place, why.to_owned())).collect();
-        for (place, why) in found {
-            errors.set_item(place, why)?;
+        let found: Vec<_> =
+            lock(&self.instances).errors().map(|(index, why)| (index, why.to_owned())).collect();
+        for (index, why) in found {
+            errors.set_item(index, why)?;
         }
         Ok(errors)
     }
@@ -112,27 +113,27 @@ impl Instances {
     /// (n,): the time of each instance, s.
     #[getter]
     fn time<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let (array, mut room) = Room::of(py, None, &[self.count])?;
-        room.values().iter_mut().zip(lock(&self.held).times()).for_each(|(to, time)| *to = time);
+        let (array, mut output) = Output::of(py, None, &[self.count])?;
+        output.values().iter_mut().zip(lock(&self.instances).times()).for_each(|(to, time)| *to = time);
         Ok(array)
     }
 
     /// (n,): the time of the next event of each instance, s; NaN if there is none.
     #[getter]
     fn next_event_time<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.of_events(py, |event| event.next.unwrap_or(f64::NAN))
+        self.event_values(py, |event| event.next.unwrap_or(f64::NAN))
     }
 
     /// (n,): 1 if the last event of the instance has changed continuous states, else 0.
     #[getter]
     fn states_changed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.of_events(py, |event| f64::from(u8::from(event.states_changed)))
+        self.event_values(py, |event| f64::from(u8::from(event.states_changed)))
     }
 
     /// (n,): 1 if the instance requests the end of the simulation, else 0.
     #[getter]
     fn wants_to_end<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.of_events(py, |event| f64::from(u8::from(event.terminate)))
+        self.event_values(py, |event| f64::from(u8::from(event.terminate)))
     }
 
     /// Set variables: a number or a row for all instances, or an array with a row for each.
@@ -149,7 +150,7 @@ impl Instances {
         py: Python,
         variables: &Bound<'_, PyAny>,
         values: &Bound<'_, PyAny>,
-        mask: Given,
+        mask: Optional,
     ) -> PyResult<()> {
         self.put(py, variables, values, mask, fmu_run::Instances::set)
     }
@@ -160,7 +161,7 @@ impl Instances {
         &self,
         py: Python<'py>,
         variables: &Bound<'py, PyAny>,
-        out: Given<'py>,
+        out: Optional<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let named = self.named(variables)?;
         self.read(py, named.columns(), out, |all, values| {
@@ -172,17 +173,12 @@ impl Instances {
     /// list[str | None]: the value of a string variable in each instance; None for an instance that has
     /// dropped out.
     fn texts(&self, py: Python, variable: &str) -> PyResult<Vec<Option<String>>> {
-        let mut texts = Vec::new();
-        self.attempt(py, |all| {
-            texts = all.texts(variable)?;
-            Ok(())
-        })?;
-        Ok(texts)
+        self.attempt(py, |all| all.texts(variable))
     }
 
     /// Perform a step of Co-Simulation: by `size`, or to the time `to`, s.
     #[pyo3(signature = (size=None, *, to=None, mask=None))]
-    fn step(&self, py: Python, size: Option<f64>, to: Option<f64>, mask: Given) -> PyResult<()> {
+    fn step(&self, py: Python, size: Option<f64>, to: Option<f64>, mask: Optional) -> PyResult<()> {
         self.only(Interface::CoSimulation)?;
         let mask = self.mask(mask)?;
         match (size, to) {
@@ -201,15 +197,15 @@ impl Instances {
         values: &Bound<'py, PyAny>,
         size: f64,
         get: &Bound<'py, PyAny>,
-        out: Given<'py>,
+        out: Optional<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
         self.only(Interface::CoSimulation)?;
         let (set, get) = (self.named(set)?, self.named(get)?);
         let values = self.fitting(set.columns(), Numbers::of(values)?)?;
-        let (array, mut room) = Room::of(py, out, &self.shape(get.columns()))?;
-        room.apart_from(&values)?;
+        let (array, mut output) = Output::of(py, out, &self.shape(get.columns()))?;
+        output.apart_from(&values)?;
         self.attempt(py, |all| {
-            all.advance((&set.selection, values.values()), size, (&get.selection, room.values()))
+            all.advance((&set.selection, values.values()), size, (&get.selection, output.values()))
         })?;
         Ok(array)
     }
@@ -223,7 +219,7 @@ impl Instances {
     /// start : dict, optional
     ///     Start values by name that replace earlier ones: numbers, (n,), or strings.
     #[pyo3(signature = (mask=None, *, start=None))]
-    fn reset(&self, py: Python, mask: Given, start: Option<Bound<'_, PyDict>>) -> PyResult<()> {
+    fn reset(&self, py: Python, mask: Optional, start: Option<Bound<'_, PyDict>>) -> PyResult<()> {
         let (mask, start) = (self.mask(mask)?, Start::of(&self.system, start.as_ref())?);
         self.revive(py, |all| {
             all.start_from(&start.values())?;
@@ -234,17 +230,13 @@ impl Instances {
 
     /// Save the state and the time of each instance.
     fn save(&self, py: Python) -> PyResult<States> {
-        let mut states = None;
-        self.attempt(py, |all| {
-            states = Some(all.save()?);
-            Ok(())
-        })?;
-        Ok(States { held: Arc::clone(&self.held), states: states.map(Arc::new) })
+        let states = self.attempt(py, fmu_run::Instances::save)?;
+        Ok(States { instances: Arc::clone(&self.instances), states: Some(Arc::new(states)) })
     }
 
     /// Restore states that these instances have saved.
     #[pyo3(signature = (states, mask=None))]
-    fn restore(&self, py: Python, states: &States, mask: Given) -> PyResult<()> {
+    fn restore(&self, py: Python, states: &States, mask: Optional) -> PyResult<()> {
         let (mask, states) = (self.mask(mask)?, self.own(states)?);
         self.revive(py, |all| {
             all.restore(&states, mask.as_deref());
@@ -256,19 +248,15 @@ impl Instances {
     /// without a state.
     fn serialize<'py>(&self, py: Python<'py>, states: &States) -> PyResult<Vec<Option<Bound<'py, PyBytes>>>> {
         let states = self.own(states)?;
-        let mut found = Vec::new();
-        self.attempt(py, |all| {
-            found = all.serialize(&states)?;
-            Ok(())
-        })?;
+        let found = self.attempt(py, |all| all.serialize(&states))?;
         Ok(found.into_iter().map(|bytes| bytes.map(|bytes| PyBytes::new(py, &bytes))).collect())
     }
 
     /// Read states from the bytes that `serialize` returned, here or in another process: one or None for each
     /// instance.
     fn deserialize(&self, py: Python, states: Vec<Option<PyBackedBytes>>) -> PyResult<States> {
-        let read = py.detach(|| lock(&self.held).deserialize(&states)).map_err(python)?;
-        Ok(States { held: Arc::clone(&self.held), states: Some(Arc::new(read)) })
+        let read = py.detach(|| lock(&self.instances).deserialize(&states)).map_err(python)?;
+        Ok(States { instances: Arc::clone(&self.instances), states: Some(Arc::new(read)) })
     }
 
     /// Compute directional derivatives of unknowns for a seed.
@@ -289,15 +277,15 @@ impl Instances {
         unknowns: &Bound<'py, PyAny>,
         knowns: &Bound<'py, PyAny>,
         seed: &Bound<'py, PyAny>,
-        out: Given<'py>,
+        out: Optional<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (unknowns, knowns) = (self.named(unknowns)?, self.named(knowns)?);
         let seed = self.fitting(knowns.columns(), Numbers::of(seed)?)?;
-        let (array, mut room) = Room::of(py, out, &self.shape(unknowns.columns()))?;
-        room.apart_from(&seed)?;
+        let (array, mut output) = Output::of(py, out, &self.shape(unknowns.columns()))?;
+        output.apart_from(&seed)?;
         self.attempt(py, |all| {
             let seed = (&knowns.selection, seed.values());
-            all.directional_derivative(&unknowns.selection, seed, room.values())
+            all.directional_derivative(&unknowns.selection, seed, output.values())
         })?;
         Ok(array)
     }
@@ -309,7 +297,7 @@ impl Instances {
         py: Python,
         variables: &Bound<'_, PyAny>,
         values: &Bound<'_, PyAny>,
-        mask: Given,
+        mask: Optional,
     ) -> PyResult<()> {
         self.only(Interface::CoSimulation)?;
         self.put(py, variables, values, mask, fmu_run::Instances::set_input_derivatives)
@@ -321,7 +309,7 @@ impl Instances {
         &self,
         py: Python<'py>,
         variables: &Bound<'py, PyAny>,
-        out: Given<'py>,
+        out: Optional<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
         self.only(Interface::CoSimulation)?;
         let named = self.named(variables)?;
@@ -332,7 +320,7 @@ impl Instances {
 
     /// Model Exchange: set the time, s: a number for all instances or (n,).
     #[pyo3(signature = (time, mask=None))]
-    fn set_time(&self, py: Python, time: &Bound<'_, PyAny>, mask: Given) -> PyResult<()> {
+    fn set_time(&self, py: Python, time: &Bound<'_, PyAny>, mask: Optional) -> PyResult<()> {
         self.only(Interface::ModelExchange)?;
         let (mask, time) = (self.mask(mask)?, self.fitting(None, Numbers::of(time)?)?);
         self.attempt(py, |all| all.set_time(time.values(), mask.as_deref()))
@@ -340,9 +328,9 @@ impl Instances {
 
     /// Model Exchange: set the continuous states, (states,) for all instances or (n, states).
     #[pyo3(signature = (states, mask=None))]
-    fn set_continuous_states(&self, py: Python, states: &Bound<'_, PyAny>, mask: Given) -> PyResult<()> {
+    fn set_continuous_states(&self, py: Python, states: &Bound<'_, PyAny>, mask: Optional) -> PyResult<()> {
         self.only(Interface::ModelExchange)?;
-        let columns = Some(lock(&self.held).continuous(Continuous::States));
+        let columns = Some(lock(&self.instances).continuous(Continuous::States));
         let (mask, states) = (self.mask(mask)?, self.fitting(columns, Numbers::of(states)?)?);
         self.attempt(py, |all| {
             all.set_continuous_states(states.values(), mask.as_deref());
@@ -352,25 +340,25 @@ impl Instances {
 
     /// Model Exchange: read the continuous states, (n, states).
     #[pyo3(signature = (out=None))]
-    fn get_continuous_states<'py>(&self, py: Python<'py>, out: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn get_continuous_states<'py>(&self, py: Python<'py>, out: Optional<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.continuous(py, Continuous::States, out)
     }
 
     /// Model Exchange: read the derivatives of the continuous states, (n, states).
     #[pyo3(signature = (out=None))]
-    fn get_derivatives<'py>(&self, py: Python<'py>, out: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn get_derivatives<'py>(&self, py: Python<'py>, out: Optional<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.continuous(py, Continuous::Derivatives, out)
     }
 
     /// Model Exchange: read the nominal values of the continuous states, (n, states).
     #[pyo3(signature = (out=None))]
-    fn get_nominals<'py>(&self, py: Python<'py>, out: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn get_nominals<'py>(&self, py: Python<'py>, out: Optional<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.continuous(py, Continuous::Nominals, out)
     }
 
     /// Model Exchange: read the event indicators, (n, indicators).
     #[pyo3(signature = (out=None))]
-    fn get_event_indicators<'py>(&self, py: Python<'py>, out: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn get_event_indicators<'py>(&self, py: Python<'py>, out: Optional<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.continuous(py, Continuous::EventIndicators, out)
     }
 
@@ -385,7 +373,13 @@ impl Instances {
     /// mask : (n,) of bool, optional
     ///     Selected instances; all by default.
     #[pyo3(signature = (variables=None, values=None, *, mask=None))]
-    fn handle_events(&self, py: Python, variables: Given, values: Given, mask: Given) -> PyResult<()> {
+    fn handle_events(
+        &self,
+        py: Python,
+        variables: Optional,
+        values: Optional,
+        mask: Optional,
+    ) -> PyResult<()> {
         self.only(Interface::ModelExchange)?;
         let mask = self.mask(mask)?;
         let (named, values) = match (&variables, &values) {
@@ -439,7 +433,7 @@ impl Instances {
         Ok(named)
     }
 
-    fn mask(&self, given: Given) -> PyResult<Option<Vec<bool>>> {
+    fn mask(&self, given: Optional) -> PyResult<Option<Vec<bool>>> {
         let Some(given) = given else { return Ok(None) };
         let mask: Vec<bool> = match given.call_method0("tolist") {
             Ok(list) => list.extract()?,
@@ -459,16 +453,16 @@ impl Instances {
 
     /// Checks the shape of values: one for all, a row for all, or a row for each instance.
     fn fitting(&self, columns: Option<usize>, values: Numbers) -> PyResult<Numbers> {
-        let (whole, length) = (self.shape(columns), columns.unwrap_or(1));
+        let (rows, length) = (self.shape(columns), columns.unwrap_or(1));
         match &values {
             Numbers::One(value) if length != 1 => Ok(Numbers::Row(vec![*value; length])),
             Numbers::One(_) => Ok(values),
-            _ if values.shape() == whole => Ok(values),
+            _ if values.shape() == rows => Ok(values),
             _ if columns.is_some() && values.shape() == [length] => Ok(values),
             _ => {
                 let row = columns.map_or(String::new(), |columns| format!(", [{columns}]"));
                 let why = format!(
-                    "the values have the shape {:?}; it must be {whole:?}{row} or a number",
+                    "the values have the shape {:?}; it must be {rows:?}{row} or a number",
                     values.shape()
                 );
                 Err(PyValueError::new_err(why))
@@ -478,13 +472,13 @@ impl Instances {
 
     /// Fails if the instances are for another interface type, before the FMU would reject the call.
     fn only(&self, wanted: Interface) -> PyResult<()> {
-        let why = match (wanted, lock(&self.held).interface()) {
+        let why = match (wanted, lock(&self.instances).interface()) {
             (wanted, interface) if wanted == interface => return Ok(()),
             (Interface::ModelExchange, _) => {
                 "these instances are for Co-Simulation; this is for Model Exchange: instances(interface=\"model-exchange\")"
             }
             _ => {
-                "these instances are for Model Exchange, which you integrate yourself; only Co-Simulation steps"
+                "these instances are for Model Exchange, which the caller integrates; only Co-Simulation has steps"
             }
         };
         Err(PyValueError::new_err(why))
@@ -492,21 +486,21 @@ impl Instances {
 
     /// Returns the states if they belong to these instances.
     fn own(&self, states: &States) -> PyResult<Arc<fmu_run::States>> {
-        let own = states.states.clone().filter(|_| Arc::ptr_eq(&self.held, &states.held));
+        let own = states.states.clone().filter(|_| Arc::ptr_eq(&self.instances, &states.instances));
         own.ok_or_else(|| {
             PyValueError::new_err(
-                "these states are of other instances; serialize them there and deserialize them here",
+                "these states belong to other instances; serialize them there and deserialize them here",
             )
         })
     }
 
     /// Runs a call without the GIL; raises FmuError if no instance is left before or after it.
-    fn attempt(
+    fn attempt<T: Send>(
         &self,
         py: Python,
-        body: impl FnOnce(&mut fmu_run::Instances) -> Result<(), Error> + Send,
-    ) -> PyResult<()> {
-        if let Some(why) = lock(&self.held).none_left() {
+        body: impl FnOnce(&mut fmu_run::Instances) -> Result<T, Error> + Send,
+    ) -> PyResult<T> {
+        if let Some(why) = lock(&self.instances).none_left() {
             let all = if self.count == 1 { "the instance has" } else { "all instances have" };
             let why = format!(
                 "{all} dropped out before; reset() or restore() brings them back (instance 0: {why})"
@@ -517,17 +511,18 @@ impl Instances {
     }
 
     /// Runs a call that may make instances usable again.
-    fn revive(
+    fn revive<T: Send>(
         &self,
         py: Python,
-        body: impl FnOnce(&mut fmu_run::Instances) -> Result<(), Error> + Send,
-    ) -> PyResult<()> {
-        let left = py.detach(|| {
-            let mut all = lock(&self.held);
-            body(&mut all)?;
-            Ok(all.none_left().map(str::to_owned))
+        body: impl FnOnce(&mut fmu_run::Instances) -> Result<T, Error> + Send,
+    ) -> PyResult<T> {
+        let called = py.detach(|| {
+            let mut all = lock(&self.instances);
+            let result = body(&mut all)?;
+            Ok((result, all.none_left().map(str::to_owned)))
         });
-        left.map_err(python)?.map_or(Ok(()), |why| Err(FmuError::new_err(why)))
+        let (result, none_left) = called.map_err(python)?;
+        none_left.map_or(Ok(result), |why| Err(FmuError::new_err(why)))
     }
 
     /// Sets values of variables: a row for each instance or one for all.
@@ -536,7 +531,7 @@ impl Instances {
         py: Python,
         variables: &Bound<'_, PyAny>,
         values: &Bound<'_, PyAny>,
-        mask: Given,
+        mask: Optional,
         body: fn(&mut fmu_run::Instances, &Selection, &[f64], fmu_run::Mask) -> Result<(), Error>,
     ) -> PyResult<()> {
         let (named, mask) = (self.named(variables)?, self.mask(mask)?);
@@ -548,11 +543,11 @@ impl Instances {
         &self,
         py: Python<'py>,
         columns: Option<usize>,
-        out: Given<'py>,
+        out: Optional<'py>,
         body: impl FnOnce(&mut fmu_run::Instances, &mut [f64]) -> Result<(), Error> + Send,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (array, mut room) = Room::of(py, out, &self.shape(columns))?;
-        self.attempt(py, |all| body(all, room.values()))?;
+        let (array, mut output) = Output::of(py, out, &self.shape(columns))?;
+        self.attempt(py, |all| body(all, output.values()))?;
         Ok(array)
     }
 
@@ -560,23 +555,27 @@ impl Instances {
         &self,
         py: Python<'py>,
         what: Continuous,
-        out: Given<'py>,
+        out: Optional<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
         self.only(Interface::ModelExchange)?;
-        let columns = lock(&self.held).continuous(what);
+        let columns = lock(&self.instances).continuous(what);
         self.read(py, Some(columns), out, |all, values| {
             all.get_continuous(what, values);
             Ok(())
         })
     }
 
-    fn of_events<'py>(
+    fn event_values<'py>(
         &self,
         py: Python<'py>,
         what: impl Fn(fmu_run::Event) -> f64,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (array, mut room) = Room::of(py, None, &[self.count])?;
-        room.values().iter_mut().zip(lock(&self.held).events()).for_each(|(to, event)| *to = what(event));
+        let (array, mut output) = Output::of(py, None, &[self.count])?;
+        output
+            .values()
+            .iter_mut()
+            .zip(lock(&self.instances).events())
+            .for_each(|(to, event)| *to = what(event));
         Ok(array)
     }
 }

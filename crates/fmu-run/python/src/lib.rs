@@ -5,8 +5,8 @@ mod buffers;
 mod instances;
 mod start;
 
-use buffers::{Numbers, Room};
-use fmu_run::{Batch, Error, Fmu, Order, Planned, System, Trajectory, Watch, Wiring};
+use buffers::{Numbers, Output};
+use fmu_run::{Batch, Composition, Error, Fmu, Order, Planned, System, Trajectory, Watch};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -19,10 +19,10 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-create_exception!(fmu_run, FmuError, PyException, "An FMU that cannot be loaded or run, or refuses a run.");
+create_exception!(fmu_run, FmuError, PyException, "An FMU that cannot be loaded or run, or rejects a run.");
 
 /// Interval for checks of Ctrl-C and reports of progress.
-const LOOK: Duration = Duration::from_millis(100);
+const INTERVAL: Duration = Duration::from_millis(100);
 
 /// An unpacked and loaded FMU or system, until it is closed.
 #[pyclass(frozen, module = "fmu_run._native")]
@@ -56,9 +56,9 @@ type Pairs = Vec<(String, String)>;
 /// Outputs and connected inputs, by stage.
 type Stages = Vec<Pairs>;
 /// Messages by run.
-type Told = Vec<(usize, String)>;
+type Messages = Vec<(usize, String)>;
 /// Trajectories and statistics, (runs, outputs, times or statistics) each, errors, notes and start values.
-type Result5<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Told, Told, Bound<'py, PyDict>);
+type Result5<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Messages, Messages, Bound<'py, PyDict>);
 
 fn python(error: Error) -> PyErr {
     match error {
@@ -93,7 +93,7 @@ impl Loaded {
 
     /// Connects FMUs: components by name, connections from outputs to inputs.
     #[staticmethod]
-    fn wired(
+    fn connected(
         name: &str,
         components: Vec<(String, PyRef<'_, Self>)>,
         connections: Vec<(String, String)>,
@@ -101,18 +101,18 @@ impl Loaded {
     ) -> PyResult<Self> {
         let fmus = components.iter().map(|(name, loaded)| match loaded.model()? {
             Model::Fmu(fmu) => Ok((name.as_str(), fmu)),
-            Model::System(_) => {
-                Err(PyValueError::new_err(format!("component {name} is a system; only FMUs are wired")))
-            }
+            Model::System(_) => Err(PyValueError::new_err(format!(
+                "component {name} is a system; only FMUs can be connected"
+            ))),
         });
         let fmus = fmus.collect::<PyResult<Vec<_>>>()?;
-        let wiring = Wiring {
+        let composition = Composition {
             name,
             components: fmus.iter().map(|(name, fmu)| (*name, fmu)).collect(),
             connections: connections.iter().map(|(from, to)| (from.as_str(), to.as_str())).collect(),
             order: order_of(order)?,
         };
-        let system = System::connect(&wiring).map_err(python)?;
+        let system = System::connect(&composition).map_err(python)?;
         Ok(Self(Mutex::new(Some(Model::System(system)))))
     }
 
@@ -212,10 +212,10 @@ impl Loaded {
         if size.trajectories().is_none() || size.measures().is_none() {
             return Err(python(Error::too_much()));
         }
-        let array = |each: usize| Room::of(py, None, &[size.runs, size.outputs, each]);
+        let array = |each: usize| Output::of(py, None, &[size.runs, size.outputs, each]);
         let ((trajectories, mut kept), (measures, mut measured)) = (array(size.kept)?, array(size.measures)?);
-        let room = [kept.values(), measured.values()];
-        let [errors, notes] = carry_out(py, &planned, room, progress.as_ref())?;
+        let results = [kept.values(), measured.values()];
+        let [errors, notes] = carry_out(py, &planned, results, progress.as_ref())?;
         Ok((trajectories, measures, errors, notes, start.dict(py)?))
     }
 }
@@ -257,29 +257,31 @@ fn carry_out(
     planned: &Planned,
     [trajectories, measures]: [&mut [f64]; 2],
     progress: Option<&Py<PyAny>>,
-) -> PyResult<[Told; 2]> {
+) -> PyResult<[Messages; 2]> {
     let watch = Watch::default();
     let (sender, receiver) = channel();
     // `Receiver` is not `Sync`, so `detach` needs a mutex around it.
     let receiver = Mutex::new(receiver);
     std::thread::scope(|scope| {
-        scope.spawn(|| sender.send(planned.run(&watch, trajectories, measures)));
+        let watch = &watch;
+        // A panic drops the sender, which ends the loop.
+        scope.spawn(move || sender.send(planned.run(watch, trajectories, measures)));
         let mut raised = None;
         loop {
             let waited =
-                py.detach(|| receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK));
+                py.detach(|| receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(INTERVAL));
             match waited {
-                Ok(told) => return raised.map_or_else(|| told.map_err(python), Err),
+                Ok(result) => return raised.map_or_else(|| result.map_err(python), Err),
                 Err(RecvTimeoutError::Disconnected) => {
                     return Err(FmuError::new_err("the thread of the runs has panicked"));
                 }
                 Err(RecvTimeoutError::Timeout) => {}
             }
             if raised.is_none() {
-                let told = progress.map_or(Ok(()), |progress| {
+                let reported = progress.map_or(Ok(()), |progress| {
                     progress.call1(py, (watch.done(), planned.size().runs)).map(drop)
                 });
-                if let Err(error) = py.check_signals().and(told) {
+                if let Err(error) = py.check_signals().and(reported) {
                     watch.cancel();
                     raised = Some(error);
                 }

@@ -47,8 +47,27 @@ pub enum Trajectory<'a> {
     Constant(f64),
     /// A value for each time, equal in all runs.
     Shared(&'a [f64]),
-    /// A time series for each run, concatenated: runs times times.
+    /// A time series for each run, concatenated: runs times x times.
     EachRun(&'a [f64]),
+}
+
+impl Trajectory<'_> {
+    /// Returns the values of a run.
+    fn of_run(self, run: usize, times: usize) -> Self {
+        match self {
+            Self::EachRun(values) => Self::Shared(&values[run * times..][..times]),
+            other => other,
+        }
+    }
+
+    /// Returns the value at the time with this index, in the values of a run.
+    #[inline]
+    fn at(&self, time: usize) -> f64 {
+        match self {
+            Self::Constant(value) => *value,
+            Self::Shared(values) | Self::EachRun(values) => values[time],
+        }
+    }
 }
 
 /// Size of the results of a [`Batch`].

@@ -26,44 +26,7 @@ pub(super) struct Plan<'a> {
 #[derive(Default)]
 pub(super) struct Inputs<'a> {
     pub variables: Selection,
-    pub values: Vec<Values<'a>>,
-}
-
-/// Values by run and time.
-#[derive(Clone, Copy)]
-pub(super) struct Values<'a> {
-    values: &'a [f64],
-    constant: f64,
-    /// Increments of the index from one run to the next and from one time to the next; 0 if the values are
-    /// equal.
-    of_run: usize,
-    of_time: usize,
-}
-
-impl<'a> Values<'a> {
-    /// Returns the values of a run, by time.
-    pub fn of_run(&self, run: usize) -> ByTime<'a> {
-        let values = &self.values[(run * self.of_run).min(self.values.len())..];
-        match self.of_time {
-            0 => ByTime { values: &[], constant: values.first().copied().unwrap_or(self.constant) },
-            _ => ByTime { values, constant: self.constant },
-        }
-    }
-}
-
-/// Values of one run.
-#[derive(Clone, Copy)]
-pub(super) struct ByTime<'a> {
-    values: &'a [f64],
-    constant: f64,
-}
-
-impl ByTime<'_> {
-    /// Returns the value at the time with this index.
-    #[inline]
-    pub fn at(&self, time: usize) -> f64 {
-        self.values.get(time).copied().unwrap_or(self.constant)
-    }
+    pub values: Vec<Trajectory<'a>>,
 }
 
 impl<'a> Plan<'a> {
@@ -96,11 +59,11 @@ impl<'a> Plan<'a> {
     }
 
     fn find_inputs(&mut self, system: &System, batch: &'a Batch) -> Result<(), Error> {
-        let mut seen = Vec::new();
+        let mut names = Vec::new();
         for (name, trajectory) in &batch.inputs {
             let variables = system.find_numbers(name)?;
             variables.iter().try_for_each(|found| found.check_own(name))?;
-            let of = variables[0].of;
+            let of = variables[0].variable;
             if !of.is_settable() || of.variability.as_deref() == Some("fixed") {
                 return request(format!(
                     "{name} is no input but {} {}; give it a start value",
@@ -108,54 +71,43 @@ impl<'a> Plan<'a> {
                     of.causality
                 ));
             }
-            once(&mut seen, name, "inputs")?;
-            self.inputs.values.push(self.trajectory(name, of.base, *trajectory)?);
+            once(&mut names, name, "inputs")?;
+            self.inputs.values.push(self.checked(name, of.base, *trajectory)?);
             self.inputs.variables.push(name, &variables);
         }
-        let mut seen = Vec::new();
+        let mut names = Vec::new();
         for (name, trajectory) in &batch.input_derivatives {
             let variables = system.takes_input_derivative(name)?;
-            once(&mut seen, name, "input derivatives")?;
-            self.derivatives.values.push(self.trajectory(name, BaseType::Real, *trajectory)?);
+            once(&mut names, name, "input derivatives")?;
+            self.derivatives.values.push(self.checked(name, BaseType::Real, *trajectory)?);
             self.derivatives.variables.push(name, &variables);
         }
         Ok(())
     }
 
-    fn trajectory(
+    /// Checks the values of an input.
+    fn checked(
         &self,
         name: &str,
         base: BaseType,
         trajectory: Trajectory<'a>,
-    ) -> Result<Values<'a>, Error> {
+    ) -> Result<Trajectory<'a>, Error> {
         let times = self.time.len();
-        let shared = Values { values: &[], constant: 0.0, of_run: 0, of_time: 0 };
-        match trajectory {
-            Trajectory::Constant(value) => {
-                fits(name, base, &[value])?;
-                Ok(Values { constant: value, ..shared })
+        let values = match &trajectory {
+            Trajectory::Constant(value) => std::slice::from_ref(value),
+            Trajectory::Shared(values) if values.len() != times => {
+                return request(format!("{name} has {} values for {times} times", values.len()));
             }
-            Trajectory::Shared(values) => {
-                if values.len() != times {
-                    return request(format!("{name} has {} values for {times} times", values.len()));
-                }
-                fits(name, base, values)?;
-                Ok(Values { values, of_time: 1, ..shared })
-            }
-            Trajectory::EachRun(values) => {
-                fits(name, base, values)?;
-                Ok(Values { values, of_run: times, of_time: 1, ..shared })
-            }
-        }
+            Trajectory::Shared(values) | Trajectory::EachRun(values) => values,
+        };
+        fits(name, base, values)?;
+        Ok(trajectory)
     }
 }
 
 fn checked_time(time: &[f64]) -> Result<&[f64], Error> {
     if time.len() < 2 {
-        return request(format!(
-            "time has {} values; a run goes from one time to another at least",
-            time.len()
-        ));
+        return request(format!("time has {} values; a run needs at least two", time.len()));
     }
     if let Some(index) = time.iter().position(|time| !time.is_finite()) {
         return request(format!("time[{index}] is {}; times must be finite", time[index]));
@@ -195,10 +147,10 @@ fn runs(batch: &Batch) -> Result<usize, Error> {
     Ok(found.map_or(1, |(_, runs)| runs))
 }
 
-fn once<'a>(seen: &mut Vec<&'a str>, name: &'a str, where_: &str) -> Result<(), Error> {
-    if seen.contains(&name) {
-        return request(format!("{name} is twice among the {where_}"));
+fn once<'a>(names: &mut Vec<&'a str>, name: &'a str, list: &str) -> Result<(), Error> {
+    if names.contains(&name) {
+        return request(format!("{name} is twice among the {list}"));
     }
-    seen.push(name);
+    names.push(name);
     Ok(())
 }

@@ -1,7 +1,8 @@
 //! Performs a plan: each thread has an instance, which it resets from run to run.
 
+use super::Trajectory;
 use super::measure::Measured;
-use super::plan::{ByTime, Plan, Values};
+use super::plan::{Inputs, Plan};
 use crate::error::Error;
 use crate::rejection::{Message, Rejection};
 use crate::running::Running;
@@ -12,9 +13,9 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{self, Duration};
 
 /// Messages with the number of their run.
-pub(super) type Told = Vec<(usize, String)>;
+pub(super) type Messages = Vec<(usize, String)>;
 
-/// Maximum time for [`ask`], in addition to the time of the runs.
+/// Maximum time for [`repeat_with_logging`], in addition to the time of the runs.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Access for another thread to the progress of [`System::run`].
@@ -44,13 +45,6 @@ impl Watch {
         lock(&self.ended).clone()
     }
 
-    fn hear(&self, run: usize, time: f64, instance: &Running) {
-        if let Some(messages) = &self.messages {
-            let new = instance.take_messages().into_iter().map(|message| (run, time, message));
-            lock(messages).extend(new);
-        }
-    }
-
     /// Returns the number of finished runs, including failed ones.
     pub fn done(&self) -> usize {
         self.done.load(Ordering::Relaxed)
@@ -70,7 +64,7 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What a run has to fill.
+/// Results of a run, which the run fills.
 struct Row<'a> {
     run: usize,
     trajectories: &'a mut [f64],
@@ -83,11 +77,11 @@ pub(super) fn run(
     plan: &Plan,
     watch: &Watch,
     [trajectories, measures]: [&mut [f64]; 2],
-) -> Result<[Told; 2], Error> {
+) -> Result<[Messages; 2], Error> {
     let begin = time::Instant::now();
     let (trajectory, measured) = (plan.outputs.len() * plan.kept(), plan.outputs.len() * plan.measures.len());
-    let room = trajectories.len() >= plan.runs * trajectory && measures.len() >= plan.runs * measured;
-    assert!(room, "there is too little room for {} runs", plan.runs);
+    let fits = trajectories.len() >= plan.runs * trajectory && measures.len() >= plan.runs * measured;
+    assert!(fits, "there is too little memory for {} runs", plan.runs);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(plan.threads)
         .build()
@@ -123,19 +117,25 @@ pub(super) fn run(
     }
     let (failures, notes): (Vec<_>, Vec<_>) = found.into_iter().unzip();
     let mut failures: Vec<_> = failures.into_iter().flatten().collect();
-    let mut notes: Told = notes.into_iter().flatten().collect();
+    let mut notes: Messages = notes.into_iter().flatten().collect();
     failures.sort_unstable_by_key(|(run, _)| *run);
     notes.sort_unstable_by_key(|(run, _)| *run);
     let until = time::Instant::now() + begin.elapsed() + PATIENCE;
     if failures.iter().any(|(_, failure)| failure.is_silent) {
-        pool.install(|| ask(system, plan, watch, until, &mut failures));
+        pool.install(|| repeat_with_logging(system, plan, watch, until, &mut failures));
     }
     Ok([failures.into_iter().map(|(run, failure)| (run, failure.text)).collect(), notes])
 }
 
 /// Repeats runs that failed without a message, because many FMUs give reasons only with logging on. Repeats
 /// each run up to its failure, after all other runs, and keeps only the message.
-fn ask(system: &System, plan: &Plan, watch: &Watch, until: time::Instant, failures: &mut [(usize, Failure)]) {
+fn repeat_with_logging(
+    system: &System,
+    plan: &Plan,
+    watch: &Watch,
+    until: time::Instant,
+    failures: &mut [(usize, Failure)],
+) {
     let silent = Mutex::new(failures.iter_mut().filter(|(_, failure)| failure.is_silent));
     let next = || silent.lock().unwrap_or_else(PoisonError::into_inner).next();
     rayon::broadcast(|_| {
@@ -182,52 +182,68 @@ struct Worker<'a> {
     plan: &'a Plan<'a>,
     watch: &'a Watch,
     /// Deadline of a run with logging on; `None` without logging.
-    logging: Option<time::Instant>,
+    deadline: Option<time::Instant>,
     instance: Option<Running>,
-    room: Room<'a>,
-}
-
-struct Room<'a> {
-    /// Values of the inputs in this run.
-    inputs: Vec<ByTime<'a>>,
-    derivatives: Vec<ByTime<'a>>,
-    /// Buffers for calls of the FMU.
-    set: Vec<f64>,
-    slopes: Vec<f64>,
+    inputs: Signals<'a>,
+    derivatives: Signals<'a>,
+    /// Orders of the input derivatives.
     orders: Vec<i32>,
     /// Outputs at a time, in their order.
     row: Vec<f64>,
     /// Number of times that the run has reached.
-    rows: usize,
+    reached: usize,
     measured: Measured,
 }
 
-impl<'a> Room<'a> {
-    fn of(plan: &Plan<'a>) -> Self {
-        Self {
-            inputs: Vec::new(),
-            derivatives: Vec::new(),
-            set: vec![0.0; plan.inputs.variables.len()],
-            slopes: vec![0.0; plan.derivatives.variables.len()],
-            orders: vec![1; plan.derivatives.variables.len()],
-            row: vec![0.0; plan.outputs.len()],
-            rows: 0,
-            measured: Measured::new(plan.measures, plan.outputs.len()),
-        }
+/// Inputs of a run.
+struct Signals<'a> {
+    values: Vec<Trajectory<'a>>,
+    /// Values at a time.
+    row: Vec<f64>,
+}
+
+impl<'a> Signals<'a> {
+    fn new(inputs: &Inputs<'a>) -> Self {
+        Self { values: inputs.values.clone(), row: vec![0.0; inputs.values.len()] }
     }
 
-    fn begin(&mut self, plan: &Plan<'a>, run: usize) {
-        let of_run = |values: &Vec<Values<'a>>| values.iter().map(|values| values.of_run(run)).collect();
-        self.inputs = of_run(&plan.inputs.values);
-        self.derivatives = of_run(&plan.derivatives.values);
-        self.rows = 0;
-        self.measured.begin();
+    /// Selects the values of a run.
+    fn begin(&mut self, inputs: &Inputs<'a>, run: usize, times: usize) {
+        self.values.clear();
+        self.values.extend(inputs.values.iter().map(|values| values.of_run(run, times)));
+    }
+
+    /// Returns the values at the time with this index.
+    #[inline]
+    fn at(&mut self, time: usize) -> &[f64] {
+        self.row.iter_mut().zip(&self.values).for_each(|(value, values)| *value = values.at(time));
+        &self.row
     }
 }
 
+/// Index of the time (`None` before the end of the initialization) and the error.
+type Stopped = (Option<usize>, Rejection);
+
 impl<'a> Worker<'a> {
-    fn new(system: &'a System, plan: &'a Plan<'a>, watch: &'a Watch, logging: Option<time::Instant>) -> Self {
-        Self { system, plan, watch, logging, instance: None, room: Room::of(plan) }
+    fn new(
+        system: &'a System,
+        plan: &'a Plan<'a>,
+        watch: &'a Watch,
+        deadline: Option<time::Instant>,
+    ) -> Self {
+        Self {
+            system,
+            plan,
+            watch,
+            deadline,
+            instance: None,
+            inputs: Signals::new(&plan.inputs),
+            derivatives: Signals::new(&plan.derivatives),
+            orders: vec![1; plan.derivatives.values.len()],
+            row: vec![0.0; plan.outputs.len()],
+            reached: 0,
+            measured: Measured::new(plan.measures, plan.outputs.len()),
+        }
     }
 
     /// Performs a run over these times. May return a note if the run reaches the last time.
@@ -247,23 +263,25 @@ impl<'a> Worker<'a> {
                 return Err(Failure { at: None, text, is_silent });
             }
         };
-        self.room.begin(plan, run);
-        let until = Until { watch: self.watch, logging: self.logging };
-        let stopped = follow(plan, times, &mut instance, &mut self.room, run, trajectories, &until).err();
-        if self.logging.is_none() {
+        self.inputs.begin(&plan.inputs, run, plan.time.len());
+        self.derivatives.begin(&plan.derivatives, run, plan.time.len());
+        self.reached = 0;
+        self.measured.begin();
+        let stopped = self.follow(times, &mut instance, run, trajectories).err();
+        if self.deadline.is_none() {
             let at = stopped.as_ref().and_then(|(at, _)| *at).map_or(0, |at| at.min(times.len() - 1));
-            self.watch.hear(run, times[at], &instance);
+            self.report_messages(run, times[at], &instance);
             let ended = stopped.as_ref().and_then(|(_, rejection)| rejection.ended());
-            lock(&self.watch.ended).extend(ended.map(|time| (run, time, self.room.row.clone())));
+            lock(&self.watch.ended).extend(ended.map(|time| (run, time, self.row.clone())));
         }
-        let filled = plan.every.map_or(0, |every| self.room.rows.div_ceil(every));
+        let filled = plan.every.map_or(0, |every| self.reached.div_ceil(every));
         for trajectory in trajectories.chunks_mut(plan.kept().max(1)) {
             trajectory[filled..].fill(f64::NAN);
         }
         let rejected = stopped.as_ref().is_some_and(|(_, rejection)| rejection.ended().is_none());
         for (output, row) in measures.chunks_mut(plan.measures.len().max(1)).enumerate() {
             for (value, measure) in row.iter_mut().zip(plan.measures) {
-                *value = if rejected { f64::NAN } else { self.room.measured.measure(*measure, output) };
+                *value = if rejected { f64::NAN } else { self.measured.measure(*measure, output) };
             }
         }
         let terminated = if rejected { Ok(()) } else { instance.terminate() };
@@ -271,7 +289,7 @@ impl<'a> Worker<'a> {
         let Some((at, rejection)) = stopped else {
             return Ok(terminated.err().map(|rejection| format!("finished; then {rejection}")));
         };
-        if !rejected && self.room.rows == plan.time.len() {
+        if !rejected && self.reached == plan.time.len() {
             return Ok(Some(rejection.to_string()));
         }
         let text = match at {
@@ -284,137 +302,125 @@ impl<'a> Worker<'a> {
     /// Returns a new or reset instance. The error contains the reason, and whether there is no message.
     fn instance(&mut self) -> Result<Running, (String, bool)> {
         let used = self.instance.take();
-        let logging_on = self.logging.is_some() || self.watch.messages.is_some();
+        let logging_on = self.deadline.is_some() || self.watch.messages.is_some();
         let instance = Running::renewed(used, self.system, Interface::CoSimulation, logging_on)?;
         instance.forget_log();
         Ok(instance)
     }
-}
 
-/// Index of the time (`None` before the end of the initialization) and the error.
-type Stopped = (Option<usize>, Rejection);
-
-/// Conditions that end a run early.
-struct Until<'a> {
-    watch: &'a Watch,
-    logging: Option<time::Instant>,
-}
-
-/// Runs an instance from the start values to the last time, or until the caller cancels or the deadline
-/// passes.
-fn follow(
-    plan: &Plan,
-    times: &[f64],
-    instance: &mut Running,
-    room: &mut Room,
-    run: usize,
-    trajectories: &mut [f64],
-    until: &Until,
-) -> Result<(), Stopped> {
-    start(plan, instance, room, run).map_err(|rejection| (None, rejection))?;
-    instance.forget_log();
-    let hear = |time: f64, instance: &Running| {
-        if until.logging.is_none() {
-            until.watch.hear(run, time, instance);
+    /// Passes the messages of the FMU to the caller, unless the run is repeated.
+    fn report_messages(&self, run: usize, time: f64, instance: &Running) {
+        if let Some(messages) = &self.watch.messages
+            && self.deadline.is_none()
+        {
+            let new = instance.take_messages().into_iter().map(|message| (run, time, message));
+            lock(messages).extend(new);
         }
-    };
-    hear(times[0], instance);
-    let measures = !plan.measures.is_empty();
-    // Index of the next kept value in a trajectory, and number of times until then.
-    let (kept, mut index, mut wait) = (plan.kept(), 0, 0);
-    let mut ended: Option<Rejection> = None;
-    for (k, &time) in times.iter().enumerate() {
-        let at = |rejection| (Some(k), rejection);
-        if until.watch.is_cancelled() {
-            return Ok(());
+    }
+
+    /// Runs an instance from the start values to the last time, or until the caller cancels or the deadline
+    /// passes.
+    fn follow(
+        &mut self,
+        times: &[f64],
+        instance: &mut Running,
+        run: usize,
+        trajectories: &mut [f64],
+    ) -> Result<(), Stopped> {
+        let plan = self.plan;
+        self.start(instance, run).map_err(|rejection| (None, rejection))?;
+        instance.forget_log();
+        if let Some(first) = times.first() {
+            self.report_messages(run, *first, instance);
         }
-        if let Some(logged) = until.logging {
-            // Messages about earlier steps are not the reason of a later error.
-            instance.forget_log();
-            drop(instance.take_messages());
-            if time::Instant::now() > logged {
+        let measures = !plan.measures.is_empty();
+        // Index of the next kept value in a trajectory, and number of times until then.
+        let (kept, mut index, mut wait) = (plan.kept(), 0, 0);
+        let mut ended: Option<Rejection> = None;
+        for (k, &time) in times.iter().enumerate() {
+            let at = |rejection| (Some(k), rejection);
+            if self.watch.is_cancelled() {
                 return Ok(());
             }
-        }
-        if !plan.read_before_set && ended.is_none() {
-            set_inputs(plan, instance, room, k).map_err(at)?;
-        }
-        let keep = wait == 0 && index < kept;
-        if (keep || measures)
-            && let Err(rejection) = instance.get(&plan.outputs, &mut room.row)
-        {
-            return Err(at(ended.unwrap_or(rejection)));
-        }
-        if keep {
-            // Avoids `chunks`, which would calculate the number of chunks each time.
-            for (output, value) in room.row.iter().enumerate() {
-                trajectories[output * kept + index] = *value;
+            if let Some(deadline) = self.deadline {
+                // Messages about earlier steps are not the reason of a later error.
+                instance.forget_log();
+                drop(instance.take_messages());
+                if time::Instant::now() > deadline {
+                    return Ok(());
+                }
             }
-            index += 1;
-            wait = plan.every.unwrap_or(1);
-        }
-        wait = wait.saturating_sub(1);
-        if measures {
-            room.measured.add(time, &room.row);
-        }
-        room.rows = k + 1;
-        if let Some(ended) = ended {
-            return Err(at(ended));
-        }
-        if plan.read_before_set {
-            set_inputs(plan, instance, room, k).map_err(at)?;
-        }
-        if let Some(next) = times.get(k + 1) {
-            let size = next - time;
-            match instance.step(time, size) {
-                Ok(()) => hear(time, instance),
-                Err(rejection) => {
+            if !plan.read_before_set && ended.is_none() {
+                self.set_inputs(instance, k).map_err(at)?;
+            }
+            let keep = wait == 0 && index < kept;
+            if (keep || measures)
+                && let Err(rejection) = instance.get(&plan.outputs, &mut self.row)
+            {
+                return Err(at(ended.unwrap_or(rejection)));
+            }
+            if keep {
+                // Avoids `chunks`, which would calculate the number of chunks each time.
+                for (output, value) in self.row.iter().enumerate() {
+                    trajectories[output * kept + index] = *value;
+                }
+                index += 1;
+                wait = plan.every.unwrap_or(1);
+            }
+            wait = wait.saturating_sub(1);
+            if measures {
+                self.measured.add(time, &self.row);
+            }
+            self.reached = k + 1;
+            if let Some(ended) = ended {
+                return Err(at(ended));
+            }
+            if plan.read_before_set {
+                self.set_inputs(instance, k).map_err(at)?;
+            }
+            if let Some(next) = times.get(k + 1) {
+                let size = next - time;
+                if let Err(rejection) = instance.step(time, size) {
                     let Some(end) = rejection.ended() else { return Err(at(rejection)) };
                     // Outputs can be read, but inputs no longer set (section 4.2.4 of FMI 2.0).
-                    if instance.get(&plan.outputs, &mut room.row).is_err() {
-                        room.row.fill(f64::NAN);
+                    if instance.get(&plan.outputs, &mut self.row).is_err() {
+                        self.row.fill(f64::NAN);
                     }
                     if next - end > 1e-9 * size {
                         return Err(at(rejection));
                     }
                     ended = Some(rejection);
+                } else {
+                    self.report_messages(run, time, instance);
                 }
             }
         }
+        Ok(())
     }
-    Ok(())
-}
 
-/// Sets start values before Initialization Mode and inputs in it.
-fn start(plan: &Plan, instance: &mut Running, room: &mut Room, run: usize) -> Result<(), Rejection> {
-    instance.begin(plan.time[0], plan.time.last().copied(), &plan.start, run)?;
-    set_values(plan, instance, room, 0)?;
-    instance.exit_initialization_mode()
-}
-
-#[inline]
-fn set_inputs(plan: &Plan, instance: &mut Running, room: &mut Room, time: usize) -> Result<(), Rejection> {
-    set_values(plan, instance, room, time)?;
-    if room.derivatives.is_empty() {
-        return Ok(());
+    /// Sets start values before Initialization Mode and inputs in it.
+    fn start(&mut self, instance: &mut Running, run: usize) -> Result<(), Rejection> {
+        let plan = self.plan;
+        instance.begin(plan.time[0], plan.time.last().copied(), &plan.start, run)?;
+        self.set_values(instance, 0)?;
+        instance.exit_initialization_mode()
     }
-    fill(&mut room.slopes, &room.derivatives, time);
-    let references = plan.derivatives.variables.references().unwrap_or_default();
-    instance.sole().set_input_derivatives(references, &room.orders, &room.slopes)
-}
 
-#[inline]
-fn set_values(plan: &Plan, instance: &mut Running, room: &mut Room, time: usize) -> Result<(), Rejection> {
-    if room.inputs.is_empty() {
-        return Ok(());
+    #[inline]
+    fn set_inputs(&mut self, instance: &mut Running, time: usize) -> Result<(), Rejection> {
+        self.set_values(instance, time)?;
+        if self.derivatives.values.is_empty() {
+            return Ok(());
+        }
+        let references = self.plan.derivatives.variables.references().unwrap_or_default();
+        instance.sole().set_input_derivatives(references, &self.orders, self.derivatives.at(time))
     }
-    fill(&mut room.set, &room.inputs, time);
-    instance.set(&plan.inputs.variables, &room.set)
-}
 
-#[inline]
-fn fill(buffer: &mut [f64], values: &[ByTime], time: usize) {
-    for (slot, values) in buffer.iter_mut().zip(values) {
-        *slot = values.at(time);
+    #[inline]
+    fn set_values(&mut self, instance: &mut Running, time: usize) -> Result<(), Rejection> {
+        if self.inputs.values.is_empty() {
+            return Ok(());
+        }
+        instance.set(&self.plan.inputs.variables, self.inputs.at(time))
     }
 }

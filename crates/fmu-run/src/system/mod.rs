@@ -24,10 +24,10 @@ use std::sync::Arc;
 /// communication point to the next, each component steps with its inputs at the first point. [`Order`]
 /// determines when outputs are passed to inputs.
 #[derive(Clone, Debug)]
-pub struct System(Arc<Whole>);
+pub struct System(Arc<Definition>);
 
 #[derive(Debug)]
-struct Whole {
+struct Definition {
     name: String,
     parts: Vec<Part>,
     /// Names of the system's inputs and outputs, and the variables that they denote.
@@ -48,7 +48,7 @@ pub(crate) struct Part {
 
 /// Specification of a system: components and connections.
 #[derive(Clone, Debug, Default)]
-pub struct Wiring<'a> {
+pub struct Composition<'a> {
     /// Name of the system.
     pub name: &'a str,
     /// Names and FMUs of the components; an FMU may occur several times.
@@ -76,19 +76,21 @@ impl System {
     /// It also reports connections that do not fit, inputs that are fed twice, and algebraic loops. Returns
     /// [`Error::Fmu`] if an FMU does not support Co-Simulation, or a process may have only one instance of
     /// it.
-    pub fn connect(wiring: &Wiring) -> Result<Self, Error> {
+    pub fn connect(composition: &Composition) -> Result<Self, Error> {
         let parts =
-            wiring.components.iter().map(|(name, fmu)| ((*name).to_owned(), Arc::clone(fmu.loaded())));
-        let connections = wiring.connections.iter().map(|(from, to)| ((*from).to_owned(), (*to).to_owned()));
-        let mut whole = Whole::of(wiring.name, parts.map(|(name, fmu)| Part { name, fmu }).collect());
-        whole.connections = connections.collect();
-        whole.finish(wiring.order)
+            composition.components.iter().map(|(name, fmu)| ((*name).to_owned(), Arc::clone(fmu.loaded())));
+        let connections =
+            composition.connections.iter().map(|(from, to)| ((*from).to_owned(), (*to).to_owned()));
+        let mut definition =
+            Definition::of(composition.name, parts.map(|(name, fmu)| Part { name, fmu }).collect());
+        definition.connections = connections.collect();
+        definition.finish(composition.order)
     }
 
     /// Creates a system with a single FMU.
     pub(crate) fn of_one(fmu: Loaded) -> Self {
         let name = fmu.description.model_name.clone();
-        Self(Arc::new(Whole::of(&name, vec![Part { name: String::new(), fmu: Arc::new(fmu) }])))
+        Self(Arc::new(Definition::of(&name, vec![Part { name: String::new(), fmu: Arc::new(fmu) }])))
     }
 
     /// Returns the name of the system; for an FMU, the name of its model.
@@ -100,7 +102,8 @@ impl System {
     /// variables of the components.
     pub fn variables(&self) -> impl Iterator<Item = (String, &Variable)> {
         let own = self.0.connectors.iter();
-        let own = own.filter_map(|(name, ends)| Some((name.clone(), self.0.look_up(ends.first()?)?.of)));
+        let own =
+            own.filter_map(|(name, ends)| Some((name.clone(), self.0.look_up(ends.first()?)?.variable)));
         own.chain(self.parts().iter().flat_map(|part| {
             part.fmu.description.variables.iter().map(|of| (joined(&part.name, &of.name), of))
         }))
@@ -218,7 +221,7 @@ impl System {
             ));
         }
         let variables = self.find_numbers(name)?;
-        let of = variables[0].of;
+        let of = variables[0].variable;
         if of.base != BaseType::Real || of.causality != "input" {
             return request(format!("{name} is no Real input; only these have input derivatives"));
         }
@@ -295,7 +298,7 @@ impl Deref for Fmu {
     }
 }
 
-impl Whole {
+impl Definition {
     fn of(name: &str, parts: Vec<Part>) -> Self {
         Self {
             name: name.to_owned(),
@@ -311,7 +314,7 @@ impl Whole {
     /// Checks the connections and sorts them into stages.
     fn finish(mut self, order: Order) -> Result<System, Error> {
         if self.parts.is_empty() {
-            return request("a system needs one component at least".to_owned());
+            return request("a system needs at least one component".to_owned());
         }
         for (index, Part { name, fmu }) in self.parts.iter().enumerate() {
             if name.is_empty() {
@@ -326,32 +329,33 @@ impl Whole {
                 && before.iter().any(|other| Arc::ptr_eq(&other.fmu, fmu))
             {
                 return Err(Error::Fmu(format!(
-                    "{} can be there only once in a process (canBeInstantiatedOnlyOncePerProcess)",
+                    "{} can have only one instance per process (canBeInstantiatedOnlyOncePerProcess)",
                     fmu.description.model_name
                 )));
             }
         }
-        let mut wires = Vec::new();
+        let mut ends = Vec::new();
         for (index, (from, to)) in self.connections.iter().enumerate() {
             let (output, input) = (self.end(from, "output")?, self.end(to, "input")?);
-            if let Err(why) = output.description.connects(output.of, input.description, input.of) {
+            if let Err(why) = output.description.connects(output.variable, input.description, input.variable)
+            {
                 return request(format!("{from} cannot feed {to}: {why}"));
             }
-            if matches!(output.of.base, BaseType::String | BaseType::Binary) {
+            if matches!(output.variable.base, BaseType::String | BaseType::Binary) {
                 return request(format!("{from} cannot feed {to}: only numbers and Booleans are passed on"));
             }
             if self.connections[..index].iter().any(|(_, other)| other == to) {
                 return request(format!("{to} is fed twice"));
             }
-            wires.push((output, input));
+            ends.push((output, input));
         }
-        self.exchange = Exchange { order, stages: order::stages(&self.connections, &wires, order)? };
+        self.exchange = Exchange { order, stages: order::stages(&self.connections, &ends, order)? };
         Ok(System(Arc::new(self)))
     }
 
     fn end(&self, name: &str, wanted: &str) -> Result<Found<'_>, Error> {
         let found = self.find(name)?[0];
-        match found.of.causality.as_str() {
+        match found.variable.causality.as_str() {
             causality if causality == wanted => Ok(found),
             causality => request(format!("{name} is {causality}, not {wanted}")),
         }
@@ -362,7 +366,7 @@ impl Whole {
             let description = &self.parts[part].fmu.description;
             let fed = self.connections.iter().find(|(_, to)| to == name);
             let fed_by = fed.map(|(from, _)| from.as_str());
-            Some(Found { part, of: description.variable(own)?, description, fed_by })
+            Some(Found { part, variable: description.variable(own)?, description, fed_by })
         };
         match &*self.parts {
             [part] if part.name.is_empty() => with(0, name),

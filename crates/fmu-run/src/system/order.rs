@@ -33,26 +33,26 @@ pub(crate) struct Stage {
 }
 
 /// A connection: an output of a component and the connected input.
-type Wire<'a> = (Found<'a>, Found<'a>);
+type Ends<'a> = (Found<'a>, Found<'a>);
 
 /// Returns whether the output of a connection depends directly on the input of another one.
-fn follows((from, _): &Wire, (_, to): &Wire) -> bool {
-    let depends_on = from.of.depends_on.as_ref();
-    to.part == from.part && depends_on.is_none_or(|inputs| inputs.contains(&to.of.reference))
+fn follows((from, _): &Ends, (_, to): &Ends) -> bool {
+    let depends_on = from.variable.depends_on.as_ref();
+    to.part == from.part && depends_on.is_none_or(|inputs| inputs.contains(&to.variable.reference))
 }
 
 /// Returns the stages, each after the stages that it depends on.
-pub(super) fn stages(names: &[(String, String)], wires: &[Wire], order: Order) -> Result<Vec<Stage>, Error> {
+pub(super) fn stages(names: &[(String, String)], ends: &[Ends], order: Order) -> Result<Vec<Stage>, Error> {
     let levels = match order {
-        Order::Jacobi => vec![0; wires.len()],
-        Order::Dependencies => levels(names, wires)?,
+        Order::Jacobi => vec![0; ends.len()],
+        Order::Dependencies => levels(names, ends)?,
     };
     let count = levels.iter().max().map_or(0, |last| last + 1);
     let stage = |number| {
         let mut stage = Stage { outputs: Selection::default(), inputs: Selection::default() };
         let of_stage = levels.iter().enumerate().filter(|(_, level)| **level == number);
         for (index, _) in of_stage {
-            let ((from, to), (output, input)) = (&names[index], wires[index]);
+            let ((from, to), (output, input)) = (&names[index], ends[index]);
             stage.outputs.push(from, &[output]);
             stage.inputs.push(to, &[input]);
         }
@@ -62,17 +62,17 @@ pub(super) fn stages(names: &[(String, String)], wires: &[Wire], order: Order) -
 }
 
 /// Returns the level of each connection: the length of the longest chain of connections that must precede it.
-fn levels(names: &[(String, String)], wires: &[Wire]) -> Result<Vec<usize>, Error> {
-    let mut levels: Vec<Option<usize>> = vec![None; wires.len()];
-    for first in 0..wires.len() {
-        level(names, wires, first, &mut levels, &mut Vec::new())?;
+fn levels(names: &[(String, String)], ends: &[Ends]) -> Result<Vec<usize>, Error> {
+    let mut levels: Vec<Option<usize>> = vec![None; ends.len()];
+    for first in 0..ends.len() {
+        level(names, ends, first, &mut levels, &mut Vec::new())?;
     }
     Ok(levels.into_iter().map(Option::unwrap_or_default).collect())
 }
 
 fn level(
     names: &[(String, String)],
-    wires: &[Wire],
+    ends: &[Ends],
     index: usize,
     levels: &mut [Option<usize>],
     path: &mut Vec<usize>,
@@ -81,20 +81,20 @@ fn level(
         return Ok(level);
     }
     if let Some(begin) = path.iter().position(|before| *before == index) {
-        let circle = path[begin..].iter().rev().map(|index| {
+        let cycle = path[begin..].iter().rev().map(|index| {
             let (from, to) = &names[*index];
             format!("{from} -> {to}")
         });
         return request(format!(
             "there is an algebraic loop: {}; each of these outputs depends on its FMU's input without a step (or its FMU does \
-            not say on what it depends), so that no order passes all values on. Order Jacobi passes them on a step later",
-            circle.collect::<Vec<_>>().join(", ")
+            not declare its dependencies), so that no order passes all values on. Order Jacobi passes them on a step later",
+            cycle.collect::<Vec<_>>().join(", ")
         ));
     }
     path.push(index);
     let mut own = 0;
-    for before in (0..wires.len()).filter(|before| follows(&wires[index], &wires[*before])) {
-        own = own.max(1 + level(names, wires, before, levels, path)?);
+    for before in (0..ends.len()).filter(|before| follows(&ends[index], &ends[*before])) {
+        own = own.max(1 + level(names, ends, before, levels, path)?);
     }
     path.pop();
     levels[index] = Some(own);

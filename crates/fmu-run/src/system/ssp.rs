@@ -1,6 +1,6 @@
 //! Reads systems from SSP files (System Structure and Parameterization 1.0).
 
-use super::{Order, Part, StartValue, System, Whole};
+use super::{Definition, Order, Part, StartValue, System};
 use crate::error::Error;
 use crate::fmu::{Loaded, unpacked};
 use crate::start::StartValues;
@@ -41,8 +41,8 @@ impl System {
     /// are no FMUs, parameter mappings, signal dictionaries, transformations of connections.
     pub unsafe fn open(path: &Path, order: Order) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
-        let folder = unpacked(path).map_err(|why| fail(why.replace("no FMU", "no SSP")))?;
-        let text = std::fs::read_to_string(folder.path().join("SystemStructure.ssd"))
+        let directory = unpacked(path).map_err(|why| fail(why.replace("no FMU", "no SSP")))?;
+        let text = std::fs::read_to_string(directory.path().join("SystemStructure.ssd"))
             .map_err(|_| fail("there is no readable SystemStructure.ssd in it; it is no SSP".to_owned()))?;
         let document = Document::parse(&text)
             .map_err(|error| fail(format!("SystemStructure.ssd is no XML: {error}")))?;
@@ -50,7 +50,7 @@ impl System {
         let system =
             child(root, "System").ok_or_else(|| fail("SystemStructure.ssd has no System".to_owned()))?;
         let mut read = Read::default();
-        read.system(folder.path(), system, "").map_err(fail)?;
+        read.system(directory.path(), system, "").map_err(fail)?;
 
         let mut loaded: BTreeMap<&str, Arc<Loaded>> = BTreeMap::new();
         let mut parts = Vec::new();
@@ -59,9 +59,9 @@ impl System {
                 Some(fmu) => Arc::clone(fmu),
                 None => {
                     // SAFETY: the caller guarantees that the libraries are sound.
-                    let opened = unsafe { Loaded::open(&folder.path().join(source), false) };
+                    let opened = unsafe { Loaded::open(&directory.path().join(source), false) };
                     let opened = opened.map_err(|error| {
-                        let inside = format!("{}/", folder.path().display());
+                        let inside = format!("{}/", directory.path().display());
                         fail(format!("component {name}: {}", error.to_string().replace(&inside, "")))
                     })?;
                     Arc::clone(loaded.entry(source).or_insert_with(|| Arc::new(opened)))
@@ -69,13 +69,13 @@ impl System {
             };
             parts.push(Part { name: name.clone(), fmu });
         }
-        let mut whole = Whole::of(root.attribute("name").unwrap_or("system"), parts);
-        read.wire(&mut whole);
-        whole.start = read.start_values(&whole)?;
+        let mut definition = Definition::of(root.attribute("name").unwrap_or("system"), parts);
+        read.connect(&mut definition);
+        definition.start = read.start_values(&definition)?;
         let experiment = child(root, "DefaultExperiment");
-        whole.stop_time =
+        definition.stop_time =
             experiment.and_then(|of| of.attribute("stopTime")).and_then(|text| text.parse().ok());
-        let system = whole.finish(order)?;
+        let system = definition.finish(order)?;
         StartValues::of(&system, &[])?;
         Ok(system)
     }
@@ -83,15 +83,15 @@ impl System {
 
 impl Read {
     /// Reads a system; names of its elements begin with `path`.
-    fn system(&mut self, folder: &Path, node: Node, path: &str) -> Result<(), String> {
-        self.bindings(folder, node, path)?;
+    fn system(&mut self, directory: &Path, node: Node, path: &str) -> Result<(), String> {
+        self.bindings(directory, node, path)?;
         for connector in children(node, "Connectors") {
             self.connectors.push(format!("{path}{}", needed(connector, "name")?));
         }
         for element in children(node, "Elements") {
             let name = needed(element, "name")?;
             match element.tag_name().name() {
-                "System" => self.system(folder, element, &format!("{path}{name}."))?,
+                "System" => self.system(directory, element, &format!("{path}{name}."))?,
                 "Component" => {
                     let source = needed(element, "source")?;
                     let kind = element.attribute("type").unwrap_or("application/x-fmu-sharedlibrary");
@@ -100,7 +100,7 @@ impl Read {
                             "component {path}{name} is no FMU but {kind}, which cannot be run"
                         ));
                     }
-                    self.bindings(folder, element, &format!("{path}{name}."))?;
+                    self.bindings(directory, element, &format!("{path}{name}."))?;
                     self.components.push((format!("{path}{name}"), source));
                 }
                 other => return Err(format!("{path}{name} is a {other}, which cannot be run")),
@@ -128,7 +128,7 @@ impl Read {
     }
 
     /// Reads the start values that are bound to an element; later values replace earlier ones.
-    fn bindings(&mut self, folder: &Path, node: Node, path: &str) -> Result<(), String> {
+    fn bindings(&mut self, directory: &Path, node: Node, path: &str) -> Result<(), String> {
         for binding in children(node, "ParameterBindings") {
             let path = format!("{path}{}", binding.attribute("prefix").unwrap_or_default());
             if child(binding, "ParameterMapping").is_some() {
@@ -140,7 +140,7 @@ impl Read {
                     set.map_or(Ok(()), |set| self.parameters(set, &path))?;
                 }
                 (Some(source), None) => {
-                    let text = std::fs::read_to_string(folder.join(source))
+                    let text = std::fs::read_to_string(directory.join(source))
                         .map_err(|_| format!("there is no readable {source} in it"))?;
                     let document =
                         Document::parse(&text).map_err(|error| format!("{source} is no XML: {error}"))?;
@@ -168,14 +168,14 @@ impl Read {
 
     /// Finds the connections between components, through all connectors of nested systems, and the connectors
     /// of the outer system.
-    fn wire(&self, whole: &mut Whole) {
-        let is_own = |whole: &Whole, name: &str| whole.look_up(name).is_some();
+    fn connect(&self, definition: &mut Definition) {
+        let is_own = |definition: &Definition, name: &str| definition.look_up(name).is_some();
         for (_, to) in &self.connections {
             let from = self.origin(to);
-            match [is_own(whole, from), is_own(whole, to)] {
-                [true, true] => whole.connections.push((from.to_owned(), to.clone())),
-                [false, true] => whole.connectors.entry(from.to_owned()).or_default().push(to.clone()),
-                [true, false] => _ = whole.connectors.insert(to.clone(), vec![from.to_owned()]),
+            match [is_own(definition, from), is_own(definition, to)] {
+                [true, true] => definition.connections.push((from.to_owned(), to.clone())),
+                [false, true] => definition.connectors.entry(from.to_owned()).or_default().push(to.clone()),
+                [true, false] => _ = definition.connectors.insert(to.clone(), vec![from.to_owned()]),
                 [false, false] => {}
             }
         }
@@ -197,14 +197,14 @@ impl Read {
     /// Returns the start values by variable, in the variable's unit. Omits values of inputs that outputs
     /// feed, because outputs would overwrite them. Omits values of connectors without a connection, because
     /// they have no effect.
-    fn start_values(&self, whole: &Whole) -> Result<Vec<(String, StartValue)>, Error> {
+    fn start_values(&self, definition: &Definition) -> Result<Vec<(String, StartValue)>, Error> {
         let mut all: Vec<(String, StartValue)> = Vec::new();
         for (name, Value { kind, text, unit }) in &self.start {
-            let leads_nowhere = self.connectors.contains(name) && !whole.connectors.contains_key(name);
+            let leads_nowhere = self.connectors.contains(name) && !definition.connectors.contains_key(name);
             if leads_nowhere {
                 continue;
             }
-            let found = whole.find(name)?[0];
+            let found = definition.find(name)?[0];
             if found.fed_by.is_some() {
                 continue;
             }

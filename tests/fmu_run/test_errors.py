@@ -1,4 +1,4 @@
-"""Arguments that do not fit, FMUs that cannot be loaded, and causes that stop runs."""
+"""Errors: invalid arguments, FMUs that cannot be loaded, and interrupted runs."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import fmpy
 import fmu_run
 import numpy as np
 import pytest
+from unruly import repacked
 
 TIME = np.linspace(0.0, 1.0, 11)
 
@@ -26,13 +27,13 @@ def fmu(testbed):
 
 
 @pytest.mark.parametrize(
-    "request_, complaint",
+    "arguments, message",
     [
         ({"inputs": {"thet1": 0.0}}, 'has no variable "thet1"; did you mean "theta1"?'),
         ({"outputs": ["Roll_Rate"]}, 'has no variable "Roll_Rate"; did you mean "roll_rate"?'),
         ({"inputs": {"theta1": np.zeros(4)}}, "theta1 has the shape (4,); it must be (11,), (runs, 11) or a number"),
         ({"inputs": {"theta1": np.zeros((2, 2, 11))}}, "theta1 has the shape (2, 2, 11)"),
-        ({"inputs": {"theta1": ["a"] * 11}}, "theta1: these are no numbers"),
+        ({"inputs": {"theta1": ["a"] * 11}}, "theta1: the values are no numbers"),
         ({"inputs": {"k1": TIME}}, "k1 is no input but a fixed parameter; give it a start value"),
         ({"inputs": {"roll": TIME}}, "roll is no input but a continuous output"),
         (
@@ -40,7 +41,7 @@ def fmu(testbed):
             "the start value of k1 has the shape [1, 1]; it must be a number, or an array with one for each",
         ),
         ({"start": {"k1": "stiff"}}, 'k1 is a number, its start value cannot be "stiff"'),
-        ({"start": {"M": 2.5}}, "M is a whole number from -2147483648 to 2147483647 and cannot be 2.5"),
+        ({"start": {"M": 2.5}}, "M is an integer from -2147483648 to 2147483647 and cannot be 2.5"),
         ({"start": {"use_omega": 2}}, "use_omega is a Boolean and cannot be 2"),
         ({"start": {"k1": [1, 2], "k2": [1, 2, 3]}}, "k1 is given for 2 runs, k2 for 3"),
         ({"start": {"k1": [1, 2]}, "inputs": {"theta1": np.zeros((3, 11))}}, "theta1 is given for 3 runs, k1 for 2"),
@@ -57,10 +58,10 @@ def fmu(testbed):
         ({"time": [0.0, 0.2, 0.2]}, "time[2] is 0.2, which is not after time[1], 0.2"),
     ],
 )
-def test_what_does_not_fit(fmu, request_, complaint):
+def test_invalid_arguments(fmu, arguments, message):
     with pytest.raises(ValueError) as raised:
-        fmu.run(**{"time": TIME, "outputs": ["roll"], **request_})
-    assert complaint in f"{raised.value}\n"
+        fmu.run(**{"time": TIME, "outputs": ["roll"], **arguments})
+    assert message in f"{raised.value}\n"
 
 
 def test_input_derivatives_of_fmi3(fmu):
@@ -73,7 +74,7 @@ def test_input_derivatives_of_fmi3(fmu):
             fmu.run(TIME, outputs=["roll"], input_derivatives=slopes)
 
 
-def test_refused_runs_leave_the_others_alone(fmu):
+def test_rejected_runs_do_not_affect_the_others(fmu):
     stiffness = np.array([100.0, -1.0, 100.0, np.nan, 100.0])
     runs = fmu.run(TIME, inputs={"theta1": TIME}, start={"k1": stiffness}, outputs=["roll"], every=1, measures=["peak"])
     assert runs.errors.keys() == {1, 3}
@@ -94,7 +95,7 @@ def test_refused_runs_leave_the_others_alone(fmu):
 
 
 @pytest.mark.parametrize(
-    "content, complaint",
+    "content, message",
     [
         (None, "cannot be opened"),
         ({}, "no readable modelDescription.xml"),
@@ -108,7 +109,7 @@ def test_refused_runs_leave_the_others_alone(fmu):
         ("text", "is no FMU, which is a zip file"),
     ],
 )
-def test_files_that_are_no_fmu(tmp_path, content, complaint):
+def test_files_that_are_no_fmu(tmp_path, content, message):
     path = tmp_path / "some.fmu"
     if isinstance(content, str):
         path.write_text(content)
@@ -116,7 +117,7 @@ def test_files_that_are_no_fmu(tmp_path, content, complaint):
         with zipfile.ZipFile(path, "w") as archive:
             for name, text in content.items():
                 archive.writestr(name, text)
-    with pytest.raises(fmu_run.FmuError, match=complaint) as raised:
+    with pytest.raises(fmu_run.FmuError, match=message) as raised:
         fmu_run.Fmu(path)
     assert str(raised.value).startswith(f"{path}: ")
     assert not (tmp_path / "outside").exists() and not (tmp_path.parent / "outside").exists()
@@ -124,23 +125,15 @@ def test_files_that_are_no_fmu(tmp_path, content, complaint):
 
 def test_no_library_for_this_platform(tmp_path, testbed):
     path = tmp_path / "foreign.fmu"
-    with zipfile.ZipFile(testbed) as whole, zipfile.ZipFile(path, "w") as archive:
-        for name in whole.namelist():
+    with zipfile.ZipFile(testbed) as original, zipfile.ZipFile(path, "w") as archive:
+        for name in original.namelist():
             moved = re.sub("binaries/[^/]+/", "binaries/vax-vms/", name)
-            archive.writestr(moved, whole.read(name))
+            archive.writestr(moved, original.read(name))
     with pytest.raises(fmu_run.FmuError, match="has no library for this platform .*; it has: vax-vms"):
         fmu_run.Fmu(path)
 
 
-def repacked(fmu, path, change) -> Path:
-    """The FMU at `path`, each file as `change(name, content)` makes it."""
-    with zipfile.ZipFile(fmu) as whole, zipfile.ZipFile(path, "w") as archive:
-        for name in whole.namelist():
-            archive.writestr(name, change(name, whole.read(name)))
-    return path
-
-
-# Libraries that FMPy brings for the machines it knows, and the processor's number in an ELF header (ELF-64, e_machine).
+# Libraries in FMPy for other systems, and the processor's number in an ELF header (ELF-64, e_machine).
 FMPY = Path(fmpy.__file__).parent
 FOREIGN = {
     "Windows on x86_64": lambda _: (FMPY / "logging/win64/logging.dll").read_bytes(),
@@ -163,7 +156,7 @@ def test_a_library_of_another_machine(tmp_path, testbed, made_for):
     assert str(raised.value).endswith(f"its library cannot be loaded: it is for {made_for}, and this is {this}")
 
 
-def test_a_library_that_is_damaged(tmp_path, testbed):
+def test_a_damaged_library(tmp_path, testbed):
     def change(name, content):
         return content[:200] if name.startswith("binaries/") else content
 
@@ -184,7 +177,7 @@ def test_an_execution_tool(tmp_path, unruly):
         assert fmu.run(TIME, outputs=["y"]).ok.all()
 
 
-def test_an_fmu_that_is_closed(testbed):
+def test_a_closed_fmu(testbed):
     fmu = fmu_run.Fmu(testbed)
     fmu.close()
     fmu.close()
@@ -201,11 +194,11 @@ def test_units_of_declared_types(unruly, unruly3):
             assert {name: fmu.variables[name].unit for name in units} == units
 
 
-def test_a_declared_type_that_is_not_defined(unruly, tmp_path):
+def test_an_undefined_declared_type(unruly, tmp_path):
     def change(name, content):
-        return content.replace(b'<Real declaredType="Length"/>', b'<Real declaredType="Forgotten"/>')
+        return content.replace(b'<Real declaredType="Length"/>', b'<Real declaredType="Undefined"/>')
 
-    with fmu_run.Fmu(repacked(unruly, tmp_path / "forgotten.fmu", change)) as fmu:
+    with fmu_run.Fmu(repacked(unruly, tmp_path / "undefined.fmu", change)) as fmu:
         assert fmu.variables["y"].unit is None and fmu.run(TIME, outputs=["y"]).ok.all()
 
 
@@ -238,7 +231,7 @@ def test_start_values_with_units(fmu):
             fmu.run(time, start=start, outputs=outputs)
 
 
-def test_hints_prefer_the_name(tmp_path, fmu):
+def test_suggested_names(fmu):
     for wrong, right in [("theta", "theta1"), ("rolls", "roll"), ("TAU2", "tau2"), ("pitch_angle", "pitch")]:
         with pytest.raises(ValueError, match=f'did you mean "{right}"'):
             fmu.run(TIME, outputs=[wrong])
@@ -260,7 +253,7 @@ def test_other_types(unruly):
         assert one.texts("label") == ["held"] and list(one.get(("mood", "flag"))[0]) == [0.0, 1.0]
         for call, message in [
             (lambda: fmu.run(TIME, outputs=["label"]), "label is no number"),
-            (lambda: one.texts("y"), "y is a number, no text"),
+            (lambda: one.texts("y"), "y is a number, not a string"),
             (
                 lambda: fmu.run(TIME, outputs=["y"], start={"mood": "Glad"}),
                 "mood is one of Good, SilentError, its start",
@@ -269,7 +262,7 @@ def test_other_types(unruly):
                 lambda: fmu.run(TIME, outputs=["y"], start={"flag": "on"}),
                 "flag is a Boolean, its start value cannot be",
             ),
-            (lambda: one.set("count", 2.5), "count is a whole number from .* and cannot be 2.5"),
+            (lambda: one.set("count", 2.5), "count is an integer from .* and cannot be 2.5"),
             (lambda: one.set(["slope", "flag"], [1.0, 2.0]), "flag is a Boolean and cannot be 2"),
             (lambda: one.set("slope", None), "None is no number"),
             (lambda: fmu.run(TIME, outputs=["y"], inputs={"slope": None}), "slope: None is no number"),
@@ -312,7 +305,7 @@ def test_ctrl_c_stops_runs(testbed, times):
 
 
 def test_progress(testbed):
-    noted = []
+    reports = []
     time = np.linspace(0, 20, 20001)
     with fmu_run.Fmu(testbed) as fmu:
         start = {"k1": np.full(400, 90.0)}
@@ -321,9 +314,9 @@ def test_progress(testbed):
             start=start,
             outputs=["roll"],
             measures=["peak"],
-            progress=lambda done, all_: noted.append((done, all_)),
+            progress=lambda done, all_: reports.append((done, all_)),
         )
-        assert noted and all(all_ == 400 for _, all_ in noted) and noted == sorted(noted)
+        assert reports and all(all_ == 400 for _, all_ in reports) and reports == sorted(reports)
 
         def stop(done, runs):
             raise RuntimeError("enough")
@@ -335,14 +328,10 @@ def test_progress(testbed):
 
 
 def test_runs_need_co_simulation(tmp_path, unruly):
-    path = tmp_path / "model_exchange.fmu"
-    with zipfile.ZipFile(unruly) as old, zipfile.ZipFile(path, "w") as new:
-        for entry in old.infolist():
-            content = old.read(entry)
-            if entry.filename == "modelDescription.xml":
-                content = content.replace(b"CoSimulation", b"ModelExchange")
-            new.writestr(entry, content)
-    with fmu_run.Fmu(path) as fmu:
+    def change(name, content):
+        return content.replace(b"<CoSimulation", b"<ModelExchange")
+
+    with fmu_run.Fmu(repacked(unruly, tmp_path / "model_exchange.fmu", change)) as fmu:
         for call in (lambda: fmu.run([0.0, 1.0], outputs=["y"]), fmu.instances):
             with pytest.raises(fmu_run.FmuError, match="no Co-Simulation, only Model Exchange, which needs a solver"):
                 call()

@@ -21,14 +21,14 @@ STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
 
 
 def angles(time: np.ndarray, count: int) -> np.ndarray:
-    """(times, count, 2) rad: other motions for each instance."""
+    """(times, count, 2) rad: a different motion for each instance."""
     _, moves = motion(len(time))
     scale = np.linspace(0.5, 1.5, count)
     return np.stack([np.multiply.outer(moves[name], scale) for name in MOTORS], axis=2)
 
 
 @pytest.mark.parametrize("threads", [1, 3])
-def test_they_do_what_runs_do(testbed, threads) -> None:
+def test_instances_equal_runs(testbed, threads) -> None:
     time, _ = motion(60)
     count, stiffness = 7, np.linspace(60.0, 130.0, 7)
     moves = angles(time, count)
@@ -48,7 +48,7 @@ def test_they_do_what_runs_do(testbed, threads) -> None:
         assert np.array_equal(wrists.get("tau1"), read[:, 0]) and wrists.errors == {}
 
 
-def test_one_go_is_three_calls(testbed) -> None:
+def test_advance_equals_three_calls(testbed) -> None:
     with fmu_run.Fmu(testbed) as fmu:
         one, three = fmu.instances(5, threads=2), fmu.instances(5)
         moves = angles(np.arange(40) * 1e-3, 5)
@@ -60,7 +60,7 @@ def test_one_go_is_three_calls(testbed) -> None:
 
 
 def test_derivatives_of_inputs_and_outputs(fmu) -> None:
-    """The slopes of straight lines, as runs take them; those of outputs by differences of tiny steps."""
+    """Input derivatives of straight lines equal runs; output derivatives equal difference quotients."""
     time = np.arange(30) * 1e-3
     with fmu_run.Fmu(fmu) as loaded:
         slopes = {"theta1": 3.0, "theta2": -2.0}
@@ -77,10 +77,10 @@ def test_derivatives_of_inputs_and_outputs(fmu) -> None:
             assert wrist.get("tau1") == runs["tau1"][0, k]
             if k + 1 < len(time):
                 wrist.step(to=time[k + 1])
-        noted, before = wrist.get_output_derivatives(("pitch", "roll"))[0], wrist.get(("pitch", "roll"))[0]
+        reported, before = wrist.get_output_derivatives(("pitch", "roll"))[0], wrist.get(("pitch", "roll"))[0]
         wrist.step(1e-7)
         found = (wrist.get(("pitch", "roll"))[0] - before) / 1e-7
-        assert np.allclose(noted, found, rtol=1e-4)
+        assert np.allclose(reported, found, rtol=1e-4)
         with pytest.raises(ValueError, match="only Real"):
             wrist.get_output_derivatives("M")
 
@@ -128,9 +128,9 @@ sys.stdout.write(one.get({OUTPUTS!r}).tobytes().hex() + " " + one.time.tobytes()
             wrists.deserialize([first, second[:-1] + bytes([second[-1] ^ 1])])
 
 
-def test_one_drops_out_and_the_others_go_on(testbed) -> None:
+def test_a_failed_instance_does_not_affect_the_others(testbed) -> None:
     with fmu_run.Fmu(testbed) as fmu:
-        wrists, alone = fmu.instances(3), fmu.instances()
+        wrists, single = fmu.instances(3), fmu.instances()
         saved = wrists.save()
         wrists.set(MOTORS, [[0.1, 0.0], [np.inf, 0.0], [0.3, 0.0]])
         wrists.step(1e-3)
@@ -140,19 +140,19 @@ def test_one_drops_out_and_the_others_go_on(testbed) -> None:
         wrists.restore(saved)
         assert wrists.errors == {} and np.array_equal(wrists.get("tau1"), np.zeros(3))
         with pytest.raises(fmu_run.FmuError, match="theta1 must be a finite number"):
-            alone.set("theta1", np.nan)
+            single.set("theta1", np.nan)
         gone = r"^the instance has dropped out before; reset\(\) or restore\(\) brings .*theta1 must be a finite number"
-        for call in (lambda: alone.step(1e-3), lambda: alone.get("roll"), alone.save):
+        for call in (lambda: single.step(1e-3), lambda: single.get("roll"), single.save):
             with pytest.raises(fmu_run.FmuError, match=gone):
                 call()
-        alone.reset()
-        assert alone.errors == {} and alone.get("roll")[0] == 0.0
+        single.reset()
+        assert single.errors == {} and single.get("roll")[0] == 0.0
         with pytest.raises(fmu_run.FmuError, match="k1 must not be below"):
             fmu.instances(2, start={"k1": -1.0})
 
 
-def test_model_exchange_by_fmpys_calls(testbed) -> None:
-    """Euler's rule, call by call."""
+def test_model_exchange_equals_fmpy(testbed) -> None:
+    """Integrates by Euler's method, call by call."""
     description = fmpy.read_model_description(str(testbed))
     by_name = {variable.name: variable for variable in description.modelVariables}
     folder = fmpy.extract(str(testbed))
@@ -203,7 +203,7 @@ def test_model_exchange_by_fmpys_calls(testbed) -> None:
 
 
 def test_events_of_the_controller(controller) -> None:
-    """Its samples are time events; in Event Mode it takes what is set there."""
+    """Samples are time events. Values can be set in Event Mode."""
     with fmu_run.Fmu(controller) as fmu:
         law = fmu.instances(3, interface="model-exchange")
         due = law.next_event_time.copy()
@@ -214,7 +214,7 @@ def test_events_of_the_controller(controller) -> None:
         assert np.array_equal(law.wants_to_end, np.zeros(3))
 
 
-def test_what_does_not_fit_is_named(testbed) -> None:
+def test_invalid_arguments(testbed) -> None:
     with fmu_run.Fmu(testbed) as fmu:
         wrists = fmu.instances(3)
         for call, message in [
@@ -226,7 +226,7 @@ def test_what_does_not_fit_is_named(testbed) -> None:
             (lambda: wrists.get("theta1", out=np.zeros(3, dtype=np.float32)), "float64"),
             (lambda: wrists.step(), "either the size of the step or the time"),
             (lambda: wrists.step(1e-3, mask=[True]), "1 Booleans for 3 instances"),
-            (lambda: wrists.restore(fmu.instances(3).save()), "states are of other instances"),
+            (lambda: wrists.restore(fmu.instances(3).save()), "states belong to other instances"),
             (lambda: fmu.instances(0), "count must be at least 1, it is 0"),
             (lambda: fmu.instances(-3), "count must be at least 1, it is -3"),
             (lambda: fmu.instances(2, threads=-1), "threads must be at least 1, it is -1"),
@@ -248,7 +248,7 @@ def test_what_does_not_fit_is_named(testbed) -> None:
             (lambda: wrists.handle_events(), "for Co-Simulation; this is for Model Exchange"),
             (lambda: wrists.get_derivatives(), "for Co-Simulation; this is for Model Exchange"),
             (lambda: wrists.set_time(0.0), "for Co-Simulation; this is for Model Exchange"),
-            (lambda: fmu.instances(interface="model-exchange").step(1e-3), "only Co-Simulation steps"),
+            (lambda: fmu.instances(interface="model-exchange").step(1e-3), "only Co-Simulation has steps"),
             (lambda: fmu.instances(interface="model-exchange").set_time(np.inf), "time is inf; it must be finite"),
         ]:
             with pytest.raises(ValueError, match=message):
@@ -259,7 +259,7 @@ def test_what_does_not_fit_is_named(testbed) -> None:
         assert wrists.errors == {}
 
 
-def test_what_an_fmu_does_not_offer_costs_no_instance(unruly) -> None:
+def test_missing_capabilities_fail_no_instance(unruly) -> None:
     with fmu_run.Fmu(unruly) as fmu:
         one = fmu.instances()
         for call, message in [
@@ -283,8 +283,8 @@ def test_more_instances_than_memory(testbed) -> None:
             fmu.run(np.arange(1e6), start={"k1": np.full(10**7, 90.0)}, outputs=["roll"] * 10**6)
 
 
-def test_several_threads_of_python_share_them(testbed) -> None:
-    """Calls wait for each other; nothing hangs, and instances outlive their FMU object."""
+def test_python_threads_share_instances(testbed) -> None:
+    """Calls wait for each other without a deadlock. Instances outlive their FMU object."""
     fmu = fmu_run.Fmu(testbed)
     wrists = fmu.instances(64, threads=2)
     fmu.close()
