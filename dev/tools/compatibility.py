@@ -1,4 +1,5 @@
-"""`tools compatibility`: writes the table of results of tests/importers in docs/compatibility.md."""
+"""Writes the table “Results of tests/importers” of docs/compatibility.md from the results of `make test-importers` in
+target/importers."""
 
 from __future__ import annotations
 
@@ -6,7 +7,6 @@ import argparse
 import json
 import re
 from pathlib import Path
-from typing import Any
 
 from prw.errors import UserError
 from prw.files import write_text
@@ -16,15 +16,7 @@ SEEN, PAGE, HEADING = Path("target/importers"), Path("docs/compatibility.md"), "
 HEADS = ("tool", "version", "fmu", "run", "seen", "date")
 TITLES = ("tool", "version", "FMU", "run", "result", "date")
 
-
-def add_parser(subparsers: Any) -> None:
-    """Add `compatibility` to the subcommands."""
-    parser = subparsers.add_parser(
-        "compatibility",
-        help="write the results of tests/importers into docs/compatibility.md",
-        description=f"Writes the table “{HEADING}” of {PAGE} from the results of `make test-importers` in {SEEN}.",
-    )
-    parser.set_defaults(run=run)
+HELP = "write the results of tests/importers into docs/compatibility.md"
 
 
 def run(_: argparse.Namespace) -> None:

@@ -71,7 +71,8 @@ def validate(monkeypatch, tmp_path, fmu):
     monkeypatch.setattr(runs.masters, "MASTERS", runs.masters.MASTERS[:1])
 
     def validate(*arguments):
-        status = run("tools", "", [validation], ["validation", "--fmus", str(FMUS), "--out", str(tmp_path), *arguments])
+        options = ["--fmus", str(FMUS), "--out", str(tmp_path), *arguments]
+        status = run("tools", "", {"validation": validation}, ["validation", *options])
         return (
             status,
             json.loads((tmp_path / "validation.json").read_text()),

@@ -232,7 +232,7 @@ def test_sweep_draws(testbed: Path) -> None:
 
 def test_wrong_sweeps(testbed: Path) -> None:
     for arguments, complaint in [
-        ({}, "nothing varies; give values by parameter"),
+        ({}, "nothing varies; give values of a parameter"),
         ({"grid": {"k9": [1.0]}}, "k9 is not known; there are J2"),
         ({"grid": {"k1": []}}, "k1: .* are not the values of a parameter"),
         (

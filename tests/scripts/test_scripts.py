@@ -104,7 +104,9 @@ def test_figures_are_written(fmu: Path, tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(gallery, "figures", lambda found: {k: v for k, v in draw(found).items() if k in some})
     for path in ("docs", "modelDescription/documentation", "crates/prw-controller/modelDescription/documentation"):
         (tmp_path / path).mkdir(parents=True)
-    assert run_command("tools", "", [figures], ["figures", "--fmu", str(fmu), "--out", "out", "--commit"]) == 0
+    assert (
+        run_command("tools", "", {"figures": figures}, ["figures", "--fmu", str(fmu), "--out", "out", "--commit"]) == 0
+    )
     written = {path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file() and "out" not in path.parts}
     assert len(written) == 9 and all((ROOT / path).is_file() for path in written)
     shown = figures.VISIT.read_bytes()
@@ -128,7 +130,7 @@ def test_compatibility_writes_the_rows_that_tests_left(tmp_path: Path, monkeypat
     compatibility.PAGE.write_text(before, encoding="utf-8")
     row = dict.fromkeys(compatibility.HEADS, "x")
     (compatibility.SEEN / "one.json").write_text(json.dumps(row), encoding="utf-8")
-    assert run_command("tools", "", [compatibility], ["compatibility"]) == 0
+    assert run_command("tools", "", {"compatibility": compatibility}, ["compatibility"]) == 0
     after = compatibility.PAGE.read_text(encoding="utf-8")
     heading = f"## {compatibility.HEADING}\n"
     table = after.split(heading)[1].split("\n## ")[0]

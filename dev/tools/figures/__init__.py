@@ -1,10 +1,10 @@
-"""`tools figures`: every figure of the paper and of the documentation, from runs of the FMU."""
+"""Reproduces the paper's Figs. 4 and 5 and draws Bode plots of the torques, poles and zeros, step responses and the order
+of convergence, all from the FMU. Writes each figure as SVG and PNG, and the figures behind the text as numbers.json."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 
@@ -18,16 +18,11 @@ VISIT = Path("docs/try-it.gif")
 ICON = Path("model.png")
 ICON_SVG = Path("documentation/model.svg")
 
+HELP = "reproduce the paper's figures from runs of the FMU"
 
-def add_parser(subparsers: Any) -> None:
-    """Add `figures` to the subcommands."""
-    parser = subparsers.add_parser(
-        "figures",
-        help="reproduce the paper's figures from runs of the FMU",
-        description="Reproduces the paper's Figs. 4 and 5 and draws Bode plots of the torques, poles and zeros, step "
-        "responses and the order of convergence, all from the FMU. Writes each figure as SVG and PNG, and the figures "
-        "behind the text as numbers.json.",
-    )
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
     parser.add_argument(
         "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where to write (default: %(default)s)"
@@ -37,7 +32,6 @@ def add_parser(subparsers: Any) -> None:
         action="store_true",
         help=f"also renew the copies kept with the sources, in {COMMITTED}, the icons of both FMUs, {FILM}, and {VISIT} (with the browser chromium)",
     )
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -1,26 +1,22 @@
-"""`tools validation`: the FMUs against the reference experiments, under every importer that is installed."""
+"""Runs the reference experiments with the testbed for FMI 2.0 and FMI 3.0 under every importer that is installed, and the
+closed loop under every master; compares with the reference, and finds the parameters that the tolerances distinguish.
+Writes validation.html and validation.json."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from prw.commands.options import DEFAULT_OUT
 from prw.errors import UserError
 
 DEFAULT_FMUS = Path("target/fmu")
 
+HELP = "compare the FMUs with the reference experiments under every importer"
 
-def add_parser(subparsers: Any) -> None:
-    """Add `validation` to the subcommands."""
-    parser = subparsers.add_parser(
-        "validation",
-        help="compare the FMUs with the reference experiments under every importer",
-        description="Runs the reference experiments with the testbed for FMI 2.0 and FMI 3.0 under every importer that is "
-        "installed, and the closed loop under every master; compares with the reference, and finds what the tolerances "
-        "tell apart. Writes validation.html and validation.json.",
-    )
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument(
         "--fmus",
         type=Path,
@@ -39,7 +35,6 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where to write (default: %(default)s)"
     )
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -5,12 +5,11 @@ from __future__ import annotations
 import itertools
 import math
 import os
-import time
 import warnings
 from collections.abc import Callable, Mapping
 from numbers import Real
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import fmu_run
 import numpy as np
@@ -37,13 +36,6 @@ Spread = float | tuple[float, float] | tuple[str, float, float]
 MEASURES: tuple[fmu_run.Measure, ...] = ("peak", "rms", "end")
 #: Statistics of runs, (runs,) each, by the name of the column; and the messages of those that failed, by run.
 Statistics = tuple[dict[str, Array], dict[int, str]]
-
-
-class Swept(NamedTuple):
-    """table: a row for each run. seconds: the time that the runs took."""
-
-    table: pyarrow.Table
-    seconds: float
 
 
 def sweep(
@@ -105,7 +97,7 @@ def sweep(
     with Testbed(existing_fmu(fmu)) as testbed:
         values = layout(grid or {}, random or {}, runs, seed, testbed, parameters)
         fixed = values_of(parameters, testbed.loaded)
-        table = carry_out(testbed, motion_of(motion), values, fixed, threads, scheduler, out).table
+        table = carry_out(testbed, motion_of(motion), values, fixed, threads, scheduler, out)
     if "done" not in table["status"].to_pylist():
         warnings.warn(f"all {table.num_rows} runs failed; run 0: {table['message'][0]}", RuntimeWarning, stacklevel=2)
     return table
@@ -119,14 +111,14 @@ def carry_out(
     threads: int | None,
     scheduler: str | None,
     out: str | os.PathLike[str] | None,
-) -> Swept:
+) -> pyarrow.Table:
     """Make the runs with the `values` (runs,) by parameter, and with the values `fixed` in all of them. Other arguments as for
     `sweep`."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     threads = counted("threads", threads) if threads is not None else os.cpu_count() or 1
-    start, total, begin = {**fixed, **values}, len(next(iter(values.values()))), time.monotonic()
+    start, total = {**fixed, **values}, len(next(iter(values.values())))
 
     def made() -> pa.Table:
         with Progress(f"{total} runs", total) as progress:
@@ -147,12 +139,12 @@ def carry_out(
         return pa.table(columns)
 
     if out is None:
-        return Swept(made(), time.monotonic() - begin)
+        return made()
     # The file is created first, so that a directory that cannot be written costs no runs.
     with replacing(Path(out) / "runs.parquet") as temporary:
-        swept = Swept(made(), time.monotonic() - begin)
-        pq.write_table(swept.table, temporary)
-    return swept
+        table = made()
+        pq.write_table(table, temporary)
+    return table
 
 
 def statistics(
@@ -190,7 +182,7 @@ def layout(
         if (name in grid) + (name in random) + (name in fixed and name in grid) > 1:
             raise UserError(f"{name} is in more than one of grid, random and parameters; choose one")
     if not grid and not random:
-        raise UserError("nothing varies; give values by parameter (grid), or relative standard deviations (random)")
+        raise UserError("nothing varies; give values of a parameter (grid) or its distribution (random)")
     draws = counted("runs", runs) if random else 1
     axes = {name: _column(name, in_own_unit(name, values, testbed.loaded)) for name, values in grid.items()}
     total = math.prod(map(len, axes.values())) * draws

@@ -1,4 +1,5 @@
-"""`prw simulate`: the paper's experiment, or the response to a recorded motor motion."""
+"""Simulates the paper's experiment (Fig. 4) or the response to recorded motor angles. Writes a CSV table (time, inputs,
+all outputs; s, rad, rad/s, N.m) and, with the extra prw[plot], a PNG figure."""
 
 from __future__ import annotations
 
@@ -14,8 +15,8 @@ from prw.commands.options import (
     add_parameter_options,
     add_paths,
     add_reading_options,
+    call,
     parameters_of,
-    reading_options,
 )
 from prw.errors import MissingPackage, UserError
 from prw.files import replacing
@@ -26,15 +27,11 @@ from prw.simulation import Run, simulated
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+HELP = "simulate the paper's experiment or a recording"
 
-def add_parser(subparsers: Any) -> None:
-    """Add `simulate` to prw's subcommands."""
-    parser = subparsers.add_parser(
-        "simulate",
-        help="simulate the paper's experiment or a recording",
-        description="Simulate the paper's experiment (Fig. 4) or the response to recorded motor angles. Writes a CSV table "
-        "(time, inputs, all outputs; s, rad, rad/s, N.m) and, with the extra prw[plot], a PNG figure.",
-    )
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument(
         "file",
         type=Path,
@@ -53,7 +50,6 @@ def add_parser(subparsers: Any) -> None:
         metavar="FILE",
         help="also write an animation: a .gif, an .mp4 (needs the extra prw[movie]) or an .html",
     )
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -65,7 +61,7 @@ def run(arguments: argparse.Namespace) -> None:
         suffix_of(arguments.animate)
     recorded = arguments.input is not None
     if recorded:
-        motion = read_motion(arguments.input, **reading_options(arguments))
+        motion = call(read_motion, arguments, path=arguments.input)
         title = f"Response to {arguments.input.name}"
     else:
         if arguments.degrees:
