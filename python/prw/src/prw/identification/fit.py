@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
@@ -147,20 +147,14 @@ class Comparison:
         covariance = (self._scaled * experiment.motor_power[:, None, :]) @ self._scaled.conj().swapaxes(-1, -2)
         covariance[:, np.arange(channels), np.arange(channels)] += stepped
         self._whiten = np.linalg.inv(np.linalg.cholesky(covariance))
-        columns = [experiment.seen(self.response.transients)]
-        if offsets:
-            steady = np.zeros((experiment.needed_bins, channels, channels), dtype=complex)
-            steady[0] = np.sqrt(len(experiment.time)) * np.eye(channels)
-            columns.insert(0, experiment.seen(steady))
-        if edges:
-            early = np.zeros((experiment.needed_bins, channels, 3 * len(edges)), dtype=complex)
-            s = 1j * np.arange(experiment.needed_bins) / experiment.bins
-            for k, i in enumerate(edges):
-                early[:, i, 3 * k : 3 * k + 3] = s[:, None] ** np.arange(3)
-            columns.insert(1 if offsets else 0, experiment.seen(early))
-        if faults:
-            columns.insert(1 if offsets else 0, experiment.seen(np.stack(faults, axis=2)))
-        nuisance = np.concatenate(columns, axis=2)
+        steady = np.zeros((experiment.needed_bins, channels, channels if offsets else 0), dtype=complex)
+        steady[0] = np.sqrt(len(experiment.time)) * np.eye(*steady.shape[1:])
+        early = np.zeros((experiment.needed_bins, channels, 3 * len(edges)), dtype=complex)
+        s = 1j * np.arange(experiment.needed_bins) / experiment.bins
+        for k, i in enumerate(edges):
+            early[:, i, 3 * k : 3 * k + 3] = s[:, None] ** np.arange(3)
+        linear = [steady, *(fault[:, :, None] for fault in faults), early, self.response.transients]
+        nuisance = experiment.seen(np.concatenate(linear, axis=2))
         difference = np.zeros((bins, channels), dtype=complex)
         if experiment.values is not None:
             difference = experiment.measured - experiment.seen(response.outputs)
@@ -298,10 +292,13 @@ class Fitter:
         """noise: of all channels, by name, SI; default: a twentieth of their motion. faults: of each experiment, see Comparison."""
         self.model, self.experiments, self.task, self.faults = model, experiments, task, faults
         self.channels = tuple(dict.fromkeys(name for e in experiments for name in e.channels))
-        columns = {name: self._columns(name) for name in self.channels}
-        spread = {n: max([1e-12, *(float(np.nanstd(v)) for v, *_ in c)]) for n, c in columns.items()}
-        self._finest = {n: max([0.0, *(finest for *_, finest in c)]) for n, c in columns.items()}
-        self._stepped = {n: max([0.0, *(float(e.mean()) for _, e, _ in c)]) for n, c in columns.items()}
+        spread = dict.fromkeys(self.channels, 1e-12)
+        self._finest, self._stepped = dict.fromkeys(self.channels, 0.0), dict.fromkeys(self.channels, 0.0)
+        for e in experiments:
+            for i, name in enumerate(e.channels if e.values is not None else ()):
+                spread[name] = max(spread[name], float(np.nanstd(cast(Array, e.values)[:, i])))
+                self._finest[name] = max(self._finest[name], float(e.finest[i]))
+                self._stepped[name] = max(self._stepped[name], float(e.channel_power[:, i].mean()))
         self.noise = dict(noise) or {n: task.noise.get(n) or 0.05 * spread[n] for n in self.channels}
         self.evaluations = 0
         self._responses: tuple[bytes, list[Response]] = b"", []
@@ -448,11 +445,6 @@ class Fitter:
     def _edges(self, experiment: Experiment) -> list[int]:
         late = {d.channel for d in self.task.distortions if d.kind != "gain"}
         return [i for i, name in enumerate(experiment.channels) if name in late]
-
-    def _columns(self, name: str) -> list[tuple[Array, Array, float]]:
-        """Values (s,), errors' power (bins,) and least noise of the channel in every experiment that contains it."""
-        with_it = [(e, e.channels.index(name)) for e in self.experiments if name in e.channels and e.values is not None]
-        return [(e.values[:, i], e.channel_power[:, i], float(e.finest[i])) for e, i in with_it if e.values is not None]
 
 
 def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int = 6, seed: int = 0) -> Solution:
