@@ -39,8 +39,8 @@ def crate(name: str) -> str:
     """The Rust package that a file belongs to."""
     if name == "build_fmu.rs":
         return "build_fmu"
-    for folder in (ROOT / name).parents:
-        manifest = folder / "Cargo.toml"
+    for directory in (ROOT / name).parents:
+        manifest = directory / "Cargo.toml"
         if manifest.is_file():
             return str(tomllib.loads(manifest.read_text(encoding="utf-8"))["package"]["name"])
     raise ValueError(f"{name} is outside of the repository")

@@ -28,7 +28,7 @@ HELP = f"run the examples and write {PAGE}"
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `tools examples`. Raises UserError with one line on what is wrong."""
+    """Carry out `tools examples`. Raises UserError with a message of one line."""
     page = "\n\n".join([HEAD, *map(section, EXAMPLES)]) + "\n"
     if PAGE.is_file() and without_times(page) == without_times(PAGE.read_text(encoding="utf-8")):
         print(f"{PAGE} is up to date")

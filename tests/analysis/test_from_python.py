@@ -91,13 +91,13 @@ def test_either_version_of_fmi(recording, fmu, found):
         ({"fmu": "none.fmu"}, "none.fmu: no such FMU"),
     ],
 )
-def test_what_cannot_be(recording, fmu, options, message):
+def test_wrong_arguments(recording, fmu, options, message):
     with pytest.raises(prw.UserError) as error:
         prw.identify(recording, **{"fmu": fmu, **options})
     assert message in str(error.value)
 
 
-def test_files_that_are_none():
+def test_sources_that_are_no_recording():
     for files, message in (
         (None, "None is no recording"),
         ([None], "None is no recording"),
@@ -108,7 +108,7 @@ def test_files_that_are_none():
 
 
 def test_columns_in_memory_and_one_name(recording, fmu):
-    """A dict in place of the file, alone or in a list, and a name in place of a list of one."""
+    """A dict in place of the file, also in a list, and a name in place of a list of one."""
     read = prw.read(recording)
     columns = {name: read[name] for name in read.units}
     expected = prw.identify(recording, estimate=["k1"], starts=1, fmu=fmu).values

@@ -11,8 +11,8 @@ from prw.motion import fig4
 from prw.testbed import OUTPUTS, Testbed
 
 
-def rows(folder):
-    return pq.read_table(folder / "runs.parquet").to_pylist()
+def rows(directory):
+    return pq.read_table(directory / "runs.parquet").to_pylist()
 
 
 def test_grid_random_and_failures(prw, tmp_path, fmu):

@@ -183,7 +183,7 @@ def test_torque_units(file: Any, unit: Any, factor: Any) -> None:
     ["t_ms,theta1_deg,theta2/deg,tau1_Nm,pitch_rate_wanted", "# Time (ms),THETA1 deg,theta2 [°],Tau1/N.m,tau1_raw"],
 )
 def test_headers_as_others_write_them(file: Any, header: Any) -> None:
-    """Units after `_`, `/` or a space, capitals, numpy's `#` before the header; what is no unit is another thing."""
+    """Units after `_`, `/` or a space, capitals, numpy's `#` before the header; a suffix that is no unit makes another name."""
     path = file("# rig 2; 13 May\n\n" + lines(header, row="{t},0.1,0.2,{x},0"))
     measured = read(path)
     assert measured.time[-1] == pytest.approx(0.29e-3)
@@ -277,9 +277,9 @@ def moving(rows: Any) -> str:
     return "time,theta1,theta2,tau1\n" + "".join(f"{k / 1000},{np.sin(k / 100)},0.1,{k % 7}\n" for k in rows)
 
 
-def test_a_gap_is_refused_or_told(file: Any) -> None:
-    """By all that read recordings. The motors may have done anything in 0.2 s; a path goes through 20 ms."""
-    with pytest.raises(UserError, match=r"no rows from 0.299 to 0.5 s, 0.201 s where 0.001 s is usual"):
+def test_a_gap_is_an_error_or_a_note(file: Any) -> None:
+    """For all readers of recordings. The motors may have done anything in 0.2 s; a path goes through 20 ms."""
+    with pytest.raises(UserError, match=r"no rows from 0.299 to 0.5 s, 0.201 s instead of the usual 0.001 s"):
         read_motion(file(moving([*range(300), *range(500, 900)])))
     measured = read(file(moving([*range(300), *range(320, 900)])))
     assert measured.notes[0] == "rows are missing once, for up to 0.021 s after 0.299 s; a smooth path bridges that"

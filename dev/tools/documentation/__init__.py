@@ -6,17 +6,17 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from prw.files import replacing
+from prw.files import write_text
 
 PROJECT = Path(".")
 
-HELP = "write the FMUs' documentation anew"
+HELP = "write the FMUs' documentation again"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument(
-        "--project", type=Path, default=PROJECT, metavar="DIR", help="the project's folder (default: %(default)s)"
+        "--project", type=Path, default=PROJECT, metavar="DIR", help="the repository root (default: %(default)s)"
     )
 
 
@@ -32,6 +32,5 @@ def run(arguments: argparse.Namespace) -> None:
         if path.is_file() and path.read_bytes() == text.encode():
             print(f"{path} is up to date")
             continue
-        with replacing(path) as temporary:
-            temporary.write_bytes(text.encode())
+        write_text(path, text)
         print(f"{path} written, {len(text.encode()) // 1000} kB")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import NamedTuple
 
@@ -82,8 +83,8 @@ def _step(fmu: Path, sides: tuple[int, int]) -> Step:
     return Step(runs[0], runs[1])
 
 
-def numbers(found: Results) -> dict[str, object]:
-    """The quoted results by name, and the version of matplotlib that drew the figures."""
+def numbers(found: Results) -> str:
+    """The quoted results by name, and the version of matplotlib that drew the figures, as JSON."""
     low = POINTS <= STATED
     ratio = found.sweep.response / found.model.response_at_hz(POINTS, ANGLE_OF)
     high = found.model.response_at_hz(1e5, ANGLE_OF)
@@ -99,7 +100,7 @@ def numbers(found: Results) -> dict[str, object]:
     def orders(errors: dict[str, np.ndarray]) -> dict[str, float]:
         return {name: round(value, 2) for name, value in order(step, errors).items()}
 
-    return {
+    content = {
         "made_with": f"matplotlib {matplotlib.__version__}",
         "poles": {
             name: sorted(rounded(pole) for pole in mode.poles() if pole.imag >= 0)
@@ -120,3 +121,4 @@ def numbers(found: Results) -> dict[str, object]:
         "order_rates": orders(rates),
         "error_1ms_percent": {name: float(f"{100 * errors[step == 1e-3][0]:.1g}") for name, errors in angles.items()},
     }
+    return json.dumps(content, indent=2) + "\n"

@@ -33,7 +33,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "repeated",
     )
     parser.add_argument(
-        "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where to write (default: %(default)s)"
+        "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="directory to write into (default: %(default)s)"
     )
 
 

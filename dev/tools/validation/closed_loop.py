@@ -34,7 +34,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="directory with prw_closed_loop.ssp and prw_closed_loop/ (default: %(default)s)",
     )
     parser.add_argument(
-        "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where to write (default: %(default)s)"
+        "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="directory to write into (default: %(default)s)"
     )
 
 

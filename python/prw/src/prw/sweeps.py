@@ -15,7 +15,7 @@ import fmu_run
 import numpy as np
 from numpy.typing import ArrayLike
 
-from prw.arguments import Given, Table, counted, in_own_unit, spread_of, values_of
+from prw.arguments import Given, Table, check_names, counted, in_own_unit, spread_of, values_of
 from prw.errors import UserError, need
 from prw.files import replacing
 from prw.motion import Array, Motion
@@ -34,7 +34,7 @@ Spread = float | tuple[float, float] | tuple[str, float, float]
 
 #: The statistics of each output in a result.
 MEASURES: tuple[fmu_run.Measure, ...] = ("peak", "rms", "end")
-#: Statistics of runs, (runs,) each, by the name of the column; and the messages of those that failed, by run.
+#: Statistics of runs, (runs,) each, by the name of the column; and the messages of failed runs, by run.
 Statistics = tuple[dict[str, Array], dict[int, str]]
 
 
@@ -84,7 +84,7 @@ def sweep(
     Raises
     ------
     UserError
-        An argument is out of range, a file cannot be read or written, or the cluster does not answer.
+        An argument is out of range, a file cannot be read or written, or the cluster does not respond.
 
     Warns
     -----
@@ -175,10 +175,9 @@ def layout(
     fixed = values_of(parameters, testbed.loaded)
     testbed.with_starts(fixed)
     starts = {**testbed.starts, **fixed}
+    check_names("grid", grid, testbed.starts)
+    check_names("random", random, testbed.starts)
     for name in (*grid, *random):
-        if name not in testbed.starts:
-            argument = "grid" if name in grid else "random"
-            raise UserError(f"{name} is not known; there are {', '.join(testbed.starts)}", argument=argument)
         if (name in grid) + (name in random) + (name in fixed and name in grid) > 1:
             raise UserError(f"{name} is in more than one of grid, random and parameters; choose one")
     if not grid and not random:

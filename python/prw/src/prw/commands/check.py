@@ -1,6 +1,6 @@
 """Compares a table of results with one of the reference experiments in the FMU: motions of the motors, and the
 response of the testbed, calculated by a program that shares no code with the FMU. Reports for every output the largest
-difference, its time, and whether it is within the tolerance; draws the outputs beyond it. Exit status 0 where all agree, else 1.
+difference, its time, and whether it is within the tolerance; draws the outputs beyond it. Exit status 0 if all agree, else 1.
 
 FILE is CSV, a .mat file of OpenModelica, or one that MATLAB saved with -v7 or earlier. Columns are found by name, with
 or without a component (testbed.roll). Units are in the header, as in `roll [deg]`, or in --units; otherwise SI.
@@ -22,7 +22,7 @@ examples:
   prw check fig4.csv                                the nearest experiment
   prw check wrist_res.mat --experiment closed_loop
   prw check run.csv --units pitch=deg,roll=deg
-The experiments as files: unzip the FMU, extra/org.fmi-standard.fmi-ls-ref; documentation/fmi-ls-ref.txt says how.
+The experiments as files: unzip the FMU, extra/org.fmi-standard.fmi-ls-ref; documentation/fmi-ls-ref.txt describes them.
 """
 
 
@@ -33,7 +33,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--model-exchange", action="store_true", help="take the tolerances for Model Exchange")
     parser.add_argument("--component", metavar="NAME", help="if several have a column of one name (default: testbed)")
     parser.add_argument("--units", action=Named, metavar="NAME=UNIT,...", help="units of columns whose header has none")
-    add_paths(parser, "where the figure goes")
+    add_paths(parser, "directory of the figure")
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -50,7 +50,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--duration", type=float, default=10.0, metavar="S", help="of a motion (default: %(default)g)")
     parser.add_argument("--rate", type=float, default=1000.0, metavar="HZ", help="of sampling (default: %(default)g)")
     add_task_options(parser)
-    add_paths(parser, "where the motions and ranking.json go", "excite")
+    add_paths(parser, "directory of the motions and ranking.json", "excite")
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -89,7 +89,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--starts", type=int, default=6, metavar="N", help="starting points of the search (default: %(default)s)"
     )
     parser.add_argument("--seed", type=int, default=0, help="of the random starting points (default: %(default)s)")
-    add_paths(parser, "where report.html, report.json, identified.json and identified.ssv go", "identified")
+    add_paths(parser, "directory of report.html, report.json, identified.json and identified.ssv", "identified")
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -118,7 +118,7 @@ def run(arguments: argparse.Namespace) -> None:
         )
     if found.undetermined:
         raise UserError(
-            f"{'; '.join(found.undetermined)}. What would settle it: {'; or '.join(found.advice)}. {report} has the rest; "
+            f"{'; '.join(found.undetermined)}. Remedies: {'; or '.join(found.advice)}. {report} has the rest; "
             "identified.json was not written"
         )
     found.to_parameters(parameters)

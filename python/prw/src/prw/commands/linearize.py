@@ -25,7 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=DEFAULT_OUT / "linear.json",
         metavar="FILE",
-        help="where to write (default: %(default)s)",
+        help="file to write (default: %(default)s)",
     )
 
 

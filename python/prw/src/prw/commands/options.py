@@ -6,6 +6,7 @@ import argparse
 import inspect
 import math
 import re
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,7 +16,7 @@ from prw.errors import UserError
 from prw.identification import DEFAULT_ESTIMATE
 from prw.testbed import default_fmu, existing_fmu, loaded
 
-#: None if there is none: a command that needs an FMU then reports where it was searched for.
+#: None if there is none: a command that needs an FMU then reports the locations that it searched.
 DEFAULT_FMU: Path | None
 try:
     DEFAULT_FMU = default_fmu()
@@ -26,12 +27,16 @@ T = TypeVar("T")
 
 
 def call(function: Callable[..., T], arguments: argparse.Namespace, **others: Any) -> T:
-    """Call the function with the options that have the names of its parameters, and with `others`."""
+    """Call the function with the options that have the names of its parameters, and with `others`.
+
+    Ignores the function's warnings about its results: commands print them as notes."""
     names = inspect.signature(function).parameters
-    return function(**{name: value for name, value in vars(arguments).items() if name in names} | others)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module=__name__)
+        return function(**{name: value for name, value in vars(arguments).items() if name in names} | others)
 
 
-def add_paths(parser: argparse.ArgumentParser, out: str = "where to write", directory: str = "") -> None:
+def add_paths(parser: argparse.ArgumentParser, out: str = "directory to write into", directory: str = "") -> None:
     """The options --fmu and --out. out: the help; directory: the default within DEFAULT_OUT."""
     parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
     default = DEFAULT_OUT / directory
@@ -67,7 +72,7 @@ def add_task_options(parser: argparse.ArgumentParser) -> None:
         action=Named,
         read=number,
         metavar="NAME=VALUE",
-        help="standard deviation of a channel's noise in SI, where it is known. May be repeated",
+        help="standard deviation of a channel's noise in SI, if it is known. May be repeated",
     )
 
 
@@ -95,7 +100,7 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
         help="lines above the header, as dSPACE writes them",
     )
     parser.add_argument(
-        "--encoding", default="", help="of the file (default: UTF-8, or UTF-16 where the file begins with its mark)"
+        "--encoding", default="", help="of the file (default: UTF-8, or UTF-16 if the file begins with its mark)"
     )
 
 

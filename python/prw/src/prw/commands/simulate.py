@@ -22,7 +22,7 @@ from prw.errors import MissingPackage, UserError
 from prw.files import replacing
 from prw.motion import fig4
 from prw.recording import read_motion
-from prw.simulation import Run, simulated
+from prw.simulation import Run, simulate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> None:
             f"{table}: is the recording itself and would be overwritten; choose another directory with --out"
         )
     given = parameters_of(arguments, arguments.fmu)
-    response = simulated(motion, given, fmu=arguments.fmu)
+    response = call(simulate, arguments, motion=motion, parameters=given)
     response.to_csv(table)
     written, missing = [table], ""
     try:
@@ -119,7 +119,7 @@ def _summary(
         f"torque {_tidy(peak('tau1', 'tau2'))} N.m"
     )
     if arguments.input is None:
-        lines.append("            opposite motors turn the wrist about its roll axis only, as the paper says")
+        lines.append("            opposite motors turn the wrist about its roll axis only, as in the paper")
     else:
         lines.append(f"at the end  pitch {_degrees(response['pitch'][-1])}, roll {_degrees(response['roll'][-1])}")
     lines += [f"note        {note}" for note in response.notes]

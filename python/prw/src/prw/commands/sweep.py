@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import os
 import time
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -73,10 +72,7 @@ def run(arguments: argparse.Namespace) -> None:
     motion = fig4() if arguments.input is None else read_motion(arguments.input, degrees=arguments.degrees)
     threads = arguments.threads if arguments.threads is not None else os.cpu_count() or 1
     begin = time.monotonic()
-    with warnings.catch_warnings():
-        # A sweep in which all runs fail warns. The lines below report failed runs.
-        warnings.simplefilter("ignore", RuntimeWarning)
-        table = call(sweep, arguments, motion=motion)
+    table = call(sweep, arguments, motion=motion)
     seconds = time.monotonic() - begin
     where = arguments.scheduler or f"{threads} thread{'s' if threads > 1 else ''}"
     pace = f"{seconds:.1f} s ({table.num_rows / seconds:.0f} per second)"

@@ -9,11 +9,11 @@ experiments), results and report. `identify` below combines them.
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
-from prw.arguments import Table, counted, is_path, is_table, names_of, positive, spread_of
+from prw.arguments import Table, check_names, counted, is_path, is_table, names_of, positive, spread_of
 from prw.errors import UserError, need
 
 if TYPE_CHECKING:
@@ -138,8 +138,8 @@ def identify(
             for each in several
         ]
         channels = dict.fromkeys(name for m in measured for name in m.measured)
-        for what, named in (("noise", noise), ("delay", delay), ("lag", lag), ("gain", gain)):
-            _check(what, named, channels)
+        for argument, named in (("noise", noise), ("delay", delay), ("lag", lag), ("gain", gain)):
+            check_names(argument, named, channels)
         rates: list[Rates] = [
             "motors" if not isinstance(each, Run) else "angles" if each.motion.omega is None else "inputs"
             for each in several
@@ -186,17 +186,17 @@ def task_of(
 
     estimate = names_of("estimate", estimate)
     whole = f"; {', '.join(known.counts)} are counted, not estimated" if known.counts else ""
-    for what, names in (("estimate", estimate), ("priors", priors), ("parameters", parameters), ("bounds", bounds)):
-        _check(what, names, known.real, whole)
-    _check("noise", noise, MEASURED)
+    for argument, names in (("estimate", estimate), ("priors", priors), ("parameters", parameters), ("bounds", bounds)):
+        check_names(argument, names, known.real, whole)
+    check_names("noise", noise, MEASURED)
     start = {**known.starts, **parameters}
     if not estimate and not priors:
         raise UserError(f"nothing is named; there are {', '.join(known.real)}", argument="estimate")
     beliefs = {name: Prior(*spread_of("priors", name, p, start[name])) for name, p in priors.items()}
     chosen = tuple(name for name in known.real if name in estimate or name in beliefs)
-    for what, values in (("parameters", parameters), ("noise", noise)):
+    for argument, values in (("parameters", parameters), ("noise", noise)):
         for name, value in values.items():
-            positive(what, value, name)
+            positive(argument, value, name)
     for name in chosen:
         if start[name] <= 0:
             raise UserError(f"{name} starts at {start[name]:g} and cannot be estimated from there; fix another value")
@@ -209,10 +209,3 @@ def task_of(
                 f"{name} from {span[0]:g} to {span[1]:g}; the first must be below the second", argument="bounds"
             )
     return Task(chosen, start, spans, beliefs, dict(noise), offsets)
-
-
-def _check(what: str, names: Iterable[str], known: Collection[str], others: str = "") -> None:
-    """Raise UserError for an unknown name."""
-    for name in names:
-        if name not in known:
-            raise UserError(f"{name} is not known; there are {', '.join(known)}{others}", argument=what)

@@ -168,8 +168,8 @@ def _optimal(
     rows = [OUTPUTS.index(name) for name in noise]
     weighted = slopes[:, :, rows] / np.array(list(noise.values()))[:, None]
     directions = np.array([[1.0, 1.0], [1.0, -1.0]])
-    seen = np.einsum("pfcm,dm->dfcp", weighted, directions).reshape(2 * len(frequency), len(rows), -1)
-    each = np.einsum("kcp,kcq->kpq", seen.conj(), seen).real
+    visible = np.einsum("pfcm,dm->dfcp", weighted, directions).reshape(2 * len(frequency), len(rows), -1)
+    each = np.einsum("kcp,kcq->kpq", visible.conj(), visible).real
     w = 2 * np.pi * frequency
     cost = 1 / limits.angle**2 + (w / limits.rate) ** 2 + (w**2 / limits.acceleration) ** 2
     each /= np.tile(cost, 2)[:, None, None]
@@ -187,7 +187,7 @@ def _optimal(
 
 
 def typical_error(information: Array) -> float:
-    """Root mean square of the parameters' standard errors, as fractions; infinite where a combination stays open."""
+    """Root mean square of the parameters' standard errors, as fractions; infinite if a combination is undetermined."""
     if condition(information) > SINGULAR:
         return np.inf
     return float(np.sqrt(np.mean(np.diag(covariance_of(information)))))
@@ -202,7 +202,7 @@ DURATION, RATE = 10.0, 1000.0
 DESCRIBED = {
     "equal": "equal motors",
     "opposite": "opposite motors",
-    "single": "one motor alone",
+    "single": "only one motor",
     "independent": "motors that move independently",
 }
 

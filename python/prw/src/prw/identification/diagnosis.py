@@ -91,7 +91,7 @@ def _looks(solution: Solution, i: int, experiment: Experiment) -> Iterator[str]:
     first = before.task.first()
     gains, likes = [], []
     for outputs in (before.compare(first)[0].response.outputs, solution.comparisons[i].response.outputs):
-        y, m = experiment.seen(outputs)[2:], experiment.measured[2:]
+        y, m = experiment.observed(outputs)[2:], experiment.measured[2:]
         size = np.maximum(np.linalg.norm(y, axis=0), 1e-300)
         product = (y.conj().T @ m).real
         gains.append(np.diag(product) / size**2)
@@ -107,15 +107,15 @@ def _looks(solution: Solution, i: int, experiment: Experiment) -> Iterator[str]:
             k = experiment.channels.index(pair[1])
             for like in likes:
                 if min(like[j, k], like[k, j]) > ALIKE and max(like[j, j], like[k, k]) < UNLIKE:
-                    yield f"{name} and {pair[1]} are swapped: each follows what the FMU has for the other"
+                    yield f"{name} and {pair[1]} are swapped: each follows the FMU's value of the other"
                     return
         for gain, like in zip(gains, likes):
             if like[j, j] < -ALIKE or (like[j, j] < -UNLIKE and abs(np.log(-gain[j])) < np.log(TOLERANCE)):
-                yield f"{name} has the wrong sign: it moves against what the FMU has, {gain[j]:.2g} times as far"
+                yield f"{name} has the wrong sign: it moves against the FMU's value, {gain[j]:.2g} times as far"
                 break
             slip = _slip(gain[j])
             if slip and like[j, j] > UNLIKE:
-                yield f"{name} looks as if it were {SLIPS[slip]}: it is {gain[j]:.3g} times what the FMU has"
+                yield f"{name} looks as if it were {SLIPS[slip]}: it is {gain[j]:.3g} times the FMU's value"
                 break
         speed = np.interp(experiment.sampled, experiment.time, np.abs(experiment.omega).max(axis=1))
         yield from _flat(name, experiment.sampled, column, speed > AT_REST * speed.max())
@@ -139,7 +139,7 @@ def _flat(name: str, time: Array, column: Array, moving: NDArray[np.bool_]) -> I
     for level, side in ((column.max(), "above"), (column.min(), "below")):
         flats = (column[first] == level) & (long >= FLAT)
         if flats.sum() >= FLATS:
-            yield f"{name} is cut off at {level:.4g} (SI), {flats.sum()} times: it saturates, and what lies {side} is lost"
+            yield f"{name} is cut off at {level:.4g} (SI), {flats.sum()} times: it saturates, values {side} are lost"
             return
     longest = int(np.argmax(long))
     if moving[first[longest] : last[longest] + 1].mean() > 0.5 and time[last[longest]] - time[first[longest]] > STUCK:
@@ -166,7 +166,7 @@ def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
     tried = [t for kind in ("delay", "lag", "gain") for t in [t for t in trials if t[1] == kind][:TRIED]]
     best = -np.inf
     results = []
-    with Progress("looking for what is wrong", len(tried)) as progress:
+    with Progress("looking for causes", len(tried)) as progress:
         for done, (_, kind, group, new) in enumerate(tried):
             progress(done)
             found = settled(solution, new, rounds=ROUNDS)
@@ -198,7 +198,7 @@ def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
 
 def _size(distortion: Distortion, value: float, error: float) -> str:
     if distortion.kind == "gain":
-        return f"reads {value:.4g} +- {error * value:.1g} times what it should"
+        return f"reads {value:.4g} +- {error * value:.1g} times the true value"
     late = "late" if value > 0 else "early"
     if distortion.kind == "lag":
         return f"lags with a time constant of {value * 1e3:.3g} +- {error:.1g} ms"

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from prw.arguments import names_of, positive
+from prw.arguments import check_names, names_of, positive
 from prw.columns import MEASURED
 from prw.errors import UserError, need
 from prw.identification import DEFAULT_ESTIMATE, task_of
@@ -107,9 +107,7 @@ def excite(
         }.items()
     )
     channels = tuple(MEASURED) if measure is None else names_of("measure", measure)
-    for name in channels:
-        if name not in MEASURED:
-            raise UserError(f"{name} is not known; there are {', '.join(MEASURED)}", argument="measure")
+    check_names("measure", channels, MEASURED)
     if not channels:
         raise UserError(f"nothing is named; there are {', '.join(MEASURED)}", argument="measure")
     if not 4 * design.FADE <= duration <= MOST_SAMPLES / rate:

@@ -97,14 +97,14 @@ class Experiment:
 
     @cached_property
     def motors(self) -> Complex:
-        """Spectra of the motors' angles and rates (all_bins, 4), and of `jumps` (all_bins, 6) where there are any."""
+        """Spectra of the motors' angles and rates (all_bins, 4), and of `jumps` (all_bins, 6) if there are any."""
         return spectra(np.hstack([self.theta, self.omega, *([] if self.jumps is None else [self.jumps])]))
 
     @cached_property
     def finest(self) -> Array:
         """Lower bound (c,) of the channels' noise, SI: the error of the numbers and of the path between samples."""
         turn = 2 * np.pi * np.arange(1, self.bins) / len(self.time)
-        # Twelve times the error of the cubic between two samples; more where rows are uneven.
+        # Twelve times the error of the cubic between two samples; more if rows are uneven.
         between = turn**4 * (0.0 if self.jumps is not None else 1 / 60 if self.between is None else 1 / 10)
         found: Array = np.max((FINEST + between)[:, None] * np.abs(self.measured[1:]), axis=0, initial=LEAST)
         return found
@@ -136,7 +136,7 @@ class Experiment:
         """Power (bins, c) of the channels' errors by encoders' steps."""
         return _power(self.channel_errors)
 
-    def seen(self, modelled: Complex) -> Complex:
+    def observed(self, modelled: Complex) -> Complex:
         """Spectra (bins, c, ...) as in `measured`, from a model's spectra (needed_bins, c, ...)."""
         if self.samplers is None:
             return modelled

@@ -32,7 +32,7 @@ from prw.state_space import Complex, StateSpace
 #: Step of the logarithms for the central differences, with errors of 1e-8 in the sensitivities.
 DIFFERENCE = 1e-4
 #: Relative singular value below which a direction of the initial state is not estimated.
-UNSEEN = 1e-9
+UNDETERMINED = 1e-9
 #: Most rounds of fitting and estimating the noise, the change that ends them, and most rounds of the latter only.
 ROUNDS, SETTLED = 12, 0.003
 NOISE_ROUNDS = 30
@@ -154,16 +154,16 @@ class Comparison:
         for k, i in enumerate(edges):
             early[:, i, 3 * k : 3 * k + 3] = s[:, None] ** np.arange(3)
         linear = [steady, *(fault[:, :, None] for fault in faults), early, self.response.transients]
-        nuisance = experiment.seen(np.concatenate(linear, axis=2))
+        nuisance = experiment.observed(np.concatenate(linear, axis=2))
         difference = np.zeros((bins, channels), dtype=complex)
         if experiment.values is not None:
-            difference = experiment.measured - experiment.seen(response.outputs)
+            difference = experiment.measured - experiment.observed(response.outputs)
         white = self._parts(self._whiten @ np.concatenate([nuisance, difference[:, :, None]], axis=2))
         flat = white.reshape(-1, white.shape[-1])
         left, sizes, right = np.linalg.svd(flat[:, :-1], full_matrices=False)
-        seen = sizes > UNSEEN * sizes[0]
-        self._basis = left[:, seen]
-        found = (right[seen].T / sizes[seen]) @ (self._basis.T @ flat[:, -1])
+        determined = sizes > UNDETERMINED * sizes[0]
+        self._basis = left[:, determined]
+        found = (right[determined].T / sizes[determined]) @ (self._basis.T @ flat[:, -1])
         self.residual = self.project(white[..., -1])
         self.offsets, self.initial = found[:channels] if offsets else np.zeros(channels), found[-6:]
         self._rest = difference - nuisance @ found
@@ -199,15 +199,15 @@ class Comparison:
         diagonal = np.arange(lower.shape[-1])
         lower[..., diagonal, diagonal] /= 2
         followed = (lower @ (whiten @ self._rest[:, :, None]))[..., 0]
-        table = self.seen_along(outputs) - self.project(self._parts(np.moveaxis(followed, 0, -1)))
+        table = self.change_along(outputs) - self.project(self._parts(np.moveaxis(followed, 0, -1)))
         # E |d residual|^2, where d residual = -(whitened dG) n_u - lower r, with errors n_u of the encoders.
         rows = [t.reshape(len(t), -1) for t in (direct, lower, moved)]
         a, s, b = (np.hstack([t.real, t.imag]) for t in rows)
         return table, 2 * (a @ a.T + s @ s.T - b @ s.T - s @ b.T)
 
-    def seen_along(self, outputs: Complex) -> Array:
+    def change_along(self, outputs: Complex) -> Array:
         """Changes (2, bins, c, q) of the residual with changes of the outputs (q, f, c)."""
-        return self.project(self._parts(-self._whiten @ self.experiment.seen(np.moveaxis(outputs, 0, -1))))
+        return self.project(self._parts(-self._whiten @ self.experiment.observed(np.moveaxis(outputs, 0, -1))))
 
     def _parts(self, table: Complex) -> Array:
         """Real and imaginary parts (2, bins, ...), each of variance 1, of spectra (bins, ...) of variance 1."""
@@ -221,8 +221,8 @@ class Comparison:
         """Variance (p, p) of the score J'r, with the drawn encoders' errors: in a periodic motion they have
         its phase and repeat with it. jacobian: (2, bins, c, p)."""
         scores = np.einsum("rfcp,rfcd->dp", jacobian, self._drawn, optimize=True)
-        seen = self._whiten * np.sqrt(self._noise)
-        of_noise = np.einsum("fcj,rfcp->rfjp", seen.conj(), jacobian, optimize=True).reshape(-1, jacobian.shape[-1])
+        noise = self._whiten * np.sqrt(self._noise)
+        of_noise = np.einsum("fcj,rfcp->rfjp", noise.conj(), jacobian, optimize=True).reshape(-1, jacobian.shape[-1])
         variance: Array = scores.T @ scores / len(scores) + (of_noise.conj().T @ of_noise).real
         return variance
 

@@ -10,8 +10,8 @@ from xml.etree import ElementTree
 
 import fmu_run
 
-from prw.linearization import CONTINUOUS, Linearizer
-from prw.testbed import OUTPUTS
+from prw.linearization import Linearizer
+from prw.testbed import CONTINUOUS, OUTPUTS
 
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"

@@ -65,7 +65,7 @@ class Path(NamedTuple):
 
 
 def smooth(time: Array, theta: Array, omega: Array | None = None, quantum: float = 0.0) -> Path:
-    """The most probable path through the angles theta (n,) rad and, where logged, rates omega (n,) rad/s at the times
+    """The most probable path through the angles theta (n,) rad and, if logged, rates omega (n,) rad/s at the times
     (n,) s, which may be uneven. quantum: of the angles in rad, if it is coarser than the data suggest."""
     quantum = max(quantum, quantum_of(theta))
     spline = _Spline(time)

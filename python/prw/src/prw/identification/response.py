@@ -82,11 +82,11 @@ class Response:
             self._motors[:, [4, 5], [1, 2]] = 1 - (1 + self._s[:, None] * experiment.step) / self._z[..., 0]
         self._resolvent = np.linalg.inv(self._z * np.eye(6) - model.A)
         self._states = self._resolvent @ ((model.before + self._z * model.after) @ self._motors)
-        answers: Complex = model.C @ self._states + model.D @ self._motors
+        from_motors: Complex = model.C @ self._states + model.D @ self._motors
         #: Spectra of the channels (f, c), periodic.
-        self.outputs: Complex = answers[..., 0]
+        self.outputs: Complex = from_motors[..., 0]
         #: From the motors' angles, moving with their rates, to the channels: (f, c, 2).
-        self.transfer: Complex = answers[..., 1:]
+        self.transfer: Complex = from_motors[..., 1:]
         #: Contribution of each of the six numbers d, (f, c, 6).
         self.transients: Complex = self._z * (model.C @ self._resolvent)
         self._filters = np.ones((bins, model.C.shape[0]), dtype=complex)

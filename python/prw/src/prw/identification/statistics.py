@@ -77,7 +77,7 @@ class Combination(NamedTuple):
     def __str__(self) -> str:
         moves = ", ".join(f"{name} {(1.1**share - 1) * 100:+.0f} %" for name, share in self.shares.items())
         if len(self.shares) == 1:
-            return f"{next(iter(self.shares))} has hardly any effect on what was measured"
+            return f"{next(iter(self.shares))} has hardly any effect on the measurements"
         names = list(self.shares)
         return (
             f"{', '.join(names[:-1])} and {names[-1]} cannot be distinguished: {moves} together change next to nothing"

@@ -22,7 +22,7 @@ from prw.state_space import Complex
 from prw.testbed import OUTPUTS
 
 #: Chance that a channel of a good fit looks coherent with the motion: little, for an encoder's steps are not as normal as it
-#: assumes, and in slow motion 1e-8 was seen; a fault's estimate over its error that is no
+#: assumes, and 1e-8 occurs in slow motion; a fault's estimate over its error that is no
 #: chance, and from which on intervals grow to cover it.
 CHANCE, CLEAR, SMALL = 1e-10, 4.7, 2.5
 #: As CLEAR, for residuals that follow the sign of a rate, as encoders' steps do in a periodic motion.
@@ -111,7 +111,7 @@ def judge(solution: Solution) -> Verdict:
     for i, (experiment, comparison) in enumerate(zip(solution.fitter.experiments, solution.comparisons)):
 
         def score(columns: Complex, i: int = i, comparison: Comparison = comparison) -> _Score:
-            return _Score(solution, i, comparison.seen_along(columns), inverse)
+            return _Score(solution, i, comparison.change_along(columns), inverse)
 
         spread, luck = _strength(solution, i)
         for j, name in enumerate(experiment.channels):
@@ -119,7 +119,7 @@ def judge(solution: Solution) -> Verdict:
             chance = there.chance(2 * experiment.bins)
             texts = []
             if chance < CHANCE:
-                texts.append("what the FMU does not explain follows the motors")
+                texts.append("the unexplained part follows the motors")
             if spread[j] > EXCESS * (1 + LUCK * luck[j]):
                 texts.append(
                     f"the residual is {float(f'{spread[j]:.2g}'):g} times the noise at frequencies at which the motors rest"
