@@ -22,13 +22,12 @@ def report(directory) -> dict:
     return json.loads((directory / "report.json").read_text())
 
 
-def check_estimates(found: dict, simulated: dict, sigmas: float = 4.5, worst: float = 0.02) -> None:
-    """Checks that all estimates are within `sigmas` standard errors of the true values, and none further than `worst` from
-    it."""
+def check_estimates(found: dict, simulated: dict, worst: float = 0.02) -> None:
+    """Checks that all estimates are within 4.5 standard errors of the true values, and none further than `worst` from them."""
     for name in rig.NAMES:
         entry = found["parameters"][name]
         off = np.log(entry["value"] / simulated[name])
-        assert abs(off) < sigmas * entry["relative_standard_error"], f"{name}: {off:+.3%}"
+        assert abs(off) < 4.5 * entry["relative_standard_error"], f"{name}: {off:+.3%}"
         assert abs(off) < worst, f"{name}: {off:+.3%}"
         assert entry["interval_95"][0] < entry["value"] < entry["interval_95"][1]
 

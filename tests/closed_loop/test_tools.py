@@ -106,4 +106,4 @@ def test_a_file_of_another_tool(validate, fmu, tmp_path, capsys):
     assert "fig4_opposite: Tool 1.0, from the file far.csv" in capsys.readouterr().err
     assert [row["agrees"] for row in found["rows"] if "Tool" in row["importer"]] == [False]
     assert validate("--result", "far.csv")[0] == 1
-    assert "write TOOL=FILE" in capsys.readouterr().err
+    assert "--result far.csv: write NAME=VALUE" in capsys.readouterr().err

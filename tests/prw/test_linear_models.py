@@ -180,18 +180,11 @@ def _description(fmu: Path) -> str:
         return archive.read("modelDescription.xml").decode()
 
 
-def test_unknown_names(pendulum: Path) -> None:
-    with pytest.raises(prw.UserError, match="no start value length; there are torque, stiffness, angle, rate"):
-        prw.linearize({"length": 1.0}, fmu=pendulum)
-    with pytest.raises(prw.UserError, match="yaw is neither a continuous output nor a state; there are angle, height"):
-        prw.linearize(fmu=pendulum, outputs=["yaw"])
-
-
 @pytest.mark.parametrize(
     "arguments, message",
     [
-        ({"outputs": ["yaw"]}, "yaw is neither a continuous output nor a state; there are "),
-        ({"parameters": {"k9": 1.0}}, "no start value k9"),
+        ({"outputs": ["yaw"]}, "yaw is neither a continuous output nor a state; there are tau1, tau2"),
+        ({"parameters": {"k9": 1.0}}, "no start value k9; there are "),
         ({"parameters": {"J2": -1.0}}, "J2"),
         ({"fmi_type": "ScheduledExecution"}, "offers no directional derivatives for ScheduledExecution"),
     ],

@@ -6,8 +6,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
+from prw.commands.options import add_paths
 from prw.files import write_text
+from prw.testbed import existing_fmu
 
 #: The copies that are kept with the sources, for the documentation and the README.
 COMMITTED = Path("docs/fmu-page/figures")
@@ -21,10 +22,7 @@ HELP = "reproduce the paper's figures from runs of the FMU"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
-    parser.add_argument(
-        "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="directory to write into (default: %(default)s)"
-    )
+    add_paths(parser)
     parser.add_argument(
         "--commit",
         action="store_true",
@@ -39,7 +37,8 @@ def run(arguments: argparse.Namespace) -> None:
     from tools.figures.results import numbers, results
     from tools.figures.writing import write_for_page, write_png, write_small_png, write_svg
 
-    found = results(arguments.fmu)
+    fmu = existing_fmu(arguments.fmu)
+    found = results(fmu)
     drawn = figures(found)
     for name, figure in drawn.items():
         write_svg(arguments.out / f"{name}.svg", figure.figure)
@@ -57,7 +56,7 @@ def run(arguments: argparse.Namespace) -> None:
         from tools.figures import visit
         from tools.figures.film import SPEED, story
 
-        run, captions = story(arguments.fmu, arguments.fmu.with_name("prw_controller.fmu"))
+        run, captions = story(fmu, fmu.with_name("prw_controller.fmu"))
         animate(run, FILM, speed=SPEED, captions=captions)
-        visit.film(arguments.fmu, VISIT)
+        visit.film(fmu, VISIT)
         print(f"renewed {COMMITTED}, {FILM} and {VISIT}")

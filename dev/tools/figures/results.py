@@ -14,7 +14,7 @@ from prw.motion import Motion, fig4
 from prw.state_space import StateSpace
 from prw.testbed import ANGLE_OF, OUTPUTS, Testbed
 from tools.convergence import Convergence, convergence, order
-from tools.frequency import SHAFTS, TORQUES, Sweep, decibels, sweep
+from tools.frequency import SHAFTS, TORQUES, decibels, sweep
 from tools.modes import Mode, pitch_and_roll
 
 #: Hz. The curves of the Bode plots run over CURVE, the measured points lie at POINTS.
@@ -36,13 +36,13 @@ class Step(NamedTuple):
 class Results(NamedTuple):
     """The linear model of the FMU (outputs SHAFTS, TORQUES, and once more all OUTPUTS), and its runs.
 
-    fig4, fig4_equal: the experiment of Fig. 4 and its counterpart. pitch_step: both motors step by 1 degree. roll_step:
+    sweep: the measured response of SHAFTS and TORQUES at POINTS. fig4, fig4_equal: the experiment of Fig. 4 and its counterpart. pitch_step: both motors step by 1 degree. roll_step:
     motor 2 steps by -1 degree instead.
     """
 
     model: StateSpace
     modes: tuple[Mode, Mode]
-    sweep: Sweep
+    sweep: np.ndarray
     fig4: Run
     fig4_equal: Run
     pitch_step: Step
@@ -86,7 +86,7 @@ def _step(fmu: Path, sides: tuple[int, int]) -> Step:
 def numbers(found: Results) -> str:
     """The quoted results by name, and the version of matplotlib that drew the figures, as JSON."""
     low = POINTS <= STATED
-    ratio = found.sweep.response / found.model.response_at_hz(POINTS, ANGLE_OF)
+    ratio = found.sweep / found.model.response_at_hz(POINTS, ANGLE_OF)
     high = found.model.response_at_hz(1e5, ANGLE_OF)
     _, opposite = found.fig4
     _, equal = found.fig4_equal

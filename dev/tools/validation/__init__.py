@@ -7,7 +7,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from prw.commands.options import DEFAULT_OUT
+from prw.commands.options import DEFAULT_OUT, Named
 from prw.errors import UserError
 
 DEFAULT_FMUS = Path("target/fmu")
@@ -17,24 +17,26 @@ HELP = "compare the FMUs with the reference experiments under every importer"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument(
-        "--fmus",
-        type=Path,
-        default=DEFAULT_FMUS,
-        metavar="DIR",
-        help="directory with prw_testbed.fmu, fmi3/ and the closed loop (default: %(default)s)",
-    )
+    add_directories(parser)
     parser.add_argument(
         "--result",
-        action="append",
-        default=[],
+        action=Named,
+        read=Path,
         metavar="TOOL=FILE",
         help="also compare this file, which another tool wrote, as `prw check` does; TOOL is its name and version. May be "
         "repeated",
     )
-    parser.add_argument(
-        "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="directory to write into (default: %(default)s)"
-    )
+
+
+def add_directories(parser: argparse.ArgumentParser) -> None:
+    """Add the options --fmus and --out."""
+    for option, default, use in (
+        ("--fmus", DEFAULT_FMUS, "of the FMUs and the closed loop"),
+        ("--out", DEFAULT_OUT, "to write into"),
+    ):
+        parser.add_argument(
+            option, type=Path, default=default, metavar="DIR", help=f"directory {use} (default: %(default)s)"
+        )
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -45,13 +47,7 @@ def run(arguments: argparse.Namespace) -> None:
     from tools.validation.page import page
     from tools.validation.runs import validate
 
-    results = []
-    for text in arguments.result:
-        tool, equals, file = text.rpartition("=")
-        if not equals or not tool.strip() or not file:
-            raise UserError(f"--result {text}: write TOOL=FILE, for example --result 'OpenModelica 1.26=wrist_res.mat'")
-        results.append((tool.strip(), Path(file)))
-    found = validate(arguments.fmus, results)
+    found = validate(arguments.fmus, arguments.result)
     write_text(arguments.out / "validation.json", found.to_json())
     write_text(arguments.out / "validation.html", page(found))
     for row in found.rows:

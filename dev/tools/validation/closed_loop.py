@@ -5,15 +5,13 @@ closed_loop.csv, closed_loop.png, coupling.csv and coupling.png."""
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from prw.commands.options import DEFAULT_OUT
 from prw.errors import UserError
 from prw.files import write_table
-from tools.validation import DEFAULT_FMUS
+from tools.validation import add_directories
 
 if TYPE_CHECKING:
     from tools.validation.system import System
@@ -26,16 +24,7 @@ HELP = "run testbed and controller under several masters"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument(
-        "--fmus",
-        type=Path,
-        default=DEFAULT_FMUS,
-        metavar="DIR",
-        help="directory with prw_closed_loop.ssp and prw_closed_loop/ (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="directory to write into (default: %(default)s)"
-    )
+    add_directories(parser)
 
 
 def run(arguments: argparse.Namespace) -> None:

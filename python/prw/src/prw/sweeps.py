@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 import os
@@ -91,60 +92,51 @@ def sweep(
     RuntimeWarning
         All runs failed.
     """
-    need("pyarrow")
-    if scheduler:
-        need("distributed")
-    with Testbed(existing_fmu(fmu)) as testbed:
-        values = layout(grid or {}, random or {}, runs, seed, testbed, parameters)
+    need("pyarrow", *(["distributed"] if scheduler else []))
+    threads = counted("threads", threads) if threads is not None else os.cpu_count() or 1
+    with Testbed(existing_fmu(fmu)) as testbed, contextlib.ExitStack() as stack:
         fixed = values_of(parameters, testbed.loaded)
-        table = carry_out(testbed, motion_of(motion), values, fixed, threads, scheduler, out)
+        values, moved = layout(grid or {}, random or {}, runs, seed, testbed, fixed), motion_of(motion)
+        # The file is created first, so that a directory that cannot be written costs no runs.
+        temporary = None if out is None else stack.enter_context(replacing(Path(out) / "runs.parquet"))
+        table = _made(testbed, moved, values, fixed, threads, scheduler)
+        if temporary is not None:
+            import pyarrow.parquet
+
+            pyarrow.parquet.write_table(table, temporary)
     if "done" not in table["status"].to_pylist():
         warnings.warn(f"all {table.num_rows} runs failed; run 0: {table['message'][0]}", RuntimeWarning, stacklevel=2)
     return table
 
 
-def carry_out(
+def _made(
     testbed: Testbed,
     motion: Motion,
     values: Mapping[str, Array],
     fixed: Mapping[str, Any],
-    threads: int | None,
+    threads: int,
     scheduler: str | None,
-    out: str | os.PathLike[str] | None,
 ) -> pyarrow.Table:
-    """Make the runs with the `values` (runs,) by parameter, and with the values `fixed` in all of them. Other arguments as for
-    `sweep`."""
+    """The table of the runs with the `values` (runs,) by parameter, and with the values `fixed` in all of them."""
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
-    threads = counted("threads", threads) if threads is not None else os.cpu_count() or 1
     start, total = {**fixed, **values}, len(next(iter(values.values())))
+    with Progress(f"{total} runs", total) as progress:
+        if scheduler:
+            from prw.cluster import on_cluster
 
-    def made() -> pa.Table:
-        with Progress(f"{total} runs", total) as progress:
-            if scheduler:
-                from prw.cluster import on_cluster
-
-                measured, errors = on_cluster(testbed.fmu, motion, fixed, values, scheduler, progress)
-            else:
-                measured, errors = statistics(testbed, motion, start, threads, lambda done, _: progress(done))
-        failed = np.isin(np.arange(total), list(errors))
-        columns = {
-            "run": pa.array(range(total), pa.int64()),
-            "status": np.where(failed, "failed", "done").tolist(),
-            "message": [errors.get(run, "") for run in range(total)],
-            **values,
-            **{name: pa.array(column, mask=failed) for name, column in measured.items()},
-        }
-        return pa.table(columns)
-
-    if out is None:
-        return made()
-    # The file is created first, so that a directory that cannot be written costs no runs.
-    with replacing(Path(out) / "runs.parquet") as temporary:
-        table = made()
-        pq.write_table(table, temporary)
-    return table
+            measured, errors = on_cluster(testbed.fmu, motion, fixed, values, scheduler, progress)
+        else:
+            measured, errors = statistics(testbed, motion, start, threads, lambda done, _: progress(done))
+    failed = np.isin(np.arange(total), list(errors))
+    columns = {
+        "run": pa.array(range(total), pa.int64()),
+        "status": np.where(failed, "failed", "done").tolist(),
+        "message": [errors.get(run, "") for run in range(total)],
+        **values,
+        **{name: pa.array(column, mask=failed) for name, column in measured.items()},
+    }
+    return pa.table(columns)
 
 
 def statistics(
@@ -168,11 +160,10 @@ def layout(
     runs: int,
     seed: int,
     testbed: Testbed,
-    parameters: Given = None,
+    fixed: Mapping[str, Any],
 ) -> dict[str, Array]:
     """The values of the parameters that vary, (runs,) each: all combinations of the grid, each with all draws, about
-    `parameters` or the FMU's start values. Raises UserError for invalid arguments."""
-    fixed = values_of(parameters, testbed.loaded)
+    `fixed` or the FMU's start values. Raises UserError for invalid arguments."""
     testbed.with_starts(fixed)
     starts = {**testbed.starts, **fixed}
     check_names("grid", grid, testbed.starts)

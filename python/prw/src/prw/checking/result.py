@@ -31,7 +31,7 @@ class Result:
     values: Mapping[str, Array]
 
 
-def read_result(path: Path, units: Mapping[str, str] = {}, component: str | None = None) -> Result:
+def read_result(path: Path, units: Mapping[str, str], component: str | None) -> Result:
     """Read the columns of time, motors and outputs; see `prw.check`. Of several rows at one time the last one counts: there,
     inputs and outputs belong together. Raises UserError naming the file and the cause."""
     check_names("units", units, QUANTITIES)

@@ -8,7 +8,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT, add_parameter_options, parameters_of
+from prw.commands.options import DEFAULT_OUT, FMU, add_parameter_options, parameters_of
 from prw.files import write_text
 from prw.linearization import linearize
 from prw.state_space import StateSpace
@@ -19,7 +19,7 @@ HELP = "the linear model of an FMU"
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     add_parameter_options(parser, "the FMU's unit")
-    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the FMU (default: %(default)s)")
+    parser.add_argument("--fmu", type=Path, help=FMU)
     parser.add_argument(
         "--out",
         type=Path,
@@ -31,7 +31,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw linearize`. Raises UserError with a message of one line."""
-    model = linearize(parameters_of(arguments, arguments.fmu), fmu=arguments.fmu)
+    model = linearize(parameters_of(arguments), fmu=arguments.fmu)
     write_text(arguments.out, json.dumps(content(model), indent=2) + "\n")
     for kind in ("states", "inputs", "outputs"):
         print(f"{kind:<11} {', '.join(getattr(model, kind)) or 'none'}")

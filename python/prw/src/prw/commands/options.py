@@ -14,15 +14,11 @@ from typing import Any, TypeVar
 from prw.arguments import values_of
 from prw.errors import UserError
 from prw.identification import DEFAULT_ESTIMATE
-from prw.testbed import default_fmu, existing_fmu, loaded
+from prw.testbed import existing_fmu, loaded
 
-#: None if there is none: a command that needs an FMU then reports the locations that it searched.
-DEFAULT_FMU: Path | None
-try:
-    DEFAULT_FMU = default_fmu()
-except UserError:
-    DEFAULT_FMU = None
 DEFAULT_OUT = Path("out")
+#: Help of --fmu.
+FMU = "the testbed FMU (default: the FMU that PRW_FMU names, else the FMU in this package or in its clone)"
 T = TypeVar("T")
 
 
@@ -38,7 +34,7 @@ def call(function: Callable[..., T], arguments: argparse.Namespace, **others: An
 
 def add_paths(parser: argparse.ArgumentParser, out: str = "directory to write into", directory: str = "") -> None:
     """The options --fmu and --out. out: the help; directory: the default within DEFAULT_OUT."""
-    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
+    parser.add_argument("--fmu", type=Path, help=FMU)
     default = DEFAULT_OUT / directory
     parser.add_argument("--out", type=Path, default=default, metavar="DIR", help=f"{out} (default: %(default)s)")
 
@@ -163,11 +159,11 @@ def add_parameter_options(parser: argparse.ArgumentParser, unit: str) -> None:
     parser.set_defaults(options={"parameters": "--parameters"})
 
 
-def parameters_of(arguments: argparse.Namespace, fmu: Path | None) -> dict[str, Any]:
+def parameters_of(arguments: argparse.Namespace) -> dict[str, Any]:
     """The values by name that these options give."""
     found: dict[str, Any] = {}
     if arguments.parameters is not None:
-        with loaded(existing_fmu(fmu)) as inside:
+        with loaded(existing_fmu(arguments.fmu)) as inside:
             found = values_of(arguments.parameters, inside)
     if arguments.set:
         arguments.options = {"parameters": "--set"}

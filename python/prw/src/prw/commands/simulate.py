@@ -23,6 +23,7 @@ from prw.files import replacing
 from prw.motion import fig4
 from prw.recording import read_motion
 from prw.simulation import Run, simulate
+from prw.testbed import existing_fmu
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -72,7 +73,7 @@ def run(arguments: argparse.Namespace) -> None:
         raise UserError(
             f"{table}: is the recording itself and would be overwritten; choose another directory with --out"
         )
-    given = parameters_of(arguments, arguments.fmu)
+    given = parameters_of(arguments)
     response = call(simulate, arguments, motion=motion, parameters=given)
     response.to_csv(table)
     written, missing = [table], ""
@@ -130,7 +131,9 @@ def _summary(
     if arguments.input is None:
         lines.append(f"next        {look}; then your own motors: prw simulate motors.csv (see prw simulate --help)")
     else:
-        lines.append(f"next        {look}; {arguments.fmu} also loads in Simulink, OpenModelica and others")
+        lines.append(
+            f"next        {look}; {existing_fmu(arguments.fmu)} also loads in Simulink, OpenModelica and others"
+        )
     return lines
 
 

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 #: The parameters that are estimated by default.
 DEFAULT_ESTIMATE = ("k1", "k2", "c1", "c2", "c3")
-#: The distortions of a channel, in the order of `identify`'s arguments.
-KINDS = ("delay", "lag", "gain")
 #: Default bounds: this factor about the start value.
 REACH = 100.0
 
@@ -107,7 +105,7 @@ def identify(
 
     from prw.arguments import values_of
     from prw.identification.experiment import may_be_simulated, prepare
-    from prw.identification.fit import Distortion, fit
+    from prw.identification.fit import DISTORTIONS, Distortion, fit
     from prw.identification.model import Model
     from prw.identification.results import Identification
     from prw.identification.statistics import certainty
@@ -124,7 +122,7 @@ def identify(
     delay, lag, gain = names_of("delay", delay), names_of("lag", lag), names_of("gain", gain)
     # Matrices are small and many: more threads are slower.
     with Model(fmu) as model, threadpool_limits(1):
-        distortions = tuple(Distortion(k, n) for k, names in zip(KINDS, (delay, lag, gain)) for n in names)
+        distortions = tuple(Distortion(k, n) for k, names in zip(DISTORTIONS, (delay, lag, gain)) for n in names)
         task = replace(
             task_of(model.known, estimate, priors, values_of(parameters, model.loaded), bounds, noise, offsets),
             distortions=distortions,

@@ -99,7 +99,7 @@ def _natural(frequency: Array, limits: Limits) -> Array:
     return np.minimum(np.minimum(limits.angle, limits.rate / w), limits.acceleration / w**2)
 
 
-def _multisine(time: Array, frequency: Array, size: Array, shift: int = 0) -> Array:
+def _multisine(time: Array, frequency: Array, size: Array, shift: int) -> Array:
     """Angle, rate and acceleration, (3, n), of a sum of sines. shift: another one gives other phases."""
     k = np.arange(len(frequency))
     power = size**2 / max(np.sum(size**2), np.finfo(float).tiny)

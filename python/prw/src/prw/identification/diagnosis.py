@@ -3,7 +3,7 @@ a delay, a lag or another gain."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from prw.columns import QUANTITIES
 from prw.identification.experiment import Experiment
-from prw.identification.fit import Distortion, Fitter, Solution, settled
+from prw.identification.fit import DISTORTIONS, Distortion, Fitter, Solution, refitted
 from prw.identification.statistics import covariance_of, information_of
 from prw.identification.verdict import CLEAR, PAIRS, Verdict, groups, judge, named, single_faults
 from prw.motion import Array
@@ -29,8 +29,8 @@ ALIKE, UNLIKE = 0.9, 0.7
 FLAT, FLATS, STUCK = 4, 3, 0.25
 #: Share of its greatest rate below which a motor is at rest.
 AT_REST = 1e-3
-#: Number of candidate sets of channels that are fitted, and rounds of estimating the noise.
-TRIED, ROUNDS = 2, 2
+#: Number of candidate sets of channels that are fitted.
+TRIED = 2
 #: Share of the best fault's gain from which another fault is named; the same for a fault in addition to the best.
 SHARE, SECOND = 0.6, 0.05
 
@@ -80,7 +80,7 @@ def _with_fault(solution: Solution, name: str) -> Solution:
     for _ in range(2):
         pairs = zip(found.fitter.experiments, found.comparisons)
         faults = [[column for n, _, column in single_faults(found, *pair) if n == name] for pair in pairs]
-        found = settled(found, (), faults, ROUNDS)
+        found = refitted(found, (), faults)
     return found
 
 
@@ -148,52 +148,45 @@ def _flat(name: str, time: Array, column: Array, moving: NDArray[np.bool_]) -> I
 
 def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
     """Distortions of single channels, pairs and all."""
-    channels = solution.fitter.channels
-    clear = {fault.name: fault for fault in verdict.faults}
-    trials = []
-    for kind in ("delay", "lag", "gain"):
-        for group in groups(channels):
-            new = tuple(Distortion(kind, name) for name in group)
-            if set(new) & set(solution.task.distortions) or (kind == "gain" and len(group) > 2):
-                continue
-            like = "gain" if kind == "gain" else "delay"
-            parts = sum(fault.gain for name in group if (fault := clear.get(named(like, (name,)))))
-            whole = clear.get(named(like, group))
-            # A set that explains no more than its parts ranks below them.
-            expected_gain = max(parts, whole.gain if whole else 0.0) - 10 * len(group)
-            trials.append((expected_gain, kind, group, new))
-    trials.sort(key=lambda trial: -trial[0])
-    tried = [t for kind in ("delay", "lag", "gain") for t in [t for t in trials if t[1] == kind][:TRIED]]
-    best = -np.inf
-    results = []
+    clear = {fault.name: fault.gain for fault in verdict.faults}
+
+    def expected_gain(kind: str, group: Sequence[str]) -> float:
+        """A set that explains no more than its parts ranks below them."""
+        like = "gain" if kind == "gain" else "delay"
+        parts = sum(clear.get(named(like, (name,)), 0.0) for name in group)
+        return max(parts, clear.get(named(like, group), 0.0)) - 10 * len(group)
+
+    tried = []
+    for kind in DISTORTIONS:
+        trials = sorted(groups(solution, kind), key=lambda group: -expected_gain(kind, group))
+        tried += [(kind, group) for group in trials[:TRIED]]
+    # Only the best set of a kind is reported.
+    best: dict[str, tuple[float, tuple[Distortion, ...], Solution]] = {}
     with Progress("looking for causes", len(tried)) as progress:
-        for done, (_, kind, group, new) in enumerate(tried):
+        for done, (kind, group) in enumerate(tried):
             progress(done)
-            found = settled(solution, new, rounds=ROUNDS)
+            new = tuple(Distortion(kind, name) for name in group)
+            found = refitted(solution, new)
             gain = solution.unlikeliness - found.unlikeliness - 12 * len(group)
-            results.append((gain, kind, group, found))
-            best = max(best, gain)
-    results.sort(key=lambda result: -result[0])
-    reported: set[str] = set()
-    for gain, kind, group, found in results:
-        # Only the best set of a kind is reported.
-        if gain < SHARE * best or gain < CLEAR**2 or kind in reported:
-            continue
-        reported.add(kind)
-        errors = np.sqrt(np.diag(covariance_of(information_of(found.jacobians) + found.task.prior_information())))
-        sizes: dict[str, list[str]] = {}
-        for k, distortion in enumerate(found.task.distortions[-len(group) :]):
-            at = len(errors) - len(group) + k
-            value, error = distortion.value(found.logarithms[at]), float(errors[at])
-            sizes.setdefault(_size(distortion, value, error), []).append(distortion.channel)
-        options = ",".join(group)
-        good = judge(found).fits
-        then = "with that, the data fit" if good else "that explains a part of it"
-        description = "; ".join(f"{', '.join(names)} {size}" for size, names in sizes.items())
-        text = f"{description}: {then} ({kind} {options} estimates it along)"
-        yield _Cause(
-            gain, kind, text, good, partial(settled, solution, found.task.distortions[-len(group) :], rounds=ROUNDS)
-        )
+            if kind not in best or gain > best[kind][0]:
+                best[kind] = gain, new, found
+    greatest = max((gain for gain, *_ in best.values()), default=0.0)
+    for kind, (gain, new, found) in best.items():
+        if gain >= max(SHARE * greatest, CLEAR**2):
+            good = judge(found).fits
+            then = "with that, the data fit" if good else "that explains a part of it"
+            channels = ",".join(distortion.channel for distortion in new)
+            text = f"{_sizes(found, new)}: {then} ({kind} {channels} estimates it along)"
+            yield _Cause(gain, kind, text, good, partial(refitted, solution, new))
+
+
+def _sizes(found: Solution, new: tuple[Distortion, ...]) -> str:
+    """The estimates of the last distortions of a fit, `new`; equal ones together."""
+    errors = np.sqrt(np.diag(covariance_of(information_of(found.jacobians) + found.task.prior_information())))
+    sizes: dict[str, list[str]] = {}
+    for distortion, x, error in zip(new, found.logarithms[-len(new) :], errors[-len(new) :]):
+        sizes.setdefault(_size(distortion, distortion.value(x), float(error)), []).append(distortion.channel)
+    return "; ".join(f"{', '.join(names)} {size}" for size, names in sizes.items())
 
 
 def _size(distortion: Distortion, value: float, error: float) -> str:

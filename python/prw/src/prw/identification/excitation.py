@@ -96,16 +96,10 @@ def excite(
     from prw.identification.model import Model
     from prw.identification.statistics import covariance_of, undetermined
 
-    angle, speed, acceleration, duration, rate = (
-        positive(name, value)
-        for name, value in {
-            "angle": angle,
-            "speed": speed,
-            "acceleration": acceleration,
-            "duration": duration,
-            "rate": rate,
-        }.items()
+    limits = design.Limits(
+        *(positive(*each) for each in (("angle", angle), ("speed", speed), ("acceleration", acceleration)))
     )
+    duration, rate = positive("duration", duration), positive("rate", rate)
     channels = tuple(MEASURED) if measure is None else names_of("measure", measure)
     check_names("measure", channels, MEASURED)
     if not channels:
@@ -121,7 +115,6 @@ def excite(
         task = task_of(model.known, estimate, parameters=parameters, noise=noise)
         known = {**design.DEFAULT_NOISE, **noise}
         assumed = {name: known[name] for name in channels}
-        limits = design.Limits(angle, speed, acceleration)
         for motion in design.motions(model, task, limits, duration, rate, assumed):
             found = design.information(model, [planned(motion, channels)], task, task.first(), assumed)
             errors = dict(zip(task.names, np.sqrt(np.diag(covariance_of(found))).tolist()))

@@ -33,8 +33,9 @@ from prw.state_space import Complex, StateSpace
 DIFFERENCE = 1e-4
 #: Relative singular value below which a direction of the initial state is not estimated.
 UNDETERMINED = 1e-9
-#: Most rounds of fitting and estimating the noise, the change that ends them, and most rounds of the latter only.
-ROUNDS, SETTLED = 12, 0.003
+#: Most rounds of fitting and estimating the noise, in a comparison too; the change that ends them, and most rounds of the
+#: latter only.
+ROUNDS, FEW_ROUNDS, SETTLED = 12, 2, 0.003
 NOISE_ROUNDS = 30
 #: A search starts at least this far inside its bounds.
 INSIDE = 1e-6
@@ -46,7 +47,8 @@ SAME = 0.01
 RIVAL = 9.0
 
 
-#: The distortions of a channel, each with a unit in which 1 is a typical size; a gain is estimated as its logarithm.
+#: The distortions of a channel, in the order of `identify`'s arguments, each with a unit in which 1 is a typical size. A gain
+#: is estimated as its logarithm.
 DISTORTIONS = {"delay": 1e-3, "lag": 1e-3, "gain": 1.0}
 #: Bounds of a distortion in these units.
 FURTHEST = 50.0
@@ -132,8 +134,8 @@ class Comparison:
         response: Response,
         noise: Array,
         offsets: bool,
-        edges: Sequence[int] = (),
-        faults: Sequence[Complex] = (),
+        edges: Sequence[int],
+        faults: Sequence[Complex],
     ):
         """noise: (c,) standard deviations, SI. offsets: whether the channels have offsets. edges: channels with a delay
         or lag, whose first samples depend on the time before the recording. faults: spectra (needed_bins, c) that the
@@ -492,14 +494,11 @@ def _solution(fitter: Fitter, point: Array, misfit: float, rivals: list[tuple[Ar
     )
 
 
-def settled(
-    solution: Solution,
-    distortions: tuple[Distortion, ...],
-    faults: Sequence[Sequence[Complex]] = (),
-    rounds: int = ROUNDS,
+def refitted(
+    solution: Solution, distortions: tuple[Distortion, ...], faults: Sequence[Sequence[Complex]] = ()
 ) -> Solution:
-    """Repeat the fit with further distortions as unknowns, or faults of each experiment. It starts from the solution and, if
-    it diverges, from the start values. rounds: of fitting and estimating the noise; few suffice for a comparison."""
+    """Repeat the fit with further distortions as unknowns, or faults of each experiment, accurately enough for a comparison.
+    It starts from the solution and, if it diverges, from the start values."""
     task = replace(solution.task, distortions=(*solution.task.distortions, *distortions))
     starts = [np.append(solution.logarithms, np.zeros(len(distortions))), task.first()]
     found = []
@@ -507,7 +506,7 @@ def settled(
         fitter = Fitter(
             solution.fitter.model, solution.fitter.experiments, task, solution.noise, faults or solution.fitter.faults
         )
-        point = fitter.settle(fitter.search(start_point, COARSE).x, rounds, FINE if rounds == ROUNDS else COARSE)
+        point = fitter.settle(fitter.search(start_point, COARSE).x, FEW_ROUNDS, COARSE)
         misfit = float(np.sum(fitter.residuals(point) ** 2))
         found.append(_solution(fitter, point, misfit, [], 1))
         if np.abs(point[: len(task.names)] - task.first()[: len(task.names)]).max() < 1:

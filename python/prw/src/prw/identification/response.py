@@ -43,7 +43,7 @@ class Discrete(NamedTuple):
         return Discrete(*((block[:half] - block[half:]) / (2 * step) for block in self))
 
 
-def discrete(models: Sequence[StateSpace], step: float, channels: tuple[str, ...], simulated: bool = False) -> Discrete:
+def discrete(models: Sequence[StateSpace], step: float, channels: tuple[str, ...], simulated: bool) -> Discrete:
     """m models over steps of `step` s, with the rows of `channels`. simulated: in steps of the FMU."""
     rows = [OUTPUTS.index(name) for name in channels]
     A, B, C, D = (np.stack([getattr(model, block) for model in models]) for block in "ABCD")
@@ -66,9 +66,7 @@ def discrete(models: Sequence[StateSpace], step: float, channels: tuple[str, ...
 class Response:
     """Response of a model to the motors of an experiment, at its first `bins` frequencies (f)."""
 
-    def __init__(
-        self, model: Discrete, experiment: Experiment, bins: int, distortions: Sequence[Distorted | None] = ()
-    ):
+    def __init__(self, model: Discrete, experiment: Experiment, bins: int, distortions: Sequence[Distorted | None]):
         """distortions: the distortion of a channel, or None if the channel is not measured."""
         self.model = model
         turn = 2j * np.pi * np.arange(bins) / len(experiment.time)

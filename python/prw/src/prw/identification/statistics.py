@@ -101,7 +101,7 @@ class Certainty(NamedTuple):
     undetermined: list[Combination]
 
 
-def certainty(solution: Solution, widening: Array | float = 0.0, level: float = 0.95) -> Certainty:
+def certainty(solution: Solution, widening: Array) -> Certainty:
     """Standard errors, correlation, intervals and open combinations of a fit. widening: (p,) standard deviations, of
     possible faults besides noise."""
     names, prior = solution.task.unknowns, solution.task.prior_information()
@@ -122,7 +122,7 @@ def certainty(solution: Solution, widening: Array | float = 0.0, level: float = 
     errors = np.hypot(errors, 0.0 if open_ones else widening)
     if open_ones:
         errors = np.maximum(errors, np.sqrt(np.diag(covariance_of(corrected))))
-    low, high = ends(solution, inverse, errors, float(ndtri(0.5 + level / 2)))
+    low, high = ends(solution, inverse, errors, float(ndtri(0.975)))
     unit = np.outer(scale, scale)
     # An undetermined combination may have no variance but rounding errors, whose quotients are clipped.
     with np.errstate(over="ignore"):

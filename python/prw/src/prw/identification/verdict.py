@@ -43,10 +43,15 @@ TURNING = 0.02
 PAIRS = (("tau1", "tau2"), ("theta3", "theta4"), ("pitch", "roll"), ("pitch_rate", "roll_rate"))
 
 
-def groups(channels: Sequence[str]) -> list[tuple[str, ...]]:
-    """Groups of channels that may share a fault: single ones, pairs, all."""
-    found = [(name,) for name in channels] + [pair for pair in PAIRS if set(pair) <= set(channels)]
-    return found + [tuple(channels)] * (len(channels) > 2)
+def groups(solution: Solution, kind: str, channels: Sequence[str] = ()) -> list[tuple[str, ...]]:
+    """Groups of channels (default: all) that may share a fault of a kind and have no distortion of this kind yet: single
+    ones, pairs, all. Gains are tried up to pairs."""
+    channels, known = channels or solution.fitter.channels, set(solution.task.distortions)
+    found: list[tuple[str, ...]] = [(name,) for name in channels]
+    found += [pair for pair in PAIRS if set(pair) <= set(channels)]
+    if len(channels) > 2 and kind != "gain":
+        found.append(tuple(channels))
+    return [group for group in found if not {Distortion(kind, name) for name in group} & known]
 
 
 def named(kind: str, group: Sequence[str]) -> str:
@@ -224,10 +229,7 @@ def single_faults(
     # A lag is the same as a delay to first order. A common fault of two channels may have ten standard errors, while each
     # single one has one or two, because the parameters compensate for the latter.
     for kind, unit in (("delay", "ms"), ("gain", "")):
-        for group in groups(experiment.channels):
-            distortions = {Distortion(kind, name) for name in group}
-            if distortions & set(solution.task.distortions) or (kind == "gain" and len(group) > 2):
-                continue
+        for group in groups(solution, kind, experiment.channels):
             indices = [experiment.channels.index(name) for name in group]
             column = np.zeros_like(there)
             column[:, indices] = Distortion(kind, group[0]).response(0.0, s)[1][:, None] * there[:, indices]
