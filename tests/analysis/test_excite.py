@@ -63,6 +63,8 @@ def test_command(prw, tmp_path):
     for entry in ranking["motions"]:
         motion = read(out / entry["file"])
         assert motion.omega is not None and motion.time[-1] == 4.0
+        assert np.abs(motion.theta).max() <= np.deg2rad(20.001) and np.abs(motion.omega).max() <= np.deg2rad(450.01)
+        assert list(entry["expected_errors"]) == ["k1", "k2", "c1", "c2", "c3"]
     best = ranking["motions"][0]["file"]
     assert prw("simulate", "--input", out / best).returncode == 0
 

@@ -56,10 +56,8 @@ def test_dask_cluster(prw, tmp_path):
         ([], "nothing varies; give values of a parameter (grid)"),
         (["--grid", "k1=1:2"], "--grid k1=1:2: write NAME=LOW:HIGH:N"),
         (["--grid", "k9=1:2:3"], "--grid: k9 is not known"),
-        (["--grid", "k1=1:2:3", "--random", "k1=5%"], "k1 is in more than one of grid, random and parameters"),
         (["--random", "k1=5"], "--random k1=5: write NAME=10%"),
         (["--random", "k1=5%", "--runs", "0"], "--runs 0: at least 1"),
-        (["--random", "k1=5%", "--threads", "0"], "--threads 0: at least 1"),
         (["--random", "k1=5%", "--input", "none.csv"], "none.csv: cannot be read"),
     ],
 )

@@ -135,7 +135,7 @@ def _convergence(found: Results) -> Figure:
     milliseconds = 1e3 * step
     for label, marker, name in (("torque", "s", "tau1"), ("roll rate", "^", "roll_rate"), ("roll", "o", "roll")):
         axis.loglog(milliseconds, angles[name], f"{marker}-", color=BLUE, markersize=4, label=f"{label}, angles alone")
-    # Below ROUNDING the values are chance, and not the same on every machine.
+    # Values below ROUNDING are rounding errors, which differ between machines.
     rounding = np.maximum(np.max(list(broken.values()), axis=0), ROUNDING)
     label = f"all, broken line with its slopes (below {ROUNDING:g})"
     axis.loglog(milliseconds, rounding, "D:", color=VERMILION, markersize=4, label=label)

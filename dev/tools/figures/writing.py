@@ -1,4 +1,4 @@
-"""Figures into files that are the same each time: SVG, PNG, and the page's SVG that follows its light or dark."""
+"""Writes figures as reproducible files: SVG, PNG, and SVG for the page, which follows its light or dark style."""
 
 from __future__ import annotations
 

@@ -17,20 +17,20 @@ from prw.errors import UserError
 from prw.motion import Array, Motion
 from prw.table import Choice, read_table
 
-#: Faster than the testbed's motors will turn on any wrist move, in rad/s; degrees taken for radians are beyond it.
+#: Motor speed in rad/s that no wrist move reaches. Degrees that are taken for radians exceed it.
 PLAUSIBLE_SPEED = 30.0
-#: More turns than a wrist move takes, in rad.
+#: Motor angle in rad that no wrist move reaches.
 PLAUSIBLE_ANGLE = 4 * np.pi
 #: Motion of a motor, in rad, below which its rate is not checked.
 SMALL_MOVE = 0.02
 #: Rate in rad/s below which a motor counts as at rest.
 SLOW = 0.1
-#: Longer between two samples, in s, than anyone lets a motor run unobserved; milliseconds taken for seconds are beyond.
+#: Time between two samples in s that is probably a mistake. Milliseconds that are taken for seconds exceed it.
 SLOW_SAMPLING = 0.5
 #: Rows are missing if two are more than this many usual steps apart. The motion of a motor is unknown in gaps longer than
 #: this, in s, unless the motor rests in this many rows before and after.
 MISSING, UNKNOWN, REST = 5.0, 0.04, 5
-#: A motor does not turn this far, in rad, from sample to sample; angles that jump by a turn do.
+#: Change of a motor angle between two samples in rad that is probably a jump by a turn.
 JUMP = 0.9 * np.pi
 #: Name of a recording that comes from no file.
 IN_MEMORY = Path("recording")

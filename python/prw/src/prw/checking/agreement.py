@@ -22,9 +22,9 @@ from prw.motion import Array
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Times that differ by less, in s, are one and the same.
+#: Times that differ by less than this, in s, are equal.
 SAME_TIME = 1e-9
-#: Motors that are off by more than this share of their largest angle or rate are other motors.
+#: Motors that differ by more than this share of their largest angle or rate follow another motion.
 OTHER_MOTORS = 1e-2
 #: Relative distance within which a factor counts as the factor of a unit.
 NEAR = 0.02

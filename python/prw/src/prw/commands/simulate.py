@@ -41,7 +41,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="CSV recording with columns time (s), theta1, theta2 (rad) and, if known, omega1, omega2 (rad/s); other "
         "units in the header, as in `theta1 [deg]` (default: the paper's experiment)",
     )
-    parser.add_argument("--input", type=Path, metavar="FILE", help="the same")
+    parser.add_argument("--input", type=Path, metavar="FILE", help="the recording, as FILE")
     add_parameter_options(parser, "SI")
     add_reading_options(parser)
     add_paths(parser)

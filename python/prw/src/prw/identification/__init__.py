@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from prw.arguments import Table, check_names, counted, is_path, is_table, names_of, positive, spread_of
@@ -19,7 +18,7 @@ from prw.errors import UserError, need
 if TYPE_CHECKING:
     from prw.arguments import Given
     from prw.identification.experiment import Rates
-    from prw.identification.fit import Task
+    from prw.identification.fit import Distortion, Task
     from prw.identification.model import Parameters
     from prw.identification.results import Identification
     from prw.recording import Recording
@@ -104,6 +103,8 @@ def identify(
     from threadpoolctl import threadpool_limits
 
     from prw.arguments import values_of
+    from prw.identification.design import advice
+    from prw.identification.diagnosis import diagnose
     from prw.identification.experiment import may_be_simulated, prepare
     from prw.identification.fit import DISTORTIONS, Distortion, fit
     from prw.identification.model import Model
@@ -123,10 +124,8 @@ def identify(
     # Matrices are small and many: more threads are slower.
     with Model(fmu) as model, threadpool_limits(1):
         distortions = tuple(Distortion(k, n) for k, names in zip(DISTORTIONS, (delay, lag, gain)) for n in names)
-        task = replace(
-            task_of(model.known, estimate, priors, values_of(parameters, model.loaded), bounds, noise, offsets),
-            distortions=distortions,
-        )
+        given = values_of(parameters, model.loaded)
+        task = task_of(model.known, estimate, priors, given, bounds, noise, offsets, distortions)
         measured = [
             each.recording()
             if isinstance(each, Run)
@@ -154,16 +153,8 @@ def identify(
                 if (better := judge(other)).fits:
                     experiments, solution, verdict = again, other, better
         sure = certainty(solution, verdict.widening)
-        hints: list[str] = []
-        diagnosis: list[str] = []
-        if not verdict.fits:
-            from prw.identification.diagnosis import diagnose
-
-            diagnosis = diagnose(solution, verdict)
-        if sure.undetermined:
-            from prw.identification.design import advice
-
-            hints = advice(model, experiments, solution)
+        diagnosis = [] if verdict.fits else diagnose(solution, verdict)
+        hints = advice(model, experiments, solution) if sure.undetermined else []
         sources = tuple(str(each.source) for each in measured)
         judged = verdict, tuple(diagnosis), tuple(hints)
         return Identification(model.fmu, model.known, sources, tuple(experiments), solution, sure, *judged)
@@ -177,6 +168,7 @@ def task_of(
     bounds: Mapping[str, tuple[float, float]] = {},
     noise: Mapping[str, float] = {},
     offsets: bool = True,
+    distortions: tuple[Distortion, ...] = (),
 ) -> Task:
     """The task that these arguments of `identify` describe, for an FMU with the parameters `known`."""
     from prw.columns import MEASURED
@@ -206,4 +198,4 @@ def task_of(
             raise UserError(
                 f"{name} from {span[0]:g} to {span[1]:g}; the first must be below the second", argument="bounds"
             )
-    return Task(chosen, start, spans, beliefs, dict(noise), offsets)
+    return Task(chosen, start, spans, beliefs, dict(noise), offsets, distortions)

@@ -173,7 +173,7 @@ def _optimal(
     w = 2 * np.pi * frequency
     cost = 1 / limits.angle**2 + (w / limits.rate) ** 2 + (w**2 / limits.acceleration) ** 2
     each /= np.tile(cost, 2)[:, None, None]
-    # An undetermined direction must not stop the search.
+    # Without this floor, an undetermined direction would make the matrix singular.
     floor = 1e-9 * np.trace(each.sum(axis=0)) * np.eye(len(logarithms))
     power = np.full(len(each), 1 / len(each))
     for _ in range(ROUNDS):

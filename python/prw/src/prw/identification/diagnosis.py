@@ -22,16 +22,16 @@ from prw.progress import Progress
 #: Gains that a wrong unit causes, within the factor TOLERANCE, and the description of the unit.
 SLIPS = {57.3: "in degrees, not radians", 1 / 57.3: "in radians, not degrees", 1000.0: "in thousandths of its unit"}
 TOLERANCE = 1.7
-#: Correlation from which two signals count as alike, and below which they do not.
+#: Correlation above which two signals are alike, and below which they are unlike.
 ALIKE, UNLIKE = 0.9, 0.7
-#: Equal values in sequence at an end of a channel's range, and such sequences, that are no chance; time after which a
-#: constant channel is stuck, s.
+#: A channel saturates if at least FLATS sequences of FLAT equal values are at an end of its range. A channel that is constant
+#: for longer than STUCK, s, is stuck.
 FLAT, FLATS, STUCK = 4, 3, 0.25
 #: Share of its greatest rate below which a motor is at rest.
 AT_REST = 1e-3
 #: Number of candidate sets of channels that are fitted.
 TRIED = 2
-#: Share of the best fault's gain from which another fault is named; the same for a fault in addition to the best.
+#: Share of the best fault's gain from which another fault is named, instead of the best or in addition to it.
 SHARE, SECOND = 0.6, 0.05
 
 
@@ -139,7 +139,7 @@ def _flat(name: str, time: Array, column: Array, moving: NDArray[np.bool_]) -> I
     for level, side in ((column.max(), "above"), (column.min(), "below")):
         flats = (column[first] == level) & (long >= FLAT)
         if flats.sum() >= FLATS:
-            yield f"{name} is cut off at {level:.4g} (SI), {flats.sum()} times: it saturates, values {side} are lost"
+            yield f"{name} is cut off at {level:.4g} (SI), {flats.sum()} times: it saturates, and values {side} are lost"
             return
     longest = int(np.argmax(long))
     if moving[first[longest] : last[longest] + 1].mean() > 0.5 and time[last[longest]] - time[first[longest]] > STUCK:

@@ -36,10 +36,10 @@ STILL = 1e-6
 #: Motion of the motors between the rows of a recording: smooth; or as in a simulation of the FMU in Co-Simulation with a
 #: step from row to row, with the motors' rates as inputs, or with rates that the FMU estimates from the angles.
 Rates = Literal["motors", "inputs", "angles"]
-#: Fractions of the motion: most noise and coarsest steps of motors that may come from a simulation; noise below which
-#: samples are used without smoothing.
+#: Fractions of the motion. Recordings whose motors have at most this noise and these steps may come from a simulation. Samples
+#: with less than the last noise are used without smoothing.
 EXACT, DIGITS, ROUNDED = 1e-3, 1e-4, 1e-6
-#: Draws of encoders' errors, and the distance in frequencies over which a line of them leaks.
+#: Number of draws of encoders' errors, and the number of neighbouring frequencies into which a line of them leaks.
 DRAWS, FURTHEST = 64, 100
 #: Largest deviation of even times, as a fraction of a step.
 EVEN = 1e-3

@@ -95,8 +95,8 @@ class Task:
     bounds: Mapping[str, tuple[float, float]]
     priors: Mapping[str, Prior]
     noise: Mapping[str, float]
-    offsets: bool = True
-    distortions: tuple[Distortion, ...] = ()
+    offsets: bool
+    distortions: tuple[Distortion, ...]
 
     @property
     def unknowns(self) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from prw.motion import Array
 UNLIKE = 1.5
 #: An estimate that is off its prior by this many standard deviations contradicts it.
 CONTRADICTION = 3.0
-#: From this standard error on, a number is no estimate.
+#: Relative standard error above which a parameter is reported as not determined.
 HOPELESS = 1.0
 
 

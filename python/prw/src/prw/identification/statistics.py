@@ -53,9 +53,9 @@ def _end(solution: Solution, i: int, step: Array, wanted: float) -> float:
     return float(point[i])
 
 
-#: Larger condition numbers are rounding errors.
+#: Larger condition numbers are only rounding errors.
 WORST_CONDITION = 1e15
-#: Largest exponent of an interval's end that a double can hold.
+#: Largest distance of an interval's end from the estimate, as a logarithm; larger ones overflow.
 WIDEST = 600.0
 #: Least value of 1 - leverage by which a residual is divided.
 LEAST_FREEDOM = 0.1

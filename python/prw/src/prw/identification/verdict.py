@@ -1,9 +1,9 @@
-"""Tests whether the model explains the data, and for faults that would explain them.
+"""Tests whether the model explains the data, and whether a fault would explain them.
 
-The residuals of a correct fit are noise. They are tested against the motion: by local regression on the motors' spectra
-and the channel's own, frequency by frequency (their coherence); along the effects of single faults (a delay, a lag or a
-gain of a channel, or of two in common; friction; backlash), as score tests (Rao, Proc. Cambridge Phil. Soc.
-44 (1948) 50); and their strength is compared with that of the noise at frequencies at which the motors do not move.
+The residuals of a correct fit are noise. Three tests compare them with the motion. Local regression over frequency finds
+residuals that are coherent with the motors' spectra or the channel's own. Score tests (Rao, Proc. Cambridge Phil. Soc. 44
+(1948) 50) find the effects of single faults: a delay, a lag or a gain of a channel or of two in common, friction, backlash.
+The third test compares the residuals' strength with the noise at frequencies at which the motors do not move.
 """
 
 from __future__ import annotations
@@ -21,21 +21,22 @@ from prw.motion import Array
 from prw.state_space import Complex
 from prw.testbed import OUTPUTS
 
-#: Chance that a channel of a good fit looks coherent with the motion: little, for an encoder's steps are not as normal as it
-#: assumes, and 1e-8 occurs in slow motion; a fault's estimate over its error that is no
-#: chance, and from which on intervals grow to cover it.
-CHANCE, CLEAR, SMALL = 1e-10, 4.7, 2.5
+#: Probability below which a coherence with the motion is a misfit. It is small, because the steps of encoders are not normally
+#: distributed; 1e-8 occurs in slow motion.
+CHANCE = 1e-10
+#: A fault's estimate in standard errors from which it is significant, and from which intervals are widened by it.
+CLEAR, SMALL = 4.7, 2.5
 #: As CLEAR, for residuals that follow the sign of a rate, as encoders' steps do in a periodic motion.
 CLEAR_SIGN = 7.0
 #: Largest ratio of a channel's noise in the band to its noise above, and its tolerance in standard errors.
 EXCESS, LUCK = 1.3, 5.0
 #: Frequencies per piece of the local regression, and most pieces.
 PIECE, MOST_PIECES = 16, 6
-#: Ratio of a signal's power to the power of encoders' errors in it from which it counts as moving.
+#: Least ratio of the power of a moving signal to the power of encoders' errors in it.
 CLEARLY_MOVING = 30.0
 #: Least share of a direction that is independent of the others.
 NEW = 0.02
-#: Share of its greatest magnitude from which a rate has a sign.
+#: Share of its greatest magnitude above which a rate has a sign.
 TURNING = 0.02
 
 
