@@ -10,7 +10,7 @@ from prw.files import write_text
 
 PROJECT = Path(".")
 
-HELP = "write the FMUs' documentation again"
+HELP = "write the FMUs' documentation"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -18,8 +18,9 @@ from prw.errors import UserError, need
 if TYPE_CHECKING:
     from prw.arguments import Given
     from prw.identification.experiment import Rates
-    from prw.identification.fit import Distortion, Task
+    from prw.identification.fit import Task
     from prw.identification.model import Parameters
+    from prw.identification.response import Distortion
     from prw.identification.results import Identification
     from prw.recording import Recording
     from prw.simulation import Run
@@ -106,8 +107,9 @@ def identify(
     from prw.identification.design import advice
     from prw.identification.diagnosis import diagnose
     from prw.identification.experiment import may_be_simulated, prepare
-    from prw.identification.fit import DISTORTIONS, Distortion, fit
+    from prw.identification.fit import fit
     from prw.identification.model import Model
+    from prw.identification.response import DISTORTIONS, Distortion
     from prw.identification.results import Identification
     from prw.identification.statistics import certainty
     from prw.identification.verdict import judge
@@ -123,7 +125,8 @@ def identify(
     delay, lag, gain = names_of("delay", delay), names_of("lag", lag), names_of("gain", gain)
     # Matrices are small and many: more threads are slower.
     with Model(fmu) as model, threadpool_limits(1):
-        distortions = tuple(Distortion(k, n) for k, names in zip(DISTORTIONS, (delay, lag, gain)) for n in names)
+        kinds = zip(DISTORTIONS, (delay, lag, gain))
+        distortions = tuple(dict.fromkeys(Distortion(kind, name) for kind, names in kinds for name in names))
         given = values_of(parameters, model.loaded)
         task = task_of(model.known, estimate, priors, given, bounds, noise, offsets, distortions)
         measured = [

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from prw.columns import QUANTITIES
 from prw.identification.experiment import Experiment
-from prw.identification.fit import DISTORTIONS, Distortion, Fitter, Solution, refitted
+from prw.identification.fit import Fitter, Solution, refitted
+from prw.identification.response import DISTORTIONS, Distortion
 from prw.identification.statistics import covariance_of, information_of
 from prw.identification.verdict import CLEAR, PAIRS, Verdict, groups, judge, named, single_faults
 from prw.motion import Array

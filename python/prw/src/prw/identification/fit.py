@@ -24,7 +24,7 @@ from scipy.optimize import OptimizeResult, least_squares
 from prw.errors import UserError
 from prw.identification.experiment import Experiment
 from prw.identification.model import Model
-from prw.identification.response import Discrete, Response, discrete
+from prw.identification.response import FURTHEST, Discrete, Distortion, Response, discrete
 from prw.motion import Array
 from prw.progress import Progress
 from prw.state_space import Complex, StateSpace
@@ -45,36 +45,6 @@ FINE, COARSE = {"ftol": 1e-12, "xtol": 1e-9, "max_nfev": 100}, {"ftol": 1e-5, "x
 SAME = 0.01
 #: Another minimum is reported if it is no more than this worse, in terms of -2 log likelihood.
 RIVAL = 9.0
-
-
-#: The distortions of a channel, in the order of `identify`'s arguments, each with a unit in which 1 is a typical size. A gain
-#: is estimated as its logarithm.
-DISTORTIONS = {"delay": 1e-3, "lag": 1e-3, "gain": 1.0}
-#: Bounds of a distortion in these units.
-FURTHEST = 50.0
-
-
-class Distortion(NamedTuple):
-    """A distortion between a channel and its record: a delay (s), a first-order lag (time constant, s) or a gain."""
-
-    kind: str
-    channel: str
-
-    def __str__(self) -> str:
-        return f"{self.kind} of {self.channel}"
-
-    def value(self, x: float) -> float:
-        """The delay or lag in s, or the gain, from the unknown x."""
-        return float(np.exp(x)) if self.kind == "gain" else x * DISTORTIONS[self.kind]
-
-    def response(self, x: float, s: Complex) -> tuple[Complex, Complex]:
-        """Frequency response (f,) and the derivative of its logarithm with respect to x."""
-        if self.kind == "gain":
-            return np.full(len(s), np.exp(x) + 0j), np.ones(len(s), dtype=complex)
-        s = s * DISTORTIONS[self.kind]
-        if self.kind == "delay":
-            return np.exp(-s * x), -s
-        return 1 / (1 + s * x), -s / (1 + s * x)
 
 
 class Prior(NamedTuple):
@@ -132,25 +102,26 @@ class Comparison:
         self,
         experiment: Experiment,
         response: Response,
-        noise: Array,
-        offsets: bool,
-        edges: Sequence[int],
+        task: Task,
+        noise: Mapping[str, float],
         faults: Sequence[Complex],
     ):
-        """noise: (c,) standard deviations, SI. offsets: whether the channels have offsets. edges: channels with a delay
-        or lag, whose first samples depend on the time before the recording. faults: spectra (needed_bins, c) that the
-        channels may contain with an unknown factor."""
+        """noise: standard deviations by channel, SI. faults: spectra (needed_bins, c) that the channels may contain with an
+        unknown factor."""
         self.experiment, self.response = experiment, response
         bins, channels = experiment.bins, len(experiment.channels)
         share = experiment.shares
         self._scaled = self.response.transfer[:bins] * share[:, None]
-        self._noise = noise**2 * share
+        self._noise = np.array([noise[name] for name in experiment.channels]) ** 2 * share
         stepped = experiment.channel_power * share**2 + self._noise
         covariance = (self._scaled * experiment.motor_power[:, None, :]) @ self._scaled.conj().swapaxes(-1, -2)
         covariance[:, np.arange(channels), np.arange(channels)] += stepped
         self._whiten = np.linalg.inv(np.linalg.cholesky(covariance))
-        steady = np.zeros((experiment.needed_bins, channels, channels if offsets else 0), dtype=complex)
+        steady = np.zeros((experiment.needed_bins, channels, channels if task.offsets else 0), dtype=complex)
         steady[0] = np.sqrt(len(experiment.time)) * np.eye(*steady.shape[1:])
+        # The first samples of a channel with a delay or lag depend on the time before the recording.
+        late = {d.channel for d in task.distortions if d.kind != "gain"}
+        edges = [i for i, name in enumerate(experiment.channels) if name in late]
         early = np.zeros((experiment.needed_bins, channels, 3 * len(edges)), dtype=complex)
         s = 1j * np.arange(experiment.needed_bins) / experiment.bins
         for k, i in enumerate(edges):
@@ -167,7 +138,7 @@ class Comparison:
         self._basis = left[:, determined]
         found = (right[determined].T / sizes[determined]) @ (self._basis.T @ flat[:, -1])
         self.residual = self.project(white[..., -1])
-        self.offsets, self.initial = found[:channels] if offsets else np.zeros(channels), found[-6:]
+        self.offsets, self.initial = found[:channels] if task.offsets else np.zeros(channels), found[-6:]
         self._rest = difference - nuisance @ found
 
     @property
@@ -307,13 +278,7 @@ class Fitter:
         self._comparisons: tuple[tuple[object, ...], list[Comparison]] = (), []
 
     def _response(self, logarithms: Array, experiment: Experiment, bins: int) -> Response:
-        x = logarithms[len(self.task.names) :]
-        distortions = [
-            (experiment.channels.index(d.channel), lambda s, d=d, xi=float(xi): d.response(xi, s))
-            if d.channel in experiment.channels
-            else None
-            for d, xi in zip(self.task.distortions, x)
-        ]
+        distortions = dict(zip(self.task.distortions, logarithms[len(self.task.names) :].tolist()))
         models = self._discrete(self._models([logarithms]), experiment)
         return Response(Discrete(*(block[0] for block in models)), experiment, bins, distortions)
 
@@ -325,20 +290,8 @@ class Fitter:
             self._responses = at, [self._response(logarithms, e, e.needed_bins) for e in self.experiments]
         key = (at, *self.noise.items())
         if self._comparisons[0] != key:
-            self._comparisons = (
-                key,
-                [
-                    Comparison(
-                        e,
-                        response,
-                        np.array([self.noise[n] for n in e.channels]),
-                        self.task.offsets,
-                        self._edges(e),
-                        self.faults[i] if self.faults else (),
-                    )
-                    for i, (e, response) in enumerate(zip(self.experiments, self._responses[1]))
-                ],
-            )
+            parts = zip(self.experiments, self._responses[1], self.faults or [()] * len(self.experiments))
+            self._comparisons = key, [Comparison(e, r, self.task, self.noise, faults) for e, r, faults in parts]
         return self._comparisons[1]
 
     def jacobians(self, logarithms: Array) -> tuple[list[Array], Array]:
@@ -443,10 +396,6 @@ class Fitter:
             np.array([np.log(prior.value) if prior else 0.0 for prior in priors]),
             np.array([1 / prior.relative if prior else 0.0 for prior in priors]),
         )
-
-    def _edges(self, experiment: Experiment) -> list[int]:
-        late = {d.channel for d in self.task.distortions if d.kind != "gain"}
-        return [i for i, name in enumerate(experiment.channels) if name in late]
 
 
 def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int = 6, seed: int = 0) -> Solution:

@@ -15,7 +15,8 @@ import numpy as np
 from scipy.special import fdtrc
 
 from prw.identification.experiment import Experiment, spectra
-from prw.identification.fit import Comparison, Distortion, Solution
+from prw.identification.fit import Comparison, Solution
+from prw.identification.response import Distortion
 from prw.identification.statistics import covariance_of, information_of
 from prw.motion import Array
 from prw.state_space import Complex
