@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 import rig
 
-from prw.errors import UserError
 from prw.identification import task_of
 from prw.identification.experiment import prepare
 from prw.identification.fit import Fitter
 from prw.identification.path import quantum_of, smooth
 from prw.motion import Motion
 from prw.recording import Recording, read
-
-OTHER = {"k1": 90.0, "k2": 61.0, "c1": 0.2, "c2": 0.9, "c3": 0.1, "J2": 0.006, "J3": 0.02, "H3": 0.03}
 
 
 def recording(simulated: rig.Rig, rows=slice(None), **columns) -> Recording:
@@ -69,19 +66,6 @@ def test_derivatives_with_respect_to_the_parameters(model, simulated):
         differences = (fitter.residuals(at + step * direction) - fitter.residuals(at - step * direction)) / (2 * step)
         # Kaufman's form leaves out a part that is perpendicular to the residual's motion and vanishes with it.
         assert np.linalg.norm(found[:, i] - differences) < 5e-3 * np.linalg.norm(differences), task.names[i]
-
-
-def test_a_value_that_the_fmu_rejects(model):
-    with pytest.raises(UserError, match="k1 must"):
-        model.at({**model.known.starts, "k1": -1.0})
-
-
-def test_the_model_forgets(model):
-    first = model.at({})
-    model.at(OTHER)
-    again = model.at({})
-    for block in ("A", "B", "C", "D"):
-        np.testing.assert_array_equal(getattr(first, block), getattr(again, block))
 
 
 def wave(t):
