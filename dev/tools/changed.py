@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 #: Tests of the testbed that compile no FMU.
 QUICK = ("--lib", "--test", "paper", "--test", "stepping", "--test", "fmu")
-#: Crates that the FMU is made of or made with.
+#: Crates that are linked into the FMU or that build it.
 OF_THE_FMU = {"build_fmu", "prw_testbed", "fmi-abi", "fmu-export", "fmu-package"}
 #: Packages without unit tests in Rust.
 UNTESTED = {"build_fmu", "fmu-run-python"}

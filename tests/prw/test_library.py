@@ -188,7 +188,7 @@ def test_wrong_motions() -> None:
         ((time, theta, [[0.0, 0.0]]), r"omega has the shape \(1, 2\)"),
         (([1.0, 1.0], theta), "time must increase"),
         (([0.0, float("nan")], theta), "time must increase"),
-        ((["now", "then"], theta), "time is not made of numbers"),
+        ((["now", "then"], theta), "time does not consist of numbers"),
     ]:
         with pytest.raises(prw.UserError, match=complaint):
             prw.Motion(*arguments)  # type: ignore[arg-type]

@@ -337,7 +337,7 @@ def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
     wrong: list[tuple[Any, str]] = [
         ({"time": [0.0, 1.0]}, "recording: column theta1 is missing; the header has time"),
         ({**good, "theta2": [0.0, None]}, "recording, column theta2: nan at index 1 is not finite"),
-        ({**good, "theta2": ["a", "b"]}, "recording, column theta2: is not made of numbers"),
+        ({**good, "theta2": ["a", "b"]}, "recording, column theta2: does not consist of numbers"),
         ({**good, "theta2": [0.0]}, "recording, column theta2: has 1 rows, but time has 2"),
         ({**good, "theta2": [[0.0], [1.0]]}, r"recording, column theta2: has the shape \(2, 1\)"),
         ({**good, "time": pandas.to_datetime(["2026-01-01", "2026-01-02"])}, "column time: has dates"),

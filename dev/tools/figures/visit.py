@@ -37,7 +37,7 @@ def film(fmu: Path, path: Path) -> None:
         page.goto(f"{page_file.as_uri()}#try&motion={MOTION}")
         player, time = page.locator(".live-player"), page.get_by_label("Time", exact=True)
         time.wait_for()
-        # Calculates the whole motion first: a frame of the page calculates only as far as its time allows.
+        # Calculates the whole motion first: a frame of the page calculates only for a limited time.
         with page.expect_download():
             page.get_by_role("button", name="Save as CSV").evaluate("button => button.click()")
         frames = []

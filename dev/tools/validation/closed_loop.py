@@ -1,4 +1,4 @@
-"""Runs the closed loop prw_closed_loop.ssp (and its twin OspSystemStructure.xml) under FMPy, libcosim and Ecos, as far as
+"""Runs the closed loop prw_closed_loop.ssp (and its twin OspSystemStructure.xml) under FMPy, libcosim and Ecos, if
 they are installed; compares them, and studies the error of the coupling over the communication step. Writes
 closed_loop.csv, closed_loop.png, coupling.csv and coupling.png."""
 

@@ -91,7 +91,7 @@ def numbers_of(where: str, values: Any) -> NDArray[np.float64]:
     try:
         array = array.astype(np.float64)
     except (TypeError, ValueError) as error:
-        raise UserError(f"{where}: is not made of numbers ({error})") from None
+        raise UserError(f"{where}: does not consist of numbers ({error})") from None
     if array.ndim != 1:
         raise UserError(f"{where}: has the shape {array.shape}; a column is (n,)")
     return array

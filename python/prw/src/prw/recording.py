@@ -227,7 +227,7 @@ def _gaps(path: Path, time: Array, theta: Array) -> list[str]:
         worst = int(max(long, key=lambda k: float(steps[k])))
         raise UserError(
             f"{path}: no rows from {time[worst]:.6g} to {time[worst + 1]:.6g} s, {steps[worst]:.3g} s instead of the usual {usual:.3g} s, while "
-            "the motors move; their motion is not known. Cut the recording there, into files of their own"
+            "the motors move; their motion is not known. Cut the recording there, into separate files"
         )
     if not len(gaps):
         return []

@@ -58,7 +58,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--runs", type=int, default=1000, metavar="N", help="draws of --random (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of the draws (default: %(default)s)")
     parser.add_argument(
-        "--input", type=Path, metavar="FILE", help="motor recording, as for `prw simulate` (default: that of Fig. 4)"
+        "--input",
+        type=Path,
+        metavar="FILE",
+        help="motor recording, as for `prw simulate` (default: the motion of Fig. 4)",
     )
     parser.add_argument("--degrees", action="store_true", help="the recording is in degrees and degrees per second")
     parser.add_argument("--threads", type=int, metavar="N", help="on this machine (default: one per core)")

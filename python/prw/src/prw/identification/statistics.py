@@ -68,7 +68,7 @@ SHARE = 0.15
 
 
 class Combination(NamedTuple):
-    """A direction that the data leave open. shares: exponent by parameter, the largest 1: the parameters can change
+    """A direction that the data do not determine. shares: exponent by parameter, the largest 1: the parameters can change
     together like p -> p * x^share. error: standard deviation of log x."""
 
     shares: Mapping[str, float]
@@ -88,7 +88,7 @@ class Certainty(NamedTuple):
     """names: of the parameters (p). relative: (p,) standard errors as fractions. low, high: (p,) ends of the 95 %
     intervals, SI. correlation: (p, p). information: (p, p), of the logarithms, priors included, without
     the encoders' contribution. condition: of its unit-diagonal form. whiteness: by how much the noise's correlation
-    widens the errors beyond what sensors explain, (p,). undetermined: combinations that the data leave open."""
+    widens the errors beyond what sensors explain, (p,). undetermined: combinations that the data do not determine."""
 
     names: Sequence[str]
     relative: Array
@@ -191,7 +191,7 @@ def _scale(information: Array) -> Array:
 
 
 def undetermined(names: Sequence[str], information: Array) -> list[Combination]:
-    """The combinations of parameters whose logarithms the information leaves open, the most uncertain first."""
+    """The combinations of parameters whose logarithms the information does not determine, the most uncertain first."""
     values, vectors = np.linalg.eigh(information)
     found = []
     for value, vector in zip(values, vectors.T):
