@@ -14,16 +14,10 @@ from prw.commands import check, excite, identify, linearize, simulate, sweep
 from prw.commands.options import Formatter
 from prw.errors import UserError
 
-#: The module of each subcommand: a docstring that describes it, HELP in a line, run(arguments), and perhaps
+#: The subcommands by name. Each module has a docstring that describes it, HELP in a line, run(arguments), and perhaps
 #: add_options(parser) and EXAMPLES.
-COMMANDS = {
-    "simulate": simulate,
-    "check": check,
-    "linearize": linearize,
-    "identify": identify,
-    "excite": excite,
-    "sweep": sweep,
-}
+_MODULES = (simulate, check, linearize, identify, excite, sweep)
+COMMANDS = {module.__name__.rpartition(".")[2]: module for module in _MODULES}
 #: The option by argument of a function, if their names differ.
 OPTIONS = {"parameters": "--set", "priors": "--prior", "skip": "--skip-lines"}
 
