@@ -71,7 +71,7 @@ def compile_c(output: str, *arguments: object) -> None:
 
 
 def prepare(fmu: Path) -> str:
-    """Compiles and unpacks what the benchmarks load into target/bench. Returns the guid."""
+    """Compiles and unpacks into target/bench the files that the benchmarks load. Returns the guid."""
     (ROOT / "out").mkdir(exist_ok=True)
     shutil.rmtree(WORK, ignore_errors=True)
     WORK.mkdir(parents=True)
@@ -79,10 +79,10 @@ def prepare(fmu: Path) -> str:
         (ROOT / "out" / "bench.md").unlink(missing_ok=True)
     with zipfile.ZipFile(fmu) as archive:
         (WORK / "fmu.so").write_bytes(archive.read("binaries/linux64/prw_testbed.so"))
-    strict, folder = ("-Wall", "-Wextra", "-Werror"), ROOT / "dev" / "benches" / "c"
+    strict, directory = ("-Wall", "-Wextra", "-Werror"), ROOT / "dev" / "benches" / "c"
     for library in ("bare_exact", "euler", "empty"):
-        compile_c(f"{library}.so", "-O3", *strict, "-shared", "-fPIC", folder / f"{library}.c")
-    compile_c("bench", "-O2", *strict, folder / "bench.c")
+        compile_c(f"{library}.so", "-O3", *strict, "-shared", "-fPIC", directory / f"{library}.c")
+    compile_c("bench", "-O2", *strict, directory / "bench.c")
     return str(fmpy.read_model_description(str(fmu)).guid)
 
 
@@ -173,11 +173,11 @@ class Case:
     def __init__(self, name: str, fmu: Path, inputs: dict[str, np.ndarray], outputs: list[str], runs: int):
         self.name, self.inputs, self.outputs, self.runs = name, inputs, outputs, runs
         self.description = fmpy.read_model_description(str(fmu))
-        self.folder = fmpy.extract(str(fmu))
+        self.directory = fmpy.extract(str(fmu))
         of = {v.name: v.valueReference for v in self.description.modelVariables}
         self.references = [of[name] for name in inputs], [of[name] for name in outputs]
         self.table = np.ascontiguousarray(np.column_stack(list(inputs.values())))
-        self.slave = instantiate_fmu(self.folder, self.description, fmi_type="CoSimulation")
+        self.slave = instantiate_fmu(self.directory, self.description, fmi_type="CoSimulation")
         self.loaded = fmu_run.Fmu(fmu)
         # One start value for each run makes as many runs.
         self.start = {next(iter(inputs)): np.full(runs, self.table[0, 0])}
@@ -185,11 +185,11 @@ class Case:
     def close(self) -> None:
         self.slave.freeInstance()
         self.loaded.close()
-        shutil.rmtree(self.folder)
+        shutil.rmtree(self.directory)
 
     def in_c(self) -> tuple[float, np.ndarray]:
         """Seconds per run in C, and the outputs (samples, n) of the last run."""
-        library = Path(self.folder, "binaries", "linux64", f"{self.description.coSimulation.modelIdentifier}.so")
+        library = Path(self.directory, "binaries", "linux64", f"{self.description.coSimulation.modelIdentifier}.so")
         lists = (",".join(map(str, references)) for references in self.references)
         arguments = (self.runs, SAMPLES, STEP, *lists, 1)
         seconds, rows = bench(library, self.description.guid, *arguments, stdin=self.table.tobytes())
@@ -238,8 +238,8 @@ def many_runs() -> None:
     wave = 2 * np.sin(10 * np.pi * np.arange(SAMPLES) * STEP / 2) ** 2 / (10 * np.pi)
     motors = {"theta1": wave, "theta2": -wave}
     wrist = {"pitch_ref": 3 * wave, "roll_ref": -2 * wave, "pitch": 2 * wave, "roll": -wave}
-    with tempfile.TemporaryDirectory() as folder:
-        ramp = build(Path(folder), "-DCOMPLETE")
+    with tempfile.TemporaryDirectory() as directory:
+        ramp = build(Path(directory), "-DCOMPLETE")
         cases = (
             Case("testbed", FMUS / "prw_testbed.fmu", motors, ["tau1", "pitch", "roll", "roll_rate"], RUNS),
             Case("controller", FMUS / "prw_controller.fmu", wrist, ["theta1", "theta2", "omega1", "omega2"], RUNS),

@@ -9,5 +9,12 @@ from prw.cli import run  # noqa: E402
 from tools import compatibility, documentation, examples, figures, validation  # noqa: E402
 from tools.validation import closed_loop  # noqa: E402
 
-COMMANDS = (documentation, examples, figures, validation, closed_loop, compatibility)
+COMMANDS = {
+    "docs": documentation,
+    "examples": examples,
+    "figures": figures,
+    "validation": validation,
+    "closed-loop": closed_loop,
+    "compatibility": compatibility,
+}
 sys.exit(run("tools", "Tools of this repository.", COMMANDS, None))

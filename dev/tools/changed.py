@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 #: Tests of the testbed that compile no FMU.
 QUICK = ("--lib", "--test", "paper", "--test", "stepping", "--test", "fmu")
-#: Crates that the FMU is made of or made with.
+#: Crates that are linked into the FMU or that build it.
 OF_THE_FMU = {"build_fmu", "prw_testbed", "fmi-abi", "fmu-export", "fmu-package"}
 #: Packages without unit tests in Rust.
 UNTESTED = {"build_fmu", "fmu-run-python"}
@@ -39,8 +39,8 @@ def crate(name: str) -> str:
     """The Rust package that a file belongs to."""
     if name == "build_fmu.rs":
         return "build_fmu"
-    for folder in (ROOT / name).parents:
-        manifest = folder / "Cargo.toml"
+    for directory in (ROOT / name).parents:
+        manifest = directory / "Cargo.toml"
         if manifest.is_file():
             return str(tomllib.loads(manifest.read_text(encoding="utf-8"))["package"]["name"])
     raise ValueError(f"{name} is outside of the repository")

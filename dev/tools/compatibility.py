@@ -1,4 +1,5 @@
-"""`tools compatibility`: writes the table of results of tests/importers in docs/compatibility.md."""
+"""Writes the table “Results of tests/importers” of docs/compatibility.md from the results of `make test-importers` in
+target/importers."""
 
 from __future__ import annotations
 
@@ -6,32 +7,23 @@ import argparse
 import json
 import re
 from pathlib import Path
-from typing import Any
 
 from prw.errors import UserError
 from prw.files import write_text
 
-#: Where tests/importers leave what they saw, a file each, and where it goes; within the project.
-SEEN, PAGE, HEADING = Path("target/importers"), Path("docs/compatibility.md"), "Results of tests/importers"
+#: Directory of the results of tests/importers, a file each; the page with their table, and its heading.
+RESULTS, PAGE, HEADING = Path("target/importers"), Path("docs/compatibility.md"), "Results of tests/importers"
 HEADS = ("tool", "version", "fmu", "run", "seen", "date")
 TITLES = ("tool", "version", "FMU", "run", "result", "date")
 
-
-def add_parser(subparsers: Any) -> None:
-    """Add `compatibility` to the subcommands."""
-    parser = subparsers.add_parser(
-        "compatibility",
-        help="write the results of tests/importers into docs/compatibility.md",
-        description=f"Writes the table “{HEADING}” of {PAGE} from the results of `make test-importers` in {SEEN}.",
-    )
-    parser.set_defaults(run=run)
+HELP = "write the results of tests/importers into docs/compatibility.md"
 
 
 def run(_: argparse.Namespace) -> None:
-    """Carry out `tools compatibility`. Raises UserError where there is nothing to write, or no place for it."""
-    rows = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(SEEN.glob("*.json"))]
+    """Carry out `tools compatibility`. Raises UserError if there are no results, or if the page lacks the heading."""
+    rows = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(RESULTS.glob("*.json"))]
     if not rows:
-        raise UserError(f"{SEEN}: there is nothing; run `make test-importers` in the project's folder")
+        raise UserError(f"{RESULTS}: there is nothing; run `make test-importers` in the repository root")
     text = PAGE.read_text(encoding="utf-8")
     lines = [f"| {' | '.join(TITLES)} |", "|" + "---|" * len(TITLES)]
     lines += [f"| {' | '.join(row[head] for head in HEADS)} |" for row in rows]

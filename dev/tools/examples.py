@@ -1,4 +1,5 @@
-"""`tools examples`: runs the examples and writes docs/examples.md: the purpose, the figure and the output of each example."""
+"""Runs the examples and writes docs/examples.md and its figures: the purpose, the figure and the output of each example.
+Run it in the repository root."""
 
 from __future__ import annotations
 
@@ -8,7 +9,6 @@ import io
 import re
 import runpy
 from pathlib import Path
-from typing import Any
 
 from prw.files import write_text
 from tools.figures.writing import write_small_png
@@ -24,19 +24,11 @@ HEAD = """# Examples
 These short programs use the FMU and the package prw. `make examples` installs their packages and builds the FMUs. To run one from
 the root of the repository: `.venv/bin/python examples/lqr.py`."""
 
-
-def add_parser(subparsers: Any) -> None:
-    """Add `examples` to the subcommands."""
-    parser = subparsers.add_parser(
-        "examples",
-        help=f"run the examples and write {PAGE}",
-        description=f"Runs the examples and writes {PAGE} and its figures. Run it in the repository root.",
-    )
-    parser.set_defaults(run=run)
+HELP = f"run the examples and write {PAGE}"
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `tools examples`. Raises UserError with one line on what is wrong."""
+    """Carry out `tools examples`. Raises UserError with a message of one line."""
     page = "\n\n".join([HEAD, *map(section, EXAMPLES)]) + "\n"
     if PAGE.is_file() and without_times(page) == without_times(PAGE.read_text(encoding="utf-8")):
         print(f"{PAGE} is up to date")

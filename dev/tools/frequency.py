@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,20 +26,12 @@ PERIODS = 2
 SETTLED = 1e-7
 
 
-class Sweep(NamedTuple):
-    """Measured responses. frequency: (k,) Hz; response: complex (k, outputs, 2 motors), outputs as asked for."""
-
-    frequency: np.ndarray
-    response: np.ndarray
-    outputs: Sequence[str]
-
-
-def sweep(fmu: Path, frequency: ArrayLike, slowest: float, outputs: Sequence[str] = (*SHAFTS, *TORQUES)) -> Sweep:
+def sweep(fmu: Path, frequency: ArrayLike, slowest: float, outputs: Sequence[str] = (*SHAFTS, *TORQUES)) -> np.ndarray:
     """Turn one motor of the Co-Simulation FMU at a time to and fro, theta = sin(2 pi f t), and compare the outputs.
 
     frequency: (k,) Hz. slowest: decay rate of the slowest transient, 1/s. After it has settled, the component of each
     output at f over whole periods (one bin of its discrete Fourier transform) is divided by the component of the motor's angle.
-    Units: the output's unit per rad.
+    Returns the response, complex (k, outputs, 2 motors), in the output's unit per rad.
     """
     frequencies = np.atleast_1d(np.asarray(frequency, dtype=float))
     response = np.empty((len(frequencies), len(outputs), 2), dtype=complex)
@@ -59,7 +50,7 @@ def sweep(fmu: Path, frequency: ArrayLike, slowest: float, outputs: Sequence[str
                 found = testbed.respond(Motion(time, theta, omega), outputs)
             drive = bin_of @ theta[window, motor]
             response[k, :, motor] = [bin_of @ found[name][window] / drive for name in outputs]
-    return Sweep(frequencies, response, tuple(outputs))
+    return response
 
 
 def decibels(response: ArrayLike) -> Array:
@@ -67,6 +58,6 @@ def decibels(response: ArrayLike) -> Array:
     return np.asarray(20 * np.log10(np.abs(response)))
 
 
-def degrees(response: ArrayLike, axis: int = 0) -> Array:
-    """The phase in degrees, unwrapped along the frequencies, which are on `axis`."""
-    return np.asarray(np.rad2deg(np.unwrap(np.angle(np.asarray(response)), axis=axis)))
+def degrees(response: ArrayLike) -> Array:
+    """The phase in degrees, unwrapped along the frequencies, which are on the first axis."""
+    return np.asarray(np.rad2deg(np.unwrap(np.angle(np.asarray(response)), axis=0)))

@@ -17,5 +17,5 @@ def model(fmu):
 
 @pytest.fixture(scope="session")
 def experiment():
-    """A rig whose parameters differ from Table 1 by up to 30 %, and what it does in one experiment of 6 s at 1 kHz."""
+    """A rig whose parameters differ from Table 1 by up to 30 %, and its response in one experiment of 6 s at 1 kHz."""
     return rig.experiment(seed=1, duration=6)

@@ -39,14 +39,13 @@ from prw.identification.fit import fit  # noqa: E402
 from prw.identification.model import Model  # noqa: E402
 from prw.identification.statistics import certainty  # noqa: E402
 from prw.identification.verdict import judge  # noqa: E402
-from prw.motion import Motion  # noqa: E402
-from prw.recording import Recording  # noqa: E402
+from prw.recording import read  # noqa: E402
 
 SENSORS = {"all": rig.ALL, "torque": ("tau1", "tau2")}
 MOTIONS = ("independent", "equal", "opposite", "fig4", "slow", "moves")
 
 
-#: Faults in sizes from harmless to gross: what it is on a rig, or on what its sensors say, and the unit.
+#: Faults of a rig or its sensors: description with the unit, and sizes from harmless to gross.
 FAULTS = {
     "late": ("torques late, ms", (0.003, 0.01, 0.03, 0.1, 1.0)),
     "lag": ("lag of all sensors, ms", (0.001, 0.003, 0.01, 0.1, 2.0)),
@@ -84,11 +83,9 @@ def repetition(fmu: str, seed: int, channels, counts: int, motion: str, fault: s
     if fault:
         simulated = spoilt(simulated, fault, size)
     columns = rig.measure(simulated, seed + 1_000_000, channels, counts)
-    theta = np.column_stack([columns["theta1"], columns["theta2"]])
-    measured = Recording(Path("rig.csv"), Motion(simulated.time, theta), {name: columns[name] for name in channels}, {})
     with Model(fmu) as model, threadpool_limits(1):
         begin = time.perf_counter()
-        solution = fit(model, [prepare(measured)], task_of(model.known, rig.NAMES), starts=1)
+        solution = fit(model, [prepare(read(columns))], task_of(model.known, rig.NAMES), starts=1)
         verdict = judge(solution)
         sure = certainty(solution, verdict.widening)
         seconds = time.perf_counter() - begin
@@ -130,12 +127,12 @@ def campaign(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[di
     grossly = missed = 0
     for fault, size in cases:
         found = list(itertools.islice(everything, rigs))
-        refused = float(np.mean([not each[4] for each in found]))
+        rejected = float(np.mean([not each[4] for each in found]))
         grossly += sum(each[5] > 2 for each in found)
         missed += sum(each[5] > 2 and each[4] for each in found)
         worst = max([0.0, *(each[5] for each in found if each[4])])
-        rows.setdefault(fault, []).append({"size": size, "does_not_fit": refused, "worst_miss_where_it_fits": worst})
-        print(f"  {FAULTS[fault][0]:<40}{size:>8g}{refused:>8.0%}{worst:>8.2g}", flush=True)
+        rows.setdefault(fault, []).append({"size": size, "does_not_fit": rejected, "worst_miss_where_it_fits": worst})
+        print(f"  {FAULTS[fault][0]:<40}{size:>8g}{rejected:>8.0%}{worst:>8.2g}", flush=True)
     good = missed <= 0.01 * grossly
     print(f"  {grossly} intervals missed by more than two widths, {missed} of them where the verdict is that it fits")
     if options.figure:
@@ -179,7 +176,7 @@ def is_too_rare(hits: np.ndarray, least: float, expected: float) -> bool:
 
 
 def main() -> int:
-    """Run the repetitions, print and write what came of them."""
+    """Run the repetitions, print and write their results."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("fmu")
     parser.add_argument("--repetitions", type=int, default=300)

@@ -32,17 +32,15 @@ class Rig(NamedTuple):
     at: Callable[[np.ndarray], dict[str, np.ndarray]]
 
 
-def experiment(
-    seed: int, duration: float = 10.0, rate: float = 1000.0, pattern: str = "independent", spread: float = 0.3
-) -> Rig:
-    """A random rig in a random motion: NAMES up to `spread` off Table 1, 40 sines from 0.1 to 20 Hz a motor, 30 deg.
+def experiment(seed: int, duration: float = 10.0, rate: float = 1000.0, pattern: str = "independent") -> Rig:
+    """A random rig in a random motion: NAMES up to 30 % off Table 1, 40 sines from 0.1 to 20 Hz a motor, 30 deg.
     Both motors in the same motion or in opposite ones, or each in its own; "fig4": the paper's, over and over; "slow":
     slow smooth moves with small vibrations of 2 to 22 Hz on top; "moves": from point to point with rests between, and
     three small sines on top."""
     random = np.random.default_rng(seed)
     parameters = dict(table_1())
     for name in NAMES:
-        parameters[name] *= float(np.exp(random.uniform(-1, 1) * np.log(1 + spread)))
+        parameters[name] *= float(np.exp(random.uniform(-1, 1) * np.log(1.3)))
     time = np.arange(int(round(duration * rate)) + 1) / rate
     if pattern == "fig4":
         return respond(parameters, time, np.array([5.0]), np.array([[-1.0], [1.0]]), 1 / (10 * np.pi))
@@ -184,10 +182,10 @@ def lagging(simulated: Rig, seconds: float) -> Rig:
     return simulated._replace(outputs=outputs)
 
 
-def late(simulated: Rig, seconds: float, channels: Sequence[str] = ("tau1", "tau2")) -> Rig:
-    """The rig with some channels late."""
+def late(simulated: Rig, seconds: float) -> Rig:
+    """The rig with late torques."""
     delayed = simulated.at(simulated.time - seconds)
-    return simulated._replace(outputs={**simulated.outputs, **{name: delayed[name] for name in channels}})
+    return simulated._replace(outputs={**simulated.outputs, **{name: delayed[name] for name in ("tau1", "tau2")}})
 
 
 def measure(

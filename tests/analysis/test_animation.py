@@ -33,14 +33,14 @@ def swing(**changed: np.ndarray | None) -> Run:
 
 
 def corners(at: dict[str, float], colour: str) -> np.ndarray:
-    """Where the corners of all faces of a colour are, (k, 3)."""
+    """The corners of all faces of a colour, (k, 3)."""
     everything = dict.fromkeys((f"theta{k}" for k in range(1, 7)), 0.0) | {"pitch": 0.0, "roll": 0.0} | at
     found, colours = Wrist(1.0).faces(everything)
     return np.reshape(found[(colours == to_rgb(colour)).all(axis=1)], (-1, 3))
 
 
-def pictures_of(path: Path) -> list[np.ndarray]:
-    """The pictures of a GIF, (height, width, 3) each."""
+def frames_of(path: Path) -> list[np.ndarray]:
+    """The frames of a GIF, (height, width, 3) each."""
     with Image.open(path) as film:
         return [np.asarray(image.convert("RGB")).astype(int) for image in ImageSequence.Iterator(film)]
 
@@ -73,11 +73,11 @@ def test_carriers_follow_from_pitch_and_roll(fmu: Path) -> None:
         np.testing.assert_allclose(shown[name], run[name], rtol=0, atol=1e-14)
 
 
-def test_gif_has_its_pictures_and_ends_as_it_began(tmp_path: Path) -> None:
+def test_gif_has_its_frames_and_ends_as_it_began(tmp_path: Path) -> None:
     animate(swing(), tmp_path / "run.gif", speed=1.0)
     with Image.open(tmp_path / "run.gif") as film:
         assert film.info["duration"] == 1000 / RATES[".gif"]
-    images = pictures_of(tmp_path / "run.gif")
+    images = frames_of(tmp_path / "run.gif")
     assert len(images) == round(0.5 * RATES[".gif"]) + 1
     height = images[0].shape[0]
     scene = [image[int(0.08 * height) : int(0.66 * height)] for image in images]
@@ -108,7 +108,7 @@ def test_movie(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "change, path, speed, complaint",
+    "change, path, speed, message",
     [
         ({}, "run", 1.0, "run: an animation is a .gif, an .mp4 or an .html"),
         ({}, "run.avi", 1.0, "a .gif, an .mp4 or an .html"),
@@ -118,11 +118,11 @@ def test_movie(tmp_path: Path) -> None:
         ({"pitch": np.full(51, np.nan)}, "run.gif", 1.0, "pitch of the run has values that are not finite"),
     ],
 )
-def test_what_cannot_be_shown_is_said(
-    tmp_path: Path, change: dict[str, Any], path: str, speed: float, complaint: str
+def test_runs_and_files_that_are_rejected(
+    tmp_path: Path, change: dict[str, Any], path: str, speed: float, message: str
 ) -> None:
     run = swing(**change)
-    with pytest.raises(UserError, match=complaint):
+    with pytest.raises(UserError, match=message):
         animate(run, tmp_path / path, speed=speed)
     assert not list(tmp_path.iterdir())
 
@@ -131,14 +131,14 @@ def test_command(prw: Any, tmp_path: Path) -> None:
     (tmp_path / "motors.csv").write_text("time,theta1,theta2\n" + "".join(f"{k / 10},{k / 9},0\n" for k in range(5)))
     done = prw("simulate", "motors.csv", "--animate", "wrist.gif")
     assert done.returncode == 0 and "wrist.gif" in done.stdout, done.stderr
-    assert len(pictures_of(tmp_path / "wrist.gif")) > 1
+    assert len(frames_of(tmp_path / "wrist.gif")) > 1
 
 
 def test_film_of_the_readme() -> None:
     """Small enough for a README; begins where it ends; panels stand still."""
     path = ROOT / "docs" / "wrist.gif"
     assert path.stat().st_size < 500_000
-    images = pictures_of(path)
+    images = frames_of(path)
     height, width, _ = images[0].shape
     scene = slice(int(0.08 * height), int(0.66 * height))
     assert np.mean(np.abs(images[0][scene] - images[-1][scene]).max(axis=2) > 40) < 0.002

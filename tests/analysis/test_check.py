@@ -79,7 +79,7 @@ def write_modelica(path, columns, units=False, across=True):
     return path
 
 
-def test_what_agrees(right, fmu, tmp_path):
+def test_a_result_that_agrees(right, fmu, tmp_path):
     found = prw.check(write_csv(tmp_path / "run.csv", right), fmu=fmu)
     assert found.agrees and found.experiment.name == "fig4_opposite" and not found.notes
     assert list(found.variables) == list(OUTPUTS)
@@ -88,7 +88,7 @@ def test_what_agrees(right, fmu, tmp_path):
 
 
 @pytest.mark.parametrize("model_exchange", [False, True])
-def test_what_does_not(soft, fmu, tmp_path, model_exchange):
+def test_a_result_that_does_not_agree(soft, fmu, tmp_path, model_exchange):
     found = prw.check(write_csv(tmp_path / "run.csv", soft), fmu=fmu, model_exchange=model_exchange)
     roll = found.variables["roll"]
     assert not found.agrees and not roll.agrees and found.variables["pitch"].agrees
@@ -147,9 +147,9 @@ def test_names_units_and_separators_of_others(right, fmu, tmp_path):
     assert prw.check(path, fmu=fmu).agrees
     plain = write_csv(tmp_path / "plain.csv", degrees)
     header, *rows = plain.read_text().splitlines()
-    spoken = tmp_path / "words.csv"
-    spoken.write_text("\n".join([f"# a tool's\nmode,{header}", "# begins", *(f"true,{row}," for row in rows)]))
-    assert prw.check(spoken, units=dict.fromkeys(DEGREES, "deg"), fmu=fmu).agrees
+    with_words = tmp_path / "words.csv"
+    with_words.write_text("\n".join([f"# a tool's\nmode,{header}", "# begins", *(f"true,{row}," for row in rows)]))
+    assert prw.check(with_words, units=dict.fromkeys(DEGREES, "deg"), fmu=fmu).agrees
     assert prw.check(plain, units=dict.fromkeys(DEGREES, "deg"), fmu=fmu).agrees
     assert "roll looks like degrees; give its unit: roll=deg" in prw.check(plain, fmu=fmu).notes
 
@@ -164,7 +164,7 @@ def test_of_two_rows_at_one_time_the_last_counts(right, fmu, tmp_path):
 
 
 def test_uneven_rows_are_interpolated(fmu, tmp_path):
-    """A solver with variable steps writes rows off the reference's times, up to 5 ms apart."""
+    """A solver with variable steps writes rows between the reference's times, up to 5 ms apart."""
     full, rng = fig4(), np.random.default_rng(1)
     rows = np.unique(np.append(np.cumsum(rng.integers(1, 6, 400)), [0, 1000]))
     rows = rows[(rows <= 1000) & ((rows % 10 != 0) | (rows % 1000 == 0))]
@@ -198,17 +198,17 @@ def test_two_components_with_one_name(right, soft, fmu, tmp_path):
         ),
         (
             lambda c: {**c, "theta2": c["theta1"], "omega2": c["omega1"], "roll": 0 * c["roll"]},
-            "theta2 is not that of fig4_opposite",
+            "theta2 differs from fig4_opposite",
         ),
     ],
 )
-def test_what_may_be_the_reason(right, fmu, tmp_path, spoil, note):
+def test_possible_causes(right, fmu, tmp_path, spoil, note):
     found = prw.check(write_csv(tmp_path / "run.csv", spoil(right)), "fig4_opposite", fmu=fmu)
     assert any(note in line for line in found.notes), found.notes
 
 
 @pytest.mark.parametrize(
-    "text, complaint",
+    "text, message",
     [
         ("", "the file is empty"),
         ("time,a\n0,1\n1,2\n", "there is none of time, theta1"),
@@ -223,12 +223,12 @@ def test_what_may_be_the_reason(right, fmu, tmp_path, spoil, note):
         ("time,theta1\n0,0\n1,0\n", "has none of the outputs tau1"),
     ],
 )
-def test_what_cannot_be_read(fmu, tmp_path, text, complaint):
+def test_tables_that_cannot_be_read(fmu, tmp_path, text, message):
     path = tmp_path / "run.csv"
     path.write_text(text)
     with pytest.raises(prw.UserError) as caught:
         prw.check(path, fmu=fmu)
-    assert str(path) in str(caught.value) and complaint in str(caught.value)
+    assert str(path) in str(caught.value) and message in str(caught.value)
 
 
 def test_mat_files_that_cannot_be_read(fmu, tmp_path):

@@ -21,6 +21,11 @@ def columns(run: prw.Run) -> dict[str, np.ndarray]:
     return dict(run.to_pandas().reset_index())
 
 
+def exact(simulated: rig.Rig) -> dict[str, np.ndarray]:
+    """The columns of sensors without errors."""
+    return {"time": simulated.time, **dict(zip(("theta1", "theta2"), simulated.theta.T)), **simulated.outputs}
+
+
 def check(found: prw.Identification, simulated: float, worst: float) -> None:
     """The estimate of k1 is within its own interval, which is narrow."""
     assert found.fits, (found.misfits, found.diagnosis)
@@ -56,17 +61,17 @@ def test_any_relative_noise(run, fmu, noise):
     check(prw.identify(table, starts=1, fmu=fmu), K1, max(1e-6, 0.15 * noise))
 
 
-def test_an_encoder_that_sees_two_steps(run, fmu):
+def test_an_encoder_with_two_values(run, fmu):
     """theta3 and theta4 have two values, which add almost no information and do no harm."""
     random, table = np.random.default_rng(1), columns(run)
     for name, noise in (("tau1", 0.02), ("tau2", 0.02), ("roll", 1e-3)):
         table[name] = table[name] + random.normal(0, noise, len(run.time))
-    seen = {name: 0.06 * np.round(table[name] / 0.06) for name in ("theta3", "theta4")}
-    assert {len(np.unique(angle)) for angle in seen.values()} == {2}
-    table |= seen
+    coarse = {name: 0.06 * np.round(table[name] / 0.06) for name in ("theta3", "theta4")}
+    assert {len(np.unique(angle)) for angle in coarse.values()} == {2}
+    table |= coarse
     found = prw.identify(table, estimate="k1", starts=1, fmu=fmu)
     without = prw.identify(
-        {name: column for name, column in table.items() if name not in seen}, estimate="k1", starts=1, fmu=fmu
+        {name: column for name, column in table.items() if name not in coarse}, estimate="k1", starts=1, fmu=fmu
     )
     check(found, K1, 1.05 * without.parameters["k1"].relative)
 
@@ -75,24 +80,12 @@ def test_an_encoder_that_sees_two_steps(run, fmu):
 def test_a_rig_with_exact_sensors(fmu, rate, pattern):
     """Its motors move smoothly between the samples."""
     simulated = rig.experiment(23, 6, rate, pattern)
-    table = {
-        "time": simulated.time,
-        "theta1": simulated.theta[:, 0],
-        "theta2": simulated.theta[:, 1],
-        **simulated.outputs,
-    }
-    check(prw.identify(table, starts=1, fmu=fmu), simulated.parameters["k1"], 2e-4)
+    check(prw.identify(exact(simulated), starts=1, fmu=fmu), simulated.parameters["k1"], 2e-4)
 
 
 def test_a_fault_shows_in_exact_data(fmu):
     simulated = rig.late(rig.experiment(23, 6), 1e-4)
-    table = {
-        "time": simulated.time,
-        "theta1": simulated.theta[:, 0],
-        "theta2": simulated.theta[:, 1],
-        **simulated.outputs,
-    }
-    found = prw.identify(table, starts=1, fmu=fmu)
+    found = prw.identify(exact(simulated), starts=1, fmu=fmu)
     assert not found.fits and "ms late" in found.diagnosis[0]
     assert found.diagnosis[0].startswith("tau1, tau2 comes 0.1 +-")
 

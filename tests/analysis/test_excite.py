@@ -32,15 +32,15 @@ def test_motions_keep_the_limits_and_start_and_end_at_rest(model):
 
 
 def test_the_expected_errors_are_those_of_many_fits(model, fmu):
-    """White noise, exact angles, 16 fits: the scatter of the estimates is what the design promised."""
+    """White noise, exact angles, 16 fits: the scatter of the estimates equals the design's expectation."""
     channels = ("tau1", "tau2", "pitch")
     noise = {"tau1": 0.05, "tau2": 0.05, "pitch": 2e-3}
-    what = task_of(model.known, ["k2", "c2", "c3"])
-    motions = design.motions(model, what, design.Limits(0.3, 5.0, 150.0), 2.0, 250.0, noise)
+    task = task_of(model.known, ["k2", "c2", "c3"])
+    motions = design.motions(model, task, design.Limits(0.3, 5.0, 150.0), 2.0, 250.0, noise)
     motion = next(m for m in motions if m.name == "chirp_independent")
     experiment = planned(motion, channels)
-    point = what.first()
-    expected = np.sqrt(np.diag(np.linalg.inv(design.information(model, [experiment], what, point, noise))))
+    point = task.first()
+    expected = np.sqrt(np.diag(np.linalg.inv(design.information(model, [experiment], task, point, noise))))
     with Testbed(fmu) as testbed:
         signals = testbed.respond(motion, channels)
     response = np.column_stack([signals[name] for name in channels])
@@ -48,7 +48,7 @@ def test_the_expected_errors_are_those_of_many_fits(model, fmu):
     found = []
     for _ in range(16):
         values = response + random.normal(0, list(noise.values()), response.shape) + random.uniform(-1, 1, 3)
-        found.append(fit(model, [replace(experiment, values=values)], what, starts=1).logarithms - point)
+        found.append(fit(model, [replace(experiment, values=values)], task, starts=1).logarithms - point)
     ratio = np.std(found, axis=0) / expected
     assert (ratio > 0.6).all() and (ratio < 1.5).all(), ratio
 
@@ -63,11 +63,13 @@ def test_command(prw, tmp_path):
     for entry in ranking["motions"]:
         motion = read(out / entry["file"])
         assert motion.omega is not None and motion.time[-1] == 4.0
+        assert np.abs(motion.theta).max() <= np.deg2rad(20.001) and np.abs(motion.omega).max() <= np.deg2rad(450.01)
+        assert list(entry["expected_errors"]) == ["k1", "k2", "c1", "c2", "c3"]
     best = ranking["motions"][0]["file"]
     assert prw("simulate", "--input", out / best).returncode == 0
 
 
-def test_opposite_motors_are_what_tells_of_the_roll_inertia(prw, tmp_path):
+def test_only_opposite_motors_determine_the_roll_inertia(prw, tmp_path):
     result = prw("excite", "--measure", "tau1,tau2", "--estimate", "J3", "--duration", 4, "--rate", 500)
     assert result.returncode == 0
     motions = json.loads((tmp_path / "out" / "excite" / "ranking.json").read_text())["motions"]

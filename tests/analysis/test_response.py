@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import rig
 
-from prw.errors import UserError
 from prw.identification import task_of
 from prw.identification.experiment import prepare
 from prw.identification.fit import Fitter
 from prw.identification.path import quantum_of, smooth
 from prw.motion import Motion
-from prw.recording import Recording
-
-OTHER = {"k1": 90.0, "k2": 61.0, "c1": 0.2, "c2": 0.9, "c3": 0.1, "J2": 0.006, "J3": 0.02, "H3": 0.03}
+from prw.recording import Recording, read
 
 
 def recording(simulated: rig.Rig, rows=slice(None), **columns) -> Recording:
-    """The recording of perfect sensors, with some columns replaced by `columns`."""
-    measured = {name: columns.get(name, simulated.outputs[name])[rows] for name in rig.ALL}
-    return Recording(
-        Path("run.csv"), Motion(simulated.time[rows], simulated.theta[rows], simulated.omega[rows]), measured, {}
-    )
+    """The recording of sensors without errors, with some columns replaced by `columns`."""
+    motion = Motion(simulated.time, simulated.theta, simulated.omega)
+    return read({name: column[rows] for name, column in {**motion.columns, **simulated.outputs, **columns}.items()})
 
 
 @pytest.fixture(scope="module")
@@ -61,11 +54,9 @@ def test_missing_and_uneven_rows_change_nothing(model, simulated):
         np.testing.assert_allclose(modelled[20:-20, 0], simulated.outputs["tau1"][at][20:-20], atol=1e-2)
 
 
-def test_derivatives_by_the_parameters(model, simulated):
+def test_derivatives_with_respect_to_the_parameters(model, simulated):
     """The derivatives that the search uses equal differences, encoders' errors included."""
-    columns = rig.measure(simulated, 5, counts=2000)
-    motion = Motion(simulated.time, np.column_stack([columns["theta1"], columns["theta2"]]))
-    measured = Recording(Path("run.csv"), motion, {name: columns[name] for name in rig.ALL}, {})
+    measured = read(rig.measure(simulated, 5, counts=2000))
     task = task_of(model.known, rig.NAMES, parameters=fixed(simulated, model))
     noise = {"tau1": 0.02, "tau2": 0.02, "theta3": 1e-3, "theta4": 1e-3, "pitch": 1e-3, "roll": 1e-3}
     fitter, at = Fitter(model, [prepare(measured)], task, noise), task.first()
@@ -75,19 +66,6 @@ def test_derivatives_by_the_parameters(model, simulated):
         differences = (fitter.residuals(at + step * direction) - fitter.residuals(at - step * direction)) / (2 * step)
         # Kaufman's form leaves out a part that is perpendicular to the residual's motion and vanishes with it.
         assert np.linalg.norm(found[:, i] - differences) < 5e-3 * np.linalg.norm(differences), task.names[i]
-
-
-def test_a_value_that_the_fmu_refuses(model):
-    with pytest.raises(UserError, match="k1 must"):
-        model.at({**model.known.starts, "k1": -1.0})
-
-
-def test_the_model_forgets(model):
-    first = model.at({})
-    model.at(OTHER)
-    again = model.at({})
-    for block in ("A", "B", "C", "D"):
-        np.testing.assert_array_equal(getattr(first, block), getattr(again, block))
 
 
 def wave(t):
@@ -128,10 +106,10 @@ def test_logged_rates_help_and_their_noise_is_found():
     quantum = 2 * np.pi / 2000
     coarse = np.round(angle / quantum) * quantum
     random = np.random.default_rng(0)
-    alone = smooth(t, coarse)
+    without_rates = smooth(t, coarse)
     both = smooth(t, coarse, rate + random.normal(0, 0.03, len(t)))
     assert both.rate_noise == pytest.approx(0.03, rel=0.1)
-    errors = [np.std(path.angle.derivative()(t) - rate) for path in (alone, both)]
+    errors = [np.std(path.angle.derivative()(t) - rate) for path in (without_rates, both)]
     assert errors[1] < errors[0] / 3
 
 
@@ -180,5 +158,5 @@ def test_an_encoder_s_errors_in_every_period_are_no_motion(counts):
     angle = (1 - np.cos(10 * np.pi * t)) / (10 * np.pi)
     theta = np.round(np.outer(angle, [1, -1]) / quantum + [0.3, 0.1]) * quantum
     assert quantum_of(theta[:, 0]) == pytest.approx(quantum)
-    found = prepare(Recording(Path("run.csv"), Motion(t, theta), {"tau1": angle}, {}))
+    found = prepare(read({"time": t, "theta1": theta[:, 0], "theta2": theta[:, 1], "tau1": angle}))
     assert 5 < found.band < 8

@@ -18,14 +18,14 @@ TUTORIAL = ROOT / "python" / "prw" / "tutorial.md"
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.S | re.M)
 
 
-def test_the_commands_do_what_the_page_says(tmp_path, fmu):
+def test_the_commands_work_as_on_the_page(tmp_path, fmu):
     if not shutil.which("cargo"):
         pytest.skip("no cargo")
     (tmp_path / "target" / "fmu").mkdir(parents=True)
     shutil.copy(fmu, tmp_path / "target" / "fmu")
     shutil.copytree(ROOT / "examples", tmp_path / "examples", ignore=shutil.ignore_patterns("*-fmu"))
-    folders = [str(Path(sys.executable).parent), os.environ["PATH"]]
-    environment = {**os.environ, "PATH": os.pathsep.join(folders)}
+    directories = [str(Path(sys.executable).parent), os.environ["PATH"]]
+    environment = {**os.environ, "PATH": os.pathsep.join(directories)}
     reported = ""
     for language, block in BLOCK.findall(TUTORIAL.read_text(encoding="utf-8")):
         if language == "python":
@@ -51,12 +51,12 @@ def test_the_commands_do_what_the_page_says(tmp_path, fmu):
     for name in ("k1", "k2", "c1", "c2", "c3"):
         off = np.log(found[name]["shown"]["value"] / float(rig[name]))
         assert abs(off) < 0.01, f"{name} {off:+.2%}"
-    for promised in ("report.html", "report.json", "identified.json", "identified.ssv"):
-        assert (tmp_path / "out" / "identified" / promised).is_file()
+    for name in ("report.html", "report.json", "identified.json", "identified.ssv"):
+        assert (tmp_path / "out" / "identified" / name).is_file()
     assert (tmp_path / "out" / "sweep" / "runs.parquet").is_file()
 
 
-def run(command, folder, environment) -> str:
-    result = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=600)
+def run(command, directory, environment) -> str:
+    result = subprocess.run(command, cwd=directory, env=environment, capture_output=True, text=True, timeout=600)
     assert result.returncode == 0, f"{' '.join(command)}\n{result.stdout}{result.stderr}"
     return result.stdout

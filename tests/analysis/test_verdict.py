@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import rig
@@ -15,13 +13,10 @@ def late(seconds):
     return lambda simulated: rig.late(simulated, seconds)
 
 
-def recording(simulated, channels=rig.ALL, spoil=None, counts=rig.COUNTS, **sensors) -> prw.Recording:
-    columns = rig.measure(simulated, 5, channels, counts, **sensors)
-    if spoil:
-        spoil(columns)
-    theta = np.column_stack([columns["theta1"], columns["theta2"]])
-    measured = {name: columns[name] for name in channels}
-    return prw.Recording(Path("run.csv"), prw.Motion(columns["time"], theta), measured, {})
+def recording(simulated, channels=rig.ALL, spoil=lambda columns: None, **sensors) -> dict[str, np.ndarray]:
+    columns = rig.measure(simulated, 5, channels, **sensors)
+    spoil(columns)
+    return columns
 
 
 def clipped(columns):
@@ -103,7 +98,7 @@ def test_two_faults_are_both_named(experiment, fmu):
     assert len(one.diagnosis) == 1, "one fault is one"
 
 
-def test_what_two_channels_have_in_common_is_seen_where_parameters_make_up_for_each_alone(fmu):
+def test_a_common_fault_is_found_if_parameters_compensate_for_each_single_one(fmu):
     # Torques 0.7 ms late, without encoders on the shafts: c1 is off by half, and the residuals look like noise.
     simulated = rig.late(rig.experiment(400004, 6, pattern="slow"), 7e-4)
     found = prw.identify(recording(simulated, ("tau1", "tau2", "pitch", "roll")), starts=1, fmu=fmu)
@@ -151,7 +146,7 @@ def test_coarse_encoders_on_the_motors_are_no_fault(fmu):
         ),
     ],
 )
-def test_what_is_wrong_is_estimated_along(experiment, fmu, spoil, option, channels, size):
+def test_faults_are_estimated_along(experiment, fmu, spoil, option, channels, size):
     found = prw.identify(recording(spoil(experiment)), starts=1, fmu=fmu, **{option: channels})
     assert found.fits, found.misfits
     for name in channels:
@@ -161,7 +156,7 @@ def test_what_is_wrong_is_estimated_along(experiment, fmu, spoil, option, channe
         assert abs(estimate.value - experiment.parameters[name]) < 4.5 * estimate.standard_error
 
 
-def test_the_command_tells_and_writes_no_parameters(prw, tmp_path, experiment):
+def test_the_command_reports_and_writes_no_parameters(prw, tmp_path, experiment):
     rig.write(tmp_path / "run.csv", rig.measure(rig.late(experiment, 1e-3), 5))
     out = tmp_path / "out" / "identified"
     result = prw("identify", "run.csv", "--starts", 1)
@@ -178,6 +173,6 @@ def test_the_command_tells_and_writes_no_parameters(prw, tmp_path, experiment):
     assert result.returncode == 0 and "delay of tau1" in result.stdout, result.stderr
 
 
-def test_a_delay_of_what_was_not_measured(fmu, experiment):
+def test_a_delay_of_a_channel_that_was_not_measured(fmu, experiment):
     with pytest.raises(prw.UserError, match="delay: tau2 is not known; there are tau1"):
         prw.identify(recording(experiment, ("tau1",)), delay=["tau2"], fmu=fmu)

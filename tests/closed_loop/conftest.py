@@ -1,4 +1,4 @@
-"""Fixtures: the closed loop made of them, and its runs under the masters that are installed."""
+"""Fixtures: the controller, the closed loop, and its runs under the masters that are installed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def closed_loop() -> system.System:
 
 @pytest.fixture(scope="session", params=masters.MASTERS, ids=lambda master: master.name)
 def master(request) -> importers.Tool:
-    """Every master in turn, as far as it is installed."""
+    """Every master in turn, if it is installed."""
     if request.param.version() is None:
         pytest.skip(f"{request.param.package} is not installed")
     return request.param

@@ -15,16 +15,16 @@ STEP = 1e-3
 
 
 @pytest.fixture(scope="module")
-def folders(fmu, controller_fmu, unpack):
+def directories(fmu, controller_fmu, unpack):
     return {each.stem: unpack(each) for each in (fmu, controller_fmu)}
 
 
 @pytest.fixture
-def make(folders):
+def make(directories):
     instances = []
 
     def make(name: str) -> Instance:
-        instances.append(Instance(folders[name], fmpy.read_model_description(folders[name]), name))
+        instances.append(Instance(directories[name], fmpy.read_model_description(directories[name]), name))
         return instances[-1]
 
     yield make
@@ -59,7 +59,7 @@ def run(make, duration: float, reference):
     return STEP * np.arange(1, n + 1), np.array(wrist), np.array(motors)
 
 
-def test_the_validator_has_nothing_to_say(controller):
+def test_the_validator_reports_nothing(controller):
     assert fmpy.read_model_description(str(controller), validate=True) and validate_fmu(str(controller)) == []
 
 
@@ -131,7 +131,7 @@ def test_output_derivatives_are_those_of_the_motion(make):
         controller.fmi.getRealOutputDerivatives(references[:2], [2, 2])
 
 
-def test_motors_start_where_they_stand(make):
+def test_motors_start_at_their_given_angles(make):
     controller = make("prw_controller")
     start(controller, theta1=0.7, theta2=0.7, pitch_ref=0.7, pitch=0.7)
     for k in range(100):

@@ -46,7 +46,7 @@ def test_there_are_at_least_two_masters():
     assert len(installed) >= 2
 
 
-def test_the_wrist_gets_where_it_shall(response, closed_loop):
+def test_the_wrist_reaches_the_reference(response, closed_loop):
     """30 degrees of pitch and 60 of roll to 0.1 degree, well within a second, and for good."""
     for axis in ("pitch", "roll"):
         goal = closed_loop.inputs[f"{axis}_ref"][1]
@@ -62,7 +62,7 @@ def test_the_motors_keep_their_limits(response, closed_loop):
         assert np.max(np.abs(response[f"testbed.tau{i}"])) < 10
 
 
-def test_systems_of_fmu_run_agree_to_the_bit(master, response, closed_loop):
+def test_systems_of_fmu_run_are_bit_identical(master, response, closed_loop):
     if master.name == "Ecos":
         pytest.skip("Ecos reads outputs after it has set the next inputs")
     own = by_fmu_run(closed_loop, starts_late=master.name == "FMPy")
@@ -70,7 +70,7 @@ def test_systems_of_fmu_run_agree_to_the_bit(master, response, closed_loop):
         assert np.array_equal(response[name], column), name
 
 
-def test_masters_agree_to_rounding(response, closed_loop):
+def test_masters_agree_within_rounding(response, closed_loop):
     """All couple by Jacobi's method, so they differ from our own such master by rounding only. Torques may be read before
     or after the next input is set, and differ then by the jump of that input."""
     wanted = ["testbed.pitch", "testbed.roll", "controller.theta1", "controller.theta2", "controller.omega1"]
@@ -85,15 +85,15 @@ def test_masters_agree_to_rounding(response, closed_loop):
 @pytest.fixture(scope="module")
 def python_loop(tmp_path_factory, fmu):
     pytest.importorskip("pythonfmu")
-    folder = tmp_path_factory.mktemp("python")
+    directory = tmp_path_factory.mktemp("python")
     source = ROOT / "examples" / "python_controller.py"
     subprocess.run(
-        [sys.executable, "-m", "pythonfmu", "build", "-f", source, "-d", folder], check=True, capture_output=True
+        [sys.executable, "-m", "pythonfmu", "build", "-f", source, "-d", directory], check=True, capture_output=True
     )
     build = ["cargo", "run", "--quiet", "--release", "-p", "prw_controller", "--bin", "build_closed_loop", "--"]
-    options = ["--testbed", fmu, "--controller", folder / "PythonController.fmu", "--out", folder]
+    options = ["--testbed", fmu, "--controller", directory / "PythonController.fmu", "--out", directory]
     subprocess.run([*build, *options], check=True, cwd=ROOT, capture_output=True)
-    return system.read(folder / "prw_closed_loop.ssp", folder / "prw_closed_loop")
+    return system.read(directory / "prw_closed_loop.ssp", directory / "prw_closed_loop")
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +119,7 @@ def study(closed_loop):
 
 
 def test_up_to_the_sample_time_derivatives_change_nothing_and_the_order_is_two(study):
-    """The controller sees every sample as it is; what is left is the testbed's line for the motors' parabola."""
+    """The controller reads exact samples. The remaining error is the testbed's line in place of the motors' parabola."""
     fine = study.step <= 1.001e-3
     np.testing.assert_allclose(study.held[fine], study.derivatives[fine], rtol=1e-6)
     order = np.diff(np.log(study.held[fine])) / np.diff(np.log(study.step[fine]))

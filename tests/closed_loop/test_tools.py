@@ -26,7 +26,7 @@ def tools(*arguments):
     return subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
 
 
-def test_it_writes_figures_and_tables_and_says_what_it_saw(closed_loop, tmp_path):
+def test_it_writes_figures_and_tables_and_prints_results(closed_loop, tmp_path):
     run = tools("--fmus", str(FMUS), "--out", str(tmp_path))
     assert run.returncode == 0, run.stderr
     for text in ("pitch_ref 30 deg, roll_ref 60 deg", "within 0.1 deg after", "FMPy", "with input derivatives"):
@@ -37,7 +37,7 @@ def test_it_writes_figures_and_tables_and_says_what_it_saw(closed_loop, tmp_path
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
 
 
-def test_what_is_missing_is_named(tmp_path):
+def test_a_missing_file_is_named(tmp_path):
     run = tools("--fmus", str(tmp_path))
     assert run.returncode == 1 and run.stderr.count("\n") == 1
     assert "prw_closed_loop.ssp: no such file; `make closed-loop` builds it" in run.stderr
@@ -71,7 +71,8 @@ def validate(monkeypatch, tmp_path, fmu):
     monkeypatch.setattr(runs.masters, "MASTERS", runs.masters.MASTERS[:1])
 
     def validate(*arguments):
-        status = run("tools", "", [validation], ["validation", "--fmus", str(FMUS), "--out", str(tmp_path), *arguments])
+        options = ["--fmus", str(FMUS), "--out", str(tmp_path), *arguments]
+        status = run("tools", "", {"validation": validation}, ["validation", *options])
         return (
             status,
             json.loads((tmp_path / "validation.json").read_text()),
@@ -105,4 +106,4 @@ def test_a_file_of_another_tool(validate, fmu, tmp_path, capsys):
     assert "fig4_opposite: Tool 1.0, from the file far.csv" in capsys.readouterr().err
     assert [row["agrees"] for row in found["rows"] if "Tool" in row["importer"]] == [False]
     assert validate("--result", "far.csv")[0] == 1
-    assert "write TOOL=FILE" in capsys.readouterr().err
+    assert "--result far.csv: write NAME=VALUE" in capsys.readouterr().err

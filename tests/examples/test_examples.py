@@ -42,7 +42,7 @@ def test_the_page_has_its_purpose_and_figures() -> None:
 def test_the_page_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in {"EXAMPLES": ("lqr",), "PAGE": tmp_path / "page.md", "FIGURES": tmp_path}.items():
         monkeypatch.setattr(examples, name, value)
-    assert cli.run("tools", "", [examples], ["examples"]) == 0
+    assert cli.run("tools", "", {"examples": examples}, ["examples"]) == 0
     section = (tmp_path / "page.md").read_text(encoding="utf-8").split(examples.HEAD)[1].strip()
     page = (ROOT / "docs" / "examples.md").read_text(encoding="utf-8")
     assert section.split("[lqr.py]")[0] in page and (tmp_path / "lqr.png").is_file()

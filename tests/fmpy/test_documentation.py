@@ -23,11 +23,10 @@ from prw.errors import UserError
 from prw.motion import Motion
 from tools.documentation.pages import PAGES, TESTBED, render
 from tools.documentation.sources import read_table
-from tools.figures import COMMITTED, ICON, ICON_SVG, bode, gallery
+from tools.figures import COMMITTED, bode, gallery
 from tools.figures.gallery import figures
-from tools.figures.icon import draw_controller, draw_testbed
 from tools.figures.results import numbers, results
-from tools.figures.writing import write_for_page, write_json, write_png, write_small_png, write_svg
+from tools.figures.writing import write_for_page, write_small_png
 
 #: Two sines from rest.
 END, AMPLITUDE, FREQUENCY = 0.5, np.array([0.3, -0.2]), np.array([14.0, 23.0])
@@ -66,8 +65,8 @@ def test_the_fmu_contains_page_and_icons(which):
         # build_fmu adds the scripts that run the FMU: test_page.py.
         main = page[page.index("<main>") + len("<main>") : page.index("</body>")]
         assert main in archive.read("documentation/index.html").decode()
-        for icon in (ICON, ICON_SVG):
-            assert archive.read(icon.as_posix()) == (ROOT / which.content / icon).read_bytes()
+        for icon in ("model.png", "documentation/model.svg"):
+            assert archive.read(icon) == (ROOT / which.content / icon).read_bytes()
     assert path.stat().st_size < 2e6
 
 
@@ -155,7 +154,10 @@ def test_reported_errors_of_model_exchange_in_fmpy(fmu, model):
 
 def test_numbers_are_up_to_date(found):
     """Two digits are quoted of the measured deviations, more of the rest; the last one may differ between machines."""
-    committed, fresh = json.loads((ROOT / COMMITTED / "numbers.json").read_text(encoding="utf-8")), numbers(found)
+    committed, fresh = (
+        json.loads((ROOT / COMMITTED / "numbers.json").read_text(encoding="utf-8")),
+        json.loads(numbers(found)),
+    )
 
     def compare(old, new, path):
         if isinstance(old, dict):
@@ -173,15 +175,12 @@ def test_numbers_are_up_to_date(found):
 
 def write(folder: Path, found) -> dict[str, bytes]:
     """The files that `make figures` keeps with the sources, by name."""
-    write_json(folder / "numbers.json", numbers(found))
+    (folder / "numbers.json").write_text(numbers(found), encoding="utf-8")
     for name, drawn in figures(found).items():
         if drawn.for_page:
             write_for_page(folder / f"{name}.svg", drawn.figure)
         if drawn.for_readme:
             write_small_png(folder / f"{name}.png", drawn.figure)
-    for name, draw in (("testbed", draw_testbed), ("controller", draw_controller)):
-        write_svg(folder / f"icon_{name}.svg", draw())
-        write_png(folder / f"icon_{name}.png", draw(), dpi=128)
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
@@ -195,7 +194,7 @@ def test_figures_are_up_to_date(written):
     made_with = json.loads((ROOT / COMMITTED / "numbers.json").read_text(encoding="utf-8"))["made_with"]
     if made_with != f"matplotlib {matplotlib.__version__}":
         pytest.skip(f"the figures were drawn by {made_with}")
-    for name in (name for name in written if name.endswith(".svg") and not name.startswith("icon_")):
+    for name in (name for name in written if name.endswith(".svg")):
         fresh, kept = written[name].decode(), (ROOT / COMMITTED / name).read_text(encoding="utf-8")
         message = f"{COMMITTED}/{name} is out of date; `make figures docs` renews it"
         assert NUMBER.sub("#", fresh) == NUMBER.sub("#", kept), message

@@ -102,8 +102,8 @@ class Controller:
 def control(model: LinearModel, law: Law, reference: Any, samples: int) -> dict[str, Any]:
     """The closed loop from rest at 0 with the constant reference `reference` (2,) rad for pitch and roll.
 
-    Returns MOTORS and the testbed's outputs by name, each (samples + 1,): at every sample of the controller, what the
-    two do continuously, without the delay of an importer's communication points.
+    Returns MOTORS and the testbed's outputs by name, each (samples + 1,): at every sample of the controller. The
+    two are coupled continuously, without the delay of an importer's communication points.
     """
     g = np.zeros((12, 12))
     g[:6, :6], g[:6, 6:8], g[:6, 8:10] = model.a, model.b_angle, model.b_rate

@@ -1,8 +1,8 @@
 """The reference experiments: motion of the motors, parameters, and response of the testbed.
 
 The oracle calculates the response. Motors that turn at constant rates are exact in both interface types and at any step size;
-of other motions the samples are exact, and what an importer makes of the time between them costs what the tolerances
-allow.
+of other motions the samples are exact, and the tolerances allow for the interpolation of importers
+between them.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def experiments() -> list[Experiment]:
 
 
 def with_counts(parameters: dict[str, Any]) -> dict[str, Any]:
-    """M and N as whole numbers."""
+    """M and N as integers."""
     return {**parameters, "M": int(parameters["M"]), "N": int(parameters["N"])}
 
 
@@ -158,7 +158,7 @@ def moved(
 
 
 def rate_step() -> Experiment:
-    """Motor 1 turns at 0.5 rad/s from the first instant on, with the wrist at rest; motor 2 stands."""
+    """Motor 1 turns at 0.5 rad/s from the first instant on, with the wrist at rest; motor 2 is at rest."""
     t, speed = times(0.5, INTERVAL), np.array([0.5, 0.0])
     parameters = with_counts(table_1())
     model = linear_model({key: float(value) for key, value in parameters.items()})

@@ -1,4 +1,4 @@
-"""The testbed's equations of motion from its energies alone: eqs. (1), (3)-(7) and Lagrange's equation (2).
+"""The testbed's equations of motion from its energies only: eqs. (1), (3)-(7) and Lagrange's equation (2).
 
 Nothing here comes from eqs. (8)-(11). M, Delta and K are the second derivatives of T, the Rayleigh function and V,
 obtained exactly, for T, V and the Rayleigh function are quadratic forms. The number type is the caller's: floats for
@@ -137,7 +137,7 @@ def linear_model(p) -> LinearModel:
     """The testbed as a first-order linear system, by Lagrange's equation for each of theta3 ... theta6.
 
     d/dt dT/dq' + dV/dq + dDelta/dq' = 0. The rows of the massless shafts (theta3, theta4) give their rates; the rows of
-    the carriers (theta5, theta6) give the accelerations. The torque on a sensor is what its coupling hands on:
+    the carriers (theta5, theta6) give the accelerations. The torque on a sensor is the torque of its coupling:
     tau = -(dV/dtheta_motor + dDelta/dtheta_motor'), which is eq. (9) in the paper's sign.
     """
     h_t, h_v, h_d = hessian(kinetic_energy, p), hessian(potential_energy, p), hessian(dissipation, p)

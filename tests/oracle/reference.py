@@ -34,7 +34,7 @@ def exponential(g: np.ndarray) -> np.ndarray:
     return expm(g)
 
 
-def follow(model: LinearModel, t, theta, slope, x0=None, after=None):
+def follow(model: LinearModel, t, theta, slope, x0=None):
     """Exact outputs when the motors follow theta[k] + slope[k] (s - t[k]) on each [t[k], t[k+1]].
 
     t (n,) in s, theta (n, 2) in rad, slope (n, 2) in rad/s; x0 (6,) defaults to rest at theta[0]. Where the path does

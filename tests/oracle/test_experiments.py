@@ -1,4 +1,4 @@
-"""The reference experiments as they are kept with the sources: up to date, and what the two oracles agree on."""
+"""The reference experiments as they are kept with the sources: they are up to date, and the two oracles agree."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from reference import follow
 from write_experiments import DECIMALS, FILES, ROOT, files
 
 COMMITTED = ROOT / "modelDescription"
-HINT = "out of date; write it anew with\n    make experiments"
+HINT = "out of date; write it again with\n    make experiments"
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +65,7 @@ def test_both_oracles_agree(found):
 
 
 def test_the_parameter_sets_are_valid_and_complete(texts):
-    """All parameters, so that none keeps what was set before; the start, too."""
+    """All parameters, so that none keeps an earlier value; the start, too."""
     schema = Path(fmpy.__file__).parent / "ssp" / "schema" / "SystemStructureParameterValues.xsd"
     valid = etree.XMLSchema(etree.parse(schema))
     variables = etree.parse(COMMITTED / "modelDescription.xml").iter("ScalarVariable")

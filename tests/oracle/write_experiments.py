@@ -1,9 +1,9 @@
-"""Writes the reference experiments as files that travel in the FMU, where the layered standard FMI-LS-REF (version
-1.0.0-alpha.1) has its place for them.
+"""Writes the reference experiments as files that the FMU contains, in the directory of the layered standard FMI-LS-REF
+(version 1.0.0-alpha.1).
 
-    python tests/oracle/write_experiments.py [FOLDER]
+    python tests/oracle/write_experiments.py [DIRECTORY]
 
-FOLDER is what goes into the FMU as it is, by default modelDescription.
+DIRECTORY is copied into the FMU, by default modelDescription.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from lxml import etree
 
 ROOT = Path(__file__).resolve().parents[2]
 LAYER = "org.fmi-standard.fmi-ls-ref"
-#: Within the folder; the second is what the standard recommends to readers.
+#: Within the directory; the second is a document for readers, as the standard recommends.
 FILES, ABOUT = Path("extra", LAYER), Path("documentation", "fmi-ls-ref.txt")
 LS = "http://fmi-standard.org/fmi-ls-manifest"
 SSV, SSC = (f"http://ssp-standard.org/SSP1/SystemStructure{kind}" for kind in ("ParameterValues", "Common"))
@@ -34,7 +34,7 @@ SOLVER = 1e-7
 
 
 def files(found: list[Experiment]) -> dict[Path, str]:
-    """The text of every file by its place in the folder."""
+    """The content of every file by its path in the directory."""
     texts = {}
     for experiment in found:
         for kind, columns in (("in", experiment.inputs), ("ref", experiment.reference)):
@@ -149,12 +149,12 @@ def xml(root: Any) -> str:
 
 
 def main() -> None:
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "modelDescription"
+    directory = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "modelDescription"
     texts = files(experiments())
     for path, text in texts.items():
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_text(text, encoding="utf-8", newline="\n")
-    print(f"wrote {len(texts)} files, {sum(map(len, texts.values())) // 1000} kB, into {folder}")
+        (directory / path).parent.mkdir(parents=True, exist_ok=True)
+        (directory / path).write_text(text, encoding="utf-8", newline="\n")
+    print(f"wrote {len(texts)} files, {sum(map(len, texts.values())) // 1000} kB, into {directory}")
 
 
 if __name__ == "__main__":

@@ -26,8 +26,8 @@ def pendulum(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     """pendulum.c, compiled here: FMI 2.0 for Model Exchange, FMI 3.0 for Co-Simulation."""
     if sys.platform != "linux" or shutil.which("cc") is None:
         pytest.skip("needs a C compiler on Linux")
-    folder = tmp_path_factory.mktemp("pendulum")
-    library, fmu = folder / "pendulum.so", folder / "pendulum.fmu"
+    directory = tmp_path_factory.mktemp("pendulum")
+    library, fmu = directory / "pendulum.so", directory / "pendulum.fmu"
     headers = Path(fmpy.__file__).parent / "c-code"
     flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", "-I", str(headers)]
     version = ["-DFMI3"] if request.param == "3" else []

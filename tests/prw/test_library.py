@@ -23,9 +23,9 @@ from prw.files import write_table
 MOTION = ROOT / "examples" / "point_to_point.csv"
 
 
-def python(program: str, folder: Path) -> str:
+def python(program: str, directory: Path) -> str:
     """The output of a program in a separate Python."""
-    result = subprocess.run([sys.executable, "-c", program], cwd=folder, capture_output=True, text=True, timeout=120)
+    result = subprocess.run([sys.executable, "-c", program], cwd=directory, capture_output=True, text=True, timeout=120)
     assert result.returncode == 0, result.stderr
     assert result.stderr == ""
     return result.stdout
@@ -89,7 +89,7 @@ def test_nothing_is_printed_or_written(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_where_a_run_goes(testbed: Path, tmp_path: Path) -> None:
+def test_a_run_is_written_converted_and_drawn(testbed: Path, tmp_path: Path) -> None:
     run = prw.simulate(MOTION, fmu=testbed)
     run.to_csv(tmp_path / "run.csv")
     back = prw.read(tmp_path / "run.csv")
@@ -105,7 +105,7 @@ def test_where_a_run_goes(testbed: Path, tmp_path: Path) -> None:
 
 
 def test_numbers_are_read_back_unchanged(tmp_path: Path) -> None:
-    """Short and long ones, those next to powers of ten and two, and what has an exponent."""
+    """Short and long ones, neighbours of powers of ten and two, and numbers with an exponent."""
     draws, path = np.random.default_rng(2), tmp_path / "motion.csv"
     powers = np.concatenate([10.0 ** np.arange(-6, 20), 2.0 ** np.arange(-16, 60)])
     near = np.concatenate(
@@ -120,16 +120,8 @@ def test_numbers_are_read_back_unchanged(tmp_path: Path) -> None:
     assert np.array_equal(found, np.column_stack([motion.time, motion.theta]))
 
 
-def test_errors_are_those_of_python_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ValueError, match="no recording"):
-        prw.read(7)  # type: ignore[arg-type]
-    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
-    with pytest.raises(ImportError, match="pip install"):
-        prw.sweep()
-
-
 def test_where_the_fmu_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """PRW_FMU first, then the one in an installed package, then that of the clone; the working directory does not matter."""
+    """PRW_FMU first, then the FMU in an installed package, then the clone's; the working directory does not matter."""
     own, here = tmp_path / "site" / "prw", tmp_path / "work" / "target" / "fmu"
     shutil.copytree(Path(prw.__path__[0]), own, ignore=shutil.ignore_patterns("__pycache__"))
     here.mkdir(parents=True)
@@ -138,12 +130,13 @@ def test_where_the_fmu_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         f"import sys; sys.path.insert(0, {str(own.parent)!r}); import prw; print(prw.default_fmu()); prw.simulate()"
     )
     line = [sys.executable, "-c", program]
-    alone = subprocess.run(line, cwd=tmp_path / "work", capture_output=True, text=True)
+    without = subprocess.run(line, cwd=tmp_path / "work", capture_output=True, text=True)
     assert (
-        "there is no FMU: none is named by fmu= (--fmu in the shell), PRW_FMU is not set, there is no" in alone.stderr
+        "there is no FMU: none is named by fmu= (--fmu in the shell), PRW_FMU is not set, there is no" in without.stderr
     )
     assert (
-        f"{own / 'fmu' / 'prw_testbed.fmu'}, and no" in alone.stderr and "`make fmu` builds in a clone" in alone.stderr
+        f"{own / 'fmu' / 'prw_testbed.fmu'}, and no" in without.stderr
+        and "`make fmu` builds in a clone" in without.stderr
     )
     (own / "clone.txt").write_text(str(ROOT))
     from_clone = program + "; prw.animate(prw.simulate(), 'wrist.html')"
@@ -163,7 +156,7 @@ def test_where_the_fmu_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.parametrize("rates", [False, True])
-def test_coarse_sampling_is_told(testbed: Path, rates: bool) -> None:
+def test_coarse_sampling_is_reported(testbed: Path, rates: bool) -> None:
     """A sine of 3 Hz, compared with its samples at 20 kHz."""
 
     def motion(rate: int, with_rates: bool) -> prw.Motion:
@@ -195,7 +188,7 @@ def test_wrong_motions() -> None:
         ((time, theta, [[0.0, 0.0]]), r"omega has the shape \(1, 2\)"),
         (([1.0, 1.0], theta), "time must increase"),
         (([0.0, float("nan")], theta), "time must increase"),
-        ((["now", "then"], theta), "time is not made of numbers"),
+        ((["now", "then"], theta), "time does not consist of numbers"),
     ]:
         with pytest.raises(prw.UserError, match=complaint):
             prw.Motion(*arguments)  # type: ignore[arg-type]
@@ -220,7 +213,7 @@ def test_wrong_simulations(testbed: Path, tmp_path: Path) -> None:
 
 
 def test_sweep_draws(testbed: Path) -> None:
-    """The draws are those of the seed, whoever runs them."""
+    """The draws depend only on the seed, not on the threads."""
     table = prw.sweep(random={"k1": 0.1, "c3": (0.5, 0.2)}, runs=300, seed=4, motion=MOTION, fmu=testbed)
     assert table == prw.sweep(
         random={"k1": 0.1, "c3": (0.5, 0.2)}, runs=300, seed=4, motion=MOTION, fmu=testbed, threads=1
@@ -232,7 +225,7 @@ def test_sweep_draws(testbed: Path) -> None:
 
 def test_wrong_sweeps(testbed: Path) -> None:
     for arguments, complaint in [
-        ({}, "nothing varies; give values by parameter"),
+        ({}, "nothing varies; give values of a parameter"),
         ({"grid": {"k9": [1.0]}}, "k9 is not known; there are J2"),
         ({"grid": {"k1": []}}, "k1: .* are not the values of a parameter"),
         (
@@ -256,8 +249,9 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch, testbed: Pa
     run = prw.simulate(fmu=testbed)
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     for call, package in [(run.plot, "matplotlib"), (run.to_pandas, "pandas"), (prw.sweep, "pyarrow")]:
-        with pytest.raises(prw.UserError, match=f"{package} missing; install with: pip install {package}"):
+        with pytest.raises(prw.UserError, match=f"{package} missing; install with: pip install {package}") as caught:
             call()
+        assert isinstance(caught.value, ValueError) and isinstance(caught.value, ImportError)
 
 
 def test_the_command_linearize(testbed: Path, tmp_path: Path) -> None:
@@ -279,7 +273,7 @@ def test_the_command_linearize(testbed: Path, tmp_path: Path) -> None:
 
 
 def test_the_programs_in_the_readme(monkeypatch: pytest.MonkeyPatch) -> None:
-    """They run as they stand, from the project's folder."""
+    """They run unchanged, in the repository root."""
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     short, program = re.findall(r"^```python\n(.*?)^```", readme, flags=re.S | re.M)
     monkeypatch.chdir(ROOT)

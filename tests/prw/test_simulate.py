@@ -71,7 +71,7 @@ def test_examples(prw: Any, tmp_path: Path, name: Any) -> None:
     # The table has twelve digits.
     assert_close(columns, expected, 1e-10)
     for output in ("tau1", "tau2", "pitch_rate"):
-        assert abs(columns[output][0]) < 1e-12, "starts with a bang"
+        assert abs(columns[output][0]) < 1e-12, "starts with a jump"
 
 
 def test_other_parameters(prw: Any, tmp_path: Path) -> None:
@@ -93,7 +93,7 @@ def test_other_parameters(prw: Any, tmp_path: Path) -> None:
         found[name] = table(tmp_path / name / "good.csv")["tau1"][-1]
     assert found["file"] == found["report"] == pytest.approx(found["set"], rel=1e-11)
     assert len({found[name] for name in ("file", "both", "none")}) == 3
-    for entry, complaint in [
+    for entry, message in [
         ({"k9": 1.0}, "--parameters: k9 is not known; there are J2"),
         (
             {"k1": {"value": 1.0, "unit": "N.m/rev"}},
@@ -104,15 +104,15 @@ def test_other_parameters(prw: Any, tmp_path: Path) -> None:
     ]:
         (tmp_path / "mine.json").write_text(json.dumps(entry))
         result = prw("simulate", "--parameters", "mine.json")
-        assert result.returncode == 1 and complaint in result.stderr and result.stderr.count("\n") == 1
-    for arguments, complaint in [
+        assert result.returncode == 1 and message in result.stderr and result.stderr.count("\n") == 1
+    for arguments, message in [
         (["--set", "k9=1"], "--set: k9 is not known; there are J2"),
         (["--set", "k1=stiff"], "--set k1=stiff: 'stiff' is not a number"),
         (["--parameters", "absent.json"], "--parameters: absent.json cannot be read (No such file"),
         (["good.csv", "--input", "good.csv"], "give one recording"),
     ]:
         result = prw("simulate", *arguments)
-        assert result.returncode == 1 and complaint in result.stderr and result.stderr.count("\n") == 1, result
+        assert result.returncode == 1 and message in result.stderr and result.stderr.count("\n") == 1, result
 
 
 def test_without_matplotlib(tmp_path: Path, fmu: Path) -> Any:
@@ -156,7 +156,7 @@ def test_other_complaints(prw: Any, tmp_path: Path) -> None:
     (tmp_path / "good.csv").write_text(GOOD)
     (tmp_path / "no.fmu").write_text("not a zip")
     (tmp_path / "taken").write_text("a file where a directory should be")
-    for arguments, complaint in [
+    for arguments, message in [
         (["--input", "absent.csv"], "absent.csv: cannot be read (No such file or directory)"),
         (["--input", "."], "cannot be read (Is a directory)"),
         (["--input", "good.csv", "--fmu", "absent.fmu"], "absent.fmu: no such FMU\n"),
@@ -164,7 +164,7 @@ def test_other_complaints(prw: Any, tmp_path: Path) -> None:
         (["--degrees"], "--degrees belongs to a recording"),
     ]:
         result = prw("simulate", *arguments, with_fmu=False)
-        assert result.returncode == 1 and complaint in result.stderr, result.stderr
+        assert result.returncode == 1 and message in result.stderr, result.stderr
         assert result.stderr.count("\n") == 1 and result.stdout == ""
     (tmp_path / "huge.csv").write_text("time,theta1,theta2\n0,0,0\n1e-3,1e308,0\n2e-3,-1e308,0\n")
     result = prw("simulate", "--input", "huge.csv")

@@ -98,15 +98,16 @@ def test_figures_are_written(fmu: Path, tmp_path: Path, monkeypatch: pytest.Monk
     built("prw_controller.fmu")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(film, "SPEED", 20)
-    monkeypatch.setattr(visit, "PICTURES", 2)
+    monkeypatch.setattr(visit, "FRAMES", 2)
     draw = gallery.figures
     some = ("fig4_pair", "poles")
     monkeypatch.setattr(gallery, "figures", lambda found: {k: v for k, v in draw(found).items() if k in some})
-    for path in ("docs", "modelDescription/documentation", "crates/prw-controller/modelDescription/documentation"):
-        (tmp_path / path).mkdir(parents=True)
-    assert run_command("tools", "", [figures], ["figures", "--fmu", str(fmu), "--out", "out", "--commit"]) == 0
+    (tmp_path / "docs").mkdir()
+    assert (
+        run_command("tools", "", {"figures": figures}, ["figures", "--fmu", str(fmu), "--out", "out", "--commit"]) == 0
+    )
     written = {path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file() and "out" not in path.parts}
-    assert len(written) == 9 and all((ROOT / path).is_file() for path in written)
+    assert len(written) == 5 and all((ROOT / path).is_file() for path in written)
     shown = figures.VISIT.read_bytes()
     visit.film(fmu, figures.VISIT)
     assert figures.VISIT.read_bytes() == shown
@@ -122,13 +123,13 @@ def test_figures_are_written(fmu: Path, tmp_path: Path, monkeypatch: pytest.Monk
 
 def test_compatibility_writes_the_rows_that_tests_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    for path in (compatibility.SEEN, compatibility.PAGE.parent):
+    for path in (compatibility.RESULTS, compatibility.PAGE.parent):
         path.mkdir(parents=True)
     before = (ROOT / compatibility.PAGE).read_text(encoding="utf-8")
     compatibility.PAGE.write_text(before, encoding="utf-8")
     row = dict.fromkeys(compatibility.HEADS, "x")
-    (compatibility.SEEN / "one.json").write_text(json.dumps(row), encoding="utf-8")
-    assert run_command("tools", "", [compatibility], ["compatibility"]) == 0
+    (compatibility.RESULTS / "one.json").write_text(json.dumps(row), encoding="utf-8")
+    assert run_command("tools", "", {"compatibility": compatibility}, ["compatibility"]) == 0
     after = compatibility.PAGE.read_text(encoding="utf-8")
     heading = f"## {compatibility.HEADING}\n"
     table = after.split(heading)[1].split("\n## ")[0]

@@ -1,28 +1,23 @@
-"""`tools docs`: the pages that travel in the FMUs."""
+"""Writes the documentation of both FMUs from the text in docs/fmu-page, the tables of the model descriptions,
+docs/compatibility.md and the figures that `make figures` has made."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
-from prw.files import replacing
+from prw.files import write_text
 
 PROJECT = Path(".")
 
+HELP = "write the FMUs' documentation"
 
-def add_parser(subparsers: Any) -> None:
-    """Add `docs` to the subcommands."""
-    parser = subparsers.add_parser(
-        "docs",
-        help="write the FMUs' documentation anew",
-        description="Writes the documentation of both FMUs from the text in docs/fmu-page, the tables of the model "
-        "descriptions, docs/compatibility.md and the figures that `make figures` has made.",
-    )
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument(
-        "--project", type=Path, default=PROJECT, metavar="DIR", help="the project's folder (default: %(default)s)"
+        "--project", type=Path, default=PROJECT, metavar="DIR", help="the repository root (default: %(default)s)"
     )
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -37,6 +32,5 @@ def run(arguments: argparse.Namespace) -> None:
         if path.is_file() and path.read_bytes() == text.encode():
             print(f"{path} is up to date")
             continue
-        with replacing(path) as temporary:
-            temporary.write_bytes(text.encode())
+        write_text(path, text)
         print(f"{path} written, {len(text.encode()) // 1000} kB")

@@ -82,11 +82,11 @@ def render(project: Path, page: Page) -> str:
         raise UserError(f"{getattr(error, 'filename', None) or sources}: {error.message}") from None
 
 
-def _in_order(folder: Path) -> list[Path]:
+def _in_order(directory: Path) -> list[Path]:
     """The files 0_header.html, 1_....html to the last."""
-    paths = sorted(folder.glob("*_*.html"), key=lambda path: int(path.stem.split("_")[0]))
+    paths = sorted(directory.glob("*_*.html"), key=lambda path: int(path.stem.split("_")[0]))
     if not paths:
-        raise UserError(f"{folder}: there is no text; run this in the project's folder")
+        raise UserError(f"{directory}: there is no text; run this in the repository root")
     return paths
 
 

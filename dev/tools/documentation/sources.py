@@ -25,7 +25,7 @@ def read(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror}); run this in the project's folder") from None
+        raise UserError(f"{path}: cannot be read ({error.strerror}); run this in the repository root") from None
 
 
 def read_description(path: Path) -> Any:
@@ -37,11 +37,11 @@ def read_description(path: Path) -> Any:
         return read_model_description(str(path))
     except Exception as error:  # FMPy raises bare Exceptions
         reason = (str(error).strip() or type(error).__name__).splitlines()[0]
-        raise UserError(f"{path}: no model description ({reason}); `make docs` writes it anew") from None
+        raise UserError(f"{path}: no model description ({reason}); `make docs` writes it again") from None
 
 
 def read_table(path: Path, heading: str) -> Table:
-    """The first table below a heading of a Markdown file. Raises UserError where there is none, or one with a gap."""
+    """The first table below a heading of a Markdown file. Raises UserError if there is none, or if a cell is missing."""
     text = read(path)
     section = re.search(rf"^(#+) {re.escape(heading)}\n(.*?)(?=^#+ |\Z)", text, flags=re.M | re.S)
     table = section and re.search(r"^\|.*\|\n\|[-:| ]+\|\n(?:\|.*\|\n)+", section[2], flags=re.M)

@@ -75,7 +75,7 @@ def text_table(table: Table) -> str:
 
 
 def _inline(text: str) -> str:
-    text = re.sub(r"\[([^\]]+)\]\([^)]*\)", r"\1", text)  # where a link leads is not in the FMU
+    text = re.sub(r"\[([^\]]+)\]\([^)]*\)", r"\1", text)  # the FMU does not contain the targets of links
     return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text, quote=False))
 
 

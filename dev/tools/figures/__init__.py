@@ -1,12 +1,14 @@
-"""`tools figures`: every figure of the paper and of the documentation, from runs of the FMU."""
+"""Reproduces the paper's Figs. 4 and 5 and draws Bode plots of the torques, poles and zeros, step responses and the order
+of convergence, all from the FMU. Writes each figure as SVG and PNG, and the figures behind the text as numbers.json."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
-from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
+from prw.commands.options import add_paths
+from prw.files import write_text
+from prw.testbed import existing_fmu
 
 #: The copies that are kept with the sources, for the documentation and the README.
 COMMITTED = Path("docs/fmu-page/figures")
@@ -14,47 +16,34 @@ COMMITTED = Path("docs/fmu-page/figures")
 FILM = Path("docs/wrist.gif")
 #: README's second image, of the page in the FMU.
 VISIT = Path("docs/try-it.gif")
-#: Within the directory of an FMU's files: its icon for importers, and the scalable icon.
-ICON = Path("model.png")
-ICON_SVG = Path("documentation/model.svg")
+
+HELP = "reproduce the paper's figures from runs of the FMU"
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add `figures` to the subcommands."""
-    parser = subparsers.add_parser(
-        "figures",
-        help="reproduce the paper's figures from runs of the FMU",
-        description="Reproduces the paper's Figs. 4 and 5 and draws Bode plots of the torques, poles and zeros, step "
-        "responses and the order of convergence, all from the FMU. Writes each figure as SVG and PNG, and the figures "
-        "behind the text as numbers.json.",
-    )
-    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
-    parser.add_argument(
-        "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where to write (default: %(default)s)"
-    )
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    add_paths(parser)
     parser.add_argument(
         "--commit",
         action="store_true",
-        help=f"also renew the copies kept with the sources, in {COMMITTED}, the icons of both FMUs, {FILM}, and {VISIT} (with the browser chromium)",
+        help=f"also renew the copies kept with the sources, in {COMMITTED}, {FILM} and {VISIT} (with the browser chromium)",
     )
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `tools figures`. Raises UserError with a message of one line."""
     # FMPy and matplotlib take a while to load.
-    from tools.documentation.pages import CONTROLLER, TESTBED
     from tools.figures.gallery import figures
-    from tools.figures.icon import draw_controller, draw_testbed
     from tools.figures.results import numbers, results
-    from tools.figures.writing import write_for_page, write_json, write_png, write_small_png, write_svg
+    from tools.figures.writing import write_for_page, write_png, write_small_png, write_svg
 
-    found = results(arguments.fmu)
+    fmu = existing_fmu(arguments.fmu)
+    found = results(fmu)
     drawn = figures(found)
     for name, figure in drawn.items():
         write_svg(arguments.out / f"{name}.svg", figure.figure)
         write_png(arguments.out / f"{name}.png", figure.figure)
-    write_json(arguments.out / "numbers.json", numbers(found))
+    write_text(arguments.out / "numbers.json", numbers(found))
     print(f"wrote {len(drawn)} figures as SVG and PNG, and numbers.json, into {arguments.out}")
     if arguments.commit:
         for name, figure in drawn.items():
@@ -62,15 +51,12 @@ def run(arguments: argparse.Namespace) -> None:
                 write_for_page(COMMITTED / f"{name}.svg", figure.figure)
             if figure.for_readme:
                 write_small_png(COMMITTED / f"{name}.png", figure.figure)
-        write_json(COMMITTED / "numbers.json", numbers(found))
-        for page, draw in ((TESTBED, draw_testbed), (CONTROLLER, draw_controller)):
-            write_png(page.content / ICON, draw(), dpi=128)
-            write_svg(page.content / ICON_SVG, draw())
+        write_text(COMMITTED / "numbers.json", numbers(found))
         from prw.animation import animate
         from tools.figures import visit
         from tools.figures.film import SPEED, story
 
-        run, captions = story(arguments.fmu, arguments.fmu.with_name("prw_controller.fmu"))
+        run, captions = story(fmu, fmu.with_name("prw_controller.fmu"))
         animate(run, FILM, speed=SPEED, captions=captions)
-        visit.film(arguments.fmu, VISIT)
-        print(f"renewed {COMMITTED}, the icons, {FILM} and {VISIT}")
+        visit.film(fmu, VISIT)
+        print(f"renewed {COMMITTED}, {FILM} and {VISIT}")

@@ -9,7 +9,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, MultipleLocator
 
 from prw.plots import BLUE, VERMILION
 from prw.testbed import ANGLE_OF
-from tools.figures.results import CURVE, Results
+from tools.figures.results import CURVE, POINTS, Results
 from tools.frequency import SHAFTS, TORQUES, decibels, degrees
 
 #: Degrees between the ticks of a phase, the first that makes at most five.
@@ -19,27 +19,25 @@ SUBSCRIPTS = "₀₁₂₃₄₅₆₇₈₉"
 
 class Transfer(NamedTuple):
     """One Bode plot. key: the letter of Fig. 5 and of its files. title: input and output. unit: unit of 0 dB. curve: complex
-    over CURVE. frequency, points: measured values, Hz and complex."""
+    over CURVE. points: measured, complex, at POINTS."""
 
     key: str
     title: str
     unit: str
     curve: np.ndarray
-    frequency: np.ndarray
     points: np.ndarray
 
 
 def transfers(found: Results) -> tuple[list[Transfer], list[Transfer]]:
     """The eight plots of H(s), Fig. 5 (a) to (h), and the four of G(s) from motor angles to torques."""
     response = found.model.response_at_hz(CURVE, ANGLE_OF)
-    frequency, points, _ = found.sweep
-    assert found.sweep.outputs == found.model.outputs
+    points = found.sweep
 
     def make(key: str, symbol: str, row: int, motor: int, unit: str) -> Transfer:
         output = found.model.outputs[row]
         greek = {"theta": "θ", "tau": "τ"}[output.rstrip("0123456789")] + SUBSCRIPTS[int(output[-1])]
         title = f"({key}) {symbol}  θ{SUBSCRIPTS[motor + 1]} → {greek}"
-        return Transfer(key, title, unit, response[:, row, motor], frequency, points[:, row, motor])
+        return Transfer(key, title, unit, response[:, row, motor], points[:, row, motor])
 
     shafts = [
         make("abcdefgh"[4 * motor + row], f"H{SUBSCRIPTS[row + 1]}{SUBSCRIPTS[motor + 1]}", row, motor, "1")
@@ -64,7 +62,7 @@ def draw_bode(figure: Any, panel: Transfer) -> None:
             # Both unwrapped; the points may have begun on another turn.
             points = points + 360 * np.round((curve[0] - points[0]) / 360)
         axis.plot(CURVE, curve, color=BLUE, label="linear model")
-        axis.plot(panel.frequency, points, "o", color=VERMILION, fillstyle="none", markersize=3.6, label="stepped sine")
+        axis.plot(POINTS, points, "o", color=VERMILION, fillstyle="none", markersize=3.6, label="stepped sine")
     magnitude.legend(loc="lower right", bbox_to_anchor=(1, 0.97), ncols=2, borderaxespad=0, columnspacing=1.2)
     magnitude.set_ylabel("dB" if panel.unit == "1" else f"dB re {panel.unit}")
     phase.set_ylabel("phase (deg)")

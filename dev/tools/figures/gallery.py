@@ -9,12 +9,12 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from prw.plots import BLUE, PAGE_STYLE, VERMILION, draw_panel, motion_panel, response_panels
+from prw.plots import BLUE, PAGE_STYLE, VERMILION, draw_into, motion_panel, response_panels
 from tools.figures.bode import draw_bode, transfers
 from tools.figures.results import Results, Run
 
 COLUMN = 4.5  # inches
-#: The Bode plots of motor 1. By symmetry, those of motor 2 are equal to them.
+#: The Bode plots of motor 1. By symmetry, the plots of motor 2 are equal.
 OF_MOTOR_1 = "abcdij"
 #: Relative errors up to this value are rounding errors.
 ROUNDING = 1e-13
@@ -67,12 +67,7 @@ def _draw_velocities(figure: Any, run: Run) -> None:
     motion = replace(motion, time=motion.time[first], theta=motion.theta[first], omega=omega)
     response = {name: values[first] for name, values in response.items()}
     panels = [motion_panel(motion, angles=False), *response_panels(response, angles=False)]
-    axes = figure.subplots(len(panels), sharex=True)
-    for axis, panel in zip(axes, panels):
-        draw_panel(axis, motion.time, panel)
-    axes[-1].set_xlim(motion.time[0], motion.time[-1])
-    axes[-1].set_xlabel("time (s)")
-    figure.align_ylabels(axes)
+    draw_into(figure, motion.time, panels)
 
 
 def _fig4_plate(found: Results) -> Figure:
@@ -140,7 +135,7 @@ def _convergence(found: Results) -> Figure:
     milliseconds = 1e3 * step
     for label, marker, name in (("torque", "s", "tau1"), ("roll rate", "^", "roll_rate"), ("roll", "o", "roll")):
         axis.loglog(milliseconds, angles[name], f"{marker}-", color=BLUE, markersize=4, label=f"{label}, angles alone")
-    # Below ROUNDING the values are chance, and not the same on every machine.
+    # Values below ROUNDING are rounding errors, which differ between machines.
     rounding = np.maximum(np.max(list(broken.values()), axis=0), ROUNDING)
     label = f"all, broken line with its slopes (below {ROUNDING:g})"
     axis.loglog(milliseconds, rounding, "D:", color=VERMILION, markersize=4, label=label)

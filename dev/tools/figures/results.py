@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ from prw.motion import Motion, fig4
 from prw.state_space import StateSpace
 from prw.testbed import ANGLE_OF, OUTPUTS, Testbed
 from tools.convergence import Convergence, convergence, order
-from tools.frequency import SHAFTS, TORQUES, Sweep, decibels, sweep
+from tools.frequency import SHAFTS, TORQUES, decibels, sweep
 from tools.modes import Mode, pitch_and_roll
 
 #: Hz. The curves of the Bode plots run over CURVE, the measured points lie at POINTS.
@@ -35,13 +36,13 @@ class Step(NamedTuple):
 class Results(NamedTuple):
     """The linear model of the FMU (outputs SHAFTS, TORQUES, and once more all OUTPUTS), and its runs.
 
-    fig4, fig4_equal: the experiment of Fig. 4 and its counterpart. pitch_step: both motors step by 1 degree. roll_step:
+    sweep: the measured response of SHAFTS and TORQUES at POINTS. fig4, fig4_equal: the experiment of Fig. 4 and its counterpart. pitch_step: both motors step by 1 degree. roll_step:
     motor 2 steps by -1 degree instead.
     """
 
     model: StateSpace
     modes: tuple[Mode, Mode]
-    sweep: Sweep
+    sweep: np.ndarray
     fig4: Run
     fig4_equal: Run
     pitch_step: Step
@@ -82,10 +83,10 @@ def _step(fmu: Path, sides: tuple[int, int]) -> Step:
     return Step(runs[0], runs[1])
 
 
-def numbers(found: Results) -> dict[str, object]:
-    """The quoted results by name, and the version of matplotlib that drew the figures."""
+def numbers(found: Results) -> str:
+    """The quoted results by name, and the version of matplotlib that drew the figures, as JSON."""
     low = POINTS <= STATED
-    ratio = found.sweep.response / found.model.response_at_hz(POINTS, ANGLE_OF)
+    ratio = found.sweep / found.model.response_at_hz(POINTS, ANGLE_OF)
     high = found.model.response_at_hz(1e5, ANGLE_OF)
     _, opposite = found.fig4
     _, equal = found.fig4_equal
@@ -99,7 +100,7 @@ def numbers(found: Results) -> dict[str, object]:
     def orders(errors: dict[str, np.ndarray]) -> dict[str, float]:
         return {name: round(value, 2) for name, value in order(step, errors).items()}
 
-    return {
+    content = {
         "made_with": f"matplotlib {matplotlib.__version__}",
         "poles": {
             name: sorted(rounded(pole) for pole in mode.poles() if pole.imag >= 0)
@@ -120,3 +121,4 @@ def numbers(found: Results) -> dict[str, object]:
         "order_rates": orders(rates),
         "error_1ms_percent": {name: float(f"{100 * errors[step == 1e-3][0]:.1g}") for name, errors in angles.items()},
     }
+    return json.dumps(content, indent=2) + "\n"

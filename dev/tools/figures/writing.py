@@ -1,9 +1,8 @@
-"""Figures into files that are the same each time: SVG, PNG, and the page's SVG that follows its light or dark."""
+"""Writes figures as reproducible files: SVG, PNG, and SVG for the page, which follows its light or dark style."""
 
 from __future__ import annotations
 
 import io
-import json
 import re
 from pathlib import Path
 from typing import Any
@@ -38,10 +37,10 @@ def write_svg(path: Path, figure: Figure) -> None:
         temporary.write_bytes(_svg(figure))
 
 
-def write_png(path: Path, figure: Figure, dpi: int = 150) -> None:
+def write_png(path: Path, figure: Figure) -> None:
     """Write the figure as PNG."""
     with replacing(path) as temporary, matplotlib.rc_context(PAGE_STYLE):
-        figure.savefig(temporary, dpi=dpi)
+        figure.savefig(temporary, dpi=150)
 
 
 def write_small_png(path: Path, figure: Figure) -> None:
@@ -52,12 +51,6 @@ def write_small_png(path: Path, figure: Figure) -> None:
     with replacing(path) as temporary:
         few = Image.open(pixels).convert("RGB").quantize(32, dither=Image.Dither.NONE)
         few.save(temporary, format="PNG", optimize=True)
-
-
-def write_json(path: Path, content: object) -> None:
-    """Write JSON, indented and in order."""
-    with replacing(path) as temporary:
-        temporary.write_bytes((json.dumps(content, indent=2) + "\n").encode())
 
 
 def write_for_page(path: Path, figure: Figure) -> None:

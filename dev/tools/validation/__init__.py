@@ -1,45 +1,42 @@
-"""`tools validation`: the FMUs against the reference experiments, under every importer that is installed."""
+"""Runs the reference experiments with the testbed for FMI 2.0 and FMI 3.0 under every importer that is installed, and the
+closed loop under every master; compares with the reference, and finds the parameters that the tolerances distinguish.
+Writes validation.html and validation.json."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
-from prw.commands.options import DEFAULT_OUT
+from prw.commands.options import DEFAULT_OUT, Named
 from prw.errors import UserError
 
 DEFAULT_FMUS = Path("target/fmu")
 
+HELP = "compare the FMUs with the reference experiments under every importer"
 
-def add_parser(subparsers: Any) -> None:
-    """Add `validation` to the subcommands."""
-    parser = subparsers.add_parser(
-        "validation",
-        help="compare the FMUs with the reference experiments under every importer",
-        description="Runs the reference experiments with the testbed for FMI 2.0 and FMI 3.0 under every importer that is "
-        "installed, and the closed loop under every master; compares with the reference, and finds what the tolerances "
-        "tell apart. Writes validation.html and validation.json.",
-    )
-    parser.add_argument(
-        "--fmus",
-        type=Path,
-        default=DEFAULT_FMUS,
-        metavar="DIR",
-        help="directory with prw_testbed.fmu, fmi3/ and the closed loop (default: %(default)s)",
-    )
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    add_directories(parser)
     parser.add_argument(
         "--result",
-        action="append",
-        default=[],
+        action=Named,
+        read=Path,
         metavar="TOOL=FILE",
         help="also compare this file, which another tool wrote, as `prw check` does; TOOL is its name and version. May be "
         "repeated",
     )
-    parser.add_argument(
-        "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where to write (default: %(default)s)"
-    )
-    parser.set_defaults(run=run)
+
+
+def add_directories(parser: argparse.ArgumentParser) -> None:
+    """Add the options --fmus and --out."""
+    for option, default, use in (
+        ("--fmus", DEFAULT_FMUS, "of the FMUs and the closed loop"),
+        ("--out", DEFAULT_OUT, "to write into"),
+    ):
+        parser.add_argument(
+            option, type=Path, default=default, metavar="DIR", help=f"directory {use} (default: %(default)s)"
+        )
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -50,13 +47,7 @@ def run(arguments: argparse.Namespace) -> None:
     from tools.validation.page import page
     from tools.validation.runs import validate
 
-    results = []
-    for text in arguments.result:
-        tool, equals, file = text.rpartition("=")
-        if not equals or not tool.strip() or not file:
-            raise UserError(f"--result {text}: write TOOL=FILE, for example --result 'OpenModelica 1.26=wrist_res.mat'")
-        results.append((tool.strip(), Path(file)))
-    found = validate(arguments.fmus, results)
+    found = validate(arguments.fmus, arguments.result)
     write_text(arguments.out / "validation.json", found.to_json())
     write_text(arguments.out / "validation.html", page(found))
     for row in found.rows:

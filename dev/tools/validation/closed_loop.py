@@ -1,17 +1,17 @@
-"""`tools closed-loop`: the testbed driven by a controller FMU, under every co-simulation master that is installed."""
+"""Runs the closed loop prw_closed_loop.ssp (and its twin OspSystemStructure.xml) under FMPy, libcosim and Ecos, if
+they are installed; compares them, and studies the error of the coupling over the communication step. Writes
+closed_loop.csv, closed_loop.png, coupling.csv and coupling.png."""
 
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from prw.commands.options import DEFAULT_OUT
 from prw.errors import UserError
 from prw.files import write_table
-from tools.validation import DEFAULT_FMUS
+from tools.validation import add_directories
 
 if TYPE_CHECKING:
     from tools.validation.system import System
@@ -19,27 +19,12 @@ if TYPE_CHECKING:
 #: A pitch or roll within this of its reference has settled, deg.
 SETTLED = 0.1
 
+HELP = "run testbed and controller under several masters"
 
-def add_parser(subparsers: Any) -> None:
-    """Add `closed-loop` to the subcommands."""
-    parser = subparsers.add_parser(
-        "closed-loop",
-        help="run testbed and controller under several masters",
-        description="Run the closed loop prw_closed_loop.ssp (and its twin OspSystemStructure.xml) under FMPy, libcosim and "
-        "Ecos, as far as they are installed; compare them, and study the error of the coupling over the communication "
-        "step. Writes closed_loop.csv, closed_loop.png, coupling.csv and coupling.png.",
-    )
-    parser.add_argument(
-        "--fmus",
-        type=Path,
-        default=DEFAULT_FMUS,
-        metavar="DIR",
-        help="directory with prw_closed_loop.ssp and prw_closed_loop/ (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where to write (default: %(default)s)"
-    )
-    parser.set_defaults(run=run)
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    add_directories(parser)
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -31,8 +31,8 @@ class Study(NamedTuple):
         return {"step": self.step, "error_held_deg": self.held, "error_with_derivatives_deg": self.derivatives}
 
 
-def study(system: System, steps: Sequence[float] = STEPS) -> Study | None:
-    """Couple the FMUs of the system at the given steps, and compare with steps of FINEST.
+def study(system: System) -> Study | None:
+    """Couple the FMUs of the system with STEPS, and compare with steps of FINEST.
 
     None if not every FMU takes and gives derivatives.
     """
@@ -46,8 +46,8 @@ def study(system: System, steps: Sequence[float] = STEPS) -> Study | None:
         found = couple(system, step, DURATION, derivatives)
         return float(np.rad2deg(np.abs(found - exact[:: round(step / FINEST)]).max()))
 
-    held, extrapolated = ([error(step, derivatives) for step in steps] for derivatives in (False, True))
-    return Study(np.array(steps), np.array(held), np.array(extrapolated))
+    held, extrapolated = ([error(step, derivatives) for step in STEPS] for derivatives in (False, True))
+    return Study(np.array(STEPS), np.array(held), np.array(extrapolated))
 
 
 def couple(

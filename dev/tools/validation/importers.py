@@ -77,8 +77,8 @@ def by_scipy(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value])
     from fmpy.simulation import apply_start_values, instantiate_fmu
     from scipy.integrate import solve_ivp
 
-    description, folder = fmpy.read_model_description(str(fmu)), fmpy.extract(str(fmu))
-    instance = instantiate_fmu(folder, description, fmi_type="ModelExchange")
+    description, directory = fmpy.read_model_description(str(fmu)), fmpy.extract(str(fmu))
+    instance = instantiate_fmu(directory, description, fmi_type="ModelExchange")
     references = {v.name: v.valueReference for v in description.modelVariables}
     inputs, outputs = [references[name] for name in (*ANGLES, *RATES)], [references[name] for name in OUTPUTS]
     fmi2 = description.fmiVersion.startswith("2.")
@@ -118,7 +118,7 @@ def by_scipy(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value])
         instance.terminate()
     finally:
         instance.freeInstance()
-        shutil.rmtree(folder, ignore_errors=True)
+        shutil.rmtree(directory, ignore_errors=True)
     return Result(fmu, time, dict(zip(OUTPUTS, np.array(rows).T)))
 
 

@@ -111,8 +111,8 @@ def run_apart(master: Tool, system: System) -> dict[str, np.ndarray]:
     Returns `time` and RECORDED by name, each (steps,): the values at the end of every step. Raises UserError with the
     output of the process if it fails, or if it logs a warning or an error.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        result = Path(folder, "result.npy")
+    with tempfile.TemporaryDirectory() as directory:
+        result = Path(directory, "result.npy")
         command = [sys.executable, "-m", __name__, master.name, *map(os.path.abspath, (system.ssp, system.osp, result))]
         try:
             process = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, cwd=ABOVE)

@@ -12,8 +12,8 @@ from tools.validation.runs import CHANGE, Row, Validation
 
 LEAD = """<p>Reference experiments, run with the testbed’s FMU under the importers that are installed here, and compared with
 a solution that comes from the energies of the testbed’s parts and shares no code with the FMU.</p>
-<p><strong>No measured data of the real testbed were available.</strong> This page says how well the FMU solves the paper’s
-equations under these importers. It does not say how well these equations describe the real testbed.</p>"""
+<p><strong>No measured data of the real testbed were available.</strong> This page shows how well the FMU solves the paper’s
+equations under these importers. It does not show how well these equations describe the real testbed.</p>"""
 
 
 def page(found: Validation) -> str:
@@ -34,7 +34,7 @@ def page(found: Validation) -> str:
             ("outcome", "Outcome", outcome(found)),
             ("experiments", "Experiments", experiments(found)),
             ("runs", "Runs", runs(found)),
-            ("sensitivity", "What the tolerances tell apart", sensitivity(found)),
+            ("sensitivity", "Changes that the tolerances detect", sensitivity(found)),
         ],
     )
 
@@ -55,9 +55,7 @@ def outcome(found: Validation) -> str:
 
 def experiments(found: Validation) -> str:
     """Names and descriptions."""
-    return text_table(
-        Table(["experiment", "what happens"], [[f"`{n}`", text] for n, text in found.experiments.items()])
-    )
+    return text_table(Table(["experiment", "description"], [[f"`{n}`", text] for n, text in found.experiments.items()]))
 
 
 def runs(found: Validation) -> str:
@@ -88,5 +86,5 @@ def sensitivity(found: Validation) -> str:
     rows = [[f"`{name}`", *(f"{shares[p]:.1f}" for p in names)] for name, shares in found.sensitivity.items()]
     return (
         f"<p>Largest difference in terms of its tolerance when one parameter is {CHANGE:.0%} larger, in Co-Simulation under "
-        "fmu_run. Above 1 the experiment tells.</p>" + text_table(Table(["experiment", *names], rows))
+        "fmu_run. The experiment detects a change above 1.</p>" + text_table(Table(["experiment", *names], rows))
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import json
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -74,8 +74,8 @@ class Validation:
         return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
 
 
-def validate(fmus: Path, results: Sequence[tuple[str, Path]] = ()) -> Validation:
-    """Run all experiments. results: (tool, file) of other tools. Raises UserError if an FMU or a file is missing, or if an
+def validate(fmus: Path, results: Mapping[str, Path] = {}) -> Validation:
+    """Run all experiments. results: files of other tools by tool. Raises UserError if an FMU or a file is missing, or if an
     FMU rejects a call."""
     from fmpy import read_model_description
 
@@ -93,7 +93,7 @@ def validate(fmus: Path, results: Sequence[tuple[str, Path]] = ()) -> Validation
         found = of_testbed(masters.run_apart(master, loop))
         agreement = compare(found, find(known, "closed_loop"), master.interface)
         rows.append(row(f"{master.name}, with the controller's FMU", str(master.version()), "2.0", agreement))
-    for tool, file in results:
+    for tool, file in results.items():
         result_row = row(f"{tool}, from the file {file.name}", "", "", check(file, fmu=paths["2.0"]))
         rows.append(replace(result_row, interface=""))
     return Validation(

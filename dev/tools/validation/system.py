@@ -52,11 +52,19 @@ def read(ssp: Path, osp: Path) -> System:
         raise UserError(f"{ssp}: cannot be read ({str(error).splitlines()[0]})") from None
     values = dict(_values(system))
     connections, inputs = [], {}
-    for wire in system.connections:
-        if wire.startElement is None:
-            inputs[wire.startConnector] = (f"{wire.endElement}.{wire.endConnector}", float(values[wire.startConnector]))
-        elif wire.endElement is not None:
-            connections.append((f"{wire.startElement}.{wire.startConnector}", f"{wire.endElement}.{wire.endConnector}"))
+    for connection in system.connections:
+        if connection.startElement is None:
+            inputs[connection.startConnector] = (
+                f"{connection.endElement}.{connection.endConnector}",
+                float(values[connection.startConnector]),
+            )
+        elif connection.endElement is not None:
+            connections.append(
+                (
+                    f"{connection.startElement}.{connection.startConnector}",
+                    f"{connection.endElement}.{connection.endConnector}",
+                )
+            )
     start: dict[str, Value] = {}
     for component in system.elements:
         start.update({f"{component.name}.{name}": value for name, value in _values(component)})

@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,13 @@ def names_of(argument: str, given: str | Iterable[str]) -> tuple[str, ...]:
     if not isinstance(given, Iterable):
         raise UserError(f"{given!r} is neither a name nor several", argument=argument)
     return tuple(given)
+
+
+def check_names(argument: str, names: Iterable[str], known: Collection[str], others: str = "") -> None:
+    """Raise UserError for a name that is not among the `known` ones. others: the end of the message."""
+    for name in names:
+        if name not in known:
+            raise UserError(f"{name} is not known; there are {', '.join(known)}{others}", argument=argument)
 
 
 def counted(argument: str, value: Any) -> int:
@@ -84,7 +91,7 @@ def numbers_of(where: str, values: Any) -> NDArray[np.float64]:
     try:
         array = array.astype(np.float64)
     except (TypeError, ValueError) as error:
-        raise UserError(f"{where}: is not made of numbers ({error})") from None
+        raise UserError(f"{where}: does not consist of numbers ({error})") from None
     if array.ndim != 1:
         raise UserError(f"{where}: has the shape {array.shape}; a column is (n,)")
     return array
@@ -118,7 +125,7 @@ def values_of(given: Given, loaded: fmu_run.Fmu) -> dict[str, Any]:
 
 
 def in_own_unit(name: str, value: Any, loaded: fmu_run.Fmu) -> Any:
-    """(value, unit) in the unit of the FMU's variable; a value without a unit as it is. Raises UserError."""
+    """(value, unit) in the unit of the FMU's variable; a value without a unit is returned unchanged. Raises UserError."""
     if not (isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], str)) or name not in loaded.variables:
         return value
     try:

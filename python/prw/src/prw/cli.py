@@ -5,16 +5,21 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from types import ModuleType
 
 from prw import progress
 from prw.commands import check, excite, identify, linearize, simulate, sweep
+from prw.commands.options import Formatter
 from prw.errors import UserError
 
-#: Each subcommand is a module with add_parser(subparsers); the parser's default `run` takes the parsed arguments.
-COMMANDS = (simulate, check, linearize, identify, excite, sweep)
+#: The subcommands by name. Each module has a docstring that describes it, HELP in a line, run(arguments), and perhaps
+#: add_options(parser) and EXAMPLES.
+_MODULES = (simulate, check, linearize, identify, excite, sweep)
+COMMANDS = {module.__name__.rpartition(".")[2]: module for module in _MODULES}
+#: The option by argument of a function, if their names differ.
+OPTIONS = {"parameters": "--set", "priors": "--prior", "skip": "--skip-lines"}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -23,14 +28,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     return run("prw", "Simulate the pitch-roll wrist testbed through its FMU.", COMMANDS, argv)
 
 
-def run(program: str, description: str, commands: Sequence[ModuleType], argv: Sequence[str] | None) -> int:
+def run(program: str, description: str, commands: Mapping[str, ModuleType], argv: Sequence[str] | None) -> int:
     """Run one of the commands as `program COMMAND ...`."""
     parser = argparse.ArgumentParser(prog=program, description=description)
     parser.add_argument("--version", action="version", version=f"{program} {version('prw')}")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for command in commands:
-        command.add_parser(subparsers)
-    # `options`: the option by argument, if their names differ.
+    for name, command in commands.items():
+        examples, add_options = getattr(command, "EXAMPLES", None), getattr(command, "add_options", lambda _: None)
+        texts = {"help": command.HELP, "description": command.__doc__, "epilog": examples}
+        subparser = subparsers.add_parser(name, formatter_class=Formatter, **texts)
+        add_options(subparser)
+        subparser.set_defaults(run=command.run)
     arguments = argparse.Namespace(options={})
     try:
         parser.parse_args(argv, arguments)
@@ -39,7 +47,7 @@ def run(program: str, description: str, commands: Sequence[ModuleType], argv: Se
         sys.stdout.flush()
     except UserError as error:
         default = f"--{error.argument}" if hasattr(arguments, error.argument) else error.argument
-        option = arguments.options.get(error.argument, default)
+        option = {**OPTIONS, **arguments.options}.get(error.argument, default)
         print(f"{program} {arguments.command}: {option}{error.detail}", file=sys.stderr)
         return error.status
     except KeyboardInterrupt:

@@ -71,8 +71,8 @@ def _on_worker(shared: tuple[bytes, Motion, Mapping[str, Any]], values: Mapping[
 @lru_cache(maxsize=1)
 def _loaded(fmu: bytes) -> Testbed:
     """The FMU, which a worker loads once."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "study.fmu"
+    with tempfile.TemporaryDirectory() as directory:
+        path = Path(directory) / "study.fmu"
         path.write_bytes(fmu)
         return Testbed(path)
 

@@ -103,7 +103,7 @@ def columns(
     """Find time, both angles, both rates if present, and those `outputs` (names of measured outputs) that are present.
 
     A column's unit is in its header (`pitch [deg]`) or in `units` by name; without either it is SI, or degrees and
-    degrees per second if `degrees`. Raises UserError naming file, row (`line`, 0 where there are none) and column.
+    degrees per second if `degrees`. Raises UserError naming file, row (`line`, 0 if there are none) and column.
     """
     where = f"{path}, row {line}" if line else str(path)
     wanted = ("time", *MOTORS, *outputs)

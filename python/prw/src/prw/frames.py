@@ -312,7 +312,7 @@ class _Frame:
 
 
 def _colours() -> Iterator[ArrayLike]:
-    """All colours except those of smooth edges: bodies in every brightness, pale curves, text and grid."""
+    """All colours except the mixed colours of smooth edges: bodies in every brightness, pale curves, text and grid."""
     for name in (BLUE, VERMILION, GREEN, PURPLE, STEEL, DARK, PALE):
         yield from (_bright(to_rgb(name), level) for level in range(LEVELS + 1))
     for name in (BLUE, VERMILION, GREEN, PURPLE):

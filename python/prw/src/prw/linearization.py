@@ -13,14 +13,12 @@ import numpy as np
 from prw.arguments import Given, names_of, values_of
 from prw.errors import UserError
 from prw.state_space import StateSpace
-from prw.testbed import existing_fmu, loaded
+from prw.testbed import CONTINUOUS, existing_fmu, loaded
 
 #: Start values of the testbed with which its states and inputs are independent of each other in Co-Simulation. With
 #: others a motor angle also changes the rate that is estimated from it and, before the first step, the states.
 INDEPENDENT = {"use_omega": True, "start_at_rest": False}
 Interface = Literal["co-simulation", "model-exchange"]
-#: Types of continuous variables in `fmu_run`.
-CONTINUOUS = ("Real", "Float32")
 INTERFACES = {"CoSimulation": "Co-Simulation", "ModelExchange": "Model Exchange"}
 #: The names of the interface types in `fmu_run`.
 HELD: dict[str, Interface] = {"CoSimulation": "co-simulation", "ModelExchange": "model-exchange"}

@@ -101,4 +101,4 @@ def _numbers(name: str, value: object) -> Array:
     try:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise UserError(f"motion: {name} is not made of numbers ({error})") from None
+        raise UserError(f"motion: {name} does not consist of numbers ({error})") from None

@@ -104,21 +104,26 @@ def draw_response(title: str, motion: Motion, response: Mapping[str, Array], ang
     return draw_panels(title, motion.time, [motion_panel(motion, angles), *response_panels(response, angles)])
 
 
-def draw_panels(title: str, time: Array, panels: Sequence[Panel]) -> Figure:
-    """A figure of panels, one below the other, over the same time (n,) in s."""
+def draw_panels(title: str, time: Array, panels: Sequence[Panel], height: float = 2.1) -> Figure:
+    """A figure of panels, one below the other, over the same time (n,) in s. height: of a panel, inches."""
     with matplotlib.rc_context(STYLE):
-        figure = ShownFigure(figsize=(8, 0.8 + 2.1 * len(panels)), layout="constrained")
+        figure = ShownFigure(figsize=(8, 0.8 + height * len(panels)), layout="constrained")
         figure.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold")
-        axes = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
-        for axis, panel in zip(axes, panels):
-            draw_panel(axis, time, panel)
-        figure.align_ylabels(axes)
-        axes[-1].set_xlabel("time (s)")
-        axes[-1].set_xlim(time[0], time[-1])
+        draw_into(figure, time, panels)
     return figure
 
 
-def draw_panel(axis: Axes, time: Array, panel: Panel) -> None:
+def draw_into(figure: Any, time: Array, panels: Sequence[Panel]) -> None:
+    """Draw the panels over time (n,) in s, one below the other, into a figure or subfigure."""
+    axes = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
+    for axis, panel in zip(axes, panels):
+        _draw_panel(axis, time, panel)
+    figure.align_ylabels(axes)
+    axes[-1].set_xlabel("time (s)")
+    axes[-1].set_xlim(time[0], time[-1])
+
+
+def _draw_panel(axis: Axes, time: Array, panel: Panel) -> None:
     """Draw the panel's two curves over time (n,) in s, with a legend at the right end of the title's line."""
     axis.set_title(panel.title)
     axis.set_ylabel(panel.label)

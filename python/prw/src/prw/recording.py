@@ -11,26 +11,26 @@ from typing import Any
 
 import numpy as np
 
-from prw.arguments import Table, columns_of, is_path, is_table, numbers_of
+from prw.arguments import Table, check_names, columns_of, is_path, is_table, numbers_of
 from prw.columns import ANGLES, MEASURED, QUANTITIES, RATES, Columns, columns, factor, shown
 from prw.errors import UserError
 from prw.motion import Array, Motion
 from prw.table import Choice, read_table
 
-#: Faster than the testbed's motors will turn on any wrist move, in rad/s; degrees taken for radians are beyond it.
+#: Motor speed in rad/s that no wrist move reaches. Degrees that are taken for radians exceed it.
 PLAUSIBLE_SPEED = 30.0
-#: More turns than a wrist move takes, in rad.
+#: Motor angle in rad that no wrist move reaches.
 PLAUSIBLE_ANGLE = 4 * np.pi
 #: Motion of a motor, in rad, below which its rate is not checked.
 SMALL_MOVE = 0.02
 #: Rate in rad/s below which a motor counts as at rest.
 SLOW = 0.1
-#: Longer between two samples, in s, than anyone lets a motor run unobserved; milliseconds taken for seconds are beyond.
+#: Time between two samples in s that is probably a mistake. Milliseconds that are taken for seconds exceed it.
 SLOW_SAMPLING = 0.5
-#: Rows are missing where this many usual steps are between two. Longer than the other, in s, a motor may have done
-#: anything, unless it rests in so many rows before and after.
+#: Rows are missing if two are more than this many usual steps apart. The motion of a motor is unknown in gaps longer than
+#: this, in s, unless the motor rests in this many rows before and after.
 MISSING, UNKNOWN, REST = 5.0, 0.04, 5
-#: A motor does not turn this far, in rad, from sample to sample; angles that jump by a turn do.
+#: Change of a motor angle between two samples in rad that is probably a jump by a turn.
 JUMP = 0.9 * np.pi
 #: Name of a recording that comes from no file.
 IN_MEMORY = Path("recording")
@@ -45,7 +45,7 @@ class Recording:
     motion
         The motion of the motors.
     measured
-        (n,) by name of the output; NaN where a cell is empty.
+        (n,) by name of the output; NaN if a cell is empty.
     units
         The unit in the file, by column.
     source
@@ -104,7 +104,7 @@ def read(
 ) -> Recording:
     """Read a recorded experiment from a CSV file, or from a DataFrame or a dict of arrays with the same columns.
 
-    Its columns: time (s), theta1, theta2 (rad) and, where present, omega1, omega2 (rad/s) and any of tau1, tau2
+    Its columns: time (s), theta1, theta2 (rad) and, if present, omega1, omega2 (rad/s) and any of tau1, tau2
     (N.m), theta3, theta4, pitch, roll (rad), pitch_rate, roll_rate (rad/s), in any order; others are ignored. The file is
     UTF-8 text (or UTF-16 with its mark) with a header line, perhaps below comments after `#`, separated by commas,
     semicolons or tabs (with semicolons, a decimal comma is understood). Time may be uneven but must increase; if
@@ -160,10 +160,8 @@ def _read(
     if not is_path(source) and not is_table(source):
         raise UserError(f"{source!r} is no recording: neither a file nor a DataFrame or a dict of arrays")
     path = Path(source) if isinstance(source, (str, os.PathLike)) else IN_MEMORY
-    for what, known in (("units", units or {}), ("names", names)):
-        for name in known:
-            if name not in QUANTITIES:
-                raise UserError(f"{name} is not known; there are {', '.join(QUANTITIES)}", argument=what)
+    check_names("units", units or {}, QUANTITIES)
+    check_names("names", names, QUANTITIES)
     called = {header: name for name, header in names.items()}
     if skip < 0:
         raise UserError("it must be 0 or more lines", argument="skip", given=skip)
@@ -228,8 +226,8 @@ def _gaps(path: Path, time: Array, theta: Array) -> list[str]:
     if long:
         worst = int(max(long, key=lambda k: float(steps[k])))
         raise UserError(
-            f"{path}: no rows from {time[worst]:.6g} to {time[worst + 1]:.6g} s, {steps[worst]:.3g} s where {usual:.3g} s is usual, while "
-            "the motors move; their motion is not known. Cut the recording there, into files of their own"
+            f"{path}: no rows from {time[worst]:.6g} to {time[worst + 1]:.6g} s, {steps[worst]:.3g} s instead of the usual {usual:.3g} s, while "
+            "the motors move; their motion is not known. Cut the recording there, into separate files"
         )
     if not len(gaps):
         return []

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from prw.arguments import Given, Table, names_of, values_of
+from prw.arguments import Given, Table, check_names, names_of, values_of
 from prw.columns import MEASURED, QUANTITIES, si_unit
-from prw.errors import UserError, need
+from prw.errors import need
 from prw.files import write_table
 from prw.motion import Array, Motion, fig4
 from prw.recording import Recording, read_motion
@@ -95,7 +95,7 @@ class Run(Mapping[str, Array]):
         return Recording(Path(self.motion.name), self.motion, measured, dict.fromkeys(self, ""))
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
-        """Write time (s), the motors' angles (rad) and, where given, rates (rad/s), and the outputs (SI) to `path`, a
+        """Write time (s), the motors' angles (rad) and, if given, rates (rad/s), and the outputs (SI) to `path`, a
         row each time. Time and motors keep all their digits; outputs have twelve. Raises UserError if the
         file cannot be written."""
         write_table(Path(path), {**self.motion.columns, **self._outputs})
@@ -173,35 +173,20 @@ def simulate(
     UserWarning
         The motors are sampled so coarsely that an output may be off by more than 1 % of its peak.
     """
-    run = simulated(motion, parameters, fmu=fmu, outputs=outputs)
-    if run.doubt:
-        warnings.warn(run.doubt, UserWarning, stacklevel=2)
-    return run
-
-
-def simulated(
-    motion: Motion | Recording | Run | str | os.PathLike[str] | Table | None = None,
-    parameters: Given = None,
-    *,
-    fmu: str | os.PathLike[str] | None = None,
-    outputs: Sequence[str] = OUTPUTS,
-) -> Run:
-    """Simulate as `simulate` does, without its warning."""
     moved = motion_of(motion)
     names = names_of("outputs", outputs)
     with Testbed(None if fmu is None else Path(fmu)) as testbed:
         given = values_of(parameters, testbed.loaded)
         values = testbed.with_starts(given)
-        for name in names:
-            if name not in testbed.loaded.variables:
-                raise UserError(
-                    f"{name} is not known; there are {', '.join(testbed.loaded.variables)}", argument="outputs"
-                )
+        check_names("outputs", names, testbed.loaded.variables)
         found = testbed.respond(moved, names, given)
         coarse = Motion(moved.time[::2], moved.theta[::2], None if moved.omega is None else moved.omega[::2])
         other = testbed.respond(coarse, names, given) if len(coarse.time) >= FEWEST else {}
     errors = {name: _sampling_error(found[name], other[name]) for name in other}
-    return Run(moved, found, values, errors)
+    run = Run(moved, found, values, errors)
+    if run.doubt:
+        warnings.warn(run.doubt, UserWarning, stacklevel=2)
+    return run
 
 
 def _sampling_error(fine: Array, coarse: Array) -> float:

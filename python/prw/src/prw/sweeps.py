@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 import os
-import time
 import warnings
 from collections.abc import Callable, Mapping
 from numbers import Real
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import fmu_run
 import numpy as np
 from numpy.typing import ArrayLike
 
-from prw.arguments import Given, Table, counted, in_own_unit, spread_of, values_of
+from prw.arguments import Given, Table, check_names, counted, in_own_unit, spread_of, values_of
 from prw.errors import UserError, need
 from prw.files import replacing
 from prw.motion import Array, Motion
@@ -35,15 +35,8 @@ Spread = float | tuple[float, float] | tuple[str, float, float]
 
 #: The statistics of each output in a result.
 MEASURES: tuple[fmu_run.Measure, ...] = ("peak", "rms", "end")
-#: Statistics of runs, (runs,) each, by the name of the column; and the messages of those that failed, by run.
+#: Statistics of runs, (runs,) each, by the name of the column; and the messages of failed runs, by run.
 Statistics = tuple[dict[str, Array], dict[int, str]]
-
-
-class Swept(NamedTuple):
-    """table: a row for each run. seconds: the time that the runs took."""
-
-    table: pyarrow.Table
-    seconds: float
 
 
 def sweep(
@@ -92,67 +85,58 @@ def sweep(
     Raises
     ------
     UserError
-        An argument is out of range, a file cannot be read or written, or the cluster does not answer.
+        An argument is out of range, a file cannot be read or written, or the cluster does not respond.
 
     Warns
     -----
     RuntimeWarning
         All runs failed.
     """
-    need("pyarrow")
-    if scheduler:
-        need("distributed")
-    with Testbed(existing_fmu(fmu)) as testbed:
-        values = layout(grid or {}, random or {}, runs, seed, testbed, parameters)
+    need("pyarrow", *(["distributed"] if scheduler else []))
+    threads = counted("threads", threads) if threads is not None else os.cpu_count() or 1
+    with Testbed(existing_fmu(fmu)) as testbed, contextlib.ExitStack() as stack:
         fixed = values_of(parameters, testbed.loaded)
-        table = carry_out(testbed, motion_of(motion), values, fixed, threads, scheduler, out).table
+        values, moved = layout(grid or {}, random or {}, runs, seed, testbed, fixed), motion_of(motion)
+        # The file is created first, so that a directory that cannot be written costs no runs.
+        temporary = None if out is None else stack.enter_context(replacing(Path(out) / "runs.parquet"))
+        table = _made(testbed, moved, values, fixed, threads, scheduler)
+        if temporary is not None:
+            import pyarrow.parquet
+
+            pyarrow.parquet.write_table(table, temporary)
     if "done" not in table["status"].to_pylist():
         warnings.warn(f"all {table.num_rows} runs failed; run 0: {table['message'][0]}", RuntimeWarning, stacklevel=2)
     return table
 
 
-def carry_out(
+def _made(
     testbed: Testbed,
     motion: Motion,
     values: Mapping[str, Array],
     fixed: Mapping[str, Any],
-    threads: int | None,
+    threads: int,
     scheduler: str | None,
-    out: str | os.PathLike[str] | None,
-) -> Swept:
-    """Make the runs with the `values` (runs,) by parameter, and with the values `fixed` in all of them. Other arguments as for
-    `sweep`."""
+) -> pyarrow.Table:
+    """The table of the runs with the `values` (runs,) by parameter, and with the values `fixed` in all of them."""
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
-    threads = counted("threads", threads) if threads is not None else os.cpu_count() or 1
-    start, total, begin = {**fixed, **values}, len(next(iter(values.values()))), time.monotonic()
+    start, total = {**fixed, **values}, len(next(iter(values.values())))
+    with Progress(f"{total} runs", total) as progress:
+        if scheduler:
+            from prw.cluster import on_cluster
 
-    def made() -> pa.Table:
-        with Progress(f"{total} runs", total) as progress:
-            if scheduler:
-                from prw.cluster import on_cluster
-
-                measured, errors = on_cluster(testbed.fmu, motion, fixed, values, scheduler, progress)
-            else:
-                measured, errors = statistics(testbed, motion, start, threads, lambda done, _: progress(done))
-        failed = np.isin(np.arange(total), list(errors))
-        columns = {
-            "run": pa.array(range(total), pa.int64()),
-            "status": np.where(failed, "failed", "done").tolist(),
-            "message": [errors.get(run, "") for run in range(total)],
-            **values,
-            **{name: pa.array(column, mask=failed) for name, column in measured.items()},
-        }
-        return pa.table(columns)
-
-    if out is None:
-        return Swept(made(), time.monotonic() - begin)
-    # The file is created first, so that a directory that cannot be written costs no runs.
-    with replacing(Path(out) / "runs.parquet") as temporary:
-        swept = Swept(made(), time.monotonic() - begin)
-        pq.write_table(swept.table, temporary)
-    return swept
+            measured, errors = on_cluster(testbed.fmu, motion, fixed, values, scheduler, progress)
+        else:
+            measured, errors = statistics(testbed, motion, start, threads, lambda done, _: progress(done))
+    failed = np.isin(np.arange(total), list(errors))
+    columns = {
+        "run": pa.array(range(total), pa.int64()),
+        "status": np.where(failed, "failed", "done").tolist(),
+        "message": [errors.get(run, "") for run in range(total)],
+        **values,
+        **{name: pa.array(column, mask=failed) for name, column in measured.items()},
+    }
+    return pa.table(columns)
 
 
 def statistics(
@@ -176,21 +160,19 @@ def layout(
     runs: int,
     seed: int,
     testbed: Testbed,
-    parameters: Given = None,
+    fixed: Mapping[str, Any],
 ) -> dict[str, Array]:
     """The values of the parameters that vary, (runs,) each: all combinations of the grid, each with all draws, about
-    `parameters` or the FMU's start values. Raises UserError for invalid arguments."""
-    fixed = values_of(parameters, testbed.loaded)
+    `fixed` or the FMU's start values. Raises UserError for invalid arguments."""
     testbed.with_starts(fixed)
     starts = {**testbed.starts, **fixed}
+    check_names("grid", grid, testbed.starts)
+    check_names("random", random, testbed.starts)
     for name in (*grid, *random):
-        if name not in testbed.starts:
-            argument = "grid" if name in grid else "random"
-            raise UserError(f"{name} is not known; there are {', '.join(testbed.starts)}", argument=argument)
         if (name in grid) + (name in random) + (name in fixed and name in grid) > 1:
             raise UserError(f"{name} is in more than one of grid, random and parameters; choose one")
     if not grid and not random:
-        raise UserError("nothing varies; give values by parameter (grid), or relative standard deviations (random)")
+        raise UserError("nothing varies; give values of a parameter (grid) or its distribution (random)")
     draws = counted("runs", runs) if random else 1
     axes = {name: _column(name, in_own_unit(name, values, testbed.loaded)) for name, values in grid.items()}
     total = math.prod(map(len, axes.values())) * draws

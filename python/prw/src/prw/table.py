@@ -9,9 +9,8 @@ import os
 import re
 from array import array
 from collections.abc import Callable, Container, Sequence
-from itertools import repeat
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, Any
 
 import numpy as np
 
@@ -22,23 +21,9 @@ from prw.progress import Progress
 DELIMITERS = (",", ";", "\t")
 #: Rows between two progress reports.
 REPORT_ROWS = 4096
-#: Characters per block of plain rows.
-BLOCK = 1 << 22
 
 #: The columns to read, (name, index), of a header in the line with this number.
 Choice = Callable[[Sequence[str], int], Sequence[tuple[str, int]]]
-
-
-class _Layout(NamedTuple):
-    """The file and its layout. width: cells of the header. columns, may_be_empty, increasing: as in `read_table`. size: bytes."""
-
-    path: Path
-    delimiter: str
-    width: int
-    columns: Sequence[tuple[str, int]]
-    may_be_empty: Container[str]
-    increasing: bool
-    size: int
 
 
 def read_table(
@@ -83,19 +68,14 @@ def _parse(
     if not first:
         raise UserError(f"{path}: the file is empty; a header and at least two rows are needed")
     delimiter = next((d for d in DELIMITERS if d in first), ",")
-    table = _reader(file, delimiter)
+    file.seek(0)
+    table = csv.reader(file, delimiter=delimiter, skipinitialspace=True)
     try:
-        header = [name.strip() for name in _header(table, begin)]
+        # The first row below `begin` lines.
+        header = [name.strip() for name in next(row for row in table if row and table.line_num > begin)]
         header[0] = header[0].lstrip("# ")
         columns = choose(header, table.line_num)
-        size = os.fstat(file.fileno()).st_size
-        layout = _Layout(path, delimiter, len(header), columns, may_be_empty, increasing, size)
-        quick = _plain_rows(file, table.line_num, layout)
-        if quick is not None:
-            return quick
-        table = _reader(file, delimiter)
-        _header(table, begin)
-        values = _rows(table, layout)
+        values = _rows(path, table, len(header), columns, may_be_empty, increasing, os.fstat(file.fileno()).st_size)
     except csv.Error as error:
         raise UserError(f"{_where(path, table.line_num)}: not a readable CSV row ({error})") from None
     if len(values) < 2:
@@ -117,56 +97,18 @@ def _top(file: IO[str], skip: int) -> tuple[int, str]:
     return count, line
 
 
-def _reader(file: IO[str], delimiter: str) -> Any:
-    file.seek(0)
-    return csv.reader(file, delimiter=delimiter, skipinitialspace=True)
-
-
-def _header(table: Any, begin: int) -> list[str]:
-    """The first row below `begin` lines."""
-    return next(row for row in table if row and table.line_num > begin)
-
-
-def _plain_rows(file: IO[str], begin: int, layout: _Layout) -> Array | None:
-    """The result of `_rows` for the lines below `begin`, in blocks; None if a line needs `_rows`."""
-    path, delimiter, width, columns, may_be_empty, increasing, size = layout
-    file.seek(0)
-    for _ in range(begin):
-        file.readline()
-    parts, bytes_read = [], 0
-    with Progress(f"reading {path}", size) as progress:
-        while text := file.read(BLOCK) + file.readline():
-            bytes_read += len(text)
-            if "\r" in text:
-                text = text.replace("\r\n", "\n")
-            if delimiter == ";" and "," in text:
-                text = text.replace(",", ".")
-            if any(mark in text for mark in '"#\r'):
-                return None
-            while delimiter * 2 in text:
-                text = text.replace(delimiter * 2, f"{delimiter}nan{delimiter}")
-            if f"{delimiter}\n" in text:
-                text = text.replace(f"{delimiter}\n", f"{delimiter}nan\n")
-            lines = list(filter(None, text.split("\n")))
-            if not {width - 1}.issuperset(map(str.count, lines, repeat(delimiter))):
-                return None
-            try:
-                used = [index for _, index in columns]
-                parts.append(np.loadtxt(lines, delimiter=delimiter, usecols=used, comments=None, ndmin=2))
-            except ValueError:
-                return None
-            progress(bytes_read)
-    values = np.concatenate(parts) if parts else np.empty((0, len(columns)))
-    empty = [name in may_be_empty for name, _ in columns]
-    if len(values) < 2 or np.isinf(values).any() or np.isnan(values[:, np.logical_not(empty)]).any():
-        return None
-    return None if increasing and not (np.diff(values[:, 0]) > 0).all() else values
-
-
-def _rows(table: Any, layout: _Layout) -> Array:
-    """All rows below the header, (rows, columns), checked cell by cell."""
-    path, delimiter, width, columns, may_be_empty, increasing, size = layout
-    cells, previous, bytes_read = array("d"), -math.inf, 0
+def _rows(
+    path: Path,
+    table: Any,
+    width: int,
+    columns: Sequence[tuple[str, int]],
+    may_be_empty: Container[str],
+    increasing: bool,
+    size: int,
+) -> Array:
+    """All rows below the header, (rows, columns). width: cells of the header. size: bytes of the file."""
+    cells, previous, bytes_read, indices = array("d"), -math.inf, 0, [index for _, index in columns]
+    comma = table.dialect.delimiter == ";"
     with Progress(f"reading {path}", size) as progress:
         for count, row in enumerate(table):
             # Some tools end each row, but not the header, with a separator.
@@ -175,34 +117,43 @@ def _rows(table: Any, layout: _Layout) -> Array:
                     continue
                 number = "1 cell" if len(row) == 1 else f"{len(row)} cells"
                 raise UserError(f"{_where(path, table.line_num)}: {number}, but the header has {width}")
-            for name, index in columns:
-                text = row[index]
-                try:
-                    value = float(text.replace(",", ".") if delimiter == ";" else text)
-                except ValueError:
-                    value = None
-                # float() would take 1_000 for a thousand
-                if name in may_be_empty and text.strip().lower() in ("", "nan"):
-                    value = math.nan
-                elif value is None or "_" in text:
-                    shown = f"{text.strip()[:40]!r} is not a number" if text.strip() else "empty cell"
-                    raise UserError(f"{_where(path, table.line_num)}, column {name}: {shown}")
-                elif not math.isfinite(value):
-                    raise UserError(f"{_where(path, table.line_num)}, column {name}: {text.strip()} is not finite")
-                cells.append(value)
-            if increasing:
-                time = cells[-len(columns)]
-                if time <= previous:
-                    complaint = "is the time of the row before again" if time == previous else "runs backwards"
-                    raise UserError(
-                        f"{_where(path, table.line_num)}, column time: {row[columns[0][1]].strip()} {complaint}"
-                        f" (after {previous!r}); time must increase from row to row"
-                    )
-                previous = time
+            line = "".join(row)
+            try:
+                values = [float(row[i].replace(",", ".") if comma else row[i]) for i in indices]
+            except ValueError:
+                values = [math.nan]
+            # float() would take 1_000 for a thousand
+            if "_" in line or not math.isfinite(sum(values)):
+                where = _where(path, table.line_num)
+                values = [_number(f"{where}, column {n}", row[i], comma, n in may_be_empty) for n, i in columns]
+            if increasing and values[0] <= previous:
+                message = "is the time of the row before again" if values[0] == previous else "runs backwards"
+                raise UserError(
+                    f"{_where(path, table.line_num)}, column time: {row[indices[0]].strip()} {message}"
+                    f" (after {previous!r}); time must increase from row to row"
+                )
+            previous = values[0]
+            cells.extend(values)
+            bytes_read += len(line) + width
             if count % REPORT_ROWS == 0:
                 progress(bytes_read)
-            bytes_read += sum(map(len, row)) + width
     return np.array(cells).reshape(-1, len(columns))
+
+
+def _number(where: str, cell: str, comma: bool, may_be_empty: bool) -> float:
+    """The number in a cell, perhaps with a decimal comma. Raises UserError that begins with `where`."""
+    text = cell.strip()
+    if may_be_empty and text.lower() in ("", "nan"):
+        return math.nan
+    try:
+        value = None if "_" in text else float(text.replace(",", ".") if comma else text)
+    except ValueError:
+        value = None
+    if value is None:
+        raise UserError(f"{where}: {f'{text[:40]!r} is not a number' if text else 'empty cell'}")
+    if not math.isfinite(value):
+        raise UserError(f"{where}: {text} is not finite")
+    return value
 
 
 def _undecodable_line(path: Path) -> int:

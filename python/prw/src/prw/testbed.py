@@ -11,6 +11,7 @@ from typing import Any, Self
 import fmu_run
 import numpy as np
 
+from prw.arguments import check_names
 from prw.columns import ANGLES, RATES
 from prw.errors import UserError
 from prw.files import CLONE, PACKAGE
@@ -21,8 +22,8 @@ OUTPUTS = ("tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3",
 ANGLE_OF = dict(zip(RATES, ANGLES))
 
 Value = float | int | bool
-#: Types of continuous variables in FMI 2.0 and 3.0.
-REAL = ("Real", "Float64")
+#: Types of continuous variables in `fmu_run`.
+CONTINUOUS = ("Real", "Float32")
 #: The environment variable that names an FMU, the FMU in the wheel, and the FMU that `make fmu` writes in the clone.
 VARIABLE = "PRW_FMU"
 INSIDE = PACKAGE / "fmu" / "prw_testbed.fmu"
@@ -95,7 +96,7 @@ class Testbed:
     @property
     def starts(self) -> dict[str, float]:
         """The start values of the Real parameters in SI, by name."""
-        parameters = (v for v in self.loaded.variables.values() if v.causality == "parameter" and v.type in REAL)
+        parameters = (v for v in self.loaded.variables.values() if v.causality == "parameter" and v.type in CONTINUOUS)
         return {v.name: float(v.start or 0) for v in parameters}
 
     def with_starts(self, parameters: Mapping[str, Value]) -> dict[str, Value]:
@@ -106,9 +107,8 @@ class Testbed:
             for v in self.loaded.variables.values()
             if v.causality == "parameter" and v.type != "String" and v.name != "use_omega"
         }
+        check_names("parameters", parameters, known)
         for name, value in parameters.items():
-            if name not in known:
-                raise UserError(f"{name} is not known; there are {', '.join(known)}", argument="parameters")
             if not isinstance(value, (Real, np.bool_)):
                 raise UserError(
                     f"{name} is {value!r}, not a number; prw.sweep takes many values", argument="parameters"
@@ -122,7 +122,7 @@ class Testbed:
         the FMU's units); each sample is one communication point.
 
         Returns `outputs` (any Real variables) by name, each (n,), in the FMU's units (N.m, rad, rad/s). Sample k is
-        read at time[k] with the motors' angles (and rates, where the motion has them) of sample k set, so a row
+        read at time[k] with the motors' angles (and rates, if the motion has them) of sample k set, so a row
         belongs together.
         """
         try:
@@ -151,4 +151,4 @@ def _value(kind: str, text: str) -> Value:
     """A start value in the format of the model description."""
     if kind == "Boolean":
         return text in ("true", "1")
-    return float(text) if kind in REAL else int(text)
+    return float(text) if kind in CONTINUOUS else int(text)

@@ -22,9 +22,9 @@ from prw.motion import Array
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Times that differ by less, in s, are one and the same.
+#: Times that differ by less than this, in s, are equal.
 SAME_TIME = 1e-9
-#: Motors that are off by more than this share of their largest angle or rate are other motors.
+#: Motors that differ by more than this share of their largest angle or rate follow another motion.
 OTHER_MOTORS = 1e-2
 #: Relative distance within which a factor counts as the factor of a unit.
 NEAR = 0.02
@@ -89,7 +89,7 @@ class Agreement:
         return "\n".join([*lines, *(f"note        {note}" for note in self.notes)])
 
     def to_json(self, path: str | os.PathLike[str] | None = None) -> str:
-        """Everything in numbers, as JSON; written to `path`, too, where that is given."""
+        """Everything in numbers, as JSON; written to `path`, too, if it is given."""
         content = {
             "result": str(self.source),
             "experiment": self.experiment.name,
@@ -110,26 +110,16 @@ class Agreement:
         """Result and reference of the outputs that do not agree, or of all if they do; save it with `.savefig(path)`.
         Raises UserError without matplotlib."""
         need("matplotlib")
-        import matplotlib
-
-        from prw.plots import STYLE, Panel, ShownFigure, draw_panel
+        from prw.plots import Panel, draw_panels
 
         differences = self.variables
-        names = [name for name, found in differences.items() if not found.agrees] or list(differences)
-        with matplotlib.rc_context(STYLE):
-            figure = ShownFigure(figsize=(8, 0.8 + 1.9 * len(names)), layout="constrained")
-            title = f"{self.source.name} and {self.experiment.name}"
-            figure.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold")
-            axes = figure.subplots(len(names), sharex=True, squeeze=False)[:, 0]
-            for axis, name in zip(axes, names):
-                curves = [("reference", self.expected[name]), ("result", self.found[name])]
-                found = differences[name]
-                off = f"{name}: off by {found.largest:.2g} at {found.at:g} s, allowed {found.allowed:.2g}"
-                draw_panel(axis, self.time, Panel(off, found.unit.replace(".", " "), curves))
-            figure.align_ylabels(axes)
-            axes[-1].set_xlabel("time (s)")
-            axes[-1].set_xlim(self.time[0], self.time[-1])
-        return figure
+        panels = []
+        for name in [name for name, found in differences.items() if not found.agrees] or list(differences):
+            curves = [("reference", self.expected[name]), ("result", self.found[name])]
+            found = differences[name]
+            off = f"{name}: off by {found.largest:.2g} at {found.at:g} s, allowed {found.allowed:.2g}"
+            panels.append(Panel(off, found.unit.replace(".", " "), curves))
+        return draw_panels(f"{self.source.name} and {self.experiment.name}", self.time, panels, 1.9)
 
     def __repr__(self) -> str:
         return self.summary()
@@ -164,7 +154,7 @@ def compare(result: Result, experiment: Experiment, interface: str) -> Agreement
 
 
 def nearest(result: Result, known: Sequence[Experiment]) -> Experiment:
-    """The experiment whose motors and outputs are nearest to the result's. Raises UserError where none has any time in
+    """The experiment whose motors and outputs are nearest to the result's. Raises UserError if none has a time in
     common with it."""
 
     def distance(experiment: Experiment) -> float:
@@ -183,7 +173,7 @@ def nearest(result: Result, known: Sequence[Experiment]) -> Experiment:
 
 
 def interpolated(time: Array, values: Array, at: Array) -> Array:
-    """Values (n,) at the times `at` (m,) within `time` (n,): where there is none, that of the cubic through the four
+    """Values (n,) at the times `at` (m,) within `time` (n,): if there is none, the value of the cubic through the four
     nearest."""
     count = min(4, len(time))
     first = np.clip(np.searchsorted(time, at) - count // 2, 0, len(time) - count)
@@ -223,7 +213,7 @@ def _notes(bare: Agreement, result: Result) -> list[str]:
             largest = max(np.abs(experiment.inputs[other]).max() for other in MOTORS if other[0] == name[0])
             if off.max() > OTHER_MOTORS * largest:
                 notes.append(
-                    f"{name} is not that of {experiment.name}: off by {off.max():.2g} {si_unit(name)} at "
+                    f"{name} differs from {experiment.name}: off by {off.max():.2g} {si_unit(name)} at "
                     f"{bare.time[off.argmax()]:g} s; look at the inputs first"
                 )
     for name, difference in bare.variables.items():
@@ -237,7 +227,7 @@ def _notes(bare: Agreement, result: Result) -> list[str]:
             notes.append(f"{name} has the other sign")
     late = _late_by(bare, result)
     if late:
-        notes.append(f"everything agrees if the result is taken {late:g} s later: is there a delay in the wiring?")
+        notes.append(f"everything agrees if the result is taken {late:g} s later: is a connection delayed?")
     return notes
 
 

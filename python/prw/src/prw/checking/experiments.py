@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from prw.arguments import check_names
 from prw.errors import UserError
 from prw.motion import Array
 
@@ -42,7 +43,7 @@ class Experiment:
 
 
 def read_experiments(fmu: Path) -> list[Experiment]:
-    """All experiments in the FMU file. Raises UserError where it has none."""
+    """All experiments in the FMU file. Raises UserError if it has none."""
     try:
         with zipfile.ZipFile(fmu) as archive:
             return [
@@ -66,10 +67,9 @@ def read_experiments(fmu: Path) -> list[Experiment]:
 
 def find(known: Sequence[Experiment], name: str) -> Experiment:
     """The experiment of that name. Raises UserError if there is none."""
-    for experiment in known:
-        if experiment.name == name:
-            return experiment
-    raise UserError(f"{name} is not known; there are {', '.join(e.name for e in known)}", argument="experiment")
+    by_name = {experiment.name: experiment for experiment in known}
+    check_names("experiment", [name], by_name)
+    return by_name[name]
 
 
 def _text(archive: zipfile.ZipFile, name: str) -> str:

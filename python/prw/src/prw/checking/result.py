@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from prw.arguments import check_names
 from prw.columns import NAMES, QUANTITIES, column, factor, shown, si_unit
 from prw.errors import UserError, need
 from prw.motion import Array
@@ -30,12 +31,10 @@ class Result:
     values: Mapping[str, Array]
 
 
-def read_result(path: Path, units: Mapping[str, str] = {}, component: str | None = None) -> Result:
+def read_result(path: Path, units: Mapping[str, str], component: str | None) -> Result:
     """Read the columns of time, motors and outputs; see `prw.check`. Of several rows at one time the last one counts: there,
     inputs and outputs belong together. Raises UserError naming the file and the cause."""
-    for name in units:
-        if name not in QUANTITIES:
-            raise UserError(f"{name} is not known; there are {', '.join(QUANTITIES)}", argument="units")
+    check_names("units", units, QUANTITIES)
     if not path.is_file():
         raise UserError(f"{path}: no such file")
     columns = _mat(path) if path.suffix.lower() == ".mat" else _csv(path)
@@ -164,7 +163,7 @@ def _of_variable(name: str, value: Any) -> dict[str, Array]:
 
 def _modelica(path: Path, content: Mapping[str, Any]) -> dict[str, Array]:
     """OpenModelica's and Dymola's trajectories: in dataInfo, for each name, which data_N it is in (0: any, the time), and
-    in which column, negative where the sign is to be changed."""
+    in which column, negative if the sign is to be changed."""
     across = "".join(content["Aclass"][3]).strip().rstrip("\0") == "binTrans"
 
     def upright(name: str) -> Any:

@@ -1,62 +1,44 @@
-"""`prw check`: compares the result of another tool with a reference experiment."""
-
-from __future__ import annotations
-
-import argparse
-from pathlib import Path
-from typing import Any
-
-from prw.checking import check
-from prw.commands.options import FORMATTER, Named, add_paths
-from prw.commands.simulate import write_png
-from prw.errors import MissingPackage, UserError
-
-DESCRIPTION = """\
-Compares a table of results with one of the reference experiments in the FMU: motions of the motors, and the
+"""Compares a table of results with one of the reference experiments in the FMU: motions of the motors, and the
 response of the testbed, calculated by a program that shares no code with the FMU. Reports for every output the largest
-difference, its time, and whether it is within the tolerance; draws the outputs beyond it. Exit status 0 where all agree, else 1.
+difference, its time, and whether it is within the tolerance; draws the outputs beyond it. Exit status 0 if all agree, else 1.
 
 FILE is CSV, a .mat file of OpenModelica, or one that MATLAB saved with -v7 or earlier. Columns are found by name, with
 or without a component (testbed.roll). Units are in the header, as in `roll [deg]`, or in --units; otherwise SI.
 """
 
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from prw.checking import check
+from prw.commands.options import Named, add_paths, call
+from prw.commands.simulate import write_png
+from prw.errors import MissingPackage, UserError
+
+HELP = "compare another tool's results with a reference"
 EXAMPLES = """\
 examples:
   prw check fig4.csv                                the nearest experiment
   prw check wrist_res.mat --experiment closed_loop
   prw check run.csv --units pitch=deg,roll=deg
-The experiments as files: unzip the FMU, extra/org.fmi-standard.fmi-ls-ref; documentation/fmi-ls-ref.txt says how.
+The experiments as files: unzip the FMU, extra/org.fmi-standard.fmi-ls-ref; documentation/fmi-ls-ref.txt describes them.
 """
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add `check` to prw's subcommands."""
-    parser = subparsers.add_parser(
-        "check",
-        help="compare another tool's results with a reference",
-        description=DESCRIPTION,
-        epilog=EXAMPLES,
-        formatter_class=FORMATTER,
-    )
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument("file", type=Path, metavar="FILE", help="table of results")
     parser.add_argument("--experiment", metavar="NAME", help="the experiment (default: the nearest one)")
     parser.add_argument("--model-exchange", action="store_true", help="take the tolerances for Model Exchange")
     parser.add_argument("--component", metavar="NAME", help="if several have a column of one name (default: testbed)")
     parser.add_argument("--units", action=Named, metavar="NAME=UNIT,...", help="units of columns whose header has none")
-    add_paths(parser, "where the figure goes")
-    parser.set_defaults(run=run)
+    add_paths(parser, "directory of the figure")
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw check`. Raises UserError with a message of one line, also if the result does not agree."""
-    found = check(
-        arguments.file,
-        arguments.experiment,
-        model_exchange=arguments.model_exchange,
-        component=arguments.component,
-        units=arguments.units,
-        fmu=arguments.fmu,
-    )
+    found = call(check, arguments, result=arguments.file)
     print(found.summary())
     if found.agrees:
         print("agrees      with the reference")

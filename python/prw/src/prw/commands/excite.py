@@ -1,21 +1,4 @@
-"""`prw excite`: motor motions for identification, ranked by the expected standard errors."""
-
-from __future__ import annotations
-
-import argparse
-import json
-from typing import Any
-
-import numpy as np
-
-from prw.arguments import positive
-from prw.commands.options import FORMATTER, add_paths, add_task_options, listed
-from prw.errors import need
-from prw.files import write_table, write_text
-from prw.identification.excitation import excite
-
-DESCRIPTION = """\
-Proposes motor motions within the motors' limits and ranks them by the standard errors of the parameters that are
+"""Proposes motor motions within the motors' limits and ranks them by the standard errors of the parameters that are
 expected from measuring the given channels once, with unknown sensor offsets. The assumed noise is white, with standard
 deviations of 0.02 N.m (torques), 0.001 rad (angles) and 0.01 rad/s (rates); --noise sets others. "typical" is the root
 mean square of a row. Kinds: multisines (slow,
@@ -23,6 +6,20 @@ wide, and one whose spectrum is optimal for the parameters), chirps; with equal,
 motors. Each motion becomes a CSV file for `prw simulate` or for your motor controller (s, rad, rad/s).
 """
 
+from __future__ import annotations
+
+import argparse
+import json
+
+import numpy as np
+
+from prw.arguments import positive
+from prw.commands.options import add_paths, add_task_options, call, listed
+from prw.errors import need
+from prw.files import write_table, write_text
+from prw.identification.excitation import excite
+
+HELP = "propose motor motions to identify parameters with"
 EXAMPLES = """\
 examples:
   prw excite                                        all channels, a 10 s experiment at 1 kHz
@@ -32,17 +29,10 @@ examples:
 """
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add `excite` to prw's subcommands."""
-    parser = subparsers.add_parser(
-        "excite",
-        help="propose motor motions to identify parameters with",
-        description=DESCRIPTION,
-        epilog=EXAMPLES,
-        formatter_class=FORMATTER,
-    )
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument(
-        "--measure", default="all", metavar="NAMES", help="channels that will be measured (default: all)"
+        "--measure", type=listed, default="all", metavar="NAMES", help="channels that will be measured (default: all)"
     )
     parser.add_argument(
         "--angle", type=float, default=40.0, metavar="DEG", help="motor limit, deg (default: %(default)g)"
@@ -60,27 +50,15 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--duration", type=float, default=10.0, metavar="S", help="of a motion (default: %(default)g)")
     parser.add_argument("--rate", type=float, default=1000.0, metavar="HZ", help="of sampling (default: %(default)g)")
     add_task_options(parser)
-    add_paths(parser, "where the motions and ranking.json go", "excite")
-    parser.set_defaults(run=run, options={"parameters": "--set"})
+    add_paths(parser, "directory of the motions and ranking.json", "excite")
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw excite`. Raises UserError with a message of one line."""
     need("scipy", "threadpoolctl")
-    for name in ("angle", "speed", "acceleration", "duration", "rate"):
-        positive(name, getattr(arguments, name))
-    ranking = excite(
-        None if arguments.measure == "all" else listed(arguments.measure),
-        angle=np.deg2rad(arguments.angle),
-        speed=np.deg2rad(arguments.speed),
-        acceleration=np.deg2rad(arguments.acceleration),
-        duration=arguments.duration,
-        rate=arguments.rate,
-        estimate=listed(arguments.estimate),
-        parameters=arguments.set,
-        noise=arguments.noise,
-        fmu=arguments.fmu,
-    )
+    names = ("angle", "speed", "acceleration")
+    limits = {name: np.deg2rad(positive(name, getattr(arguments, name))) for name in names}
+    ranking = call(excite, arguments, **limits, measure=None if arguments.measure == ("all",) else arguments.measure)
     for entry in ranking:
         write_table(arguments.out / f"{entry.name}.csv", entry.motion.columns)
     best = ranking[0]

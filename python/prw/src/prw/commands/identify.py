@@ -1,30 +1,4 @@
-"""`prw identify`: the parameters of the testbed from measurements, by least squares on the FMU."""
-
-from __future__ import annotations
-
-import argparse
-import re
-from pathlib import Path
-from typing import Any
-
-from prw.columns import factor
-from prw.commands.options import (
-    FORMATTER,
-    Named,
-    add_paths,
-    add_reading_options,
-    add_task_options,
-    bounds,
-    listed,
-    number,
-    reading_options,
-    spread,
-)
-from prw.errors import DoesNotFit, UserError, need
-from prw.identification import identify
-
-DESCRIPTION = """\
-Estimates parameters of the testbed from measurements: the values with which the FMU, driven by the measured motor
+"""Estimates parameters of the testbed from measurements: the values with which the FMU, driven by the measured motor
 angles, comes closest to the measurements. Sensor offsets and the state at the first row are unknown and estimated along.
 
 Each FILE is one experiment, a CSV table with the columns
@@ -36,6 +10,28 @@ be uneven; lines above the header that start with # are comments.
 Exit status: 0; 1 for an error or undetermined parameters; 3 if the FMU does not explain the data.
 """
 
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+
+from prw.columns import factor
+from prw.commands.options import (
+    Named,
+    add_paths,
+    add_reading_options,
+    add_task_options,
+    bounds,
+    call,
+    listed,
+    number,
+    spread,
+)
+from prw.errors import DoesNotFit, UserError, need
+from prw.identification import identify
+
+HELP = "estimate parameters from measurements"
 EXAMPLES = """\
 examples:
   prw identify run1.csv run2.csv                     k1, k2, c1, c2, c3 from two experiments together
@@ -47,19 +43,13 @@ then:
 """
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add `identify` to prw's subcommands."""
-    parser = subparsers.add_parser(
-        "identify",
-        help="estimate parameters from measurements",
-        description=DESCRIPTION,
-        epilog=EXAMPLES,
-        formatter_class=FORMATTER,
-    )
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help="CSV table of one experiment")
     add_task_options(parser)
     parser.add_argument(
         "--prior",
+        dest="priors",
         action=Named,
         read=spread,
         metavar="NAME=[VALUE:]PERCENT%",
@@ -86,6 +76,7 @@ def add_parser(subparsers: Any) -> None:
     ):
         parser.add_argument(
             f"--{kind}",
+            type=listed,
             default="",
             metavar="NAMES",
             help=f"channels that may {effect}, with commas; this is then estimated, too",
@@ -93,35 +84,18 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--write-anyway", action="store_true", help="write parameters even if the FMU does not explain the data"
     )
-    parser.add_argument("--no-offsets", action="store_true", help="the sensors have no offsets")
+    parser.add_argument("--no-offsets", dest="offsets", action="store_false", help="the sensors have no offsets")
     parser.add_argument(
         "--starts", type=int, default=6, metavar="N", help="starting points of the search (default: %(default)s)"
     )
     parser.add_argument("--seed", type=int, default=0, help="of the random starting points (default: %(default)s)")
-    add_paths(parser, "where report.html, report.json, identified.json and identified.ssv go", "identified")
-    parser.set_defaults(run=run, options={"parameters": "--set", "priors": "--prior", "skip": "--skip-lines"})
+    add_paths(parser, "directory of report.html, report.json, identified.json and identified.ssv", "identified")
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw identify`. Raises UserError with a message of one line."""
     need("scipy", "jinja2", "matplotlib", "threadpoolctl")
-    found = identify(
-        arguments.files,
-        estimate=listed(arguments.estimate),
-        priors=arguments.prior,
-        parameters=arguments.set,
-        bounds=arguments.bounds,
-        noise=arguments.noise,
-        **reading_options(arguments),
-        quantum=_quantum(arguments.quantum),
-        offsets=not arguments.no_offsets,
-        starts=arguments.starts,
-        seed=arguments.seed,
-        delay=listed(arguments.delay),
-        lag=listed(arguments.lag),
-        gain=listed(arguments.gain),
-        fmu=arguments.fmu,
-    )
+    found = call(identify, arguments, quantum=_quantum(arguments.quantum))
     report, numbers_, parameters, ssv = (
         arguments.out / name for name in ("report.html", "report.json", "identified.json", "identified.ssv")
     )
@@ -144,7 +118,7 @@ def run(arguments: argparse.Namespace) -> None:
         )
     if found.undetermined:
         raise UserError(
-            f"{'; '.join(found.undetermined)}. What would settle it: {'; or '.join(found.advice)}. {report} has the rest; "
+            f"{'; '.join(found.undetermined)}. Remedies: {'; or '.join(found.advice)}. {report} has the rest; "
             "identified.json was not written"
         )
     found.to_parameters(parameters)

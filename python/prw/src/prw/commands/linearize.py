@@ -1,4 +1,5 @@
-"""`prw linearize`: A, B, C, D of an FMU."""
+"""Writes A, B, C, D of the testbed's FMU, or of any other with directional derivatives (FMI 2.0 or 3.0), with the names
+and units of states, inputs and outputs, and prints the poles."""
 
 from __future__ import annotations
 
@@ -7,35 +8,30 @@ import json
 from pathlib import Path
 from typing import Any
 
-from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT, add_parameter_options, parameters_of
+from prw.commands.options import DEFAULT_OUT, FMU, add_parameter_options, parameters_of
 from prw.files import write_text
 from prw.linearization import linearize
 from prw.state_space import StateSpace
 
+HELP = "the linear model of an FMU"
 
-def add_parser(subparsers: Any) -> None:
-    """Add `linearize` to prw's subcommands."""
-    parser = subparsers.add_parser(
-        "linearize",
-        help="the linear model of an FMU",
-        description="Writes A, B, C, D of the testbed's FMU, or of any other with directional derivatives (FMI 2.0 or 3.0), "
-        "with the names and units of states, inputs and outputs, and prints the poles.",
-    )
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     add_parameter_options(parser, "the FMU's unit")
-    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the FMU (default: %(default)s)")
+    parser.add_argument("--fmu", type=Path, help=FMU)
     parser.add_argument(
         "--out",
         type=Path,
         default=DEFAULT_OUT / "linear.json",
         metavar="FILE",
-        help="where to write (default: %(default)s)",
+        help="file to write (default: %(default)s)",
     )
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw linearize`. Raises UserError with a message of one line."""
-    model = linearize(parameters_of(arguments, arguments.fmu), fmu=arguments.fmu)
+    model = linearize(parameters_of(arguments), fmu=arguments.fmu)
     write_text(arguments.out, json.dumps(content(model), indent=2) + "\n")
     for kind in ("states", "inputs", "outputs"):
         print(f"{kind:<11} {', '.join(getattr(model, kind)) or 'none'}")

@@ -3,34 +3,43 @@
 from __future__ import annotations
 
 import argparse
+import inspect
 import math
 import re
+import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from prw.arguments import values_of
 from prw.errors import UserError
 from prw.identification import DEFAULT_ESTIMATE
-from prw.testbed import default_fmu, existing_fmu, loaded
+from prw.testbed import existing_fmu, loaded
 
-#: None if there is none: a command that needs an FMU then reports where it was searched for.
-DEFAULT_FMU: Path | None
-try:
-    DEFAULT_FMU = default_fmu()
-except UserError:
-    DEFAULT_FMU = None
 DEFAULT_OUT = Path("out")
+#: Help of --fmu.
+FMU = "the testbed FMU (default: the FMU that PRW_FMU names, else the FMU in this package or in its clone)"
+T = TypeVar("T")
 
 
-def add_paths(parser: argparse.ArgumentParser, out: str = "where to write", directory: str = "") -> None:
+def call(function: Callable[..., T], arguments: argparse.Namespace, **others: Any) -> T:
+    """Call the function with the options that have the names of its parameters, and with `others`.
+
+    Ignores the function's warnings about its results: commands print them as notes."""
+    names = inspect.signature(function).parameters
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module=__name__)
+        return function(**{name: value for name, value in vars(arguments).items() if name in names} | others)
+
+
+def add_paths(parser: argparse.ArgumentParser, out: str = "directory to write into", directory: str = "") -> None:
     """The options --fmu and --out. out: the help; directory: the default within DEFAULT_OUT."""
-    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
+    parser.add_argument("--fmu", type=Path, help=FMU)
     default = DEFAULT_OUT / directory
     parser.add_argument("--out", type=Path, default=default, metavar="DIR", help=f"{out} (default: %(default)s)")
 
 
-class FORMATTER(argparse.RawDescriptionHelpFormatter):
+class Formatter(argparse.RawDescriptionHelpFormatter):
     """Keeps the line breaks of descriptions and examples, at a width of 110 characters."""
 
     def __init__(self, prog: str):
@@ -41,23 +50,25 @@ def add_task_options(parser: argparse.ArgumentParser) -> None:
     """Options on parameters and noise that identification and experiment design share."""
     parser.add_argument(
         "--estimate",
+        type=listed,
         default=",".join(DEFAULT_ESTIMATE),
         metavar="NAMES",
         help="parameters to estimate, with commas; all others stay fixed (default: %(default)s)",
     )
     parser.add_argument(
         "--set",
+        dest="parameters",
         action=Named,
-        read=positive,
+        read=number,
         metavar="NAME=VALUE",
         help="start value, or value of a fixed parameter, in SI (default: the FMU's). May be repeated",
     )
     parser.add_argument(
         "--noise",
         action=Named,
-        read=positive,
+        read=number,
         metavar="NAME=VALUE",
-        help="standard deviation of a channel's noise in SI, where it is known. May be repeated",
+        help="standard deviation of a channel's noise in SI, if it is known. May be repeated",
     )
 
 
@@ -77,28 +88,22 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
         help="name of a column in the file, as in 'theta1=Motor 1'. May be repeated",
     )
     parser.add_argument(
-        "--skip-lines", type=int, default=0, metavar="N", help="lines above the header, as dSPACE writes them"
+        "--skip-lines",
+        dest="skip",
+        type=int,
+        default=0,
+        metavar="N",
+        help="lines above the header, as dSPACE writes them",
     )
     parser.add_argument(
-        "--encoding", default="", help="of the file (default: UTF-8, or UTF-16 where the file begins with its mark)"
+        "--encoding", default="", help="of the file (default: UTF-8, or UTF-16 if the file begins with its mark)"
     )
-
-
-def reading_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Arguments of `prw.read` from these options."""
-    return {
-        "units": arguments.units,
-        "degrees": arguments.degrees,
-        "names": arguments.names,
-        "skip": arguments.skip_lines,
-        "encoding": arguments.encoding,
-    }
 
 
 class Named(argparse.Action):
-    """Collects NAME=VALUE, with commas or by repetition, as a dict of `read(name, string)` by name."""
+    """Collects NAME=VALUE, with commas or by repetition, as a dict of `read(string)` by name."""
 
-    def __init__(self, read: Callable[[str, str], Any] = lambda _, text: text, **options: Any):
+    def __init__(self, read: Callable[[str], Any] = str, **options: Any):
         super().__init__(default={}, **options)
         self.read = read
 
@@ -114,7 +119,7 @@ class Named(argparse.Action):
             if name in found:
                 raise UserError(f"{name} is given twice", argument=option)
             try:
-                found[name] = self.read(name, text)
+                found[name] = self.read(text)
             except ValueError as error:
                 raise UserError(str(error), argument=option, given=part) from None
         setattr(namespace, self.dest, found)
@@ -151,25 +156,21 @@ def add_parameter_options(parser: argparse.ArgumentParser, unit: str) -> None:
         metavar="FILE",
         help="parameters in JSON, as `prw identify` writes; --set has precedence",
     )
+    parser.set_defaults(options={"parameters": "--parameters"})
 
 
-def parameters_of(arguments: argparse.Namespace, fmu: Path | None) -> dict[str, Any]:
+def parameters_of(arguments: argparse.Namespace) -> dict[str, Any]:
     """The values by name that these options give."""
     found: dict[str, Any] = {}
     if arguments.parameters is not None:
-        with loaded(existing_fmu(fmu)) as inside:
+        with loaded(existing_fmu(arguments.fmu)) as inside:
             found = values_of(arguments.parameters, inside)
     if arguments.set:
         arguments.options = {"parameters": "--set"}
     return {**found, **arguments.set}
 
 
-def positive(_: str, text: str) -> float:
-    """A positive number. Raises ValueError."""
-    return number(text)
-
-
-def value(_: str, text: str) -> float | bool:
+def value(text: str) -> float | bool:
     """A number, or `true` or `false`. Raises ValueError."""
     try:
         return text == "true" if text in ("true", "false") else float(text)
@@ -177,20 +178,18 @@ def value(_: str, text: str) -> float | bool:
         raise ValueError(f"{text!r} is not a number") from None
 
 
-def spread(name: str, text: str) -> float | tuple[float, float]:
+def spread(text: str) -> float | tuple[float, float]:
     """[VALUE:]PERCENT% as a fraction, or (value, fraction). Raises ValueError."""
     match = re.fullmatch(r"(?:([^:]+):)?\s*([^:%]+)%", text)
     if not match:
-        raise ValueError(f"write {name}=10%, or {name}=VALUE:10%")
+        raise ValueError("write NAME=10%, or NAME=VALUE:10%")
     fraction = number(match[2]) / 100
     return (number(match[1]), fraction) if match[1] else fraction
 
 
-def bounds(name: str, text: str) -> tuple[float, float]:
+def bounds(text: str) -> tuple[float, float]:
     """LOW:HIGH. Raises ValueError."""
     low, colon, high = text.partition(":")
     if not colon:
-        raise ValueError(f"write {name}=LOW:HIGH")
-    if number(low) >= number(high):
-        raise ValueError("the first must be below the second")
+        raise ValueError("write NAME=LOW:HIGH")
     return number(low), number(high)

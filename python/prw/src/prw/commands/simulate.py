@@ -1,4 +1,5 @@
-"""`prw simulate`: the paper's experiment, or the response to a recorded motor motion."""
+"""Simulates the paper's experiment (Fig. 4) or the response to recorded motor angles. Writes a CSV table (time, inputs,
+all outputs; s, rad, rad/s, N.m) and, with the extra prw[plot], a PNG figure."""
 
 from __future__ import annotations
 
@@ -14,27 +15,24 @@ from prw.commands.options import (
     add_parameter_options,
     add_paths,
     add_reading_options,
+    call,
     parameters_of,
-    reading_options,
 )
 from prw.errors import MissingPackage, UserError
 from prw.files import replacing
 from prw.motion import fig4
 from prw.recording import read_motion
-from prw.simulation import Run, simulated
+from prw.simulation import Run, simulate
+from prw.testbed import existing_fmu
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+HELP = "simulate the paper's experiment or a recording"
 
-def add_parser(subparsers: Any) -> None:
-    """Add `simulate` to prw's subcommands."""
-    parser = subparsers.add_parser(
-        "simulate",
-        help="simulate the paper's experiment or a recording",
-        description="Simulate the paper's experiment (Fig. 4) or the response to recorded motor angles. Writes a CSV table "
-        "(time, inputs, all outputs; s, rad, rad/s, N.m) and, with the extra prw[plot], a PNG figure.",
-    )
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument(
         "file",
         type=Path,
@@ -43,7 +41,7 @@ def add_parser(subparsers: Any) -> None:
         help="CSV recording with columns time (s), theta1, theta2 (rad) and, if known, omega1, omega2 (rad/s); other "
         "units in the header, as in `theta1 [deg]` (default: the paper's experiment)",
     )
-    parser.add_argument("--input", type=Path, metavar="FILE", help="the same")
+    parser.add_argument("--input", type=Path, metavar="FILE", help="the recording, as FILE")
     add_parameter_options(parser, "SI")
     add_reading_options(parser)
     add_paths(parser)
@@ -53,7 +51,6 @@ def add_parser(subparsers: Any) -> None:
         metavar="FILE",
         help="also write an animation: a .gif, an .mp4 (needs the extra prw[movie]) or an .html",
     )
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -65,7 +62,7 @@ def run(arguments: argparse.Namespace) -> None:
         suffix_of(arguments.animate)
     recorded = arguments.input is not None
     if recorded:
-        motion = read_motion(arguments.input, **reading_options(arguments))
+        motion = call(read_motion, arguments, path=arguments.input)
         title = f"Response to {arguments.input.name}"
     else:
         if arguments.degrees:
@@ -76,8 +73,8 @@ def run(arguments: argparse.Namespace) -> None:
         raise UserError(
             f"{table}: is the recording itself and would be overwritten; choose another directory with --out"
         )
-    given = parameters_of(arguments, arguments.fmu)
-    response = simulated(motion, given, fmu=arguments.fmu)
+    given = parameters_of(arguments)
+    response = call(simulate, arguments, motion=motion, parameters=given)
     response.to_csv(table)
     written, missing = [table], ""
     try:
@@ -123,7 +120,7 @@ def _summary(
         f"torque {_tidy(peak('tau1', 'tau2'))} N.m"
     )
     if arguments.input is None:
-        lines.append("            opposite motors turn the wrist about its roll axis only, as the paper says")
+        lines.append("            opposite motors turn the wrist about its roll axis only, as in the paper")
     else:
         lines.append(f"at the end  pitch {_degrees(response['pitch'][-1])}, roll {_degrees(response['roll'][-1])}")
     lines += [f"note        {note}" for note in response.notes]
@@ -134,7 +131,9 @@ def _summary(
     if arguments.input is None:
         lines.append(f"next        {look}; then your own motors: prw simulate motors.csv (see prw simulate --help)")
     else:
-        lines.append(f"next        {look}; {arguments.fmu} also loads in Simulink, OpenModelica and others")
+        lines.append(
+            f"next        {look}; {existing_fmu(arguments.fmu)} also loads in Simulink, OpenModelica and others"
+        )
     return lines
 
 

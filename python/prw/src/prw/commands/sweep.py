@@ -1,29 +1,25 @@
-"""`prw sweep`: parameter studies and Monte Carlo over thousands of runs of the FMU."""
-
-from __future__ import annotations
-
-import argparse
-import os
-from pathlib import Path
-from typing import Any
-
-import numpy as np
-
-from prw.commands.options import FORMATTER, Named, add_paths, spread
-from prw.errors import UserError, need
-from prw.motion import Array, fig4
-from prw.recording import read_motion
-from prw.sweeps import Swept, carry_out, layout
-from prw.testbed import Testbed
-
-DESCRIPTION = """\
-Runs the FMU many times with different parameters, on all cores of this machine or on a Dask cluster, and writes one row
+"""Runs the FMU many times with different parameters, on all cores of this machine or on a Dask cluster, and writes one row
 for each run into runs.parquet: its parameters and each output's peak, rms and value at the end (SI).
 
 --grid parameters make all combinations; --random ones are drawn for each of --runs runs (per combination). A run that
 fails is recorded with its message.
 """
 
+from __future__ import annotations
+
+import argparse
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+
+from prw.commands.options import Named, add_paths, call, spread
+from prw.motion import Array, fig4
+from prw.recording import read_motion
+from prw.sweeps import sweep
+
+HELP = "run the FMU with many sets of parameters"
 EXAMPLES = """\
 examples:
   prw sweep --grid k1=60:240:13 --grid c3=0.1:0.8:8           104 combinations, in the experiment of Fig. 4
@@ -35,7 +31,7 @@ then:
 """
 
 
-def _steps(name: str, text: str) -> Array:
+def _steps(text: str) -> Array:
     """N even steps from LOW to HIGH. Raises ValueError."""
     parts = text.split(":")
     try:
@@ -43,19 +39,12 @@ def _steps(name: str, text: str) -> Array:
         if len(parts) != 3 or count < 1 or not np.isfinite([low, high]).all():
             raise ValueError
     except (ValueError, IndexError):
-        raise ValueError(f"write {name}=LOW:HIGH:N with an integer N of at least 1") from None
+        raise ValueError("write NAME=LOW:HIGH:N with an integer N of at least 1") from None
     return np.linspace(low, high, count)
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add `sweep` to prw's subcommands."""
-    parser = subparsers.add_parser(
-        "sweep",
-        help="run the FMU with many sets of parameters",
-        description=DESCRIPTION,
-        epilog=EXAMPLES,
-        formatter_class=FORMATTER,
-    )
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
     parser.add_argument(
         "--grid", action=Named, read=_steps, metavar="NAME=LOW:HIGH:N", help="N even steps, in SI. May be repeated"
     )
@@ -69,41 +58,30 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--runs", type=int, default=1000, metavar="N", help="draws of --random (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of the draws (default: %(default)s)")
     parser.add_argument(
-        "--input", type=Path, metavar="FILE", help="motor recording, as for `prw simulate` (default: that of Fig. 4)"
+        "--input",
+        type=Path,
+        metavar="FILE",
+        help="motor recording, as for `prw simulate` (default: the motion of Fig. 4)",
     )
     parser.add_argument("--degrees", action="store_true", help="the recording is in degrees and degrees per second")
     parser.add_argument("--threads", type=int, metavar="N", help="on this machine (default: one per core)")
     parser.add_argument("--workers", type=int, dest="threads", help=argparse.SUPPRESS)  # its name in 0.2.0
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, like tcp://head:8786")
     add_paths(parser, directory="sweep")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw sweep`. Raises UserError with a message of one line."""
-    need("pyarrow", *(["distributed"] if arguments.scheduler else []))
     motion = fig4() if arguments.input is None else read_motion(arguments.input, degrees=arguments.degrees)
     threads = arguments.threads if arguments.threads is not None else os.cpu_count() or 1
-    grid, random = arguments.grid, arguments.random
-    for name in random:
-        if name in grid:
-            raise UserError(f"{name} is in --grid and in --random; choose one")
-    if not grid and not random:
-        raise UserError("nothing varies; add --grid NAME=LOW:HIGH:N or --random NAME=PERCENT% (see --help)")
-    with Testbed(arguments.fmu) as testbed:
-        values = layout(grid, random, arguments.runs, arguments.seed, testbed)
-        swept = carry_out(testbed, motion, values, {}, threads, arguments.scheduler, arguments.out)
-    print("\n".join(_summary(arguments, swept, threads)))
-
-
-def _summary(arguments: argparse.Namespace, swept: Swept, threads: int) -> list[str]:
-    """The number of runs, failures and files, one line each."""
+    begin = time.monotonic()
+    table = call(sweep, arguments, motion=motion)
+    seconds = time.monotonic() - begin
     where = arguments.scheduler or f"{threads} thread{'s' if threads > 1 else ''}"
-    total = swept.table.num_rows
-    pace = f"{swept.seconds:.1f} s ({total / swept.seconds:.0f} per second)"
-    lines = [f"ran         {total} runs on {where} in {pace}"]
-    status = swept.table.column("status").to_pylist()
+    pace = f"{seconds:.1f} s ({table.num_rows / seconds:.0f} per second)"
+    print(f"ran         {table.num_rows} runs on {where} in {pace}")
+    status = table.column("status").to_pylist()
     if failed := status.count("failed"):
         first = status.index("failed")
-        lines.append(f"failed      {failed} runs; run {first}: {swept.table.column('message')[first]}")
-    return [*lines, f"wrote       {arguments.out / 'runs.parquet'}"]
+        print(f"failed      {failed} runs; run {first}: {table.column('message')[first]}")
+    print(f"wrote       {arguments.out / 'runs.parquet'}")

@@ -9,11 +9,10 @@ experiments), results and report. `identify` below combines them.
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
-from prw.arguments import Table, counted, is_path, is_table, names_of, positive, spread_of
+from prw.arguments import Table, check_names, counted, is_path, is_table, names_of, positive, spread_of
 from prw.errors import UserError, need
 
 if TYPE_CHECKING:
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
     from prw.identification.experiment import Rates
     from prw.identification.fit import Task
     from prw.identification.model import Parameters
+    from prw.identification.response import Distortion
     from prw.identification.results import Identification
     from prw.recording import Recording
     from prw.simulation import Run
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 #: The parameters that are estimated by default.
 DEFAULT_ESTIMATE = ("k1", "k2", "c1", "c2", "c3")
-#: The distortions of a channel, in the order of `identify`'s arguments.
-KINDS = ("delay", "lag", "gain")
 #: Default bounds: this factor about the start value.
 REACH = 100.0
 
@@ -106,9 +104,12 @@ def identify(
     from threadpoolctl import threadpool_limits
 
     from prw.arguments import values_of
+    from prw.identification.design import advice
+    from prw.identification.diagnosis import diagnose
     from prw.identification.experiment import may_be_simulated, prepare
-    from prw.identification.fit import Distortion, fit
+    from prw.identification.fit import fit
     from prw.identification.model import Model
+    from prw.identification.response import DISTORTIONS, Distortion
     from prw.identification.results import Identification
     from prw.identification.statistics import certainty
     from prw.identification.verdict import judge
@@ -124,11 +125,10 @@ def identify(
     delay, lag, gain = names_of("delay", delay), names_of("lag", lag), names_of("gain", gain)
     # Matrices are small and many: more threads are slower.
     with Model(fmu) as model, threadpool_limits(1):
-        distortions = tuple(Distortion(k, n) for k, names in zip(KINDS, (delay, lag, gain)) for n in names)
-        task = replace(
-            task_of(model.known, estimate, priors, values_of(parameters, model.loaded), bounds, noise, offsets),
-            distortions=distortions,
-        )
+        kinds = zip(DISTORTIONS, (delay, lag, gain))
+        distortions = tuple(dict.fromkeys(Distortion(kind, name) for kind, names in kinds for name in names))
+        given = values_of(parameters, model.loaded)
+        task = task_of(model.known, estimate, priors, given, bounds, noise, offsets, distortions)
         measured = [
             each.recording()
             if isinstance(each, Run)
@@ -138,8 +138,8 @@ def identify(
             for each in several
         ]
         channels = dict.fromkeys(name for m in measured for name in m.measured)
-        for what, named in (("noise", noise), ("delay", delay), ("lag", lag), ("gain", gain)):
-            _check(what, named, channels)
+        for argument, named in (("noise", noise), ("delay", delay), ("lag", lag), ("gain", gain)):
+            check_names(argument, named, channels)
         rates: list[Rates] = [
             "motors" if not isinstance(each, Run) else "angles" if each.motion.omega is None else "inputs"
             for each in several
@@ -156,16 +156,8 @@ def identify(
                 if (better := judge(other)).fits:
                     experiments, solution, verdict = again, other, better
         sure = certainty(solution, verdict.widening)
-        hints: list[str] = []
-        diagnosis: list[str] = []
-        if not verdict.fits:
-            from prw.identification.diagnosis import diagnose
-
-            diagnosis = diagnose(solution, verdict)
-        if sure.undetermined:
-            from prw.identification.design import advice
-
-            hints = advice(model, experiments, solution)
+        diagnosis = [] if verdict.fits else diagnose(solution, verdict)
+        hints = advice(model, experiments, solution) if sure.undetermined else []
         sources = tuple(str(each.source) for each in measured)
         judged = verdict, tuple(diagnosis), tuple(hints)
         return Identification(model.fmu, model.known, sources, tuple(experiments), solution, sure, *judged)
@@ -179,6 +171,7 @@ def task_of(
     bounds: Mapping[str, tuple[float, float]] = {},
     noise: Mapping[str, float] = {},
     offsets: bool = True,
+    distortions: tuple[Distortion, ...] = (),
 ) -> Task:
     """The task that these arguments of `identify` describe, for an FMU with the parameters `known`."""
     from prw.columns import MEASURED
@@ -186,17 +179,17 @@ def task_of(
 
     estimate = names_of("estimate", estimate)
     whole = f"; {', '.join(known.counts)} are counted, not estimated" if known.counts else ""
-    for what, names in (("estimate", estimate), ("priors", priors), ("parameters", parameters), ("bounds", bounds)):
-        _check(what, names, known.real, whole)
-    _check("noise", noise, MEASURED)
+    for argument, names in (("estimate", estimate), ("priors", priors), ("parameters", parameters), ("bounds", bounds)):
+        check_names(argument, names, known.real, whole)
+    check_names("noise", noise, MEASURED)
     start = {**known.starts, **parameters}
     if not estimate and not priors:
         raise UserError(f"nothing is named; there are {', '.join(known.real)}", argument="estimate")
     beliefs = {name: Prior(*spread_of("priors", name, p, start[name])) for name, p in priors.items()}
     chosen = tuple(name for name in known.real if name in estimate or name in beliefs)
-    for what, values in (("parameters", parameters), ("noise", noise)):
+    for argument, values in (("parameters", parameters), ("noise", noise)):
         for name, value in values.items():
-            positive(what, value, name)
+            positive(argument, value, name)
     for name in chosen:
         if start[name] <= 0:
             raise UserError(f"{name} starts at {start[name]:g} and cannot be estimated from there; fix another value")
@@ -208,11 +201,4 @@ def task_of(
             raise UserError(
                 f"{name} from {span[0]:g} to {span[1]:g}; the first must be below the second", argument="bounds"
             )
-    return Task(chosen, start, spans, beliefs, dict(noise), offsets)
-
-
-def _check(what: str, names: Iterable[str], known: Collection[str], others: str = "") -> None:
-    """Raise UserError for an unknown name."""
-    for name in names:
-        if name not in known:
-            raise UserError(f"{name} is not known; there are {', '.join(known)}{others}", argument=what)
+    return Task(chosen, start, spans, beliefs, dict(noise), offsets, distortions)

@@ -8,7 +8,8 @@ phases (IEEE Trans. Inf. Theory 16 (1970) 85), which keep their peaks low. All m
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,13 +35,12 @@ DEFAULT_NOISE = {name: channel.noise for name, channel in MEASURED.items()}
 ROUNDS = 300
 
 
-@dataclass(frozen=True)
-class Limits:
+class Limits(NamedTuple):
     """Limits of the motors: angle from the middle in rad, rate in rad/s, acceleration in rad/s2."""
 
-    angle: float = 0.7
-    rate: float = 8.0
-    acceleration: float = 400.0
+    angle: float
+    rate: float
+    acceleration: float
 
 
 def motions(
@@ -99,7 +99,7 @@ def _natural(frequency: Array, limits: Limits) -> Array:
     return np.minimum(np.minimum(limits.angle, limits.rate / w), limits.acceleration / w**2)
 
 
-def _multisine(time: Array, frequency: Array, size: Array, shift: int = 0) -> Array:
+def _multisine(time: Array, frequency: Array, size: Array, shift: int) -> Array:
     """Angle, rate and acceleration, (3, n), of a sum of sines. shift: another one gives other phases."""
     k = np.arange(len(frequency))
     power = size**2 / max(np.sum(size**2), np.finfo(float).tiny)
@@ -149,7 +149,7 @@ def _within(name: str, time: Array, motors: Sequence[Array], limits: Limits) -> 
     """The motors' waves (3, n), faded and scaled up to the limits."""
     motors = [_faded(time, wave) for wave in motors]
     peaks = np.max([np.abs(wave).max(axis=1) for wave in motors], axis=0)
-    scale = min(limit / peak for limit, peak in zip((limits.angle, limits.rate, limits.acceleration), peaks))
+    scale = min(limit / peak for limit, peak in zip(limits, peaks))
     theta, omega = (np.column_stack([scale * wave[i] for wave in motors]) for i in (0, 1))
     return Motion(time, theta, omega, name)
 
@@ -168,12 +168,12 @@ def _optimal(
     rows = [OUTPUTS.index(name) for name in noise]
     weighted = slopes[:, :, rows] / np.array(list(noise.values()))[:, None]
     directions = np.array([[1.0, 1.0], [1.0, -1.0]])
-    seen = np.einsum("pfcm,dm->dfcp", weighted, directions).reshape(2 * len(frequency), len(rows), -1)
-    each = np.einsum("kcp,kcq->kpq", seen.conj(), seen).real
+    visible = np.einsum("pfcm,dm->dfcp", weighted, directions).reshape(2 * len(frequency), len(rows), -1)
+    each = np.einsum("kcp,kcq->kpq", visible.conj(), visible).real
     w = 2 * np.pi * frequency
     cost = 1 / limits.angle**2 + (w / limits.rate) ** 2 + (w**2 / limits.acceleration) ** 2
     each /= np.tile(cost, 2)[:, None, None]
-    # An undetermined direction must not stop the search.
+    # Without this floor, an undetermined direction would make the matrix singular.
     floor = 1e-9 * np.trace(each.sum(axis=0)) * np.eye(len(logarithms))
     power = np.full(len(each), 1 / len(each))
     for _ in range(ROUNDS):
@@ -187,18 +187,14 @@ def _optimal(
 
 
 def typical_error(information: Array) -> float:
-    """Root mean square of the parameters' standard errors, as fractions; infinite where a combination stays open."""
+    """Root mean square of the parameters' standard errors, as fractions; infinite if a combination is undetermined."""
     if condition(information) > SINGULAR:
         return np.inf
     return float(np.sqrt(np.mean(np.diag(covariance_of(information)))))
 
 
 #: Sensors that come in pairs.
-SENSORS = {
-    "tau1 and tau2": ("tau1", "tau2"),
-    "theta3 and theta4": ("theta3", "theta4"),
-    "pitch and roll": ("pitch", "roll"),
-}
+SENSORS = (("tau1", "tau2"), ("theta3", "theta4"), ("pitch", "roll"))
 #: Estimates are limited to this factor about their start values.
 REACH = 10.0
 DURATION, RATE = 10.0, 1000.0
@@ -206,7 +202,7 @@ DURATION, RATE = 10.0, 1000.0
 DESCRIBED = {
     "equal": "equal motors",
     "opposite": "opposite motors",
-    "single": "one motor alone",
+    "single": "only one motor",
     "independent": "motors that move independently",
 }
 
@@ -223,32 +219,26 @@ def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) 
     have = prior + information(model, experiments, task, point, noise)
     channels = tuple(dict.fromkeys(name for experiment in experiments for name in experiment.channels))
     limits = _limits(experiments)
-    trials = []
-    candidates = motions(model, task, limits, DURATION, RATE, {name: noise[name] for name in channels})
-    for motion in candidates:
+    trials = {}
+    for motion in motions(model, task, limits, DURATION, RATE, {name: noise[name] for name in channels}):
         more = information(model, [planned(motion, channels)], task, point, noise)
-        trials.append((_worst(have + more), motion.name))
-    sentences: list[str] = []
-    for error, name in sorted(trials)[:1]:
-        if error < UNDETERMINED:
-            pattern = name.rsplit("_", 1)[1]
-            described = DESCRIBED.get(pattern, "a spectrum made for it")
-            sentences.append(
-                f"an experiment with {described} (worst standard error then {error:.1%}; "
-                f"`excite` proposes it for {','.join(channels)} as {name})"
-            )
-    trials = []
-    for name, pair in SENSORS.items():
-        if set(pair) <= set(channels):
-            continue
-        wider = [_measured_wholly(e, (*e.channels, *(c for c in pair if c not in e.channels))) for e in experiments]
-        trials.append((_worst(prior + information(model, wider, task, point, noise)), name))
-    for error, name in sorted(trials)[:1]:
-        if error < UNDETERMINED:
-            sentences.append(f"measuring {name} as well in the same motion (worst standard error then {error:.1%})")
-    if not sentences:
-        sentences.append("no single motion or pair of sensors; fix one of them or give it a prior")
-    return sentences
+        described = DESCRIBED.get(motion.name.rsplit("_", 1)[1], "a spectrum made for it")
+        reason = f"; `excite` proposes it for {','.join(channels)} as {motion.name}"
+        trials[f"an experiment with {described}", reason] = _worst(have + more)
+    sentences = _best(trials)
+    trials = {}
+    for pair in SENSORS:
+        if not set(pair) <= set(channels):
+            wider = [_measured_wholly(e, (*e.channels, *(c for c in pair if c not in e.channels))) for e in experiments]
+            worst = _worst(prior + information(model, wider, task, point, noise))
+            trials[f"measuring {' and '.join(pair)} as well in the same motion", ""] = worst
+    return [*sentences, *_best(trials)] or ["no single motion or pair of sensors; fix one of them or give it a prior"]
+
+
+def _best(trials: Mapping[tuple[str, str], float]) -> list[str]:
+    """The description of the trial with the least error, if that is small enough. trials: errors by description."""
+    (begin, end), error = min(trials.items(), key=lambda trial: trial[1], default=(("", ""), np.inf))
+    return [f"{begin} (worst standard error then {error:.1%}{end})"] if error < UNDETERMINED else []
 
 
 def _measured_wholly(experiment: Experiment, channels: tuple[str, ...]) -> Experiment:
@@ -265,5 +255,4 @@ def _limits(experiments: Sequence[Experiment]) -> Limits:
     """Limits of the motors: the largest values in the experiments, and at least small ones."""
     angle = max(np.abs(e.theta - e.theta.mean(axis=0)).max() for e in experiments)
     rate = max(np.abs(e.omega).max() for e in experiments)
-    least = Limits(0.1, 1.0, 50.0)
-    return Limits(max(angle, least.angle), max(rate, least.rate), max(40 * rate, least.acceleration))
+    return Limits(max(angle, 0.1), max(rate, 1.0), max(40 * rate, 50.0))

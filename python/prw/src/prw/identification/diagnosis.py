@@ -3,7 +3,7 @@ a delay, a lag or another gain."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from prw.columns import QUANTITIES
 from prw.identification.experiment import Experiment
-from prw.identification.fit import Distortion, Fitter, Solution, settled
+from prw.identification.fit import Fitter, Solution, refitted
+from prw.identification.response import DISTORTIONS, Distortion
 from prw.identification.statistics import covariance_of, information_of
 from prw.identification.verdict import CLEAR, PAIRS, Verdict, groups, judge, named, single_faults
 from prw.motion import Array
@@ -22,16 +23,16 @@ from prw.progress import Progress
 #: Gains that a wrong unit causes, within the factor TOLERANCE, and the description of the unit.
 SLIPS = {57.3: "in degrees, not radians", 1 / 57.3: "in radians, not degrees", 1000.0: "in thousandths of its unit"}
 TOLERANCE = 1.7
-#: Correlation from which two signals count as alike, and below which they do not.
+#: Correlation above which two signals are alike, and below which they are unlike.
 ALIKE, UNLIKE = 0.9, 0.7
-#: Equal values in sequence at an end of a channel's range, and such sequences, that are no chance; time after which a
-#: constant channel is stuck, s.
+#: A channel saturates if at least FLATS sequences of FLAT equal values are at an end of its range. A channel that is constant
+#: for longer than STUCK, s, is stuck.
 FLAT, FLATS, STUCK = 4, 3, 0.25
 #: Share of its greatest rate below which a motor is at rest.
 AT_REST = 1e-3
-#: Number of candidate sets of channels that are fitted, and rounds of estimating the noise.
-TRIED, ROUNDS = 2, 2
-#: Share of the best fault's gain from which another fault is named; the same for a fault in addition to the best.
+#: Number of candidate sets of channels that are fitted.
+TRIED = 2
+#: Share of the best fault's gain from which another fault is named, instead of the best or in addition to it.
 SHARE, SECOND = 0.6, 0.05
 
 
@@ -80,7 +81,7 @@ def _with_fault(solution: Solution, name: str) -> Solution:
     for _ in range(2):
         pairs = zip(found.fitter.experiments, found.comparisons)
         faults = [[column for n, _, column in single_faults(found, *pair) if n == name] for pair in pairs]
-        found = settled(found, (), faults, ROUNDS)
+        found = refitted(found, (), faults)
     return found
 
 
@@ -91,7 +92,7 @@ def _looks(solution: Solution, i: int, experiment: Experiment) -> Iterator[str]:
     first = before.task.first()
     gains, likes = [], []
     for outputs in (before.compare(first)[0].response.outputs, solution.comparisons[i].response.outputs):
-        y, m = experiment.seen(outputs)[2:], experiment.measured[2:]
+        y, m = experiment.observed(outputs)[2:], experiment.measured[2:]
         size = np.maximum(np.linalg.norm(y, axis=0), 1e-300)
         product = (y.conj().T @ m).real
         gains.append(np.diag(product) / size**2)
@@ -107,15 +108,15 @@ def _looks(solution: Solution, i: int, experiment: Experiment) -> Iterator[str]:
             k = experiment.channels.index(pair[1])
             for like in likes:
                 if min(like[j, k], like[k, j]) > ALIKE and max(like[j, j], like[k, k]) < UNLIKE:
-                    yield f"{name} and {pair[1]} are swapped: each follows what the FMU has for the other"
+                    yield f"{name} and {pair[1]} are swapped: each follows the FMU's value of the other"
                     return
         for gain, like in zip(gains, likes):
             if like[j, j] < -ALIKE or (like[j, j] < -UNLIKE and abs(np.log(-gain[j])) < np.log(TOLERANCE)):
-                yield f"{name} has the wrong sign: it moves against what the FMU has, {gain[j]:.2g} times as far"
+                yield f"{name} has the wrong sign: it moves against the FMU's value, {gain[j]:.2g} times as far"
                 break
             slip = _slip(gain[j])
             if slip and like[j, j] > UNLIKE:
-                yield f"{name} looks as if it were {SLIPS[slip]}: it is {gain[j]:.3g} times what the FMU has"
+                yield f"{name} looks as if it were {SLIPS[slip]}: it is {gain[j]:.3g} times the FMU's value"
                 break
         speed = np.interp(experiment.sampled, experiment.time, np.abs(experiment.omega).max(axis=1))
         yield from _flat(name, experiment.sampled, column, speed > AT_REST * speed.max())
@@ -139,7 +140,7 @@ def _flat(name: str, time: Array, column: Array, moving: NDArray[np.bool_]) -> I
     for level, side in ((column.max(), "above"), (column.min(), "below")):
         flats = (column[first] == level) & (long >= FLAT)
         if flats.sum() >= FLATS:
-            yield f"{name} is cut off at {level:.4g} (SI), {flats.sum()} times: it saturates, and what lies {side} is lost"
+            yield f"{name} is cut off at {level:.4g} (SI), {flats.sum()} times: it saturates, and values {side} are lost"
             return
     longest = int(np.argmax(long))
     if moving[first[longest] : last[longest] + 1].mean() > 0.5 and time[last[longest]] - time[first[longest]] > STUCK:
@@ -148,57 +149,50 @@ def _flat(name: str, time: Array, column: Array, moving: NDArray[np.bool_]) -> I
 
 def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
     """Distortions of single channels, pairs and all."""
-    channels = solution.fitter.channels
-    clear = {fault.name: fault for fault in verdict.faults}
-    trials = []
-    for kind in ("delay", "lag", "gain"):
-        for group in groups(channels):
-            new = tuple(Distortion(kind, name) for name in group)
-            if set(new) & set(solution.task.distortions) or (kind == "gain" and len(group) > 2):
-                continue
-            like = "gain" if kind == "gain" else "delay"
-            parts = sum(fault.gain for name in group if (fault := clear.get(named(like, (name,)))))
-            whole = clear.get(named(like, group))
-            # A set that explains no more than its parts ranks below them.
-            expected_gain = max(parts, whole.gain if whole else 0.0) - 10 * len(group)
-            trials.append((expected_gain, kind, group, new))
-    trials.sort(key=lambda trial: -trial[0])
-    tried = [t for kind in ("delay", "lag", "gain") for t in [t for t in trials if t[1] == kind][:TRIED]]
-    best = -np.inf
-    results = []
-    with Progress("looking for what is wrong", len(tried)) as progress:
-        for done, (_, kind, group, new) in enumerate(tried):
+    clear = {fault.name: fault.gain for fault in verdict.faults}
+
+    def expected_gain(kind: str, group: Sequence[str]) -> float:
+        """A set that explains no more than its parts ranks below them."""
+        like = "gain" if kind == "gain" else "delay"
+        parts = sum(clear.get(named(like, (name,)), 0.0) for name in group)
+        return max(parts, clear.get(named(like, group), 0.0)) - 10 * len(group)
+
+    tried = []
+    for kind in DISTORTIONS:
+        trials = sorted(groups(solution, kind), key=lambda group: -expected_gain(kind, group))
+        tried += [(kind, group) for group in trials[:TRIED]]
+    # Only the best set of a kind is reported.
+    best: dict[str, tuple[float, tuple[Distortion, ...], Solution]] = {}
+    with Progress("looking for causes", len(tried)) as progress:
+        for done, (kind, group) in enumerate(tried):
             progress(done)
-            found = settled(solution, new, rounds=ROUNDS)
+            new = tuple(Distortion(kind, name) for name in group)
+            found = refitted(solution, new)
             gain = solution.unlikeliness - found.unlikeliness - 12 * len(group)
-            results.append((gain, kind, group, found))
-            best = max(best, gain)
-    results.sort(key=lambda result: -result[0])
-    reported: set[str] = set()
-    for gain, kind, group, found in results:
-        # Only the best set of a kind is reported.
-        if gain < SHARE * best or gain < CLEAR**2 or kind in reported:
-            continue
-        reported.add(kind)
-        errors = np.sqrt(np.diag(covariance_of(information_of(found.jacobians) + found.task.prior_information())))
-        sizes: dict[str, list[str]] = {}
-        for k, distortion in enumerate(found.task.distortions[-len(group) :]):
-            at = len(errors) - len(group) + k
-            value, error = distortion.value(found.logarithms[at]), float(errors[at])
-            sizes.setdefault(_size(distortion, value, error), []).append(distortion.channel)
-        options = ",".join(group)
-        good = judge(found).fits
-        then = "with that, the data fit" if good else "that explains a part of it"
-        description = "; ".join(f"{', '.join(names)} {size}" for size, names in sizes.items())
-        text = f"{description}: {then} ({kind} {options} estimates it along)"
-        yield _Cause(
-            gain, kind, text, good, partial(settled, solution, found.task.distortions[-len(group) :], rounds=ROUNDS)
-        )
+            if kind not in best or gain > best[kind][0]:
+                best[kind] = gain, new, found
+    greatest = max((gain for gain, *_ in best.values()), default=0.0)
+    for kind, (gain, new, found) in best.items():
+        if gain >= max(SHARE * greatest, CLEAR**2):
+            good = judge(found).fits
+            then = "with that, the data fit" if good else "that explains a part of it"
+            channels = ",".join(distortion.channel for distortion in new)
+            text = f"{_sizes(found, new)}: {then} ({kind} {channels} estimates it along)"
+            yield _Cause(gain, kind, text, good, partial(refitted, solution, new))
+
+
+def _sizes(found: Solution, new: tuple[Distortion, ...]) -> str:
+    """The estimates of the last distortions of a fit, `new`; equal ones together."""
+    errors = np.sqrt(np.diag(covariance_of(information_of(found.jacobians) + found.task.prior_information())))
+    sizes: dict[str, list[str]] = {}
+    for distortion, x, error in zip(new, found.logarithms[-len(new) :], errors[-len(new) :]):
+        sizes.setdefault(_size(distortion, distortion.value(x), float(error)), []).append(distortion.channel)
+    return "; ".join(f"{', '.join(names)} {size}" for size, names in sizes.items())
 
 
 def _size(distortion: Distortion, value: float, error: float) -> str:
     if distortion.kind == "gain":
-        return f"reads {value:.4g} +- {error * value:.1g} times what it should"
+        return f"reads {value:.4g} +- {error * value:.1g} times the true value"
     late = "late" if value > 0 else "early"
     if distortion.kind == "lag":
         return f"lags with a time constant of {value * 1e3:.3g} +- {error:.1g} ms"

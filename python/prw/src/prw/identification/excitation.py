@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from prw.arguments import names_of, positive
+from prw.arguments import check_names, names_of, positive
 from prw.columns import MEASURED
 from prw.errors import UserError, need
 from prw.identification import DEFAULT_ESTIMATE, task_of
@@ -96,20 +96,12 @@ def excite(
     from prw.identification.model import Model
     from prw.identification.statistics import covariance_of, undetermined
 
-    angle, speed, acceleration, duration, rate = (
-        positive(name, value)
-        for name, value in {
-            "angle": angle,
-            "speed": speed,
-            "acceleration": acceleration,
-            "duration": duration,
-            "rate": rate,
-        }.items()
+    limits = design.Limits(
+        *(positive(*each) for each in (("angle", angle), ("speed", speed), ("acceleration", acceleration)))
     )
+    duration, rate = positive("duration", duration), positive("rate", rate)
     channels = tuple(MEASURED) if measure is None else names_of("measure", measure)
-    for name in channels:
-        if name not in MEASURED:
-            raise UserError(f"{name} is not known; there are {', '.join(MEASURED)}", argument="measure")
+    check_names("measure", channels, MEASURED)
     if not channels:
         raise UserError(f"nothing is named; there are {', '.join(MEASURED)}", argument="measure")
     if not 4 * design.FADE <= duration <= MOST_SAMPLES / rate:
@@ -123,7 +115,6 @@ def excite(
         task = task_of(model.known, estimate, parameters=parameters, noise=noise)
         known = {**design.DEFAULT_NOISE, **noise}
         assumed = {name: known[name] for name in channels}
-        limits = design.Limits(angle, speed, acceleration)
         for motion in design.motions(model, task, limits, duration, rate, assumed):
             found = design.information(model, [planned(motion, channels)], task, task.first(), assumed)
             errors = dict(zip(task.names, np.sqrt(np.diag(covariance_of(found))).tolist()))

@@ -36,10 +36,10 @@ STILL = 1e-6
 #: Motion of the motors between the rows of a recording: smooth; or as in a simulation of the FMU in Co-Simulation with a
 #: step from row to row, with the motors' rates as inputs, or with rates that the FMU estimates from the angles.
 Rates = Literal["motors", "inputs", "angles"]
-#: Fractions of the motion: most noise and coarsest steps of motors that may come from a simulation; noise below which
-#: samples are used without smoothing.
+#: Fractions of the motion. Recordings whose motors have at most this noise and these steps may come from a simulation. Samples
+#: with less than the last noise are used without smoothing.
 EXACT, DIGITS, ROUNDED = 1e-3, 1e-4, 1e-6
-#: Draws of encoders' errors, and the distance in frequencies over which a line of them leaks.
+#: Number of draws of encoders' errors, and the number of neighbouring frequencies into which a line of them leaks.
 DRAWS, FURTHEST = 64, 100
 #: Largest deviation of even times, as a fraction of a step.
 EVEN = 1e-3
@@ -97,14 +97,14 @@ class Experiment:
 
     @cached_property
     def motors(self) -> Complex:
-        """Spectra of the motors' angles and rates (all_bins, 4), and of `jumps` (all_bins, 6) where there are any."""
+        """Spectra of the motors' angles and rates (all_bins, 4), and of `jumps` (all_bins, 6) if there are any."""
         return spectra(np.hstack([self.theta, self.omega, *([] if self.jumps is None else [self.jumps])]))
 
     @cached_property
     def finest(self) -> Array:
         """Lower bound (c,) of the channels' noise, SI: the error of the numbers and of the path between samples."""
         turn = 2 * np.pi * np.arange(1, self.bins) / len(self.time)
-        # Twelve times the error of the cubic between two samples; more where rows are uneven.
+        # Twelve times the error of the cubic between two samples; more if rows are uneven.
         between = turn**4 * (0.0 if self.jumps is not None else 1 / 60 if self.between is None else 1 / 10)
         found: Array = np.max((FINEST + between)[:, None] * np.abs(self.measured[1:]), axis=0, initial=LEAST)
         return found
@@ -136,7 +136,7 @@ class Experiment:
         """Power (bins, c) of the channels' errors by encoders' steps."""
         return _power(self.channel_errors)
 
-    def seen(self, modelled: Complex) -> Complex:
+    def observed(self, modelled: Complex) -> Complex:
         """Spectra (bins, c, ...) as in `measured`, from a model's spectra (needed_bins, c, ...)."""
         if self.samplers is None:
             return modelled

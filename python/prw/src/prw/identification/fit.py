@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
@@ -24,7 +24,7 @@ from scipy.optimize import OptimizeResult, least_squares
 from prw.errors import UserError
 from prw.identification.experiment import Experiment
 from prw.identification.model import Model
-from prw.identification.response import Discrete, Response, discrete
+from prw.identification.response import FURTHEST, Discrete, Distortion, Response, discrete
 from prw.motion import Array
 from prw.progress import Progress
 from prw.state_space import Complex, StateSpace
@@ -32,9 +32,10 @@ from prw.state_space import Complex, StateSpace
 #: Step of the logarithms for the central differences, with errors of 1e-8 in the sensitivities.
 DIFFERENCE = 1e-4
 #: Relative singular value below which a direction of the initial state is not estimated.
-UNSEEN = 1e-9
-#: Most rounds of fitting and estimating the noise, the change that ends them, and most rounds of the latter only.
-ROUNDS, SETTLED = 12, 0.003
+UNDETERMINED = 1e-9
+#: Most rounds of fitting and estimating the noise, in a comparison too; the change that ends them, and most rounds of the
+#: latter only.
+ROUNDS, FEW_ROUNDS, SETTLED = 12, 2, 0.003
 NOISE_ROUNDS = 30
 #: A search starts at least this far inside its bounds.
 INSIDE = 1e-6
@@ -44,35 +45,6 @@ FINE, COARSE = {"ftol": 1e-12, "xtol": 1e-9, "max_nfev": 100}, {"ftol": 1e-5, "x
 SAME = 0.01
 #: Another minimum is reported if it is no more than this worse, in terms of -2 log likelihood.
 RIVAL = 9.0
-
-
-#: The distortions of a channel, each with a unit in which 1 is a typical size; a gain is estimated as its logarithm.
-DISTORTIONS = {"delay": 1e-3, "lag": 1e-3, "gain": 1.0}
-#: Bounds of a distortion in these units.
-FURTHEST = 50.0
-
-
-class Distortion(NamedTuple):
-    """A distortion between a channel and its record: a delay (s), a first-order lag (time constant, s) or a gain."""
-
-    kind: str
-    channel: str
-
-    def __str__(self) -> str:
-        return f"{self.kind} of {self.channel}"
-
-    def value(self, x: float) -> float:
-        """The delay or lag in s, or the gain, from the unknown x."""
-        return float(np.exp(x)) if self.kind == "gain" else x * DISTORTIONS[self.kind]
-
-    def response(self, x: float, s: Complex) -> tuple[Complex, Complex]:
-        """Frequency response (f,) and the derivative of its logarithm with respect to x."""
-        if self.kind == "gain":
-            return np.full(len(s), np.exp(x) + 0j), np.ones(len(s), dtype=complex)
-        s = s * DISTORTIONS[self.kind]
-        if self.kind == "delay":
-            return np.exp(-s * x), -s
-        return 1 / (1 + s * x), -s / (1 + s * x)
 
 
 class Prior(NamedTuple):
@@ -93,8 +65,8 @@ class Task:
     bounds: Mapping[str, tuple[float, float]]
     priors: Mapping[str, Prior]
     noise: Mapping[str, float]
-    offsets: bool = True
-    distortions: tuple[Distortion, ...] = ()
+    offsets: bool
+    distortions: tuple[Distortion, ...]
 
     @property
     def unknowns(self) -> tuple[str, ...]:
@@ -130,48 +102,43 @@ class Comparison:
         self,
         experiment: Experiment,
         response: Response,
-        noise: Array,
-        offsets: bool,
-        edges: Sequence[int] = (),
-        faults: Sequence[Complex] = (),
+        task: Task,
+        noise: Mapping[str, float],
+        faults: Sequence[Complex],
     ):
-        """noise: (c,) standard deviations, SI. offsets: whether the channels have offsets. edges: channels with a delay
-        or lag, whose first samples depend on the time before the recording. faults: spectra (needed_bins, c) that the
-        channels may contain with an unknown factor."""
+        """noise: standard deviations by channel, SI. faults: spectra (needed_bins, c) that the channels may contain with an
+        unknown factor."""
         self.experiment, self.response = experiment, response
         bins, channels = experiment.bins, len(experiment.channels)
         share = experiment.shares
         self._scaled = self.response.transfer[:bins] * share[:, None]
-        self._noise = noise**2 * share
+        self._noise = np.array([noise[name] for name in experiment.channels]) ** 2 * share
         stepped = experiment.channel_power * share**2 + self._noise
         covariance = (self._scaled * experiment.motor_power[:, None, :]) @ self._scaled.conj().swapaxes(-1, -2)
         covariance[:, np.arange(channels), np.arange(channels)] += stepped
         self._whiten = np.linalg.inv(np.linalg.cholesky(covariance))
-        columns = [experiment.seen(self.response.transients)]
-        if offsets:
-            steady = np.zeros((experiment.needed_bins, channels, channels), dtype=complex)
-            steady[0] = np.sqrt(len(experiment.time)) * np.eye(channels)
-            columns.insert(0, experiment.seen(steady))
-        if edges:
-            early = np.zeros((experiment.needed_bins, channels, 3 * len(edges)), dtype=complex)
-            s = 1j * np.arange(experiment.needed_bins) / experiment.bins
-            for k, i in enumerate(edges):
-                early[:, i, 3 * k : 3 * k + 3] = s[:, None] ** np.arange(3)
-            columns.insert(1 if offsets else 0, experiment.seen(early))
-        if faults:
-            columns.insert(1 if offsets else 0, experiment.seen(np.stack(faults, axis=2)))
-        nuisance = np.concatenate(columns, axis=2)
+        steady = np.zeros((experiment.needed_bins, channels, channels if task.offsets else 0), dtype=complex)
+        steady[0] = np.sqrt(len(experiment.time)) * np.eye(*steady.shape[1:])
+        # The first samples of a channel with a delay or lag depend on the time before the recording.
+        late = {d.channel for d in task.distortions if d.kind != "gain"}
+        edges = [i for i, name in enumerate(experiment.channels) if name in late]
+        early = np.zeros((experiment.needed_bins, channels, 3 * len(edges)), dtype=complex)
+        s = 1j * np.arange(experiment.needed_bins) / experiment.bins
+        for k, i in enumerate(edges):
+            early[:, i, 3 * k : 3 * k + 3] = s[:, None] ** np.arange(3)
+        linear = [steady, *(fault[:, :, None] for fault in faults), early, self.response.transients]
+        nuisance = experiment.observed(np.concatenate(linear, axis=2))
         difference = np.zeros((bins, channels), dtype=complex)
         if experiment.values is not None:
-            difference = experiment.measured - experiment.seen(response.outputs)
+            difference = experiment.measured - experiment.observed(response.outputs)
         white = self._parts(self._whiten @ np.concatenate([nuisance, difference[:, :, None]], axis=2))
         flat = white.reshape(-1, white.shape[-1])
         left, sizes, right = np.linalg.svd(flat[:, :-1], full_matrices=False)
-        seen = sizes > UNSEEN * sizes[0]
-        self._basis = left[:, seen]
-        found = (right[seen].T / sizes[seen]) @ (self._basis.T @ flat[:, -1])
+        determined = sizes > UNDETERMINED * sizes[0]
+        self._basis = left[:, determined]
+        found = (right[determined].T / sizes[determined]) @ (self._basis.T @ flat[:, -1])
         self.residual = self.project(white[..., -1])
-        self.offsets, self.initial = found[:channels] if offsets else np.zeros(channels), found[-6:]
+        self.offsets, self.initial = found[:channels] if task.offsets else np.zeros(channels), found[-6:]
         self._rest = difference - nuisance @ found
 
     @property
@@ -205,15 +172,15 @@ class Comparison:
         diagonal = np.arange(lower.shape[-1])
         lower[..., diagonal, diagonal] /= 2
         followed = (lower @ (whiten @ self._rest[:, :, None]))[..., 0]
-        table = self.seen_along(outputs) - self.project(self._parts(np.moveaxis(followed, 0, -1)))
+        table = self.change_along(outputs) - self.project(self._parts(np.moveaxis(followed, 0, -1)))
         # E |d residual|^2, where d residual = -(whitened dG) n_u - lower r, with errors n_u of the encoders.
         rows = [t.reshape(len(t), -1) for t in (direct, lower, moved)]
         a, s, b = (np.hstack([t.real, t.imag]) for t in rows)
         return table, 2 * (a @ a.T + s @ s.T - b @ s.T - s @ b.T)
 
-    def seen_along(self, outputs: Complex) -> Array:
+    def change_along(self, outputs: Complex) -> Array:
         """Changes (2, bins, c, q) of the residual with changes of the outputs (q, f, c)."""
-        return self.project(self._parts(-self._whiten @ self.experiment.seen(np.moveaxis(outputs, 0, -1))))
+        return self.project(self._parts(-self._whiten @ self.experiment.observed(np.moveaxis(outputs, 0, -1))))
 
     def _parts(self, table: Complex) -> Array:
         """Real and imaginary parts (2, bins, ...), each of variance 1, of spectra (bins, ...) of variance 1."""
@@ -227,8 +194,8 @@ class Comparison:
         """Variance (p, p) of the score J'r, with the drawn encoders' errors: in a periodic motion they have
         its phase and repeat with it. jacobian: (2, bins, c, p)."""
         scores = np.einsum("rfcp,rfcd->dp", jacobian, self._drawn, optimize=True)
-        seen = self._whiten * np.sqrt(self._noise)
-        of_noise = np.einsum("fcj,rfcp->rfjp", seen.conj(), jacobian, optimize=True).reshape(-1, jacobian.shape[-1])
+        noise = self._whiten * np.sqrt(self._noise)
+        of_noise = np.einsum("fcj,rfcp->rfjp", noise.conj(), jacobian, optimize=True).reshape(-1, jacobian.shape[-1])
         variance: Array = scores.T @ scores / len(scores) + (of_noise.conj().T @ of_noise).real
         return variance
 
@@ -298,23 +265,20 @@ class Fitter:
         """noise: of all channels, by name, SI; default: a twentieth of their motion. faults: of each experiment, see Comparison."""
         self.model, self.experiments, self.task, self.faults = model, experiments, task, faults
         self.channels = tuple(dict.fromkeys(name for e in experiments for name in e.channels))
-        columns = {name: self._columns(name) for name in self.channels}
-        spread = {n: max([1e-12, *(float(np.nanstd(v)) for v, *_ in c)]) for n, c in columns.items()}
-        self._finest = {n: max([0.0, *(finest for *_, finest in c)]) for n, c in columns.items()}
-        self._stepped = {n: max([0.0, *(float(e.mean()) for _, e, _ in c)]) for n, c in columns.items()}
+        spread = dict.fromkeys(self.channels, 1e-12)
+        self._finest, self._stepped = dict.fromkeys(self.channels, 0.0), dict.fromkeys(self.channels, 0.0)
+        for e in experiments:
+            for i, name in enumerate(e.channels if e.values is not None else ()):
+                spread[name] = max(spread[name], float(np.nanstd(cast(Array, e.values)[:, i])))
+                self._finest[name] = max(self._finest[name], float(e.finest[i]))
+                self._stepped[name] = max(self._stepped[name], float(e.channel_power[:, i].mean()))
         self.noise = dict(noise) or {n: task.noise.get(n) or 0.05 * spread[n] for n in self.channels}
         self.evaluations = 0
         self._responses: tuple[bytes, list[Response]] = b"", []
         self._comparisons: tuple[tuple[object, ...], list[Comparison]] = (), []
 
     def _response(self, logarithms: Array, experiment: Experiment, bins: int) -> Response:
-        x = logarithms[len(self.task.names) :]
-        distortions = [
-            (experiment.channels.index(d.channel), lambda s, d=d, xi=float(xi): d.response(xi, s))
-            if d.channel in experiment.channels
-            else None
-            for d, xi in zip(self.task.distortions, x)
-        ]
+        distortions = dict(zip(self.task.distortions, logarithms[len(self.task.names) :].tolist()))
         models = self._discrete(self._models([logarithms]), experiment)
         return Response(Discrete(*(block[0] for block in models)), experiment, bins, distortions)
 
@@ -326,20 +290,8 @@ class Fitter:
             self._responses = at, [self._response(logarithms, e, e.needed_bins) for e in self.experiments]
         key = (at, *self.noise.items())
         if self._comparisons[0] != key:
-            self._comparisons = (
-                key,
-                [
-                    Comparison(
-                        e,
-                        response,
-                        np.array([self.noise[n] for n in e.channels]),
-                        self.task.offsets,
-                        self._edges(e),
-                        self.faults[i] if self.faults else (),
-                    )
-                    for i, (e, response) in enumerate(zip(self.experiments, self._responses[1]))
-                ],
-            )
+            parts = zip(self.experiments, self._responses[1], self.faults or [()] * len(self.experiments))
+            self._comparisons = key, [Comparison(e, r, self.task, self.noise, faults) for e, r, faults in parts]
         return self._comparisons[1]
 
     def jacobians(self, logarithms: Array) -> tuple[list[Array], Array]:
@@ -445,15 +397,6 @@ class Fitter:
             np.array([1 / prior.relative if prior else 0.0 for prior in priors]),
         )
 
-    def _edges(self, experiment: Experiment) -> list[int]:
-        late = {d.channel for d in self.task.distortions if d.kind != "gain"}
-        return [i for i, name in enumerate(experiment.channels) if name in late]
-
-    def _columns(self, name: str) -> list[tuple[Array, Array, float]]:
-        """Values (s,), errors' power (bins,) and least noise of the channel in every experiment that contains it."""
-        with_it = [(e, e.channels.index(name)) for e in self.experiments if name in e.channels and e.values is not None]
-        return [(e.values[:, i], e.channel_power[:, i], float(e.finest[i])) for e, i in with_it if e.values is not None]
-
 
 def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int = 6, seed: int = 0) -> Solution:
     """Estimate the parameters from `task.start` and `starts` - 1 other starting points; return the best solution.
@@ -500,14 +443,11 @@ def _solution(fitter: Fitter, point: Array, misfit: float, rivals: list[tuple[Ar
     )
 
 
-def settled(
-    solution: Solution,
-    distortions: tuple[Distortion, ...],
-    faults: Sequence[Sequence[Complex]] = (),
-    rounds: int = ROUNDS,
+def refitted(
+    solution: Solution, distortions: tuple[Distortion, ...], faults: Sequence[Sequence[Complex]] = ()
 ) -> Solution:
-    """Repeat the fit with further distortions as unknowns, or faults of each experiment. It starts from the solution and, if
-    it diverges, from the start values. rounds: of fitting and estimating the noise; few suffice for a comparison."""
+    """Repeat the fit with further distortions as unknowns, or faults of each experiment, accurately enough for a comparison.
+    It starts from the solution and, if it diverges, from the start values."""
     task = replace(solution.task, distortions=(*solution.task.distortions, *distortions))
     starts = [np.append(solution.logarithms, np.zeros(len(distortions))), task.first()]
     found = []
@@ -515,7 +455,7 @@ def settled(
         fitter = Fitter(
             solution.fitter.model, solution.fitter.experiments, task, solution.noise, faults or solution.fitter.faults
         )
-        point = fitter.settle(fitter.search(start_point, COARSE).x, rounds, FINE if rounds == ROUNDS else COARSE)
+        point = fitter.settle(fitter.search(start_point, COARSE).x, FEW_ROUNDS, COARSE)
         misfit = float(np.sum(fitter.residuals(point) ** 2))
         found.append(_solution(fitter, point, misfit, [], 1))
         if np.abs(point[: len(task.names)] - task.first()[: len(task.names)]).max() < 1:

@@ -10,15 +10,15 @@ from xml.etree import ElementTree
 
 import fmu_run
 
-from prw.linearization import CONTINUOUS, Linearizer
-from prw.testbed import OUTPUTS
+from prw.linearization import Linearizer
+from prw.testbed import CONTINUOUS, OUTPUTS
 
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 
 
 class Parameter(NamedTuple):
-    """A Real parameter of the model description. start: its start value in SI. shown, factor: its display unit, and the
+    """A parameter of the model description. start: its start value in SI. shown, factor: its display unit, and the
     factor from that unit to SI. meaning: its description."""
 
     start: float
@@ -29,14 +29,14 @@ class Parameter(NamedTuple):
 
 
 class Parameters:
-    """The parameters that the model description of the testbed declares. real: by name. counts: start values of the
-    Integer parameters. guid: of the FMU, a hash of its sources and start values."""
+    """The parameters that the model description of the testbed declares. real, counts: the Real and the Integer
+    parameters by name. guid: of the FMU, a hash of its sources and start values."""
 
     def __init__(self, fmu: fmu_run.Fmu):
         self.guid: str = fmu.token
         self.real: dict[str, Parameter] = {}
-        self.counts: dict[str, int] = {}
-        self._units, self._meanings = fmu.units, {}
+        self.counts: dict[str, Parameter] = {}
+        self._units = fmu.units
         for v in fmu.variables.values():
             unit, start = v.unit or "", v.start or "0"
             # Initial states of a run are no properties of the testbed.
@@ -45,7 +45,7 @@ class Parameters:
                 factor = float(fmu.converted(v.name, 1.0, shown)) if v.display_unit else 1.0
                 self.real[v.name] = Parameter(float(start), unit, shown, factor, v.description)
             elif v.causality == "parameter" and "Int" in v.type:
-                self.counts[v.name], self._meanings[v.name] = int(start), v.description
+                self.counts[v.name] = Parameter(int(start), "", "1", 1.0, v.description)
 
     @property
     def starts(self) -> dict[str, float]:
@@ -55,13 +55,11 @@ class Parameters:
     def for_building(self, values: Mapping[str, float]) -> str:
         """All parameters in the format of modelDescription/parameters.json, for `build_fmu --parameters`; `values` are
         in SI and are written in their display units."""
-        entries: dict[str, dict[str, object]] = {}
-        for name, parameter in self.real.items():
-            value = values[name] / parameter.factor
-            entries[name] = {"value": value, "unit": parameter.shown, "meaning": parameter.meaning}
-        for name, count in self.counts.items():
-            entries[name] = {"value": count, "unit": "1", "meaning": self._meanings[name]}
-        lines = [f"  {json.dumps(name)}: {json.dumps(entry, ensure_ascii=False)}" for name, entry in entries.items()]
+        lines = []
+        for name, parameter in {**self.real, **self.counts}.items():
+            value = values[name] / parameter.factor if name in self.real else parameter.start
+            entry = {"value": value, "unit": parameter.shown, "meaning": parameter.meaning}
+            lines.append(f"  {json.dumps(name)}: {json.dumps(entry, ensure_ascii=False)}")
         return "{\n" + ",\n".join(lines) + "\n}\n"
 
     def ssv(self, values: Mapping[str, float], title: str) -> str:
@@ -70,13 +68,13 @@ class Parameters:
             ElementTree.register_namespace(prefix, space)
         root = ElementTree.Element(f"{{{SSV}}}ParameterSet", version="1.0", name=title)
         parameters = ElementTree.SubElement(root, f"{{{SSV}}}Parameters")
-        for name, parameter in self.real.items():
+        for name, parameter in {**self.real, **self.counts}.items():
             element = ElementTree.SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
-            value = {"value": repr(float(values[name])), "unit": parameter.unit}
-            ElementTree.SubElement(element, f"{{{SSV}}}Real", value)
-        for name, count in self.counts.items():
-            element = ElementTree.SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
-            ElementTree.SubElement(element, f"{{{SSV}}}Integer", value=str(count))
+            if name in self.real:
+                value = {"value": repr(float(values[name])), "unit": parameter.unit}
+                ElementTree.SubElement(element, f"{{{SSV}}}Real", value)
+            else:
+                ElementTree.SubElement(element, f"{{{SSV}}}Integer", value=str(parameter.start))
         units, used = ElementTree.SubElement(root, f"{{{SSV}}}Units"), {p.unit for p in self.real.values()}
         for name, unit in self._units.items():
             if name in used:

@@ -65,7 +65,7 @@ class Path(NamedTuple):
 
 
 def smooth(time: Array, theta: Array, omega: Array | None = None, quantum: float = 0.0) -> Path:
-    """The most probable path through the angles theta (n,) rad and, where logged, rates omega (n,) rad/s at the times
+    """The most probable path through the angles theta (n,) rad and, if logged, rates omega (n,) rad/s at the times
     (n,) s, which may be uneven. quantum: of the angles in rad, if it is coarser than the data suggest."""
     quantum = max(quantum, quantum_of(theta))
     spline = _Spline(time)
@@ -116,14 +116,9 @@ class _Spline:
         # Not the first and last time themselves, which may lie outside by rounding.
         self._ends = self._knots[DEGREE], self._knots[-DEGREE - 1]
         self.size = pieces + DEGREE
-        difference = np.array([1.0])
-        for _ in range(ORDER):
-            difference = np.convolve(difference, [1.0, -1.0])
-        self.penalties = max(self.size - ORDER, 0)
-        self.penalty = np.zeros((DEGREE + 1, self.size))
-        for i in range(ORDER + 1):
-            for j in range(i + 1):
-                self.penalty[DEGREE - (i - j), i : i + self.penalties] += difference[i] * difference[j]
+        self.penalties = self.size - ORDER
+        difference = diags([-1.0, 3.0, -3.0, 1.0], range(ORDER + 1), shape=(self.penalties, self.size), format="csr")
+        self.penalty = _squared(difference)
 
     def curve(self, coefficients: Array) -> BSpline:
         return BSpline(self._knots, coefficients, DEGREE)
@@ -152,14 +147,8 @@ class _Fit(NamedTuple):
 def _fit(spline: _Spline, blocks: list[Block], least: float) -> _Fit:
     """The most probable path. blocks: the measurements. least: lower bound of the first block's variance, rad2."""
     count = sum(len(values) for _, values in blocks) - ORDER
-    normals, rights = [], []
-    for rows, values in blocks:
-        product = rows.T @ rows
-        normal = np.zeros((DEGREE + 1, spline.size))
-        for i in range(DEGREE + 1):
-            normal[DEGREE - i, i:] = product.diagonal(i)
-        normals.append(normal)
-        rights.append(rows.T @ values)
+    normals = [_squared(rows) for rows, _ in blocks]
+    rights = [rows.T @ values for rows, values in blocks]
 
     def solve(penalty: float, weights: list[float]) -> tuple[Array, float, float]:
         """Coefficients, misfit with penalty, and logarithm of the determinant."""
@@ -200,6 +189,15 @@ def _fit(spline: _Spline, blocks: list[Block], least: float) -> _Fit:
     quiet = solve(min(penalty * OVERSMOOTHING, 10.0 ** STIFFNESS[1]), weights)[0]
     penalty = max(penalty / UNDERSMOOTHING, 10.0 ** STIFFNESS[0])
     return _Fit(solve(penalty, weights)[0], quiet, float(np.sqrt(variance)), weights)
+
+
+def _squared(rows: csr_matrix) -> Array:
+    """rows.T @ rows in the banded storage of `cholesky_banded`."""
+    product = rows.T @ rows
+    banded = np.zeros((DEGREE + 1, product.shape[0]))
+    for i in range(DEGREE + 1):
+        banded[DEGREE - i, i:] = product.diagonal(i)
+    return banded
 
 
 def _weights(x: Sequence[float]) -> list[float]:

@@ -43,23 +43,11 @@ def page(found: Identification) -> str:
         loader=PackageLoader("prw.identification", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters.update(digits=_digits, percent=_percent, shade=_shade)
-    estimates = found.parameters
-    rows = [
-        {
-            "name": name,
-            "meaning": parameter.meaning.split(";")[0],
-            "factor": parameter.factor,
-            "unit": parameter.shown,
-            "start": found.solution.task.start[name],
-            "found": estimates.get(name),
-        }
-        for name, parameter in found.known.real.items()
-    ]
     return environment.get_template("report.html.j2").render(
         found=found,
         sure=found.sure,
         solution=found.solution,
-        rows=rows,
+        estimates=found.parameters,
         channels=[_shown(channel) for channel in found.channels],
         figures=figures(found),
     )

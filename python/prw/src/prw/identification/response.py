@@ -12,7 +12,7 @@ the start of the next step the states jump by the difference of the angle from t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,8 +23,34 @@ from prw.motion import Array
 from prw.state_space import Complex, StateSpace
 from prw.testbed import OUTPUTS
 
-#: Index of a channel, and a function of s = 2 pi i f (f,): frequency response and the derivative of its logarithm.
-Distorted = tuple[int, Callable[[Complex], tuple[Complex, Complex]]]
+#: The distortions of a channel, in the order of `identify`'s arguments, each with a unit in which 1 is a typical size. A gain
+#: is estimated as its logarithm.
+DISTORTIONS = {"delay": 1e-3, "lag": 1e-3, "gain": 1.0}
+#: Bounds of a distortion in these units.
+FURTHEST = 50.0
+
+
+class Distortion(NamedTuple):
+    """A distortion between a channel and its record: a delay (s), a first-order lag (time constant, s) or a gain."""
+
+    kind: str
+    channel: str
+
+    def __str__(self) -> str:
+        return f"{self.kind} of {self.channel}"
+
+    def value(self, x: float) -> float:
+        """The delay or lag in s, or the gain, from the unknown x."""
+        return float(np.exp(x)) if self.kind == "gain" else x * DISTORTIONS[self.kind]
+
+    def response(self, x: float, s: Complex) -> tuple[Complex, Complex]:
+        """Frequency response (f,) and the derivative of its logarithm with respect to x."""
+        if self.kind == "gain":
+            return np.full(len(s), np.exp(x) + 0j), np.ones(len(s), dtype=complex)
+        s = s * DISTORTIONS[self.kind]
+        if self.kind == "delay":
+            return np.exp(-s * x), -s
+        return 1 / (1 + s * x), -s / (1 + s * x)
 
 
 class Discrete(NamedTuple):
@@ -43,7 +69,7 @@ class Discrete(NamedTuple):
         return Discrete(*((block[:half] - block[half:]) / (2 * step) for block in self))
 
 
-def discrete(models: Sequence[StateSpace], step: float, channels: tuple[str, ...], simulated: bool = False) -> Discrete:
+def discrete(models: Sequence[StateSpace], step: float, channels: tuple[str, ...], simulated: bool) -> Discrete:
     """m models over steps of `step` s, with the rows of `channels`. simulated: in steps of the FMU."""
     rows = [OUTPUTS.index(name) for name in channels]
     A, B, C, D = (np.stack([getattr(model, block) for model in models]) for block in "ABCD")
@@ -66,10 +92,8 @@ def discrete(models: Sequence[StateSpace], step: float, channels: tuple[str, ...
 class Response:
     """Response of a model to the motors of an experiment, at its first `bins` frequencies (f)."""
 
-    def __init__(
-        self, model: Discrete, experiment: Experiment, bins: int, distortions: Sequence[Distorted | None] = ()
-    ):
-        """distortions: the distortion of a channel, or None if the channel is not measured."""
+    def __init__(self, model: Discrete, experiment: Experiment, bins: int, distortions: Mapping[Distortion, float]):
+        """distortions: the unknown of each; channels that the experiment does not contain are ignored."""
         self.model = model
         turn = 2j * np.pi * np.arange(bins) / len(experiment.time)
         self._z, self._s = np.exp(turn)[:, None, None], (turn / experiment.step).astype(np.complex128)
@@ -82,19 +106,19 @@ class Response:
             self._motors[:, [4, 5], [1, 2]] = 1 - (1 + self._s[:, None] * experiment.step) / self._z[..., 0]
         self._resolvent = np.linalg.inv(self._z * np.eye(6) - model.A)
         self._states = self._resolvent @ ((model.before + self._z * model.after) @ self._motors)
-        answers: Complex = model.C @ self._states + model.D @ self._motors
+        from_motors: Complex = model.C @ self._states + model.D @ self._motors
         #: Spectra of the channels (f, c), periodic.
-        self.outputs: Complex = answers[..., 0]
+        self.outputs: Complex = from_motors[..., 0]
         #: From the motors' angles, moving with their rates, to the channels: (f, c, 2).
-        self.transfer: Complex = answers[..., 1:]
+        self.transfer: Complex = from_motors[..., 1:]
         #: Contribution of each of the six numbers d, (f, c, 6).
         self.transients: Complex = self._z * (model.C @ self._resolvent)
         self._filters = np.ones((bins, model.C.shape[0]), dtype=complex)
         self._growths = np.zeros((len(distortions), bins, model.C.shape[0]), dtype=complex)
-        for k, distortion in enumerate(distortions):
-            if distortion is not None:
-                channel, response = distortion
-                through, self._growths[k, :, channel] = response(self._s)
+        for k, (distortion, x) in enumerate(distortions.items()):
+            if distortion.channel in experiment.channels:
+                channel = experiment.channels.index(distortion.channel)
+                through, self._growths[k, :, channel] = distortion.response(x, self._s)
                 self._filters[:, channel] *= through
         self.outputs *= self._filters
         self.transients *= self._filters[..., None]

@@ -25,7 +25,7 @@ from prw.motion import Array
 UNLIKE = 1.5
 #: An estimate that is off its prior by this many standard deviations contradicts it.
 CONTRADICTION = 3.0
-#: From this standard error on, a number is no estimate.
+#: Relative standard error above which a parameter is reported as not determined.
 HOPELESS = 1.0
 
 
@@ -120,7 +120,7 @@ class Identification:
 
     @property
     def fits(self) -> bool:
-        """Whether the model explains the data. If not, the parameters are not those of the testbed."""
+        """Whether the model explains the data. If not, they are not the testbed's parameters."""
         return self.verdict.fits
 
     @property
@@ -178,7 +178,7 @@ class Identification:
             )
             swapped = " (the couplings exchanged)" if self._exchanged(point) else ""
             lines.append(
-                f"the data fit as well with {values}{swapped}; given is what is nearest to the start values. "
+                f"the data fit as well with {values}{swapped}; the result is the one nearest to the start values. "
                 "theta3 and theta4 would distinguish them"
             )
         if self.fits and self.verdict.widening.any() and not sure.undetermined:

@@ -53,9 +53,9 @@ def _end(solution: Solution, i: int, step: Array, wanted: float) -> float:
     return float(point[i])
 
 
-#: Larger condition numbers are rounding errors.
+#: Larger condition numbers are only rounding errors.
 WORST_CONDITION = 1e15
-#: Largest exponent of an interval's end that a double can hold.
+#: Largest distance of an interval's end from the estimate, as a logarithm; larger ones overflow.
 WIDEST = 600.0
 #: Least value of 1 - leverage by which a residual is divided.
 LEAST_FREEDOM = 0.1
@@ -68,7 +68,7 @@ SHARE = 0.15
 
 
 class Combination(NamedTuple):
-    """A direction that the data leave open. shares: exponent by parameter, the largest 1: the parameters can change
+    """A direction that the data do not determine. shares: exponent by parameter, the largest 1: the parameters can change
     together like p -> p * x^share. error: standard deviation of log x."""
 
     shares: Mapping[str, float]
@@ -77,7 +77,7 @@ class Combination(NamedTuple):
     def __str__(self) -> str:
         moves = ", ".join(f"{name} {(1.1**share - 1) * 100:+.0f} %" for name, share in self.shares.items())
         if len(self.shares) == 1:
-            return f"{next(iter(self.shares))} has hardly any effect on what was measured"
+            return f"{next(iter(self.shares))} has hardly any effect on the measurements"
         names = list(self.shares)
         return (
             f"{', '.join(names[:-1])} and {names[-1]} cannot be distinguished: {moves} together change next to nothing"
@@ -88,7 +88,7 @@ class Certainty(NamedTuple):
     """names: of the parameters (p). relative: (p,) standard errors as fractions. low, high: (p,) ends of the 95 %
     intervals, SI. correlation: (p, p). information: (p, p), of the logarithms, priors included, without
     the encoders' contribution. condition: of its unit-diagonal form. whiteness: by how much the noise's correlation
-    widens the errors beyond what sensors explain, (p,). undetermined: combinations that the data leave open."""
+    widens the errors beyond what sensors explain, (p,). undetermined: combinations that the data do not determine."""
 
     names: Sequence[str]
     relative: Array
@@ -101,7 +101,7 @@ class Certainty(NamedTuple):
     undetermined: list[Combination]
 
 
-def certainty(solution: Solution, widening: Array | float = 0.0, level: float = 0.95) -> Certainty:
+def certainty(solution: Solution, widening: Array) -> Certainty:
     """Standard errors, correlation, intervals and open combinations of a fit. widening: (p,) standard deviations, of
     possible faults besides noise."""
     names, prior = solution.task.unknowns, solution.task.prior_information()
@@ -122,7 +122,7 @@ def certainty(solution: Solution, widening: Array | float = 0.0, level: float = 
     errors = np.hypot(errors, 0.0 if open_ones else widening)
     if open_ones:
         errors = np.maximum(errors, np.sqrt(np.diag(covariance_of(corrected))))
-    low, high = ends(solution, inverse, errors, float(ndtri(0.5 + level / 2)))
+    low, high = ends(solution, inverse, errors, float(ndtri(0.975)))
     unit = np.outer(scale, scale)
     # An undetermined combination may have no variance but rounding errors, whose quotients are clipped.
     with np.errstate(over="ignore"):
@@ -191,7 +191,7 @@ def _scale(information: Array) -> Array:
 
 
 def undetermined(names: Sequence[str], information: Array) -> list[Combination]:
-    """The combinations of parameters whose logarithms the information leaves open, the most uncertain first."""
+    """The combinations of parameters whose logarithms the information does not determine, the most uncertain first."""
     values, vectors = np.linalg.eigh(information)
     found = []
     for value, vector in zip(values, vectors.T):

@@ -1,9 +1,9 @@
-"""Tests whether the model explains the data, and for faults that would explain them.
+"""Tests whether the model explains the data, and whether a fault would explain them.
 
-The residuals of a correct fit are noise. They are tested against the motion: by local regression on the motors' spectra
-and the channel's own, frequency by frequency (their coherence); along the effects of single faults (a delay, a lag or a
-gain of a channel, or of two in common; friction; backlash), as score tests (Rao, Proc. Cambridge Phil. Soc.
-44 (1948) 50); and their strength is compared with that of the noise at frequencies at which the motors do not move.
+The residuals of a correct fit are noise. Three tests compare them with the motion. Local regression over frequency finds
+residuals that are coherent with the motors' spectra or the channel's own. Score tests (Rao, Proc. Cambridge Phil. Soc. 44
+(1948) 50) find the effects of single faults: a delay, a lag or a gain of a channel or of two in common, friction, backlash.
+The third test compares the residuals' strength with the noise at frequencies at which the motors do not move.
 """
 
 from __future__ import annotations
@@ -15,27 +15,29 @@ import numpy as np
 from scipy.special import fdtrc
 
 from prw.identification.experiment import Experiment, spectra
-from prw.identification.fit import Comparison, Distortion, Solution
+from prw.identification.fit import Comparison, Solution
+from prw.identification.response import Distortion
 from prw.identification.statistics import covariance_of, information_of
 from prw.motion import Array
 from prw.state_space import Complex
 from prw.testbed import OUTPUTS
 
-#: Chance that a channel of a good fit looks coherent with the motion: little, for an encoder's steps are not as normal as it
-#: assumes, and in slow motion 1e-8 was seen; a fault's estimate over its error that is no
-#: chance, and from which on intervals grow to cover it.
-CHANCE, CLEAR, SMALL = 1e-10, 4.7, 2.5
+#: Probability below which a coherence with the motion is a misfit. It is small, because the steps of encoders are not normally
+#: distributed; 1e-8 occurs in slow motion.
+CHANCE = 1e-10
+#: A fault's estimate in standard errors from which it is significant, and from which intervals are widened by it.
+CLEAR, SMALL = 4.7, 2.5
 #: As CLEAR, for residuals that follow the sign of a rate, as encoders' steps do in a periodic motion.
 CLEAR_SIGN = 7.0
 #: Largest ratio of a channel's noise in the band to its noise above, and its tolerance in standard errors.
 EXCESS, LUCK = 1.3, 5.0
 #: Frequencies per piece of the local regression, and most pieces.
 PIECE, MOST_PIECES = 16, 6
-#: Ratio of a signal's power to the power of encoders' errors in it from which it counts as moving.
+#: Least ratio of the power of a moving signal to the power of encoders' errors in it.
 CLEARLY_MOVING = 30.0
 #: Least share of a direction that is independent of the others.
 NEW = 0.02
-#: Share of its greatest magnitude from which a rate has a sign.
+#: Share of its greatest magnitude above which a rate has a sign.
 TURNING = 0.02
 
 
@@ -43,10 +45,15 @@ TURNING = 0.02
 PAIRS = (("tau1", "tau2"), ("theta3", "theta4"), ("pitch", "roll"), ("pitch_rate", "roll_rate"))
 
 
-def groups(channels: Sequence[str]) -> list[tuple[str, ...]]:
-    """Groups of channels that may share a fault: single ones, pairs, all."""
-    found = [(name,) for name in channels] + [pair for pair in PAIRS if set(pair) <= set(channels)]
-    return found + [tuple(channels)] * (len(channels) > 2)
+def groups(solution: Solution, kind: str, channels: Sequence[str] = ()) -> list[tuple[str, ...]]:
+    """Groups of channels (default: all) that may share a fault of a kind and have no distortion of this kind yet: single
+    ones, pairs, all. Gains are tried up to pairs."""
+    channels, known = channels or solution.fitter.channels, set(solution.task.distortions)
+    found: list[tuple[str, ...]] = [(name,) for name in channels]
+    found += [pair for pair in PAIRS if set(pair) <= set(channels)]
+    if len(channels) > 2 and kind != "gain":
+        found.append(tuple(channels))
+    return [group for group in found if not {Distortion(kind, name) for name in group} & known]
 
 
 def named(kind: str, group: Sequence[str]) -> str:
@@ -111,7 +118,7 @@ def judge(solution: Solution) -> Verdict:
     for i, (experiment, comparison) in enumerate(zip(solution.fitter.experiments, solution.comparisons)):
 
         def score(columns: Complex, i: int = i, comparison: Comparison = comparison) -> _Score:
-            return _Score(solution, i, comparison.seen_along(columns), inverse)
+            return _Score(solution, i, comparison.change_along(columns), inverse)
 
         spread, luck = _strength(solution, i)
         for j, name in enumerate(experiment.channels):
@@ -119,7 +126,7 @@ def judge(solution: Solution) -> Verdict:
             chance = there.chance(2 * experiment.bins)
             texts = []
             if chance < CHANCE:
-                texts.append("what the FMU does not explain follows the motors")
+                texts.append("the unexplained part follows the motors")
             if spread[j] > EXCESS * (1 + LUCK * luck[j]):
                 texts.append(
                     f"the residual is {float(f'{spread[j]:.2g}'):g} times the noise at frequencies at which the motors rest"
@@ -224,10 +231,7 @@ def single_faults(
     # A lag is the same as a delay to first order. A common fault of two channels may have ten standard errors, while each
     # single one has one or two, because the parameters compensate for the latter.
     for kind, unit in (("delay", "ms"), ("gain", "")):
-        for group in groups(experiment.channels):
-            distortions = {Distortion(kind, name) for name in group}
-            if distortions & set(solution.task.distortions) or (kind == "gain" and len(group) > 2):
-                continue
+        for group in groups(solution, kind, experiment.channels):
             indices = [experiment.channels.index(name) for name in group]
             column = np.zeros_like(there)
             column[:, indices] = Distortion(kind, group[0]).response(0.0, s)[1][:, None] * there[:, indices]
