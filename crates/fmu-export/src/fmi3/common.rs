@@ -3,12 +3,12 @@
 //! # Safety
 //! The importer guarantees the contract of the [module above](super#safety).
 
-use super::{FromOne, types::*};
+use super::types::*;
 use crate::boundary::life_cycle::experiment;
 use crate::boundary::values::*;
 use crate::boundary::{array, of_elements, output, partial_derivatives, target};
 use crate::export::Exported;
-use crate::instance::{Instance, Outcome, reject};
+use crate::instance::{FromOne, Instance, Outcome, reject};
 use fmi_abi::BaseType::{self, *};
 use fmi_abi::Value;
 
