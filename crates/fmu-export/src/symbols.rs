@@ -14,10 +14,6 @@ macro_rules! export_fmu {
     ($model:ty : $first:ident $(+ $next:ident)*) => {
         $crate::offer!($model: $first $(+ $next)*);
         $crate::symbols!($model);
-
-        #[doc(hidden)]
-        #[allow(non_camel_case_types)]
-        pub type model_of_export_fmu = $model;
     };
 }
 

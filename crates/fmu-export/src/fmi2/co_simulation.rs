@@ -6,7 +6,7 @@
 use super::types::*;
 use crate::boundary::{array, output_derivatives, target};
 use crate::export::Exported;
-use crate::instance::{Instance, Outcome, no_status, reject};
+use crate::instance::{Instance, Outcome, discard, reject};
 
 pub unsafe fn fmi2SetRealInputDerivatives<M: Exported>(
     instance: &mut Instance<M>,
@@ -55,8 +55,9 @@ fn status_kind(kind: fmi2StatusKind) -> Outcome<StatusKind> {
     StatusKind::from_c(kind).map_or_else(|| reject(format!("there is no fmi2StatusKind {kind}")), Ok)
 }
 
-fn nothing_to_say(kind: StatusKind) -> Outcome {
-    no_status(match kind {
+/// Discards a query that concerns only asynchronous steps, or that another function answers.
+fn no_status(kind: StatusKind) -> Outcome {
+    discard(match kind {
         StatusKind::DoStepStatus | StatusKind::PendingStatus => {
             "no step is pending: fmi2DoStep works synchronously"
         }
@@ -76,7 +77,7 @@ pub unsafe fn fmi2GetRealStatus<M: Exported>(
             unsafe { target(value, "value") }?.write(instance.last_successful_time());
             Ok(())
         }
-        other => nothing_to_say(other),
+        other => no_status(other),
     }
 }
 
@@ -91,7 +92,7 @@ pub unsafe fn fmi2GetBooleanStatus<M: Exported>(
             unsafe { target(value, "value") }?.write(instance.has_ended().into());
             Ok(())
         }
-        other => nothing_to_say(other),
+        other => no_status(other),
     }
 }
 
@@ -101,7 +102,7 @@ pub unsafe fn fmi2GetStatus<M: Exported>(
     kind: fmi2StatusKind,
     _value: *mut fmi2Status,
 ) -> Outcome {
-    nothing_to_say(status_kind(kind)?)
+    no_status(status_kind(kind)?)
 }
 
 /// See [`fmi2GetStatus`].
@@ -110,7 +111,7 @@ pub unsafe fn fmi2GetIntegerStatus<M: Exported>(
     kind: fmi2StatusKind,
     _value: *mut fmi2Integer,
 ) -> Outcome {
-    nothing_to_say(status_kind(kind)?)
+    no_status(status_kind(kind)?)
 }
 
 /// See [`fmi2GetStatus`].
@@ -119,5 +120,5 @@ pub unsafe fn fmi2GetStringStatus<M: Exported>(
     kind: fmi2StatusKind,
     _value: *mut fmi2String,
 ) -> Outcome {
-    nothing_to_say(status_kind(kind)?)
+    no_status(status_kind(kind)?)
 }

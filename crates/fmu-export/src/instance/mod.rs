@@ -13,9 +13,8 @@ mod serialized;
 mod sorted;
 mod values;
 
-pub(crate) use co_simulation::no_status;
 pub(crate) use reference::{FromOne, Reference};
-pub(crate) use rejection::{Outcome, Rejection, reject, reject_with};
+pub(crate) use rejection::{Outcome, Rejection, discard, reject, reject_with};
 
 use self::sorted::Sorted;
 use crate::capabilities::Events;
@@ -24,7 +23,7 @@ use crate::log::Logger;
 use crate::model::{Error, Experiment, Setup};
 use crate::offsets::Placed;
 use crate::types::{NUMBER, TIME};
-use crate::variable::{Read, ReadAt, Variable, shape_of_calculation};
+use crate::variable::{Read, Variable, shape_of_calculation};
 use fmi_abi::BaseType;
 use fmi_abi::Causality;
 use fmi_abi::Status;
@@ -302,12 +301,7 @@ impl<M: Exported> Instance<M> {
 
     /// Returns the model after all calculations that reading needs.
     #[inline]
-    fn calculated(&mut self) -> &M {
-        self.calculated_in_place()
-    }
-
-    #[inline]
-    fn calculated_in_place(&mut self) -> &Placed<M> {
+    fn calculated(&mut self) -> &Placed<M> {
         if self.state.stale {
             self.state.stale = false;
             self.state.model.calculate(self.state.time);
@@ -381,14 +375,12 @@ impl<M: 'static> Implicit<M> {
 
     /// Represents any event indicator; the values come from the model.
     const INDICATOR: &'static Variable<M> = &Variable::local(&NUMBER)
-        .read_by(
-            Read {
-                shape: shape_of_calculation(std::marker::PhantomData::<M>, |_| f64::NAN),
-                real: |_| f64::NAN,
-                value: |_| Value::Real(f64::NAN),
-            },
-            ReadAt { reals: |_, _, _| f64::NAN, value: |_, _| Value::Real(f64::NAN) },
-        )
+        .read_by(Read {
+            shape: shape_of_calculation(std::marker::PhantomData::<M>, |_| f64::NAN),
+            real: |_, _| f64::NAN,
+            reals: |_, _, _| f64::NAN,
+            value: |_, _| Value::Real(f64::NAN),
+        })
         .finished("eventIndicator", "An event happens where it changes its sign");
 }
 

@@ -345,26 +345,6 @@ fn walk<F: Either, M: Exported>(interface: Interface) {
     assert!(visits.len() == modes && visits.values().all(|calls| *calls > 100), "{visits:?}");
 }
 
-/// Checks that NULL and zeros as arguments do no harm in any state, and without an instance.
-#[test]
-fn zeros() {
-    fn check<F: Either, M: Exported>() {
-        for (interface, mode) in modes_of_model::<F, M>() {
-            for function in F::functions() {
-                let fmu = F::in_mode::<M>(interface, mode);
-                if fmu.call_with_zeros(function) == Status::Error {
-                    F::in_mode::<M>(interface, mode).rejected(function, |fmu| fmu.call_with_zeros(function));
-                }
-            }
-        }
-        assert!(F::nothing::<M>().call_all().iter().all(|(_, status)| *status == Status::Error));
-    }
-    check::<Importer, Oscillator>();
-    check::<fmi3::Importer, Oscillator>();
-    check::<fmi3::Importer, Ticker>();
-    check::<fmi3::Importer, Palette>();
-}
-
 /// Checks that the table in the code agrees, also about states that cannot be reached here, and that it
 /// distinguishes the standard from tolerated calls.
 #[test]

@@ -94,18 +94,6 @@ fn communication_points_off_by_rounding() {
     }
 }
 
-#[test]
-fn communication_points_that_are_added_up() {
-    for step_size in [0.1, 1e-3, 1.0 / 60.0, 1e-6] {
-        let fmu = Importer::initialized_at::<Oscillator>(0.0);
-        let mut time = 0.0;
-        for _ in 0..STEPS {
-            fmu.step(time, step_size);
-            time += step_size;
-        }
-    }
-}
-
 /// Checks that the last step may exceed the stop time by a rounding error, for several ways to compute times.
 #[test]
 fn stop_time_passed_by_rounding() {
