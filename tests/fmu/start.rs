@@ -7,7 +7,7 @@ use crate::{new, vr};
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::Status;
-use fmu_test_kit::{Arguments, Either, Importer as Fmu, fmi3};
+use fmu_test_kit::{Either, Importer as Fmu, fmi3};
 use prw_testbed::TestbedFmu;
 use prw_testbed::variables::Name;
 
@@ -41,7 +41,7 @@ fn rests(fmu: &impl Either) {
 /// Checks that the testbed in Co-Simulation stays exactly at rest, because nothing is twisted.
 fn rest_in_co_simulation<F: Either>() {
     for (stage, use_omega) in STAGES.into_iter().flat_map(|stage| [(stage, 0), (stage, 1)]) {
-        let fmu = F::make::<TestbedFmu>(&Arguments::of::<TestbedFmu>(CoSimulation)).unwrap();
+        let fmu = F::of::<TestbedFmu>(CoSimulation);
         fmu.ok(fmu.set_boolean(vr(Name::use_omega), use_omega));
         initialize(&fmu, |now| {
             if now == stage {
@@ -91,7 +91,7 @@ fn a_rejected_step_starts_nothing() {
 
 fn rest_in_model_exchange<F: Either>() {
     for stage in STAGES {
-        let fmu = F::make::<TestbedFmu>(&Arguments::of::<TestbedFmu>(ModelExchange)).unwrap();
+        let fmu = F::of::<TestbedFmu>(ModelExchange);
         initialize(&fmu, |now| {
             if now == stage {
                 fmu.set(&THETA, &ANGLES);

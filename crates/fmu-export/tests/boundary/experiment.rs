@@ -14,7 +14,7 @@ fn talker(instance_name: &'static CStr, resource_location: Option<&CStr>) -> Imp
         resource_location,
         ..Arguments::of::<Talker>(CoSimulation)
     };
-    Importer::try_with::<Talker>(&arguments).unwrap()
+    Importer::make::<Talker>(&arguments).unwrap()
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn files_in_the_resources() {
 fn bad_resources() {
     let location = CString::new(resources("mute", "\n").to_str().unwrap()).unwrap();
     let arguments = Arguments { resource_location: Some(&location), ..Arguments::of::<Talker>(CoSimulation) };
-    let log = Importer::try_with::<Talker>(&arguments).expect_err("there is nothing to say");
+    let log = Importer::make::<Talker>(&arguments).expect_err("there is nothing to say");
     assert_eq!(log.len(), 1);
     assert_eq!(log[0].text, "fmi2Instantiate: resources/words.txt is empty");
 }

@@ -301,7 +301,7 @@ fn instantiation() {
         &["requiredIntermediateVariables must be empty"],
     );
     let arguments = Arguments { callbacks: false, ..Arguments::of::<Oscillator>(CoSimulation) };
-    assert!(Importer::try_with::<Oscillator>(&arguments).is_err());
+    assert!(Importer::make::<Oscillator>(&arguments).is_err());
     no_instance::<fmi3::Importer, Sum>(|a| a.fmu_type = 2, &["this FMU has no Scheduled Execution"]);
 }
 
