@@ -178,12 +178,4 @@ mod tests {
         assert!((shown(N_M_PER_RAD, 180.0 / PI).unwrap() - 1.0).abs() < 1e-15);
         assert_eq!(shown(ONE, 1.0), None);
     }
-
-    #[test]
-    fn builders_set_what_they_say() {
-        let unit = Unit::new("x").kg(1).m(2).s(3).A(4).K(5).mol(6).cd(7).rad(8).factor(9.0).offset(10.0);
-        let base =
-            BaseUnit { kg: 1, m: 2, s: 3, A: 4, K: 5, mol: 6, cd: 7, rad: 8, factor: 9.0, offset: 10.0 };
-        assert_eq!(unit, Unit { name: "x", base, display: None });
-    }
 }

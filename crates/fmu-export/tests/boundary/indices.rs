@@ -2,7 +2,7 @@
 //! path.
 
 use crate::models::{Meter, meter::Name};
-use fmu_export::Interface::{CoSimulation, ModelExchange};
+use fmu_export::Interface::CoSimulation;
 use fmu_export::Status;
 use fmu_test_kit::{Either, Importer, fmi3};
 
@@ -88,26 +88,4 @@ fn rejected<F: Either>() {
 fn rejected_as_before() {
     rejected::<Importer>();
     rejected::<fmi3::Importer>();
-}
-
-/// Checks that a calculated start value follows an input until the simulation begins, in any order of the
-/// calls.
-#[test]
-fn starts_that_are_calculated() {
-    fn check<F: Either>() {
-        let fmu = F::of::<Meter>(ModelExchange);
-        fmu.set(&[0], &[2.0]);
-        fmu.initialize(0.0);
-        fmu.set(&[0, 1], &[3.0, 1.0]);
-        assert_eq!(fmu.get([LEVEL]), [3.0]);
-        let restored = fmu.bytes();
-        fmu.enter_continuous_time();
-        fmu.set(&[0], &[4.0]);
-        assert_eq!(fmu.get([LEVEL]), [3.0]);
-        fmu.restore(&restored);
-        fmu.set(&[0], &[5.0]);
-        assert_eq!(fmu.get([LEVEL]), [5.0]);
-    }
-    check::<Importer>();
-    check::<fmi3::Importer>();
 }

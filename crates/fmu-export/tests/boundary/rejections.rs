@@ -1,7 +1,7 @@
 //! Invalid calls are rejected: `fmi2Error`, one message with the reason, and no change. [`Either::rejected`] checks
 //! this; the tables here list the calls and parts of their messages. Other files contain the rejections of their calls.
 
-use crate::models::{Ball, Oscillator, Sum, Talker, oscillator::Name, talker};
+use crate::models::{Ball, Fuse, Oscillator, Talker, oscillator::Name, talker};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::{Exported, Model, Status, Variables};
@@ -282,33 +282,33 @@ fn no_instance<F: Either, M: Exported>(change: impl Fn(&mut Arguments<'static>),
 #[test]
 fn instantiation() {
     fn check<F: Either>(guid: &str) {
-        no_instance::<F, Sum>(|a| a.instance_name = None, &["the instance needs a name"]);
-        no_instance::<F, Sum>(|a| a.instance_name = Some(c""), &["the instance needs a name"]);
-        no_instance::<F, Sum>(|a| a.instance_name = Some(c" \t "), &["the instance needs a name"]);
-        no_instance::<F, Sum>(|a| a.guid = None, &[guid, "NULL is not"]);
-        no_instance::<F, Sum>(|a| a.guid = Some(CString::default()), &[guid]);
-        no_instance::<F, Sum>(|a| a.guid = Some(c"{1%s-#r1#}".into()), &[guid, "{1_s-_r1_}", "{sum}"]);
-        no_instance::<F, Sum>(|a| a.guid = CString::new(Talker::INFO.guid).ok(), &["{talker}", "{sum}"]);
-        no_instance::<F, Sum>(|a| a.fmu_type = 0, &["this FMU has no Model Exchange"]);
+        no_instance::<F, Fuse>(|a| a.instance_name = None, &["the instance needs a name"]);
+        no_instance::<F, Fuse>(|a| a.instance_name = Some(c""), &["the instance needs a name"]);
+        no_instance::<F, Fuse>(|a| a.instance_name = Some(c" \t "), &["the instance needs a name"]);
+        no_instance::<F, Fuse>(|a| a.guid = None, &[guid, "NULL is not"]);
+        no_instance::<F, Fuse>(|a| a.guid = Some(CString::default()), &[guid]);
+        no_instance::<F, Fuse>(|a| a.guid = Some(c"{1%s-#r1#}".into()), &[guid, "{1_s-_r1_}", "{fuse}"]);
+        no_instance::<F, Fuse>(|a| a.guid = CString::new(Talker::INFO.guid).ok(), &["{talker}", "{fuse}"]);
+        no_instance::<F, Fuse>(|a| a.fmu_type = 0, &["this FMU has no Model Exchange"]);
         no_instance::<F, drift::Drift>(|_| (), &["this FMU has no Co-Simulation"]);
     }
     check::<Importer>("guid");
     check::<fmi3::Importer>("instantiationToken");
     no_instance::<Importer, Oscillator>(|a| a.fmu_type = 2, &["fmuType", "2"]);
     no_instance::<Importer, Oscillator>(|a| a.fmu_type = -1, &["fmuType", "-1"]);
-    no_instance::<fmi3::Importer, Sum>(
+    no_instance::<fmi3::Importer, Fuse>(
         |a| a.required_intermediate_variables = &[0],
         &["requiredIntermediateVariables must be empty"],
     );
     let arguments = Arguments { callbacks: false, ..Arguments::of::<Oscillator>(CoSimulation) };
     assert!(Importer::make::<Oscillator>(&arguments).is_err());
-    no_instance::<fmi3::Importer, Sum>(|a| a.fmu_type = 2, &["this FMU has no Scheduled Execution"]);
+    no_instance::<fmi3::Importer, Fuse>(|a| a.fmu_type = 2, &["this FMU has no Scheduled Execution"]);
 }
 
 #[test]
 fn instances_of_the_other_version() {
-    let old = Importer::of::<Sum>(CoSimulation);
-    let functions = fmu_export::fmi3::functions::<Sum>();
+    let old = Importer::of::<Fuse>(CoSimulation);
+    let functions = fmu_export::fmi3::functions::<Fuse>();
     // SAFETY: a live instance of the same model.
     let status = unsafe { (functions.fmi3Reset)(old.instance()) };
     assert_eq!(Status::from_c(status), Status::Error);

@@ -15,7 +15,6 @@ pub mod motor;
 pub mod oscillator;
 pub mod palette;
 pub mod rod;
-pub mod sum;
 pub mod talker;
 pub mod ticker;
 
@@ -30,7 +29,6 @@ pub use motor::Motor;
 pub use oscillator::Oscillator;
 pub use palette::Palette;
 pub use rod::Rod;
-pub use sum::Sum;
 pub use talker::Talker;
 pub use ticker::Ticker;
 
