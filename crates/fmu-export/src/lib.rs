@@ -63,7 +63,7 @@ pub use {
     offsets::{both_offsets, offset_in, offset_of_real},
     table::{
         StateOfTable, check_line, count_elements, count_letters, count_states, find_states, spread,
-        spread_names, write_names,
+        write_names,
     },
     value::{Dimensions, visit_enumeration},
     variable::{

@@ -22,7 +22,8 @@ pub unsafe trait Variables: Sized + 'static {
     /// reference in FMI 2.0.
     const TABLE: &'static [Variable<Self>];
 
-    /// Names of the variables, in the order of `TABLE`; all elements of an array have the same name.
+    /// Names of the lines.
+    #[doc(hidden)]
     const NAMES: &'static [Self::Name];
 
     /// Indices of the states and of their derivatives in the table, sorted by the index of the state.
@@ -35,16 +36,19 @@ pub unsafe trait Variables: Sized + 'static {
 
     /// Returns the index of a variable in the table; for an array, the index of its first element.
     fn index(name: Self::Name) -> usize {
-        let index = Self::NAMES.iter().position(|known| *known == name);
-        index.expect("the table has a variable for each name")
+        let line = Self::NAMES.iter().position(|known| *known == name);
+        index_of(Self::LINES, line.expect("the table has a line for each name"))
     }
 
     /// Returns the name of the variable at an index of the table, and the number of the element.
     #[doc(hidden)]
     #[inline]
     fn element(index: u32) -> (Self::Name, usize) {
-        let number = if Self::ARRAYS { Self::TABLE[index as usize].element() } else { 0 };
-        (Self::NAMES[index as usize], number)
+        if !Self::ARRAYS {
+            return (Self::NAMES[index as usize], 0);
+        }
+        let variable = &Self::TABLE[index as usize];
+        (Self::NAMES[variable.line as usize], variable.element())
     }
 
     /// Returns the offset of the `f64` that holds the value of a line, or `without` if reading needs a
@@ -254,23 +258,6 @@ pub const fn spread<M, const COUNT: usize>(
         line += 1;
     }
     table
-}
-
-/// Returns the names of the lines, each repeated once per element.
-#[doc(hidden)]
-pub const fn spread_names<M, N: Copy, const COUNT: usize>(lines: &[Variable<M>], names: &[N]) -> [N; COUNT] {
-    let mut spread = [names[0]; COUNT];
-    let (mut index, mut line) = (0, 0);
-    while line < lines.len() {
-        let mut element = 0;
-        while element < lines[line].length() {
-            spread[index] = names[line];
-            index += 1;
-            element += 1;
-        }
-        line += 1;
-    }
-    spread
 }
 
 /// Returns the number of states in a table.
@@ -559,12 +546,7 @@ macro_rules! variables {
                     &TABLE
                 };
 
-                const NAMES: &'static [Self::Name] = {
-                    const LINES: &[$crate::Variable<$model>] = <$model as $crate::Variables>::LINES;
-                    const NAMES: [<$model as $crate::Variables>::Name; $crate::count_elements(LINES)] =
-                        $crate::spread_names(LINES, &[$(<<$model as $crate::Variables>::Name>::$name),+]);
-                    &NAMES
-                };
+                const NAMES: &'static [Self::Name] = &[$(<<$model as $crate::Variables>::Name>::$name),+];
 
                 #[allow(long_running_const_eval)]
                 const STATES: &'static [$crate::StateOfTable] = {

@@ -96,29 +96,19 @@ pub unsafe fn fmi2GetBooleanStatus<M: Exported>(
     }
 }
 
-/// Returns `fmi2Discard`, because the function is for asynchronous steps.
-pub unsafe fn fmi2GetStatus<M: Exported>(
-    _: &mut Instance<M>,
-    kind: fmi2StatusKind,
-    _value: *mut fmi2Status,
-) -> Outcome {
-    no_status(status_kind(kind)?)
+/// Defines the queries that concern only asynchronous steps.
+macro_rules! without_status {
+    ($($function:ident $value:ty;)+) => {
+        $(
+            pub unsafe fn $function<M: Exported>(_: &mut Instance<M>, kind: fmi2StatusKind, _: *mut $value) -> Outcome {
+                no_status(status_kind(kind)?)
+            }
+        )+
+    };
 }
 
-/// See [`fmi2GetStatus`].
-pub unsafe fn fmi2GetIntegerStatus<M: Exported>(
-    _: &mut Instance<M>,
-    kind: fmi2StatusKind,
-    _value: *mut fmi2Integer,
-) -> Outcome {
-    no_status(status_kind(kind)?)
-}
-
-/// See [`fmi2GetStatus`].
-pub unsafe fn fmi2GetStringStatus<M: Exported>(
-    _: &mut Instance<M>,
-    kind: fmi2StatusKind,
-    _value: *mut fmi2String,
-) -> Outcome {
-    no_status(status_kind(kind)?)
+without_status! {
+    fmi2GetStatus fmi2Status;
+    fmi2GetIntegerStatus fmi2Integer;
+    fmi2GetStringStatus fmi2String;
 }

@@ -1,9 +1,9 @@
 //! One valid call of each function of both FMI versions, for any model in any mode.
 
 use fmu_export::fmi2::types::fmi2EventInfo;
-use fmu_export::{BaseType, Causality, Exported, Mode, Status, Variability, Variable};
+use fmu_export::{Causality, Exported, Mode, Status, Variability, Variable};
 use fmu_test_kit::calls::{Argument, signature};
-use fmu_test_kit::careless::element_size;
+use fmu_test_kit::careless::{bases_of, element_size};
 use fmu_test_kit::{Either, serialized};
 use std::mem::MaybeUninit;
 
@@ -21,27 +21,6 @@ fn first<M: Exported>(wanted: impl Fn(&Variable<M>) -> bool) -> Option<u32> {
     M::TABLE.iter().position(wanted).map(|index| index as u32)
 }
 
-/// Returns the type of the variables of a getter or setter, by the end of its name.
-fn base_of(function: &str) -> BaseType {
-    const BASES: [(&str, BaseType); 14] = [
-        ("UInt8", BaseType::UInt8),
-        ("UInt16", BaseType::UInt16),
-        ("UInt32", BaseType::UInt32),
-        ("UInt64", BaseType::UInt64),
-        ("Int8", BaseType::Int8),
-        ("Int16", BaseType::Int16),
-        ("Int32", BaseType::Integer),
-        ("Int64", BaseType::Int64),
-        ("Float32", BaseType::Float32),
-        ("Integer", BaseType::Integer),
-        ("Boolean", BaseType::Boolean),
-        ("String", BaseType::String),
-        ("Binary", BaseType::Binary),
-        ("", BaseType::Real),
-    ];
-    BASES.into_iter().find(|(end, _)| function.ends_with(end)).expect("the last one fits").1
-}
-
 /// Returns the value reference for the argument of this name; `None` if the model has no such variable.
 fn reference<F: Either, M: Exported>(name: &str, function: &str, mode: Mode) -> Option<u32> {
     let is_set = function[4..].starts_with("Set");
@@ -55,7 +34,7 @@ fn reference<F: Either, M: Exported>(name: &str, function: &str, mode: Mode) -> 
         "known" => first::<M>(|of| of.causality() == Causality::Input || of.is_state()),
         _ if function.ends_with("InputDerivatives") => first::<M>(|of| of.causality() == Causality::Input),
         _ if function.ends_with("OutputDerivatives") => first::<M>(|of| of.causality() == Causality::Output),
-        _ => first::<M>(|of| of.base() == base_of(function) && (!is_set || is_settable(of))),
+        _ => first::<M>(|of| bases_of(function).contains(&of.base()) && (!is_set || is_settable(of))),
     };
     found.map(|index| F::standard().reference(index))
 }
@@ -73,15 +52,13 @@ impl ValidCall {
                     let content = match (of, name) {
                         ("ValueReference", _) => reference::<F, M>(name, function, mode).unwrap_or(0).into(),
                         _ if is_handle(of) && function.contains("Free") => handle(fmu),
-                        (_, "order") => 1,
                         ("Real" | "Float64", _) => 1.0_f64.to_bits(),
                         ("Float32", _) => 1.0_f32.to_bits().into(),
-                        ("Boolean", _) => 1,
                         ("UInt16", _) => 2000,
                         ("String", _) if read => c"text".as_ptr().expose_provenance() as u64,
                         ("Binary", _) if read => c"bytes".as_ptr().expose_provenance() as u64,
                         _ if is_handle(of) => 0,
-                        _ => 3,
+                        _ => 1,
                     };
                     let mut memory = Box::new_uninit_slice(bytes.len().div_ceil(8).max(16));
                     if read || is_handle(of) {

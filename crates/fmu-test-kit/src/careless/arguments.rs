@@ -7,6 +7,34 @@ use fmu_export::{BaseType, Causality, Exported, Standard, Variable};
 use std::ffi::CStr;
 use std::ptr::null;
 
+/// Base types of the variables of getters and setters, by the final part of the names of the functions.
+#[rustfmt::skip]
+const BY_END: [(&str, &[BaseType]); 15] = {
+    use BaseType::*;
+    [
+        ("Real", &[Real]),
+        ("Float64", &[Real]),
+        ("Integer", &[Integer, Enumeration]),
+        ("Boolean", &[Boolean]),
+        ("String", &[String]),
+        ("Float32", &[Float32]),
+        ("UInt8", &[UInt8]),
+        ("Int8", &[Int8]),
+        ("UInt16", &[UInt16]),
+        ("Int16", &[Int16]),
+        ("UInt32", &[UInt32]),
+        ("Int32", &[Integer]),
+        ("UInt64", &[UInt64]),
+        ("Int64", &[Int64, Enumeration]),
+        ("Binary", &[Binary]),
+    ]
+};
+
+/// Returns the base types of the variables of a function; Reals by default.
+pub fn bases_of(function: &str) -> &'static [BaseType] {
+    BY_END.into_iter().find(|(end, _)| function.ends_with(end)).unwrap_or(BY_END[0]).1
+}
+
 /// Value references, grouped by the functions that use them.
 pub struct Variables {
     all: u32,
@@ -14,7 +42,7 @@ pub struct Variables {
     real_starts: Vec<u32>,
     unknowns: Vec<u32>,
     /// Variables by the final part of the names of functions.
-    by_end: [(&'static str, Vec<u32>); 14],
+    by_end: [(&'static str, Vec<u32>); BY_END.len()],
     states: usize,
     indicators: usize,
     /// Value references of arrays in FMI 3.0, each with its number of values.
@@ -24,7 +52,6 @@ pub struct Variables {
 impl Variables {
     /// Collects the value references of a model in an FMI version.
     pub fn of<M: Exported>(standard: Standard) -> Self {
-        use BaseType::*;
         let reference = |index| standard.reference(index);
         // In FMI 3.0, elements of arrays are not variables.
         let is_one = |variable: &Variable<M>| standard == Standard::Fmi2 || variable.element() == 0;
@@ -32,29 +59,13 @@ impl Variables {
             let indices = (0..).zip(M::TABLE).filter(|(_, variable)| is_one(variable) && wanted(variable));
             indices.map(|(index, _)| reference(index)).collect::<Vec<u32>>()
         };
-        let reals = |wanted: fn(&Variable<M>) -> bool| those(&|of| of.base() == Real && wanted(of));
-        let ends: [(_, &[BaseType]); 14] = [
-            ("Real", &[Real]),
-            ("Integer", &[Integer, Enumeration]),
-            ("Boolean", &[Boolean]),
-            ("String", &[String]),
-            ("Float32", &[Float32]),
-            ("UInt8", &[UInt8]),
-            ("Int8", &[Int8]),
-            ("UInt16", &[UInt16]),
-            ("Int16", &[Int16]),
-            ("UInt32", &[UInt32]),
-            ("Int32", &[Integer]),
-            ("UInt64", &[UInt64]),
-            ("Int64", &[Int64, Enumeration]),
-            ("Binary", &[Binary]),
-        ];
+        let reals = |wanted: fn(&Variable<M>) -> bool| those(&|of| of.base() == BaseType::Real && wanted(of));
         Self {
             all: reference(M::TABLE.len() as u32),
             real_inputs: reals(|of| of.causality() == Causality::Input),
             real_starts: reals(Variable::has_start),
             unknowns: reals(|of| of.causality() == Causality::Output || of.differentiates().is_some()),
-            by_end: ends.map(|(end, bases)| (end, those(&|of| bases.contains(&of.base())))),
+            by_end: BY_END.map(|(end, bases)| (end, those(&|of| bases.contains(&of.base())))),
             states: M::STATES.len(),
             indicators: M::MODEL_EXCHANGE.map_or(0, |offer| offer.indicators),
             arrays: (0..)

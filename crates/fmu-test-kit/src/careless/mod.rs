@@ -17,6 +17,7 @@ use crate::serialized::{fnv1a, sealed, time};
 use crate::{Arguments, Importer, Message, Random};
 use arbitrary::{Result, Unstructured};
 use arguments::CallArguments;
+pub use arguments::bases_of;
 pub use call::element_size;
 use call::{Answer, Call, has_handles};
 use fmu_export::{Exported, Interface, Standard, Status};
