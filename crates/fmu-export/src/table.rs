@@ -1,7 +1,7 @@
 //! The table of variables: [`variables!`](crate::variables) and the code that it generates.
 
 use crate::saved::StateVisitor;
-use crate::variable::{Index, Letters, Variable, reject};
+use crate::variable::{Index, Letters, Read, Variable, reject};
 use std::fmt::Debug;
 use std::mem::MaybeUninit;
 
@@ -96,10 +96,10 @@ impl<M: Variables> Variable<M> {
     /// Reads the scalar, or elements of the array from this element on, as many as `values` holds. Returns 0
     /// if all values are finite.
     pub(crate) fn reals(&self, model: &M, time: f64, values: &mut [MaybeUninit<f64>]) -> f64 {
-        match &self.read {
-            Some(read) => (read.reals)(model, self.number(), values),
-            None => values.iter_mut().map(|value| *value.write(time) * 0.0).sum(),
+        if let Some(Read { reals: Some(reals), .. }) = self.read {
+            return reals(model, self.number(), values);
         }
+        values.iter_mut().map(|value| *value.write(self.real(model).unwrap_or(time)) * 0.0).sum()
     }
 
     #[inline]
@@ -325,7 +325,7 @@ pub const fn check_line<M>(lines: &[Variable<M>], Index(line): Index) {
     if let Some(differentiated) = of.differentiates()
         && !of.has_dimensions(&lines[differentiated as usize])
     {
-        reject(of.name(), "it must be an array of the same length as what it is the derivative of");
+        reject(of.name(), "a derivative must have the dimensions of its state");
     }
 }
 
@@ -484,18 +484,18 @@ macro_rules! variables {
                     $( #[allow(dead_code)] fn $first() {} )?
                     $(
                         let variable = variable.stored(
+                            match |model: &$model| $crate::type_of(
+                                &(*model).$first $([$at])* $( .$field $([$index])* )*
+                            ) {
+                                $first => $crate::shape_of_field($first),
+                            },
                             $crate::Read {
-                                shape: match |model: &$model| $crate::type_of(
-                                    &(*model).$first $([$at])* $( .$field $([$index])* )*
-                                ) {
-                                    $first => $crate::shape_of_field($first),
-                                },
                                 real: |model, number| match &(*model).$first $([$at])* $( .$field $([$index])* )* {
                                     $first => $crate::read_real($first, number),
                                 },
-                                reals: |model, from, values| match &(*model).$first $([$at])* $( .$field $([$index])* )* {
+                                reals: ::core::option::Option::Some(|model, from, values| match &(*model).$first $([$at])* $( .$field $([$index])* )* {
                                     $first => $crate::read_reals($first, from, values),
-                                },
+                                }),
                                 value: |model, number| match &(*model).$first $([$at])* $( .$field $([$index])* )* {
                                     $first => $crate::read_value($first, number),
                                 },
@@ -636,12 +636,16 @@ macro_rules! variables {
     };
     (@instead_of $before:tt $instead:expr) => { $instead };
     (@calculated $variable:ident $model:ty, $calculate:expr) => {
-        $variable.read_by($crate::Read {
-            shape: $crate::shape_of_calculation(::core::marker::PhantomData::<$model>, $calculate),
-            real: |model, number| $crate::read_real_by(model, $calculate, number),
-            reals: |model, first, values| $crate::read_reals_by(model, $calculate, first, values),
-            value: |model, number| $crate::read_value_by(model, $calculate, number),
-        })
+        $variable.read_by(
+            $crate::shape_of_calculation(::core::marker::PhantomData::<$model>, $calculate),
+            $crate::Read {
+                real: |model, number| $crate::read_real_by(model, $calculate, number),
+                reals: ::core::option::Option::Some(|model, first, values| {
+                    $crate::read_reals_by(model, $calculate, first, values)
+                }),
+                value: |model, number| $crate::read_value_by(model, $calculate, number),
+            },
+        )
     };
     (@label $name:ident) => { ::core::stringify!($name) };
     (@label $name:ident $label:literal) => { $label };

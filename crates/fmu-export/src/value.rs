@@ -43,7 +43,7 @@ pub trait Scalar: Saved {
 #[diagnostic::on_unimplemented(
     message = "no variable can have a value of the type `{Self}`",
     label = "the type is `{Self}`",
-    note = "values are f64, f32, whole numbers from i8 to u64, bool, String, Vec<u8>, enums made by enumeration!, and \
+    note = "values are f64, f32, integers from i8 to u64, bool, String, Vec<u8>, enums made by enumeration!, and \
             arrays of them, such as [f64; 8]"
 )]
 pub trait Place: Saved {
@@ -209,7 +209,7 @@ impl Scalar for f32 {
     }
 }
 
-macro_rules! whole_number {
+macro_rules! integers {
     ($($type:ty: $kind:ident;)+) => {
         $(impl Scalar for $type {
             const BASE: BaseType = BaseType::$kind;
@@ -229,7 +229,7 @@ macro_rules! whole_number {
     };
 }
 
-whole_number! {
+integers! {
     i8: Int8;
     u8: UInt8;
     i16: Int16;

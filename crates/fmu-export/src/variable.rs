@@ -87,11 +87,11 @@ macro_rules! functions {
 
 functions! {
     /// Functions that read a value: an element of an array, or element 0 of a scalar. `reals` fills the slice,
-    /// starting at an element; it returns 0 if all values are finite.
+    /// starting at an element; it returns 0 if all values are finite. Only arrays have it, because each function
+    /// adds to the size of a library.
     Read {
-        shape: Shape,
         real: fn(&M, usize) -> f64,
-        reals: fn(&M, usize, &mut [MaybeUninit<f64>]) -> f64,
+        reals: Option<fn(&M, usize, &mut [MaybeUninit<f64>]) -> f64>,
         value: fn(&M, usize) -> Value
     }
 
@@ -187,7 +187,7 @@ impl<M> Variable<M> {
     pub const fn clock(of: &'static Type) -> Self {
         let mut variable = Self::local(of);
         variable.rejected = Some(
-            "clocks are not offered, nor is Scheduled Execution: events take their place, see ModelExchange::event \
+            "clocks and Scheduled Execution are not supported; use events, see ModelExchange::event \
              and CoSimulation::EVENTS",
         );
         variable
@@ -198,7 +198,7 @@ impl<M> Variable<M> {
     pub const fn structural_parameter(of: &'static Type) -> Self {
         let mut variable = Self::parameter(of);
         variable.rejected = Some(
-            "structural parameters are not offered: an array has the length that the field has in Rust, as 8 in [f64; 8]",
+            "structural parameters are not supported: an array has the length of its field in Rust, for example 8 in [f64; 8]",
         );
         variable
     }
@@ -304,22 +304,25 @@ impl<M> Variable<M> {
 
     /// Called by the macro; sets the functions for a value in a field of the model.
     #[doc(hidden)]
-    pub const fn stored(mut self, read: Read<M>, store: Store<M>, plain: bool) -> Self {
+    pub const fn stored(mut self, shape: Shape, read: Read<M>, store: Store<M>, plain: bool) -> Self {
         self.plain = plain;
         self.store = Some(store);
-        self.read_by(read)
+        self.read_by(shape, read)
     }
 
     /// Called by the macro; sets the functions for a value that is calculated.
     #[doc(hidden)]
-    pub const fn read_by(mut self, read: Read<M>) -> Self {
-        if let Some(Read { shape: Shape { dimensions, .. }, .. }) = &self.read
-            && !dimensions.is(&read.shape.dimensions)
-        {
-            self.rejected = Some("what in and by give must be arrays of the same length");
+    pub const fn read_by(mut self, shape: Shape, mut read: Read<M>) -> Self {
+        if shape.base as u8 != self.base as u8 {
+            self.rejected = Some(wrong_type(self.base));
+        } else if self.read.is_some() && !self.dimensions.is(&shape.dimensions) {
+            self.rejected = Some("the values of in and by must have equal dimensions");
+        }
+        self.dimensions = shape.dimensions;
+        if self.dimensions.is_scalar() {
+            read.reals = None;
         }
         self.read = Some(read);
-        self.dimensions = read.shape.dimensions;
         self
     }
 
@@ -372,12 +375,10 @@ impl<M> Variable<M> {
             return self.rejected;
         }
         if self.description.is_empty() {
-            return Some("say in a comment above it (///) what it is");
+            return Some("add a description: a comment (///) above the line");
         }
         if !legal {
-            return Some(
-                "what it is cannot be constant, fixed, tunable or discrete as it is said to be here (section 2.2.7)",
-            );
+            return Some("this causality does not permit this variability (section 2.2.7)");
         }
         let legal = matches!(
             (self.causality, self.variability, self.initial),
@@ -388,7 +389,7 @@ impl<M> Variable<M> {
                 | (CalculatedParameter | Local, Fixed | Tunable, Some(Initial::Calculated | Initial::Approx))
         );
         if !legal {
-            return Some("what it is cannot be exact or approx as it is said to be here (section 2.2.7)");
+            return Some("this causality and variability do not permit this initial value (section 2.2.7)");
         }
         let is_real = matches!(self.of.base(), BaseType::Real);
         if matches!(self.variability, Continuous) && !self.of.base().is_float() {
@@ -407,20 +408,17 @@ impl<M> Variable<M> {
             return Some("only a continuous Real output or local can be a derivative");
         }
         if self.depends_on.is_some() && !matches!(self.causality, Output | Local | CalculatedParameter) {
-            return Some("only what is calculated depends on others");
+            return Some("only calculated variables have dependencies");
         }
         if matches!(self.causality, Independent) && !is_real {
             return Some("the time is a Real");
         }
         match self.read {
             None if !matches!(self.causality, Independent) => {
-                return Some("say where its value lives (in ...) or how it is calculated (by ...)");
+                return Some("name the field of its value (in ...) or its calculation (by ...)");
             }
             Some(_) if matches!(self.causality, Independent) => {
                 return Some("its value is the time: it has neither in nor by");
-            }
-            Some(Read { shape: Shape { base, .. }, .. }) if base as u8 != self.of.base() as u8 => {
-                return Some(wrong_type(self.of.base()));
             }
             _ => {}
         }
@@ -432,7 +430,7 @@ impl<M> Variable<M> {
             || matches!(self.initial, Some(Initial::Exact | Initial::Approx))
                 && !matches!(self.variability, Constant);
         if is_set && self.store.is_none() {
-            return Some("what importers set must live in the model (in ...)");
+            return Some("importers set it, so it needs a field of the model (in ...)");
         }
         None
     }

@@ -55,14 +55,14 @@ fn status_kind(kind: fmi2StatusKind) -> Outcome<StatusKind> {
     StatusKind::from_c(kind).map_or_else(|| reject(format!("there is no fmi2StatusKind {kind}")), Ok)
 }
 
-/// Discards a query that concerns only asynchronous steps, or that another function answers.
+/// Discards a query that concerns only asynchronous steps, or that another function returns.
 fn no_status(kind: StatusKind) -> Outcome {
     discard(match kind {
         StatusKind::DoStepStatus | StatusKind::PendingStatus => {
             "no step is pending: fmi2DoStep works synchronously"
         }
-        StatusKind::LastSuccessfulTime => "fmi2LastSuccessfulTime is a Real: ask fmi2GetRealStatus",
-        StatusKind::Terminated => "fmi2Terminated is a Boolean: ask fmi2GetBooleanStatus",
+        StatusKind::LastSuccessfulTime => "fmi2LastSuccessfulTime is a Real: call fmi2GetRealStatus",
+        StatusKind::Terminated => "fmi2Terminated is a Boolean: call fmi2GetBooleanStatus",
     })
 }
 

@@ -375,12 +375,10 @@ impl<M: 'static> Implicit<M> {
 
     /// Represents any event indicator; the values come from the model.
     const INDICATOR: &'static Variable<M> = &Variable::local(&NUMBER)
-        .read_by(Read {
-            shape: shape_of_calculation(std::marker::PhantomData::<M>, |_| f64::NAN),
-            real: |_, _| f64::NAN,
-            reals: |_, _, _| f64::NAN,
-            value: |_, _| Value::Real(f64::NAN),
-        })
+        .read_by(
+            shape_of_calculation(std::marker::PhantomData::<M>, |_| f64::NAN),
+            Read { real: |_, _| f64::NAN, reals: None, value: |_, _| Value::Real(f64::NAN) },
+        )
         .finished("eventIndicator", "An event happens where it changes its sign");
 }
 

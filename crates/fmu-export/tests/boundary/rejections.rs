@@ -326,7 +326,7 @@ mod drift {
     variables! { for Drift;
         /// Grows
         x = output(&NUMBER).state() in x;
-        /// As fast as this
+        /// Rate
         der_x = local(&NUMBER).derivative_of(x) by |_| 1.0;
     }
 

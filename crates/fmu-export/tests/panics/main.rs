@@ -46,7 +46,7 @@ fn shows_at_once(fault: Fault) -> bool {
     [Fault::Update, Fault::Log].contains(&fault)
 }
 
-/// One test for both standards, because what Rust prints about panics is switched off for the whole process.
+/// One test for both FMI versions, because the messages of Rust about panics are switched off for the whole process.
 #[test]
 fn every_panic_is_contained() {
     contained::<Importer>();
@@ -145,7 +145,7 @@ fn every_panic_of_c_sources_is_contained() {
     std::thread::scope(|scope| (0..4).for_each(|_| _ = scope.spawn(on_a_thread)));
 }
 
-/// What Rust prints about a panic stays out of the test's output.
+/// Runs the work without the messages that Rust prints about panics.
 fn without_output<T>(work: impl FnOnce() -> T) -> T {
     std::panic::set_hook(Box::new(|_| {}));
     let result = work();
