@@ -15,11 +15,11 @@
 //! [`stiffness_sect`](Side::stiffness_sect) and [`damping`](Side::damping). This avoids differences of large
 //! terms and keeps extreme parameters accurate.
 
+use crate::balance::Balance;
 use crate::motor::Motion;
 use crate::number::Number;
 use crate::pair::{PitchRoll, Sides};
 use crate::parameters::{InvalidParameter, Parameters};
-use crate::propagator::Balance;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::{Add, Mul, Sub};
 

@@ -21,7 +21,8 @@
 //! 4. [`motor`]: the motion of a motor between samples of its angle.
 //! 5. [`decoupled`]: the same equations for pitch and roll, the mean and the half difference of the two
 //!    sides. Pitch and roll do not influence each other.
-//! 6. [`propagator`]: the exact solution over one step during which the motors move on straight lines.
+//! 6. [`propagator`]: the exact solution over one step during which the motors move on straight lines; its
+//!    matrices are computed with the scaling of [`balance`].
 //! 7. [`testbed`]: motors and state, advanced from one communication point to the next.
 //! 8. [`instant`]: torques, rates and accelerations at one instant, and their derivatives with respect to the
 //!    parameters.
@@ -48,6 +49,7 @@
 //! # Ok::<(), prw_testbed::parameters::InvalidParameter>(())
 //! ```
 
+pub mod balance;
 mod capabilities;
 pub mod decoupled;
 pub mod energies;

@@ -11,6 +11,7 @@
 //! The form follows from `A [1, 1, 0] + b_angle = 0`. Each step adds an increment to z. So a testbed at rest
 //! stays exactly at rest. Tiny steps lose no precision, although `exp(A h)` is close to 1.
 
+use crate::balance::{Balance, rescaled};
 use crate::decoupled::{Decoupled, Subsystem};
 use crate::number::{Arithmetic, Number, TwoFloat};
 use crate::pair::{Pair, PitchRoll};
@@ -29,7 +30,15 @@ impl<T: Number> Propagator<T> {
     /// Computes the propagator for step size `h` in s.
     pub fn new(system: &Subsystem<T>, h: f64) -> Self {
         let balance = Balance::new(&system.a);
-        balance.propagator(balance.equations(system).propagate(h, balance.doublings(h.log2())))
+        Equations::new(system, balance).propagate(h, balance.doublings(h.log2())).in_rad_per_s(balance)
+    }
+
+    /// Converts a propagator of scaled equations to a velocity in rad/s.
+    fn in_rad_per_s(self, Balance { scale, .. }: Balance) -> Self {
+        Self {
+            growth: rescaled(&self.growth, 1.0 / scale),
+            ramp: Vector3::new(self.ramp.x, self.ramp.y, self.ramp.z * scale.into()),
+        }
     }
 }
 
@@ -39,6 +48,15 @@ struct Equations<T> {
     a: Matrix3<T>,
     b_angle: Vector3<T>,
     b_rate: Vector3<T>,
+}
+
+impl<T: Number> Equations<T> {
+    /// Creates the equations of a subsystem with the velocity in the unit of its balance.
+    fn new(system: &Subsystem<T>, Balance { scale, .. }: Balance) -> Self {
+        let to_scale = |z: Vector3<T>| Vector3::new(z.x, z.y, z.z / scale);
+        let Subsystem { a, b_angle, b_rate, .. } = system;
+        Self { a: rescaled(a, scale), b_angle: to_scale(*b_angle), b_rate: to_scale(*b_rate) }
+    }
 }
 
 impl<T: Arithmetic> Equations<T> {
@@ -72,65 +90,6 @@ impl<T: Arithmetic> Equations<T> {
         }
         Propagator { growth, ramp }
     }
-}
-
-/// The velocity unit in which the series of a subsystem converges best, and the rate of convergence.
-///
-/// Angles and velocities differ in magnitude. With the velocity in this unit, the entries that couple them
-/// have the same magnitude. This makes the norm smaller, and the error of the doublings too. The unit is a
-/// power of 2, so the scaling is exact.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Balance {
-    /// Velocity unit, rad/s.
-    scale: f64,
-    /// Base-2 logarithm of the factor by which a step of 1 s must be divided for the series to converge. The
-    /// logarithm avoids overflow for long steps of stiff systems.
-    halvings: f64,
-}
-
-impl Balance {
-    /// Computes the balance for the state matrix `a`.
-    pub fn new<T: Number>(a: &Matrix3<T>) -> Self {
-        let rounded = a.map(T::rounded);
-        let into_velocity = rounded[(2, 0)].abs().max(rounded[(2, 1)].abs());
-        let from_velocity = rounded[(0, 2)].abs().max(rounded[(1, 2)].abs());
-        let power = (-0.5 * (into_velocity / from_velocity).log2()).round().clamp(-300.0, 300.0) as i32;
-        let scale = 0.5_f64.powi(power);
-        let norm = rescaled(a, scale).map(T::rounded).abs().row_sum().max();
-        Self { scale, halvings: (norm / 0.25).log2() }
-    }
-
-    /// Returns the number of halvings for a step size with this base-2 logarithm.
-    fn doublings(&self, log2_of_h: f64) -> i32 {
-        (self.halvings + log2_of_h).ceil().clamp(0.0, 2100.0) as i32
-    }
-
-    fn equations<T: Number>(&self, system: &Subsystem<T>) -> Equations<T> {
-        let to_scale = |z: Vector3<T>| Vector3::new(z.x, z.y, z.z / self.scale);
-        Equations {
-            a: rescaled(&system.a, self.scale),
-            b_angle: to_scale(system.b_angle),
-            b_rate: to_scale(system.b_rate),
-        }
-    }
-
-    /// Converts a propagator of these scaled equations to a velocity in rad/s.
-    fn propagator<T: Number>(&self, Propagator { growth, ramp }: Propagator<T>) -> Propagator<T> {
-        Propagator {
-            growth: rescaled(&growth, 1.0 / self.scale),
-            ramp: Vector3::new(ramp.x, ramp.y, ramp.z * self.scale.into()),
-        }
-    }
-}
-
-/// Returns the matrix for a velocity in units of `scale`.
-fn rescaled<T: Number>(a: &Matrix3<T>, scale: f64) -> Matrix3<T> {
-    let mut b = *a;
-    b[(2, 0)] = b[(2, 0)] / scale;
-    b[(2, 1)] = b[(2, 1)] / scale;
-    b[(0, 2)] *= scale.into();
-    b[(1, 2)] *= scale.into();
-    b
 }
 
 /// A propagator rounded to `f64`, as used for stepping.
@@ -178,7 +137,7 @@ impl Rounded {
                 return rounded;
             }
         }
-        let [pitch, roll] = [balances[0].equations(pitch), balances[1].equations(roll)];
+        let [pitch, roll] = [Equations::new(pitch, balances[0]), Equations::new(roll, balances[1])];
         let pairs = Equations {
             a: pitch.a.zip_map(&roll.a, Pair::new),
             b_angle: pitch.b_angle.zip_map(&roll.b_angle, Pair::new),
@@ -191,7 +150,7 @@ impl Rounded {
             growth: growth.map(|pair| pair[i]),
             ramp: ramp.map(|pair| pair[i]),
         });
-        [0, 1].map(|i| Self::new(&balances[i].propagator(propagated[i])))
+        [0, 1].map(|i| Self::new(&propagated[i].in_rad_per_s(balances[i])))
     }
 
     fn is_finite(&self) -> bool {

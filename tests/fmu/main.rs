@@ -11,7 +11,6 @@ mod parameters;
 mod robustness;
 mod saved_states;
 mod start;
-mod steps;
 
 use fmu_export::{Interface, Mode, Variable, Variables};
 use fmu_test_kit::{Either, Importer};

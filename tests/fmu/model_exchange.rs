@@ -1,10 +1,8 @@
 //! Model Exchange (section 3.2): eq. (11) for an importer's integrator.
 
-use crate::exact::{INPUTS, STATES, UNKNOWNS, distance, jacobian, parameters, set_parameters, start_at};
-use crate::in_mode;
+use crate::exact::{INPUTS, STATES, UNKNOWNS, distance, jacobian, parameters, set_parameters};
 use crate::{new, vr};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
-use fmu_export::Mode::*;
 use fmu_test_kit::{Either, Random};
 use nalgebra::SVector;
 use prw_testbed::Parameters;
@@ -36,28 +34,6 @@ fn equations() {
             assert_eq!(fmu.states::<6>(), fmu.get(STATES));
         }
     }
-}
-
-#[test]
-fn start_values_are_the_first_states() {
-    let start = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
-    let fmu = in_mode(ModelExchange, Instantiated);
-    start_at(&fmu, start);
-    fmu.initialize(0.0);
-    assert_eq!(fmu.states::<6>(), start);
-    fmu.enter_continuous_time();
-    assert_eq!(fmu.states::<6>(), start);
-}
-
-/// Checks that a state set as a variable and a state set in the array of states have equal effects.
-#[test]
-fn both_ways_to_set_a_state() {
-    let fmu = in_mode(ModelExchange, ContinuousTime);
-    fmu.ok(fmu.set_states([0.0, 0.0, 0.25, 0.0, 0.0, 0.0].as_ptr(), 6));
-    let by_array = (fmu.states::<6>(), fmu.derivatives::<6>());
-    fmu.ok(fmu.set_states([0.0; 6].as_ptr(), 6));
-    fmu.set(&[vr(Name::theta5)], &[0.25]);
-    assert_eq!((fmu.states::<6>(), fmu.derivatives::<6>()), by_array);
 }
 
 /// Returns angles and rates of motors that start smoothly from rest.

@@ -1,12 +1,11 @@
 //! Saved states (section 2.1.8): their content, and rejected states.
 
-use crate::{TABLE, in_mode, vr};
+use crate::{TABLE, in_mode};
 use fmu_export::BaseType;
 use fmu_export::Interface::CoSimulation;
 use fmu_export::Mode::*;
 use fmu_test_kit::Either;
 use fmu_test_kit::serialized::{VALUES, with};
-use prw_testbed::variables::Name;
 use std::ops::Range;
 
 /// Returns the range of a variable's value; the memory of the model follows the last variable.
@@ -15,17 +14,6 @@ fn index_of(vr: u32) -> Range<usize> {
     let length = |base| if base == BaseType::Boolean { 1 } else { 8 };
     let begin = VALUES + stored.map(|variable| length(variable.base())).sum::<usize>();
     begin..begin + 8
-}
-
-/// Checks invalid parameters with a correct checksum.
-#[test]
-fn impossible_parameters() {
-    let fmu = in_mode(CoSimulation, StepComplete);
-    let bytes = fmu.bytes();
-    let j2 = index_of(vr(Name::J2));
-    assert_eq!(bytes[j2.clone()], prw_testbed::Parameters::BUILT_IN.J2.to_le_bytes());
-    let message = fmu.rejected_bytes(&with(bytes, j2, &(-1.0_f64).to_le_bytes()));
-    assert!(message.contains("J2"), "{message}");
 }
 
 /// Checks that impossible numbers of samples are rejected; the number is the first value after the variables.

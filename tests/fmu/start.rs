@@ -1,13 +1,12 @@
 //! Start of the testbed: at rest at the motor angles, for any order of the importer's calls, or in a given
 //! state.
 
-use crate::exact::{INPUTS, STARTS, STATES, distance, start_at};
+use crate::exact::{INPUTS, STATES, distance, start_at};
 use crate::{INTERFACES, in_mode};
 use crate::{new, vr};
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::Status;
-use fmu_export::fmi3::reference;
 use fmu_test_kit::{Either, Importer as Fmu, fmi3};
 use prw_testbed::TestbedFmu;
 use prw_testbed::variables::Name;
@@ -19,55 +18,44 @@ const GIVEN: [f64; 6] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
 
 /// A stage of the calls before the first step.
 type Stage = usize;
-const BEFORE_SETUP: Stage = 0;
-const INSTANTIATED: Stage = 1;
-const INITIALIZING: Stage = 2;
-const INITIALIZED: Stage = 3;
+const INSTANTIATED: Stage = 0;
+const INITIALIZING: Stage = 1;
+const INITIALIZED: Stage = 2;
+const STAGES: [Stage; 3] = [INSTANTIATED, INITIALIZING, INITIALIZED];
 
 /// Makes the importer's calls up to the first step, and calls `act` at each stage.
-fn initialize(fmu: &Fmu, act: impl Fn(Stage)) {
-    act(BEFORE_SETUP);
-    fmu.ok(fmu.fmi2SetupExperiment(0, 0.0, 0.0, 0, 1.0));
+fn initialize<F: Either>(fmu: &F, act: impl Fn(Stage)) {
     act(INSTANTIATED);
-    fmu.ok(fmu.fmi2EnterInitializationMode());
+    fmu.enter_initialization(0.0, None);
     act(INITIALIZING);
-    fmu.ok(fmu.fmi2ExitInitializationMode());
-    act(INITIALIZED);
-}
-
-fn initialize3(fmu: &fmi3::Importer, act: impl Fn(Stage)) {
-    act(BEFORE_SETUP);
-    fmu.ok(fmu.fmi3EnterInitializationMode(0, 0.0, 0.0, 0, 0.0));
-    act(INITIALIZING);
-    fmu.ok(fmu.fmi3ExitInitializationMode());
+    fmu.ok(fmu.exit_initialization_mode());
     act(INITIALIZED);
 }
 
 #[track_caller]
-fn rests(fmu: &Fmu) {
+fn rests(fmu: &impl Either) {
     assert_eq!(fmu.get(STATES), REST);
     assert_eq!(fmu.get([vr(Name::tau1), vr(Name::tau2), vr(Name::der_theta3)]), [0.0; 3]);
 }
 
 /// Checks that the testbed in Co-Simulation stays exactly at rest, because nothing is twisted.
-#[test]
-fn rest_in_co_simulation() {
-    for stages in [vec![BEFORE_SETUP], vec![INSTANTIATED], vec![INITIALIZING], vec![INITIALIZED]] {
-        for use_omega in [0, 1] {
-            let fmu = new(CoSimulation);
-            fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &use_omega));
-            initialize(&fmu, |stage| {
-                if stages.contains(&stage) {
-                    fmu.set(&THETA, &ANGLES);
-                }
-            });
-            rests(&fmu);
-            for i in 0..50 {
+fn rest_in_co_simulation<F: Either>() {
+    for (stage, use_omega) in STAGES.into_iter().flat_map(|stage| [(stage, 0), (stage, 1)]) {
+        let fmu = F::of::<TestbedFmu>(CoSimulation);
+        fmu.ok(fmu.set_boolean(vr(Name::use_omega), use_omega));
+        initialize(&fmu, |now| {
+            if now == stage {
                 fmu.set(&THETA, &ANGLES);
-                fmu.step(f64::from(i) * 0.01, 0.01);
-                rests(&fmu);
             }
+        });
+        rests(&fmu);
+        for i in 0..50 {
+            fmu.set(&THETA, &ANGLES);
+            fmu.step(f64::from(i) * 0.01, 0.01);
+            rests(&fmu);
         }
+        fmu.set(&THETA, &[0.0; 2]);
+        assert_eq!(fmu.get(STATES), REST, "after the start");
     }
 }
 
@@ -101,10 +89,9 @@ fn a_rejected_step_starts_nothing() {
     rests(&fmu);
 }
 
-#[test]
-fn rest_in_model_exchange() {
-    for stage in [BEFORE_SETUP, INSTANTIATED, INITIALIZING, INITIALIZED] {
-        let fmu = new(ModelExchange);
+fn rest_in_model_exchange<F: Either>() {
+    for stage in STAGES {
+        let fmu = F::of::<TestbedFmu>(ModelExchange);
         initialize(&fmu, |now| {
             if now == stage {
                 fmu.set(&THETA, &ANGLES);
@@ -113,16 +100,22 @@ fn rest_in_model_exchange() {
         rests(&fmu);
         fmu.enter_continuous_time();
         rests(&fmu);
-        let mut rates = [f64::NAN; 6];
-        fmu.ok(fmu.fmi2GetDerivatives(rates.as_mut_ptr(), 6));
-        assert_eq!(rates, [0.0; 6]);
+        assert_eq!(fmu.derivatives::<6>(), [0.0; 6]);
         // From here on the importer integrates, whether or not it has set states.
         fmu.set(&THETA, &[0.0; 2]);
         assert_eq!(fmu.get(STATES), REST);
-        fmu.ok(fmu.fmi2EnterEventMode());
+        fmu.ok(fmu.enter_event_mode());
         fmu.set(&THETA, &[1.0; 2]);
         assert_eq!(fmu.get(STATES), REST, "in a later event mode");
     }
+}
+
+#[test]
+fn rest_in_both_versions() {
+    rest_in_co_simulation::<Fmu>();
+    rest_in_co_simulation::<fmi3::Importer>();
+    rest_in_model_exchange::<Fmu>();
+    rest_in_model_exchange::<fmi3::Importer>();
 }
 
 /// OpenModelica sets parameters late, and in Event Mode sets states that it has just read.
@@ -138,8 +131,7 @@ fn late_parameters_and_states_in_event_mode() {
             fmu.set(&[vr(Name::k1)], &[60.0]);
         }
         let expected = if given { GIVEN } else { REST };
-        let mut x = [f64::NAN; 6];
-        fmu.ok(fmu.fmi2GetContinuousStates(x.as_mut_ptr(), 6));
+        let mut x = fmu.states::<6>();
         assert_eq!(x, expected);
         x[4] += 0.25;
         fmu.ok(fmu.fmi2SetContinuousStates(x.as_ptr(), 6));
@@ -154,7 +146,7 @@ fn late_parameters_and_states_in_event_mode() {
 #[test]
 fn a_given_start() {
     for interface in INTERFACES {
-        for stage in [BEFORE_SETUP, INSTANTIATED, INITIALIZING, INITIALIZED] {
+        for stage in STAGES {
             let fmu = new(interface);
             initialize(&fmu, |now| {
                 if now == stage {
@@ -201,45 +193,20 @@ fn saved_and_reset() {
     }
 }
 
-fn get3(fmu: &fmi3::Importer) -> [f64; 6] {
-    fmu.get(STATES)
-}
-
 #[test]
-fn fmi3() {
-    for (interface, stage) in INTERFACES
-        .into_iter()
-        .flat_map(|interface| [BEFORE_SETUP, INITIALIZING, INITIALIZED].map(|s| (interface, s)))
-    {
-        let fmu = fmi3::Importer::of::<TestbedFmu>(interface);
-        initialize3(&fmu, |now| {
-            if now == stage {
-                fmu.set(&THETA, &ANGLES);
-            }
-        });
-        assert_eq!(get3(&fmu), REST, "{interface}");
-        if interface == CoSimulation {
-            fmu.step(0.0, 0.01);
-            assert_eq!(get3(&fmu), REST);
-        } else {
-            fmu.ok(fmu.fmi3EnterContinuousTimeMode());
-        }
-        fmu.set(&THETA, &[0.0; 2]);
-        assert_eq!(get3(&fmu), REST, "{interface}, after the start");
-    }
+fn states_in_event_mode_of_fmi3() {
     // In Event Mode, FMI 3.0 allows setting one state; the other states keep their values.
     let fmu = fmi3::Importer::of::<TestbedFmu>(ModelExchange);
     fmu.set(&THETA, &ANGLES);
-    initialize3(&fmu, |_| {});
+    initialize(&fmu, |_| {});
     fmu.set(&[vr(Name::theta5)], &[9.0]);
     fmu.set(&THETA, &[0.0; 2]);
-    assert_eq!(get3(&fmu), [0.7, -0.4, 9.0, -0.4, 0.0, 0.0]);
+    assert_eq!(fmu.get(STATES), [0.7, -0.4, 9.0, -0.4, 0.0, 0.0]);
     // A given start state applies even if it is set late.
     let fmu = fmi3::Importer::of::<TestbedFmu>(ModelExchange);
-    initialize3(&fmu, |_| {});
-    fmu.ok(fmu.fmi3SetBoolean(&reference(vr(Name::start_at_rest)), 1, &0, 1));
-    fmu.set(&STARTS, &GIVEN);
-    assert_eq!(get3(&fmu), GIVEN);
+    initialize(&fmu, |_| {});
+    start_at(&fmu, GIVEN);
+    assert_eq!(fmu.get(STATES), GIVEN);
 }
 
 /// Checks that the error for setting a state names the variables to set instead.

@@ -1,4 +1,4 @@
-//! Conversion of a model with capabilities to an FMU: [`export_fmu!`](crate::export_fmu).
+//! The capabilities of a model in one trait: [`offer!`](crate::offer).
 
 use crate::capabilities::{Event, Events, Step, StepCompleted, Stepped};
 use crate::model::{Error, Model};
@@ -101,27 +101,6 @@ pub struct ModelExchangeOffer {
     pub indicators: usize,
     /// Whether the importer must report each completed step of the integrator.
     pub step_completed: bool,
-}
-
-/// Exports a [`Model`] with its capabilities as an FMU. The library then contains the functions of FMI 2.0
-/// and of FMI 3.0.
-///
-/// Call it once in `src/lib.rs` of an FMU's crate, which must be a `cdylib`. The symbols belong to the crate
-/// that calls the macro, so several FMU crates can share a workspace.
-///
-/// ```text
-/// export_fmu!(Lag: CoSimulation + ModelExchange);
-/// ```
-#[macro_export]
-macro_rules! export_fmu {
-    ($model:ty : $first:ident $(+ $next:ident)*) => {
-        $crate::offer!($model: $first $(+ $next)*);
-        $crate::symbols!($model);
-
-        #[doc(hidden)]
-        #[allow(non_camel_case_types)]
-        pub type model_of_export_fmu = $model;
-    };
 }
 
 /// Declares the capabilities of a model without exporting C symbols; [`export_fmu!`](crate::export_fmu)

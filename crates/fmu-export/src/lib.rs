@@ -5,14 +5,15 @@
 //! An author writes a [`Model`] with a table of [`variables!`], implements capabilities and calls
 //! [`export_fmu!`]. `instance` contains the checks and effects of each call, without pointers and independent
 //! of the FMI version. `boundary` contains the code that the C functions share. [`fmi2`] and [`fmi3`] contain
-//! the C functions; [`fmi_abi`] contains their types and the tables of allowed calls. All `unsafe` code is in
-//! `boundary`, [`fmi2`] and [`fmi3`]. [`describe`](describe()) returns the library's description of its model
-//! for the program that makes the FMU.
+//! the C functions; [`fmi_abi`] contains their types and the tables of allowed calls. `offsets` reads and writes
+//! fields of a model by their offsets. All `unsafe` code is in these four modules. [`describe`](describe())
+//! returns the library's description of its model for the program that makes the FMU.
 
 mod boundary;
 mod capabilities;
 mod describe;
 mod export;
+mod files;
 pub mod fmi2;
 pub mod fmi3;
 mod info;
@@ -21,6 +22,7 @@ mod integrate;
 mod log;
 mod lookup;
 mod model;
+mod offsets;
 mod saved;
 mod settable;
 mod simulation;
@@ -56,16 +58,16 @@ pub use variable::{Index, Variable};
 
 #[doc(hidden)]
 pub use {
-    boundary::{both_offsets, offset_in, offset_of_real},
     describe::{Receive, pass_description},
     fmi_abi::{fmi2_functions, fmi3_functions},
+    offsets::{both_offsets, offset_in, offset_of_real},
     table::{
         StateOfTable, check_line, count_elements, count_letters, count_states, find_states, spread,
-        spread_names, write_names,
+        write_names,
     },
     value::{Dimensions, visit_enumeration},
     variable::{
-        Read, ReadAt, Shape, Store, StoreAt, read_real, read_real_by, read_reals, read_reals_by, read_value,
-        read_value_by, set_real, set_value, shape_of_calculation, shape_of_field, type_of,
+        Read, Shape, Store, read_real, read_real_by, read_reals, read_reals_by, read_value, read_value_by,
+        set_real, set_value, shape_of_calculation, shape_of_field, type_of,
     },
 };

@@ -153,7 +153,7 @@ impl Setup {
 /// The errors of [`std::fs::read`].
 pub fn read_resource(path: impl AsRef<Path>) -> std::io::Result<Vec<u8>> {
     #[cfg(target_family = "wasm")]
-    let content = crate::boundary::webassembly::read(path.as_ref());
+    let content = crate::files::read(path.as_ref());
     #[cfg(not(target_family = "wasm"))]
     let content = std::fs::read(path);
     content

@@ -50,7 +50,7 @@ impl Saved for String {
     }
 }
 
-macro_rules! whole_numbers {
+macro_rules! integers {
     ($($type:ty)+) => {
         $(impl Saved for $type {
             fn visit(&mut self, visitor: &mut dyn StateVisitor) {
@@ -65,7 +65,7 @@ macro_rules! whole_numbers {
     };
 }
 
-whole_numbers!(i8 i16 i32 i64 isize u8 u16 u32);
+integers!(i8 i16 i32 i64 isize u8 u16 u32);
 
 /// Stored as the `i64` with the same bits.
 impl Saved for u64 {

@@ -1,36 +1,21 @@
-//! The C functions of both FMI versions: the code that all calls share, and the symbols of a library.
+//! The C symbols of a library: [`export_fmu!`](crate::export_fmu).
 
-/// Defines the C functions of an FMI version, generic over the model and under their C names, and a table of
-/// pointers to them.
-macro_rules! c_functions {
-    (
-        $standard:ident $handle:ident
-        without an instance { $($free:ident($($free_argument:ident: $free_type:ty),*) -> $result:ty;)+ }
-        with an instance {
-            $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
-        }
-    ) => {
-        $(
-            #[doc = concat!("`", stringify!($function), "`, for model `M`.")]
-            #[inline]
-            pub unsafe extern "C" fn $function<M: $crate::Exported>(
-                c: $handle
-                $(, $argument: $type)*
-            ) -> fmi_abi::c_types::c_int {
-                // SAFETY: the importer guarantees the contract of this module for the instance and all
-                // arguments.
-                let status = unsafe { $crate::boundary::short::call!($function(c $(, $argument: $type)*)) };
-                status as _
-            }
-        )+
-
-        /// Returns the functions of a model in this program, as an importer loads them from a library.
-        pub fn functions<M: $crate::Exported>() -> Functions {
-            Functions { $($free: $free::<M>,)+ $($function: $function::<M>,)+ }
-        }
+/// Exports a [`Model`](crate::Model) with its capabilities as an FMU. The library then contains the functions of FMI 2.0
+/// and of FMI 3.0.
+///
+/// Call it once in `src/lib.rs` of an FMU's crate, which must be a `cdylib`. The symbols belong to the crate
+/// that calls the macro, so several FMU crates can share a workspace.
+///
+/// ```text
+/// export_fmu!(Lag: CoSimulation + ModelExchange);
+/// ```
+#[macro_export]
+macro_rules! export_fmu {
+    ($model:ty : $first:ident $(+ $next:ident)*) => {
+        $crate::offer!($model: $first $(+ $next)*);
+        $crate::symbols!($model);
     };
 }
-pub(crate) use c_functions;
 
 /// Defines the symbols of the library for a model: the functions of both FMI versions, and the function that
 /// describes the model to fmu-package.

@@ -1,7 +1,7 @@
 //! The table of variables: [`variables!`](crate::variables) and the code that it generates.
 
 use crate::saved::StateVisitor;
-use crate::variable::{Index, Variable, reject};
+use crate::variable::{Index, Letters, Read, Variable, reject};
 use std::fmt::Debug;
 use std::mem::MaybeUninit;
 
@@ -22,7 +22,8 @@ pub unsafe trait Variables: Sized + 'static {
     /// reference in FMI 2.0.
     const TABLE: &'static [Variable<Self>];
 
-    /// Names of the variables, in the order of `TABLE`; all elements of an array have the same name.
+    /// Names of the lines.
+    #[doc(hidden)]
     const NAMES: &'static [Self::Name];
 
     /// Indices of the states and of their derivatives in the table, sorted by the index of the state.
@@ -35,16 +36,19 @@ pub unsafe trait Variables: Sized + 'static {
 
     /// Returns the index of a variable in the table; for an array, the index of its first element.
     fn index(name: Self::Name) -> usize {
-        let index = Self::NAMES.iter().position(|known| *known == name);
-        index.expect("the table has a variable for each name")
+        let line = Self::NAMES.iter().position(|known| *known == name);
+        index_of(Self::LINES, line.expect("the table has a line for each name"))
     }
 
     /// Returns the name of the variable at an index of the table, and the number of the element.
     #[doc(hidden)]
     #[inline]
     fn element(index: u32) -> (Self::Name, usize) {
-        let number = if Self::ARRAYS { Self::TABLE[index as usize].element() } else { 0 };
-        (Self::NAMES[index as usize], number)
+        if !Self::ARRAYS {
+            return (Self::NAMES[index as usize], 0);
+        }
+        let variable = &Self::TABLE[index as usize];
+        (Self::NAMES[variable.line as usize], variable.element())
     }
 
     /// Returns the offset of the `f64` that holds the value of a line, or `without` if reading needs a
@@ -86,31 +90,29 @@ impl<M: Variables> Variable<M> {
     /// Returns the value of a Real; `None` for the time.
     #[inline]
     pub(crate) fn real(&self, model: &M) -> Option<f64> {
-        if M::ARRAYS && self.read_at.is_some() {
-            return self.value(model).map(|value| value.real());
-        }
-        self.read.as_ref().map(|read| (read.real)(model))
+        self.read.as_ref().map(|read| (read.real)(model, self.number()))
     }
 
     /// Reads the scalar, or elements of the array from this element on, as many as `values` holds. Returns 0
     /// if all values are finite.
     pub(crate) fn reals(&self, model: &M, time: f64, values: &mut [MaybeUninit<f64>]) -> f64 {
-        if let Some(read) = &self.read_at {
-            return (read.reals)(model, self.element(), values);
+        if let Some(Read { reals: Some(reals), .. }) = self.read {
+            return reals(model, self.number(), values);
         }
         values.iter_mut().map(|value| *value.write(self.real(model).unwrap_or(time)) * 0.0).sum()
     }
 
     #[inline]
     pub(crate) fn set_real(&self, model: &mut M, value: f64) {
-        if M::ARRAYS
-            && let Some(store) = &self.store_at
-        {
-            return (store.real)(model, self.element(), value);
-        }
         if let Some(store) = &self.store {
-            (store.real)(model, value);
+            (store.real)(model, self.number(), value);
         }
+    }
+
+    /// Returns the number of the element; a constant for models without arrays.
+    #[inline(always)]
+    fn number(&self) -> usize {
+        if M::ARRAYS { self.element() } else { 0 }
     }
 }
 
@@ -160,7 +162,7 @@ pub const fn count_letters<M>(lines: &[Variable<M>]) -> usize {
     while line < lines.len() {
         let mut element = 0;
         while is_array(&lines[line]) && element < lines[line].length() {
-            count += NameOfElement::new(&lines[line], element).length;
+            count += name_of_element(&lines[line], element).bytes().len();
             element += 1;
         }
         line += 1;
@@ -176,10 +178,10 @@ pub const fn write_names<M, const LETTERS: usize>(lines: &[Variable<M>]) -> [u8;
     while line < lines.len() {
         let mut element = 0;
         while is_array(&lines[line]) && element < lines[line].length() {
-            let name = NameOfElement::new(&lines[line], element);
+            let name = name_of_element(&lines[line], element);
             let mut index = 0;
-            while index < name.length {
-                letters[written] = name.letters[index];
+            while index < name.bytes().len() {
+                letters[written] = name.bytes()[index];
                 written += 1;
                 index += 1;
             }
@@ -190,52 +192,34 @@ pub const fn write_names<M, const LETTERS: usize>(lines: &[Variable<M>]) -> [u8;
     letters
 }
 
-/// The name of an array element: the name of the array with indices that count from 1 (section 2.2.9 of FMI
-/// 2.0). Indices follow the variable, as in `der(T[3])`.
-struct NameOfElement {
-    letters: [u8; 300],
-    length: usize,
+/// Returns the name of an array element: the name of the array with indices that count from 1 (section 2.2.9 of
+/// FMI 2.0). Indices follow the variable, as in `der(T[3])`.
+const fn name_of_element<M>(array: &Variable<M>, element: usize) -> Letters {
+    let name = array.name_of_array().as_bytes();
+    let is_derivative = matches!(name, [b'd', b'e', b'r', b'(', ..]);
+    let mut end = 0;
+    while end < name.len() && !(is_derivative && matches!(name[end], b',' | b')')) {
+        end += 1;
+    }
+    let mut written = Letters::new().with(name.split_at(end).0);
+    let sizes = array.dimensions();
+    let mut direction = 0;
+    while direction < sizes.len() {
+        let (mut row, mut inner) = (1, direction + 1);
+        while inner < sizes.len() {
+            row *= sizes[inner];
+            inner += 1;
+        }
+        written = written.with(if direction == 0 { b"[" } else { b"," });
+        written = with_number(written, element / row % sizes[direction] + 1);
+        direction += 1;
+    }
+    written.with(b"]").with(name.split_at(end).1)
 }
 
-impl NameOfElement {
-    const fn new<M>(array: &Variable<M>, element: usize) -> Self {
-        let name = array.name_of_array().as_bytes();
-        let is_derivative = matches!(name, [b'd', b'e', b'r', b'(', ..]);
-        let mut end = 0;
-        while end < name.len() && !(is_derivative && matches!(name[end], b',' | b')')) {
-            end += 1;
-        }
-        let mut written = Self { letters: [0; 300], length: 0 }.with(name.split_at(end).0);
-        let sizes = array.dimensions();
-        let mut direction = 0;
-        while direction < sizes.len() {
-            let (mut row, mut inner) = (1, direction + 1);
-            while inner < sizes.len() {
-                row *= sizes[inner];
-                inner += 1;
-            }
-            written = written.with(if direction == 0 { b"[" } else { b"," });
-            written = written.with_number(element / row % sizes[direction] + 1);
-            direction += 1;
-        }
-        written.with(b"]").with(name.split_at(end).1)
-    }
-
-    const fn with(mut self, text: &[u8]) -> Self {
-        let mut index = 0;
-        while index < text.len() {
-            assert!(self.length < self.letters.len(), "the name of an array is too long");
-            self.letters[self.length] = text[index];
-            self.length += 1;
-            index += 1;
-        }
-        self
-    }
-
-    const fn with_number(self, number: usize) -> Self {
-        let written = if number < 10 { self } else { self.with_number(number / 10) };
-        written.with(&[b'0' + (number % 10) as u8])
-    }
+const fn with_number(letters: Letters, number: usize) -> Letters {
+    let written = if number < 10 { letters } else { with_number(letters, number / 10) };
+    written.with(&[b'0' + (number % 10) as u8])
 }
 
 /// Returns the table of variables; the names of array elements are slices of the result of [`write_names`].
@@ -255,7 +239,7 @@ pub const fn spread<M, const COUNT: usize>(
         let mut element = 0;
         while element < of.length() {
             let name = if is_array(of) {
-                let (name, rest) = letters.split_at(NameOfElement::new(of, element).length);
+                let (name, rest) = letters.split_at(name_of_element(of, element).bytes().len());
                 letters = rest;
                 match std::str::from_utf8(name) {
                     Ok(name) => name,
@@ -274,23 +258,6 @@ pub const fn spread<M, const COUNT: usize>(
         line += 1;
     }
     table
-}
-
-/// Returns the names of the lines, each repeated once per element.
-#[doc(hidden)]
-pub const fn spread_names<M, N: Copy, const COUNT: usize>(lines: &[Variable<M>], names: &[N]) -> [N; COUNT] {
-    let mut spread = [names[0]; COUNT];
-    let (mut index, mut line) = (0, 0);
-    while line < lines.len() {
-        let mut element = 0;
-        while element < lines[line].length() {
-            spread[index] = names[line];
-            index += 1;
-            element += 1;
-        }
-        line += 1;
-    }
-    spread
 }
 
 /// Returns the number of states in a table.
@@ -358,7 +325,7 @@ pub const fn check_line<M>(lines: &[Variable<M>], Index(line): Index) {
     if let Some(differentiated) = of.differentiates()
         && !of.has_dimensions(&lines[differentiated as usize])
     {
-        reject(of.name(), "it must be an array of the same length as what it is the derivative of");
+        reject(of.name(), "a derivative must have the dimensions of its state");
     }
 }
 
@@ -376,8 +343,7 @@ const fn is_element<M>(one: &Variable<M>, array: &Variable<M>) -> bool {
     }
     let mut element = 0;
     while has_index && is_array(array) && element < array.length() {
-        let of = NameOfElement::new(array, element);
-        if is_equal(name, of.letters.split_at(of.length).0) {
+        if is_equal(name, name_of_element(array, element).bytes()) {
             return true;
         }
         element += 1;
@@ -518,47 +484,23 @@ macro_rules! variables {
                     $( #[allow(dead_code)] fn $first() {} )?
                     $(
                         let variable = variable.stored(
+                            match |model: &$model| $crate::type_of(
+                                &(*model).$first $([$at])* $( .$field $([$index])* )*
+                            ) {
+                                $first => $crate::shape_of_field($first),
+                            },
                             $crate::Read {
-                                shape: match |model: &$model| $crate::type_of(
-                                    &(*model).$first $([$at])* $( .$field $([$index])* )*
-                                ) {
-                                    $first => $crate::shape_of_field($first),
+                                real: |model, number| match &(*model).$first $([$at])* $( .$field $([$index])* )* {
+                                    $first => $crate::read_real($first, number),
                                 },
-                                real: |model| match &(*model).$first $([$at])* $( .$field $([$index])* )* {
-                                    $first => $crate::read_real($first, 0),
-                                },
-                                value: |model| match &(*model).$first $([$at])* $( .$field $([$index])* )* {
-                                    $first => $crate::read_value($first, 0),
-                                },
-                            },
-                            $crate::Store {
-                                real: |model, value| {
-                                    match &mut (*model).$first $([$at])* $( .$field $([$index])* )* {
-                                        $first => $crate::set_real($first, 0, value),
-                                    }
-                                    $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_index])* )* = true; )?
-                                    $( { let $changed = model; $after } )?
-                                },
-                                value: |model, value| {
-                                    match &mut (*model).$first $([$at])* $( .$field $([$index])* )* {
-                                        $first => $crate::set_value($first, 0, value),
-                                    }
-                                    $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_index])* )* = true; )?
-                                    $( { let $changed = model; $after } )?
-                                },
-                                visit: |model, visitor| match &mut (*model).$first $([$at])* $( .$field $([$index])* )* {
-                                    $first => $crate::Saved::visit($first, visitor),
-                                },
-                            },
-                            $crate::ReadAt {
-                                reals: |model, from, values| match &(*model).$first $([$at])* $( .$field $([$index])* )* {
+                                reals: ::core::option::Option::Some(|model, from, values| match &(*model).$first $([$at])* $( .$field $([$index])* )* {
                                     $first => $crate::read_reals($first, from, values),
-                                },
+                                }),
                                 value: |model, number| match &(*model).$first $([$at])* $( .$field $([$index])* )* {
                                     $first => $crate::read_value($first, number),
                                 },
                             },
-                            $crate::StoreAt {
+                            $crate::Store {
                                 real: |model, number, value| {
                                     match &mut (*model).$first $([$at])* $( .$field $([$index])* )* {
                                         $first => $crate::set_real($first, number, value),
@@ -572,6 +514,9 @@ macro_rules! variables {
                                     }
                                     $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_index])* )* = true; )?
                                     $( { let $changed = model; $after } )?
+                                },
+                                visit: |model, visitor| match &mut (*model).$first $([$at])* $( .$field $([$index])* )* {
+                                    $first => $crate::Saved::visit($first, visitor),
                                 },
                             },
                             true $( & $crate::variables!(@instead_of $after false) )?,
@@ -601,12 +546,7 @@ macro_rules! variables {
                     &TABLE
                 };
 
-                const NAMES: &'static [Self::Name] = {
-                    const LINES: &[$crate::Variable<$model>] = <$model as $crate::Variables>::LINES;
-                    const NAMES: [<$model as $crate::Variables>::Name; $crate::count_elements(LINES)] =
-                        $crate::spread_names(LINES, &[$(<<$model as $crate::Variables>::Name>::$name),+]);
-                    &NAMES
-                };
+                const NAMES: &'static [Self::Name] = &[$(<<$model as $crate::Variables>::Name>::$name),+];
 
                 #[allow(long_running_const_eval)]
                 const STATES: &'static [$crate::StateOfTable] = {
@@ -697,13 +637,12 @@ macro_rules! variables {
     (@instead_of $before:tt $instead:expr) => { $instead };
     (@calculated $variable:ident $model:ty, $calculate:expr) => {
         $variable.read_by(
+            $crate::shape_of_calculation(::core::marker::PhantomData::<$model>, $calculate),
             $crate::Read {
-                shape: $crate::shape_of_calculation(::core::marker::PhantomData::<$model>, $calculate),
-                real: |model| $crate::read_real_by(model, $calculate, 0),
-                value: |model| $crate::read_value_by(model, $calculate, 0),
-            },
-            $crate::ReadAt {
-                reals: |model, first, values| $crate::read_reals_by(model, $calculate, first, values),
+                real: |model, number| $crate::read_real_by(model, $calculate, number),
+                reals: ::core::option::Option::Some(|model, first, values| {
+                    $crate::read_reals_by(model, $calculate, first, values)
+                }),
                 value: |model, number| $crate::read_value_by(model, $calculate, number),
             },
         )

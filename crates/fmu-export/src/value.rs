@@ -43,7 +43,7 @@ pub trait Scalar: Saved {
 #[diagnostic::on_unimplemented(
     message = "no variable can have a value of the type `{Self}`",
     label = "the type is `{Self}`",
-    note = "values are f64, f32, whole numbers from i8 to u64, bool, String, Vec<u8>, enums made by enumeration!, and \
+    note = "values are f64, f32, integers from i8 to u64, bool, String, Vec<u8>, enums made by enumeration!, and \
             arrays of them, such as [f64; 8]"
 )]
 pub trait Place: Saved {
@@ -209,7 +209,7 @@ impl Scalar for f32 {
     }
 }
 
-macro_rules! whole_number {
+macro_rules! integers {
     ($($type:ty: $kind:ident;)+) => {
         $(impl Scalar for $type {
             const BASE: BaseType = BaseType::$kind;
@@ -229,7 +229,7 @@ macro_rules! whole_number {
     };
 }
 
-whole_number! {
+integers! {
     i8: Int8;
     u8: UInt8;
     i16: Int16;
@@ -335,61 +335,4 @@ macro_rules! enumeration {
             }
         }
     };
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn values_go_in_and_out() {
-        fn check<T: Scalar + Clone + PartialEq + std::fmt::Debug>(
-            start: T,
-            other: T,
-            value: Value,
-            base: BaseType,
-        ) {
-            assert_eq!((T::BASE, other.value()), (base, value.clone()));
-            let mut index = start.clone();
-            index.assign(&value);
-            assert_eq!(index, other);
-            // A value of another type is ignored.
-            let wrong = if base == BaseType::Boolean { Value::Real(1.0) } else { Value::Boolean(true) };
-            index.assign(&wrong);
-            assert_eq!(index, other);
-        }
-        check(0.0, 1.5, Value::Real(1.5), BaseType::Real);
-        check(0, -7, Value::Integer(-7), BaseType::Integer);
-        check(false, true, Value::Boolean(true), BaseType::Boolean);
-        check(String::new(), "a".to_owned(), Value::String("a".to_owned()), BaseType::String);
-    }
-
-    /// Checks that the direct access to Reals agrees with the general access.
-    #[test]
-    fn reals_without_a_detour() {
-        let mut index = 1.0;
-        index.set_real(2.5);
-        assert_eq!((index.real(), index.value()), (2.5, Value::Real(2.5)));
-        assert!(7_i32.real().is_nan() && true.real().is_nan());
-        let mut whole = 7;
-        whole.set_real(8.0);
-        assert_eq!(whole, 7);
-    }
-
-    /// Checks that strings of values are valid in XML and keep all digits of Reals.
-    #[test]
-    fn texts_of_values() {
-        for (value, text) in [
-            (Value::Real(0.1), "0.1"),
-            (Value::Real(-1e-300), "-1e-300"),
-            (Value::Integer(-3), "-3"),
-            (Value::Boolean(true), "true"),
-            (Value::String("<a>".to_owned()), "<a>"),
-        ] {
-            assert!(value.to_string().starts_with(text), "{value}");
-        }
-        for value in [0.1, 1e300, f64::MIN_POSITIVE, 5e-324, -1.0 / 3.0] {
-            assert_eq!(Value::Real(value).to_string().parse(), Ok(value));
-        }
-    }
 }

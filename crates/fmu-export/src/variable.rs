@@ -53,9 +53,6 @@ pub struct Variable<M> {
     plain: bool,
     pub(crate) read: Option<Read<M>>,
     pub(crate) store: Option<Store<M>>,
-    /// Access to elements of arrays; `None` for scalars.
-    pub(crate) read_at: Option<ReadAt<M>>,
-    pub(crate) store_at: Option<StoreAt<M>>,
     /// A fault that is known before the line is complete.
     rejected: Option<&'static str>,
 }
@@ -89,23 +86,22 @@ macro_rules! functions {
 }
 
 functions! {
-    /// Functions that read a value.
-    Read { shape: Shape, real: fn(&M) -> f64, value: fn(&M) -> Value }
-
-    /// Functions that set a value in the model, and visit it for a serialized state. An array is visited as a
-    /// whole.
-    Store {
-        real: fn(&mut M, f64),
-        value: fn(&mut M, &Value),
-        visit: fn(&mut M, &mut dyn StateVisitor)
+    /// Functions that read a value: an element of an array, or element 0 of a scalar. `reals` fills the slice,
+    /// starting at an element; it returns 0 if all values are finite. Only arrays have it, because each function
+    /// adds to the size of a library.
+    Read {
+        real: fn(&M, usize) -> f64,
+        reals: Option<fn(&M, usize, &mut [MaybeUninit<f64>]) -> f64>,
+        value: fn(&M, usize) -> Value
     }
 
-    /// Functions that read elements of an array. `reals` fills the slice, starting at an element; it returns
-    /// 0 if all values are finite. `value` reads one element.
-    ReadAt { reals: fn(&M, usize, &mut [MaybeUninit<f64>]) -> f64, value: fn(&M, usize) -> Value }
-
-    /// Functions that set an element of an array in the model.
-    StoreAt { real: fn(&mut M, usize, f64), value: fn(&mut M, usize, &Value) }
+    /// Functions that set an element in the model, and visit the value for a serialized state. An array is
+    /// visited as a whole.
+    Store {
+        real: fn(&mut M, usize, f64),
+        value: fn(&mut M, usize, &Value),
+        visit: fn(&mut M, &mut dyn StateVisitor)
+    }
 }
 
 /// Base type and dimensions of a value.
@@ -140,8 +136,6 @@ impl<M> Variable<M> {
             plain: false,
             read: None,
             store: None,
-            read_at: None,
-            store_at: None,
             rejected: None,
         }
     }
@@ -193,7 +187,7 @@ impl<M> Variable<M> {
     pub const fn clock(of: &'static Type) -> Self {
         let mut variable = Self::local(of);
         variable.rejected = Some(
-            "clocks are not offered, nor is Scheduled Execution: events take their place, see ModelExchange::event \
+            "clocks and Scheduled Execution are not supported; use events, see ModelExchange::event \
              and CoSimulation::EVENTS",
         );
         variable
@@ -204,7 +198,7 @@ impl<M> Variable<M> {
     pub const fn structural_parameter(of: &'static Type) -> Self {
         let mut variable = Self::parameter(of);
         variable.rejected = Some(
-            "structural parameters are not offered: an array has the length that the field has in Rust, as 8 in [f64; 8]",
+            "structural parameters are not supported: an array has the length of its field in Rust, for example 8 in [f64; 8]",
         );
         variable
     }
@@ -310,35 +304,25 @@ impl<M> Variable<M> {
 
     /// Called by the macro; sets the functions for a value in a field of the model.
     #[doc(hidden)]
-    pub const fn stored(
-        mut self,
-        read: Read<M>,
-        store: Store<M>,
-        read_at: ReadAt<M>,
-        store_at: StoreAt<M>,
-        plain: bool,
-    ) -> Self {
+    pub const fn stored(mut self, shape: Shape, read: Read<M>, store: Store<M>, plain: bool) -> Self {
         self.plain = plain;
         self.store = Some(store);
-        if !read.shape.dimensions.is_scalar() {
-            self.store_at = Some(store_at);
-        }
-        self.read_by(read, read_at)
+        self.read_by(shape, read)
     }
 
     /// Called by the macro; sets the functions for a value that is calculated.
     #[doc(hidden)]
-    pub const fn read_by(mut self, read: Read<M>, read_at: ReadAt<M>) -> Self {
-        if let Some(Read { shape: Shape { dimensions, .. }, .. }) = &self.read
-            && !dimensions.is(&read.shape.dimensions)
-        {
-            self.rejected = Some("what in and by give must be arrays of the same length");
+    pub const fn read_by(mut self, shape: Shape, mut read: Read<M>) -> Self {
+        if shape.base as u8 != self.base as u8 {
+            self.rejected = Some(wrong_type(self.base));
+        } else if self.read.is_some() && !self.dimensions.is(&shape.dimensions) {
+            self.rejected = Some("the values of in and by must have equal dimensions");
+        }
+        self.dimensions = shape.dimensions;
+        if self.dimensions.is_scalar() {
+            read.reals = None;
         }
         self.read = Some(read);
-        self.dimensions = read.shape.dimensions;
-        if !self.dimensions.is_scalar() {
-            self.read_at = Some(read_at);
-        }
         self
     }
 
@@ -391,12 +375,10 @@ impl<M> Variable<M> {
             return self.rejected;
         }
         if self.description.is_empty() {
-            return Some("say in a comment above it (///) what it is");
+            return Some("add a description: a comment (///) above the line");
         }
         if !legal {
-            return Some(
-                "what it is cannot be constant, fixed, tunable or discrete as it is said to be here (section 2.2.7)",
-            );
+            return Some("this causality does not permit this variability (section 2.2.7)");
         }
         let legal = matches!(
             (self.causality, self.variability, self.initial),
@@ -407,7 +389,7 @@ impl<M> Variable<M> {
                 | (CalculatedParameter | Local, Fixed | Tunable, Some(Initial::Calculated | Initial::Approx))
         );
         if !legal {
-            return Some("what it is cannot be exact or approx as it is said to be here (section 2.2.7)");
+            return Some("this causality and variability do not permit this initial value (section 2.2.7)");
         }
         let is_real = matches!(self.of.base(), BaseType::Real);
         if matches!(self.variability, Continuous) && !self.of.base().is_float() {
@@ -426,20 +408,17 @@ impl<M> Variable<M> {
             return Some("only a continuous Real output or local can be a derivative");
         }
         if self.depends_on.is_some() && !matches!(self.causality, Output | Local | CalculatedParameter) {
-            return Some("only what is calculated depends on others");
+            return Some("only calculated variables have dependencies");
         }
         if matches!(self.causality, Independent) && !is_real {
             return Some("the time is a Real");
         }
         match self.read {
             None if !matches!(self.causality, Independent) => {
-                return Some("say where its value lives (in ...) or how it is calculated (by ...)");
+                return Some("name the field of its value (in ...) or its calculation (by ...)");
             }
             Some(_) if matches!(self.causality, Independent) => {
                 return Some("its value is the time: it has neither in nor by");
-            }
-            Some(Read { shape: Shape { base, .. }, .. }) if base as u8 != self.of.base() as u8 => {
-                return Some(wrong_type(self.of.base()));
             }
             _ => {}
         }
@@ -451,7 +430,7 @@ impl<M> Variable<M> {
             || matches!(self.initial, Some(Initial::Exact | Initial::Approx))
                 && !matches!(self.variability, Constant);
         if is_set && self.store.is_none() {
-            return Some("what importers set must live in the model (in ...)");
+            return Some("importers set it, so it needs a field of the model (in ...)");
         }
         None
     }
@@ -552,18 +531,13 @@ impl<M> Variable<M> {
 
     /// Returns the value in the model; `None` for the time.
     pub fn value(&self, model: &M) -> Option<Value> {
-        match &self.read_at {
-            Some(read) => Some((read.value)(model, self.element())),
-            None => self.read.map(|read| (read.value)(model)),
-        }
+        self.read.map(|read| (read.value)(model, self.element()))
     }
 
     /// Sets the value in the model without checks. Does nothing for a calculated value.
     pub fn set(&self, model: &mut M, value: &Value) {
-        match (&self.store_at, &self.store) {
-            (Some(store), _) => (store.value)(model, self.element(), value),
-            (None, Some(store)) => (store.value)(model, value),
-            (None, None) => {}
+        if let Some(store) = &self.store {
+            (store.value)(model, self.element(), value);
         }
     }
 
@@ -663,7 +637,12 @@ pub fn read_reals_by<M, T: Place>(
 /// Ends the compilation with a message that contains a variable's name and its fault.
 #[track_caller]
 pub(crate) const fn reject(name: &str, fault: &str) -> ! {
-    panic!("{}", Message::new(name, fault).text())
+    let message =
+        Letters::new().with(b"the variable ").with(name.as_bytes()).with(b": ").with(fault.as_bytes());
+    match std::str::from_utf8(message.bytes()) {
+        Ok(message) => panic!("{}", message),
+        Err(_) => panic!("a name is not UTF-8"),
+    }
 }
 
 /// Returns the message for a value whose Rust type does not match the type of the variable.
@@ -686,31 +665,29 @@ const fn wrong_type(base: BaseType) -> &'static str {
     }
 }
 
-/// Message of [`refuse`], built at compile time.
-struct Message {
+/// A string that is built at compile time: the name of an array element, or a message.
+pub(crate) struct Letters {
     bytes: [u8; 400],
     length: usize,
 }
 
-impl Message {
-    const fn new(name: &str, fault: &str) -> Self {
-        Self { bytes: [0; 400], length: 0 }.with("the variable ").with(name).with(": ").with(fault)
+impl Letters {
+    pub const fn new() -> Self {
+        Self { bytes: [0; 400], length: 0 }
     }
 
-    const fn with(mut self, text: &str) -> Self {
+    pub const fn with(mut self, text: &[u8]) -> Self {
         let mut index = 0;
-        while index < text.len() && self.length < self.bytes.len() {
-            self.bytes[self.length] = text.as_bytes()[index];
+        while index < text.len() {
+            assert!(self.length < self.bytes.len(), "the name of a variable is too long");
+            self.bytes[self.length] = text[index];
             self.length += 1;
             index += 1;
         }
         self
     }
 
-    const fn text(&self) -> &str {
-        match std::str::from_utf8(self.bytes.split_at(self.length).0) {
-            Ok(text) => text,
-            Err(_) => "a variable whose name is very long cannot be what it is said to be",
-        }
+    pub const fn bytes(&self) -> &[u8] {
+        self.bytes.split_at(self.length).0
     }
 }

@@ -10,7 +10,7 @@
 
 use fmu_export as fmi;
 
-/// A status of the author's own.
+/// A status of the author.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Status {
     #[default]
@@ -63,15 +63,15 @@ struct Idler {
 }
 
 fmi::variables! { for Idler, memory in model;
-    /// What is called like an argument of the macro's own
+    /// Named like an argument of the macro
     model = input(&fmi::NUMBER) in variable then |variable| { variable.model += 1.0; };
-    /// And like a variable
+    /// Named like a variable
     variable = output(&fmi::NUMBER).state() in variable;
-    /// Like what the crate has
+    /// Named like an item of the crate
     Status = local(&fmi::NUMBER).derivative_of(variable).depends_on(&[model]) by |model| model.model;
-    /// Like the macro's own item
+    /// Named like an item of the macro
     Name = output(&fmi::NUMBER) by |value| value.variable;
-    /// Like a constant of Rust
+    /// Named like a constant of Rust
     COUNT = output(&fmi::NUMBER) by |_| 0.0;
 }
 

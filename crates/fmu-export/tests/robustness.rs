@@ -15,10 +15,10 @@ macro_rules! models {
 }
 
 const MODELS: &[(&str, RunBytes)] =
-    models!(Importer: Oscillator Ball Counter Talker Sum Fuse Lazy Motor Rod Meter);
+    models!(Importer: Oscillator Ball Counter Talker Fuse Lazy Motor Rod Meter);
 
 const MODELS_OF_FMI3: &[(&str, RunBytes)] =
-    models!(fmi3::Importer: Oscillator Ball Counter Talker Sum Fuse Ticker Palette Motor Rod Meter);
+    models!(fmi3::Importer: Oscillator Ball Counter Talker Fuse Ticker Palette Motor Rod Meter);
 
 /// Functions that never succeed: steps are synchronous, and no model has clocks or structural parameters.
 const NEVER: &str = "fmi2CancelStep fmi2GetStatus fmi2GetIntegerStatus fmi2GetStringStatus fmi3GetClock \

@@ -11,10 +11,8 @@ use std::ptr::null_mut;
 /// Defines a test of both FMI versions for each check of a model.
 #[macro_export]
 macro_rules! every_check {
-    ($model:ty) => {
-        $crate::every_check! { $model: random_contents_break_nothing steps_of_any_size }
-    };
-    ($model:ty: $($check:ident)*) => {
+    ($model:ty) => { $crate::every_check! { @each $model: random_contents_break_nothing steps_of_any_size } };
+    (@each $model:ty: $($check:ident)*) => {
         $(#[test] fn $check() {
             $crate::checks::$check::<$crate::Importer, $model>();
             $crate::checks::$check::<$crate::fmi3::Importer, $model>();

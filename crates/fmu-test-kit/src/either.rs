@@ -24,35 +24,119 @@ pub(crate) fn truth(flag: i32) -> bool {
     flag == 1
 }
 
-/// Declares the functions that differ only in their names.
-macro_rules! same {
-    ($($name:ident $fmi2:ident $fmi3:ident ($($argument:ident: $type:ty),*);)+) => {
-        $(#[allow(missing_docs, reason = "named like the functions")] fn $name(&self $(, $argument: $type)*) -> Status;)+
+/// Declares the methods whose functions differ only in names and in types, or implements them for an FMI version.
+macro_rules! methods {
+    ($version:ident) => {
+        $crate::either::methods! { @$version
+            calls {
+                exit_initialization_mode fmi2ExitInitializationMode fmi3ExitInitializationMode ();
+                terminate fmi2Terminate fmi3Terminate ();
+                reset fmi2Reset fmi3Reset ();
+                get_state fmi2GetFMUstate fmi3GetFMUState (state: *mut *mut c_void);
+                set_state fmi2SetFMUstate fmi3SetFMUState (state: *mut c_void);
+                free_state fmi2FreeFMUstate fmi3FreeFMUState (state: *mut *mut c_void);
+                state_size fmi2SerializedFMUstateSize fmi3SerializedFMUStateSize (state: *mut c_void, size: *mut usize);
+                enter_event_mode fmi2EnterEventMode fmi3EnterEventMode ();
+                enter_continuous_time_mode fmi2EnterContinuousTimeMode fmi3EnterContinuousTimeMode ();
+                set_time fmi2SetTime fmi3SetTime (time: f64);
+                set_states fmi2SetContinuousStates fmi3SetContinuousStates (x: *const f64, count: usize);
+                get_states fmi2GetContinuousStates fmi3GetContinuousStates (x: *mut f64, count: usize);
+                get_derivatives fmi2GetDerivatives fmi3GetContinuousStateDerivatives (rates: *mut f64, count: usize);
+                get_nominals fmi2GetNominalsOfContinuousStates fmi3GetNominalsOfContinuousStates
+                    (nominals: *mut f64, count: usize);
+                get_indicators fmi2GetEventIndicators fmi3GetEventIndicators (indicators: *mut f64, count: usize);
+            }
+            values {
+                set_integer fmi2SetInteger fmi3SetInt32, get_integer fmi2GetInteger fmi3GetInt32: i32;
+                set_boolean fmi2SetBoolean fmi3SetBoolean, get_boolean fmi2GetBoolean fmi3GetBoolean: u8;
+                set_text fmi2SetString fmi3SetString, get_text fmi2GetString fmi3GetString: *const c_char;
+                set_item fmi2SetInteger fmi3SetInt64, get_item fmi2GetInteger fmi3GetInt64: i32;
+            }
+        }
     };
-}
-/// Passes the list of these functions to another macro.
-macro_rules! same_functions {
-    ($with:ident) => {
-        $with! {
-            exit_initialization_mode fmi2ExitInitializationMode fmi3ExitInitializationMode ();
-            terminate fmi2Terminate fmi3Terminate ();
-            reset fmi2Reset fmi3Reset ();
-            get_state fmi2GetFMUstate fmi3GetFMUState (state: *mut *mut c_void);
-            set_state fmi2SetFMUstate fmi3SetFMUState (state: *mut c_void);
-            free_state fmi2FreeFMUstate fmi3FreeFMUState (state: *mut *mut c_void);
-            state_size fmi2SerializedFMUstateSize fmi3SerializedFMUStateSize (state: *mut c_void, size: *mut usize);
-            enter_event_mode fmi2EnterEventMode fmi3EnterEventMode ();
-            enter_continuous_time_mode fmi2EnterContinuousTimeMode fmi3EnterContinuousTimeMode ();
-            set_time fmi2SetTime fmi3SetTime (time: f64);
-            set_states fmi2SetContinuousStates fmi3SetContinuousStates (x: *const f64, count: usize);
-            get_states fmi2GetContinuousStates fmi3GetContinuousStates (x: *mut f64, count: usize);
-            get_derivatives fmi2GetDerivatives fmi3GetContinuousStateDerivatives (rates: *mut f64, count: usize);
-            get_nominals fmi2GetNominalsOfContinuousStates fmi3GetNominalsOfContinuousStates (nominals: *mut f64, count: usize);
-            get_indicators fmi2GetEventIndicators fmi3GetEventIndicators (indicators: *mut f64, count: usize);
+    (
+        @declare
+        calls { $($name:ident $fmi2:ident $fmi3:ident ($($argument:ident: $type:ty),*);)+ }
+        values { $($set:ident $set2:ident $set3:ident, $get:ident $get2:ident $get3:ident: $value:ty;)+ }
+    ) => {
+        $(
+            #[doc = concat!("Calls `", stringify!($fmi2), "` or `", stringify!($fmi3), "`.")]
+            fn $name(&self $(, $argument: $type)*) -> Status;
+        )+
+        $(
+            #[doc = concat!("Calls `", stringify!($set2), "` or `", stringify!($set3), "` for one variable.")]
+            fn $set(&self, index: u32, value: $value) -> Status;
+            #[doc = concat!("Calls `", stringify!($get2), "` or `", stringify!($get3), "` for one variable.")]
+            fn $get(&self, index: u32, value: &mut $value) -> Status;
+        )+
+    };
+    (
+        @fmi2
+        calls { $($name:ident $fmi2:ident $fmi3:ident ($($argument:ident: $type:ty),*);)+ }
+        values { $($set:ident $set2:ident $set3:ident, $get:ident $get2:ident $get3:ident: $value:ty;)+ }
+    ) => {
+        $crate::either::methods! { @implement
+            $($name $fmi2 ($($argument: $type),*);)+ | $($set $set2, $get $get2: $value;)+ | []
+        }
+    };
+    (
+        @fmi3
+        calls { $($name:ident $fmi2:ident $fmi3:ident ($($argument:ident: $type:ty),*);)+ }
+        values { $($set:ident $set2:ident $set3:ident, $get:ident $get2:ident $get3:ident: $value:ty;)+ }
+    ) => {
+        $crate::either::methods! { @implement
+            $($name $fmi3 ($($argument: $type),*);)+ | $($set $set3, $get $get3: $value;)+ | [1]
+        }
+    };
+    (
+        @implement
+        $($name:ident $call:ident ($($argument:ident: $type:ty),*);)+ |
+        $($set:ident $setter:ident, $get:ident $getter:ident: $value:ty;)+ | $count:tt
+    ) => {
+        $(fn $name(&self $(, $argument: $type)*) -> Status { self.$call($($argument),*) })+
+        $($crate::either::methods! { @value $set $setter, $get $getter: $value, $count })+
+
+        fn functions() -> &'static [&'static str] {
+            FUNCTIONS
+        }
+
+        fn make<M: Exported>(arguments: &Arguments) -> Result<Self, Vec<Message>> {
+            Self::instantiate(functions_of::<M>(), arguments)
+        }
+
+        fn nothing<M: Exported>() -> Self {
+            Self { functions: functions_of::<M>(), instance: null_mut(), log: Default::default() }
+        }
+
+        unsafe fn call(&self, name: &str, words: &[u64]) -> Status {
+            // SAFETY: the address belongs to the function of this name; the caller guarantees the arguments.
+            Status::from_c(unsafe { calls::call(self.address_of(name), name, self.instance.cast(), words) })
+        }
+
+        fn take_log(&self) -> Vec<Message> {
+            self.log.take()
+        }
+
+        fn on_message(&self, hook: Hook) {
+            *lock(&self.log.hook) = Some(hook);
+        }
+    };
+    (@value $set:ident $setter:ident, $get:ident $getter:ident: $value:ty, [$($count:literal)?]) => {
+        #[allow(clippy::useless_conversion, reason = "some types are equal")]
+        fn $set(&self, index: u32, value: $value) -> Status {
+            self.$setter(&Self::standard().reference(index), 1, &value.into() $(, $count)?)
+        }
+
+        #[allow(clippy::useless_conversion, reason = "some types are equal")]
+        fn $get(&self, index: u32, value: &mut $value) -> Status {
+            let mut found = (*value).into();
+            let status = self.$getter(&Self::standard().reference(index), 1, &mut found $(, $count)?);
+            *value = found.try_into().expect("a small number");
+            status
         }
     };
 }
-pub(crate) use same_functions;
+pub(crate) use methods;
 
 /// An instance of FMI 2.0 or FMI 3.0, as an importer uses it. Variables are given by their indices in the
 /// table.
@@ -68,7 +152,7 @@ pub trait Either: Send {
     where
         Self: Sized;
 
-    same_functions!(same);
+    methods!(declare);
 
     /// Makes an instance of a model in this program.
     ///
@@ -121,30 +205,6 @@ pub trait Either: Send {
     /// Sets up to 16 Reals.
     fn try_set(&self, indices: &[u32], values: &[f64]) -> Status;
 
-    /// Sets an Integer.
-    fn set_integer(&self, index: u32, value: i32) -> Status;
-
-    /// Sets a Boolean.
-    fn set_boolean(&self, index: u32, value: u8) -> Status;
-
-    /// Sets a String.
-    fn set_text(&self, index: u32, value: *const c_char) -> Status;
-
-    /// Sets an Enumeration.
-    fn set_item(&self, index: u32, value: i32) -> Status;
-
-    /// Reads an Integer.
-    fn get_integer(&self, index: u32, value: &mut i32) -> Status;
-
-    /// Reads a Boolean.
-    fn get_boolean(&self, index: u32, value: &mut u8) -> Status;
-
-    /// Reads a String.
-    fn get_text(&self, index: u32, value: &mut *const c_char) -> Status;
-
-    /// Reads an Enumeration.
-    fn get_item(&self, index: u32, value: &mut i32) -> Status;
-
     /// Performs a step.
     fn try_step(&self, point: f64, step_size: f64) -> Status;
 
@@ -180,12 +240,21 @@ pub trait Either: Send {
     /// De-serializes a state.
     fn deserialize(&self, bytes: *const u8, size: usize, state: *mut *mut c_void) -> Status;
 
+    /// Makes an instance of a model in this program, or of the library that `FMU_LIBRARY` names.
+    #[track_caller]
+    fn of<M: Exported>(interface: Interface) -> Self
+    where
+        Self: Sized,
+    {
+        Self::make::<M>(&Arguments::of::<M>(interface)).expect("an instance")
+    }
+
     /// Makes an instance and initializes it at this time.
     fn initialized_at<M: Exported>(start_time: f64) -> Self
     where
         Self: Sized,
     {
-        let fmu = Self::make::<M>(&Arguments::of::<M>(Interface::CoSimulation)).expect("an instance");
+        let fmu = Self::of::<M>(Interface::CoSimulation);
         fmu.initialize(start_time);
         fmu
     }

@@ -1,6 +1,6 @@
 //! FMI 2.0: an instance as an importer uses it.
 
-use crate::either::{self, truth};
+use crate::either::{methods, truth};
 use crate::importer::{Log, importer, lock, remember};
 use crate::{Arguments, Either, Hook, Message, Updated, library::functions_of};
 use fmi_abi::calls;
@@ -92,29 +92,11 @@ impl Importer {
     }
 }
 
-macro_rules! same {
-    ($($name:ident $fmi2:ident $fmi3:ident ($($argument:ident: $type:ty),*);)+) => {
-        $(fn $name(&self $(, $argument: $type)*) -> Status { self.$fmi2($($argument),*) })+
-    };
-}
-
 impl Either for Importer {
-    either::same_functions!(same);
+    methods!(fmi2);
 
     fn standard() -> Standard {
         Standard::Fmi2
-    }
-
-    fn functions() -> &'static [&'static str] {
-        FUNCTIONS
-    }
-
-    fn make<M: Exported>(arguments: &Arguments) -> Result<Self, Vec<Message>> {
-        Self::try_with::<M>(arguments)
-    }
-
-    fn nothing<M: Exported>() -> Self {
-        Self::null::<M>()
     }
 
     fn modes_of(interface: Interface) -> &'static [Mode] {
@@ -126,19 +108,6 @@ impl Either for Importer {
                 &[Instantiated, Initialization, Event, ContinuousTime, Terminated, Error]
             }
         }
-    }
-
-    unsafe fn call(&self, name: &str, words: &[u64]) -> Status {
-        // SAFETY: the address belongs to the function of this name; the caller guarantees the arguments.
-        Status::from_c(unsafe { calls::call(self.address_of(name), name, self.instance.cast(), words) })
-    }
-
-    fn take_log(&self) -> Vec<Message> {
-        self.log.take()
-    }
-
-    fn on_message(&self, hook: Hook) {
-        *lock(&self.log.hook) = Some(hook);
     }
 
     fn enter_initialization_mode(&self, start_time: f64, stop_time: Option<f64>) -> Status {
@@ -157,41 +126,6 @@ impl Either for Importer {
     fn try_set(&self, vr: &[u32], values: &[f64]) -> Status {
         assert_eq!(vr.len(), values.len());
         self.fmi2SetReal(vr.as_ptr(), vr.len(), values.as_ptr())
-    }
-
-    fn set_integer(&self, vr: u32, value: i32) -> Status {
-        self.fmi2SetInteger(&vr, 1, &value)
-    }
-
-    fn set_boolean(&self, vr: u32, value: u8) -> Status {
-        self.fmi2SetBoolean(&vr, 1, &value.into())
-    }
-
-    fn set_text(&self, vr: u32, value: *const c_char) -> Status {
-        self.fmi2SetString(&vr, 1, &value)
-    }
-
-    fn set_item(&self, vr: u32, value: i32) -> Status {
-        self.set_integer(vr, value)
-    }
-
-    fn get_integer(&self, vr: u32, value: &mut i32) -> Status {
-        self.fmi2GetInteger(&vr, 1, value)
-    }
-
-    fn get_boolean(&self, vr: u32, value: &mut u8) -> Status {
-        let mut boolean = (*value).into();
-        let status = self.fmi2GetBoolean(&vr, 1, &mut boolean);
-        *value = boolean.try_into().expect("a Boolean is 0 or 1");
-        status
-    }
-
-    fn get_text(&self, vr: u32, value: &mut *const c_char) -> Status {
-        self.fmi2GetString(&vr, 1, value)
-    }
-
-    fn get_item(&self, vr: u32, value: &mut i32) -> Status {
-        self.get_integer(vr, value)
     }
 
     fn try_step(&self, point: f64, step_size: f64) -> Status {

@@ -1,6 +1,6 @@
 //! FMI 3.0: an instance as an importer uses it.
 
-use crate::either::{self, truth};
+use crate::either::{methods, truth};
 use crate::importer::{Log, importer, lock, remember};
 use crate::{Arguments, Either, Hook, Message, Updated};
 use fmi_abi::calls;
@@ -121,29 +121,11 @@ fn references(indices: &[u32]) -> [u32; 16] {
     references.map(reference)
 }
 
-macro_rules! same {
-    ($($name:ident $fmi2:ident $fmi3:ident ($($argument:ident: $type:ty),*);)+) => {
-        $(fn $name(&self $(, $argument: $type)*) -> Status { self.$fmi3($($argument),*) })+
-    };
-}
-
 impl Either for Importer {
-    either::same_functions!(same);
+    methods!(fmi3);
 
     fn standard() -> Standard {
         Standard::Fmi3
-    }
-
-    fn functions() -> &'static [&'static str] {
-        FUNCTIONS
-    }
-
-    fn make<M: Exported>(arguments: &Arguments) -> Result<Self, Vec<Message>> {
-        Self::try_with::<M>(arguments)
-    }
-
-    fn nothing<M: Exported>() -> Self {
-        Self::null::<M>()
     }
 
     fn modes_of(interface: Interface) -> &'static [Mode] {
@@ -151,19 +133,6 @@ impl Either for Importer {
             Interface::CoSimulation => &[Instantiated, Initialization, Event, StepComplete, Terminated],
             Interface::ModelExchange => &[Instantiated, Initialization, Event, ContinuousTime, Terminated],
         }
-    }
-
-    unsafe fn call(&self, name: &str, words: &[u64]) -> Status {
-        // SAFETY: the address belongs to the function of this name; the caller guarantees the arguments.
-        Status::from_c(unsafe { calls::call(self.address_of(name), name, self.instance.cast(), words) })
-    }
-
-    fn take_log(&self) -> Vec<Message> {
-        self.log.take()
-    }
-
-    fn on_message(&self, hook: Hook) {
-        *lock(&self.log.hook) = Some(hook);
     }
 
     fn enter_initialization_mode(&self, start_time: f64, stop_time: Option<f64>) -> Status {
@@ -183,41 +152,6 @@ impl Either for Importer {
     fn try_set(&self, indices: &[u32], values: &[f64]) -> Status {
         let vr = references(indices);
         self.fmi3SetFloat64(vr.as_ptr(), indices.len(), values.as_ptr(), values.len())
-    }
-
-    fn set_integer(&self, index: u32, value: i32) -> Status {
-        self.fmi3SetInt32(&reference(index), 1, &value, 1)
-    }
-
-    fn set_boolean(&self, index: u32, value: u8) -> Status {
-        self.fmi3SetBoolean(&reference(index), 1, &value, 1)
-    }
-
-    fn set_text(&self, index: u32, value: *const c_char) -> Status {
-        self.fmi3SetString(&reference(index), 1, &value, 1)
-    }
-
-    fn set_item(&self, index: u32, value: i32) -> Status {
-        self.fmi3SetInt64(&reference(index), 1, &value.into(), 1)
-    }
-
-    fn get_integer(&self, index: u32, value: &mut i32) -> Status {
-        self.fmi3GetInt32(&reference(index), 1, value, 1)
-    }
-
-    fn get_boolean(&self, index: u32, value: &mut u8) -> Status {
-        self.fmi3GetBoolean(&reference(index), 1, value, 1)
-    }
-
-    fn get_text(&self, index: u32, value: &mut *const c_char) -> Status {
-        self.fmi3GetString(&reference(index), 1, value, 1)
-    }
-
-    fn get_item(&self, index: u32, value: &mut i32) -> Status {
-        let mut item = (*value).into();
-        let status = self.fmi3GetInt64(&reference(index), 1, &mut item, 1);
-        *value = item.try_into().expect("items are small");
-        status
     }
 
     fn try_step(&self, point: f64, step_size: f64) -> Status {

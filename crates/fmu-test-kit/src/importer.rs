@@ -180,35 +180,6 @@ macro_rules! importer {
                 if instance.is_null() { Err(log.take()) } else { Ok(Self { functions, instance, log }) }
             }
 
-            /// Makes an instance of a model in this program, or of the library that `FMU_LIBRARY` names.
-            ///
-            /// # Panics
-            /// Panics if there is no instance.
-            pub fn of<M: Exported>(interface: Interface) -> Self {
-                Self::with::<M>(&Arguments::of::<M>(interface))
-            }
-
-            /// Makes an instance with these arguments.
-            ///
-            /// # Panics
-            /// Panics if there is no instance.
-            pub fn with<M: Exported>(arguments: &Arguments) -> Self {
-                Self::try_with::<M>(arguments).unwrap_or_else(|log| panic!("there is no instance: {log:?}"))
-            }
-
-            /// Makes an instance with these arguments, or returns an error.
-            ///
-            /// # Errors
-            /// Returns the log messages if there is no instance.
-            pub fn try_with<M: Exported>(arguments: &Arguments) -> Result<Self, Vec<Message>> {
-                Self::instantiate(functions_of::<M>(), arguments)
-            }
-
-            /// Returns a NULL instance, as of an importer that ignored a failed instantiation.
-            pub fn null<M: Exported>() -> Self {
-                Self { functions: functions_of::<M>(), instance: null_mut(), log: std::sync::Arc::default() }
-            }
-
             /// Frees the instance, as an importer might do in a log callback.
             ///
             /// # Safety

@@ -76,7 +76,7 @@ fn steps_of_fmi2() -> Vec<[f64; 6]> {
 fn with(event_mode_used: fmi3Boolean, early_return_allowed: fmi3Boolean) -> fmu_test_kit::fmi3::Importer {
     let arguments =
         Arguments { event_mode_used, early_return_allowed, ..Arguments::of::<Controller>(CoSimulation) };
-    let fmu = fmu_test_kit::fmi3::Importer::with::<Controller>(&arguments);
+    let fmu = fmu_test_kit::fmi3::Importer::make::<Controller>(&arguments).unwrap();
     fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
     fmu.initialize(START);
     fmu

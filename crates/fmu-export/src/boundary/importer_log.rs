@@ -1,9 +1,9 @@
 //! The importer's log callback.
 
-use crate::fmi2::types::fmi2CallbackLogger;
-use crate::fmi3::types::fmi3LogMessageCallback;
 use crate::log::Message;
 use fmi_abi::c_types::c_void;
+use fmi_abi::fmi2::types::fmi2CallbackLogger;
+use fmi_abi::fmi3::types::fmi3LogMessageCallback;
 use std::ffi::CString;
 
 /// The callback in the form of its FMI version.

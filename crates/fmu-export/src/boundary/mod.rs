@@ -1,6 +1,5 @@
 //! The code that the C functions of both FMI versions share: an instance behind a pointer, calls on it, and
-//! the importer's arrays. Also the functions that differ only in their names. Only this module,
-//! [`fmi2`](crate::fmi2) and [`fmi3`](crate::fmi3) contain pointers and `unsafe`.
+//! the importer's arrays. Also the functions that differ only in their names.
 
 mod arrays;
 mod call;
@@ -9,7 +8,6 @@ mod importer_log;
 mod instances;
 pub(crate) mod life_cycle;
 pub(crate) mod model_exchange;
-mod offsets;
 pub(crate) mod short;
 pub(crate) mod states;
 pub(crate) mod values;
@@ -20,8 +18,6 @@ pub(crate) use call::{Component, call, call_at_once, forget_panic, panic_message
 pub(crate) use derivatives::{output_derivatives, partial_derivatives};
 pub(crate) use importer_log::{Callback, ImporterLog};
 pub(crate) use instances::{Arguments, free, instantiate};
-pub(crate) use offsets::Placed;
-pub use offsets::{both_offsets, offset_in, offset_of_real};
 
 use crate::export::Exported;
 use crate::instance::Instance;

@@ -10,8 +10,7 @@
 #![allow(clippy::too_many_arguments, reason = "as many as the standard has")]
 
 use crate::export::Exported;
-use crate::fmi3::FromOne;
-use crate::instance::{Instance, Reference};
+use crate::instance::{FromOne, Instance, Reference};
 use fmi_abi::fmi3::types::fmi3Boolean;
 use std::mem::MaybeUninit;
 
@@ -186,3 +185,35 @@ macro_rules! call {
     ($function:ident $arguments:tt) => { $crate::boundary::short::call!(@body $function $arguments) };
 }
 pub(crate) use call;
+
+/// Defines the C functions of an FMI version, generic over the model and under their C names, and a table of
+/// pointers to them.
+macro_rules! c_functions {
+    (
+        $standard:ident $handle:ident
+        without an instance { $($free:ident($($free_argument:ident: $free_type:ty),*) -> $result:ty;)+ }
+        with an instance {
+            $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
+        }
+    ) => {
+        $(
+            #[doc = concat!("`", stringify!($function), "`, for model `M`.")]
+            #[inline]
+            pub unsafe extern "C" fn $function<M: $crate::Exported>(
+                c: $handle
+                $(, $argument: $type)*
+            ) -> fmi_abi::c_types::c_int {
+                // SAFETY: the importer guarantees the contract of this module for the instance and all
+                // arguments.
+                let status = unsafe { $crate::boundary::short::call!($function(c $(, $argument: $type)*)) };
+                status as _
+            }
+        )+
+
+        /// Returns the functions of a model in this program, as an importer loads them from a library.
+        pub fn functions<M: $crate::Exported>() -> Functions {
+            Functions { $($free: $free::<M>,)+ $($function: $function::<M>,)+ }
+        }
+    };
+}
+pub(crate) use c_functions;

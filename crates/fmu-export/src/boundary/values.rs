@@ -1,6 +1,6 @@
 //! Values of variables in arrays of the importer (section 2.1.7 of FMI 2.0, 2.2.7.2 of FMI 3.0).
 
-use super::{array, output, same, string};
+use super::string;
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, Reference};
 use fmi_abi::BaseType;
@@ -36,17 +36,20 @@ macro_rules! getters_and_setters {
             values: *mut $type
             $(, $value_count: usize)?
         ) -> Outcome {
+            use crate::boundary::{array, of_elements, output, same};
+            use crate::instance::Reference;
             let value_count = [$($value_count,)? count][0];
-            if M::ARRAYS && <$reference as crate::instance::Reference>::ARRAYS {
-                // SAFETY: by contract, arrays of these lengths that do not overlap.
-                return unsafe { crate::boundary::of_elements::<M, $reference>(instance, vr, count, value_count, |instance, vr| {
-                    let values = crate::boundary::output(values, value_count, <$reference as crate::instance::Reference>::VALUES)?;
-                    $get_values(instance, vr, values, &$bases)
-                }) };
-            }
             // SAFETY: by contract, arrays of these lengths that do not overlap.
-            let (vr, values) = unsafe { to_write::<$reference, _>(vr, count, values, value_count) }?;
-            $get_values(instance, vr, values, &$bases)
+            unsafe {
+                if M::ARRAYS && <$reference>::ARRAYS {
+                    return of_elements::<M, $reference>(instance, vr, count, value_count, |instance, vr| {
+                        $get_values(instance, vr, output(values, value_count, <$reference>::VALUES)?, &$bases)
+                    });
+                }
+                same("values", count, value_count)?;
+                let vr: &[$reference] = array(<$reference>::cast(vr), count, <$reference>::REFERENCES)?;
+                $get_values(instance, vr, output(values, value_count, <$reference>::VALUES)?, &$bases)
+            }
         }
 
         #[inline]
@@ -57,54 +60,24 @@ macro_rules! getters_and_setters {
             values: *const $type
             $(, $value_count: usize)?
         ) -> Outcome {
+            use crate::boundary::{array, of_elements, same};
+            use crate::instance::Reference;
             let value_count = [$($value_count,)? count][0];
             // SAFETY: by contract, arrays of these lengths; `char` pointers are strings.
             unsafe {
-                if M::ARRAYS && <$reference as crate::instance::Reference>::ARRAYS {
-                    return crate::boundary::of_elements::<M, $reference>(instance, vr, count, value_count, |instance, vr| {
-                        let values = crate::boundary::array(values, value_count, <$reference as crate::instance::Reference>::VALUES)?;
-                        $set_values(instance, vr, values, &$bases)
+                if M::ARRAYS && <$reference>::ARRAYS {
+                    return of_elements::<M, $reference>(instance, vr, count, value_count, |instance, vr| {
+                        $set_values(instance, vr, array(values, value_count, <$reference>::VALUES)?, &$bases)
                     });
                 }
-                let (vr, values) = to_read::<$reference, _>(vr, count, values, value_count)?;
-                $set_values(instance, vr, values, &$bases)
+                same("values", count, value_count)?;
+                let vr: &[$reference] = array(<$reference>::cast(vr), count, <$reference>::REFERENCES)?;
+                $set_values(instance, vr, array(values, value_count, <$reference>::VALUES)?, &$bases)
             }
         }
     };
 }
 pub(crate) use getters_and_setters;
-
-/// Returns the importer's arrays for a getter.
-///
-/// # Safety
-/// Each is NULL or an array of its length; no other code uses the values during `'a`.
-#[inline]
-pub(crate) unsafe fn to_write<'a, R: Reference, T>(
-    vr: *const u32,
-    count: usize,
-    values: *mut T,
-    value_count: usize,
-) -> Outcome<(&'a [R], &'a mut [MaybeUninit<T>])> {
-    same("values", count, value_count)?;
-    // SAFETY: the caller guarantees the arrays and their lengths.
-    Ok(unsafe { (array(R::cast(vr), count, R::REFERENCES)?, output(values, value_count, R::VALUES)?) })
-}
-
-/// Returns the importer's arrays for a setter.
-///
-/// # Safety
-/// Each is NULL or an array of its length, which does not change during `'a`.
-#[inline]
-pub(crate) unsafe fn to_read<'a, R: Reference, T>(
-    vr: *const u32,
-    count: usize,
-    values: *const T,
-    value_count: usize,
-) -> Outcome<(&'a [R], &'a [T])> {
-    same("values", count, value_count)?;
-    // SAFETY: the caller guarantees the arrays and their lengths.
-    Ok(unsafe { (array(R::cast(vr), count, R::REFERENCES)?, array(values, value_count, R::VALUES)?) })
-}
 
 #[inline]
 pub(crate) fn get_reals<M: Exported, R: Reference>(

@@ -1,5 +1,5 @@
-//! Functions for the code around a WebAssembly module: the C code in an FMU with C sources, or the scripts of a page. A panic does not unwind
-//! there, and the module cannot access the importer's memory and callbacks. Each instance has a separate
+//! Functions for the code around a WebAssembly module: the C code in an FMU with C sources, or the
+//! scripts of a page. A panic does not unwind there, and the module cannot access the importer's memory and callbacks. Each instance has a separate
 //! module with its own memory.
 
 #![cfg(target_family = "wasm")]
@@ -13,17 +13,14 @@ use fmi_abi::Status;
 use fmi_abi::c_types::{c_char, c_void};
 use std::any::Any;
 use std::cell::{Cell, RefCell};
-use std::io;
 use std::panic::PanicHookInfo;
-use std::path::{Path, PathBuf};
 
 thread_local! {
     static ROOM: RefCell<Vec<u64>> = const { RefCell::new(Vec::new()) };
     static PANIC: Cell<Option<String>> = const { Cell::new(None) };
-    static FILES: RefCell<Vec<(PathBuf, Vec<u8>)>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Stores a file for [`read`].
+/// Stores a file for the model.
 ///
 /// # Safety
 /// `path` is a string, and `content` points to `size` bytes.
@@ -31,16 +28,7 @@ pub unsafe fn add_file(path: *const c_char, content: *const c_void, size: usize)
     // SAFETY: the caller guarantees both.
     let (path, content) = unsafe { (string(path), std::slice::from_raw_parts(content.cast::<u8>(), size)) };
     let path = path.unwrap_or_default().to_string_lossy().into_owned().into();
-    FILES.with_borrow_mut(|files| files.push((path, content.to_owned())));
-}
-
-/// Reads a file that the page contains. C sources have none.
-pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
-    FILES.with_borrow(|files| match files.iter().find(|(name, _)| name == path) {
-        Some((_, content)) => Ok(content.clone()),
-        None if files.is_empty() => Err(io::ErrorKind::Unsupported.into()),
-        None => Err(io::ErrorKind::NotFound.into()),
-    })
+    crate::files::store(path, content.to_owned());
 }
 
 /// Stores the messages of panics for [`broken`].

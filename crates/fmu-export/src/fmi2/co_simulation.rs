@@ -6,7 +6,7 @@
 use super::types::*;
 use crate::boundary::{array, output_derivatives, target};
 use crate::export::Exported;
-use crate::instance::{Instance, Outcome, no_status, reject};
+use crate::instance::{Instance, Outcome, discard, reject};
 
 pub unsafe fn fmi2SetRealInputDerivatives<M: Exported>(
     instance: &mut Instance<M>,
@@ -55,13 +55,14 @@ fn status_kind(kind: fmi2StatusKind) -> Outcome<StatusKind> {
     StatusKind::from_c(kind).map_or_else(|| reject(format!("there is no fmi2StatusKind {kind}")), Ok)
 }
 
-fn nothing_to_say(kind: StatusKind) -> Outcome {
-    no_status(match kind {
+/// Discards a query that concerns only asynchronous steps, or that another function returns.
+fn no_status(kind: StatusKind) -> Outcome {
+    discard(match kind {
         StatusKind::DoStepStatus | StatusKind::PendingStatus => {
             "no step is pending: fmi2DoStep works synchronously"
         }
-        StatusKind::LastSuccessfulTime => "fmi2LastSuccessfulTime is a Real: ask fmi2GetRealStatus",
-        StatusKind::Terminated => "fmi2Terminated is a Boolean: ask fmi2GetBooleanStatus",
+        StatusKind::LastSuccessfulTime => "fmi2LastSuccessfulTime is a Real: call fmi2GetRealStatus",
+        StatusKind::Terminated => "fmi2Terminated is a Boolean: call fmi2GetBooleanStatus",
     })
 }
 
@@ -76,7 +77,7 @@ pub unsafe fn fmi2GetRealStatus<M: Exported>(
             unsafe { target(value, "value") }?.write(instance.last_successful_time());
             Ok(())
         }
-        other => nothing_to_say(other),
+        other => no_status(other),
     }
 }
 
@@ -91,33 +92,23 @@ pub unsafe fn fmi2GetBooleanStatus<M: Exported>(
             unsafe { target(value, "value") }?.write(instance.has_ended().into());
             Ok(())
         }
-        other => nothing_to_say(other),
+        other => no_status(other),
     }
 }
 
-/// Returns `fmi2Discard`, because the function is for asynchronous steps.
-pub unsafe fn fmi2GetStatus<M: Exported>(
-    _: &mut Instance<M>,
-    kind: fmi2StatusKind,
-    _value: *mut fmi2Status,
-) -> Outcome {
-    nothing_to_say(status_kind(kind)?)
+/// Defines the queries that concern only asynchronous steps.
+macro_rules! without_status {
+    ($($function:ident $value:ty;)+) => {
+        $(
+            pub unsafe fn $function<M: Exported>(_: &mut Instance<M>, kind: fmi2StatusKind, _: *mut $value) -> Outcome {
+                no_status(status_kind(kind)?)
+            }
+        )+
+    };
 }
 
-/// See [`fmi2GetStatus`].
-pub unsafe fn fmi2GetIntegerStatus<M: Exported>(
-    _: &mut Instance<M>,
-    kind: fmi2StatusKind,
-    _value: *mut fmi2Integer,
-) -> Outcome {
-    nothing_to_say(status_kind(kind)?)
-}
-
-/// See [`fmi2GetStatus`].
-pub unsafe fn fmi2GetStringStatus<M: Exported>(
-    _: &mut Instance<M>,
-    kind: fmi2StatusKind,
-    _value: *mut fmi2String,
-) -> Outcome {
-    nothing_to_say(status_kind(kind)?)
+without_status! {
+    fmi2GetStatus fmi2Status;
+    fmi2GetIntegerStatus fmi2Integer;
+    fmi2GetStringStatus fmi2String;
 }

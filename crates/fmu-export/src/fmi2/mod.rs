@@ -33,7 +33,7 @@ pub use crate::boundary::webassembly::{add_file, broken, room};
 
 use types::*;
 
-fmi_abi::fmi2_functions!(crate::symbols::c_functions);
+fmi_abi::fmi2_functions!(crate::boundary::short::c_functions);
 
 /// Bodies of the functions, each under its C name.
 mod bodies {

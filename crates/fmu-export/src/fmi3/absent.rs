@@ -39,7 +39,7 @@ absent! { "this FMU has no Scheduled Execution":
     fmi3ActivateModelPartition(fmi3ValueReference, fmi3Float64);
 }
 
-absent! { "what depends on what is in modelDescription.xml alone (providesPerElementDependencies is false)":
+absent! { "modelDescription.xml contains all dependencies (providesPerElementDependencies is false)":
     fmi3GetNumberOfVariableDependencies(fmi3ValueReference, *mut usize);
     fmi3GetVariableDependencies(
         fmi3ValueReference, *mut usize, *mut fmi3ValueReference, *mut usize, *mut fmi3DependencyKind, usize

@@ -3,10 +3,10 @@
 //! # Safety
 //! The importer guarantees the contract of the [module above](super#safety).
 
-use super::{FromOne, types::*};
+use super::types::*;
 use crate::boundary::{output_derivatives, target};
 use crate::export::Exported;
-use crate::instance::{Instance, Outcome};
+use crate::instance::{FromOne, Instance, Outcome};
 
 pub unsafe fn fmi3EnterStepMode<M: Exported>(instance: &mut Instance<M>) -> Outcome {
     instance.enter_step_mode();

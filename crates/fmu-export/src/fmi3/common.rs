@@ -3,12 +3,12 @@
 //! # Safety
 //! The importer guarantees the contract of the [module above](super#safety).
 
-use super::{FromOne, types::*};
+use super::types::*;
 use crate::boundary::life_cycle::experiment;
 use crate::boundary::values::*;
 use crate::boundary::{array, of_elements, output, partial_derivatives, target};
 use crate::export::Exported;
-use crate::instance::{Instance, Outcome, reject};
+use crate::instance::{FromOne, Instance, Outcome, reject};
 use fmi_abi::BaseType::{self, *};
 use fmi_abi::Value;
 
@@ -98,7 +98,7 @@ pub unsafe fn fmi3SetBinary<M: Exported>(
     }
 }
 
-/// Defines the functions for partial derivatives; the literal tells whether the derivative is adjoint.
+/// Defines the functions for partial derivatives; the literal is true for adjoint derivatives.
 macro_rules! derivatives {
     ($($function:ident: $adjoint:literal;)+) => {
         $(
@@ -135,7 +135,7 @@ derivatives! {
 }
 
 pub unsafe fn fmi3EvaluateDiscreteStates<M: Exported>(_: &mut Instance<M>) -> Outcome {
-    reject("fmi3UpdateDiscreteStates does it all (providesEvaluateDiscreteStates is false)")
+    reject("fmi3UpdateDiscreteStates evaluates the discrete states (providesEvaluateDiscreteStates is false)")
 }
 
 pub unsafe fn fmi3UpdateDiscreteStates<M: Exported>(

@@ -22,15 +22,17 @@ pub unsafe extern "C" fn fmi3InstantiateModelExchange<M: Exported>(
     log_message: Option<fmi3LogMessageCallback>,
 ) -> fmi3Instance {
     let importer = Importer { standard: Standard::Fmi3, event_mode: false, early_return: false };
-    let call = Call {
-        function: "fmi3InstantiateModelExchange",
-        texts: [instance_name, instantiation_token, resource_path],
-        logging_on,
-        environment,
-        log_message,
-    };
     // SAFETY: the importer guarantees the contract of the module.
-    unsafe { make::<M>(&call, Ok(Interface::ModelExchange), importer) }
+    unsafe {
+        make::<M>(
+            "fmi3InstantiateModelExchange",
+            [instance_name, instantiation_token, resource_path],
+            logging_on,
+            (environment, log_message),
+            Ok(Interface::ModelExchange),
+            importer,
+        )
+    }
 }
 
 /// `fmi3InstantiateCoSimulation`. The importer owns the result until it calls `fmi3FreeInstance`.
@@ -60,15 +62,17 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation<M: Exported>(
              (providesIntermediateUpdate is false)",
         ),
     };
-    let call = Call {
-        function: "fmi3InstantiateCoSimulation",
-        texts: [instance_name, instantiation_token, resource_path],
-        logging_on,
-        environment,
-        log_message,
-    };
     // SAFETY: the importer guarantees the contract of the module.
-    unsafe { make::<M>(&call, interface, importer) }
+    unsafe {
+        make::<M>(
+            "fmi3InstantiateCoSimulation",
+            [instance_name, instantiation_token, resource_path],
+            logging_on,
+            (environment, log_message),
+            interface,
+            importer,
+        )
+    }
 }
 
 /// `fmi3InstantiateScheduledExecution`. Returns NULL, because Scheduled Execution is not supported.
@@ -85,41 +89,37 @@ pub unsafe extern "C" fn fmi3InstantiateScheduledExecution<M: Exported>(
     _unlock_preemption: Option<fmi3UnlockPreemptionCallback>,
 ) -> fmi3Instance {
     let importer = Importer { standard: Standard::Fmi3, event_mode: false, early_return: false };
-    let call = Call {
-        function: "fmi3InstantiateScheduledExecution",
-        texts: [instance_name, instantiation_token, resource_path],
-        logging_on,
-        environment,
-        log_message,
-    };
     // SAFETY: the importer guarantees the contract of the module.
-    unsafe { make::<M>(&call, reject("this FMU has no Scheduled Execution"), importer) }
+    unsafe {
+        make::<M>(
+            "fmi3InstantiateScheduledExecution",
+            [instance_name, instantiation_token, resource_path],
+            logging_on,
+            (environment, log_message),
+            reject("this FMU has no Scheduled Execution"),
+            importer,
+        )
+    }
 }
 
-/// The arguments that the three functions share.
-struct Call {
-    function: &'static str,
-    /// Instance name, instantiation token, resource path.
-    texts: [fmi3String; 3],
-    logging_on: fmi3Boolean,
-    environment: fmi3InstanceEnvironment,
-    log_message: Option<fmi3LogMessageCallback>,
-}
-
-/// Creates an instance.
+/// Creates an instance. The strings are its name, the instantiation token and the path of the resources.
 ///
 /// # Safety
 /// The strings are NULL or valid; the callback works until the instance is freed.
-unsafe fn make<M: Exported>(call: &Call, interface: Outcome<Interface>, importer: Importer) -> fmi3Instance {
+unsafe fn make<M: Exported>(
+    function: &str,
+    texts: [fmi3String; 3],
+    logging_on: fmi3Boolean,
+    (environment, log_message): (fmi3InstanceEnvironment, Option<fmi3LogMessageCallback>),
+    interface: Outcome<Interface>,
+    importer: Importer,
+) -> fmi3Instance {
     // SAFETY: the caller guarantees NULL or strings.
-    let [name, guid, resources] = call.texts.map(|text| unsafe { string(text) });
-    let log = || ImporterLog {
-        callback: call.log_message.map(Callback::Fmi3),
-        environment: call.environment,
-        instance_name: name.unwrap_or(c"").to_owned(),
-    };
-    let logging_on = call.logging_on != fmi3False;
-    instantiate::<M>(call.function, log, Arguments { name, guid, resources, logging_on, interface, importer })
+    let [name, guid, resources] = texts.map(|text| unsafe { string(text) });
+    let instance_name = name.unwrap_or(c"").to_owned();
+    let log = || ImporterLog { callback: log_message.map(Callback::Fmi3), environment, instance_name };
+    let logging_on = logging_on != fmi3False;
+    instantiate::<M>(function, log, Arguments { name, guid, resources, logging_on, interface, importer })
 }
 
 /// `fmi3FreeInstance`. Ignores NULL and calls from the log callback.

@@ -33,7 +33,6 @@ pub use instances::{
     fmi3InstantiateScheduledExecution,
 };
 
-use crate::instance::Reference;
 use crate::table::Variables;
 use crate::variable::Variable;
 use fmi_abi::Standard;
@@ -42,27 +41,6 @@ use types::*;
 /// Returns the value reference of the variable at this index of the table, or after the table.
 pub const fn reference(index: u32) -> fmi3ValueReference {
     Standard::Fmi3.reference(index)
-}
-
-/// A [value reference](reference()) as an importer passes it.
-#[derive(Clone, Copy)]
-#[repr(transparent)]
-pub(crate) struct FromOne(fmi3ValueReference);
-
-impl Reference for FromOne {
-    const ARRAYS: bool = true;
-    const REFERENCES: &str = "valueReferences";
-    const VALUES: &str = "values";
-
-    #[inline]
-    fn cast(array: *const u32) -> *const Self {
-        array.cast()
-    }
-
-    #[inline]
-    fn index(self) -> u32 {
-        self.0.wrapping_sub(reference(0))
-    }
 }
 
 /// Returns the independent variable with its index: in the table, or of `time`, the first after the table.
@@ -75,7 +53,7 @@ pub fn indicator<M: Variables>(number: usize) -> u32 {
     crate::instance::first_indicator::<M>() + number as u32
 }
 
-fmi_abi::fmi3_functions!(crate::symbols::c_functions);
+fmi_abi::fmi3_functions!(crate::boundary::short::c_functions);
 
 /// Bodies of the functions, each under its C name.
 mod bodies {

@@ -1,7 +1,6 @@
 //! Co-Simulation (section 4.2).
 
-use super::rejection::discard;
-use super::{Instance, Outcome, Rejection, State, reject, reject_with};
+use super::{Instance, Outcome, Rejection, State, discard, reject, reject_with};
 use crate::capabilities::{Events, Step, Stepped};
 use crate::export::Exported;
 use crate::model::Error;
@@ -247,12 +246,6 @@ fn reject_step<T>(point: f64, step_size: f64) -> Outcome<T> {
     reject(format!(
         "the communication point must be finite and the step size finite and > 0, they are {point} and {step_size}"
     ))
-}
-
-/// Discards a status query that concerns only asynchronous steps, or that another function answers.
-#[cold]
-pub(crate) fn no_status(message: &str) -> Outcome {
-    discard(message)
 }
 
 /// Tolerance for the end of the last step after the stop time, relative to the simulated time. Importers that

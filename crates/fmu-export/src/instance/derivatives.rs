@@ -216,7 +216,7 @@ impl<M: Exported> Instance<M> {
         for ((vr, order), value) in vr.iter().zip(orders).zip(values) {
             let index = vr.index() as usize;
             value.write(match M::TABLE.get(index) {
-                Some(variable) => finite(variable, derivative(model, index, order.unsigned_abs()))?,
+                Some(variable) => finite(variable, derivative::<M>(model, index, order.unsigned_abs()))?,
                 None => derivative_of_time(*order),
             });
         }

@@ -6,23 +6,24 @@ mod co_simulation;
 mod derivatives;
 mod model_exchange;
 mod origin;
+mod reference;
 mod rejection;
 mod saved_states;
 mod serialized;
 mod sorted;
 mod values;
 
-pub(crate) use co_simulation::no_status;
-pub(crate) use rejection::{Outcome, Rejection, reject, reject_with};
+pub(crate) use reference::{FromOne, Reference};
+pub(crate) use rejection::{Outcome, Rejection, discard, reject, reject_with};
 
 use self::sorted::Sorted;
-use crate::boundary::Placed;
 use crate::capabilities::Events;
 use crate::export::Exported;
 use crate::log::Logger;
 use crate::model::{Error, Experiment, Setup};
+use crate::offsets::Placed;
 use crate::types::{NUMBER, TIME};
-use crate::variable::{Read, ReadAt, Variable, shape_of_calculation};
+use crate::variable::{Read, Variable, shape_of_calculation};
 use fmi_abi::BaseType;
 use fmi_abi::Causality;
 use fmi_abi::Status;
@@ -71,37 +72,6 @@ pub(crate) struct Importer {
 impl Importer {
     /// An importer of FMI 2.0.
     pub const FMI2: Self = Self { standard: Standard::Fmi2, event_mode: false, early_return: true };
-}
-
-/// A value reference: a number that denotes the index of a variable in the table, or after it.
-pub(crate) trait Reference: Copy {
-    /// Whether a reference may denote a whole array.
-    const ARRAYS: bool;
-    /// Name of the array of references in the FMI standard; `VALUES` is the name of the array of values.
-    const REFERENCES: &str;
-    const VALUES: &str;
-
-    fn index(self) -> u32;
-
-    /// Casts an importer's array to an array of this type.
-    fn cast(array: *const u32) -> *const Self;
-}
-
-/// Value reference of FMI 2.0: the index itself.
-impl Reference for u32 {
-    const ARRAYS: bool = false;
-    const REFERENCES: &str = "vr";
-    const VALUES: &str = "value";
-
-    #[inline]
-    fn cast(array: *const u32) -> *const Self {
-        array
-    }
-
-    #[inline]
-    fn index(self) -> u32 {
-        self
-    }
 }
 
 /// Content of a saved state.
@@ -331,12 +301,7 @@ impl<M: Exported> Instance<M> {
 
     /// Returns the model after all calculations that reading needs.
     #[inline]
-    fn calculated(&mut self) -> &M {
-        self.calculated_in_place()
-    }
-
-    #[inline]
-    fn calculated_in_place(&mut self) -> &Placed<M> {
+    fn calculated(&mut self) -> &Placed<M> {
         if self.state.stale {
             self.state.stale = false;
             self.state.model.calculate(self.state.time);
@@ -411,12 +376,8 @@ impl<M: 'static> Implicit<M> {
     /// Represents any event indicator; the values come from the model.
     const INDICATOR: &'static Variable<M> = &Variable::local(&NUMBER)
         .read_by(
-            Read {
-                shape: shape_of_calculation(std::marker::PhantomData::<M>, |_| f64::NAN),
-                real: |_| f64::NAN,
-                value: |_| Value::Real(f64::NAN),
-            },
-            ReadAt { reals: |_, _, _| f64::NAN, value: |_, _| Value::Real(f64::NAN) },
+            shape_of_calculation(std::marker::PhantomData::<M>, |_| f64::NAN),
+            Read { real: |_, _| f64::NAN, reals: None, value: |_, _| Value::Real(f64::NAN) },
         )
         .finished("eventIndicator", "An event happens where it changes its sign");
 }

@@ -35,16 +35,16 @@ const CHECKSUM_LENGTH: usize = 8;
 
 /// Returns the number of bytes of a serialized state. `state` is not changed.
 pub(super) fn size<M: Exported>(state: &mut State<M>) -> usize {
-    let mut counter = Counter(0);
+    let mut counter = Writer::default();
     state.visit(&mut counter);
-    HEADER_LENGTH + counter.0 + CHECKSUM_LENGTH
+    HEADER_LENGTH + counter.count + CHECKSUM_LENGTH
 }
 
 /// Fills `bytes`, which must have the length from [`size`]. Rejects a state that could not be read back.
 pub(super) fn write<M: Exported>(state: &mut State<M>, origin: Origin, bytes: &mut [u8]) -> Outcome {
     check(state)?;
     let (content, checksum) = bytes.split_at_mut(bytes.len() - CHECKSUM_LENGTH);
-    let mut writer = Writer { rest: &mut *content };
+    let mut writer = Writer { rest: Some(&mut *content), count: 0 };
     writer.put(MAGIC);
     writer.put(&guid_hash::<M>());
     writer.put(&[origin.byte()]);
@@ -117,36 +117,21 @@ fn fnv1a(bytes: &[u8]) -> u64 {
     })
 }
 
-struct Counter(usize);
-
-impl StateVisitor for Counter {
-    fn real(&mut self, _: &mut f64) {
-        self.0 += 8;
-    }
-    fn integer(&mut self, _: &mut i64) {
-        self.0 += 8;
-    }
-    fn boolean(&mut self, _: &mut bool) {
-        self.0 += 1;
-    }
-    fn text(&mut self, text: &mut String) {
-        self.0 += 8 + text.len();
-    }
-    fn length(&mut self, _: &mut usize) {
-        self.0 += 8;
-    }
-    fn invalid(&mut self) {}
-}
-
+/// Writes to the memory, or only counts the bytes without memory.
+#[derive(Default)]
 struct Writer<'a> {
-    rest: &'a mut [u8],
+    rest: Option<&'a mut [u8]>,
+    count: usize,
 }
 
 impl Writer<'_> {
     fn put(&mut self, bytes: &[u8]) {
-        let (head, rest) = std::mem::take(&mut self.rest).split_at_mut(bytes.len());
-        head.copy_from_slice(bytes);
-        self.rest = rest;
+        self.count += bytes.len();
+        if let Some(rest) = self.rest.take() {
+            let (head, rest) = rest.split_at_mut(bytes.len());
+            head.copy_from_slice(bytes);
+            self.rest = Some(rest);
+        }
     }
 }
 
@@ -161,7 +146,7 @@ impl StateVisitor for Writer<'_> {
         self.put(&[u8::from(*value)]);
     }
     fn text(&mut self, text: &mut String) {
-        self.put(&(text.len() as u64).to_le_bytes());
+        self.length(&mut text.len());
         self.put(text.as_bytes());
     }
     fn length(&mut self, length: &mut usize) {
@@ -229,17 +214,15 @@ impl StateVisitor for Reader<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Counter, Reader, Writer};
+    use super::{Reader, Writer};
     use crate::saved::Saved;
     use std::collections::{BTreeMap, VecDeque};
 
     fn written<T: Saved>(mut value: T) -> Vec<u8> {
-        let mut counter = Counter(0);
+        let mut counter = Writer::default();
         value.visit(&mut counter);
-        let mut bytes = vec![0; counter.0];
-        let mut writer = Writer { rest: &mut bytes };
-        value.visit(&mut writer);
-        assert!(writer.rest.is_empty(), "the counter is right");
+        let mut bytes = vec![0; counter.count];
+        value.visit(&mut Writer { rest: Some(&mut bytes), count: 0 });
         bytes
     }
 

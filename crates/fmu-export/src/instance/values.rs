@@ -22,7 +22,7 @@ impl<M: Exported> Instance<M> {
             return self.get_reals_of_arrays(|number| vr[number].index(), values);
         }
         let time = self.state.time;
-        let model = self.calculated_in_place();
+        let model = self.calculated();
         let mut sum = 0.0;
         for (vr, value) in vr.iter().zip(&mut *values) {
             let mut read = model.real_in_place(vr.index());
@@ -97,7 +97,7 @@ impl<M: Exported> Instance<M> {
         for (vr, value) in vr.iter().zip(values) {
             let (variable, read) = match M::TABLE.get(vr.index() as usize) {
                 Some(variable) => (variable, variable.real(model).unwrap_or(time)),
-                None => (super::Implicit::<M>::INDICATOR, implicit_value(model, time, vr.index())),
+                None => (super::Implicit::<M>::INDICATOR, implicit_value::<M>(model, time, vr.index())),
             };
             value.write(finite(variable, read)?);
         }

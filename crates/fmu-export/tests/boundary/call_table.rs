@@ -7,6 +7,7 @@ use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Mode::{self, *};
 use fmu_export::{Exported, Standard, Status};
 use fmu_test_kit::Random;
+use fmu_test_kit::calls::Argument;
 use fmu_test_kit::checks::modes_of_model;
 use fmu_test_kit::serialized::{MODE, with_mode};
 use fmu_test_kit::{Either, Importer, fmi3};
@@ -275,7 +276,7 @@ fn check_every_function<F: Either, M: Exported>() {
         for function in F::functions() {
             let label = format!("{function} in state '{mode}' of {interface}, {}", M::INFO.name);
             let fmu = F::in_mode::<M>(interface, mode);
-            let valid = ValidCall::new::<F, M>(&fmu, function, interface, mode);
+            let valid = ValidCall::new::<F, M>(&fmu, function, mode);
             let call = |fmu: &F| valid.make(fmu, |_| ());
             if !accepted(function, interface, mode) {
                 let message = fmu.rejected(&label, call);
@@ -295,6 +296,9 @@ fn check_every_function<F: Either, M: Exported>() {
                 _ => Status::Ok,
             };
             assert_eq!(call(&fmu), expected, "{label}: {:?}", fmu.take_log());
+            if expected == Status::Ok {
+                valid.read_outputs();
+            }
             let (end, bytes) = (next::<M>(function, interface, mode), fmu.bytes());
             assert_eq!(bytes[MODE], with_mode(bytes.clone(), end)[MODE], "{label} does not lead to '{end}'");
         }
@@ -331,7 +335,7 @@ fn walk<F: Either, M: Exported>(interface: Interface) {
         if matches!(&function[4..], "Reset" | "Terminate") && random.bits() % 8 > 0 {
             continue;
         }
-        let status = ValidCall::new::<F, M>(&fmu, function, interface, mode).make(&fmu, |_| ());
+        let status = ValidCall::new::<F, M>(&fmu, function, mode).make(&fmu, |_| ());
         let log = fmu.take_log();
         if lacking::<M>(function, interface).is_some() || !accepted(function, interface, mode) {
             assert_eq!(status, Status::Error, "{function} in state '{mode}' of {interface}: {log:?}");
@@ -343,26 +347,6 @@ fn walk<F: Either, M: Exported>(interface: Interface) {
     }
     let modes = if interface == CoSimulation { 4 } else { 5 };
     assert!(visits.len() == modes && visits.values().all(|calls| *calls > 100), "{visits:?}");
-}
-
-/// Checks that NULL and zeros as arguments do no harm in any state, and without an instance.
-#[test]
-fn zeros() {
-    fn check<F: Either, M: Exported>() {
-        for (interface, mode) in modes_of_model::<F, M>() {
-            for function in F::functions() {
-                let fmu = F::in_mode::<M>(interface, mode);
-                if fmu.call_with_zeros(function) == Status::Error {
-                    F::in_mode::<M>(interface, mode).rejected(function, |fmu| fmu.call_with_zeros(function));
-                }
-            }
-        }
-        assert!(F::nothing::<M>().call_all().iter().all(|(_, status)| *status == Status::Error));
-    }
-    check::<Importer, Oscillator>();
-    check::<fmi3::Importer, Oscillator>();
-    check::<fmi3::Importer, Ticker>();
-    check::<fmi3::Importer, Palette>();
 }
 
 /// Checks that the table in the code agrees, also about states that cannot be reached here, and that it
@@ -403,4 +387,79 @@ fn table_in_the_code() {
     }
     check::<Importer>();
     check::<fmi3::Importer>();
+}
+
+/// Functions that reject a NULL or misaligned pointer, but need none here.
+fn needs_no_pointer(function: &str, name: &str) -> bool {
+    matches!(function, "fmi2GetStatus" | "fmi2GetIntegerStatus" | "fmi2GetStringStatus")
+        || function.contains("FreeFMU") && name == "state"
+}
+
+/// Checks every pointer of every function: NULL, misaligned, and of an array larger than memory. The call is
+/// rejected with the reason, and changes nothing.
+fn pointers<F: Either, M: Exported>() {
+    let mut checked = 0;
+    for (interface, mode) in modes_of_model::<F, M>() {
+        if [Mode::StepFailed, Mode::Terminated, Mode::Error].contains(&mode) {
+            continue;
+        }
+        let fmu = F::in_mode::<M>(interface, mode);
+        for function in F::functions() {
+            if !accepted(function, interface, mode) || lacking::<M>(function, interface).is_some() {
+                continue;
+            }
+            let mut call = ValidCall::new::<F, M>(&fmu, function, mode);
+            if function.ends_with("SetDebugLogging") {
+                call.words[1] = 1;
+            }
+            let is_empty = |of: &Argument| of.of == "usize" && call.words[position(&call, of)] == 0;
+            if call.arguments.iter().any(is_empty) {
+                continue;
+            }
+            for (index, argument) in call.arguments.iter().enumerate() {
+                let label = format!("{function} in {mode} of {interface}, {}", argument.name);
+                let Some((of, _)) = argument.pointee() else { continue };
+                if needs_no_pointer(function, argument.name) {
+                    continue;
+                }
+                let message = fmu.rejected(&label, |fmu| call.make(fmu, |words| words[index] = 0));
+                assert!(message.contains("NULL"), "{label}: {message}");
+                checked += 1;
+                let one_byte = ["Int8", "UInt8", "Byte"].contains(&of)
+                    || of == "Boolean" && F::standard() == Standard::Fmi3;
+                if !one_byte {
+                    let message = fmu.rejected(&label, |fmu| call.make(fmu, |words| words[index] += 1));
+                    assert!(message.contains("not aligned"), "{label}: {message}");
+                }
+            }
+            let is_array =
+                call.arguments.first().is_some_and(|of| of.name == "vr") && !function.ends_with("Binary");
+            if is_array || function.ends_with("InputDerivatives") {
+                let message = fmu.rejected(function, |fmu| {
+                    call.make(fmu, |words| {
+                        for (word, argument) in words.iter_mut().zip(call.arguments) {
+                            *word = if argument.of == "usize" { u64::MAX / 4 } else { *word };
+                        }
+                    })
+                });
+                assert!(message.contains("larger than memory"), "{function}: {message}");
+            }
+        }
+    }
+    assert!(checked > 40, "only {checked}");
+}
+
+fn position(call: &ValidCall, argument: &Argument) -> usize {
+    call.arguments.iter().position(|of| std::ptr::eq(of, argument)).expect("an argument of the call")
+}
+
+#[test]
+fn null_and_misaligned_pointers() {
+    pointers::<Importer, Oscillator>();
+    pointers::<Importer, Talker>();
+    pointers::<Importer, Ball>();
+    pointers::<fmi3::Importer, Oscillator>();
+    pointers::<fmi3::Importer, Ball>();
+    pointers::<fmi3::Importer, Talker>();
+    pointers::<fmi3::Importer, Palette>();
 }

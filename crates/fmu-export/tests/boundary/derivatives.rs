@@ -1,7 +1,7 @@
 //! Derivatives with respect to variables (section 2.1.9 of FMI 2.0) and to time (4.2.1), in both FMI
 //! versions. [`Either::try_directional`] compares adjoint with directional derivatives.
 
-use crate::models::{Meter, Oscillator, Sum, meter, oscillator::Name};
+use crate::models::{Fuse, Meter, Oscillator, meter, oscillator::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::Variables;
@@ -152,8 +152,8 @@ fn only_in_fmi3() {
     fmu.rejected("seeds", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &k, 0, &1.0, 0, &mut out, 0));
     fmu.rejected("no known", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &u, 1, &1.0, 1, &mut out, 1));
     fmu.rejected("no seed", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &k, 1, &f64::NAN, 1, &mut out, 1));
-    let sum = fmi3::Importer::initialized_at::<Sum>(0.0);
-    sum.rejected_with(&["providesAdjointDerivatives is false"], |fmu| {
+    let fuse = fmi3::Importer::initialized_at::<Fuse>(0.0);
+    fuse.rejected_with(&["providesAdjointDerivatives is false"], |fmu| {
         fmu.fmi3GetAdjointDerivative(&1, 1, &0, 1, &1.0, 1, &mut out, 1)
     });
 }

@@ -24,7 +24,7 @@ fn of_fmi3<M: Exported>(
     prepare: impl FnOnce(&fmi3::Importer),
 ) -> fmi3::Importer {
     let arguments = Arguments { event_mode_used, early_return_allowed, ..Arguments::of::<M>(CoSimulation) };
-    let fmu = fmi3::Importer::with::<M>(&arguments);
+    let fmu = fmi3::Importer::make::<M>(&arguments).unwrap();
     prepare(&fmu);
     fmu.initialize(0.0);
     fmu
@@ -206,7 +206,7 @@ fn the_importer_handles_them() {
     assert_eq!(fmu.do_step(0.25, 0.25), at(0.5, false));
     // A model without events has no Event Mode.
     let arguments = Arguments { event_mode_used: fmi3True, ..Arguments::of::<Fuse>(CoSimulation) };
-    let log = fmi3::Importer::try_with::<Fuse>(&arguments).unwrap_err();
+    let log = fmi3::Importer::make::<Fuse>(&arguments).unwrap_err();
     assert!(log[0].text.contains("hasEventMode is false"), "{log:?}");
 }
 

@@ -2,7 +2,7 @@
 //! path.
 
 use crate::models::{Meter, meter::Name};
-use fmu_export::Interface::{self, CoSimulation, ModelExchange};
+use fmu_export::Interface::CoSimulation;
 use fmu_export::Status;
 use fmu_test_kit::{Either, Importer, fmi3};
 
@@ -11,14 +11,10 @@ const TOTAL: u32 = Name::total as u32;
 const SUM: u32 = Name::sum as u32;
 const LEVEL: u32 = Name::level as u32;
 
-fn new<F: Either>(interface: Interface) -> F {
-    F::make::<Meter>(&fmu_test_kit::Arguments::of::<Meter>(interface)).expect("an instance")
-}
-
 /// Sets and reads `count` inputs per call, with each as the first, before the first step and after it. All
 /// must keep their values.
 fn set_and_read<F: Either>(count: usize) {
-    let fmu: F = new(CoSimulation);
+    let fmu = F::of::<Meter>(CoSimulation);
     fmu.initialize(0.0);
     let (mut now, mut time, mut number) = ([0.0; 6], 0.0, 0.0);
     let mut seconds = 0;
@@ -61,7 +57,7 @@ fn alone_and_together() {
 
 /// Checks that a rejected variable at any index changes neither the model nor the importer's array.
 fn rejected<F: Either>() {
-    let fmu: F = new(CoSimulation);
+    let fmu = F::of::<Meter>(CoSimulation);
     fmu.initialize(0.0);
     for round in 0..3 {
         let before = fmu.bytes();
@@ -92,26 +88,4 @@ fn rejected<F: Either>() {
 fn rejected_as_before() {
     rejected::<Importer>();
     rejected::<fmi3::Importer>();
-}
-
-/// Checks that a calculated start value follows an input until the simulation begins, in any order of the
-/// calls.
-#[test]
-fn starts_that_are_calculated() {
-    fn check<F: Either>() {
-        let fmu: F = new(ModelExchange);
-        fmu.set(&[0], &[2.0]);
-        fmu.initialize(0.0);
-        fmu.set(&[0, 1], &[3.0, 1.0]);
-        assert_eq!(fmu.get([LEVEL]), [3.0]);
-        let restored = fmu.bytes();
-        fmu.enter_continuous_time();
-        fmu.set(&[0], &[4.0]);
-        assert_eq!(fmu.get([LEVEL]), [3.0]);
-        fmu.restore(&restored);
-        fmu.set(&[0], &[5.0]);
-        assert_eq!(fmu.get([LEVEL]), [5.0]);
-    }
-    check::<Importer>();
-    check::<fmi3::Importer>();
 }

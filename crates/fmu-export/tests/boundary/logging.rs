@@ -12,7 +12,7 @@ use std::ptr::{null, null_mut};
 
 fn logging<M: Exported>(logging_on: bool) -> Importer {
     let arguments = Arguments { logging_on: logging_on.into(), ..Arguments::of::<M>(CoSimulation) };
-    Importer::try_with::<M>(&arguments).unwrap()
+    Importer::make::<M>(&arguments).unwrap()
 }
 
 /// Returns the logged statuses of an event, a warning, a discarded query and an error: O, W, D, E.
@@ -185,7 +185,7 @@ fn messages_of_a_model_that_fails() {
 fn instances_do_not_mix() {
     let fmus = [c"left", c"right"].map(|name| {
         let arguments = Arguments { instance_name: Some(name), ..Arguments::of::<Talker>(CoSimulation) };
-        Importer::try_with::<Talker>(&arguments).unwrap()
+        Importer::make::<Talker>(&arguments).unwrap()
     });
     for (fmu, name) in fmus.iter().zip(["left", "right"]) {
         assert_eq!(fmu.try_set(&[99], &[0.0]), Status::Error);
@@ -199,7 +199,7 @@ fn instances_do_not_mix() {
 #[test]
 fn no_logger() {
     let arguments = Arguments { logger: false, logging_on: 1, ..Arguments::of::<Talker>(ModelExchange) };
-    let fmu = Importer::try_with::<Talker>(&arguments).unwrap();
+    let fmu = Importer::make::<Talker>(&arguments).unwrap();
     fmu.initialize(0.0);
     assert_eq!(fmu.try_set(&[99], &[0.0]), Status::Error);
     assert_eq!(fmu.take_log(), []);

@@ -13,7 +13,6 @@ macro_rules! for_every_model {
         $function::<$($importer,)? crate::models::Ball>();
         $function::<$($importer,)? crate::models::Counter>();
         $function::<$($importer,)? crate::models::Talker>();
-        $function::<$($importer,)? crate::models::Sum>();
         $function::<$($importer,)? crate::models::Fuse>();
         $function::<$($importer,)? crate::models::Motor>();
         $function::<$($importer,)? crate::models::Lazy>();

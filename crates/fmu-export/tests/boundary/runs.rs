@@ -2,7 +2,7 @@
 //! derivatives, start values and errors of the model take effect.
 
 use crate::INTERFACES;
-use crate::models::{oscillator::Name, sum::Name as Of, *};
+use crate::models::{oscillator::Name, *};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::{Exported, Simulation};
@@ -11,9 +11,6 @@ use fmu_test_kit::{Either, Importer, fmi3, serialized};
 
 const FORCE: u32 = Name::force as u32;
 const STATES: [u32; 2] = [Name::position as u32, Name::velocity as u32];
-const U: u32 = Of::u as u32;
-const Y: u32 = Of::y as u32;
-const GAIN: u32 = Of::gain as u32;
 
 /// Returns the state without the byte for FMI version and interface type, the mode, and the checksum.
 fn content(fmu: &impl Either) -> Vec<u8> {
@@ -44,7 +41,6 @@ fn steps_in_both_versions() {
     same::<Oscillator>();
     same::<Counter>();
     same::<Talker>();
-    same::<Sum>();
     same::<Ticker>();
     same::<Palette>();
 }
@@ -98,20 +94,6 @@ fn input_derivatives() {
     assert_eq!(once.get(STATES), other.get(STATES));
 }
 
-#[test]
-fn derivatives_of_the_initialization_are_used() {
-    let [with, without] = [true, false].map(|given| {
-        let fmu = Importer::in_mode::<Oscillator>(CoSimulation, Initialization);
-        if given {
-            fmu.set_rates([FORCE], [2.0]);
-        }
-        fmu.ok(fmu.fmi2ExitInitializationMode());
-        fmu.step(0.0, 0.01);
-        fmu.get([STATES[0]])
-    });
-    assert!(with[0] > 0.0 && without[0] == 0.0);
-}
-
 /// Checks start values of states, their nominal values, which come from the types, and that a state set as a
 /// variable and a state set in the array of states have equal effects.
 #[test]
@@ -139,33 +121,4 @@ fn states() {
     }
     check::<Importer>();
     check::<fmi3::Importer>();
-}
-
-/// Checks that errors of the model reach the importer with their message, and the step can be repeated.
-#[test]
-fn errors_of_the_model() {
-    let fmu = Importer::of::<Sum>(CoSimulation);
-    fmu.ok(fmu.fmi2SetupExperiment(0, 0.0, -1.0, 0, 0.0));
-    let message = fmu.rejected("start time", |fmu| fmu.fmi2EnterInitializationMode());
-    assert_eq!(message, "fmi2EnterInitializationMode: this model knows no time before 0");
-    fmu.initialize(0.0);
-    fmu.set(&[U], &[9.0]);
-    fmu.step(0.0, 1.0);
-    let message = fmu.rejected("sum", |fmu| fmu.try_step(1.0, 1.0));
-    assert_eq!(message, "fmi2DoStep: the sum would be more than 10");
-    fmu.set(&[U], &[1.0]);
-    fmu.step(1.0, 1.0);
-    assert_eq!(fmu.get([Y]), [10.0]);
-}
-
-/// Checks that the range of a parameter's type is enforced; the range of an input or output is a hint.
-#[test]
-fn ranges() {
-    let fmu = Importer::of::<Sum>(CoSimulation);
-    for (value, word) in [(10.5, "above 10"), (-0.5, "below 0")] {
-        let message = fmu.rejected("gain", |fmu| fmu.try_set(&[GAIN], &[value]));
-        assert!(message.contains("gain") && message.contains(word), "{message}");
-        fmu.set(&[U, Y], &[value, value]);
-    }
-    fmu.set(&[GAIN], &[10.0]);
 }

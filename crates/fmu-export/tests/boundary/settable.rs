@@ -1,7 +1,6 @@
 //! Modes in which a variable can be set (footnotes 1, 3, 4, 5 and 6 of sections 3.2.3 and 4.2.4), for every
 //! variable in every state.
 
-use crate::models::*;
 use crate::{INTERFACES, offers};
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Mode::{self, *};
@@ -38,47 +37,6 @@ fn tolerated<M>(variable: &Variable<M>, mode: Mode) -> bool {
 
 pub fn accepted<M>(variable: &Variable<M>, interface: Interface, mode: Mode) -> bool {
     standard(variable, interface, mode) || tolerated(variable, mode)
-}
-
-/// Checks the rules against expected letters of the tables, for one variable of each kind: Co-Simulation,
-/// Model Exchange.
-fn check_by_hand<M: Exported>(rows: &[(&str, &str, &str)]) {
-    for (name, co_simulation, model_exchange) in rows {
-        let mut variables = M::TABLE.iter();
-        let variable = variables.find(|variable| variable.name() == *name).expect(name);
-        for (interface, letters) in [(CoSimulation, co_simulation), (ModelExchange, model_exchange)] {
-            let found: String = Importer::modes_of(interface)
-                .iter()
-                .copied()
-                .zip(if interface == CoSimulation { "INCFTE".chars() } else { "INMKTE".chars() })
-                .filter_map(|(mode, letter)| accepted(variable, interface, mode).then_some(letter))
-                .collect();
-            assert_eq!(found, *letters, "{name}, {interface}");
-        }
-    }
-}
-
-#[test]
-fn one_of_each_kind() {
-    check_by_hand::<Oscillator>(&[
-        ("force", "INC", "INMK"),
-        ("position", "IN", "INK"),
-        ("velocity", "IN", "INK"),
-        ("der(velocity)", "", ""),
-        ("energy", "", ""),
-        ("mass", "INC", "INMK"),
-        ("springs", "INC", "INM"),
-    ]);
-    check_by_hand::<Counter>(&[("weight", "INC", "INM"), ("count", "IN", "IN"), ("odd", "", "")]);
-    check_by_hand::<Talker>(&[
-        ("heard", "INC", "INM"),
-        ("volume", "INC", "INMK"),
-        ("decibels", "", ""),
-        ("root", "I", "I"),
-        ("answer", "", ""),
-        ("time", "", ""),
-        ("who", "", ""),
-    ]);
 }
 
 fn set(fmu: &Importer, vr: u32, base: BaseType) -> Status {

@@ -132,13 +132,12 @@ fn probing_has_no_consequences() {
 }
 
 /// Checks that a calculated start follows the other values until the first step, or until the importer sets
-/// the state.
-#[test]
-fn calculated_start() {
+/// the state; also in a restored state.
+fn calculated_start<F: Either>() {
     let [plain, stiffness, level] =
         [meter::Name::plain, meter::Name::stiffness, meter::Name::level].map(|name| name as u32);
     for interface in INTERFACES {
-        let fmu = Importer::of::<Meter>(interface);
+        let fmu = F::of::<Meter>(interface);
         fmu.set(&[plain, stiffness], &[6.0, 2.0]);
         let words = ["its start follows from plain, stiffness: set these"];
         fmu.rejected_with(&words, |fmu| fmu.try_set(&[level], &[1.0]));
@@ -148,6 +147,7 @@ fn calculated_start() {
         fmu.ok(fmu.exit_initialization_mode());
         fmu.set(&[plain], &[8.0]);
         assert_eq!(fmu.get([level]), [4.0]);
+        let restored = fmu.bytes();
         match interface {
             CoSimulation => fmu.step(0.0, 0.5),
             ModelExchange => _ = fmu.enter_continuous_time(),
@@ -155,10 +155,19 @@ fn calculated_start() {
         let started = fmu.get([level]);
         fmu.set(&[plain], &[0.0]);
         assert_eq!(fmu.get([level]), started, "{interface}");
+        fmu.restore(&restored);
+        fmu.set(&[plain], &[10.0]);
+        assert_eq!(fmu.get([level]), [5.0]);
     }
     // OpenModelica sets states while still in Event Mode.
-    let fmu = Importer::in_mode::<Meter>(ModelExchange, Event);
+    let fmu = F::in_mode::<Meter>(ModelExchange, Event);
     fmu.ok(fmu.set_states(&7.0, 1));
     fmu.set(&[plain], &[8.0]);
     assert_eq!(fmu.get([level]), [7.0]);
+}
+
+#[test]
+fn calculated_starts() {
+    calculated_start::<Importer>();
+    calculated_start::<fmi3::Importer>();
 }

@@ -13,22 +13,14 @@ mod two_of_one_name {
 }
 
 // Other variables are named by their names.
-mod unknown_name_in_depends_on {
+mod unknown_names {
     include!("shared/fields.rs");
 
     variables! { for Plant;
         /// An output
         y = output(&NUMBER).depends_on(&[w]) by |plant| plant.u;
-    }
-}
-
-// Other variables are named by their names.
-mod unknown_name_in_derivative_of {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
         /// A rate
-        dx = local(&NUMBER).derivative_of(w) by |plant| plant.u;
+        dx = local(&NUMBER).derivative_of(z) by |plant| plant.u;
     }
 }
 

@@ -1,34 +1,66 @@
-//! Tables and capabilities that contradict themselves, found while constants are evaluated.
+//! Tables and capabilities that contradict themselves, detected while constants are evaluated. The description of a variable
+//! is the rule that its line violates.
 
-// Where a value is set and how it is read go together.
-mod array_and_scalar {
+mod lines {
     include!("shared/fields.rs");
 
     variables! { for Plant;
-        /// Inputs
-        u = input(&NUMBER) in list by |plant| plant.u;
-    }
-}
-
-// Element by element: a derivative has as many as its state.
-mod array_of_another_length {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// States
+        /// The value that is set and the value that is read have equal dimensions
+        array_and_scalar = input(&NUMBER) in list by |plant| plant.u;
+        /// Valid: states with derivatives
         T = output(&NUMBER).state() in list;
-        /// Their rates, but for one
-        der_T as "der(T)" = local(&NUMBER).derivative_of(T) by |plant| [plant.u; 7];
-    }
-}
-
-// Nobody could set it.
-mod array_without_elements {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// Nothing
-        y = output(&NUMBER) by |_| [0.0; 0];
+        /// A derivative has the dimensions of its state
+        array_of_another_length = local(&NUMBER).derivative_of(T) by |plant| [plant.u; 7];
+        /// An array has elements
+        array_without_elements = output(&NUMBER) by |_| [0.0; 0];
+        /// There are no clocks
+        clock = clock(&BOOLEAN);
+        /// There are no structural parameters
+        structural = structural_parameter(&INTEGER) in n;
+        /// A constant is exact (section 2.2.7)
+        constant_approx = output(&NUMBER).constant().approx() in x;
+        /// Names differ from the names of array elements
+        element_of_the_same_name as "T[3]" = input(&NUMBER) in u;
+        /// The value of the time is the time of the instance
+        independent_with_by = independent(&TIME) by |plant| plant.x;
+        /// An input is not constant (section 2.2.7)
+        input_constant = input(&NUMBER).constant() in u;
+        /// An input has no dependencies
+        input_depends_on = input(&NUMBER).depends_on(&[input_constant]) in u;
+        /// An input has no initial (section 2.2.7)
+        input_exact = input(&NUMBER).exact() in u;
+        /// An input has a field
+        input_with_by_only = input(&NUMBER) by |plant| plant.u;
+        /// Valid: a state with a derivative
+        x = output(&NUMBER).state() in x;
+        /// A derivative is a Real
+        integer_derivative = local(&INTEGER).derivative_of(x) by |plant| plant.n;
+        /// A continuous variable is a Real (section 2.2.7)
+        integer_state = output(&INTEGER).state() in n;
+        // A variable has a description.
+        no_description = input(&NUMBER) in u;
+        /// A variable has a field or a calculation
+        nothing = output(&NUMBER);
+        /// An output is not tunable (section 2.2.7)
+        output_tunable = output(&NUMBER).tunable() in x;
+        /// The value of a parameter is exact (section 2.2.7)
+        parameter_approx = parameter(&NUMBER).approx() in x;
+        /// A parameter is fixed or tunable (section 2.2.7)
+        parameter_discrete = parameter(&NUMBER).discrete() in x;
+        /// A parameter has a field
+        parameter_without_field = parameter(&NUMBER) by |plant| plant.x;
+        /// A state has a derivative
+        state_without_derivative = output(&NUMBER).state() in u;
+        /// A state has a field
+        state_without_field = output(&NUMBER).state() by |plant| plant.x;
+        /// Valid: the derivative of this state
+        rate = local(&NUMBER).derivative_of(state_without_field) by |plant| plant.u;
+        /// Names of variables differ
+        two_of_one_label as "x" = input(&NUMBER) in x;
+        /// The value of an Integer is an i32
+        wrong_type_of_field = output(&INTEGER) in x;
+        /// The value of a Real is an f64
+        wrong_type_of_calculation = output(&NUMBER) by |plant| plant.n;
     }
 }
 
@@ -41,235 +73,9 @@ mod capability_not_named {
     offer!(Plant: CoSimulation);
 }
 
-// What FMI 3.0 has more.
-mod clock {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// Ticks
-        tick = clock(&BOOLEAN);
-        /// How many
-        n = structural_parameter(&INTEGER) in n;
-    }
-}
-
-// A constant is exact (section 2.2.7).
-mod constant_approx {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// An output
-        y = output(&NUMBER).constant().approx() in x;
-    }
-}
-
-// Names of elements are names.
-mod element_of_the_same_name {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// Its elements are T[1], T[2] and so on
-        T = input(&NUMBER) in list;
-        /// One of them again
-        T3 as "T[3]" = input(&NUMBER) in u;
-    }
-}
-
-// The time is the instance's.
-mod independent_with_by {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// The time
-        time = independent(&TIME) by |plant| plant.x;
-    }
-}
-
-// An input changes (section 2.2.7).
-mod input_constant {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// An input
-        u = input(&NUMBER).constant() in u;
-    }
-}
-
-// Only what is calculated depends on others.
-mod input_depends_on {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// An input
-        u = input(&NUMBER).depends_on(&[u]) in u;
-    }
-}
-
-// An input has no initial (section 2.2.7).
-mod input_exact {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// An input
-        u = input(&NUMBER).exact() in u;
-    }
-}
-
-// An input lives somewhere.
-mod input_with_by_only {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// An input
-        u = input(&NUMBER) by |plant| plant.u;
-    }
-}
-
-// Only a Real has a rate.
-mod integer_derivative {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// A state
-        x = output(&NUMBER).state() in x;
-        /// Its rate
-        n = local(&INTEGER).derivative_of(x) by |plant| plant.n;
-    }
-}
-
-// Only a Real is continuous (section 2.2.7).
-mod integer_state {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// A state
-        n = output(&INTEGER).state() in n;
-    }
-}
-
-// Users read what a variable is.
-mod no_description {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        u = input(&NUMBER) in u;
-    }
-}
-
-// A variable has a place or a calculation.
-mod nothing_said {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// An output
-        y = output(&NUMBER);
-    }
-}
-
-// An output is no parameter (section 2.2.7).
-mod output_tunable {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// An output
-        y = output(&NUMBER).tunable() in x;
-    }
-}
-
-// A parameter has an exact value (section 2.2.7).
-mod output_with_wrong_initial {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// A parameter
-        gain = parameter(&NUMBER).approx() in x;
-    }
-}
-
-// A parameter is fixed or tunable (section 2.2.7).
-mod parameter_discrete {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// A parameter
-        gain = parameter(&NUMBER).discrete() in x;
-    }
-}
-
-// What importers set lives somewhere.
-mod parameter_without_index {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// A parameter
-        gain = parameter(&NUMBER) by |plant| plant.x;
-    }
-}
-
-// A text has no range.
-mod range_of_a_text {
-    use fmu_export::*;
-
-    pub const TEXT: Type = STRING.min(0.0);
-
-}
-
-// Every state has a derivative.
-mod state_without_derivative {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// A state with one
-        u = output(&NUMBER).state() in u;
-        /// Its rate
-        du = local(&NUMBER).derivative_of(u) by |plant| plant.u;
-        /// A state without
-        x = output(&NUMBER).state() in x;
-    }
-}
-
-// A state lives somewhere.
-mod state_without_index {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// A state
-        x = output(&NUMBER).state() by |plant| plant.x;
-        /// Its rate
-        dx = local(&NUMBER).derivative_of(x) by |plant| plant.u;
-    }
-}
-
-// Names are unique for importers, too.
-mod two_of_one_label {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// An input
-        u = input(&NUMBER) in u;
-        /// Another
-        w as "u" = input(&NUMBER) in x;
-    }
-}
-
-// An Integer lives in an i32.
-mod wrong_type_in_place {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// An output
-        y = output(&INTEGER) in x;
-    }
-}
-
-// A Real is an f64.
-mod wrong_type_of_calculation {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// An output
-        y = output(&NUMBER) by |plant| plant.n;
-    }
+// A string has no range.
+mod range_of_a_string {
+    pub const STRING: fmu_export::Type = fmu_export::STRING.min(0.0);
 }
 
 fn main() {}

@@ -52,23 +52,15 @@ mod no_type_in_place {
     }
 }
 
-// A place is a field of the model.
-mod unknown_field {
+// A place is a field of the model, and a kind is a function of Variable.
+mod unknown_names {
     include!("shared/fields.rs");
 
     variables! { for Plant;
         /// An input
         u = input(&NUMBER) in w;
-    }
-}
-
-// A kind is a function of Variable.
-mod unknown_kind {
-    include!("shared/fields.rs");
-
-    variables! { for Plant;
-        /// An input
-        u = inlet(&NUMBER) in u;
+        /// Another input
+        v = inlet(&NUMBER) in u;
     }
 }
 

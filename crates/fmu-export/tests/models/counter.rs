@@ -13,7 +13,7 @@ pub struct Counter {
     sum: f64,
     period: f64,
     full: i32,
-    /// When it counts next.
+    /// Time of the next count.
     next: f64,
 }
 
@@ -23,21 +23,21 @@ const DIGITS: Type = Type::integer("Digits").min_integer(2);
 variables! { for Counter, memory in next;
     /// Whether it counts
     on = input(&BOOLEAN) in on;
-    /// What it adds
+    /// Increment
     increment = input(&INTEGER) in increment;
-    /// What the increments weigh; changes at events only
+    /// Weight of the increments; changes at events only
     weight = input(&NUMBER).discrete() in weight;
-    /// What it has counted
+    /// Count
     count = output(&INTEGER).exact() in count;
-    /// How often it was full
+    /// How often the count was full
     carries = output(&INTEGER).exact() in carries;
-    /// What all increments have weighed
+    /// Weight of all increments
     sum = output(&NUMBER).discrete().exact() in sum;
     /// Whether the count is odd
     odd = output(&BOOLEAN) by |counter| counter.count % 2 != 0;
-    /// Between two counts
+    /// Time between two counts
     period = parameter(&PERIOD) in period;
-    /// The first count that is too much
+    /// Smallest count that is too large
     full = parameter(&DIGITS) in full;
 }
 
@@ -76,7 +76,7 @@ impl Model for Counter {
 }
 
 impl ModelExchange for Counter {
-    /// At most one thing at a time: where more is to do at the same time, the importer calls again (section 3.2.2).
+    /// Does at most one thing; if more is due at the same time, the importer calls again (section 3.2.2).
     fn event(&mut self, time: f64) -> Result<Event, Error> {
         if self.count >= self.full {
             self.carry();

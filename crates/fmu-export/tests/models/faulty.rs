@@ -1,4 +1,4 @@
-//! A model whose every method can panic. No example to follow.
+//! A model whose every method can panic; not an example for authors.
 
 use fmu_export::*;
 use std::cell::Cell;
@@ -26,11 +26,11 @@ pub enum Fault {
     OutputDerivative,
     Memory,
     Drop,
-    /// With something that is no text.
+    /// With a payload that is no string.
     NoMessage,
-    /// With something that panics when it is dropped, and so does what that panic carries.
+    /// With a payload whose drop panics with such a payload.
     Bomb,
-    /// In the next instance or copy, whatever this one is told.
+    /// In the next instance or copy, regardless of the parameter.
     New,
     Clone,
 }
@@ -58,7 +58,7 @@ pub struct Faulty {
     memory: Memory,
 }
 
-/// What it remembers besides its variables: its fault once more.
+/// Memory besides the variables: the fault again.
 #[derive(Clone)]
 struct Memory(i32);
 
@@ -107,17 +107,17 @@ impl Saved for Memory {
 }
 
 variables! { for Faulty, memory in memory;
-    /// What comes in
+    /// Input
     u = input(&NUMBER) in number then |faulty| { faulty.panic_if(Fault::Then); };
-    /// What goes out
+    /// Output
     y = output(&NUMBER) by |faulty| faulty.read(0.5);
     /// Where it breaks
     fault = parameter(&INTEGER) in fault then |faulty| { faulty.memory = Memory(faulty.fault); };
-    /// A whole number
+    /// An integer
     n = output(&INTEGER) by |faulty| faulty.read(3);
-    /// A truth
+    /// A Boolean
     truth = input(&BOOLEAN) in truth then |faulty| { faulty.panic_if(Fault::Then); } by |faulty| faulty.read(faulty.truth);
-    /// A text
+    /// A string
     text = input(&STRING) in text then |faulty| { faulty.panic_if(Fault::Then); } by |faulty| {
         faulty.panic_if(Fault::ReadText);
         faulty.text.clone()

@@ -1,4 +1,4 @@
-//! A clock that says beforehand where it will fail, which it does where it is told to.
+//! A clock that fails where its parameter requests it, after a warning.
 
 use fmu_export::*;
 
@@ -24,7 +24,7 @@ enumeration! {
     }
 }
 
-/// A temperature, as an author may wrap it: only what must be is written.
+/// A temperature, as an author may wrap it, with only the required functions.
 #[derive(Clone, Copy)]
 pub struct Celsius(pub f32);
 
@@ -56,7 +56,7 @@ pub struct Grumbler {
     warmer: f32,
     rounds: i32,
     last: f64,
-    /// When the next event is due: never is infinitely late.
+    /// Time of the next event; infinity for never.
     next: f64,
     log: Log,
 }
@@ -67,11 +67,11 @@ const KELVIN: Type = Type::float32("Kelvin", &units::ONE);
 variables! { for Grumbler, memory in next;
     /// Where something goes wrong
     trouble = parameter(&TROUBLE) in trouble;
-    /// Around it
+    /// Ambient temperature
     ambient = input(&NUMBER) in ambient;
-    /// How much warmer it is itself
+    /// Temperature above the ambient temperature
     warmer = output(&KELVIN).exact() in warmer;
-    /// Of events
+    /// Number of rounds of events
     rounds = output(&INTEGER).exact() in rounds;
     /// No event is after that
     last = parameter(&NUMBER) in last;

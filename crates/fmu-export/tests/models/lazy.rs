@@ -1,8 +1,8 @@
-//! A model that calculates once what is read, and works with it in events.
+//! A model that calculates values once before they are read, and uses them in events.
 
 use fmu_export::*;
 
-/// Calculates the sum of all that it has, and remembers it.
+/// Calculates and stores the sum of all its values.
 #[derive(Clone)]
 pub struct Lazy {
     real: f64,
@@ -32,7 +32,7 @@ variables! { for Lazy, memory in slope;
     der_state as "der(state)" = local(&NUMBER).derivative_of(state) by |lazy| lazy.sum;
     /// The sum as it was calculated
     sum = output(&NUMBER) by |lazy| lazy.sum;
-    /// The same without the time, calculated when it is read
+    /// Sum without the time, calculated when it is read
     summands = local(&NUMBER) by |lazy| lazy.summands();
     /// The time
     time = independent(&TIME);

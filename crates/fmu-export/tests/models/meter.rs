@@ -60,13 +60,13 @@ variables! { for Meter, memory in has_started, ring.begin, ring.values, counted,
     boxed = input(&NUMBER) in boxed.value then boxed.is_set;
     /// In a vector
     listed = input(&NUMBER) in list[1];
-    /// In a place that changes
+    /// In an element that changes
     moving = input(&NUMBER) in ring[0];
     /// The sum as it was calculated
     total = output(&NUMBER) from total;
-    /// The same, calculated when it is read
+    /// Sum, calculated when it is read
     sum = output(&NUMBER) by |meter| meter.sum();
-    /// How many of the marks are set, and how often the second wire was
+    /// Number of marks that are set, plus 10 times the number of times that the second wire was set
     marks = output(&INTEGER) by |meter| {
         10 * meter.counted + meter.wires.iter().chain([&*meter.boxed]).map(|wire| i32::from(wire.is_set)).sum::<i32>()
     };

@@ -6,7 +6,7 @@ use fmu_export::*;
 #[derive(Clone)]
 pub struct Oscillator {
     force: f64,
-    /// The slope of the force in the next step, if the importer has said one.
+    /// Slope of the force in the next step, if the importer has set one.
     slope: Option<f64>,
     position: f64,
     velocity: f64,
@@ -30,9 +30,9 @@ const SPRINGS: Type = Type::integer("Springs").min_integer(1).max_integer(9);
 variables! { for Oscillator, memory in slope;
     /// Force on the mass
     force = input(&FORCE) in force;
-    /// Where the mass is
+    /// Position of the mass
     position = output(&POSITION).state() in position;
-    /// How fast it is
+    /// Velocity of the mass
     velocity = local(&VELOCITY).state() in velocity;
     /// Rate of the position
     der_position as "der(position)" = local(&VELOCITY).derivative_of(position).depends_on(&[velocity])
@@ -146,7 +146,7 @@ impl Partials for Oscillator {
             (Name::spring_force, Name::stiffness) => -f64::from(self.springs) * self.position,
             (Name::energy, Name::position) => k * self.position,
             (Name::energy, Name::velocity) => m * self.velocity,
-            // Nobody has asked for the rest of the energy yet.
+            // Not provided, for tests of the error.
             (Name::energy, Name::mass | Name::stiffness | Name::damping) => return None,
             _ => 0.0,
         })

@@ -1,4 +1,4 @@
-//! A value of every kind.
+//! A value of every type.
 
 use fmu_export::*;
 
@@ -12,7 +12,7 @@ enumeration! {
     }
 }
 
-/// Keeps what it is given.
+/// Keeps the values that are set.
 #[derive(Clone, Default)]
 pub struct Palette {
     float64: f64,

@@ -2,15 +2,15 @@
 
 use fmu_export::*;
 
-/// The pieces of the rod, and what they are heated by.
+/// Number of pieces of the rod.
 pub const PIECES: usize = 8;
 const HEATERS: usize = 2;
 
 enumeration! {
-    /// How a heater stands.
+    /// State of a heater.
     pub enum Switch {
         Off = 0,
-        /// It heats
+        /// The heater heats
         On = 3,
     }
 }
@@ -46,7 +46,7 @@ variables! { for Rod;
     T = output(&TEMPERATURE).state() in temperatures;
     /// Power of the heaters, each for half of the rod
     power = input(&POWER) in power;
-    /// Whether they are switched on
+    /// Whether the heaters are switched on
     switches = input(&SWITCH) in switches;
     /// Rates of the temperatures
     der_T as "der(T)" = local(&RATE).derivative_of(T).depends_on(wall, T, power, switches, capacities, conductance)
@@ -59,15 +59,15 @@ variables! { for Rod;
     capacities = parameter(&CAPACITY) in capacities;
     /// Conductance from piece to piece
     conductance = parameter(&CONDUCTANCE) in conductance;
-    /// Below the first a half is cold, above the second it is warm
+    /// Temperatures of each half below which it is cold and above which it is warm
     limits = parameter(&TEMPERATURE) in limits;
     /// Whether a piece is above the upper limit of its half, since the last step or event
     hot = output(&BOOLEAN).exact().depends_on(&[]) in hot;
     /// A number for each half
     counted = parameter(&COUNT) in counted then |rod| { rod.conductance = rod.conductance.min(1.0); };
-    /// What the halves are called
+    /// Names of the halves
     labels = parameter(&STRING) in labels;
-    /// Whether the halves are warm, and what they are called
+    /// Names of the halves and whether they are warm
     reports = output(&STRING).depends_on(&[T, limits, labels]) by |rod| rod.reports();
 }
 

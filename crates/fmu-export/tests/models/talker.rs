@@ -1,4 +1,4 @@
-//! Texts, names and all the odd kinds of variables; messages, resources, and what the importer says of its experiment.
+//! Strings, names and the rarer kinds of variables; messages, resources, and the experiment.
 
 use fmu_export::*;
 
@@ -37,25 +37,25 @@ const LEVEL: Type = Type::real("Level", &units::ONE).min(0.0).max(11.0);
 const SQUARE: Type = Type::real("Square", &units::ONE).min(1e-6).max(1e6);
 
 variables! { for Talker, memory in said, experiment.start_time, experiment.stop_time, experiment.tolerance;
-    /// What it hears
+    /// String that it hears
     heard = input(&STRING) in heard;
-    /// What it says
+    /// Reply
     reply = output(&STRING) by |talker| talker.reply();
-    /// What it said last
+    /// Last reply
     said = output(&STRING) by |talker| talker.said.last().cloned().unwrap_or_default();
-    /// What it says first
+    /// First reply
     greeting = parameter(&STRING) in greeting;
     /// How it talks
     mood = input(&MOOD) in mood;
-    /// The same mood, as it hears itself
+    /// Mood again
     own_mood = output(&MOOD) by |talker| talker.mood;
-    /// How loud it is, to be turned while it runs
+    /// Volume, tunable during the simulation
     volume = parameter(&LEVEL).tunable() in volume;
-    /// The same in decibels
+    /// Volume in decibels
     decibels = calculated_parameter(&NUMBER).tunable() by |talker| 20.0 * (1e-3 + talker.volume).log10();
-    /// What the greeting is long
+    /// Length of the greeting
     length = calculated_parameter(&INTEGER) by |talker| talker.greeting.len() as i32;
-    /// What it finds the square root of
+    /// Number whose square root it finds
     square = parameter(&SQUARE) in radicand;
     /// The root, from a start value on
     root = local(&NUMBER).approx() in guess by |talker| talker.root;
@@ -65,13 +65,13 @@ variables! { for Talker, memory in said, experiment.start_time, experiment.stop_
     time = independent(&TIME);
     /// Who it is
     who = local(&STRING).fixed() by |talker| talker.who.clone();
-    /// What it has read in its resources
+    /// Content of its resource file
     words = local(&STRING).fixed() by |talker| talker.words.clone();
-    /// When it begins
+    /// Start time
     begin = local(&TIME).fixed() by |talker| talker.experiment.start_time;
-    /// When it ends, or -1
+    /// Stop time, or -1
     end = local(&TIME).fixed() by |talker| talker.experiment.stop_time.unwrap_or(-1.0);
-    /// How exact it should be, or -1
+    /// Tolerance, or -1
     tolerance = local(&NUMBER).fixed() by |talker| talker.experiment.tolerance.unwrap_or(-1.0);
 }
 

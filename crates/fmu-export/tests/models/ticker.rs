@@ -13,13 +13,13 @@ pub struct Ticker {
 }
 
 variables! { for Ticker, memory in next;
-    /// What a tick adds
+    /// Amount that a tick adds
     amount = input(&NUMBER).discrete() in amount;
-    /// What all ticks have added
+    /// Sum of all ticks
     sum = output(&NUMBER).discrete().exact() in sum;
-    /// How many there were
+    /// Number of ticks
     ticks = output(&INTEGER).exact() in ticks;
-    /// After so many it ends
+    /// Number of ticks after which the simulation ends
     last = parameter(&INTEGER) in last;
 }
 

@@ -22,12 +22,8 @@ const TRUTH: u32 = Name::truth as u32;
 const TEXT: u32 = Name::text as u32;
 const FAULT: u32 = Name::fault as u32;
 
-fn new<F: Either>(interface: Interface) -> F {
-    F::make::<Faulty>(&Arguments::of::<Faulty>(interface)).expect("an instance")
-}
-
 fn initialized<F: Either>(interface: Interface) -> F {
-    let fmu: F = new(interface);
+    let fmu = F::of::<Faulty>(interface);
     fmu.initialize(0.0);
     fmu
 }
@@ -50,7 +46,7 @@ fn shows_at_once(fault: Fault) -> bool {
     [Fault::Update, Fault::Log].contains(&fault)
 }
 
-/// One test for both standards, because what Rust prints about panics is switched off for the whole process.
+/// One test for both FMI versions, because the messages of Rust about panics are switched off for the whole process.
 #[test]
 fn every_panic_is_contained() {
     contained::<Importer>();
@@ -67,7 +63,7 @@ fn contained<F: Special>() {
     let all = of_both::<F>().into_iter().chain(F::CALLS.iter().copied());
     all.for_each(|case| is_contained(case, &bystanders));
 
-    let fmu: F = new(CoSimulation);
+    let fmu = F::of::<Faulty>(CoSimulation);
     fmu.ok(set_fault(&fmu, Fault::Initialize));
     let message = fatal(&fmu, "initialization", |fmu| fmu.enter_initialization_mode(0.0, None));
     assert!(message.starts_with(&named::<F>("EnterInitializationMode")), "{message}");
@@ -80,13 +76,13 @@ fn contained<F: Special>() {
     check_that_all_is_over(&fmu);
 
     // A panic while an instance is freed ends with it; so do those of its states.
-    let fmu: F = new(CoSimulation);
+    let fmu = F::of::<Faulty>(CoSimulation);
     fmu.ok(set_fault(&fmu, Fault::Drop));
     (0..3).for_each(|_| _ = fmu.save());
     without_output(|| drop(fmu));
 
     // A panic while one is made, for the first time and by a reset.
-    let fmu: F = new(CoSimulation);
+    let fmu = F::of::<Faulty>(CoSimulation);
     fatal(&fmu, "reset", |fmu| while_all_break(Fault::New, || fmu.reset()));
     check_that_all_is_over(&fmu);
     let none = || F::make::<Faulty>(&Arguments::of::<Faulty>(CoSimulation)).map(drop);
@@ -149,7 +145,7 @@ fn every_panic_of_c_sources_is_contained() {
     std::thread::scope(|scope| (0..4).for_each(|_| _ = scope.spawn(on_a_thread)));
 }
 
-/// What Rust prints about a panic stays out of the test's output.
+/// Runs the work without the messages that Rust prints about panics.
 fn without_output<T>(work: impl FnOnce() -> T) -> T {
     std::panic::set_hook(Box::new(|_| {}));
     let result = work();

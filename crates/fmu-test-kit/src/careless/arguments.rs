@@ -3,22 +3,46 @@
 
 use arbitrary::{Result, Unstructured};
 use fmu_export::fmi2::types::*;
-use fmu_export::{BaseType, Causality, Exported, Standard};
+use fmu_export::{BaseType, Causality, Exported, Standard, Variable};
 use std::ffi::CStr;
 use std::ptr::null;
+
+/// Base types of the variables of getters and setters, by the final part of the names of the functions.
+#[rustfmt::skip]
+const BY_END: [(&str, &[BaseType]); 15] = {
+    use BaseType::*;
+    [
+        ("Real", &[Real]),
+        ("Float64", &[Real]),
+        ("Integer", &[Integer, Enumeration]),
+        ("Boolean", &[Boolean]),
+        ("String", &[String]),
+        ("Float32", &[Float32]),
+        ("UInt8", &[UInt8]),
+        ("Int8", &[Int8]),
+        ("UInt16", &[UInt16]),
+        ("Int16", &[Int16]),
+        ("UInt32", &[UInt32]),
+        ("Int32", &[Integer]),
+        ("UInt64", &[UInt64]),
+        ("Int64", &[Int64, Enumeration]),
+        ("Binary", &[Binary]),
+    ]
+};
+
+/// Returns the base types of the variables of a function; Reals by default.
+pub fn bases_of(function: &str) -> &'static [BaseType] {
+    BY_END.into_iter().find(|(end, _)| function.ends_with(end)).unwrap_or(BY_END[0]).1
+}
 
 /// Value references, grouped by the functions that use them.
 pub struct Variables {
     all: u32,
-    reals: Vec<u32>,
     real_inputs: Vec<u32>,
     real_starts: Vec<u32>,
     unknowns: Vec<u32>,
-    whole: Vec<u32>,
-    booleans: Vec<u32>,
-    texts: Vec<u32>,
-    /// Variables of the types that exist only in FMI 3.0, by the final part of the function names.
-    typed: [(&'static str, Vec<u32>); 10],
+    /// Variables by the final part of the names of functions.
+    by_end: [(&'static str, Vec<u32>); BY_END.len()],
     states: usize,
     indicators: usize,
     /// Value references of arrays in FMI 3.0, each with its number of values.
@@ -30,38 +54,18 @@ impl Variables {
     pub fn of<M: Exported>(standard: Standard) -> Self {
         let reference = |index| standard.reference(index);
         // In FMI 3.0, elements of arrays are not variables.
-        let is_one =
-            |variable: &fmu_export::Variable<M>| standard == Standard::Fmi2 || variable.element() == 0;
-        let those = |wanted: &dyn Fn(&fmu_export::Variable<M>) -> bool| {
+        let is_one = |variable: &Variable<M>| standard == Standard::Fmi2 || variable.element() == 0;
+        let those = |wanted: &dyn Fn(&Variable<M>) -> bool| {
             let indices = (0..).zip(M::TABLE).filter(|(_, variable)| is_one(variable) && wanted(variable));
             indices.map(|(index, _)| reference(index)).collect::<Vec<u32>>()
         };
-        let real = |variable: &fmu_export::Variable<M>| variable.base() == BaseType::Real;
-        let bases = |bases: &[BaseType]| those(&|variable| bases.contains(&variable.base()));
+        let reals = |wanted: fn(&Variable<M>) -> bool| those(&|of| of.base() == BaseType::Real && wanted(of));
         Self {
             all: reference(M::TABLE.len() as u32),
-            reals: those(&real),
-            real_inputs: those(&|variable| real(variable) && variable.causality() == Causality::Input),
-            real_starts: those(&|variable| real(variable) && variable.has_start()),
-            unknowns: those(&|variable| {
-                real(variable)
-                    && (variable.causality() == Causality::Output || variable.differentiates().is_some())
-            }),
-            whole: those(&|variable| [BaseType::Integer, BaseType::Enumeration].contains(&variable.base())),
-            booleans: those(&|variable| variable.base() == BaseType::Boolean),
-            texts: those(&|variable| variable.base() == BaseType::String),
-            typed: [
-                ("Float32", bases(&[BaseType::Float32])),
-                ("UInt8", bases(&[BaseType::UInt8])),
-                ("Int8", bases(&[BaseType::Int8])),
-                ("UInt16", bases(&[BaseType::UInt16])),
-                ("Int16", bases(&[BaseType::Int16])),
-                ("UInt32", bases(&[BaseType::UInt32])),
-                ("Int32", bases(&[BaseType::Integer])),
-                ("UInt64", bases(&[BaseType::UInt64])),
-                ("Int64", bases(&[BaseType::Int64, BaseType::Enumeration])),
-                ("Binary", bases(&[BaseType::Binary])),
-            ],
+            real_inputs: reals(|of| of.causality() == Causality::Input),
+            real_starts: reals(Variable::has_start),
+            unknowns: reals(|of| of.causality() == Causality::Output || of.differentiates().is_some()),
+            by_end: BY_END.map(|(end, bases)| (end, those(&|of| bases.contains(&of.base())))),
             states: M::STATES.len(),
             indicators: M::MODEL_EXCHANGE.map_or(0, |offer| offer.indicators),
             arrays: (0..)
@@ -86,14 +90,10 @@ impl Variables {
             "fmi2SetReal" => &self.real_starts,
             "fmi2SetRealInputDerivatives" => &self.real_inputs,
             "fmi2GetDirectionalDerivative" => &self.unknowns,
-            name if name.ends_with("Real") || name.ends_with("Derivatives") => &self.reals,
-            name if name.ends_with("Integer") => &self.whole,
-            name if name.ends_with("Boolean") => &self.booleans,
-            name if name.ends_with("String") => &self.texts,
-            name => match self.typed.iter().find(|(end, _)| name.ends_with(end)) {
-                Some((_, fitting)) => fitting,
-                None => &self.reals,
-            },
+            name => {
+                let of_type = self.by_end.iter().find(|(end, _)| name.ends_with(end));
+                &of_type.unwrap_or(&self.by_end[0]).1
+            }
         };
         let fits = u.ratio(15, 16)? && !fitting.is_empty();
         array(count, || {

@@ -26,6 +26,17 @@ pub fn has_handles(function: &str) -> bool {
     function.contains("FMUstate") || function.contains("FMUState")
 }
 
+/// Returns the size of a pointee of a function's argument; 4 for the parts of an event information.
+pub fn element_size(of: &str, function: &str) -> usize {
+    match of {
+        "Boolean" if function.starts_with("fmi2") => 4,
+        "Int8" | "UInt8" | "Boolean" | "Clock" | "Byte" => 1,
+        "Int16" | "UInt16" => 2,
+        "Float64" | "Real" | "Int64" | "UInt64" | "String" | "Binary" | "usize" => 8,
+        _ => 4,
+    }
+}
+
 impl Call {
     /// Returns whether a call with this status must leave the state unchanged. A step that ends early in FMI
     /// 2.0 changes the state.
@@ -165,13 +176,7 @@ impl Array {
         function: &str,
         a: &CallArguments,
     ) -> Self {
-        let size = match of {
-            "Boolean" if function.starts_with("fmi2") => 4,
-            "Int8" | "UInt8" | "Boolean" | "Clock" => 1,
-            "Int16" | "UInt16" => 2,
-            "Float64" | "Real" | "Int64" | "UInt64" | "String" | "Binary" | "usize" => 8,
-            _ => 4,
-        };
+        let size = element_size(of, function);
         let mut bytes = Vec::new();
         if !to_read {
             let count = match list.iter().rfind(|other| other.of == "usize").map(|of| of.name) {

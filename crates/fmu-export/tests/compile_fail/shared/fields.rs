@@ -1,4 +1,4 @@
-// What the models here have in common.
+// Fields of the models here.
 use fmu_export::*;
 
 #[derive(Clone)]

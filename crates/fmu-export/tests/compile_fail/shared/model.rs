@@ -1,4 +1,4 @@
-// The same with one variable, as a model that steps.
+// A model with one variable and steps.
 include!("fields.rs");
 
 variables! { for Plant;

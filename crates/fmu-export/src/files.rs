@@ -1,0 +1,25 @@
+//! Files that the page around a WebAssembly module contains. C sources have none.
+
+#![cfg(target_family = "wasm")]
+
+use std::cell::RefCell;
+use std::io;
+use std::path::{Path, PathBuf};
+
+thread_local! {
+    static FILES: RefCell<Vec<(PathBuf, Vec<u8>)>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Stores a file for [`read`].
+pub(crate) fn store(path: PathBuf, content: Vec<u8>) {
+    FILES.with_borrow_mut(|files| files.push((path, content)));
+}
+
+/// Reads a file that was stored.
+pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
+    FILES.with_borrow(|files| match files.iter().find(|(name, _)| name == path) {
+        Some((_, content)) => Ok(content.clone()),
+        None if files.is_empty() => Err(io::ErrorKind::Unsupported.into()),
+        None => Err(io::ErrorKind::NotFound.into()),
+    })
+}

@@ -1,0 +1,46 @@
+//! The scaling of the velocity with which [`propagator`](crate::propagator) computes its matrices.
+
+use crate::number::Number;
+use nalgebra::Matrix3;
+
+/// The velocity unit in which the series of a subsystem converges best, and the rate of convergence.
+///
+/// Angles and velocities differ in magnitude. With the velocity in this unit, the entries that couple them
+/// have the same magnitude. This makes the norm smaller, and the error of the doublings too. The unit is a
+/// power of 2, so the scaling is exact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Balance {
+    /// Velocity unit, rad/s.
+    pub(crate) scale: f64,
+    /// Base-2 logarithm of the factor by which a step of 1 s must be divided for the series to converge. The
+    /// logarithm avoids overflow for long steps of stiff systems.
+    halvings: f64,
+}
+
+impl Balance {
+    /// Computes the balance for the state matrix `a`.
+    pub fn new<T: Number>(a: &Matrix3<T>) -> Self {
+        let rounded = a.map(T::rounded);
+        let into_velocity = rounded[(2, 0)].abs().max(rounded[(2, 1)].abs());
+        let from_velocity = rounded[(0, 2)].abs().max(rounded[(1, 2)].abs());
+        let power = (-0.5 * (into_velocity / from_velocity).log2()).round().clamp(-300.0, 300.0) as i32;
+        let scale = 0.5_f64.powi(power);
+        let norm = rescaled(a, scale).map(T::rounded).abs().row_sum().max();
+        Self { scale, halvings: (norm / 0.25).log2() }
+    }
+
+    /// Returns the number of halvings for a step size with this base-2 logarithm.
+    pub(crate) fn doublings(&self, log2_of_h: f64) -> i32 {
+        (self.halvings + log2_of_h).ceil().clamp(0.0, 2100.0) as i32
+    }
+}
+
+/// Returns the matrix for a velocity in units of `scale`.
+pub(crate) fn rescaled<T: Number>(a: &Matrix3<T>, scale: f64) -> Matrix3<T> {
+    let mut b = *a;
+    b[(2, 0)] = b[(2, 0)] / scale;
+    b[(2, 1)] = b[(2, 1)] / scale;
+    b[(0, 2)] *= scale.into();
+    b[(1, 2)] *= scale.into();
+    b
+}
