@@ -24,7 +24,7 @@ pub struct Baseline {
 }
 
 impl Baseline {
-    /// Reads a file of lines such as `logs.silent: known since 2024` or `refusals.tolerated "J2": intended`.
+    /// Reads a file of lines such as `logs.silent: known since 2024` or `rejections.tolerated "J2": intended`.
     ///
     /// # Errors
     /// When it cannot be read, or a line has no name or no reason.
@@ -109,16 +109,19 @@ mod tests {
     #[test]
     fn a_reason_is_needed_for_each_observation() {
         let text =
-            "# known\nlogs.silent: since 2024\n\nrefusals.tolerated \"J2\": intended: see the manual\n";
+            "# known\nlogs.silent: since 2024\n\nrejections.tolerated \"J2\": intended: see the manual\n";
         let baseline = Baseline::parse(text).unwrap_or_default();
         let finding = |name: &str, observed: &[&str]| {
             let more = observed[1..].iter().map(|observed| (*observed).to_owned()).collect();
             Finding { name: name.to_owned(), observed: observed[0].to_owned(), more, ..Finding::default() }
         };
         assert_eq!(baseline.reason(&finding("logs.silent", &["a", "b"])), Some("since 2024".to_owned()));
-        let accepted = finding("refusals.tolerated", &["a value for J2"]);
+        let accepted = finding("rejections.tolerated", &["a value for J2"]);
         assert_eq!(baseline.reason(&accepted), Some("intended: see the manual".to_owned()));
-        assert_eq!(baseline.reason(&finding("refusals.tolerated", &["a value for J2", "one for J3"])), None);
+        assert_eq!(
+            baseline.reason(&finding("rejections.tolerated", &["a value for J2", "one for J3"])),
+            None
+        );
         assert_eq!(baseline.reason(&finding("states.restore", &["x"])), None);
         assert_eq!(baseline.unused(&[accepted], &[]), ["logs.silent"]);
     }

@@ -47,7 +47,7 @@ const STEPS: &[&str] = &["SetTime", "DoStep", "CompletedIntegratorStep"];
 /// Findings that compare no calls.
 #[rustfmt::skip]
 const ALONE: [&str; 5] = [
-    "life_cycle.refused", "life_cycle.states-changed", "results.early-return", "results.early-unsaid", "start_values.inputs",
+    "life_cycle.rejected", "life_cycle.states-changed", "results.early-return", "results.early-unsaid", "start_values.inputs",
 ];
 
 /// Chooses numbers that look random.
@@ -359,7 +359,7 @@ impl Checker {
         // An end that only this call sequence can show has the name of its rule; others have the name of the topic.
         let own = ["fresh-process", "unload", "exit"].iter().any(|name| rule.ends_with(name));
         let name = match rule.split_once('.') {
-            Some((topic, _)) if !own && (!forbidden || topic == "refusals") => topic,
+            Some((topic, _)) if !own && (!forbidden || topic == "rejections") => topic,
             _ => rule,
         };
         keep(&format!("{name}.{what}"), observed)

@@ -51,7 +51,7 @@ use std::time::Instant;
 use trajectory::{NoTrajectory, find_trajectory};
 
 /// Topics that a quick check leaves out.
-const LONG: [&str; 2] = ["hostile", "resources"];
+const LONG: [&str; 2] = ["malformed", "resources"];
 
 /// Checks an FMU, prints the findings and writes the reports. The exit status is 1 for findings of a severity that fails the
 /// check, otherwise 2 if the FMU, one of its interfaces or a topic was not checked, otherwise 0.
@@ -295,7 +295,7 @@ fn attack_with(
             check(checker, trajectory)
         }
         (Check::Malformed(rule, fits, write), Some(trajectory)) if fits.fit(checker, trajectory) => {
-            checks::hostile::all(checker, rule, write(checker, trajectory)?)
+            checks::malformed::all(checker, rule, write(checker, trajectory)?)
         }
         _ => Ok(()),
     }

@@ -16,10 +16,10 @@ pub const TOPICS: [&str; 14] = [
     "dependencies",
     "results",
     "reset",
-    "refusals",
+    "rejections",
     "logs",
     "resources",
-    "hostile",
+    "malformed",
 ];
 
 /// A rule that the files of the FMU break, and the observation.
@@ -126,7 +126,7 @@ mod tests {
             (three.severity, three.section.as_str()),
             (Severity::Violation, "FMI 3.0.2 section 2.3.1")
         );
-        let hang = broken(Fmi2, "hostile.times.hang", String::new());
+        let hang = broken(Fmi2, "malformed.times.hang", String::new());
         assert_eq!((hang.severity, hang.section.as_str()), (Severity::Fragile, ""));
     }
 

@@ -12,7 +12,7 @@ use crate::writer::{Point, Trajectory, Writer};
 fn play(checker: &Checker, writer: Writer) -> anyhow::Result<()> {
     let copy = writer.sequence.clone();
     // Discard is allowed: the FMU may need a smaller step.
-    checker.check("life_cycle.refused", writer.sequence, move |run| first_failure(&copy, run, 2))
+    checker.check("life_cycle.rejected", writer.sequence, move |run| first_failure(&copy, run, 2))
 }
 
 const ALL: Part = Points(usize::MAX);

@@ -4,11 +4,11 @@ pub mod dependencies;
 pub mod derivatives;
 pub mod early_returns;
 pub mod functions;
-pub mod hostile;
 pub mod life_cycle;
 pub mod logs;
+pub mod malformed;
 pub mod package;
-pub mod refusals;
+pub mod rejections;
 pub mod reset;
 pub mod resources;
 pub mod results;
@@ -73,7 +73,7 @@ pub const ALL: &[(&str, Check)] = &[
     ("life_cycle", Each(Always, life_cycle::orders)),
     ("life_cycle", Once(life_cycle::free_null)),
     ("states", Each(Saves, states::restore)),
-    ("hostile", Malformed("hostile.values", Always, hostile::values)),
+    ("malformed", Malformed("malformed.values", Always, malformed::values)),
     ("resources", Each(Always, resources::cycles)),
     ("results", Each(Always, results::repeat)),
     ("functions", Once(functions::present)),
@@ -86,7 +86,7 @@ pub const ALL: &[(&str, Check)] = &[
     ("derivatives", Each(Integrated, derivatives::vectors)),
     ("dependencies", Each(Always, dependencies::missing)),
     ("dependencies", Each(Always, dependencies::initial)),
-    ("refusals", Each(Always, refusals::change_nothing)),
+    ("rejections", Each(Always, rejections::change_nothing)),
     ("results", Each(Several, results::instances)),
     ("results", Each(Always, results::reading)),
     ("results", Each(Always, results::name)),
@@ -98,10 +98,10 @@ pub const ALL: &[(&str, Check)] = &[
     ("life_cycle", Each(Always, life_cycle::random)),
     ("life_cycle", Each(Integrated, life_cycle::events)),
     ("logs", Each(Always, logs::switches)),
-    ("hostile", Malformed("hostile.null-instance", Always, hostile::null_instances)),
-    ("hostile", Malformed("hostile.null", Always, hostile::nulls)),
-    ("hostile", Malformed("hostile.references", Always, hostile::references)),
-    ("hostile", Malformed("hostile.sizes", Always, hostile::sizes)),
-    ("hostile", Malformed("hostile.times", Always, hostile::times)),
-    ("hostile", Malformed("hostile.bytes", Serializes, hostile::bytes)),
+    ("malformed", Malformed("malformed.null-instance", Always, malformed::null_instances)),
+    ("malformed", Malformed("malformed.null", Always, malformed::nulls)),
+    ("malformed", Malformed("malformed.references", Always, malformed::references)),
+    ("malformed", Malformed("malformed.sizes", Always, malformed::sizes)),
+    ("malformed", Malformed("malformed.times", Always, malformed::times)),
+    ("malformed", Malformed("malformed.bytes", Serializes, malformed::bytes)),
 ];

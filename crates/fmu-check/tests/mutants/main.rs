@@ -146,9 +146,9 @@ macro_rules! mutants {
 }
 
 mutants! {
-    2 half_set "refusals" "refusals.changed";
-    3 discard_changes "refusals" "refusals.discarded";
-    2 step_rejected_halfway "refusals" "refusals.changed";
+    2 half_set "rejections" "rejections.changed";
+    3 discard_changes "rejections" "rejections.discarded";
+    2 step_rejected_halfway "rejections" "rejections.changed";
     2 getter_changes "results" "results.reading";
     3 reading_once "results" "results.reading";
     2 lossy_state "states" "states.restore-values";
@@ -199,20 +199,20 @@ mutants! {
     3 state_not_supported "functions" "functions.capability";
     2 status_unknown "results" "functions.status";
     3 free_null_crashes "life_cycle" "life_cycle.free-null.crash";
-    2 terminate_rejected "life_cycle" "life_cycle.refused";
+    2 terminate_rejected "life_cycle" "life_cycle.rejected";
     3 reset_rejected "reset" "reset.incomplete";
-    2 get_after_end_rejected "life_cycle" "life_cycle.refused";
+    2 get_after_end_rejected "life_cycle" "life_cycle.rejected";
     3 crash_amid "results" "results.crash";
     3 token_ignored "life_cycle" "life_cycle.token";
-    2 category_unknown "refusals" "logs.category";
-    3 log_latin1 "refusals" "logs.text";
-    3 silent "refusals" "logs.silent";
+    2 category_unknown "rejections" "logs.category";
+    3 log_latin1 "rejections" "logs.text";
+    3 silent "rejections" "logs.silent";
     3 log_when_off "logs" "logs.off";
-    2 endless_step "hostile" "hostile.times.hang";
-    3 null_crashes "hostile" "hostile.null.crash";
-    2 bytes_crash "hostile" "hostile.bytes.crash";
-    3 reference_crashes "hostile" "hostile.references.crash";
-    2 reference_exits "hostile" "hostile.references.exit";
+    2 endless_step "malformed" "malformed.times.hang";
+    3 null_crashes "malformed" "malformed.null.crash";
+    2 bytes_crash "malformed" "malformed.bytes.crash";
+    3 reference_crashes "malformed" "malformed.references.crash";
+    2 reference_exits "malformed" "malformed.references.exit";
     2 text_cut "start_values" "start_values.set";
     2 event_loses_input "start_values" "start_values.inputs";
     3 start_in_mode_ignored "start_values" "start_values.when";
@@ -223,7 +223,7 @@ mutants! {
     3 directional_added "derivatives" "derivatives.directional";
     3 event_again_now "life_cycle" "life_cycle.next-event-time";
     2 event_moves_silently "life_cycle" "life_cycle.states-changed";
-    2 last_step_rejected "life_cycle" "life_cycle.refused";
+    2 last_step_rejected "life_cycle" "life_cycle.rejected";
     3 early_time_wrong "results" "results.early-return";
     3 early_unsaid "results" "results.early-unsaid";
     2 name_in_result "results" "results.name";
@@ -235,14 +235,14 @@ mutants! {
     2 name_gone "life_cycle" "arrays.read-beyond";
     3 stop_ignored "life_cycle" "life_cycle.stop-time";
     2 order_ignored "derivatives" "derivatives.order";
-    3 pool_of_eight "life_cycle" "life_cycle.refused";
+    3 pool_of_eight "life_cycle" "life_cycle.rejected";
     2 output_stale "results" "results.reading";
     2 unload_crashes "life_cycle" "life_cycle.unload.crash";
     3 exit_hangs "life_cycle" "life_cycle.unload.hang";
     3 early_read_wrong "start_values" "start_values.start";
-    2 set_after_end "refusals" "refusals.tolerated";
-    3 set_after_end_crashes "refusals" "refusals.crash";
-    2 long_step_hangs "hostile" "hostile.times.hang";
+    2 set_after_end "rejections" "rejections.tolerated";
+    3 set_after_end_crashes "rejections" "rejections.crash";
+    2 long_step_hangs "malformed" "malformed.times.hang";
 }
 
 #[test]
@@ -464,7 +464,7 @@ fn a_quick_check_is_quick() {
     assert!(begin.elapsed().as_secs() < 30);
     let unchecked = report["unreached"].as_array().expect("a list").iter();
     let names: Vec<_> = unchecked.map(|of| (of["name"].clone(), of["allowed"].clone())).collect();
-    assert_eq!(names, [("resources".into(), true.into()), ("hostile".into(), true.into())]);
+    assert_eq!(names, [("resources".into(), true.into()), ("malformed".into(), true.into())]);
     assert_eq!(report["status"], 0);
 }
 

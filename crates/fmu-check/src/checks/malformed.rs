@@ -1,6 +1,6 @@
 //! Malformed calls, as faulty importers make them. A crash or a hang is fragile.
 
-use super::refusals::unknown_reference;
+use super::rejections::unknown_reference;
 use crate::call_sequence::{Arg, CallSequence, End, Kind, Values};
 use crate::checker::{Checker, Random};
 use crate::description::{kind_of, type_name};

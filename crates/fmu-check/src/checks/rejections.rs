@@ -13,8 +13,8 @@ use std::sync::Arc;
 /// the call is accepted.
 type Attack = (String, Vec<Arg>, String, Option<&'static str>);
 
-const TOLERATED: Option<&str> = Some("refusals.tolerated");
-const ACCEPTED: Option<&str> = Some("refusals.accepted");
+const TOLERATED: Option<&str> = Some("rejections.tolerated");
+const ACCEPTED: Option<&str> = Some("rejections.accepted");
 
 fn attack(function: &str, args: Vec<Arg>, what: &str, rule: Option<&'static str>) -> Attack {
     (function.to_owned(), args, what.to_owned(), rule)
@@ -74,7 +74,7 @@ fn variable_attacks(checker: &Checker, interface: Interface) -> Vec<Attack> {
             attacks.extend(input_attacks(checker, variable, &function, kind, other));
         }
         let (group, rule, what) = if variable.variability == "constant" {
-            ("constant", Some("refusals.constant"), format!("a value for the constant {}", variable.name))
+            ("constant", Some("rejections.constant"), format!("a value for the constant {}", variable.name))
         } else if variable.causality == "output" && variable.initial == "calculated" {
             ("output", TOLERATED, format!("a value for the output {}", variable.name))
         } else if is("parameter", "fixed") {
@@ -273,7 +273,7 @@ fn after_end(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     writer.forbidden = true;
     let ids = writer.set(0, &[(index, value)]);
     let name = description.variables[index].name.clone();
-    checker.check("refusals.tolerated", writer.sequence, move |run| {
+    checker.check("rejections.tolerated", writer.sequence, move |run| {
         let accepted = ids.iter().all(|id| run.succeeds(*id));
         accepted.then(|| format!("a value for the input {name} is accepted after Terminate"))
     })
@@ -303,11 +303,11 @@ fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyho
     });
     // In FMI 2.0, a discarded step may have advanced the time.
     let discarded = match checker.fmi3() {
-        true => Some("refusals.discarded"),
-        false => Some("refusals.changed").filter(|_| function != "DoStep"),
+        true => Some("rejections.discarded"),
+        false => Some("rejections.changed").filter(|_| function != "DoStep"),
     };
     let error = Arc::clone(&changed);
-    let run = checker.judge("refusals.changed", writer.sequence.clone(), move |run| error(run, 3))?;
+    let run = checker.judge("rejections.changed", writer.sequence.clone(), move |run| error(run, 3))?;
     if let Some(rule) = discarded {
         checker.keep(rule, &run, &writer.sequence, move |run| changed(run, 2));
     }
