@@ -3,17 +3,17 @@
 
 use crate::call_sequence::{CallSequence, Message, Numbered, Run, Step, Values, all_steps};
 use crate::description::Description;
-use crate::finding::{Finding, Judge, Judges, status_name, step_name};
+use crate::finding::{Criterion, Finding, SharedCriterion, status_name, step_name};
 use crate::rules;
 use fmi_abi::Standard;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// A rule, and the judge that describes how a run breaks it.
-type Broken = (&'static str, Judge);
+type Broken = (&'static str, SharedCriterion);
 
-fn rule(name: &'static str, judge: impl Judges) -> Broken {
-    (name, Arc::new(judge))
+fn rule(name: &'static str, criterion: impl Criterion) -> Broken {
+    (name, Arc::new(criterion))
 }
 
 /// Returns the findings in a run that neither crashed nor hung.
@@ -28,22 +28,22 @@ pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -
         }
     }
     let mut names = HashSet::new();
-    let found = broken.into_iter().filter_map(|(name, judge)| {
-        let observed = judge(run)?;
+    let found = broken.into_iter().filter_map(|(name, criterion)| {
+        let observed = criterion(run)?;
         let finding = rules::broken(description.standard, name, observed);
-        Some(finding.shown_by(sequence.clone(), judge))
+        Some(finding.shown_by(sequence.clone(), criterion))
     });
     found.filter(|finding| names.insert(finding.name.clone()) || finding.topic() == "arrays").collect()
 }
 
 /// Processes that were left by a sequence that has freed all instances.
 fn processes(all: &[&Numbered], run: &Run) -> Option<Broken> {
-    if run.left.is_empty() {
+    if run.orphans.is_empty() {
         return None;
     }
     let pairs = lives(all)?;
     Some(rule("resources.processes", move |run| {
-        let (count, first) = (run.left.len(), run.left.first()?);
+        let (count, first) = (run.orphans.len(), run.orphans.first()?);
         let freed = |(make, free): &(u32, u32)| run.outcome(*make).is_none() || run.outcome(*free).is_some();
         let processes = if count == 1 { "process is" } else { "processes are" };
         pairs.iter().all(freed).then(|| {

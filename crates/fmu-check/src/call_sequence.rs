@@ -320,7 +320,7 @@ pub struct Run {
     /// Output on the standard output and the standard error.
     pub output: String,
     /// Names of the processes that were left at its end.
-    pub left: Vec<String>,
+    pub orphans: Vec<String>,
 }
 
 impl Run {

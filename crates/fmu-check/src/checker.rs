@@ -3,7 +3,7 @@
 use crate::always;
 use crate::call_sequence::{CallSequence, End, Numbered, Run, Setting, Step, step_of};
 use crate::description::Description;
-use crate::finding::{Event, Finding, Judge, Judges, Severity, ending, event, step_name};
+use crate::finding::{Criterion, Event, Finding, Severity, SharedCriterion, ending, event, step_name};
 use crate::legal::first_illegal;
 use crate::rules;
 use crate::run::{Stop, Workers};
@@ -92,7 +92,7 @@ pub struct Checker {
     alone: RwLock<()>,
     /// Functions that did not return when no other call sequence was played and the limit was three times as long.
     hung: Mutex<HashSet<String>>,
-    played: Mutex<u64>,
+    executed: Mutex<u64>,
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -101,7 +101,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// Keeps one finding of each name: the most severe, and of several such the one with the shortest call sequence, regardless
 /// of the order of the checks. Its `more` lists the observations of the others.
-fn keep(found: &mut Vec<Finding>, mut finding: Finding) {
+fn record(found: &mut Vec<Finding>, mut finding: Finding) {
     let Some(kept) = found.iter_mut().find(|kept| kept.name == finding.name) else {
         found.push(finding);
         return;
@@ -148,7 +148,7 @@ impl Checker {
             unchecked: Mutex::default(),
             alone: RwLock::default(),
             hung: Mutex::default(),
-            played: Mutex::default(),
+            executed: Mutex::default(),
         }
     }
 
@@ -192,19 +192,19 @@ impl Checker {
         !self.can(interface, &["canBeInstantiatedOnlyOncePerProcess"])
     }
 
-    pub fn play(&self, sequence: &CallSequence) -> anyhow::Result<Run> {
-        self.play_for(sequence, self.limit)
+    pub fn execute(&self, sequence: &CallSequence) -> anyhow::Result<Run> {
+        self.execute_for(sequence, self.limit)
     }
 
     /// Plays a sequence for so many seconds at most.
-    pub fn play_for(&self, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
+    pub fn execute_for(&self, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
         debug_assert_eq!(self.illegal(sequence), None);
         if Instant::now() >= self.deadline {
             return Err(Stop::TimeOver.into());
         }
         let run = {
             let _with_others = self.alone.read().unwrap_or_else(PoisonError::into_inner);
-            self.play_until(sequence, limit)?
+            self.execute_until(sequence, limit)?
         };
         // The machine may be busy, so a call that seems to hang is played again with no other at the same time and three times the
         // time. A function that has not returned then is not tried again.
@@ -215,7 +215,7 @@ impl Checker {
             return Ok(run);
         }
         let _alone = self.alone.write().unwrap_or_else(PoisonError::into_inner);
-        let run = self.play_until(sequence, 3.0 * limit)?;
+        let run = self.execute_until(sequence, 3.0 * limit)?;
         if matches!(run.end, End::Hang(_)) {
             locked(&self.hung).insert(name(&run));
         }
@@ -223,10 +223,10 @@ impl Checker {
     }
 
     /// Plays a sequence until the limit or the deadline.
-    fn play_until(&self, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
-        let left = self.deadline.saturating_duration_since(Instant::now()).as_secs_f64();
-        *locked(&self.played) += 1;
-        let run = self.workers.play(&self.setting, sequence, limit.min(left.max(0.5)))?;
+    fn execute_until(&self, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
+        let remaining = self.deadline.saturating_duration_since(Instant::now()).as_secs_f64();
+        *locked(&self.executed) += 1;
+        let run = self.workers.execute(&self.setting, sequence, limit.min(remaining.max(0.5)))?;
         match run.end {
             End::Hang(seconds) if seconds < limit => Err(Stop::TimeOver.into()),
             _ => Ok(run),
@@ -239,8 +239,8 @@ impl Checker {
         Some(format!("{id} {:?}", step_of(sequence, id)?.step))
     }
 
-    pub fn played(&self) -> u64 {
-        *locked(&self.played)
+    pub fn executed(&self) -> u64 {
+        *locked(&self.executed)
     }
 
     pub fn take(&self) -> Vec<Finding> {
@@ -260,7 +260,7 @@ impl Checker {
     }
 
     pub fn add(&self, finding: Finding) {
-        keep(&mut locked(&self.found), finding);
+        record(&mut locked(&self.found), finding);
     }
 
     /// Returns whether there is a finding of this name.
@@ -269,10 +269,10 @@ impl Checker {
     }
 
     /// Keeps a finding if a run breaks a rule; returns whether it does.
-    pub fn keep(&self, name: &str, run: &Run, sequence: &CallSequence, judge: impl Judges) -> bool {
-        let observed = if run.end == End::Done { judge(run) } else { None };
+    pub fn record(&self, name: &str, run: &Run, sequence: &CallSequence, criterion: impl Criterion) -> bool {
+        let observed = if run.end == End::Done { criterion(run) } else { None };
         let found = observed.map(|observed| {
-            self.add(self.broken(name, observed).shown_by(sequence.clone(), Arc::new(judge)))
+            self.add(self.broken(name, observed).shown_by(sequence.clone(), Arc::new(criterion)))
         });
         found.is_some()
     }
@@ -283,32 +283,37 @@ impl Checker {
     }
 
     /// Keeps the findings of the rules that hold for every run.
-    pub fn keep_always(&self, sequence: &CallSequence, run: &Run) {
+    pub fn record_always(&self, sequence: &CallSequence, run: &Run) {
         always::findings(&self.description, sequence, run).into_iter().for_each(|finding| self.add(finding));
     }
 
     /// Plays a call sequence and judges the run: first by its end, then by the rules that hold
     /// for every run, then by `judge`.
-    pub fn judge(&self, name: &str, sequence: CallSequence, judge: impl Judges) -> anyhow::Result<Run> {
+    pub fn evaluate(
+        &self,
+        name: &str,
+        sequence: CallSequence,
+        criterion: impl Criterion,
+    ) -> anyhow::Result<Run> {
         let forbidden = sequence.iter().any(|numbered| numbered.forbidden);
         let limit = if forbidden { self.limit.min(3.0) } else { self.limit };
-        let run = self.play_for(&sequence, limit)?;
+        let run = self.execute_for(&sequence, limit)?;
         if run.end != End::Done {
             self.ended(name, &sequence, &run, forbidden)?;
             return Ok(run);
         }
-        self.keep_always(&sequence, &run);
-        self.keep(name, &run, &sequence, judge);
+        self.record_always(&sequence, &run);
+        self.record(name, &run, &sequence, criterion);
         Ok(run)
     }
 
     /// Plays a sequence and judges it by one rule.
-    pub fn check(&self, name: &str, sequence: CallSequence, judge: impl Judges) -> anyhow::Result<()> {
-        self.judge(name, sequence, judge).map(|_| ())
+    pub fn check(&self, name: &str, sequence: CallSequence, criterion: impl Criterion) -> anyhow::Result<()> {
+        self.evaluate(name, sequence, criterion).map(|_| ())
     }
 
     /// Judges whether reads that must be equal differ. The message has `{}` for the variable, its value and the other value.
-    pub fn differ(&self, one: &[Read], other: &[Read], message: &'static str) -> Box<dyn Judges> {
+    pub fn differ(&self, one: &[Read], other: &[Read], message: &'static str) -> Box<dyn Criterion> {
         let (description, one, other) = (self.description.clone(), one.to_vec(), other.to_vec());
         Box::new(move |run: &Run| {
             let values = difference(&description, run, &one, &other)?.into_iter().chain([String::new()]);
@@ -319,7 +324,7 @@ impl Checker {
     /// Keeps the finding of a run that crashed, hung or exited.
     fn ended(&self, rule: &str, sequence: &CallSequence, run: &Run, forbidden: bool) -> anyhow::Result<()> {
         let Some(observed) = ending(run, sequence) else { return Ok(()) };
-        let ends: Judge = {
+        let ends: SharedCriterion = {
             let (sequence, kind) = (sequence.clone(), std::mem::discriminant(&run.end));
             let name_at =
                 |run: &Run, sequence: &CallSequence| at(sequence, run).map(|at| step_name(&at.step));
@@ -329,7 +334,7 @@ impl Checker {
                 same.then(|| ending(run, &sequence))?
             })
         };
-        let keep = |name: &str, observed: String| {
+        let record = |name: &str, observed: String| {
             let mut ended = self.broken(name, observed).shown_by(sequence.clone(), Arc::clone(&ends));
             if forbidden {
                 ended.severity = ended.severity.max(Severity::Fragile);
@@ -340,18 +345,18 @@ impl Checker {
         // A repetition with accessible memory after each array shows whether an access beyond an array caused the crash.
         if matches!(run.end, End::Crash(_)) && cfg!(unix) && !forbidden {
             let soft = Setting { soft: true, ..self.setting.clone() };
-            let again = self.workers.play(&soft, sequence, self.limit)?;
+            let again = self.workers.execute(&soft, sequence, self.limit)?;
             if again.outcomes.values().any(|outcome| !outcome.damage.is_empty()) {
-                return keep("arrays.written-beyond", format!("{observed}: it writes beyond an array"));
+                return record("arrays.written-beyond", format!("{observed}: it writes beyond an array"));
             }
             if again.end == End::Done {
                 let how = "it reads beyond an array, or memory that was freed";
-                return keep("arrays.read-beyond", format!("{observed}: {how}"));
+                return record("arrays.read-beyond", format!("{observed}: {how}"));
             }
         }
         let what = match run.end {
-            End::Unloadable(_) => return keep("package.unloadable", observed),
-            End::Flood(_) => return keep("resources.processes", observed),
+            End::Unloadable(_) => return record("package.unloadable", observed),
+            End::Flood(_) => return record("resources.processes", observed),
             End::Hang(_) => "hang",
             End::Exit(_) => "exit",
             _ => "crash",
@@ -362,7 +367,7 @@ impl Checker {
             Some((topic, _)) if !own && (!forbidden || topic == "rejections") => topic,
             _ => rule,
         };
-        keep(&format!("{name}.{what}"), observed)
+        record(&format!("{name}.{what}"), observed)
     }
 
     /// The result of a successful update of the discrete states.
@@ -379,10 +384,10 @@ impl Checker {
     /// Writes the program of a finding. A call sequence without a hang has ten times the time: the machine may be busy.
     pub fn reproduce(&self, finding: &mut Finding) -> anyhow::Result<()> {
         let late = Instant::now() > self.deadline && self.quick;
-        if finding.judge.is_some() && !late {
+        if finding.criterion.is_some() && !late {
             let patience = if finding.name.ends_with("hang") { 1.0 } else { 10.0 };
             let limit = patience * (self.limit + 3.0 * self.setting.repetitions);
-            let run = self.workers.play(&self.hard(finding), &finding.sequence, limit)?;
+            let run = self.workers.execute(&self.hard(finding), &finding.sequence, limit)?;
             crate::reproduce::program(finding, &run, &self.setting, &self.description);
         }
         Ok(())
@@ -391,11 +396,11 @@ impl Checker {
     /// A shorter sequence for each finding, as long as there is time.
     pub fn shorten(&self, finding: &mut Finding) {
         finding.steps = (finding.sequence.len(), finding.sequence.len());
-        let Some(judge) = finding.judge.clone() else { return };
+        let Some(criterion) = finding.criterion.clone() else { return };
         let setting = self.hard(finding);
         let hangs = finding.name.ends_with("hang");
         let limit = if hangs { self.limit.min(1.5) } else { self.limit };
-        let mut left = match finding.topic() {
+        let mut remaining = match finding.topic() {
             _ if hangs => 12,
             "resources" => 15,
             _ => 400,
@@ -407,20 +412,20 @@ impl Checker {
         let pinned = pinned.map_or(&[][..], |(_, calls)| calls);
         // A shorter sequence may show other numbers, but not another observation.
         let (same, mut observed) = (outline(&finding.observed), finding.observed.clone());
-        let mut shows = |tried: &CallSequence| {
-            let run = self.workers.play(&setting, tried, limit).ok();
-            let now = run.and_then(|run| judge(&run)).filter(|now| outline(now) == same);
+        let mut reproduces = |tried: &CallSequence| {
+            let run = self.workers.execute(&setting, tried, limit).ok();
+            let now = run.and_then(|run| criterion(&run)).filter(|now| outline(now) == same);
             now.is_some_and(|now| {
                 observed = now;
                 true
             })
         };
         let mut short = shrink(&self.description, &finding.sequence, pinned, !alone, |tried| {
-            left -= 1;
-            left >= 0 && Instant::now() <= self.deadline && shows(tried)
+            remaining -= 1;
+            remaining >= 0 && Instant::now() <= self.deadline && reproduces(tried)
         });
         // A finding that does not show in every run is not shortened.
-        if short.len() < finding.sequence.len() && !shows(&short) {
+        if short.len() < finding.sequence.len() && !reproduces(&short) {
             (short, observed) = (finding.sequence.clone(), finding.observed.clone());
         }
         finding.observed = observed;
@@ -431,7 +436,7 @@ impl Checker {
 
 #[cfg(test)]
 mod tests {
-    use super::keep;
+    use super::record;
     use crate::finding::{Finding, Severity};
 
     /// A more severe finding of a name replaces the one before, whose observation stays in the list.
@@ -453,9 +458,9 @@ mod tests {
             (Severity::Violation, "e"),
             (Severity::Note, "b"),
         ] {
-            keep(&mut found, finding("topic.name", severity, observed));
+            record(&mut found, finding("topic.name", severity, observed));
         }
-        keep(&mut found, finding("topic.other", Severity::Note, "a"));
+        record(&mut found, finding("topic.other", Severity::Note, "a"));
         let [one, other] = &found[..] else { panic!("{} findings", found.len()) };
         assert_eq!((one.severity, one.observed.as_str()), (Severity::Violation, "c"));
         assert_eq!(one.more, ["a", "b", "d", "e"]);

@@ -53,13 +53,13 @@ impl Description {
             wrong: written.faults.iter().filter_map(observation).collect(),
             written,
         };
-        let wrong = description.judge();
+        let wrong = description.evaluate();
         description.wrong.extend(wrong);
         Ok(description)
     }
 
     /// Returns the rules that the description breaks.
-    fn judge(&self) -> Vec<Observation> {
+    fn evaluate(&self) -> Vec<Observation> {
         let mut wrong = Vec::new();
         if self.token.is_empty() {
             wrong.push(("description.token", "guid or instantiationToken is missing or empty".to_owned()));

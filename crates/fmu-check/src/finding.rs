@@ -29,21 +29,21 @@ impl Severity {
 }
 
 /// Judges a run; returns a sentence that describes the violation.
-pub trait Judges: Fn(&Run) -> Option<String> + Send + Sync + 'static {}
+pub trait Criterion: Fn(&Run) -> Option<String> + Send + Sync + 'static {}
 
-impl<T: Fn(&Run) -> Option<String> + Send + Sync + 'static> Judges for T {}
+impl<T: Fn(&Run) -> Option<String> + Send + Sync + 'static> Criterion for T {}
 
 /// A judge that findings share.
-pub type Judge = Arc<dyn Judges>;
+pub type SharedCriterion = Arc<dyn Criterion>;
 
 /// Judges by the first of these judges that finds a violation.
-pub fn any(judges: impl IntoIterator<Item = Box<dyn Judges>>) -> Box<dyn Judges> {
-    let judges: Vec<_> = judges.into_iter().collect();
-    Box::new(move |run: &Run| judges.iter().find_map(|judge| judge(run)))
+pub fn any(criteria: impl IntoIterator<Item = Box<dyn Criterion>>) -> Box<dyn Criterion> {
+    let criteria: Vec<_> = criteria.into_iter().collect();
+    Box::new(move |run: &Run| criteria.iter().find_map(|criterion| criterion(run)))
 }
 
 /// Judges whether one of these calls did not return OK.
-pub fn fails(sequence: &CallSequence, ids: Vec<u32>) -> Box<dyn Judges> {
+pub fn fails(sequence: &CallSequence, ids: Vec<u32>) -> Box<dyn Criterion> {
     let sequence = sequence.clone();
     Box::new(move |run: &Run| failure(&sequence, run, &ids))
 }
@@ -70,7 +70,7 @@ pub struct Finding {
     pub c: String,
     /// Judges whether a run shows the finding.
     #[serde(skip)]
-    pub judge: Option<Judge>,
+    pub criterion: Option<SharedCriterion>,
     /// Whether it fails the check.
     pub fails: bool,
     /// The reason for which it is accepted, if the baseline has one.
@@ -81,8 +81,8 @@ pub struct Finding {
 
 impl Finding {
     /// Adds the calls that show the finding.
-    pub fn shown_by(self, sequence: CallSequence, judge: Judge) -> Self {
-        Self { sequence, judge: Some(judge), ..self }
+    pub fn shown_by(self, sequence: CallSequence, criterion: SharedCriterion) -> Self {
+        Self { sequence, criterion: Some(criterion), ..self }
     }
 
     /// Its topic.

@@ -187,7 +187,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
         why: why.to_owned(),
         allowed: true,
     }));
-    report.judge(options, &baseline);
+    report.evaluate(options, &baseline);
     Ok(report)
 }
 
@@ -217,8 +217,8 @@ fn reach(checker: &mut Checker, interface: Interface) -> anyhow::Result<writer::
         return trajectory;
     };
     let copy = sequence.clone();
-    let judge = move |run: &call_sequence::Run| finding::first_failure(&copy, run, 1);
-    checker.check("life_cycle.simulation", sequence.clone(), judge)?;
+    let criterion = move |run: &call_sequence::Run| finding::first_failure(&copy, run, 1);
+    checker.check("life_cycle.simulation", sequence.clone(), criterion)?;
     // An FMU that accesses memory beyond arrays may succeed with accessible memory after them.
     if ["arrays.read-beyond", "arrays.written-beyond"].iter().any(|name| checker.has(name)) {
         checker.setting.soft = true;
@@ -319,9 +319,9 @@ fn attack(checker: &Checker, progress: bool, wanted: &(impl Fn(&str) -> bool + S
             }
             Err(error) => *failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error),
         }
-        let left = checker.deadline.saturating_duration_since(Instant::now()).as_secs();
-        let (all, played) = (jobs.len(), checker.played());
-        format!("{done} of {all} checks, {played} call sequences run, {left} s left: {topic:20}")
+        let remaining = checker.deadline.saturating_duration_since(Instant::now()).as_secs();
+        let (all, executed) = (jobs.len(), checker.executed());
+        format!("{done} of {all} checks, {executed} call sequences run, {remaining} s remaining: {topic:20}")
     });
     failure.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
 }

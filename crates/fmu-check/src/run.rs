@@ -1,7 +1,7 @@
 //! Plays call sequences in separate processes.
 
 use crate::call_sequence::{CallSequence, End, Numbered, Outcome, Run, Setting, Step};
-use crate::worker::{Ended, Job, Last, OWN_FAULT, PLAYED, SCRATCH, Unloadable, VARIABLE, interrupted};
+use crate::worker::{EXECUTED, Ended, Job, Last, OWN_FAULT, SCRATCH, Unloadable, VARIABLE, interrupted};
 use anyhow::{Context as _, bail};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -73,7 +73,7 @@ impl Workers {
     }
 
     /// Plays a call sequence, each part between fresh processes in a separate process, for `limit` seconds at most.
-    pub fn play(&self, setting: &Setting, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
+    pub fn execute(&self, setting: &Setting, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
         let mut run = Run::default();
         let mut bytes = HashMap::new();
         for (phase, part) in sequence.split(|numbered| numbered.step == Step::FreshProcess).enumerate() {
@@ -96,8 +96,8 @@ impl Workers {
             Some(server) => server,
             None => Server::new(situation, &self.scratch)?,
         };
-        let played = server.play(&format!("{limit} {}\n", serde_json::to_string(job)?));
-        match played {
+        let result = server.execute(&format!("{limit} {}\n", serde_json::to_string(job)?));
+        match result {
             Ok(ended) => {
                 idle().entry(situation).or_default().push(server);
                 Ok(ended)
@@ -159,7 +159,7 @@ impl Server {
         Ok(Self(command.spawn().context("a process for the FMU cannot be started")?))
     }
 
-    fn play(&mut self, job: &str) -> anyhow::Result<Ended> {
+    fn execute(&mut self, job: &str) -> anyhow::Result<Ended> {
         use std::io::{BufRead as _, Write as _};
         let (input, output) = self.0.stdin.as_mut().zip(self.0.stdout.as_mut()).context("no pipes")?;
         input.write_all(job.as_bytes())?;
@@ -190,7 +190,7 @@ fn read(
     run: &mut Run,
 ) -> anyhow::Result<HashMap<usize, Vec<u8>>> {
     run.output.push_str(&ended.output);
-    run.left.extend(ended.left);
+    run.orphans.extend(ended.orphans);
     let mut last = None;
     for line in ended.outcomes.lines() {
         if let Ok(outcome) = serde_json::from_str::<Outcome>(line) {
@@ -202,7 +202,7 @@ fn read(
             return Ok(HashMap::new());
         }
     }
-    if let Some(bytes) = last.filter(|_| ended.code == Some(PLAYED)) {
+    if let Some(bytes) = last.filter(|_| ended.code == Some(EXECUTED)) {
         return Ok(bytes);
     }
     // Abort messages of the Rust and C libraries, after a failure that is not in the FMU.

@@ -79,7 +79,7 @@ pub fn shrink(
     sequence: &CallSequence,
     pinned: &[&str],
     compared: bool,
-    mut shows: impl FnMut(&CallSequence) -> bool,
+    mut reproduces: impl FnMut(&CallSequence) -> bool,
 ) -> CallSequence {
     let legal = first_illegal(description, sequence).is_none();
     let mut best = sequence.clone();
@@ -107,7 +107,7 @@ pub fn shrink(
             let begin = end.saturating_sub(size);
             let tried = without(&best, &units[begin..end].concat());
             let keeps = !legal || first_illegal(description, &tried).is_none();
-            if keeps && all_steps(&tried).len() < all_steps(&best).len() && shows(&tried) {
+            if keeps && all_steps(&tried).len() < all_steps(&best).len() && reproduces(&tried) {
                 best = tried;
                 units.drain(begin..end);
                 shorter = true;
@@ -161,7 +161,7 @@ mod tests {
     fn what_is_left_is_needed_and_legal() {
         let (description, trajectory) = (description(), trajectory());
         let mut writer = Writer::new(&description, &trajectory, &[0]);
-        writer.play(0, WHOLE);
+        writer.write(0, WHOLE);
         let short =
             shrink(&description, &writer.sequence, &[], false, |tried| count(tried, "fmi2DoStep") >= 2);
         let calls = ["the instantiation", "fmi2SetupExperiment", "fmi2EnterInitializationMode"];
@@ -174,7 +174,7 @@ mod tests {
     fn nothing_is_left_out_that_is_pinned() {
         let (description, trajectory) = (description(), trajectory());
         let mut writer = Writer::new(&description, &trajectory, &[0]);
-        writer.play(0, WHOLE);
+        writer.write(0, WHOLE);
         let short = shrink(&description, &writer.sequence, &["SetReal"], false, |_| true);
         assert_eq!((count(&short, "fmi2SetReal"), count(&short, "fmi2DoStep")), (6, 0));
     }
@@ -184,16 +184,16 @@ mod tests {
     fn compared_simulations_stay_alike() {
         let (description, trajectory) = (description(), trajectory());
         let mut writer = Writer::new(&description, &trajectory, &[0]);
-        writer.play(0, WHOLE);
+        writer.write(0, WHOLE);
         let mut thread = Writer { next: writer.next, ..Writer::new(&description, &trajectory, &[0]) };
-        thread.play(1, WHOLE);
+        thread.write(1, WHOLE);
         writer.next = thread.next;
         writer.add(Step::Parallel(vec![thread.sequence]));
         let parallel = |sequence: &CallSequence| {
             matches!(sequence.last(), Some(Numbered { step: Step::Parallel(_), .. }))
         };
-        let shows = |tried: &CallSequence| parallel(tried) && count(tried, "fmi2DoStep") >= 4;
-        let short = shrink(&description, &writer.sequence, &[], true, shows);
+        let reproduces = |tried: &CallSequence| parallel(tried) && count(tried, "fmi2DoStep") >= 4;
+        let short = shrink(&description, &writer.sequence, &[], true, reproduces);
         let Some(Step::Parallel(threads)) = short.last().map(|numbered| &numbered.step) else {
             panic!("{short:?}")
         };

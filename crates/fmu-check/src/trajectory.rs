@@ -55,8 +55,8 @@ fn step_size(description: &Description) -> f64 {
 }
 
 /// Returns the trajectory up to the points whose calls succeed.
-fn up_to(mut trajectory: Trajectory, good: usize) -> Trajectory {
-    trajectory.points.truncate(good);
+fn up_to(mut trajectory: Trajectory, succeeded: usize) -> Trajectory {
+    trajectory.points.truncate(succeeded);
     if let Some(last) = trajectory.points.last() {
         trajectory.end = last.time + last.size;
     }
@@ -78,18 +78,18 @@ fn in_steps(checker: &Checker, trajectory: Trajectory) -> anyhow::Result<Traject
         let points = steps(description, description.start_time, &sizes, discrete);
         let trajectory = Trajectory { points, ..trajectory.clone() };
         let mut writer = checker.writer(&trajectory);
-        let ids = writer.play(0, &[Part::Begin, Part::Points(usize::MAX)]).ids;
+        let ids = writer.write(0, &[Part::Begin, Part::Points(usize::MAX)]).ids;
         let begin = Instant::now();
-        let run = checker.play(&writer.sequence)?;
+        let run = checker.execute(&writer.sequence)?;
         if reach > 1.0 && (run.end != End::Done || begin.elapsed() > LONG) {
             continue;
         }
         made(&run, &writer, ids[0])?;
-        let (good, discarded) = good_steps(checker, &run, &writer.sequence);
+        let (succeeded, discarded) = successful_steps(checker, &run, &writer.sequence);
         match failure(&writer.sequence, &run, &ids) {
-            None => return Ok(up_to(trajectory, good)),
+            None => return Ok(up_to(trajectory, succeeded)),
             // A model may end its simulation.
-            Some(_) if discarded && good >= 2 => return Ok(up_to(trajectory, good)),
+            Some(_) if discarded && succeeded >= 2 => return Ok(up_to(trajectory, succeeded)),
             Some(why) if !discrete && reach == 1.0 => return Err(NoTrajectory(why, writer.sequence).into()),
             Some(_) => {}
         }
@@ -98,20 +98,20 @@ fn in_steps(checker: &Checker, trajectory: Trajectory) -> anyhow::Result<Traject
 }
 
 /// The number of steps before one that fails or ends the simulation, and whether one was discarded.
-fn good_steps(checker: &Checker, run: &Run, sequence: &CallSequence) -> (usize, bool) {
+fn successful_steps(checker: &Checker, run: &Run, sequence: &CallSequence) -> (usize, bool) {
     let step = |step: &Step| matches!(step, Step::Call { function, .. } if function.ends_with("DoStep"));
     let ids = sequence.iter().filter(|numbered| step(&numbered.step)).map(|numbered| numbered.id);
-    let mut good = 0;
+    let mut succeeded = 0;
     for id in ids {
         let flags = run.outcome(id).map_or(&[][..], |outcome| &outcome.written);
         let flag = |index: usize| flags.get(index).is_some_and(|flag| flag.numbers().first() == Some(&1.0));
         // A step that returns early counts as failed: the next step would have to begin at lastSuccessfulTime.
         if run.status(id).is_none_or(|status| status > 1) || checker.fmi3() && (0..3).any(flag) {
-            return (good, run.status(id) == Some(2));
+            return (succeeded, run.status(id) == Some(2));
         }
-        good += 1;
+        succeeded += 1;
     }
-    (good, false)
+    (succeeded, false)
 }
 
 /// Fails if a run has crashed or hung, or its instantiation has failed.
@@ -128,8 +128,8 @@ fn initialized(checker: &Checker, trajectory: &mut Trajectory) -> anyhow::Result
         trajectory.updates = updates;
         let mut writer = checker.writer(trajectory);
         let parts = [Part::Make, Part::Enter, Part::Call("ExitInitializationMode"), Part::Update(updates)];
-        let ids = writer.play(0, &parts).ids;
-        let run = checker.play(&writer.sequence)?;
+        let ids = writer.write(0, &parts).ids;
+        let run = checker.execute(&writer.sequence)?;
         made(&run, &writer, ids[0])?;
         if let Some(why) = failure(&writer.sequence, &run, &ids[1..]) {
             return Err(NoTrajectory(why, writer.sequence).into());
@@ -161,7 +161,7 @@ fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> any
     let indicators = checker.description.event_indicators.unwrap_or(0);
     loop {
         let mut writer = checker.writer(trajectory);
-        let before = writer.play(0, &[Part::Begin, Part::Points(usize::MAX)]).ids;
+        let before = writer.write(0, &[Part::Begin, Part::Points(usize::MAX)]).ids;
         let here = writer.point(0, point);
         let vectors = [
             ("GetContinuousStates", count),
@@ -171,7 +171,7 @@ fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> any
         let read =
             |(name, count)| (count > 0 && !trajectory.is_stepped()).then(|| writer.vector(0, name, count));
         let vectors = vectors.map(read);
-        let run = checker.play(&writer.sequence)?;
+        let run = checker.execute(&writer.sequence)?;
         made(&run, &writer, before[0])?;
         if let Some(why) = failure(&writer.sequence, &run, &[&before[1..], &here].concat()) {
             let few = trajectory.points.len() < 3;

@@ -86,7 +86,7 @@ pub enum Part {
 
 /// Numbers of the calls that were written, and the reads.
 #[derive(Clone, Default)]
-pub struct Played {
+pub struct Calls {
     /// Calls other than those that read.
     pub ids: Vec<u32>,
     /// Calls that read.
@@ -143,47 +143,47 @@ impl<'a> Writer<'a> {
         id
     }
 
-    pub fn play(&mut self, instance: usize, parts: &[Part]) -> Played {
-        let mut played = Played::default();
+    pub fn write(&mut self, instance: usize, parts: &[Part]) -> Calls {
+        let mut calls = Calls::default();
         let points = &self.trajectory.points;
         for part in parts {
             match *part {
-                Part::Make => played.ids.push(self.make(instance)),
-                Part::Enter => played.ids.push(self.enter(instance)),
-                Part::Leave => played.ids.extend(self.leave(instance)),
-                Part::Begin => played.ids.extend(self.begin(instance)),
+                Part::Make => calls.ids.push(self.make(instance)),
+                Part::Enter => calls.ids.push(self.enter(instance)),
+                Part::Leave => calls.ids.extend(self.leave(instance)),
+                Part::Begin => calls.ids.extend(self.begin(instance)),
                 Part::Points(most) => {
-                    played.ids.extend(points.iter().take(most).flat_map(|point| self.point(instance, point)));
+                    calls.ids.extend(points.iter().take(most).flat_map(|point| self.point(instance, point)));
                 }
                 Part::Run(from) => {
                     for point in &points[from..] {
-                        played.ids.extend(self.point(instance, point));
-                        played.reads.extend(self.read_all(instance));
+                        calls.ids.extend(self.point(instance, point));
+                        calls.reads.extend(self.read_all(instance));
                     }
                 }
-                Part::Read => played.reads.extend(self.read(instance)),
-                Part::ReadAll => played.reads.extend(self.read_all(instance)),
-                Part::Call(function) => played.ids.push(self.call(instance, function, vec![])),
-                Part::Update(times) => played.ids.extend(self.update(instance, times)),
+                Part::Read => calls.reads.extend(self.read(instance)),
+                Part::ReadAll => calls.reads.extend(self.read_all(instance)),
+                Part::Call(function) => calls.ids.push(self.call(instance, function, vec![])),
+                Part::Update(times) => calls.ids.extend(self.update(instance, times)),
                 Part::Save(slot) => {
-                    played.ids.push(self.call(instance, "GetFMUState", vec![Arg::StateOut(slot)]))
+                    calls.ids.push(self.call(instance, "GetFMUState", vec![Arg::StateOut(slot)]))
                 }
                 Part::Restore(slot) => {
-                    played.ids.push(self.call(instance, "SetFMUState", vec![Arg::State(slot)]))
+                    calls.ids.push(self.call(instance, "SetFMUState", vec![Arg::State(slot)]))
                 }
                 Part::Drop(slot) => {
-                    played.ids.push(self.call(instance, "FreeFMUState", vec![Arg::StateOut(slot)]))
+                    calls.ids.push(self.call(instance, "FreeFMUState", vec![Arg::StateOut(slot)]))
                 }
-                Part::Free => played.ids.push(self.free(instance)),
+                Part::Free => calls.ids.push(self.free(instance)),
             }
         }
-        played
+        calls
     }
 
     /// Writes parts of a simulation, and returns the reads of each part that reads.
     pub fn groups<const N: usize>(&mut self, instance: usize, parts: &[Part]) -> [Vec<Read>; N] {
         let groups = parts.iter().filter_map(|part| {
-            let reads = self.play(instance, &[*part]).reads;
+            let reads = self.write(instance, &[*part]).reads;
             matches!(part, Part::Read | Part::ReadAll | Part::Run(_)).then_some(reads)
         });
         let groups: Vec<Vec<Read>> = groups.collect();

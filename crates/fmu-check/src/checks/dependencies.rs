@@ -78,7 +78,7 @@ pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
             continue;
         }
         let mut writer = checker.writer(trajectory);
-        writer.play(0, &to_middle(trajectory));
+        writer.write(0, &to_middle(trajectory));
         moved(checker, "dependencies.missing", writer, known, &value, unknowns, |writer, numbers| {
             set_known(writer, &states, &vector, known, numbers);
         })?;
@@ -105,7 +105,7 @@ pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
             continue;
         }
         let mut writer = checker.writer(trajectory);
-        writer.play(0, &[Make, Enter]);
+        writer.write(0, &[Make, Enter]);
         let value = description.variables[known].starts();
         moved(checker, "dependencies.initial", writer, known, &value, unknowns, |writer, numbers| {
             writer.set_numbers(0, known, numbers);

@@ -3,7 +3,7 @@
 use crate::call_sequence::{Arg, Kind, Run, Values};
 use crate::checker::Checker;
 use crate::description::Description;
-use crate::finding::Judges;
+use crate::finding::Criterion;
 use crate::writer::{Part, Read, Trajectory, Writer, value_of};
 use fmi_abi::{BaseType, Interface};
 use std::sync::Arc;
@@ -92,7 +92,7 @@ pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
         return Ok(());
     }
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &to_middle(trajectory));
+    writer.write(0, &to_middle(trajectory));
     let before = writer.read(0);
     let [outputs, inputs] = [&unknowns, &knowns].map(|indices| references(&checker.description, indices));
     let mut request = |function: &str, seed: &[f64], count: usize| {
@@ -113,18 +113,18 @@ pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
     let sequence = writer.sequence.clone();
     let message = "{} was {}, after derivatives were requested it is {}";
     let is_unchanged = checker.differ(&before, &after, message);
-    let run = checker.judge("derivatives.changed", sequence.clone(), is_unchanged)?;
+    let run = checker.evaluate("derivatives.changed", sequence.clone(), is_unchanged)?;
     if run.end != crate::call_sequence::End::Done {
         return Ok(());
     }
     let names = [&unknowns, &knowns].map(|indices| names(&checker.description, indices));
     if let Some(sum) = sum {
-        let judge = is_linear(columns.clone(), sum, names[0].clone());
-        checker.keep("derivatives.linear", &run, &sequence, judge);
+        let criterion = is_linear(columns.clone(), sum, names[0].clone());
+        checker.record("derivatives.linear", &run, &sequence, criterion);
         let rules = [("derivatives.adjoint", 1e-6), ("derivatives.adjoint-digits", 1e-11)];
         rules.into_iter().filter(|_| has_adjoint).any(|(name, tolerance)| {
-            let judge = is_transposed(columns.clone(), rows.clone(), names.clone(), tolerance);
-            checker.keep(name, &run, &sequence, judge)
+            let criterion = is_transposed(columns.clone(), rows.clone(), names.clone(), tolerance);
+            checker.record(name, &run, &sequence, criterion)
         });
         order(checker, trajectory, &outputs, &inputs)?;
     }
@@ -145,7 +145,7 @@ fn numbers(run: &Run, id: u32) -> Option<Vec<f64>> {
 }
 
 /// Judges whether the derivatives for unit seeds add up to the derivative for a seed of ones.
-fn is_linear(columns: Vec<u32>, sum: u32, names: Vec<String>) -> impl Judges {
+fn is_linear(columns: Vec<u32>, sum: u32, names: Vec<String>) -> impl Criterion {
     move |run: &Run| {
         let columns: Vec<Vec<f64>> = columns.iter().map(|id| numbers(run, *id)).collect::<Option<_>>()?;
         let together = numbers(run, sum)?;
@@ -164,7 +164,12 @@ fn is_linear(columns: Vec<u32>, sum: u32, names: Vec<String>) -> impl Judges {
 }
 
 /// Judges whether the adjoint derivatives are the transposed directional derivatives.
-fn is_transposed(columns: Vec<u32>, rows: Vec<u32>, names: [Vec<String>; 2], tolerance: f64) -> impl Judges {
+fn is_transposed(
+    columns: Vec<u32>,
+    rows: Vec<u32>,
+    names: [Vec<String>; 2],
+    tolerance: f64,
+) -> impl Criterion {
     move |run: &Run| {
         let matrix = |ids: &[u32]| ids.iter().map(|id| numbers(run, *id)).collect::<Option<Vec<_>>>();
         let (columns, rows) = (matrix(&columns)?, matrix(&rows)?);
@@ -189,7 +194,7 @@ fn order(checker: &Checker, trajectory: &Trajectory, unknowns: &[u32], knowns: &
     let seed: Vec<f64> = (1..=knowns.len()).map(|number| number as f64).collect();
     let back: Vec<f64> = seed.iter().rev().copied().collect();
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &to_middle(trajectory));
+    writer.write(0, &to_middle(trajectory));
     let name = "GetDirectionalDerivative";
     let one = derivative(&mut writer, name, unknowns, knowns, &seed, unknowns.len());
     let other = derivative(&mut writer, name, &reversed(unknowns), &reversed(knowns), &back, unknowns.len());
@@ -227,10 +232,10 @@ pub fn middle_values(
     states: &[usize],
 ) -> anyhow::Result<(Vec<Vec<f64>>, Vec<f64>)> {
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &to_middle(trajectory));
+    writer.write(0, &to_middle(trajectory));
     let read = writer.read_these(0, knowns);
     let vector = (!states.is_empty()).then(|| writer.vector(0, "GetContinuousStates", states.len()));
-    let run = checker.play(&writer.sequence)?;
+    let run = checker.execute(&writer.sequence)?;
     let numbers = |values: Option<Values>| values.map(|values| values.numbers()).unwrap_or_default();
     let values = knowns.iter().map(|known| numbers(value_of(&run, &read, *known))).collect();
     Ok((values, numbers(vector.and_then(|id| run.written(id)).cloned())))
@@ -264,7 +269,7 @@ fn differences(
             continue;
         }
         let mut writer = checker.writer(trajectory);
-        writer.play(0, &to_middle(trajectory));
+        writer.write(0, &to_middle(trajectory));
         let analytic = column(&mut writer, &references(description, unknowns), variable.reference, by_column);
         let reads = [step, -step, step / 2.0, -step / 2.0, 0.0].map(|by| {
             set_known(&mut writer, &states, &vector, *known, &[value + by]);
@@ -283,10 +288,10 @@ fn differences(
         });
         let precise = Arc::clone(&differences);
         let sequence = writer.sequence.clone();
-        let judge = move |run: &Run| differences.judge(run, 1e-4);
-        let run = checker.judge("derivatives.directional", sequence.clone(), judge)?;
+        let criterion = move |run: &Run| differences.evaluate(run, 1e-4);
+        let run = checker.evaluate("derivatives.directional", sequence.clone(), criterion)?;
         if !checker.has("derivatives.directional") {
-            checker.keep("derivatives.precision", &run, &sequence, move |run| precise.judge(run, 2e-7));
+            checker.record("derivatives.precision", &run, &sequence, move |run| precise.evaluate(run, 2e-7));
         }
     }
     Ok(())
@@ -318,7 +323,7 @@ struct Differences {
 }
 
 impl Differences {
-    fn judge(&self, run: &Run, tolerance: f64) -> Option<String> {
+    fn evaluate(&self, run: &Run, tolerance: f64) -> Option<String> {
         for (row, unknown) in self.unknowns.iter().enumerate() {
             if self.itself.contains(unknown) {
                 continue;
@@ -376,7 +381,7 @@ pub fn vectors(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
         }
     }
     let model = description.clone();
-    let run = checker.judge("derivatives.vectors", writer.sequence.clone(), move |run| {
+    let run = checker.evaluate("derivatives.vectors", writer.sequence.clone(), move |run| {
         vectors.iter().filter(|(vector, ..)| run.succeeds(*vector)).find_map(|(vector, reads, indices)| {
             let numbers = run.written(*vector)?.numbers();
             let values = indices.iter().filter_map(|index| value_of(run, reads, *index));
@@ -389,7 +394,7 @@ pub fn vectors(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
             Some(format!("number {} of the vector is {one:?}, {name} is {other:?}", at + 1))
         })
     })?;
-    checker.keep("derivatives.nominals", &run, &writer.sequence, move |run| {
+    checker.record("derivatives.nominals", &run, &writer.sequence, move |run| {
         let numbers = numbers(run, nominals?)?;
         let bad = numbers.iter().find(|number| !(**number > 0.0 && number.is_finite()))?;
         Some(format!("a nominal value is {bad:?}"))

@@ -15,9 +15,9 @@ pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
             continue;
         }
         let mut writer = checker.writer(trajectory);
-        let steps = Arc::new(play(checker, &mut writer, time, event_mode, early_return)?);
+        let steps = Arc::new(run_steps(checker, &mut writer, time, event_mode, early_return)?);
         let again = Arc::clone(&steps);
-        let run = checker.judge("results.early-return", writer.sequence.clone(), move |run| {
+        let run = checker.evaluate("results.early-return", writer.sequence.clone(), move |run| {
             again.iter().find_map(|step| {
                 let (event, early, reached) = ended(&again, run, step.id)?;
                 if early && !early_return {
@@ -35,7 +35,7 @@ pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
                 })
             })
         })?;
-        checker.keep("results.early-unsaid", &run, &writer.sequence, move |run| {
+        checker.record("results.early-unsaid", &run, &writer.sequence, move |run| {
             steps.iter().find_map(|step| {
                 let (event, early, reached) = ended(&steps, run, step.id)?;
                 let end = step.end;
@@ -67,7 +67,7 @@ fn outputs(run: &Run, id: u32) -> Option<([bool; 3], f64)> {
 }
 
 /// Runs the steps of the trajectory, which may end at events between its points.
-fn play(
+fn run_steps(
     checker: &Checker,
     writer: &mut Writer<'_>,
     time: Option<usize>,
@@ -96,7 +96,7 @@ fn play(
         }
         let id = writer.step(0, at, size);
         let values = writer.read_these(0, time.as_slice());
-        let run = checker.play(&writer.sequence)?;
+        let run = checker.execute(&writer.sequence)?;
         steps.push(Stepped { id, values, end: goal, event: None });
         let Some(([event, terminate, early], reached)) = outputs(&run, id) else { break };
         // A step that did not advance, without an event, would not advance again.
@@ -129,7 +129,7 @@ fn over_event(checker: &Checker, writer: &mut Writer<'_>) -> anyhow::Result<Opti
     let mut next = None;
     for _ in 0..10 {
         let ids = writer.update(0, 1);
-        let run = checker.play(&writer.sequence)?;
+        let run = checker.execute(&writer.sequence)?;
         let event = checker.event(&run, ids[0]);
         if !event.is_some_and(|event| event.again) {
             next = event.and_then(|event| event.next);

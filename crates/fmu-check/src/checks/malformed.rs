@@ -19,7 +19,7 @@ type Sequences = anyhow::Result<Vec<CallSequence>>;
 pub fn all(checker: &Checker, name: &str, sequences: Vec<CallSequence>) -> anyhow::Result<()> {
     let (mut crashes, mut hangs) = (0, 0);
     for sequence in sequences {
-        match checker.judge(name, sequence, |_| None)?.end {
+        match checker.evaluate(name, sequence, |_| None)?.end {
             End::Hang(_) => hangs += 1,
             End::Done => {}
             _ => crashes += 1,
@@ -39,7 +39,7 @@ fn after(
     write: impl FnOnce(&mut Writer),
 ) -> CallSequence {
     let mut writer = checker.writer(trajectory);
-    writer.play(0, legal);
+    writer.write(0, legal);
     writer.forbidden = true;
     write(&mut writer);
     writer.sequence
@@ -241,7 +241,7 @@ pub fn values(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let is_input = |index: usize| description.variables[index].causality == "input";
     let size = |index: usize| description.variables[index].size.unwrap_or(1);
     // Inputs are set again at every point.
-    let mut play = |values: Vec<(usize, Values)>, again: bool| {
+    let mut add = |values: Vec<(usize, Values)>, again: bool| {
         sequences.push(after(checker, trajectory, &[Part::Make, Part::Enter], |writer| {
             writer.set(0, &values);
             writer.leave(0);
@@ -262,7 +262,7 @@ pub fn values(checker: &Checker, trajectory: &Trajectory) -> Sequences {
                 .map(|index| (index, Values::new(description.kind(index), vec![number; size(index)])))
                 .collect();
             if !values.is_empty() {
-                play(values, input);
+                add(values, input);
             }
         }
     }
@@ -270,7 +270,7 @@ pub fn values(checker: &Checker, trajectory: &Trajectory) -> Sequences {
         let Some(base) = description.variables[index].base else { continue };
         let (name, kind) = (type_name(description.standard, base), kind_of(description.standard, base));
         for value in extreme_values(name, kind, size(index)) {
-            play(vec![(index, value)], is_input(index) && trajectory.is_stepped());
+            add(vec![(index, value)], is_input(index) && trajectory.is_stepped());
         }
     }
     sequences.truncate(120);
@@ -290,9 +290,9 @@ pub fn times(checker: &Checker, trajectory: &Trajectory) -> Sequences {
                 writer.step(0, start, number);
             } else {
                 writer.call(0, "SetTime", vec![Arg::real(number)]);
-                writer.play(0, &[Part::ReadAll, Part::Call("EnterEventMode"), Part::Update(1)]);
+                writer.write(0, &[Part::ReadAll, Part::Call("EnterEventMode"), Part::Update(1)]);
             }
-            writer.play(0, &[Part::Read, Part::Free]);
+            writer.write(0, &[Part::Read, Part::Free]);
         }));
         sequences.push(after(checker, trajectory, &[Part::Make], |writer| {
             writer.enter_with(0, None, number, None);
@@ -300,7 +300,7 @@ pub fn times(checker: &Checker, trajectory: &Trajectory) -> Sequences {
             if trajectory.is_stepped() {
                 writer.step(0, number, size);
             }
-            writer.play(0, &[Part::Read, Part::Free]);
+            writer.write(0, &[Part::Read, Part::Free]);
         }));
     }
     Ok(sequences)
@@ -309,9 +309,9 @@ pub fn times(checker: &Checker, trajectory: &Trajectory) -> Sequences {
 /// Passes malformed bytes as a serialized state: empty, constant, cut, doubled and damaged ones.
 pub fn bytes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &[Part::Begin, Part::Save(0)]);
+    writer.write(0, &[Part::Begin, Part::Save(0)]);
     let [_, saved] = writer.serialize(0, 0);
-    let run = checker.play(&writer.sequence)?;
+    let run = checker.execute(&writer.sequence)?;
     let Some(Values::Numbers(_, bytes)) = run.written(saved) else { return Ok(Vec::new()) };
     let mut tries: Vec<Vec<u64>> = vec![
         Vec::new(),
@@ -335,7 +335,7 @@ pub fn bytes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
             let count = Arg::Whole(bytes.len() as i64);
             let args = vec![Arg::In(Kind::U8, bytes), count, Arg::StateOut(1)];
             writer.call(0, "DeserializeFMUState", args);
-            writer.play(0, &[Part::Restore(1), Part::ReadAll]);
+            writer.write(0, &[Part::Restore(1), Part::ReadAll]);
             if let Some(point) = trajectory.points.first().filter(|_| trajectory.is_stepped()) {
                 writer.step(0, point.time, point.size);
             }

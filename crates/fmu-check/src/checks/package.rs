@@ -22,7 +22,7 @@ pub fn unpack(path: &Path, directory: &Path, most: u64) -> anyhow::Result<Vec<Ob
         .map_err(|error| anyhow::anyhow!("{at}: is no FMU, which is a ZIP file ({error})"))?;
     let mut found = Vec::new();
     let mut names = BTreeSet::new();
-    let mut left = most;
+    let mut remaining = most;
     for index in 0..archive.len() {
         let name = entry(&mut archive, index, &mut names, &mut found)?;
         if crate::worker::interrupted() {
@@ -38,9 +38,9 @@ pub fn unpack(path: &Path, directory: &Path, most: u64) -> anyhow::Result<Vec<Ob
         }
         std::fs::create_dir_all(target.parent().unwrap_or(directory))?;
         // The size that the entry declares may be wrong.
-        let written = std::io::copy(&mut (&mut entry).take(left + 1), &mut File::create(&target)?)
+        let written = std::io::copy(&mut (&mut entry).take(remaining + 1), &mut File::create(&target)?)
             .map_err(|error| anyhow::anyhow!("{at}: cannot be unpacked ({error})"))?;
-        left = left.checked_sub(written).with_context(|| {
+        remaining = remaining.checked_sub(written).with_context(|| {
             let most = most >> 20;
             format!(
                 "{at}: it has more than {most} MB when it is unpacked; if that is right, give --unpacked MB"

@@ -5,7 +5,7 @@ use crate::checker::Checker;
 use crate::description::{Variable, kind_of, type_name};
 use crate::finding::status_name;
 use crate::values::{near, other_values};
-use crate::writer::{Part, Played, Point, Read, Trajectory, Writer, access, difference, step_args};
+use crate::writer::{Calls, Part, Point, Read, Trajectory, Writer, access, difference, step_args};
 use fmi_abi::Interface;
 use std::sync::Arc;
 
@@ -221,13 +221,17 @@ fn input_of(checker: &Checker, kind: Kind) -> Option<u64> {
 }
 
 /// A trajectory, with an attack in its middle or without: the attack, the reads after it, and the rest.
-fn play(writer: &mut Writer, instance: usize, attack: Option<&Attack>) -> (Option<u32>, Vec<Read>, Played) {
+fn write_simulation(
+    writer: &mut Writer,
+    instance: usize,
+    attack: Option<&Attack>,
+) -> (Option<u32>, Vec<Read>, Calls) {
     let trajectory = writer.trajectory;
     let to = trajectory.points.len() / 2;
-    writer.play(instance, &[Part::Begin, Part::Points(to)]);
+    writer.write(instance, &[Part::Begin, Part::Points(to)]);
     let attack = attack.map(|(function, args, ..)| writer.forbidden(Some(instance), function, args.clone()));
     let at_once = writer.read_all(instance);
-    let mut later = Played::default();
+    let mut later = Calls::default();
     for (number, point) in trajectory.points[to..].iter().enumerate() {
         // The first two steps set no inputs, so that a value that the attack has set takes effect.
         let inputs = if number < 2 { Vec::new() } else { point.inputs.clone() };
@@ -269,7 +273,7 @@ fn after_end(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         return Ok(());
     };
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &[Part::Begin, Part::Points(2), Part::Call("Terminate")]);
+    writer.write(0, &[Part::Begin, Part::Points(2), Part::Call("Terminate")]);
     writer.forbidden = true;
     let ids = writer.set(0, &[(index, value)]);
     let name = description.variables[index].name.clone();
@@ -282,8 +286,8 @@ fn after_end(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
 /// Checks that an attack is rejected and changes nothing.
 fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let (_, alone_at_once, alone) = play(&mut writer, 0, None);
-    let (Some(id), at_once, later) = play(&mut writer, 1, Some(&attack)) else { return Ok(()) };
+    let (_, alone_at_once, alone) = write_simulation(&mut writer, 0, None);
+    let (Some(id), at_once, later) = write_simulation(&mut writer, 1, Some(&attack)) else { return Ok(()) };
     let (function, _, what, accepted) = attack;
     let call = format!("{function} with {what} returns");
     let named = call.clone();
@@ -307,12 +311,12 @@ fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyho
         false => Some("rejections.changed").filter(|_| function != "DoStep"),
     };
     let error = Arc::clone(&changed);
-    let run = checker.judge("rejections.changed", writer.sequence.clone(), move |run| error(run, 3))?;
+    let run = checker.evaluate("rejections.changed", writer.sequence.clone(), move |run| error(run, 3))?;
     if let Some(rule) = discarded {
-        checker.keep(rule, &run, &writer.sequence, move |run| changed(run, 2));
+        checker.record(rule, &run, &writer.sequence, move |run| changed(run, 2));
     }
     if let Some(rule) = accepted {
-        checker.keep(rule, &run, &writer.sequence, move |run| {
+        checker.record(rule, &run, &writer.sequence, move |run| {
             let status = run.status(id).filter(|_| run.succeeds(id))?;
             Some(format!("{call} {}", status_name(status)))
         });

@@ -3,7 +3,7 @@
 use crate::call_sequence::{Arg, Kind, Numbered, Run, Step};
 use crate::checker::Checker;
 use crate::description::Description;
-use crate::finding::{Judges, any, status_name};
+use crate::finding::{Criterion, any, status_name};
 use crate::trajectory::steps;
 use crate::values::is_other_time;
 use crate::writer::Part::{Begin, Points, ReadAll, Run as RunFrom};
@@ -15,11 +15,11 @@ const WHOLE: &[Part] = &[Begin, ReadAll, RunFrom(0)];
 /// Repeats the calls in another process with other addresses and other memory contents.
 pub fn repeat(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let one = writer.play(0, WHOLE).reads;
+    let one = writer.write(0, WHOLE).reads;
     writer.add(Step::FreshProcess);
-    let other = writer.play(0, WHOLE).reads;
-    let judge = checker.differ(&one, &other, "{} is {}, in another process {}");
-    checker.check("results.process", writer.sequence, judge)
+    let other = writer.write(0, WHOLE).reads;
+    let criterion = checker.differ(&one, &other, "{} is {}, in another process {}");
+    checker.check("results.process", writer.sequence, criterion)
 }
 
 /// Repeats the calls with an instance of another name. Strings may contain the name.
@@ -27,28 +27,28 @@ pub fn name(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let mut runs = ["instance", "an instance of another name"].map(|name| {
         writer.make_with(0, |how| how.name = name.to_owned());
-        let reads = writer.play(0, &[Part::Enter, Part::Leave, ReadAll, RunFrom(0)]).reads;
+        let reads = writer.write(0, &[Part::Enter, Part::Leave, ReadAll, RunFrom(0)]).reads;
         writer.free(0);
         reads
     });
     let is_number = |(index, _): &(usize, usize)| checker.description.variables[*index].is_number();
     runs.iter_mut().for_each(|reads| reads.retain(|read| read.variables.iter().all(is_number)));
     let [one, other] = runs;
-    let judge = checker.differ(&one, &other, "{} is {}, of an instance of another name {}");
-    checker.check("results.name", writer.sequence, judge)
+    let criterion = checker.differ(&one, &other, "{} is {}, of an instance of another name {}");
+    checker.check("results.name", writer.sequence, criterion)
 }
 
 /// Checks an instance next to a second one, which is called in turns with it.
 pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let alone = writer.play(0, WHOLE).reads;
+    let alone = writer.write(0, WHOLE).reads;
     writer.free(0);
-    let (mut one, mut other) = (writer.play(1, &[Begin, ReadAll]).reads, Vec::new());
+    let (mut one, mut other) = (writer.write(1, &[Begin, ReadAll]).reads, Vec::new());
     // The second instance is two points behind, so that the states of both differ.
     let count = trajectory.points.len();
     for number in 0..count + 2 {
         if number == 1 {
-            other.extend(writer.play(2, &[Begin, ReadAll]).reads);
+            other.extend(writer.write(2, &[Begin, ReadAll]).reads);
         }
         if let Some(point) = trajectory.points.get(number) {
             writer.point(1, point);
@@ -63,11 +63,11 @@ pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<(
             other.extend(writer.read_all(2));
         }
     }
-    let judges = [
+    let criteria = [
         checker.differ(&alone, &one, "{} is {}, next to another instance {}"),
         checker.differ(&alone, &other, "{} is {}, of a second instance next to the first {}"),
     ];
-    checker.check("results.instances", writer.sequence, any(judges))
+    checker.check("results.instances", writer.sequence, any(criteria))
 }
 
 /// Returns a message for the first variable that has one value read separately and another read with others.
@@ -76,7 +76,7 @@ fn unlike(
     singly: Vec<(usize, Vec<Read>)>,
     together: Vec<Read>,
     message: fn(&str, String, String) -> String,
-) -> Box<dyn Judges> {
+) -> Box<dyn Criterion> {
     let description = checker.description.clone();
     Box::new(move |run: &Run| {
         singly.iter().find_map(|(index, reads)| {
@@ -90,9 +90,9 @@ fn unlike(
 /// Checks that reading changes nothing, regardless of the variables, their grouping and the number of reads.
 pub fn reading(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let silent = writer.play(0, &[Begin, Points(usize::MAX), ReadAll, Part::Free]).reads;
+    let silent = writer.write(0, &[Begin, Points(usize::MAX), ReadAll, Part::Free]).reads;
     let all = &checker.readable;
-    writer.play(1, &[Begin, ReadAll]);
+    writer.write(1, &[Begin, ReadAll]);
     for point in &trajectory.points {
         writer.point(1, point);
         for index in all.iter().rev().take(200) {
@@ -103,14 +103,14 @@ pub fn reading(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     let [read, again] = [(); 2].map(|()| writer.read_all(1));
     let mut single = |index: &usize| (*index, writer.read_these(1, &[*index]));
     let singly: Vec<_> = all.iter().take(400).map(&mut single).collect();
-    let judges = [
+    let criteria = [
         checker.differ(&read, &again, "{} is {}, read a second time {}"),
         unlike(checker, singly, read.clone(), |name, one, together| {
             format!("{name} is {together} read with others and {one} read separately")
         }),
         checker.differ(&silent, &read, "{} is {}, after more was read meanwhile {}"),
     ];
-    checker.check("results.reading", writer.sequence, any(judges))?;
+    checker.check("results.reading", writer.sequence, any(criteria))?;
     repeated(checker, trajectory, all)?;
     first(checker, trajectory)
 }
@@ -121,17 +121,17 @@ fn first(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let outputs = checker.readable.iter().copied();
     let outputs = outputs.filter(|index| variables[*index].causality == "output").take(checker.most(16));
     let mut writer = checker.writer(trajectory);
-    let together = writer.play(0, &[Begin, Points(3), Part::Read, Part::Free]).reads;
+    let together = writer.write(0, &[Begin, Points(3), Part::Read, Part::Free]).reads;
     let mut alone = Vec::new();
     for output in outputs {
-        writer.play(0, &[Begin, Points(3)]);
+        writer.write(0, &[Begin, Points(3)]);
         alone.push((output, writer.read_these(0, &[output])));
         writer.free(0);
     }
-    let judge = unlike(checker, alone, together, |name, one, other| {
+    let criterion = unlike(checker, alone, together, |name, one, other| {
         format!("{name} is {one} read first and {other} read after others")
     });
-    checker.check("results.reading", writer.sequence, judge)
+    checker.check("results.reading", writer.sequence, criterion)
 }
 
 /// Checks a call that reads each variable twice, and a call that reads none.
@@ -167,23 +167,23 @@ fn repeated(checker: &Checker, trajectory: &Trajectory, all: &[usize]) -> anyhow
 /// Checks instances in four threads.
 pub fn threads(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let alone = writer.play(0, WHOLE).reads;
+    let alone = writer.write(0, WHOLE).reads;
     writer.free(0);
     let mut sequences: Vec<Vec<Numbered>> = Vec::new();
-    let mut judges = Vec::new();
+    let mut criteria = Vec::new();
     for number in 1..=4 {
         let mut thread = Writer { next: writer.next, ..checker.writer(trajectory) };
         // Twenty simulations for each thread, so that simulations overlap.
         for _ in 0..20 {
-            let reads = thread.play(number, WHOLE).reads;
-            judges.push(checker.differ(&alone, &reads, "{} is {}, on a thread next to others {}"));
+            let reads = thread.write(number, WHOLE).reads;
+            criteria.push(checker.differ(&alone, &reads, "{} is {}, on a thread next to others {}"));
             thread.free(number);
         }
         writer.next = thread.next;
         sequences.push(thread.sequence);
     }
     writer.add(Step::Parallel(sequences));
-    checker.check("results.threads", writer.sequence, any(judges))
+    checker.check("results.threads", writer.sequence, any(criteria))
 }
 
 /// Checks simulations to the same time with other step sizes and constant inputs.
@@ -208,7 +208,7 @@ pub fn cut(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         for point in steps(&checker.description, start, &vec![*size; *count], false) {
             writer.point(instance, &Point { inputs: Vec::new(), ..point });
         }
-        ends.push(writer.play(instance, &[Part::Read, Part::Free]).reads);
+        ends.push(writer.write(instance, &[Part::Read, Part::Free]).reads);
     }
     let description = checker.description.clone();
     checker.check("results.cut", writer.sequence, move |run| {

@@ -4,7 +4,7 @@
 use crate::call_sequence::{Run, Values};
 use crate::checker::Checker;
 use crate::description::Variable;
-use crate::finding::{Judges, any};
+use crate::finding::{Criterion, any};
 use crate::values::other_values;
 use crate::worker::FILL;
 use crate::writer::Part::{Begin, Enter, Free, Leave, Make, Points};
@@ -19,7 +19,7 @@ pub fn starts(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     let situations = [&[Make, Enter][..], &[Make]];
     for parts in situations.into_iter().take(if checker.fmi3() { 2 } else { 1 }) {
         let (model, mut writer) = (Arc::clone(&model), checker.writer(trajectory));
-        writer.play(0, parts);
+        writer.write(0, parts);
         let reads = writer.read_these(0, &sample(&model, 10_000));
         checker.check("start_values.start", writer.sequence, move |run| {
             values_of(run, &reads).find_map(|(index, value)| {
@@ -101,11 +101,11 @@ fn values(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         writer.point(0, point);
         reads.extend(writer.read(0));
     }
-    let run = checker.play(&writer.sequence)?;
-    checker.keep_always(&writer.sequence, &run);
+    let run = checker.execute(&writer.sequence)?;
+    checker.record_always(&writer.sequence, &run);
     for (name, test) in VALUE_TESTS {
         let (model, reads) = (Arc::clone(&checker.description), reads.clone());
-        checker.keep(name, &run, &writer.sequence, move |run| {
+        checker.record(name, &run, &writer.sequence, move |run| {
             values_of(run, &reads).find_map(|(index, value)| {
                 let variable = Some(&model.variables[index]).filter(|variable| !variable.clocked)?;
                 Some(format!("{} {}", variable.name, test(variable, &value)?))
@@ -134,10 +134,10 @@ fn constants(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
     let first = writer.read_these(0, &fixed);
-    writer.play(0, &[Points(usize::MAX)]);
+    writer.write(0, &[Points(usize::MAX)]);
     let last = writer.read_these(0, &fixed);
-    let judge = checker.differ(&first, &last, "{} was {} and has become {}");
-    checker.check("start_values.fixed", writer.sequence, judge)
+    let criterion = checker.differ(&first, &last, "{} was {} and has become {}");
+    checker.check("start_values.fixed", writer.sequence, criterion)
 }
 
 /// Checks that values that are set are read: before and in Initialization Mode, and at a communication point.
@@ -187,16 +187,16 @@ fn when(checker: &Checker, trajectory: &Trajectory, values: &[(usize, Values)]) 
     let mut sets = Vec::new();
     let [before, within] =
         [(&[Make][..], &[Enter][..]), (&[Make, Enter, Part::Read][..], &[][..])].map(|(before, after)| {
-            writer.play(0, before);
+            writer.write(0, before);
             sets.extend(writer.set(0, values));
-            writer.play(0, after);
-            writer.play(0, &[Part::Read, Leave, Part::ReadAll, Free]).reads
+            writer.write(0, after);
+            writer.write(0, &[Part::Read, Leave, Part::ReadAll, Free]).reads
         });
     let message = "{} is {} with values set before Initialization Mode, {} with values set in it";
     let differ = checker.differ(&before, &within, message);
     checker.check("start_values.when", writer.sequence, move |run| {
-        let good = sets.iter().all(|id| run.succeeds(*id));
-        if good { differ(run) } else { None }
+        let succeeded = sets.iter().all(|id| run.succeeds(*id));
+        if succeeded { differ(run) } else { None }
     })
 }
 
@@ -207,11 +207,11 @@ fn lost(
     reads: Vec<Read>,
     values: Vec<(usize, Values)>,
     has: &'static str,
-) -> Box<dyn Judges> {
+) -> Box<dyn Criterion> {
     let description = checker.description.clone();
     Box::new(move |run: &Run| {
-        let good = ids.iter().all(|id| run.succeeds(*id));
-        values.iter().filter(|_| good).find_map(|(index, value)| {
+        let succeeded = ids.iter().all(|id| run.succeeds(*id));
+        values.iter().filter(|_| succeeded).find_map(|(index, value)| {
             let read = value_of(run, &reads, *index).filter(|read| read.differ(value).is_some())?;
             let name = &description.variables[*index].name;
             Some(format!("{name} was set to {} and {has} {}", value.show(0), read.show(0)))
@@ -227,9 +227,9 @@ fn read_back(
     after: &[Part],
 ) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    writer.play(0, before);
+    writer.write(0, before);
     let sets = writer.set(0, &values);
-    writer.play(0, after);
+    writer.write(0, after);
     let reads = read_again(&mut writer, &values);
     checker.check("start_values.set", writer.sequence, lost(checker, sets, reads, values, "reads"))
 }
@@ -243,11 +243,11 @@ fn read_again(writer: &mut Writer, values: &[(usize, Values)]) -> Vec<Read> {
 fn inputs(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
-    let mut judges = Vec::new();
+    let mut criteria = Vec::new();
     for point in &trajectory.points {
         let ids = writer.point(0, point);
         let reads = read_again(&mut writer, &point.inputs);
-        judges.push(lost(checker, ids, reads, point.inputs.clone(), "has become"));
+        criteria.push(lost(checker, ids, reads, point.inputs.clone(), "has become"));
     }
-    checker.check("start_values.inputs", writer.sequence, any(judges))
+    checker.check("start_values.inputs", writer.sequence, any(criteria))
 }

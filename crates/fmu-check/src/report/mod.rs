@@ -58,7 +58,7 @@ impl Report {
                 .iter()
                 .map(|trajectory| trajectory.interface.to_string())
                 .collect(),
-            sequences: checker.played(),
+            sequences: checker.executed(),
             seconds: 0.0,
             seed: checker.seed,
             variables: [checker.description.variables.len(), checker.readable.len()],
@@ -68,7 +68,7 @@ impl Report {
     }
 
     /// Decides which findings fail and what is allowed, for all outputs.
-    pub(crate) fn judge(&mut self, options: &Options, baseline: &Baseline) {
+    pub(crate) fn evaluate(&mut self, options: &Options, baseline: &Baseline) {
         let from = match options.fail_on {
             FailOn::Violation => Some(Severity::Violation),
             FailOn::Fragile => Some(Severity::Fragile),

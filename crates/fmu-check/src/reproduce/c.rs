@@ -1,6 +1,6 @@
 //! A sequence as a program in C.
 
-use super::evidence::{Evidence, Measure, Proof};
+use super::evidence::{Evidence, Expected, Measure};
 use crate::call_sequence::{Arg, CallSequence, Kind, Make, NULL_INSTANCE, Numbered, Setting, Step};
 use crate::description::Description;
 use crate::finding::Finding;
@@ -89,18 +89,18 @@ fn library(setting: &Setting, sequence: &CallSequence) -> String {
 /// Returns the C function that compares the results of the calls with the results of the finding.
 fn shows(evidence: &Evidence) -> String {
     let results = match evidence {
-        Evidence::None | Evidence::End | Evidence::Left => None,
+        Evidence::None | Evidence::End | Evidence::Orphans => None,
         Evidence::Printed => Some("*result(\"printed\", 0) != 0".to_owned()),
         Evidence::Damage => Some("damaged()".to_owned()),
         Evidence::Differ(pairs) => {
             let list: Vec<String> = pairs.iter().map(|[one, other]| format!("{{{one}, {other}}}")).collect();
             Some(format!("any_differ((const int[][2]){{{}}}, {})", list.join(", "), pairs.len()))
         }
-        Evidence::Same(proofs) => {
-            let same = |Proof { id, observed, .. }: &Proof| {
+        Evidence::Same(expected) => {
+            let same = |Expected { id, observed, .. }: &Expected| {
                 format!("strcmp(result(\"r\", {id}), {}) == 0", literal(observed.as_bytes()))
             };
-            Some(proofs.iter().map(same).collect::<Vec<_>>().join("\n        && "))
+            Some(expected.iter().map(same).collect::<Vec<_>>().join("\n        && "))
         }
         Evidence::Grown(Measure::Settings, first, last, _) => {
             let [first, last] = [first, last].map(|id| format!("strchr(result(\"r\", {id}), ';')"));
@@ -114,7 +114,7 @@ fn shows(evidence: &Evidence) -> String {
     let kind = match evidence {
         Evidence::None => "NONE",
         Evidence::End => "END",
-        Evidence::Left => "LEFT",
+        Evidence::Orphans => "ORPHANS",
         _ => "RESULTS",
     };
     let results = results.unwrap_or_else(|| "false".to_owned());
@@ -147,7 +147,9 @@ impl Writer<'_> {
     /// Parts of the results of a call that matter.
     fn matters(&self, id: u32) -> Option<[bool; 2]> {
         match self.evidence {
-            Evidence::Same(proofs) => proofs.iter().find(|proof| proof.id == id).map(|proof| proof.matters),
+            Evidence::Same(expected) => {
+                expected.iter().find(|result| result.id == id).map(|result| result.matters)
+            }
             Evidence::Differ(pairs) => pairs.iter().any(|pair| pair.contains(&id)).then_some([true, false]),
             _ => None,
         }
@@ -220,7 +222,7 @@ impl Writer<'_> {
         let mut after = parts.after;
         if let Some([written, log]) = self.matters(id) {
             after.push(format!("FILE *file = begin({id}, status);"));
-            after.extend(parts.proofs.into_iter().filter(|_| written));
+            after.extend(parts.results.into_iter().filter(|_| written));
             after.push(format!("end(file, {});", if log { "messages" } else { "\"\"" }));
         }
         if *self.evidence == Evidence::Damage {
@@ -263,20 +265,20 @@ impl Writer<'_> {
             Arg::Out(kind, count) => parts.out(name, *kind, *count, number),
             Arg::State(slot) => format!("s{slot}"),
             Arg::StateOut(slot) => {
-                parts.proofs.push(format!("fprintf(file, \"%d,;\", s{slot} != NULL);"));
+                parts.results.push(format!("fprintf(file, \"%d,;\", s{slot} != NULL);"));
                 format!("&s{slot}")
             }
             Arg::Saved(slot) => format!("guarded(b{slot}, *n{slot})"),
             Arg::SavedSize(slot) => format!("*n{slot}"),
             Arg::SizeOut(slot) => {
                 parts.after.push(format!("print(\" -> %zu bytes\", *n{slot});"));
-                parts.proofs.push(format!("put_numbers(file, n{slot}, 1, 8);"));
+                parts.results.push(format!("put_numbers(file, n{slot}, 1, 8);"));
                 format!("n{slot}")
             }
             Arg::SavedOut(slot) => {
                 parts.before.push(format!("void *a{number} = guarded(NULL, *n{slot});"));
                 parts.after.push(format!("memcpy(b{slot}, a{number}, *n{slot});"));
-                parts.proofs.push(format!("put_numbers(file, a{number}, *n{slot}, 1);"));
+                parts.results.push(format!("put_numbers(file, a{number}, *n{slot}, 1);"));
                 format!("a{number}")
             }
         }
@@ -288,7 +290,7 @@ struct Parts {
     before: Vec<String>,
     after: Vec<String>,
     /// Lines that keep the results.
-    proofs: Vec<String>,
+    results: Vec<String>,
     /// Lines that look for damage.
     checks: Vec<String>,
 }
@@ -324,7 +326,7 @@ impl Parts {
             self.after.push(format!("print(\" ->\"); {guard}show(a{number}, {count}, '{letter}', {width});"));
         }
         if name != "fmi3GetBinary" {
-            self.proofs.push(match letter {
+            self.results.push(match letter {
                 's' => format!("if (status < 2) put_texts(file, a{number}, {count});"),
                 _ => format!("put_numbers(file, a{number}, {count}, {width});"),
             });

@@ -29,7 +29,7 @@ typedef struct {
     void *environment;
 } Callbacks;
 
-enum { NONE, END, LEFT, RESULTS };
+enum { NONE, END, ORPHANS, RESULTS };
 
 static void *library;
 static char library_path[5000];

@@ -140,7 +140,7 @@ mod linux {
         if !reap() {
             return Vec::new();
         }
-        let left = descendants().into_iter().map(|(_, name)| name).collect();
+        let orphans = descendants().into_iter().map(|(_, name)| name).collect();
         let begin = Instant::now();
         while reap() && begin.elapsed() < Duration::from_secs(10) {
             // SAFETY: the group and the processes descend from this one. A group is ended at once, so that none of it escapes
@@ -157,7 +157,7 @@ mod linux {
             }
             std::thread::sleep(Duration::from_micros(200));
         }
-        left
+        orphans
     }
 
     /// A session for this process, from which it cannot send signals to the processes of the checker or to all processes:

@@ -44,7 +44,7 @@ pub const SCRATCH: &str = "FMU_CHECK_SCRATCH";
 pub const OWN_FAULT: i32 = 97;
 
 /// The exit status of a worker that has played its sequence.
-pub const PLAYED: i32 = 96;
+pub const EXECUTED: i32 = 96;
 
 #[derive(Serialize, Deserialize)]
 pub struct Job {
@@ -67,7 +67,7 @@ pub struct Ended {
     /// Its outcomes, a line of JSON for each.
     pub outcomes: String,
     /// Names of the processes that it has left.
-    pub left: Vec<String>,
+    pub orphans: Vec<String>,
     /// The number of its processes, if that is why it was ended.
     pub flood: Option<usize>,
     /// Whether it ended in a function of the FMU.
@@ -113,7 +113,7 @@ fn work_from_files(job: &Path) -> Result<(), String> {
 /// Ends the process without the exit handlers of the library, which are not tested. Its buffered output is written.
 fn end(result: Result<(), String>) -> ! {
     let status = match result {
-        Ok(()) => PLAYED,
+        Ok(()) => EXECUTED,
         Err(error) => {
             eprintln!("{error}");
             OWN_FAULT
@@ -136,7 +136,7 @@ fn work(job: Job, file: File) {
     if job.setting.soft {
         memory::AFTER.store(4096, std::sync::atomic::Ordering::Relaxed);
     }
-    let player = Player {
+    let executor = Executor {
         setting: job.setting,
         libraries: Mutex::default(),
         instances: Mutex::default(),
@@ -145,8 +145,8 @@ fn work(job: Job, file: File) {
         sizes: Mutex::default(),
         file: Mutex::new(file),
     };
-    player.play(&job.sequence, true);
-    player.write(&Last { bytes: std::mem::take(&mut locked(&player.bytes)) });
+    executor.execute(&job.sequence, true);
+    executor.write(&Last { bytes: std::mem::take(&mut locked(&executor.bytes)) });
 }
 
 fn limit(memory: u64) {
@@ -194,7 +194,7 @@ static ENVIRONMENTS: AtomicUsize = AtomicUsize::new(0x10_0000);
 // SAFETY: the callbacks are only read.
 unsafe impl Send for Instance {}
 
-struct Player {
+struct Executor {
     setting: Setting,
     /// The libraries of Co-Simulation and Model Exchange, once they are loaded.
     libraries: Mutex<[Option<&'static libloading::Library>; 2]>,
@@ -283,7 +283,7 @@ enum Content {
     Saved(usize),
 }
 
-impl Player {
+impl Executor {
     fn write(&self, line: &impl Serialize) {
         #[cfg(unix)]
         if std::process::id() != PROCESS.load(Ordering::Relaxed) {
@@ -299,7 +299,7 @@ impl Player {
         let _ = locked(&self.file).write_all(&line);
     }
 
-    fn play(&self, sequence: &[Numbered], report: bool) -> Vec<Outcome> {
+    fn execute(&self, sequence: &[Numbered], report: bool) -> Vec<Outcome> {
         let mut outcomes = Vec::new();
         for numbered in sequence {
             let mut outcome = Outcome { id: numbered.id, ..Outcome::default() };
@@ -309,7 +309,7 @@ impl Player {
                     memory::KEEP.store(true, Ordering::Relaxed);
                     let (mut done, mut last) = (0, Vec::new());
                     while done < *times && begin.elapsed().as_secs_f64() < self.setting.repetitions {
-                        last = self.play(steps, false);
+                        last = self.execute(steps, false);
                         done += 1;
                         if last.iter().any(|outcome| outcome.status.is_some_and(|status| status > 2)) {
                             break;
@@ -326,7 +326,7 @@ impl Player {
                     memory::KEEP.store(true, Ordering::Relaxed);
                     std::thread::scope(|scope| {
                         for sequence in sequences {
-                            scope.spawn(|| self.play(sequence, report));
+                            scope.spawn(|| self.execute(sequence, report));
                         }
                     });
                     memory::KEEP.store(false, Ordering::Relaxed);
@@ -388,7 +388,7 @@ impl Player {
             }
             Step::Quit => {
                 self.write(&Last { bytes: HashMap::new() });
-                in_fmu(|| std::process::exit(PLAYED))
+                in_fmu(|| std::process::exit(EXECUTED))
             }
             Step::Repeat(..) | Step::Parallel(_) | Step::FreshProcess => {}
         }
@@ -414,7 +414,7 @@ impl Player {
                         let why = std::error::Error::source(&error)
                             .map_or_else(|| error.to_string(), |source| source.to_string());
                         self.write(&Unloadable { unloadable: why });
-                        std::process::exit(PLAYED)
+                        std::process::exit(EXECUTED)
                     }
                 }
             }
@@ -494,14 +494,14 @@ impl Player {
         outcome.log = messages(environment as usize);
         let co_simulation = make.co_simulation;
         let environment = environment as usize;
-        self.keep(
+        self.store(
             index,
             Instance { handle: handle as usize, environment, co_simulation, _callbacks: callbacks },
         );
     }
 
     /// Replaces an instance. Arguments of an instance that was not freed stay allocated.
-    fn keep(&self, index: usize, instance: Instance) {
+    fn store(&self, index: usize, instance: Instance) {
         let before = match instance.handle {
             0 => locked(&self.instances).remove(&index),
             _ => locked(&self.instances).insert(index, instance),

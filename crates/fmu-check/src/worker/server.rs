@@ -32,7 +32,7 @@ fn jobs() -> std::io::Result<()> {
     let mut files = [tempfile::tempfile()?, tempfile::tempfile()?];
     // SAFETY: only returns a number.
     let checker = unsafe { libc::getppid() };
-    let mut times_left = 0;
+    let mut sequences_with_orphans = 0;
     for line in std::io::stdin().lines() {
         let line = line?;
         let Some((limit, job)) = line.split_once(' ') else { continue };
@@ -42,20 +42,20 @@ fn jobs() -> std::io::Result<()> {
             -1 => return Err(std::io::Error::last_os_error()),
             0 => {
                 isolate(checker);
-                play(job, files)
+                execute(job, files)
             }
             child => {
                 let (ended, flood) = wait(child, limit.parse().unwrap_or_default());
                 // Processes that end soon after the instance are no finding. After three sequences with others, the server does not wait.
-                let patient = ended.is_some() && times_left < 3;
-                let left = end_descendants(child, Duration::from_millis(if patient { 300 } else { 0 }));
-                times_left += usize::from(ended.is_some() && !left.is_empty());
+                let patient = ended.is_some() && sequences_with_orphans < 3;
+                let orphans = end_descendants(child, Duration::from_millis(if patient { 300 } else { 0 }));
+                sequences_with_orphans += usize::from(ended.is_some() && !orphans.is_empty());
                 if abandoned() {
                     return Ok(());
                 }
                 let inside = calls_under_way().load(Ordering::Relaxed) > 0;
                 let ended = ended.map(Ended::from).unwrap_or_default();
-                pass_on(Ended { left, flood, inside, ..ended }, &mut files)?;
+                pass_on(Ended { orphans, flood, inside, ..ended }, &mut files)?;
             }
         }
     }
@@ -63,7 +63,7 @@ fn jobs() -> std::io::Result<()> {
 }
 
 /// Plays a job in the process that was forked for it.
-fn play(job: &str, [output, outcomes]: [File; 2]) -> ! {
+fn execute(job: &str, [output, outcomes]: [File; 2]) -> ! {
     use std::os::fd::AsRawFd as _;
     let nothing = File::open("/dev/null");
     for (file, number) in [(nothing.as_ref().unwrap_or(&output), 0), (&output, 1), (&output, 2)] {
