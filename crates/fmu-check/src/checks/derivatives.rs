@@ -1,4 +1,4 @@
-//! Partial derivatives against differences, adjoint against directional ones, vectors against variables.
+//! Checks partial derivatives against differences, adjoint derivatives against directional ones, and vectors against variables.
 
 use crate::call_sequence::{Arg, Kind, Run, Values};
 use crate::checker::Checker;
@@ -8,7 +8,7 @@ use crate::writer::{Part, Read, Trajectory, Writer, value_of};
 use fmi_abi::{BaseType, Interface};
 use std::sync::Arc;
 
-/// Finds a continuous scalar unknown and a continuous scalar known on which the unknown may depend.
+/// Returns a continuous scalar unknown and a continuous scalar known on which it may depend.
 pub fn pair(description: &Description, interface: Interface) -> Option<(usize, usize)> {
     let unknowns = unknowns(description, interface);
     let knowns = knowns(description, interface);
@@ -28,7 +28,7 @@ fn continuous(description: &Description, index: usize) -> bool {
         && !variable.clocked
 }
 
-/// The unknowns: outputs, and in Model Exchange state derivatives.
+/// Returns at most 200 continuous scalar outputs and, in Model Exchange, state derivatives.
 fn unknowns(description: &Description, interface: Interface) -> Vec<usize> {
     let derivatives: &[_] =
         if interface == Interface::ModelExchange { &description.derivatives } else { &[] };
@@ -39,7 +39,7 @@ fn unknowns(description: &Description, interface: Interface) -> Vec<usize> {
     found
 }
 
-/// The knowns: inputs, and in Model Exchange states.
+/// Returns the continuous scalar inputs and, in Model Exchange, states.
 fn knowns(description: &Description, interface: Interface) -> Vec<usize> {
     let inputs =
         (0..description.variables.len()).filter(|index| description.variables[*index].causality == "input");
@@ -70,19 +70,19 @@ pub fn derivative(
     writer.call(0, function, args)
 }
 
-/// The calls up to the point at which partial derivatives are requested: near the middle and outside of events.
+/// Returns the parts of the simulation up to the point in the middle, where partial derivatives are requested.
 pub fn to_middle(trajectory: &Trajectory) -> [Part; 2] {
     [Part::Begin, Part::Points(trajectory.points.len() / 2)]
 }
 
-/// Whether directional and adjoint derivatives are declared.
+/// Returns whether directional derivatives are declared, and whether adjoint derivatives are.
 fn offers(checker: &Checker, interface: Interface) -> [bool; 2] {
     let directional = ["providesDirectionalDerivative", "providesDirectionalDerivatives"];
     [&directional[..], &["providesAdjointDerivatives"]].map(|names| checker.can(interface, names))
 }
 
-/// Checks directional derivatives against differences, adjoint derivatives against directional ones, and the derivative for
-/// a sum of seeds against the sum of derivatives.
+/// Checks derivatives against differences, adjoint derivatives against directional ones, and the derivative for a seed of ones
+/// against the sum of the derivatives for unit seeds.
 pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let [has_directional, has_adjoint] = offers(checker, trajectory.interface);
     let unknowns = unknowns(&checker.description, trajectory.interface);
@@ -139,12 +139,12 @@ fn names(description: &Description, indices: &[usize]) -> Vec<String> {
     indices.iter().map(|index| description.variables[*index].name.clone()).collect()
 }
 
-/// The numbers that a successful call wrote.
+/// Returns the numbers that a call wrote if it returned OK.
 fn numbers(run: &Run, id: u32) -> Option<Vec<f64>> {
     run.written(id).filter(|_| run.status(id) == Some(0)).map(Values::numbers)
 }
 
-/// Judges whether the derivatives for unit seeds add up to the derivative for a seed of ones.
+/// Returns the criterion that the derivatives for unit seeds add up to the derivative for a seed of ones.
 fn is_linear(columns: Vec<u32>, sum: u32, names: Vec<String>) -> impl Criterion {
     move |run: &Run| {
         let columns: Vec<Vec<f64>> = columns.iter().map(|id| numbers(run, *id)).collect::<Option<_>>()?;
@@ -163,7 +163,7 @@ fn is_linear(columns: Vec<u32>, sum: u32, names: Vec<String>) -> impl Criterion 
     }
 }
 
-/// Judges whether the adjoint derivatives are the transposed directional derivatives.
+/// Returns the criterion that the adjoint derivatives are the transposed directional derivatives.
 fn is_transposed(
     columns: Vec<u32>,
     rows: Vec<u32>,
@@ -188,7 +188,7 @@ fn is_transposed(
     }
 }
 
-/// Requests the derivatives again with unknowns and knowns in another order.
+/// Checks that the derivatives do not depend on the order of unknowns and knowns.
 fn order(checker: &Checker, trajectory: &Trajectory, unknowns: &[u32], knowns: &[u32]) -> anyhow::Result<()> {
     let reversed = |list: &[u32]| list.iter().rev().copied().collect::<Vec<_>>();
     let seed: Vec<f64> = (1..=knowns.len()).map(|number| number as f64).collect();
@@ -210,7 +210,7 @@ fn order(checker: &Checker, trajectory: &Trajectory, unknowns: &[u32], knowns: &
     })
 }
 
-/// Sets one known: a state among those that are given, or an input.
+/// Sets a known: an element of the state vector if it is one of `states`, otherwise an input.
 pub fn set_known(writer: &mut Writer, states: &[usize], vector: &[f64], known: usize, numbers: &[f64]) {
     match states.iter().position(|index| *index == known) {
         Some(at) => {
@@ -241,7 +241,7 @@ pub fn middle_values(
     Ok((values, numbers(vector.and_then(|id| run.written(id)).cloned())))
 }
 
-/// Checks each derivative against differences with two step sizes, whose disagreement estimates their error.
+/// Checks each derivative against central differences with two step sizes. Their difference estimates the error.
 fn differences(
     checker: &Checker,
     trajectory: &Trajectory,
@@ -307,18 +307,18 @@ fn column(writer: &mut Writer, unknowns: &[u32], known: u32, by_column: bool) ->
     unknowns.iter().map(adjoint).collect()
 }
 
-/// The derivatives with respect to one known, and the reads for their differences.
+/// Derivatives with respect to one known, and the reads for the differences.
 struct Differences {
     unknowns: Vec<usize>,
     names: Vec<String>,
     known: String,
-    /// The variables that are the known.
+    /// Indices of the known and its aliases.
     itself: Vec<usize>,
     is_stepped: bool,
     step: f64,
-    /// The call that wrote the derivative of each unknown, and its index there.
+    /// Number of the call that returned the derivative of each unknown, and the index in its result.
     analytic: Vec<(u32, usize)>,
-    /// The unknowns with the known at +step, -step, +step/2, -step/2 and 0.
+    /// Reads of the unknowns with +step, -step, +step/2, -step/2 and 0 added to the known.
     reads: [Vec<Read>; 5],
 }
 
@@ -337,13 +337,13 @@ impl Differences {
             let derivative = numbers(run, id)?.get(index).copied()?;
             let (step, here) = (self.step, values[4]);
             let (wide, narrow) = ((values[0] - values[1]) / (2.0 * step), (values[2] - values[3]) / step);
-            // One-sided differences show a kink, where there is no derivative to compare with.
+            // One-sided differences that disagree indicate a kink, where the derivative does not exist.
             let (left, right) = ((here - values[3]) / (step / 2.0), (values[2] - here) / (step / 2.0));
             let rounding = 1e-13 * here.abs().max(values[0].abs()) / step;
             let doubt = (wide - narrow).abs() * 10.0 + rounding * 100.0;
             let scale = narrow.abs().max(derivative.abs());
             let kink = (left - right).abs() > 0.05 * scale + rounding * 100.0;
-            // An output that changes only in the next step has no difference here.
+            // An output of Co-Simulation may change only in the next step, so its differences are 0.
             let silent = self.is_stepped && narrow == 0.0 && wide == 0.0;
             if kink && doubt > 1e-9 || silent {
                 continue;
@@ -360,7 +360,8 @@ impl Differences {
     }
 }
 
-/// The vectors of states and derivatives are the values of their variables, in the order of the model structure.
+/// Checks that the vectors of states and derivatives equal their variables, in the order of ModelStructure, and that nominal
+/// values are positive and finite.
 pub fn vectors(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let count = description.states_count().unwrap_or(0);

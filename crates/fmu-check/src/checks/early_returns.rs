@@ -1,4 +1,4 @@
-//! Event Mode and early returns of FMI 3.0 in Co-Simulation.
+//! Checks Event Mode and early returns in Co-Simulation of FMI 3.0.
 
 use crate::call_sequence::Run;
 use crate::checker::Checker;
@@ -6,7 +6,7 @@ use crate::values::is_other_time;
 use crate::writer::{Read, Trajectory, Writer, value_of};
 use std::sync::Arc;
 
-/// Checks the outputs of steps over events in FMI 3.0: for importers that handle events, that allow early returns, or both.
+/// Checks the outputs of `fmi3DoStep` at events, with `eventModeUsed`, with `earlyReturnAllowed` and with both.
 pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let time = checker.description.variables.iter().position(|variable| variable.causality == "independent");
     let has_events = checker.can(trajectory.interface, &["hasEventMode"]);
@@ -51,7 +51,7 @@ pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A step: its number, the reads after it, its end, and the call that enters Event Mode after it.
+/// Step: its number, the reads after it, its requested end, and the number of the call that enters Event Mode after it.
 struct Stepped {
     id: u32,
     values: Vec<Read>,
@@ -59,14 +59,14 @@ struct Stepped {
     event: Option<u32>,
 }
 
-/// The outputs eventHandlingNeeded, terminateSimulation, earlyReturn and lastSuccessfulTime of a step that succeeded.
+/// Returns eventHandlingNeeded, terminateSimulation, earlyReturn and lastSuccessfulTime of a successful step.
 fn outputs(run: &Run, id: u32) -> Option<([bool; 3], f64)> {
     let outcome = run.outcome(id).filter(|_| run.succeeds(id))?;
     let reached = outcome.written.get(3)?.numbers()[0];
     Some(([0, 1, 2].map(|index| outcome.written[index].numbers() == [1.0]), reached))
 }
 
-/// Runs the steps of the trajectory, which may end at events between its points.
+/// Writes and executes the steps of the trajectory, which may end at events between its points.
 fn run_steps(
     checker: &Checker,
     writer: &mut Writer<'_>,
@@ -113,8 +113,8 @@ fn run_steps(
     Ok(steps)
 }
 
-/// The outputs eventHandlingNeeded, earlyReturn and lastSuccessfulTime of a step that succeeded. In a shortened call sequence,
-/// `None` if an event before the step was not handled.
+/// Returns eventHandlingNeeded, earlyReturn and lastSuccessfulTime of a successful step; `None` if a shortened call sequence
+/// lacks Event Mode after an earlier step.
 fn ended(steps: &[Stepped], run: &Run, id: u32) -> Option<(bool, bool, f64)> {
     let mut before = steps.iter().take_while(|step| step.id != id);
     let is_skipped = |step: &Stepped| {
@@ -124,7 +124,8 @@ fn ended(steps: &[Stepped], run: &Run, id: u32) -> Option<(bool, bool, f64)> {
     (!before.any(is_skipped)).then_some((event, early, reached))
 }
 
-/// Runs the updates to count how many the event needs, and goes back to Step Mode; returns the next time event.
+/// Updates the discrete states, at most ten times, until the event needs no further update, and enters Step Mode. Returns the
+/// time of the next event.
 fn over_event(checker: &Checker, writer: &mut Writer<'_>) -> anyhow::Result<Option<f64>> {
     let mut next = None;
     for _ in 0..10 {

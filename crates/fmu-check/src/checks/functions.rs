@@ -1,4 +1,4 @@
-//! Functions, versions, an instance for the right token, and the calls that declared capabilities allow.
+//! Checks the exported functions, the version, and the functions of declared capabilities.
 
 use super::derivatives::{derivative, pair, references};
 use crate::call_sequence::{End, Run, Setting, Step};
@@ -9,7 +9,7 @@ use fmi_abi::calls::{fmi2, fmi3, signatures};
 use fmi_abi::{Interface, Mode, Standard};
 use std::sync::Arc;
 
-/// Checks that the loader finds all symbols that the library needs, including those that it looks up late.
+/// Checks that the loader resolves all symbols that the library needs, including those with lazy binding.
 fn symbols(checker: &Checker) -> anyhow::Result<()> {
     let sequence = checker.step(checker.version(), false);
     let [late, now] = [false, true].map(|now| {

@@ -1,4 +1,4 @@
-//! Checks that instances accept every order of calls that the standard allows.
+//! Checks that instances accept orders of calls that the standard allows.
 
 use super::Fits::{self, Always, Integrated, Several, Stepped};
 use crate::call_sequence::{Arg, NULL_INSTANCE, Step};
@@ -19,7 +19,7 @@ const ALL: Part = Points(usize::MAX);
 const TERMINATE: Part = Call("Terminate");
 const RESET: Part = Call("Reset");
 
-/// Orders of the calls of one instance: those that importers use, and edge cases.
+/// Orders of calls of one instance.
 const ORDERS: &[&[Part]] = &[
     &[Make, Free],
     &[Make, Enter, ReadAll, Free],
@@ -28,10 +28,10 @@ const ORDERS: &[&[Part]] = &[
     &[Make, RESET, Enter, RESET, RESET, Enter, Leave, RESET, Enter, Leave, Points(2), Free],
 ];
 
-/// Writes an order of other calls.
+/// Writes an order of calls that needs more than parts of the simulation.
 type Order = fn(&mut Writer, &Trajectory);
 
-/// Orders of other calls, and the simulations that they fit.
+/// Simulations that an order fits, and the function that writes the order.
 const OTHER_ORDERS: &[(Fits, Order)] = &[
     (Several, many),
     (Always, long_name),
@@ -41,7 +41,7 @@ const OTHER_ORDERS: &[(Fits, Order)] = &[
     (Fits::EventMode, event_mode),
 ];
 
-/// Twenty instances, more than a fixed pool may have; four of them are freed in another order.
+/// Makes twenty instances, more than a fixed pool may have. Four of them run and are freed in another order.
 fn many(writer: &mut Writer, _: &Trajectory) {
     (4..20).for_each(|instance| drop(writer.write(instance, &[Make])));
     (0..4).for_each(|instance| drop(writer.write(instance, &[Begin])));
@@ -52,7 +52,7 @@ fn many(writer: &mut Writer, _: &Trajectory) {
     }
 }
 
-/// A name with spaces and letters beyond ASCII; a stop time and a tolerance.
+/// Runs an instance whose name has spaces and characters beyond ASCII, with a stop time and a tolerance.
 fn long_name(writer: &mut Writer, trajectory: &Trajectory) {
     writer.make_with(0, |how| how.name = "a long name, with Gödel in it %s #1#".to_owned());
     let stop = trajectory.end + 1.0 + trajectory.end.abs();
@@ -60,7 +60,7 @@ fn long_name(writer: &mut Writer, trajectory: &Trajectory) {
     writer.write(0, &[Leave, Points(3), Free]);
 }
 
-/// The last step ends at the stop time.
+/// Runs up to the stop time, where the last step ends.
 fn up_to_the_stop(writer: &mut Writer, trajectory: &Trajectory) {
     writer.make(0);
     writer.enter_with(0, None, writer.description.start_time, Some(trajectory.end));
@@ -83,7 +83,7 @@ fn logging(writer: &mut Writer, _: &Trajectory) {
     writer.free(0);
 }
 
-/// An event at every point: importers may enter Event Mode at any time.
+/// Enters Event Mode at every point, which importers may do at any time.
 fn events_everywhere(writer: &mut Writer, trajectory: &Trajectory) {
     writer.begin(0);
     for point in &trajectory.points {
@@ -105,7 +105,7 @@ fn event_mode(writer: &mut Writer, trajectory: &Trajectory) {
     writer.write(0, &[ReadAll, TERMINATE, Free]);
 }
 
-/// Checks all orders of the tables, another token, unloading and steps beyond the stop time.
+/// Checks all orders of the tables, a wrong token, unloading, the exit of the process and a step beyond the stop time.
 pub fn orders(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for order in ORDERS {
         let mut writer = checker.writer(trajectory);
@@ -242,7 +242,7 @@ pub fn events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
             past.then(|| format!("at {time:?} the next event is at {:?}", event.next.unwrap_or_default()))
         })
     })?;
-    // An importer that has skipped time events.
+    // The importer has skipped time events.
     let late = trajectory.end.abs() * 10.0 + 10.0;
     let mut writer = checker.writer(trajectory);
     writer.begin(0);

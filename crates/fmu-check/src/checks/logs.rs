@@ -1,4 +1,4 @@
-//! Checks that there are no messages while logging is off.
+//! Checks that the FMU logs nothing while logging is off.
 
 use crate::call_sequence::Arg;
 use crate::checker::Checker;

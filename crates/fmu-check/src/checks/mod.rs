@@ -1,4 +1,4 @@
-//! The checks, by topics.
+//! Checks, in a module for each topic.
 
 pub mod dependencies;
 pub mod derivatives;
@@ -21,17 +21,17 @@ use crate::writer::Trajectory;
 use Check::{Each, Malformed, Once};
 use Fits::{Always, Integrated, Saves, Serializes, Several, Stepped, Stepped3};
 
-/// A check.
+/// Function of a check.
 #[derive(Clone, Copy)]
 pub enum Check {
     Once(fn(&Checker) -> anyhow::Result<()>),
-    /// Runs for each simulation that fits.
+    /// Checks each simulation that fits.
     Each(Fits, fn(&Checker, &Trajectory) -> anyhow::Result<()>),
-    /// Plays the malformed call sequences of this rule for each simulation that fits.
+    /// Executes the malformed call sequences of this rule for each simulation that fits.
     Malformed(&'static str, Fits, fn(&Checker, &Trajectory) -> anyhow::Result<Vec<CallSequence>>),
 }
 
-/// The simulations that a check or an order of calls fits.
+/// Condition on the simulations for which a check or an order of calls is executed.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Fits {
     Always,
@@ -52,7 +52,7 @@ pub enum Fits {
 }
 
 impl Fits {
-    /// Whether a simulation fits.
+    /// Returns whether a simulation fits.
     pub fn fit(self, checker: &Checker, trajectory: &Trajectory) -> bool {
         let (interface, stepped) = (trajectory.interface, trajectory.is_stepped());
         match self {
@@ -68,7 +68,7 @@ impl Fits {
     }
 }
 
-/// All checks of the library with their topics.
+/// Topic and function of every check that calls the library.
 pub const ALL: &[(&str, Check)] = &[
     ("life_cycle", Each(Always, life_cycle::orders)),
     ("life_cycle", Once(life_cycle::free_null)),

@@ -7,7 +7,7 @@ use crate::values::other_values;
 use crate::writer::Part::{Call, Enter, Leave, Make, Read, Run};
 use crate::writer::Trajectory;
 
-/// Checks that the values and the simulation after a reset are the values and the simulation of a new instance.
+/// Checks that the values and the simulation after a reset equal the values and the simulation of a new instance.
 pub fn reset(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for end in [&[Call("Terminate")][..], &[]] {
         let mut writer = checker.writer(trajectory);
@@ -22,7 +22,7 @@ pub fn reset(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     changed(checker, trajectory)
 }
 
-/// Checks that variables that were set have their start values after a reset.
+/// Checks that a reset restores the start values of variables that were set.
 fn changed(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let (mut values, mut others) = (Vec::new(), Vec::new());

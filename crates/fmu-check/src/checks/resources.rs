@@ -1,4 +1,4 @@
-//! Resources that remain after many simulations, and settings of the process.
+//! Checks the resources after many simulations, and the settings of the process.
 
 use crate::call_sequence::{End, Measured, Run, Step, Values};
 use crate::checker::Checker;
@@ -7,7 +7,7 @@ use crate::writer::Part::{Begin, Call, Drop, Enter, Free, Leave, Make, Points, R
 use crate::writer::{Part, Trajectory, Writer};
 use fmi_abi::BaseType;
 
-/// Checks the resources after many simulations, resets, states and strings.
+/// Checks the resources after many simulations, strings, resets and saved states, and the settings of the process.
 pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let measured = |what: &'static str, before: &[Part], cycle: &dyn Fn(&mut Writer)| {
         let mut writer = checker.writer(trajectory);
@@ -28,7 +28,7 @@ pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
         .filter_map(|(index, variable)| Some((index, Values::texts(variable.start.first()?.as_bytes(), 1))))
         .collect();
     if !texts.is_empty() {
-        measured("texts set", &[Make], &|writer| {
+        measured("strings set", &[Make], &|writer| {
             writer.set(0, &texts);
         })?;
     }
@@ -49,7 +49,7 @@ pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     settings(checker, trajectory)
 }
 
-/// Plays a cycle many times, and judges the resources that remain.
+/// Repeats a cycle of calls and compares memory, threads and open files before and after the repetitions.
 fn measured(
     checker: &Checker,
     mut writer: Writer,
@@ -69,7 +69,7 @@ fn measured(
         return checker.check("resources.cycles", sequence, |_| None);
     }
     checker.record_always(&sequence, &run);
-    // The resources before and after enough cycles, and the number of these.
+    // The resources before and after the repetitions and their number; `None` for fewer than 50.
     let done = move |run: &Run| -> Option<(Measured, Measured, usize)> {
         let measured = |id| run.outcome(id)?.measured.clone();
         let (before, times) = (measured(warm)?.times, measured(many)?.times);
@@ -80,14 +80,13 @@ fn measured(
         let grown = two.memory.saturating_sub(one.memory);
         // The smallest block of glibc is 32 bytes, and glibc may keep a few blocks. Other C libraries are measured in pages.
         let enough = if one.exact { 16 * times as u64 + 4096 } else { 64 * times as u64 + (4 << 20) };
-        (grown > enough).then(|| {
-            format!("{grown} bytes are left after {times} {what}: {} for each", grown / times as u64)
-        })
+        (grown > enough)
+            .then(|| format!("{grown} bytes remain after {times} {what}: {} for each", grown / times as u64))
     });
     type Count = fn(&Measured) -> usize;
     let counts: [(&str, Count, &str); 2] = [
-        ("resources.threads", |measured| measured.threads, "threads are left"),
-        ("resources.files", |measured| measured.files, "files are left open"),
+        ("resources.threads", |measured| measured.threads, "threads remain"),
+        ("resources.files", |measured| measured.files, "files remain open"),
     ];
     for (name, count, are_left) in counts {
         checker.record(name, &run, &sequence, move |run| {

@@ -1,4 +1,4 @@
-//! Checks that results depend only on the calls: not on the process, other instances, threads or reads.
+//! Checks that results do not depend on the process, the instance name, other instances, threads or reads, and checks times.
 
 use crate::call_sequence::{Arg, Kind, Numbered, Run, Step};
 use crate::checker::Checker;
@@ -9,10 +9,10 @@ use crate::values::is_other_time;
 use crate::writer::Part::{Begin, Points, ReadAll, Run as RunFrom};
 use crate::writer::{Part, Point, Read, Trajectory, Writer, access, value_of};
 
-/// The whole trajectory with all that can be read.
+/// Complete simulation, with all variables and vectors read at every point.
 const WHOLE: &[Part] = &[Begin, ReadAll, RunFrom(0)];
 
-/// Repeats the calls in another process with other addresses and other memory contents.
+/// Checks that another process, with other addresses and memory contents, has the same results.
 pub fn repeat(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let one = writer.write(0, WHOLE).reads;
@@ -22,7 +22,7 @@ pub fn repeat(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     checker.check("results.process", writer.sequence, criterion)
 }
 
-/// Repeats the calls with an instance of another name. Strings may contain the name.
+/// Checks that an instance with another name has the same results, except strings, which may contain the name.
 pub fn name(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let mut runs = ["instance", "an instance of another name"].map(|name| {
@@ -38,7 +38,7 @@ pub fn name(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     checker.check("results.name", writer.sequence, criterion)
 }
 
-/// Checks an instance next to a second one, which is called in turns with it.
+/// Checks that two instances that are called in turns have the results of a single instance.
 pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let alone = writer.write(0, WHOLE).reads;
@@ -70,7 +70,7 @@ pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<(
     checker.check("results.instances", writer.sequence, any(criteria))
 }
 
-/// Returns a message for the first variable that has one value read separately and another read with others.
+/// Returns the criterion that each variable has the same value read separately and read with others.
 fn unlike(
     checker: &Checker,
     singly: Vec<(usize, Vec<Read>)>,
@@ -87,7 +87,7 @@ fn unlike(
     })
 }
 
-/// Checks that reading changes nothing, regardless of the variables, their grouping and the number of reads.
+/// Checks that results do not depend on the variables that are read, their grouping and the number of reads.
 pub fn reading(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let silent = writer.write(0, &[Begin, Points(usize::MAX), ReadAll, Part::Free]).reads;
@@ -115,7 +115,7 @@ pub fn reading(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     first(checker, trajectory)
 }
 
-/// Checks each output when it is read first after a step, in a separate instance.
+/// Checks that each output has the same value if it is the first variable that is read.
 fn first(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let variables = &checker.description.variables;
     let outputs = checker.readable.iter().copied();
@@ -164,7 +164,7 @@ fn repeated(checker: &Checker, trajectory: &Trajectory, all: &[usize]) -> anyhow
     })
 }
 
-/// Checks instances in four threads.
+/// Checks that simulations on four threads have the results of a single simulation.
 pub fn threads(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let alone = writer.write(0, WHOLE).reads;
@@ -186,7 +186,7 @@ pub fn threads(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     checker.check("results.threads", writer.sequence, any(criteria))
 }
 
-/// Checks simulations to the same time with other step sizes and constant inputs.
+/// Checks that simulations to the same time with different step sizes and constant inputs have similar results.
 pub fn cut(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     if !checker.can(trajectory.interface, &["canHandleVariableCommunicationStepSize"])
         || trajectory.points.len() < 4
@@ -194,7 +194,7 @@ pub fn cut(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     {
         return Ok(());
     }
-    // Half a step must be as good as a whole one.
+    // With a fixed internal step size, half a step must still be a multiple of it.
     let offer = checker.description.co_simulation.as_ref();
     let fixed = offer.and_then(|offer| offer.number("fixedInternalStepSize"));
     let Point { time: start, size, .. } = trajectory.points[0];
@@ -220,7 +220,7 @@ pub fn cut(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     })
 }
 
-/// Judges the values of a variable after 8, 4, 16 and 24 steps to the same time.
+/// Returns a message if the values of a variable after 8, 4, 16 and 24 steps to the same time are not similar.
 fn unlike_in_steps(description: &Description, index: usize, values: &[Vec<f64>]) -> Option<String> {
     let variable = &description.variables[index];
     let name = &variable.name;
@@ -296,7 +296,7 @@ pub fn time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Checks lastSuccessfulTime of FMI 3.0; it may differ from the end of the step if the solver cannot reach it.
+/// Checks that `lastSuccessfulTime` is the end of each step that returns OK.
 pub fn last_successful(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.begin(0);

@@ -1,5 +1,5 @@
-//! Checks that a simulation from a restored state repeats the first one: in the same instance, from serialized
-//! bytes, and in a fresh process.
+//! Checks that a simulation from a restored state equals the first one: in the same instance, in a new instance and in a new
+//! process.
 
 use crate::call_sequence::{Step, Values};
 use crate::checker::Checker;
@@ -7,7 +7,7 @@ use crate::finding::{any, fails};
 use crate::writer::Part::{Begin, Call, Drop, Enter, Free, Leave, Make, Points, ReadAll, Restore, Run, Save};
 use crate::writer::Trajectory;
 
-/// The points at which states are saved: the first, one in the middle, one near the end.
+/// Returns the numbers of points before a state is saved: 0, 1, half of them and all but two, if they are less than all.
 fn indices(trajectory: &Trajectory) -> Vec<usize> {
     let count = trajectory.points.len();
     let mut indices = vec![0, 1, count / 2, count.saturating_sub(2)];
@@ -17,7 +17,7 @@ fn indices(trajectory: &Trajectory) -> Vec<usize> {
     indices
 }
 
-/// Checks that saving changes nothing, and that a simulation can be repeated from a restored state, twice.
+/// Checks that saving a state changes nothing, and that simulations after restoring it once and twice equal the first one.
 pub fn restore(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for index in indices(trajectory) {
         let mut writer = checker.writer(trajectory);
@@ -42,7 +42,7 @@ pub fn restore(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     free_null(checker, trajectory)
 }
 
-/// Checks states that are saved in one mode and restored in another.
+/// Checks states that are saved before and in Initialization Mode and restored after Terminate and while time advances.
 fn modes(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let first = writer.write(0, &[Make, Save(0), Enter, Save(1), Leave, Run(0), Call("Terminate")]).reads;
@@ -57,7 +57,7 @@ fn modes(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     checker.check("states.modes", writer.sequence, any(criteria))
 }
 
-/// Checks a handle that is used again for another state, and two saved states.
+/// Checks a handle that is used for a second state, and switching between two saved states.
 fn reused(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     if trajectory.points.len() < 3 {
         return Ok(());
@@ -78,7 +78,7 @@ fn reused(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     checker.check("states.several", writer.sequence, any(criteria))
 }
 
-/// Checks that freeing NULL is ignored and that freeing a state sets its handle to NULL.
+/// Checks that freeing NULL succeeds and that freeing a state sets its handle to NULL.
 fn free_null(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.write(0, &[Begin, Save(0)]);
@@ -93,7 +93,7 @@ fn free_null(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     })
 }
 
-/// Deserializes a state in the same instance, in a new one and in a fresh process.
+/// Checks that a simulation from a serialized state equals the first one, in a new instance and in a new process.
 pub fn serialized(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for (index, fresh) in indices(trajectory).into_iter().flat_map(|index| [(index, false), (index, true)]) {
         let mut writer = checker.writer(trajectory);
@@ -105,7 +105,7 @@ pub fn serialized(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<
         } else {
             writer.write(0, &[Drop(0), Free]);
         }
-        // States may be set in two situations that importers use: after instantiation and after initialization.
+        // Importers set states after instantiation or after initialization.
         writer.write(1, &[if index == 0 && fresh { Make } else { Begin }]);
         let read = writer.deserialize(1, 0, 1);
         let set = writer.write(1, &[Restore(1), ReadAll]);
@@ -124,7 +124,7 @@ pub fn serialized(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<
     again(checker, trajectory)
 }
 
-/// Checks that a deserialized state is serialized to the same bytes.
+/// Checks that a deserialized state is serialized to the same bytes again.
 fn again(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.write(0, &[Begin, Points(trajectory.points.len() / 2), Save(0)]);

@@ -1,4 +1,4 @@
-//! A sequence as a program in C.
+//! Writes a call sequence as a program in C.
 
 use super::evidence::{Evidence, Expected, Measure};
 use crate::call_sequence::{Arg, CallSequence, Kind, Make, NULL_INSTANCE, Numbered, Setting, Step};
@@ -25,7 +25,7 @@ pub fn program(
         states: BTreeSet::new(),
         bytes: BTreeSet::new(),
     };
-    // The parts of the sequence, a process for each.
+    // Each part of the sequence is executed in a separate process.
     let parts = sequence.split(|numbered| numbered.step == Step::FreshProcess).enumerate();
     let parts: Vec<String> = parts
         .map(|(number, part)| {
@@ -39,7 +39,7 @@ pub fn program(
     let declared = each(instances, &|index| format!("static void *c{index};\n"))
         + &each(states, &|slot| format!("static void *s{slot};\n"))
         + &each(bytes, &|slot| format!("static size_t *n{slot};\nstatic char *b{slot};\n"));
-    // Serialized bytes are passed on to the next process in files.
+    // Files pass the serialized states to the next process.
     let load = each(bytes, &|slot| {
         format!("    b{slot} = guarded(NULL, 1 << 24);\n    n{slot} = passed_on({slot}, b{slot});\n")
     });
@@ -47,7 +47,7 @@ pub fn program(
     let list: Vec<String> = (0..parts.len()).map(|number| format!("phase{number}")).collect();
     format!(
         "/*\n{} * cc repro.c -o repro -ldl -lpthread && ./repro DIRECTORY_OF_THE_UNPACKED_FMU\n *\n \
-         * Exit status: 1 if the finding shows, 0 if it does not, 3 if that is not known.\n */\n\
+         * Exit status: 1 if the finding is reproduced, 0 if it is not, 3 if that is not known.\n */\n\
          #define FMI {}\n{}{declared}\n{threads}{}static void (*const phases[])(void) = {{{}}};\n\
          static const char library_name[] = \"{}\";\n\nstatic void load(void) {{\n{load}}}\n\n\
          static void save(void) {{\n{save}}}\n\n{}{}",
@@ -62,7 +62,7 @@ pub fn program(
     )
 }
 
-/// The lines of the comment at the top of a program.
+/// Returns the lines of the comment at the top of a program.
 fn head(finding: &Finding, description: &Description) -> String {
     let section = if finding.section.is_empty() { "not in the standard" } else { &finding.section };
     let lines = [
@@ -76,7 +76,7 @@ fn head(finding: &Finding, description: &Description) -> String {
     lines.iter().map(|line| format!(" * {}\n", plain(line))).collect()
 }
 
-/// The library below the directory of the unpacked FMU.
+/// Returns the path of the library in the directory of the unpacked FMU.
 fn library(setting: &Setting, sequence: &CallSequence) -> String {
     let model_exchange =
         sequence.iter().any(|numbered| matches!(&numbered.step, Step::Make(_, make) if !make.co_simulation));
@@ -86,7 +86,7 @@ fn library(setting: &Setting, sequence: &CallSequence) -> String {
     path.strip_prefix(directory).unwrap_or(&path).to_string_lossy().replace('\\', "/")
 }
 
-/// Returns the C function that compares the results of the calls with the results of the finding.
+/// Returns the C function that decides whether the results of the calls reproduce the finding.
 fn shows(evidence: &Evidence) -> String {
     let results = match evidence {
         Evidence::None | Evidence::End | Evidence::Orphans => None,
@@ -121,7 +121,7 @@ fn shows(evidence: &Evidence) -> String {
     format!("#define EVIDENCE {kind}\n\nstatic bool shows(void) {{\n    return {results};\n}}\n\n")
 }
 
-/// Writes the calls, and notes the names that they need.
+/// Writes calls, and collects the functions and variables that they need.
 struct Writer<'a> {
     fmi3: bool,
     evidence: &'a Evidence,
@@ -144,7 +144,7 @@ impl Writer<'_> {
         lines.lines().fold(String::new(), |text, line| text + indent + line + "\n")
     }
 
-    /// Parts of the results of a call that matter.
+    /// Returns whether the values and the messages of a call are compared; `None` if the call is not compared.
     fn matters(&self, id: u32) -> Option<[bool; 2]> {
         match self.evidence {
             Evidence::Same(expected) => {
@@ -238,7 +238,7 @@ impl Writer<'_> {
         )
     }
 
-    /// The value that is passed for an argument, with the lines that it needs.
+    /// Returns the C expression for an argument, and adds the lines that it needs to `parts`.
     fn argument(&mut self, parts: &mut Parts, arg: &Arg, name: &str) -> String {
         let number = self.number();
         let string = |text: &Vec<u8>, end: usize| format!("guarded({}, {})", literal(text), text.len() + end);
@@ -289,9 +289,9 @@ impl Writer<'_> {
 struct Parts {
     before: Vec<String>,
     after: Vec<String>,
-    /// Lines that keep the results.
+    /// Lines that write the results to a file.
     results: Vec<String>,
-    /// Lines that look for damage.
+    /// Lines that detect writes outside of the arrays for results.
     checks: Vec<String>,
 }
 
@@ -318,7 +318,7 @@ impl Parts {
             _ => 'u',
         };
         if name == "fmi2NewDiscreteStates" {
-            // fmi2EventInfo has five flags, then the time.
+            // fmi2EventInfo has five flags, padding and the time.
             let time = format!("show((char *)a{number} + 24, 1, 'f', 8);");
             self.after.push(format!("print(\" ->\"); show(a{number}, 5, 'i', 4); {time}"));
         } else if name != "fmi3GetBinary" {
@@ -335,7 +335,7 @@ impl Parts {
     }
 }
 
-/// Returns the names of the variables whose value references are the first argument.
+/// Returns the names of at most eight variables whose value references are the first argument.
 fn comment(args: &[Arg], description: &Description) -> Option<String> {
     let Some(Arg::In(Kind::U32, references)) = args.first() else { return None };
     let names: Vec<&str> = references
@@ -375,7 +375,7 @@ fn number_of(kind: Kind, bits: u64) -> String {
     }
 }
 
-/// A string in C; long ones are cut off.
+/// Returns a C string literal of at most 4000 bytes.
 fn literal(bytes: &[u8]) -> String {
     let text = bytes.iter().take(4000).fold(String::new(), |mut text, byte| {
         let _ = match byte {

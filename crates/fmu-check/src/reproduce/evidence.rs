@@ -1,36 +1,35 @@
-//! The results that show a finding, found by leaving out those that the judge does not need. A program that reproduces a
-//! finding compares them.
+//! Results that are compared by the program that reproduces a finding: those without which the criterion is fulfilled.
 
 use crate::call_sequence::{Arg, CallSequence, End, Numbered, Outcome, Run, Step, Values, step_of};
 use crate::finding::{Finding, SharedCriterion, step_name};
 use std::fmt::Write as _;
 
-/// Comparison by which a program decides whether a finding shows.
+/// Comparison by which a program decides whether it reproduces the finding.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Evidence {
-    /// No comparison is known.
+    /// No known comparison.
     #[default]
     None,
-    /// A process does not end as it should, or the library cannot be loaded.
+    /// Crash, hang, exit or too many processes, or a library that cannot be loaded.
     End,
-    /// Processes are left at the end.
+    /// Processes that are alive after the end of the call sequence.
     Orphans,
-    /// Something was printed.
+    /// Output on the standard output or the standard error.
     Printed,
-    /// Something was written before an array or to one that is for reading.
+    /// Writes outside of the arrays for results.
     Damage,
-    /// The results of any of these pairs of calls differ.
+    /// Pairs of calls, at least one of which has different results.
     Differ(Vec<[u32; 2]>),
-    /// The results of these calls are those that were observed.
+    /// Calls that all have the expected results.
     Same(Vec<Expected>),
-    /// Bytes, threads or files between two measurements grow by more than a number, or settings change.
+    /// Quantity that grows by more than a number between the measurements of two steps; settings only differ.
     Grown(Measure, u32, u32, u64),
 }
 
-/// Maximum number of repetitions in a program, which should end in seconds.
+/// Maximum number of repetitions in a program.
 const REPETITIONS: usize = 500;
 
-/// The quantity of a measurement.
+/// Quantity of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Measure {
     Memory,
@@ -39,17 +38,17 @@ pub enum Measure {
     Settings,
 }
 
-/// A call whose results matter.
+/// Expected results of a call.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expected {
     pub id: u32,
-    /// Whether the values that it wrote matter, and its messages.
+    /// Whether the values that the call wrote are compared, and whether its messages are.
     pub matters: [bool; 2],
-    /// The results that were observed.
+    /// Results of the run, in the format of the programs.
     pub observed: String,
 }
 
-/// Finds the results that show a finding in a run of its call sequence.
+/// Returns the comparison for a finding, from a run of its call sequence.
 pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     let Some(criterion) = &finding.criterion else { return Evidence::None };
     if run.end != End::Done || finding.name == "package.symbols" {
@@ -92,8 +91,8 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     }
 }
 
-/// Returns each read of a thread with the corresponding read of the simulation before the threads. Which of them differ
-/// depends on chance.
+/// Returns each read on a thread with the corresponding read of the simulation before the threads. The pairs that differ are
+/// not the same in every run.
 fn pairs(sequence: &CallSequence) -> Vec<[u32; 2]> {
     let queries = |sequence: &[Numbered]| -> Vec<u32> {
         let query = |numbered: &&Numbered| matches!(&numbered.step, Step::Call { function, .. } if function[4..].starts_with("Get"));
@@ -111,7 +110,7 @@ fn pairs(sequence: &CallSequence) -> Vec<[u32; 2]> {
         .collect()
 }
 
-/// The run with as few outcomes as the judge needs.
+/// Returns the run without the outcomes that the criterion does not need.
 fn needed(criterion: &SharedCriterion, run: &Run) -> Run {
     let mut needed = run.clone();
     let mut ids: Vec<u32> = run.outcomes.keys().copied().collect();
@@ -130,7 +129,7 @@ fn needed(criterion: &SharedCriterion, run: &Run) -> Run {
     needed
 }
 
-/// The parts of an outcome without which there is no finding.
+/// Returns the parts of an outcome that the criterion needs.
 fn expected_result(criterion: &SharedCriterion, run: &Run, id: u32) -> Expected {
     let without = |change: &dyn Fn(&mut Outcome)| {
         let mut changed = run.clone();
@@ -157,7 +156,7 @@ fn hex(bytes: &[u8]) -> String {
     })
 }
 
-/// The results as the programs write them.
+/// Formats the results as the programs do.
 fn shown(outcome: &Outcome, [written, log]: [bool; 2]) -> String {
     let mut text = String::new();
     let or_null = |bytes: &Option<Vec<u8>>| bytes.as_ref().map_or("-".to_owned(), |bytes| hex(bytes));
@@ -198,7 +197,7 @@ fn function(sequence: &[Numbered], id: u32) -> Option<String> {
     })
 }
 
-/// A growth between two measurements.
+/// Returns the comparison of two measurements.
 fn grown(finding: &Finding, needed: &Run) -> Evidence {
     let mut ids: Vec<(u32, bool)> = needed
         .outcomes
@@ -223,7 +222,7 @@ fn grown(finding: &Finding, needed: &Run) -> Evidence {
     }
 }
 
-/// The sequence with as many repetitions as were made.
+/// Returns the sequence with the numbers of repetitions of a run, at most `REPETITIONS`.
 pub fn as_repeated(sequence: &CallSequence, run: &Run) -> CallSequence {
     let mut sequence = sequence.clone();
     for numbered in &mut sequence {

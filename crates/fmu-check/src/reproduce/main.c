@@ -95,6 +95,6 @@ int main(int count, char **arguments) {
     found = orphans();
     if (EVIDENCE != ORPHANS) found = EVIDENCE == RESULTS && shows();
     clear();
-    printf("%s\n", found ? "The finding shows." : "The finding does not show.");
+    printf("%s\n", found ? "The finding is reproduced." : "The finding is not reproduced.");
     return EVIDENCE == NONE ? 3 : found;
 }
