@@ -411,7 +411,7 @@ impl Checker {
         let ends = ["crash", "hang", "exit"].iter().any(|end| finding.name.ends_with(end));
         let pinned = PINNED.iter().find(|(topic, _)| *topic == finding.topic() && !ends && !alone);
         let pinned = pinned.map_or(&[][..], |(_, calls)| calls);
-        // The observation of a shorter sequence may have other numbers, but no other words.
+        // The observation of a shorter sequence may differ only in its numbers.
         let (same, mut observed) = (outline(&finding.observed), finding.observed.clone());
         let mut reproduces = |tried: &CallSequence| {
             let run = self.workers.execute(&setting, tried, limit).ok();

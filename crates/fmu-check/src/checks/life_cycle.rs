@@ -254,7 +254,6 @@ pub fn events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
         let next = event.next.filter(|next| !event.again && *next <= late)?;
         Some(format!("after events were passed by, at {late:?} the next event is at {next:?}"))
     })?;
-    // An event iteration that does not end.
     let mut writer = checker.writer(trajectory);
     writer.write(0, &[Make, Enter, Call("ExitInitializationMode")]);
     let ids = writer.update(0, 100);
