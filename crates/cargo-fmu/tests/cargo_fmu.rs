@@ -135,7 +135,7 @@ fn ball() {
     // The second FMU is checked although the first one has findings.
     let fmus = ["--fmu", "target/fmu/my_ball.fmu", "--fmu", "target/fmu/fmi3/my_ball.fmu"];
     let output = directory
-        .fmu("my-ball", &[&["check", "--only", "refusals", "--fail-on", "note"], &fmus[..]].concat());
+        .fmu("my-ball", &[&["check", "--only", "rejections", "--fail-on", "note"], &fmus[..]].concat());
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(!output.status.success() && text.contains("(FMI 2.0,") && text.contains("(FMI 3.0,"), "{text}");
 }

@@ -3,20 +3,20 @@
 
 use crate::call_sequence::{CallSequence, Message, Numbered, Run, Step, Values, all_steps};
 use crate::description::Description;
-use crate::finding::{Finding, Judge, Judges, status_name, step_name};
+use crate::finding::{Criterion, Finding, SharedCriterion, status_name, step_name};
 use crate::rules;
 use fmi_abi::Standard;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-/// A rule, and the judge that describes how a run breaks it.
-type Broken = (&'static str, Judge);
+/// Name of a rule, and the criterion that describes the violation in a run.
+type Broken = (&'static str, SharedCriterion);
 
-fn rule(name: &'static str, judge: impl Judges) -> Broken {
-    (name, Arc::new(judge))
+fn rule(name: &'static str, criterion: impl Criterion) -> Broken {
+    (name, Arc::new(criterion))
 }
 
-/// Returns the findings in a run that neither crashed nor hung.
+/// Returns the findings in a run that ended after its last step.
 pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -> Vec<Finding> {
     let all = all_steps(sequence);
     let mut broken: Vec<Broken> = processes(&all, run).into_iter().collect();
@@ -28,31 +28,31 @@ pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -
         }
     }
     let mut names = HashSet::new();
-    let found = broken.into_iter().filter_map(|(name, judge)| {
-        let observed = judge(run)?;
+    let found = broken.into_iter().filter_map(|(name, criterion)| {
+        let observed = criterion(run)?;
         let finding = rules::broken(description.standard, name, observed);
-        Some(finding.shown_by(sequence.clone(), judge))
+        Some(finding.shown_by(sequence.clone(), criterion))
     });
     found.filter(|finding| names.insert(finding.name.clone()) || finding.topic() == "arrays").collect()
 }
 
-/// Processes that were left by a sequence that has freed all instances.
+/// Returns the rule that no process remains after all instances were freed; `None` if there is no orphaned process.
 fn processes(all: &[&Numbered], run: &Run) -> Option<Broken> {
-    if run.left.is_empty() {
+    if run.orphans.is_empty() {
         return None;
     }
     let pairs = lives(all)?;
     Some(rule("resources.processes", move |run| {
-        let (count, first) = (run.left.len(), run.left.first()?);
+        let (count, first) = (run.orphans.len(), run.orphans.first()?);
         let freed = |(make, free): &(u32, u32)| run.outcome(*make).is_none() || run.outcome(*free).is_some();
         let processes = if count == 1 { "process is" } else { "processes are" };
         pairs.iter().all(freed).then(|| {
-            format!("{count} {processes} left after all instances were freed; the first is called {first:?}")
+            format!("{count} {processes} alive after all instances were freed; the first is called {first:?}")
         })
     }))
 }
 
-/// The instantiations of a sequence, each with the call that frees the instance; none if an instance is not freed.
+/// Returns the number of each instantiation and of the call that frees its instance; `None` if an instance is not freed.
 fn lives(all: &[&Numbered]) -> Option<Vec<(u32, u32)>> {
     let mut alive = HashMap::new();
     let mut pairs = Vec::new();
@@ -66,7 +66,7 @@ fn lives(all: &[&Numbered]) -> Option<Vec<(u32, u32)>> {
     alive.is_empty().then_some(pairs)
 }
 
-/// Values that a call wrote, and its status.
+/// Returns the rules for the arrays, the status and the strings of a call.
 fn call(numbered: &Numbered) -> Vec<Broken> {
     let (id, name) = (numbered.id, step_name(&numbered.step));
     let arrays = [("arrays.const", true), ("arrays.written-beyond", false)].map(|(of, constant)| {
@@ -98,11 +98,13 @@ fn show(text: &[u8]) -> String {
     format!("{:?}", String::from_utf8_lossy(text))
 }
 
+/// Conversions of printf that a message of FMI 3.0 does not contain.
 const CONVERSIONS: [&str; 14] =
     ["%s", "%d", "%i", "%u", "%g", "%f", "%e", "%x", "%lf", "%ld", "%lu", "%zu", "%.", "%p"];
 
-/// The rules for messages, with an error in a message of an FMU that has these categories.
+/// Tests a message of an FMU with these log categories; returns a description of the error.
 type MessageTest = fn(&Message, &[String], Standard) -> Option<String>;
+/// Rules for messages.
 const MESSAGE_TESTS: [(&str, MessageTest); 4] = [
     ("logs.category", |message, categories, _| {
         let Some(category) = &message.category else {
@@ -124,7 +126,7 @@ const MESSAGE_TESTS: [(&str, MessageTest); 4] = [
     ("logs.status", |message, _, _| {
         (!(0..=5).contains(&message.status)).then(|| format!("its status is {}", message.status))
     }),
-    // In FMI 2.0 a message is a format of printf, and its arguments follow.
+    // In FMI 2.0, a message is a format of printf, so conversions are allowed.
     ("logs.format", |message, _, standard| {
         let text = message.text.as_deref().filter(|_| standard == Standard::Fmi3)?;
         let text = String::from_utf8_lossy(text);
@@ -145,7 +147,7 @@ fn messages(description: &Description, id: u32) -> impl Iterator<Item = Broken> 
     })
 }
 
-/// The rule against calls that fail without a message while logging is on.
+/// Returns the rule that a failed call logs a message; `None` if logging is switched off in the sequence.
 fn silence(sequence: &CallSequence, numbered: &Numbered) -> Option<Broken> {
     let off = sequence.iter().any(|numbered| {
         matches!(&numbered.step, Step::Make(_, make) if !make.logging)

@@ -1,10 +1,10 @@
-//! Accepted findings of a project, with the reason of each, in a text file.
+//! Text file with the accepted findings of a project and the reason for each.
 
 use crate::finding::Finding;
 use anyhow::Context as _;
 use std::path::Path;
 
-/// An accepted rule, or the observations of a rule that contain a string.
+/// Line of a baseline: accepts a rule, or the observations of the rule that contain `text`.
 struct Accepted {
     name: String,
     text: Option<String>,
@@ -12,7 +12,7 @@ struct Accepted {
 }
 
 impl Accepted {
-    /// Whether it accepts an observation of a finding.
+    /// Returns whether this line accepts an observation of a finding.
     fn fits(&self, finding: &Finding, observed: &str) -> bool {
         self.name == finding.name && self.text.as_ref().is_none_or(|text| observed.contains(text.as_str()))
     }
@@ -24,10 +24,10 @@ pub struct Baseline {
 }
 
 impl Baseline {
-    /// Reads a file of lines such as `logs.silent: known since 2024` or `refusals.tolerated "J2": intended`.
+    /// Reads a file of lines such as `logs.silent: known since 2024` or `rejections.tolerated "J2": intended`.
     ///
     /// # Errors
-    /// When it cannot be read, or a line has no name or no reason.
+    /// Fails if the file cannot be read, or if a line has an unknown name or no reason.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         let text =
             std::fs::read_to_string(path).with_context(|| format!("{}: cannot be read", path.display()))?;
@@ -39,7 +39,7 @@ impl Baseline {
         })
     }
 
-    /// The number of the first line that is wrong, if there is one.
+    /// Parses the lines of a baseline; the error is the number of the first invalid line.
     fn parse(text: &str) -> Result<Self, usize> {
         let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
         let accepted =
@@ -67,7 +67,7 @@ impl Baseline {
         Ok(Self { accepted: accepted.collect::<Result<_, _>>()? })
     }
 
-    /// The reason for which all observations of a finding are accepted.
+    /// Returns the reasons if all observations of a finding are accepted.
     pub fn reason(&self, finding: &Finding) -> Option<String> {
         let mut reasons: Vec<&str> = Vec::new();
         for observed in std::iter::once(&finding.observed).chain(&finding.more) {
@@ -79,7 +79,7 @@ impl Baseline {
         Some(reasons.join("; "))
     }
 
-    /// The reason for which an interface or a topic need not be checked.
+    /// Returns the reason for which an interface or a topic need not be checked.
     pub fn unchecked_reason(&self, name: &str) -> Option<&str> {
         self.accepted.iter().find(|accepted| accepted.name == name).map(|accepted| accepted.reason.as_str())
     }
@@ -109,16 +109,19 @@ mod tests {
     #[test]
     fn a_reason_is_needed_for_each_observation() {
         let text =
-            "# known\nlogs.silent: since 2024\n\nrefusals.tolerated \"J2\": intended: see the manual\n";
+            "# known\nlogs.silent: since 2024\n\nrejections.tolerated \"J2\": intended: see the manual\n";
         let baseline = Baseline::parse(text).unwrap_or_default();
         let finding = |name: &str, observed: &[&str]| {
             let more = observed[1..].iter().map(|observed| (*observed).to_owned()).collect();
             Finding { name: name.to_owned(), observed: observed[0].to_owned(), more, ..Finding::default() }
         };
         assert_eq!(baseline.reason(&finding("logs.silent", &["a", "b"])), Some("since 2024".to_owned()));
-        let accepted = finding("refusals.tolerated", &["a value for J2"]);
+        let accepted = finding("rejections.tolerated", &["a value for J2"]);
         assert_eq!(baseline.reason(&accepted), Some("intended: see the manual".to_owned()));
-        assert_eq!(baseline.reason(&finding("refusals.tolerated", &["a value for J2", "one for J3"])), None);
+        assert_eq!(
+            baseline.reason(&finding("rejections.tolerated", &["a value for J2", "one for J3"])),
+            None
+        );
         assert_eq!(baseline.reason(&finding("states.restore", &["x"])), None);
         assert_eq!(baseline.unused(&[accepted], &[]), ["logs.silent"]);
     }

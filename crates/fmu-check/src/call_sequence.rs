@@ -1,27 +1,27 @@
-//! Call sequences and their results as data. A worker plays them, a shrinker shortens them, a printer writes them
-//! as programs.
+//! Call sequences and their results. `worker` executes call sequences, `shrink` shortens them, and `reproduce` writes them as
+//! programs in C.
 
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
 macro_rules! kinds {
     ($($kind:ident $of:ty, $c:literal;)+) => {
-        /// The kinds of numbers in arrays; `Pointer` points to strings or to bytes.
+        /// Type of the elements of an array; `Pointer` points to a string or to bytes.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
         pub enum Kind { $($kind),+ }
 
         impl Kind {
-            /// The bytes of one.
+            /// Returns the size of an element in bytes.
             pub const fn size(self) -> usize {
                 match self { $(Self::$kind => size_of::<$of>()),+ }
             }
 
-            /// The type in C.
+            /// Returns the name of the type in C.
             pub const fn c_name(self) -> &'static str {
                 match self { $(Self::$kind => $c),+ }
             }
 
-            /// The number behind bits.
+            /// Converts bits to the number.
             #[allow(unreachable_patterns, reason = "floating-point numbers come first")]
             pub fn number(self, bits: u64) -> f64 {
                 match self {
@@ -31,7 +31,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// The bits of a number.
+            /// Converts a number to its bits.
             #[allow(unreachable_patterns, reason = "floating-point numbers come first")]
             pub fn bits(self, number: f64) -> u64 {
                 match self {
@@ -60,40 +60,40 @@ kinds! {
 }
 
 impl Kind {
-    /// Whether it is a floating-point number.
+    /// Returns whether the type is floating-point.
     pub const fn is_float(self) -> bool {
         matches!(self, Self::F64 | Self::F32)
     }
 }
 
-/// One argument of a call.
+/// Argument of a call.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Arg {
-    /// A floating-point number, as its bits.
+    /// Bits of a floating-point number.
     Real(u64),
     /// An integer, a size or a Boolean.
     Whole(i64),
     /// NULL.
     Null,
-    /// An array of numbers, as their bits.
+    /// Array of numbers for the FMU to read, as their bits.
     In(Kind, Vec<u64>),
-    /// An array of strings; `None` is NULL.
+    /// Array of strings; `None` is NULL.
     Texts(Vec<Option<Vec<u8>>>),
-    /// An array of pointers to bytes.
+    /// Array of pointers to bytes.
     Blobs(Vec<Vec<u8>>),
-    /// Room for so many numbers.
+    /// Array for this many results.
     Out(Kind, usize),
-    /// A saved state, by the number of its index.
+    /// Handle of the saved state at this index.
     State(usize),
-    /// The index of a saved state.
+    /// Pointer to the handle of the saved state at this index, which the call sets.
     StateOut(usize),
-    /// Serialized bytes, by the number of their index.
+    /// Serialized state at this index, as bytes.
     Saved(usize),
-    /// The number of these bytes.
+    /// Number of bytes of the serialized state at this index.
     SavedSize(usize),
-    /// Receives the size of these bytes.
+    /// Pointer that receives the size of the serialized state at this index.
     SizeOut(usize),
-    /// Receives these bytes, up to the size.
+    /// Array that receives the serialized state at this index.
     SavedOut(usize),
 }
 
@@ -109,23 +109,23 @@ pub struct Make {
     /// Whether the interface type is Co-Simulation.
     pub co_simulation: bool,
     pub name: String,
-    /// The guid or instantiationToken.
+    /// `guid` of FMI 2.0 or `instantiationToken` of FMI 3.0.
     pub token: String,
-    /// Whether it logs.
+    /// Value of `loggingOn`.
     pub logging: bool,
-    /// Whether the importer handles events (FMI 3.0).
+    /// Value of `eventModeUsed` (FMI 3.0).
     pub event_mode: bool,
-    /// Whether steps may return early (FMI 3.0).
+    /// Value of `earlyReturnAllowed` (FMI 3.0).
     pub early_return: bool,
 }
 
-/// The index of an instance that is NULL: freeing it is allowed.
+/// Index that represents a NULL instance, which may be freed.
 pub const NULL_INSTANCE: usize = 999;
 
-/// A step of a sequence.
+/// Step of a call sequence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Step {
-    /// A new instance at this index.
+    /// Makes an instance with this index.
     Make(usize, Make),
     Free(usize),
     /// Calls a function of an instance, or of NULL, with the arguments after the instance.
@@ -134,31 +134,31 @@ pub enum Step {
         function: String,
         args: Vec<Arg>,
     },
-    /// Calls that need no instance: the version and the platform.
+    /// Calls a function without an instance, which returns a string: the version or the platform.
     Version(String),
     /// Repeats steps this many times, or until the time limit.
     Repeat(usize, Vec<Numbered>),
     /// Runs call sequences at the same time, each in a separate thread.
     Parallel(Vec<Vec<Numbered>>),
-    /// Measures memory, threads and settings of the process.
+    /// Measures memory, threads, open files and settings of the process.
     Measure,
-    /// Continues in a new process, which receives only serialized bytes.
+    /// Continues in a new process, which receives only the serialized states.
     FreshProcess,
     Unload,
-    /// Exits the process, which runs the destructors of its libraries. Must be the last step.
+    /// Exits the process, which runs the destructors of its libraries. This is the last step of a sequence.
     Quit,
 }
 
-/// A step with a number that it keeps when others are left out.
+/// Step with a number that does not change when other steps are removed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Numbered {
     pub id: u32,
-    /// Whether the standard forbids the call. Such calls are not considered in the check of the following ones.
+    /// Whether the standard forbids the call. The state machine of `legal` ignores forbidden calls.
     pub forbidden: bool,
     pub step: Step,
 }
 
-/// A sequence of calls.
+/// Steps in the order of their execution.
 pub type CallSequence = Vec<Numbered>;
 
 /// Returns all steps of a sequence, including those of its repetitions and threads.
@@ -179,32 +179,32 @@ pub fn step_of(sequence: &[Numbered], id: u32) -> Option<&Numbered> {
     all_steps(sequence).into_iter().find(|numbered| numbered.id == id)
 }
 
-/// A message of the FMU.
+/// Message that the FMU logged.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Message {
     pub status: i32,
-    /// Its category, as bytes; `None` is NULL.
+    /// Bytes of the category; `None` is NULL.
     pub category: Option<Vec<u8>>,
-    /// The message, as bytes; `None` is NULL.
+    /// Bytes of the message; `None` is NULL.
     pub text: Option<Vec<u8>>,
 }
 
 /// Values of a variable or an array.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Values {
-    /// Numbers, as their bits.
+    /// Bits of numbers.
     Numbers(Kind, Vec<u64>),
-    /// Texts or bytes; `None` is NULL.
+    /// Strings or binary values; `None` is NULL.
     Texts(Vec<Option<Vec<u8>>>),
 }
 
 impl Values {
-    /// Numbers of a kind.
+    /// Returns numbers of a type.
     pub fn new(kind: Kind, numbers: impl IntoIterator<Item = f64>) -> Self {
         Self::Numbers(kind, numbers.into_iter().map(|number| kind.bits(number)).collect())
     }
 
-    /// A string or bytes for each element.
+    /// Returns `size` copies of a string or binary value.
     pub fn texts(text: &[u8], size: usize) -> Self {
         Self::Texts(vec![Some(text.to_owned()); size])
     }
@@ -216,7 +216,7 @@ impl Values {
         }
     }
 
-    /// This many values, starting at an index.
+    /// Returns `size` values from the index `begin`; `None` if there are fewer.
     pub fn part(&self, begin: usize, size: usize) -> Option<Self> {
         Some(match self {
             Self::Numbers(kind, bits) => Self::Numbers(*kind, bits.get(begin..begin + size)?.to_vec()),
@@ -224,7 +224,7 @@ impl Values {
         })
     }
 
-    /// The value at an index, formatted for people.
+    /// Formats the value at an index for messages.
     pub fn show(&self, index: usize) -> String {
         match self {
             Self::Numbers(kind, bits) => match bits.get(index).map(|bits| kind.number(*bits)) {
@@ -239,7 +239,7 @@ impl Values {
         }
     }
 
-    /// The first index at which two differ.
+    /// Returns the first index at which the values differ.
     pub fn differ(&self, other: &Self) -> Option<usize> {
         match (self, other) {
             (Self::Numbers(kind, one), Self::Numbers(_, two)) => {
@@ -256,71 +256,71 @@ impl Values {
     }
 }
 
-/// The result of one step.
+/// Result of a step.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     pub id: u32,
-    /// Status of the function; for an instantiation, 1 for an instance and 0 for NULL.
+    /// Status that the function returned; for an instantiation, 1 for an instance and 0 for NULL.
     pub status: Option<i32>,
-    /// The library has no such function.
+    /// Whether the library lacks the function.
     pub missing: bool,
-    /// Values that were written to the arrays, in the order of the arguments.
+    /// Contents of the arrays for results, in the order of the arguments.
     pub written: Vec<Values>,
-    /// Messages of the FMU during the step.
+    /// Messages that the FMU logged during the step.
     pub log: Vec<Message>,
-    /// Writes outside of the arrays.
+    /// Descriptions of writes outside of the arrays for results.
     pub damage: Vec<String>,
-    /// The string that a version function returned.
+    /// String that the function for the version or the platform returned.
     pub text: Option<Vec<u8>>,
-    /// Result of a measurement or of repetitions.
+    /// Measurement, or the number of repetitions.
     pub measured: Option<Measured>,
 }
 
-/// Memory, threads and settings of the process.
+/// Memory, threads, open files and settings of the process.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
-    /// Bytes in use as counted by the C library; if it does not count them, memory of the whole process.
+    /// Allocated bytes if `exact`, otherwise the resident memory of the process.
     pub memory: u64,
-    /// Whether the C library counted them.
+    /// Whether the C library counts allocated bytes.
     pub exact: bool,
     pub threads: usize,
     pub files: usize,
-    /// Settings of the process: rounding, locale, working directory, signal handlers.
+    /// Working directory, floating-point control word, locale and signal handlers.
     pub settings: Vec<String>,
     /// Number of repetitions.
     pub times: usize,
 }
 
-/// How a sequence ended.
+/// End of the process that executed a call sequence.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum End {
-    /// Ended after its last step.
+    /// The last step returned.
     #[default]
     Done,
     /// The process crashed, for this reason.
     Crash(String),
-    /// The process did not end in time.
+    /// The process exceeded the limit, which is given in seconds.
     Hang(f64),
-    /// The library called `exit`.
+    /// The process exited before the last step, with this status.
     Exit(i32),
     /// The library cannot be loaded, for this reason.
     Unloadable(String),
-    /// The FMU started too many processes, which were ended.
+    /// The FMU started this many processes, more than the limit, and all were ended.
     Flood(usize),
 }
 
-/// The result of a call sequence.
+/// Result of a call sequence.
 #[derive(Clone, Debug, Default)]
 pub struct Run {
     /// Results by the number of the step.
     pub outcomes: HashMap<u32, Outcome>,
     pub end: End,
-    /// The step in which it ended, if not with the last.
+    /// Number of the step in which the process ended, if that is not the last step.
     pub at: Option<u32>,
     /// Output on the standard output and the standard error.
     pub output: String,
-    /// Names of the processes that were left at its end.
-    pub left: Vec<String>,
+    /// Names of the child processes that were alive after the end of the call sequence.
+    pub orphans: Vec<String>,
 }
 
 impl Run {
@@ -332,31 +332,31 @@ impl Run {
         self.outcome(id)?.status
     }
 
-    /// Whether a step returned OK or a warning.
+    /// Returns whether a step returned OK or Warning.
     pub fn succeeds(&self, id: u32) -> bool {
         self.status(id).is_some_and(|status| status <= 1)
     }
 
-    /// The first array that a step wrote.
+    /// Returns the contents of the first array for results of a step.
     pub fn written(&self, id: u32) -> Option<&Values> {
         self.outcome(id)?.written.first()
     }
 }
 
-/// The setting that all call sequences of an FMU share.
+/// Parameters that all call sequences of an FMU share.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Setting {
-    /// FMI 3.0, not 2.0.
+    /// Whether the FMI version is 3.0, not 2.0.
     pub fmi3: bool,
-    /// The library of Co-Simulation and of Model Exchange.
+    /// Paths of the libraries for Co-Simulation and for Model Exchange.
     pub libraries: [Option<std::path::PathBuf>; 2],
     pub resources: std::path::PathBuf,
-    /// Bytes of memory at most.
+    /// Maximum address space of a process in bytes.
     pub memory: u64,
-    /// Memory after each array is accessible, to detect writes there.
+    /// Whether memory after each array is accessible, to detect writes instead of crashing.
     pub soft: bool,
-    /// All symbols are looked up when the library is loaded, as some importers do.
+    /// Whether the loader resolves all symbols when it loads the library, as in some importers.
     pub now: bool,
-    /// Seconds of repetitions at most.
+    /// Maximum duration of the repetitions of a step in seconds.
     pub repetitions: f64,
 }

@@ -1,9 +1,9 @@
-//! Runs the call sequences of all checks, judges the results and keeps the findings.
+//! Executes the call sequences of all checks, evaluates the results and records the findings.
 
 use crate::always;
 use crate::call_sequence::{CallSequence, End, Numbered, Run, Setting, Step, step_of};
 use crate::description::Description;
-use crate::finding::{Event, Finding, Judge, Judges, Severity, ending, event, step_name};
+use crate::finding::{Criterion, Event, Finding, Severity, SharedCriterion, ending, event, step_name};
 use crate::legal::first_illegal;
 use crate::rules;
 use crate::run::{Stop, Workers};
@@ -14,22 +14,22 @@ use std::collections::HashSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::{Duration, Instant};
 
-/// An interface or a topic that was not checked.
+/// Interface or topic that was not checked.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Unchecked {
-    /// Its name.
+    /// Name of the interface or topic.
     pub name: String,
-    /// The reason.
+    /// Reason for which it was not checked.
     pub why: String,
-    /// Whether the user has allowed it by name.
+    /// Whether an option or the baseline allows it.
     pub allowed: bool,
 }
 
-/// Seconds of a quick check; call sequences that are played then may take a little longer.
+/// Duration of a quick check in seconds, after which no call sequence is started.
 const QUICK: f64 = 24.0;
 
-/// Calls that stay in the shortest sequence of a topic: a comparison needs them on both sides, else there are other
-/// differences.
+/// Functions for each topic whose calls are never removed from a call sequence. If one of two compared simulations lacked such
+/// a call, the results would differ for that reason.
 const PINNED: &[(&str, &[&str])] = &[
     ("states", STATES),
     ("reset", STATES),
@@ -44,13 +44,13 @@ const STATES: &[&str] = &[
 ];
 const STEPS: &[&str] = &["SetTime", "DoStep", "CompletedIntegratorStep"];
 
-/// Findings that compare no calls.
+/// Findings whose criterion compares no calls, so calls are removed separately.
 #[rustfmt::skip]
 const ALONE: [&str; 5] = [
-    "life_cycle.refused", "life_cycle.states-changed", "results.early-return", "results.early-unsaid", "start_values.inputs",
+    "life_cycle.rejected", "life_cycle.states-changed", "results.early-return", "results.early-unsaid", "start_values.inputs",
 ];
 
-/// Chooses numbers that look random.
+/// Pseudorandom number generator.
 pub struct Random(u64);
 
 impl Random {
@@ -64,44 +64,45 @@ impl Random {
     }
 }
 
-/// The step in which a run ended.
+/// Returns the step in which a process ended before the last step.
 fn at<'s>(sequence: &'s CallSequence, run: &Run) -> Option<&'s Numbered> {
     step_of(sequence, run.at?)
 }
 
-/// An FMU under attack.
+/// State of the check of an FMU.
 pub struct Checker {
     pub description: Arc<Description>,
-    /// Variables that most checks read.
+    /// Indices of the variables that most checks read.
     pub readable: Vec<usize>,
     pub setting: Setting,
     pub workers: Workers,
-    /// A simulation that succeeds, for each interface type.
+    /// Successful simulation of each interface type that can be checked.
     pub trajectories: Vec<Trajectory>,
     /// Seed of random choices.
     pub seed: u64,
-    /// Seconds for one sequence.
+    /// Maximum duration of a call sequence in seconds.
     pub limit: f64,
-    /// End of the time for all checks.
+    /// Instant after which no call sequence is started.
     pub deadline: Instant,
-    /// Whether fewer values and orders are tried.
+    /// Whether fewer values and orders of calls are tried.
     pub quick: bool,
     found: Mutex<Vec<Finding>>,
     unchecked: Mutex<Vec<Unchecked>>,
-    /// Call sequences hold a read lock while they are played. A suspected hang is played again with a write lock.
+    /// Lock that each call sequence holds for reading. A suspected hang is repeated with the lock held for writing, so that no
+    /// other call sequence is executed at the same time.
     alone: RwLock<()>,
-    /// Functions that did not return when no other call sequence was played and the limit was three times as long.
+    /// Functions that did not return in a repetition with three times the limit and no other call sequence.
     hung: Mutex<HashSet<String>>,
-    played: Mutex<u64>,
+    executed: Mutex<u64>,
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Keeps one finding of each name: the most severe, and of several such the one with the shortest call sequence, regardless
-/// of the order of the checks. Its `more` lists the observations of the others.
-fn keep(found: &mut Vec<Finding>, mut finding: Finding) {
+/// Records a finding. Of several with one name, the most severe is kept, and of these the one with the shortest call sequence.
+/// Its field `more` lists the other observations.
+fn record(found: &mut Vec<Finding>, mut finding: Finding) {
     let Some(kept) = found.iter_mut().find(|kept| kept.name == finding.name) else {
         found.push(finding);
         return;
@@ -124,7 +125,7 @@ fn outline(observed: &str) -> String {
 }
 
 impl Checker {
-    /// An FMU whose trajectories are not yet known.
+    /// Makes a checker without trajectories.
     pub fn new(
         description: Description,
         setting: Setting,
@@ -148,7 +149,7 @@ impl Checker {
             unchecked: Mutex::default(),
             alone: RwLock::default(),
             hung: Mutex::default(),
-            played: Mutex::default(),
+            executed: Mutex::default(),
         }
     }
 
@@ -160,12 +161,12 @@ impl Checker {
         vec![Numbered { id: 0, forbidden, step }]
     }
 
-    /// The call that returns the version, which loads the library.
+    /// Returns a step that calls the function for the version, which loads the library.
     pub fn version(&self) -> Step {
         Step::Version(if self.fmi3() { "fmi3GetVersion" } else { "fmi2GetVersion" }.to_owned())
     }
 
-    /// The number of values or orders that are tried; fewer in a quick check.
+    /// Returns `many`, or an eighth of it in a quick check.
     pub fn most(&self, many: usize) -> usize {
         if self.quick { many.div_ceil(8) } else { many }
     }
@@ -174,7 +175,7 @@ impl Checker {
         self.description.standard == Standard::Fmi3
     }
 
-    /// Whether a capability is declared for an interface.
+    /// Returns whether an interface type declares one of these capabilities.
     pub fn can(&self, interface: Interface, names: &[&str]) -> bool {
         self.description.offer(interface).is_some_and(|offer| offer.can(names))
     }
@@ -187,27 +188,27 @@ impl Checker {
         self.saves(interface) && self.can(interface, &["canSerializeFMUstate", "canSerializeFMUState"])
     }
 
-    /// Whether there may be two instances in a process.
+    /// Returns whether a process may have several instances.
     pub fn several(&self, interface: Interface) -> bool {
         !self.can(interface, &["canBeInstantiatedOnlyOncePerProcess"])
     }
 
-    pub fn play(&self, sequence: &CallSequence) -> anyhow::Result<Run> {
-        self.play_for(sequence, self.limit)
+    pub fn execute(&self, sequence: &CallSequence) -> anyhow::Result<Run> {
+        self.execute_for(sequence, self.limit)
     }
 
-    /// Plays a sequence for so many seconds at most.
-    pub fn play_for(&self, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
+    /// Executes a call sequence with a limit in seconds.
+    pub fn execute_for(&self, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
         debug_assert_eq!(self.illegal(sequence), None);
         if Instant::now() >= self.deadline {
             return Err(Stop::TimeOver.into());
         }
         let run = {
             let _with_others = self.alone.read().unwrap_or_else(PoisonError::into_inner);
-            self.play_until(sequence, limit)?
+            self.execute_until(sequence, limit)?
         };
-        // The machine may be busy, so a call that seems to hang is played again with no other at the same time and three times the
-        // time. A function that has not returned then is not tried again.
+        // The machine may be busy, so a suspected hang is repeated with no other call sequence at the same time and three times
+        // the limit. If the function does not return then either, its next hang is not repeated.
         let name = |run: &Run| {
             at(sequence, run).map_or(String::new(), |at| format!("{}{}", step_name(&at.step), at.forbidden))
         };
@@ -215,32 +216,32 @@ impl Checker {
             return Ok(run);
         }
         let _alone = self.alone.write().unwrap_or_else(PoisonError::into_inner);
-        let run = self.play_until(sequence, 3.0 * limit)?;
+        let run = self.execute_until(sequence, 3.0 * limit)?;
         if matches!(run.end, End::Hang(_)) {
             locked(&self.hung).insert(name(&run));
         }
         Ok(run)
     }
 
-    /// Plays a sequence until the limit or the deadline.
-    fn play_until(&self, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
-        let left = self.deadline.saturating_duration_since(Instant::now()).as_secs_f64();
-        *locked(&self.played) += 1;
-        let run = self.workers.play(&self.setting, sequence, limit.min(left.max(0.5)))?;
+    /// Executes a call sequence until the limit or the deadline.
+    fn execute_until(&self, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
+        let remaining = self.deadline.saturating_duration_since(Instant::now()).as_secs_f64();
+        *locked(&self.executed) += 1;
+        let run = self.workers.execute(&self.setting, sequence, limit.min(remaining.max(0.5)))?;
         match run.end {
             End::Hang(seconds) if seconds < limit => Err(Stop::TimeOver.into()),
             _ => Ok(run),
         }
     }
 
-    /// An error in a call sequence itself, for developers of this tool.
+    /// Returns the first step that the standard does not allow, which is an error in fmu-check.
     fn illegal(&self, sequence: &CallSequence) -> Option<String> {
         let id = first_illegal(&self.description, sequence)?;
         Some(format!("{id} {:?}", step_of(sequence, id)?.step))
     }
 
-    pub fn played(&self) -> u64 {
-        *locked(&self.played)
+    pub fn executed(&self) -> u64 {
+        *locked(&self.executed)
     }
 
     pub fn take(&self) -> Vec<Finding> {
@@ -251,7 +252,7 @@ impl Checker {
         std::mem::take(&mut locked(&self.unchecked))
     }
 
-    /// Notes an interface or a topic that was not checked, and the first reason.
+    /// Records an interface or a topic that was not checked, with the first reason.
     pub fn unchecked(&self, name: &str, why: String) {
         let mut unchecked = locked(&self.unchecked);
         if !unchecked.iter().any(|known| known.name == name) {
@@ -260,7 +261,7 @@ impl Checker {
     }
 
     pub fn add(&self, finding: Finding) {
-        keep(&mut locked(&self.found), finding);
+        record(&mut locked(&self.found), finding);
     }
 
     /// Returns whether there is a finding of this name.
@@ -268,47 +269,52 @@ impl Checker {
         locked(&self.found).iter().any(|finding| finding.name == name)
     }
 
-    /// Keeps a finding if a run breaks a rule; returns whether it does.
-    pub fn keep(&self, name: &str, run: &Run, sequence: &CallSequence, judge: impl Judges) -> bool {
-        let observed = if run.end == End::Done { judge(run) } else { None };
+    /// Records a finding if a run breaks a rule; returns whether it does.
+    pub fn record(&self, name: &str, run: &Run, sequence: &CallSequence, criterion: impl Criterion) -> bool {
+        let observed = if run.end == End::Done { criterion(run) } else { None };
         let found = observed.map(|observed| {
-            self.add(self.broken(name, observed).shown_by(sequence.clone(), Arc::new(judge)))
+            self.add(self.broken(name, observed).shown_by(sequence.clone(), Arc::new(criterion)))
         });
         found.is_some()
     }
 
-    /// The finding that the FMU breaks a rule.
+    /// Returns the finding that the FMU breaks a rule.
     pub fn broken(&self, name: &str, observed: String) -> Finding {
         rules::broken(self.description.standard, name, observed)
     }
 
-    /// Keeps the findings of the rules that hold for every run.
-    pub fn keep_always(&self, sequence: &CallSequence, run: &Run) {
+    /// Records the findings of the rules that hold for every run.
+    pub fn record_always(&self, sequence: &CallSequence, run: &Run) {
         always::findings(&self.description, sequence, run).into_iter().for_each(|finding| self.add(finding));
     }
 
-    /// Plays a call sequence and judges the run: first by its end, then by the rules that hold
-    /// for every run, then by `judge`.
-    pub fn judge(&self, name: &str, sequence: CallSequence, judge: impl Judges) -> anyhow::Result<Run> {
+    /// Executes a call sequence and records its findings: the end of the process or, if the last step returned, the violations
+    /// of `criterion` and of the rules that hold for every run.
+    pub fn evaluate(
+        &self,
+        name: &str,
+        sequence: CallSequence,
+        criterion: impl Criterion,
+    ) -> anyhow::Result<Run> {
         let forbidden = sequence.iter().any(|numbered| numbered.forbidden);
         let limit = if forbidden { self.limit.min(3.0) } else { self.limit };
-        let run = self.play_for(&sequence, limit)?;
+        let run = self.execute_for(&sequence, limit)?;
         if run.end != End::Done {
             self.ended(name, &sequence, &run, forbidden)?;
             return Ok(run);
         }
-        self.keep_always(&sequence, &run);
-        self.keep(name, &run, &sequence, judge);
+        self.record_always(&sequence, &run);
+        self.record(name, &run, &sequence, criterion);
         Ok(run)
     }
 
-    /// Plays a sequence and judges it by one rule.
-    pub fn check(&self, name: &str, sequence: CallSequence, judge: impl Judges) -> anyhow::Result<()> {
-        self.judge(name, sequence, judge).map(|_| ())
+    /// Executes a call sequence and records its findings, as `evaluate` does.
+    pub fn check(&self, name: &str, sequence: CallSequence, criterion: impl Criterion) -> anyhow::Result<()> {
+        self.evaluate(name, sequence, criterion).map(|_| ())
     }
 
-    /// Judges whether reads that must be equal differ. The message has `{}` for the variable, its value and the other value.
-    pub fn differ(&self, one: &[Read], other: &[Read], message: &'static str) -> Box<dyn Judges> {
+    /// Returns the criterion that reads are equal. The message has `{}` for the variable, its value and the other value.
+    pub fn differ(&self, one: &[Read], other: &[Read], message: &'static str) -> Box<dyn Criterion> {
         let (description, one, other) = (self.description.clone(), one.to_vec(), other.to_vec());
         Box::new(move |run: &Run| {
             let values = difference(&description, run, &one, &other)?.into_iter().chain([String::new()]);
@@ -316,10 +322,10 @@ impl Checker {
         })
     }
 
-    /// Keeps the finding of a run that crashed, hung or exited.
+    /// Records the finding of a run that ended before its last step.
     fn ended(&self, rule: &str, sequence: &CallSequence, run: &Run, forbidden: bool) -> anyhow::Result<()> {
         let Some(observed) = ending(run, sequence) else { return Ok(()) };
-        let ends: Judge = {
+        let ends: SharedCriterion = {
             let (sequence, kind) = (sequence.clone(), std::mem::discriminant(&run.end));
             let name_at =
                 |run: &Run, sequence: &CallSequence| at(sequence, run).map(|at| step_name(&at.step));
@@ -329,7 +335,7 @@ impl Checker {
                 same.then(|| ending(run, &sequence))?
             })
         };
-        let keep = |name: &str, observed: String| {
+        let record = |name: &str, observed: String| {
             let mut ended = self.broken(name, observed).shown_by(sequence.clone(), Arc::clone(&ends));
             if forbidden {
                 ended.severity = ended.severity.max(Severity::Fragile);
@@ -337,90 +343,90 @@ impl Checker {
             self.add(ended);
             Ok(())
         };
-        // A repetition with accessible memory after each array shows whether an access beyond an array caused the crash.
+        // A repetition with accessible memory after each array reveals an access beyond an array.
         if matches!(run.end, End::Crash(_)) && cfg!(unix) && !forbidden {
             let soft = Setting { soft: true, ..self.setting.clone() };
-            let again = self.workers.play(&soft, sequence, self.limit)?;
+            let again = self.workers.execute(&soft, sequence, self.limit)?;
             if again.outcomes.values().any(|outcome| !outcome.damage.is_empty()) {
-                return keep("arrays.written-beyond", format!("{observed}: it writes beyond an array"));
+                return record("arrays.written-beyond", format!("{observed}: it writes beyond an array"));
             }
             if again.end == End::Done {
                 let how = "it reads beyond an array, or memory that was freed";
-                return keep("arrays.read-beyond", format!("{observed}: {how}"));
+                return record("arrays.read-beyond", format!("{observed}: {how}"));
             }
         }
         let what = match run.end {
-            End::Unloadable(_) => return keep("package.unloadable", observed),
-            End::Flood(_) => return keep("resources.processes", observed),
+            End::Unloadable(_) => return record("package.unloadable", observed),
+            End::Flood(_) => return record("resources.processes", observed),
             End::Hang(_) => "hang",
             End::Exit(_) => "exit",
             _ => "crash",
         };
-        // An end that only this call sequence can show has the name of its rule; others have the name of the topic.
+        // An end that only this call sequence can reach is named after its rule, any other after the topic.
         let own = ["fresh-process", "unload", "exit"].iter().any(|name| rule.ends_with(name));
         let name = match rule.split_once('.') {
-            Some((topic, _)) if !own && (!forbidden || topic == "refusals") => topic,
+            Some((topic, _)) if !own && (!forbidden || topic == "rejections") => topic,
             _ => rule,
         };
-        keep(&format!("{name}.{what}"), observed)
+        record(&format!("{name}.{what}"), observed)
     }
 
-    /// The result of a successful update of the discrete states.
+    /// Returns the result of a successful update of the discrete states.
     pub fn event(&self, run: &Run, id: u32) -> Option<Event> {
         event(run, id, self.fmi3())
     }
 
-    /// Returns the setting that shows a finding: arrays end at a guard page for accesses beyond arrays.
+    /// Returns the setting that reproduces a finding. For a crash or an access beyond an array, arrays end at a guard page.
     fn hard(&self, finding: &Finding) -> Setting {
         let ends = ["read-beyond", "written-beyond", "crash"].iter().any(|end| finding.name.ends_with(end));
         Setting { soft: self.setting.soft && !ends, ..self.setting.clone() }
     }
 
-    /// Writes the program of a finding. A call sequence without a hang has ten times the time: the machine may be busy.
+    /// Writes the program that reproduces a finding. The limit is ten times as long, except for a hang: the machine may be busy.
     pub fn reproduce(&self, finding: &mut Finding) -> anyhow::Result<()> {
         let late = Instant::now() > self.deadline && self.quick;
-        if finding.judge.is_some() && !late {
+        if finding.criterion.is_some() && !late {
             let patience = if finding.name.ends_with("hang") { 1.0 } else { 10.0 };
             let limit = patience * (self.limit + 3.0 * self.setting.repetitions);
-            let run = self.workers.play(&self.hard(finding), &finding.sequence, limit)?;
+            let run = self.workers.execute(&self.hard(finding), &finding.sequence, limit)?;
             crate::reproduce::program(finding, &run, &self.setting, &self.description);
         }
         Ok(())
     }
 
-    /// A shorter sequence for each finding, as long as there is time.
+    /// Removes calls that the finding does not need, until the deadline or the maximum number of attempts.
     pub fn shorten(&self, finding: &mut Finding) {
         finding.steps = (finding.sequence.len(), finding.sequence.len());
-        let Some(judge) = finding.judge.clone() else { return };
+        let Some(criterion) = finding.criterion.clone() else { return };
         let setting = self.hard(finding);
         let hangs = finding.name.ends_with("hang");
         let limit = if hangs { self.limit.min(1.5) } else { self.limit };
-        let mut left = match finding.topic() {
+        let mut remaining = match finding.topic() {
             _ if hangs => 12,
             "resources" => 15,
             _ => 400,
         };
-        // If nothing is compared, one call shows the finding.
+        // If the criterion compares no calls, calls are removed separately.
         let alone = ALONE.contains(&finding.name.as_str());
         let ends = ["crash", "hang", "exit"].iter().any(|end| finding.name.ends_with(end));
         let pinned = PINNED.iter().find(|(topic, _)| *topic == finding.topic() && !ends && !alone);
         let pinned = pinned.map_or(&[][..], |(_, calls)| calls);
-        // A shorter sequence may show other numbers, but not another observation.
+        // The observation of a shorter sequence may differ only in its numbers.
         let (same, mut observed) = (outline(&finding.observed), finding.observed.clone());
-        let mut shows = |tried: &CallSequence| {
-            let run = self.workers.play(&setting, tried, limit).ok();
-            let now = run.and_then(|run| judge(&run)).filter(|now| outline(now) == same);
+        let mut reproduces = |tried: &CallSequence| {
+            let run = self.workers.execute(&setting, tried, limit).ok();
+            let now = run.and_then(|run| criterion(&run)).filter(|now| outline(now) == same);
             now.is_some_and(|now| {
                 observed = now;
                 true
             })
         };
         let mut short = shrink(&self.description, &finding.sequence, pinned, !alone, |tried| {
-            left -= 1;
-            left >= 0 && Instant::now() <= self.deadline && shows(tried)
+            remaining -= 1;
+            remaining >= 0 && Instant::now() <= self.deadline && reproduces(tried)
         });
-        // A finding that does not show in every run is not shortened.
-        if short.len() < finding.sequence.len() && !shows(&short) {
+        // A finding that is not reproduced by every run is not shortened.
+        if short.len() < finding.sequence.len() && !reproduces(&short) {
             (short, observed) = (finding.sequence.clone(), finding.observed.clone());
         }
         finding.observed = observed;
@@ -431,10 +437,10 @@ impl Checker {
 
 #[cfg(test)]
 mod tests {
-    use super::keep;
+    use super::record;
     use crate::finding::{Finding, Severity};
 
-    /// A more severe finding of a name replaces the one before, whose observation stays in the list.
+    /// Checks that a more severe finding replaces one of the same name, whose observation remains in the list.
     #[test]
     fn no_evidence_is_lost() {
         let finding = |name: &str, severity, observed: &str| Finding {
@@ -453,9 +459,9 @@ mod tests {
             (Severity::Violation, "e"),
             (Severity::Note, "b"),
         ] {
-            keep(&mut found, finding("topic.name", severity, observed));
+            record(&mut found, finding("topic.name", severity, observed));
         }
-        keep(&mut found, finding("topic.other", Severity::Note, "a"));
+        record(&mut found, finding("topic.other", Severity::Note, "a"));
         let [one, other] = &found[..] else { panic!("{} findings", found.len()) };
         assert_eq!((one.severity, one.observed.as_str()), (Severity::Violation, "c"));
         assert_eq!(one.more, ["a", "b", "d", "e"]);

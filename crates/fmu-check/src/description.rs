@@ -1,4 +1,4 @@
-//! The model description with its errors, which are findings.
+//! Model description with its errors, which are findings.
 
 use crate::call_sequence::Kind;
 use crate::rules::Observation;
@@ -16,11 +16,11 @@ pub struct Description {
     pub stop_time: Option<f64>,
     /// Step size of the default experiment, if it has a positive one.
     pub step_size: Option<f64>,
-    /// Errors in the description.
+    /// Rules that the model description breaks.
     pub wrong: Vec<Observation>,
 }
 
-/// A description has the fields of the model description as written.
+/// Gives access to the fields of the model description.
 impl Deref for Description {
     type Target = ModelDescription;
 
@@ -30,10 +30,10 @@ impl Deref for Description {
 }
 
 impl Description {
-    /// Reads a `modelDescription.xml`.
+    /// Parses a `modelDescription.xml`.
     ///
     /// # Errors
-    /// Fails if the text is no XML, or for other FMI versions. The message names the fault.
+    /// Fails if the string is no XML or has another FMI version.
     pub fn parse(text: &str) -> Result<Self, String> {
         let written = ModelDescription::parse(text)?;
         let [start_time, stop_time, step_size] = written.default_experiment;
@@ -53,13 +53,13 @@ impl Description {
             wrong: written.faults.iter().filter_map(observation).collect(),
             written,
         };
-        let wrong = description.judge();
+        let wrong = description.evaluate();
         description.wrong.extend(wrong);
         Ok(description)
     }
 
     /// Returns the rules that the description breaks.
-    fn judge(&self) -> Vec<Observation> {
+    fn evaluate(&self) -> Vec<Observation> {
         let mut wrong = Vec::new();
         if self.token.is_empty() {
             wrong.push(("description.token", "guid or instantiationToken is missing or empty".to_owned()));
@@ -106,7 +106,7 @@ impl Description {
             }
             wrong.extend(faults(variable));
         }
-        // A derivative that is not listed may be one that is no state's (section 2.2.8 of FMI 2.0).
+        // A variable with the attribute `derivative` is only listed if it is a state derivative (section 2.2.8 of FMI 2.0).
         for unknown in &self.derivatives {
             let variable = &self.variables[unknown.variable];
             if variable.derivative_of.is_none() {
@@ -122,7 +122,7 @@ impl Description {
         wrong
     }
 
-    /// Whether Co-Simulation needs Event Mode: FMUs with clocks do (section 2.3.1 of FMI 3.0, `eventModeUsed`).
+    /// Returns whether Co-Simulation needs Event Mode, as FMUs with clocks do (section 2.3.1 of FMI 3.0, `eventModeUsed`).
     pub fn event_mode(&self) -> bool {
         let has_clocks = self.variables.iter().any(|variable| variable.base.is_none() || variable.clocked);
         has_clocks && self.co_simulation.as_ref().is_some_and(|offer| offer.can(&["hasEventMode"]))
@@ -139,24 +139,24 @@ impl Description {
         })
     }
 
-    /// Returns the kind of the values of a variable.
+    /// Returns the C type of the values of a variable.
     pub fn kind(&self, index: usize) -> Kind {
         kind_of(self.standard, self.variables[index].base.unwrap_or(BaseType::Boolean))
     }
 
-    /// The continuous states, by indices, in the order of their derivatives.
+    /// Returns the indices of the continuous states, in the order of their derivatives in ModelStructure.
     pub fn states(&self) -> Vec<usize> {
         self.derivatives.iter().filter_map(|unknown| self.variables[unknown.variable].derivative_of).collect()
     }
 
-    /// How many numbers the vector of states has.
+    /// Returns the number of elements of the state vector; `None` if a size is unknown.
     pub fn states_count(&self) -> Option<usize> {
         self.derivatives.iter().map(|unknown| self.variables[unknown.variable].size).sum()
     }
 }
 
-/// Combinations of causality and variability, each with the values of `initial` that it may have: the tables of section 2.2.7
-/// of FMI 2.0.5 and section 2.4.7.4 of FMI 3.0.2.
+/// Causality, variabilities and values of `initial` that may be combined: the tables of section 2.2.7 of FMI 2.0.5 and section
+/// 2.4.7.4 of FMI 3.0.2.
 const COMBINATIONS: &[(&str, &[&str], &[&str])] = &[
     ("parameter", &["fixed", "tunable"], &["exact"]),
     ("structuralParameter", &["fixed", "tunable"], &["exact"]),
@@ -170,7 +170,7 @@ const COMBINATIONS: &[(&str, &[&str], &[&str])] = &[
     ("independent", &["continuous"], &[""]),
 ];
 
-/// Returns the rules that a variable breaks without regard to the others.
+/// Returns the rules that a single variable breaks.
 fn faults(variable: &Variable) -> Vec<Observation> {
     let (name, mut wrong) = (&variable.name, Vec::new());
     let mut add = |rule, why: String| wrong.push((rule, why));
@@ -220,7 +220,7 @@ fn faults(variable: &Variable) -> Vec<Observation> {
     wrong
 }
 
-/// Returns the last part of the names of the functions for a type.
+/// Returns the end of the names of the getter and setter of a type, for example `Float64`.
 pub fn type_name(standard: Standard, base: BaseType) -> &'static str {
     match (standard, base) {
         (Standard::Fmi2, BaseType::Enumeration) => "Integer",
@@ -247,7 +247,7 @@ pub fn kind_of(standard: Standard, base: BaseType) -> Kind {
     }
 }
 
-/// Whether a string is a valid identifier of C.
+/// Returns whether a string is a valid C identifier.
 fn is_c_name(text: &str) -> bool {
     let mut letters = text.chars();
     letters.next().is_some_and(|first| first.is_ascii_alphabetic() || first == '_')

@@ -1,4 +1,4 @@
-//! Findings: severity, section of the standard, and the shortest call sequence that shows the finding.
+//! Findings, and the criteria that recognize them in a run.
 
 use crate::call_sequence::{CallSequence, End, Numbered, Run, Step, Values, step_of};
 use serde::Serialize;
@@ -18,7 +18,7 @@ pub enum Severity {
 }
 
 impl Severity {
-    /// Its name.
+    /// Returns the name of the severity.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Note => "note",
@@ -28,70 +28,70 @@ impl Severity {
     }
 }
 
-/// Judges a run; returns a sentence that describes the violation.
-pub trait Judges: Fn(&Run) -> Option<String> + Send + Sync + 'static {}
+/// Criterion for runs: returns a description of the violation, `None` if the run fulfils the criterion.
+pub trait Criterion: Fn(&Run) -> Option<String> + Send + Sync + 'static {}
 
-impl<T: Fn(&Run) -> Option<String> + Send + Sync + 'static> Judges for T {}
+impl<T: Fn(&Run) -> Option<String> + Send + Sync + 'static> Criterion for T {}
 
-/// A judge that findings share.
-pub type Judge = Arc<dyn Judges>;
+/// Criterion that is shared by copies of a finding.
+pub type SharedCriterion = Arc<dyn Criterion>;
 
-/// Judges by the first of these judges that finds a violation.
-pub fn any(judges: impl IntoIterator<Item = Box<dyn Judges>>) -> Box<dyn Judges> {
-    let judges: Vec<_> = judges.into_iter().collect();
-    Box::new(move |run: &Run| judges.iter().find_map(|judge| judge(run)))
+/// Returns the criterion that all these criteria are fulfilled.
+pub fn any(criteria: impl IntoIterator<Item = Box<dyn Criterion>>) -> Box<dyn Criterion> {
+    let criteria: Vec<_> = criteria.into_iter().collect();
+    Box::new(move |run: &Run| criteria.iter().find_map(|criterion| criterion(run)))
 }
 
-/// Judges whether one of these calls did not return OK.
-pub fn fails(sequence: &CallSequence, ids: Vec<u32>) -> Box<dyn Judges> {
+/// Returns the criterion that these calls return OK or Warning.
+pub fn fails(sequence: &CallSequence, ids: Vec<u32>) -> Box<dyn Criterion> {
     let sequence = sequence.clone();
     Box::new(move |run: &Run| failure(&sequence, run, &ids))
 }
 
-/// A finding.
+/// Violation of a rule by an FMU.
 #[derive(Clone, Default, Serialize)]
 pub struct Finding {
-    /// Its name: the topic, a dot, the fault.
+    /// Name of the rule: the topic, a dot, the fault.
     pub name: String,
-    /// Its severity.
+    /// Severity of the finding.
     pub severity: Severity,
-    /// The edition and section of the standard; empty if the rule is not part of it.
+    /// Edition and section of the standard; empty if the rule is not in the standard.
     pub section: String,
-    /// The requirement.
+    /// Requirement of the rule.
     pub requirement: String,
-    /// The observation.
+    /// Observation that violates the requirement.
     pub observed: String,
     /// Further observations of this rule.
     pub more: Vec<String>,
-    /// The calls that show it; empty for findings in files.
+    /// Call sequence that reproduces the finding; empty for a finding in the files of the FMU.
     #[serde(skip)]
     pub sequence: CallSequence,
-    /// The call sequence as a program in C.
+    /// Program in C that reproduces the finding.
     pub c: String,
-    /// Judges whether a run shows the finding.
+    /// Criterion that a run violates if it reproduces the finding.
     #[serde(skip)]
-    pub judge: Option<Judge>,
-    /// Whether it fails the check.
+    pub criterion: Option<SharedCriterion>,
+    /// Whether the finding fails the check.
     pub fails: bool,
-    /// The reason for which it is accepted, if the baseline has one.
+    /// Reason in the baseline for which the finding is accepted.
     pub accepted: Option<String>,
-    /// The numbers of steps before and after shortening.
+    /// Number of steps before and after shortening.
     pub steps: (usize, usize),
 }
 
 impl Finding {
-    /// Adds the calls that show the finding.
-    pub fn shown_by(self, sequence: CallSequence, judge: Judge) -> Self {
-        Self { sequence, judge: Some(judge), ..self }
+    /// Adds the call sequence and the criterion that reproduce the finding.
+    pub fn shown_by(self, sequence: CallSequence, criterion: SharedCriterion) -> Self {
+        Self { sequence, criterion: Some(criterion), ..self }
     }
 
-    /// Its topic.
+    /// Returns the topic of the rule.
     pub fn topic(&self) -> &str {
         self.name.split('.').next().unwrap_or_default()
     }
 }
 
-/// Returns a sentence on a run that crashed, hung or exited, with the function in which it did.
+/// Returns a description of the end of a process before its last step; `None` if the last step returned.
 pub fn ending(run: &Run, sequence: &CallSequence) -> Option<String> {
     let name = run
         .at
@@ -101,13 +101,15 @@ pub fn ending(run: &Run, sequence: &CallSequence) -> Option<String> {
         End::Done => return None,
         End::Crash(why) => format!("{name} crashes ({why})"),
         End::Hang(seconds) => format!("{name} does not return within {seconds:.1} s"),
-        End::Exit(code) => format!("{name} ends the whole process with exit status {code}"),
+        End::Exit(code) => format!("{name} ends the process with exit status {code}"),
         End::Unloadable(why) => format!("the library cannot be loaded: {why}"),
-        End::Flood(count) => format!("{name} leads to {count} processes at once, after which all were ended"),
+        End::Flood(count) => {
+            format!("{name} leads to {count} processes at a time, after which all were ended")
+        }
     })
 }
 
-/// A short description of a step.
+/// Returns a short description of a step.
 pub fn step_name(step: &Step) -> String {
     match step {
         Step::Make(..) => "the instantiation".to_owned(),
@@ -125,27 +127,27 @@ pub fn step_name(step: &Step) -> String {
     }
 }
 
-/// The result of an event.
+/// Result of an update of the discrete states.
 #[derive(Clone, Copy, Debug)]
 pub struct Event {
-    /// Another update is needed.
+    /// Whether another update is needed.
     pub again: bool,
-    /// The model wants to end.
+    /// Whether the model requests the end of the simulation.
     pub terminate: bool,
-    /// Continuous states have changed.
+    /// Whether the continuous states have changed.
     pub states_changed: bool,
-    /// The next time event.
+    /// Time of the next time event.
     pub next: Option<f64>,
 }
 
-/// The result of a successful update of the discrete states.
+/// Returns the result of a successful update of the discrete states.
 pub fn event(run: &Run, id: u32, fmi3: bool) -> Option<Event> {
     let outcome = run.outcome(id).filter(|outcome| outcome.status.is_some_and(|status| status <= 1))?;
     let (flags, time) = if fmi3 {
         let number = |index: usize| outcome.written.get(index)?.numbers().first().copied();
         ([0, 1, 3, 4].map(|index| number(index) == Some(1.0)), number(5)?)
     } else {
-        // fmi2EventInfo has five flags, two to a word, and the time.
+        // fmi2EventInfo has five flags of 32 bits, padding, and the time: four words of 64 bits.
         let Values::Numbers(_, words) = outcome.written.first()? else { return None };
         let [first, changed, defined, time] = words[..] else { return None };
         let flags = [first as u32 != 0, first >> 32 != 0, changed >> 32 != 0, defined as u32 != 0];
@@ -155,12 +157,12 @@ pub fn event(run: &Run, id: u32, fmi3: bool) -> Option<Event> {
     Some(Event { again, terminate, states_changed, next: defined.then_some(time) })
 }
 
-/// Returns a sentence on the first of these calls that did not return OK.
+/// Describes the first of these calls that failed.
 pub fn failure(sequence: &CallSequence, run: &Run, ids: &[u32]) -> Option<String> {
     ids.iter().find_map(|id| failure_of(sequence, run, *id))
 }
 
-/// Returns a sentence on this call if it did not return OK.
+/// Describes this call if it failed: its function is missing, or it returned NULL or a status worse than Warning.
 pub fn failure_of(sequence: &CallSequence, run: &Run, id: u32) -> Option<String> {
     let outcome = run.outcome(id)?;
     let step = &step_of(sequence, id)?.step;
@@ -179,7 +181,7 @@ pub fn failure_of(sequence: &CallSequence, run: &Run, id: u32) -> Option<String>
     Some(format!("{name} returns {result}{why}"))
 }
 
-/// Returns a sentence on the first failed instantiation, otherwise on the first call that returns more than `most`.
+/// Describes the first failed instantiation, otherwise the first call that returned a status above `most`.
 pub fn first_failure(sequence: &CallSequence, run: &Run, most: i32) -> Option<String> {
     let made = |numbered: &&Numbered| matches!(numbered.step, Step::Make(..));
     let failed = |numbered: &&Numbered| {

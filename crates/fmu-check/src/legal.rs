@@ -1,4 +1,4 @@
-//! Checks that a call sequence follows the standard: no finding may come from a call that the standard does not allow.
+//! Checks that the standard allows a call sequence, so that no finding is caused by a forbidden call.
 
 use crate::call_sequence::{Arg, Make, NULL_INSTANCE, Numbered, Step};
 use crate::description::Description;
@@ -18,15 +18,15 @@ struct State {
     updated: bool,
 }
 
-/// Returns the id of the first step that the standard does not allow. Steps that are illegal on purpose are skipped.
+/// Returns the number of the first step that the standard does not allow. Steps that are marked as forbidden are skipped.
 pub fn first_illegal(description: &Description, sequence: &[Numbered]) -> Option<u32> {
     walk(description, sequence, &mut Objects::default())
 }
 
-/// Index of the instance that a saved state belongs to, and the state.
+/// Index of the instance that saved a state, and the state.
 type SavedState = (usize, State);
 
-/// State of all instances, saved states and byte buffers.
+/// States of the instances, saved states and serialized states, by index.
 #[derive(Default)]
 struct Objects {
     instances: HashMap<usize, State>,
@@ -34,7 +34,7 @@ struct Objects {
     bytes: HashMap<usize, State>,
 }
 
-/// Returns the id of the first illegal step, and updates the objects up to that step.
+/// Returns the number of the first illegal step, and updates the objects up to that step.
 fn walk(description: &Description, sequence: &[Numbered], objects: &mut Objects) -> Option<u32> {
     for Numbered { step, id, .. } in sequence.iter().filter(|numbered| !numbered.forbidden) {
         let is_legal = match step {
@@ -47,9 +47,9 @@ fn walk(description: &Description, sequence: &[Numbered], objects: &mut Objects)
             Step::Call { instance, function, args } => {
                 instance.is_some_and(|index| objects.call(description.standard, index, function, args))
             }
-            // A call that is allowed twice is allowed any number of times.
+            // Steps that are allowed twice are allowed any number of times.
             Step::Repeat(_, steps) => (0..2).all(|_| walk(description, steps, objects).is_none()),
-            // Each thread has separate instances.
+            // Threads share no instances.
             Step::Parallel(sequences) => {
                 sequences.iter().all(|sequence| first_illegal(description, sequence).is_none())
             }
@@ -88,7 +88,7 @@ impl Objects {
         is_free
     }
 
-    /// Calls a function on an instance; returns whether that is allowed.
+    /// Updates the state of an instance for a call; returns whether the call is allowed.
     fn call(&mut self, standard: Standard, index: usize, function: &str, args: &[Arg]) -> bool {
         let Some(state) = self.instances.get_mut(&index) else { return false };
         let is_allowed = signature(function)
@@ -102,7 +102,7 @@ impl Objects {
 }
 
 impl State {
-    /// Changes the state as the function does; returns whether the arguments are allowed.
+    /// Updates the state for a call; returns whether the arguments are allowed.
     fn call(&mut self, standard: Standard, function: &str, args: &[Arg]) -> bool {
         let real = |index: usize| match args.get(index) {
             Some(Arg::Real(bits)) => f64::from_bits(*bits),
@@ -139,7 +139,7 @@ impl State {
                 return self.updated;
             }
             "DoStep" => {
-                // After an early return, only the run knows the time.
+                // After an early return, the time is not known before the run.
                 let here = !is_other_time(real(0), self.time) || self.early_return && real(0) < self.time;
                 self.time = real(0) + real(1);
                 return here && real(1) > 0.0;
@@ -160,7 +160,7 @@ impl State {
     }
 }
 
-/// Calls a function of saved states; returns whether the state and the bytes exist.
+/// Updates the saved and serialized states for a call; returns whether those that the call uses exist.
 fn saved_states(
     slots: &mut HashMap<usize, SavedState>,
     bytes: &mut HashMap<usize, State>,

@@ -2,9 +2,9 @@
 //!
 //! ## Inside
 //!
-//! A check writes a call sequence (`writer`, `call_sequence`), which a separate process plays (`run`, `worker`), and judges the
-//! results. The call sequence of a finding is shortened (`shrink`) as long as the standard allows it (`legal`), and written
-//! as a program in C (`reproduce`). Only `worker` has `unsafe` code: an FMU may crash its process.
+//! A check writes a call sequence (`writer`, `call_sequence`), which a separate process executes (`run`, `worker`), and evaluates
+//! the results. The call sequence of a finding is shortened (`shrink`) within the limits of the standard (`legal`), and written as
+//! a program in C (`reproduce`). Only `worker` has `unsafe` code: an FMU may crash its process.
 //!
 //! Each module uses only modules before it: `call_sequence`, `finding`, `rules`, `description`, `values`, `writer`, `legal`,
 //! `shrink`, `worker`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`, `checks`, `baseline`, `report`.
@@ -25,7 +25,7 @@ mod run;
 mod shrink;
 mod trajectory;
 mod values;
-#[allow(unsafe_code, reason = "the library under attack is loaded and called here")]
+#[allow(unsafe_code, reason = "the library of the FMU is loaded and called here")]
 mod worker;
 mod writer;
 
@@ -50,13 +50,13 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 use trajectory::{NoTrajectory, find_trajectory};
 
-/// Topics that a quick check leaves out.
-const LONG: [&str; 2] = ["hostile", "resources"];
+/// Topics that are not part of a quick check.
+const LONG: [&str; 2] = ["malformed", "resources"];
 
 /// Checks an FMU, prints the findings and writes the reports. The exit status is 1 for findings of a severity that fails the
 /// check, otherwise 2 if the FMU, one of its interfaces or a topic was not checked, otherwise 0.
 ///
-/// The program must call [`work_if_asked`] before anything else: it is started again to play call sequences.
+/// The program must call [`work_if_asked`] first in `main`, because it is started again to execute call sequences.
 pub fn command(fmu: &Path, options: &Options) -> ExitCode {
     if let Some(rule) = &options.explain {
         return match rules::explain(rule) {
@@ -97,7 +97,8 @@ pub fn command(fmu: &Path, options: &Options) -> ExitCode {
     }
 }
 
-/// Findings outside of the arrays and logs that any call can show, or that prevent other checks.
+/// Findings that `--only` does not remove, besides the findings of the topics `arrays` and `logs`. Any call may have them, or they
+/// prevent other checks.
 #[rustfmt::skip]
 const ALWAYS: [&str; 6] = [
     "functions.status", "package.unloadable", "package.symbols",
@@ -132,7 +133,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     let begin = Instant::now();
     let baseline = options.baseline.as_deref().map(baseline::Baseline::read).transpose()?.unwrap_or_default();
     let scratch = tempfile::Builder::new().prefix("fmu-check-").tempdir()?;
-    // The workers end, and write nothing any more, before the directory is removed.
+    // The workers are dropped, and end, before the directory is removed.
     let workers = run::Workers::new(scratch.path().to_owned())?;
     let directory = &scratch.path().join("fmu");
     let zip_observations = checks::package::unpack(path, directory, options.unpacked << 20)?;
@@ -140,7 +141,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
         format!("{}: there is no modelDescription.xml in it; it is no FMU", path.display())
     })?;
     let encoding = encoding(&text);
-    // Other encodings are decoded for the checks that follow.
+    // For the further checks, a file that is not UTF-8 is decoded as Latin-1.
     let text = match std::str::from_utf8(&text) {
         Ok(text) => text.to_owned(),
         Err(_) => text.iter().map(|byte| char::from(*byte)).collect(),
@@ -187,11 +188,11 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
         why: why.to_owned(),
         allowed: true,
     }));
-    report.judge(options, &baseline);
+    report.evaluate(options, &baseline);
     Ok(report)
 }
 
-/// Errors in the encoding of a model description, from its first line and its bytes.
+/// Returns the error in the encoding of a model description, which its XML declaration or its bytes have.
 fn encoding(text: &[u8]) -> Option<rules::Observation> {
     let declaration = text.split(|byte| *byte == b'>').next().unwrap_or_default();
     let declaration = String::from_utf8_lossy(declaration);
@@ -209,7 +210,7 @@ fn encoding(text: &[u8]) -> Option<rules::Observation> {
     Some(("description.encoding", why))
 }
 
-/// Finds a simulation that succeeds; keeps a finding if there is none.
+/// Returns a successful simulation; records a finding if there is none.
 fn reach(checker: &mut Checker, interface: Interface) -> anyhow::Result<writer::Trajectory> {
     let trajectory = find_trajectory(checker, interface);
     let Some(NoTrajectory(_, sequence)) = trajectory.as_ref().err().and_then(|error| error.downcast_ref())
@@ -217,9 +218,9 @@ fn reach(checker: &mut Checker, interface: Interface) -> anyhow::Result<writer::
         return trajectory;
     };
     let copy = sequence.clone();
-    let judge = move |run: &call_sequence::Run| finding::first_failure(&copy, run, 1);
-    checker.check("life_cycle.simulation", sequence.clone(), judge)?;
-    // An FMU that accesses memory beyond arrays may succeed with accessible memory after them.
+    let criterion = move |run: &call_sequence::Run| finding::first_failure(&copy, run, 1);
+    checker.check("life_cycle.simulation", sequence.clone(), criterion)?;
+    // An FMU that accesses memory beyond arrays may succeed if that memory is accessible.
     if ["arrays.read-beyond", "arrays.written-beyond"].iter().any(|name| checker.has(name)) {
         checker.setting.soft = true;
         return find_trajectory(checker, interface);
@@ -227,7 +228,7 @@ fn reach(checker: &mut Checker, interface: Interface) -> anyhow::Result<writer::
     trajectory
 }
 
-/// The libraries, and the interfaces that cannot be checked with the reason of each.
+/// Returns the setting, and the interface types that cannot be checked with the reason for each.
 fn setting(
     options: &Options,
     directory: &Path,
@@ -262,7 +263,7 @@ fn setting(
     (setting, without)
 }
 
-/// Handles all items, several at a time. After each, progress shows the line that `each` returns.
+/// Calls `each` with each item and the number of items so far, on several threads. With `progress`, prints the line that it returns.
 fn in_parallel<T: Sync>(items: &[T], progress: bool, each: impl Fn(&T, usize) -> String + Sync) {
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     std::thread::scope(|scope| {
@@ -283,7 +284,7 @@ fn in_parallel<T: Sync>(items: &[T], progress: bool, each: impl Fn(&T, usize) ->
     }
 }
 
-/// A check, for the simulations that it fits.
+/// Executes a check if it fits the simulation.
 fn attack_with(
     checker: &Checker,
     check: Check,
@@ -295,13 +296,13 @@ fn attack_with(
             check(checker, trajectory)
         }
         (Check::Malformed(rule, fits, write), Some(trajectory)) if fits.fit(checker, trajectory) => {
-            checks::hostile::all(checker, rule, write(checker, trajectory)?)
+            checks::malformed::all(checker, rule, write(checker, trajectory)?)
         }
         _ => Ok(()),
     }
 }
 
-/// All checks that are wanted, several at a time.
+/// Executes all checks of the wanted topics on several threads.
 fn attack(checker: &Checker, progress: bool, wanted: &(impl Fn(&str) -> bool + Sync)) -> anyhow::Result<()> {
     let wanted_checks = checks::ALL.iter().filter(|(topic, _)| wanted(topic));
     let jobs: Vec<_> = wanted_checks
@@ -319,9 +320,9 @@ fn attack(checker: &Checker, progress: bool, wanted: &(impl Fn(&str) -> bool + S
             }
             Err(error) => *failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error),
         }
-        let left = checker.deadline.saturating_duration_since(Instant::now()).as_secs();
-        let (all, played) = (jobs.len(), checker.played());
-        format!("{done} of {all} checks, {played} call sequences run, {left} s left: {topic:20}")
+        let remaining = checker.deadline.saturating_duration_since(Instant::now()).as_secs();
+        let (all, executed) = (jobs.len(), checker.executed());
+        format!("{done} of {all} checks, {executed} call sequences run, {remaining} s remaining: {topic:20}")
     });
     failure.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
 }
@@ -334,7 +335,7 @@ fn shorten(checker: &Checker, findings: &mut [Finding], options: &Options, progr
         if !options.no_shrink {
             checker.shorten(&mut finding);
         }
-        // If the run fails, the finding has no program.
+        // Without a successful run, the finding has no program.
         let _ = checker.reproduce(&mut finding);
         format!("the shortest calls for {count} findings: {:40}", finding.name)
     });

@@ -3,33 +3,33 @@
 use crate::rules;
 use std::path::PathBuf;
 
-/// How an FMU is checked.
+/// Options of a check, which are options of the command.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Options {
     /// Checks only these topics, with commas between: description, package, functions, start_values, life_cycle,
-    /// states, derivatives, dependencies, results, reset, refusals, logs, resources, hostile.
+    /// states, derivatives, dependencies, results, reset, rejections, logs, resources, malformed.
     #[arg(long, value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(rules::TOPICS))]
     pub only: Vec<String>,
     /// Succeeds without these topics and interfaces (co-simulation, model-exchange, scheduled-execution), with commas between.
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(
         rules::TOPICS.iter().chain(&INTERFACES)))]
     pub allow_unchecked: Vec<String>,
-    /// Seconds for all of it.
+    /// Maximum duration of the check in seconds.
     #[arg(long, default_value_t = 120.0)]
     pub time: f64,
-    /// Seconds for one sequence; longer is a hang.
+    /// Maximum duration of a call sequence in seconds; a longer one is a hang.
     #[arg(long, default_value_t = 10.0)]
     pub limit: f64,
     /// Megabytes of memory that the FMU may use.
     #[arg(long, default_value_t = 8192)]
     pub memory: u64,
-    /// Megabytes that the FMU may have when it is unpacked.
+    /// Maximum size of the unpacked FMU in megabytes.
     #[arg(long, default_value_t = 1000)]
     pub unpacked: u64,
     /// Seed of the random orders of calls.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Checks a part in 30 seconds at most: neither malformed calls nor resources, and fewer values and orders of calls.
+    /// Checks in at most 30 seconds, without malformed calls and resources, and with fewer values and orders of calls.
     #[arg(long, conflicts_with = "time")]
     pub quick: bool,
     /// Accepts the findings in this file, which has a line for each: NAME: REASON.
@@ -47,10 +47,10 @@ pub struct Options {
     /// Fails for findings of this severity and worse.
     #[arg(long, value_enum, default_value_t = FailOn::Violation)]
     pub fail_on: FailOn,
-    /// Seconds of each simulation that is repeated to find leaks.
+    /// Maximum duration in seconds of the repetitions that detect leaks.
     #[arg(long, default_value_t = 1.5)]
     pub repeat: f64,
-    /// Leaves sequences as long as they are.
+    /// Does not shorten call sequences.
     #[arg(long)]
     pub no_shrink: bool,
     /// Runs an FMU that starts another program, which must be installed.
@@ -61,15 +61,15 @@ pub struct Options {
 /// Lowest severity that fails the check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum FailOn {
-    /// The standard requires it.
+    /// Violations of the standard.
     Violation,
     /// Fragile findings and violations.
     Fragile,
-    /// Information.
+    /// All findings.
     Note,
-    /// Not at all.
+    /// No finding fails the check.
     Never,
 }
 
-/// The interfaces that an FMU may offer.
+/// Names of the interface types that an FMU may have.
 pub const INTERFACES: [&str; 3] = ["co-simulation", "model-exchange", "scheduled-execution"];

@@ -4,7 +4,7 @@
 use crate::finding::{Finding, Severity};
 use fmi_abi::Standard;
 
-/// The topics of the rules.
+/// Topics of the rules.
 pub const TOPICS: [&str; 14] = [
     "description",
     "package",
@@ -16,22 +16,22 @@ pub const TOPICS: [&str; 14] = [
     "dependencies",
     "results",
     "reset",
-    "refusals",
+    "rejections",
     "logs",
     "resources",
-    "hostile",
+    "malformed",
 ];
 
-/// A rule that the files of the FMU break, and the observation.
+/// Name of a rule that the files of the FMU break, and the observation.
 pub type Observation = (&'static str, String);
 
-/// All rules as a page.
+/// Page with all rules.
 const PAGE: &str = include_str!("../RULES.md");
 
 struct Rule {
-    /// Its name: the topic, a dot, the observation.
+    /// Topic, a dot, and the name within the topic.
     name: &'static str,
-    /// The requirement, the severities and, for some rules, a sentence of the standard.
+    /// Requirement, severities and, for some rules, a sentence of the standard.
     text: &'static str,
 }
 
@@ -126,7 +126,7 @@ mod tests {
             (three.severity, three.section.as_str()),
             (Severity::Violation, "FMI 3.0.2 section 2.3.1")
         );
-        let hang = broken(Fmi2, "hostile.times.hang", String::new());
+        let hang = broken(Fmi2, "malformed.times.hang", String::new());
         assert_eq!((hang.severity, hang.section.as_str()), (Severity::Fragile, ""));
     }
 
@@ -149,7 +149,7 @@ mod tests {
         assert!(explain("states.nothing").is_none());
     }
 
-    /// The sources of the checks name no rule that is not in the table.
+    /// Checks that the sources of the checks name only rules of the page.
     #[test]
     fn every_claim_is_a_rule() {
         let directory = concat!(env!("CARGO_MANIFEST_DIR"), "/src/checks");

@@ -1,30 +1,30 @@
-//! Plays call sequences in separate processes.
+//! Executes call sequences in separate processes.
 
 use crate::call_sequence::{CallSequence, End, Numbered, Outcome, Run, Setting, Step};
-use crate::worker::{Ended, Job, Last, OWN_FAULT, PLAYED, SCRATCH, Unloadable, VARIABLE, interrupted};
+use crate::worker::{EXECUTED, Ended, Job, Last, OWN_FAULT, SCRATCH, Unloadable, VARIABLE, interrupted};
 use anyhow::{Context as _, bail};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Processes that play call sequences.
+/// Starts the processes that execute call sequences.
 pub struct Workers {
-    /// The temporary directory of the check, for the files of processes.
+    /// Temporary directory of the check, for the files of the processes.
     scratch: PathBuf,
     #[cfg(target_os = "linux")]
     idle: std::sync::Mutex<HashMap<Situation, Vec<Server>>>,
 }
 
-/// Conditions that a process is started with: how many processes of its call sequence come before it, and whether
-/// libraries are bound at once.
+/// Number of processes of the call sequence before this one, and whether the loader resolves all symbols when it loads a
+/// library. Both set environment variables of the process.
 type Situation = (usize, bool);
 
-/// Reasons for which a check cannot go on.
+/// Reason for which a check cannot continue.
 #[derive(Debug)]
 pub enum Stop {
-    /// The time for all checks is over.
+    /// The deadline has passed.
     TimeOver,
-    /// This tool needs more memory than the FMU may use.
+    /// fmu-check needs more memory than the limit for the FMU.
     OutOfMemory,
     /// The user has interrupted the check.
     Interrupted,
@@ -42,25 +42,25 @@ impl std::fmt::Display for Stop {
 
 impl std::error::Error for Stop {}
 
-/// The command that starts this program as a worker.
+/// Returns the command that starts this program as a worker.
 fn worker(job: &Path, scratch: &Path, (phase, now): Situation) -> anyhow::Result<Command> {
     let mut command = Command::new(std::env::current_exe()?);
     command
         .env(VARIABLE, job)
         .env(SCRATCH, scratch)
-        // Uninitialized memory differs between the processes of a call sequence.
+        // The contents of uninitialized memory differ between the processes of a call sequence.
         .env("MALLOC_PERTURB_", (1 + phase * 90).to_string())
-        // Freed blocks that each thread keeps would count as in use (mallinfo2 of glibc).
+        // mallinfo2 of glibc counts freed blocks in the cache of a thread as allocated.
         .env("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0")
         .envs(now.then_some(("LD_BIND_NOW", "1")));
     Ok(command)
 }
 
 impl Workers {
-    /// Processes that are started when they are needed.
+    /// Starts the first server. Others are started when they are needed.
     ///
     /// # Errors
-    /// When the first of them cannot be started. It removes the temporary directory if this process is killed.
+    /// Fails if the server cannot be started. The server removes the temporary directory if this process is killed.
     pub fn new(scratch: PathBuf) -> anyhow::Result<Self> {
         Ok(Self {
             #[cfg(target_os = "linux")]
@@ -72,8 +72,8 @@ impl Workers {
         })
     }
 
-    /// Plays a call sequence, each part between fresh processes in a separate process, for `limit` seconds at most.
-    pub fn play(&self, setting: &Setting, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
+    /// Executes a call sequence with a limit in seconds for each process. Each `FreshProcess` step starts another process.
+    pub fn execute(&self, setting: &Setting, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
         let mut run = Run::default();
         let mut bytes = HashMap::new();
         for (phase, part) in sequence.split(|numbered| numbered.step == Step::FreshProcess).enumerate() {
@@ -87,7 +87,7 @@ impl Workers {
         Ok(run)
     }
 
-    /// Plays a job in a process that is forked for it.
+    /// Executes a job in a process that an idle server forks.
     #[cfg(target_os = "linux")]
     fn process(&self, job: &Job, situation: Situation, limit: f64) -> anyhow::Result<Ended> {
         let idle = || self.idle.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -96,19 +96,19 @@ impl Workers {
             Some(server) => server,
             None => Server::new(situation, &self.scratch)?,
         };
-        let played = server.play(&format!("{limit} {}\n", serde_json::to_string(job)?));
-        match played {
+        let result = server.execute(&format!("{limit} {}\n", serde_json::to_string(job)?));
+        match result {
             Ok(ended) => {
                 idle().entry(situation).or_default().push(server);
                 Ok(ended)
             }
-            // The library has ended the process that forks.
+            // The server has ended.
             Err(_) if interrupted() => Err(Stop::Interrupted.into()),
             Err(_) => Ok(Ended::from(server.0.wait()?)),
         }
     }
 
-    /// Plays a job in a process that is started for it: not every system can load every library after a fork.
+    /// Executes a job in a new process. Other systems than Linux cannot load every library after a fork.
     #[cfg(not(target_os = "linux"))]
     fn process(&self, job: &Job, situation: Situation, limit: f64) -> anyhow::Result<Ended> {
         use std::process::Stdio;
@@ -145,7 +145,7 @@ impl Workers {
     }
 }
 
-/// A process that forks one for each job.
+/// Process that forks a child process for each job.
 #[cfg(target_os = "linux")]
 struct Server(std::process::Child);
 
@@ -159,7 +159,7 @@ impl Server {
         Ok(Self(command.spawn().context("a process for the FMU cannot be started")?))
     }
 
-    fn play(&mut self, job: &str) -> anyhow::Result<Ended> {
+    fn execute(&mut self, job: &str) -> anyhow::Result<Ended> {
         use std::io::{BufRead as _, Write as _};
         let (input, output) = self.0.stdin.as_mut().zip(self.0.stdout.as_mut()).context("no pipes")?;
         input.write_all(job.as_bytes())?;
@@ -177,12 +177,12 @@ impl Server {
 #[cfg(target_os = "linux")]
 impl Drop for Server {
     fn drop(&mut self) {
-        // Waiting closes its input, which ends it.
+        // `wait` closes the input of the server, which ends it.
         let _ = self.0.wait();
     }
 }
 
-/// Reads the outcomes of a process, and returns the bytes that it has serialized.
+/// Adds the outcomes of a process to `run`, and returns the serialized states.
 fn read(
     sequence: &[Numbered],
     ended: Ended,
@@ -190,7 +190,7 @@ fn read(
     run: &mut Run,
 ) -> anyhow::Result<HashMap<usize, Vec<u8>>> {
     run.output.push_str(&ended.output);
-    run.left.extend(ended.left);
+    run.orphans.extend(ended.orphans);
     let mut last = None;
     for line in ended.outcomes.lines() {
         if let Ok(outcome) = serde_json::from_str::<Outcome>(line) {
@@ -202,10 +202,10 @@ fn read(
             return Ok(HashMap::new());
         }
     }
-    if let Some(bytes) = last.filter(|_| ended.code == Some(PLAYED)) {
+    if let Some(bytes) = last.filter(|_| ended.code == Some(EXECUTED)) {
         return Ok(bytes);
     }
-    // Abort messages of the Rust and C libraries, after a failure that is not in the FMU.
+    // These are messages of fmu-check: a failed allocation of Rust, and of a guarded array.
     let no_memory = ["memory allocation of", "no memory for an array"];
     if !ended.inside && no_memory.iter().any(|text| run.output.contains(text)) {
         return Err(Stop::OutOfMemory.into());
@@ -228,13 +228,13 @@ fn read(
 fn crash(code: Option<i32>, signal: Option<i32>, output: &str) -> String {
     #[cfg(unix)]
     let signals = [
-        (libc::SIGSEGV, "SIGSEGV: it touched memory that is not its own"),
-        (libc::SIGBUS, "SIGBUS: it touched memory that is not its own"),
-        (libc::SIGABRT, "SIGABRT: it ended itself"),
-        (libc::SIGFPE, "SIGFPE: a division by zero"),
-        (libc::SIGILL, "SIGILL: no instruction"),
-        (libc::SIGKILL, "SIGKILL: killed by itself, or for want of memory"),
-        (libc::SIGSYS, "SIGSYS: it sent a signal to processes that are not its own"),
+        (libc::SIGSEGV, "SIGSEGV: invalid memory access"),
+        (libc::SIGBUS, "SIGBUS: misaligned access or access beyond the end of a mapped file"),
+        (libc::SIGABRT, "SIGABRT: abort() was called"),
+        (libc::SIGFPE, "SIGFPE: integer division by zero or overflow, or a trapped floating-point exception"),
+        (libc::SIGILL, "SIGILL: illegal instruction"),
+        (libc::SIGKILL, "SIGKILL: killed by the process itself or by the out-of-memory killer"),
+        (libc::SIGSYS, "SIGSYS: it sent a signal to processes outside of its session"),
         (libc::SIGXFSZ, "SIGXFSZ: it wrote more than 1 GiB to a file"),
     ];
     #[cfg(not(unix))]

@@ -1,11 +1,11 @@
-//! The shortest sequence of calls that still shows a finding.
+//! Shortens the call sequence of a finding.
 
 use crate::call_sequence::{CallSequence, Numbered, Step, all_steps};
 use crate::description::Description;
 use crate::legal::first_illegal;
 use std::collections::HashMap;
 
-/// Returns groups of calls that are only left out together.
+/// Returns groups of calls that are only removed together.
 fn units(sequence: &[Numbered]) -> Vec<Vec<u32>> {
     let (mut units, mut open, mut before) = (Vec::<Vec<u32>>::new(), false, "");
     for numbered in sequence {
@@ -30,7 +30,7 @@ fn units(sequence: &[Numbered]) -> Vec<Vec<u32>> {
     units
 }
 
-/// A key of a step without its instance; `None` for calls that only read.
+/// Returns a key of a call, which does not contain the instance; `None` for calls that only read and other steps.
 fn content(step: &Step) -> Option<String> {
     match step {
         Step::Call { function, args, .. } => {
@@ -42,7 +42,7 @@ fn content(step: &Step) -> Option<String> {
     }
 }
 
-/// A sequence without some calls, also of its threads.
+/// Returns the sequence without the steps that have these numbers, also in its threads.
 fn without(sequence: &[Numbered], ids: &[u32]) -> CallSequence {
     let kept = sequence.iter().filter(|numbered| !ids.contains(&numbered.id)).cloned();
     kept.map(|mut numbered| {
@@ -54,7 +54,7 @@ fn without(sequence: &[Numbered], ids: &[u32]) -> CallSequence {
     .collect()
 }
 
-/// Removes corresponding units of compared simulations together: a simulation that lacks a call would differ for that reason only.
+/// Joins corresponding units of compared simulations. If one simulation lacked a call, its results would differ for that reason.
 fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
     let contents: HashMap<u32, String> = all_steps(sequence)
         .into_iter()
@@ -72,14 +72,14 @@ fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
     groups.into_iter().map(|(_, ids)| ids).collect()
 }
 
-/// Leaves out the calls that are not needed for `shows` to hold, as long as the standard allows the rest. Calls of `pinned`
-/// functions stay; corresponding calls of compared simulations are left out together.
+/// Removes calls that `reproduces` does not need, if the standard allows the remaining calls. Calls of `pinned` functions are not
+/// removed; with `compared`, corresponding calls of compared simulations are removed together.
 pub fn shrink(
     description: &Description,
     sequence: &CallSequence,
     pinned: &[&str],
     compared: bool,
-    mut shows: impl FnMut(&CallSequence) -> bool,
+    mut reproduces: impl FnMut(&CallSequence) -> bool,
 ) -> CallSequence {
     let legal = first_illegal(description, sequence).is_none();
     let mut best = sequence.clone();
@@ -107,7 +107,7 @@ pub fn shrink(
             let begin = end.saturating_sub(size);
             let tried = without(&best, &units[begin..end].concat());
             let keeps = !legal || first_illegal(description, &tried).is_none();
-            if keeps && all_steps(&tried).len() < all_steps(&best).len() && shows(&tried) {
+            if keeps && all_steps(&tried).len() < all_steps(&best).len() && reproduces(&tried) {
                 best = tried;
                 units.drain(begin..end);
                 shorter = true;
@@ -161,7 +161,7 @@ mod tests {
     fn what_is_left_is_needed_and_legal() {
         let (description, trajectory) = (description(), trajectory());
         let mut writer = Writer::new(&description, &trajectory, &[0]);
-        writer.play(0, WHOLE);
+        writer.write(0, WHOLE);
         let short =
             shrink(&description, &writer.sequence, &[], false, |tried| count(tried, "fmi2DoStep") >= 2);
         let calls = ["the instantiation", "fmi2SetupExperiment", "fmi2EnterInitializationMode"];
@@ -174,26 +174,26 @@ mod tests {
     fn nothing_is_left_out_that_is_pinned() {
         let (description, trajectory) = (description(), trajectory());
         let mut writer = Writer::new(&description, &trajectory, &[0]);
-        writer.play(0, WHOLE);
+        writer.write(0, WHOLE);
         let short = shrink(&description, &writer.sequence, &["SetReal"], false, |_| true);
         assert_eq!((count(&short, "fmi2SetReal"), count(&short, "fmi2DoStep")), (6, 0));
     }
 
-    /// A simulation that is compared with others on threads loses no call that these keep.
+    /// Checks that a call is removed from all compared simulations or from none.
     #[test]
     fn compared_simulations_stay_alike() {
         let (description, trajectory) = (description(), trajectory());
         let mut writer = Writer::new(&description, &trajectory, &[0]);
-        writer.play(0, WHOLE);
+        writer.write(0, WHOLE);
         let mut thread = Writer { next: writer.next, ..Writer::new(&description, &trajectory, &[0]) };
-        thread.play(1, WHOLE);
+        thread.write(1, WHOLE);
         writer.next = thread.next;
         writer.add(Step::Parallel(vec![thread.sequence]));
         let parallel = |sequence: &CallSequence| {
             matches!(sequence.last(), Some(Numbered { step: Step::Parallel(_), .. }))
         };
-        let shows = |tried: &CallSequence| parallel(tried) && count(tried, "fmi2DoStep") >= 4;
-        let short = shrink(&description, &writer.sequence, &[], true, shows);
+        let reproduces = |tried: &CallSequence| parallel(tried) && count(tried, "fmi2DoStep") >= 4;
+        let short = shrink(&description, &writer.sequence, &[], true, reproduces);
         let Some(Step::Parallel(threads)) = short.last().map(|numbered| &numbered.step) else {
             panic!("{short:?}")
         };

@@ -1,4 +1,4 @@
-//! Finds a simulation that succeeds by trying it. All checks are variations of it.
+//! Finds a successful simulation, which most checks vary.
 
 use crate::call_sequence::{CallSequence, End, Run, Step, Values, step_of};
 use crate::checker::Checker;
@@ -9,13 +9,13 @@ use crate::writer::{Part, Point, Trajectory, Writer};
 use fmi_abi::Interface;
 use std::time::{Duration, Instant};
 
-/// Longest time of a simulation with long steps: checks repeat the simulation many times.
+/// Maximum duration of a simulation with long steps, because checks repeat the simulation many times.
 const LONG: Duration = Duration::from_millis(250);
 
-/// Updates of the discrete states that an event may need.
+/// Maximum number of updates of the discrete states in an event.
 const UPDATES: usize = 10;
 
-/// The reason for which a simulation fails, and its calls.
+/// Reason for which a simulation fails, and its call sequence.
 #[derive(Debug)]
 pub struct NoTrajectory(pub String, pub CallSequence);
 
@@ -27,11 +27,11 @@ impl std::fmt::Display for NoTrajectory {
 
 impl std::error::Error for NoTrajectory {}
 
-/// A simulation that succeeds: in Co-Simulation steps with changing inputs, in Model Exchange an integration by Euler's
-/// method with its events.
+/// Returns a successful simulation: in Co-Simulation steps with changing inputs, in Model Exchange an integration by Euler's
+/// method with events.
 ///
 /// # Errors
-/// [`NoTrajectory`] when there is none, and any other that ends the check.
+/// Fails with [`NoTrajectory`] if no simulation succeeds, or with [`Stop`](crate::run::Stop).
 pub fn find_trajectory(checker: &Checker, interface: Interface) -> anyhow::Result<Trajectory> {
     let start = checker.description.start_time;
     let trajectory = Trajectory { interface, updates: 0, points: Vec::new(), end: start };
@@ -42,29 +42,30 @@ pub fn find_trajectory(checker: &Checker, interface: Interface) -> anyhow::Resul
     }
 }
 
-/// The time from the start to the end of the default experiment.
+/// Returns the duration of the default experiment; 1 s if it has no stop time.
 fn range(description: &Description) -> f64 {
     description.stop_time.map_or(1.0, |stop| stop - description.start_time).max(1e-6)
 }
 
-/// Returns the step size, a multiple of the solver's (section 4.4.1 of FMI 3.0).
+/// Returns the step size, a multiple of `fixedInternalStepSize` if there is one (section 4.4.1 of FMI 3.0).
 fn step_size(description: &Description) -> f64 {
     let size = description.step_size.unwrap_or(range(description) / 100.0);
     let internal = description.co_simulation.as_ref().and_then(|offer| offer.number("fixedInternalStepSize"));
     internal.map_or(size, |internal| internal * (size / internal).round().clamp(1.0, 100.0))
 }
 
-/// Returns the trajectory up to the points whose calls succeed.
-fn up_to(mut trajectory: Trajectory, good: usize) -> Trajectory {
-    trajectory.points.truncate(good);
+/// Returns the trajectory of the first `succeeded` points.
+fn up_to(mut trajectory: Trajectory, succeeded: usize) -> Trajectory {
+    trajectory.points.truncate(succeeded);
     if let Some(last) = trajectory.points.last() {
         trajectory.end = last.time + last.size;
     }
     trajectory
 }
 
-/// Finds steps of two sizes to the end of the default experiment if the FMU allows it and that is fast; otherwise
-/// of one size. If steps with changes of Booleans fail, the Booleans are constant.
+/// Finds successful steps without Event Mode. The attempts, in this order, are steps of two sizes to the end of the default
+/// experiment, if the FMU allows several sizes and is fast enough, and steps of one size. In a second attempt with either,
+/// Booleans are constant.
 fn in_steps(checker: &Checker, trajectory: Trajectory) -> anyhow::Result<Trajectory> {
     let description = &checker.description;
     let size = step_size(description);
@@ -78,18 +79,18 @@ fn in_steps(checker: &Checker, trajectory: Trajectory) -> anyhow::Result<Traject
         let points = steps(description, description.start_time, &sizes, discrete);
         let trajectory = Trajectory { points, ..trajectory.clone() };
         let mut writer = checker.writer(&trajectory);
-        let ids = writer.play(0, &[Part::Begin, Part::Points(usize::MAX)]).ids;
+        let ids = writer.write(0, &[Part::Begin, Part::Points(usize::MAX)]).ids;
         let begin = Instant::now();
-        let run = checker.play(&writer.sequence)?;
+        let run = checker.execute(&writer.sequence)?;
         if reach > 1.0 && (run.end != End::Done || begin.elapsed() > LONG) {
             continue;
         }
         made(&run, &writer, ids[0])?;
-        let (good, discarded) = good_steps(checker, &run, &writer.sequence);
+        let (succeeded, discarded) = successful_steps(checker, &run, &writer.sequence);
         match failure(&writer.sequence, &run, &ids) {
-            None => return Ok(up_to(trajectory, good)),
-            // A model may end its simulation.
-            Some(_) if discarded && good >= 2 => return Ok(up_to(trajectory, good)),
+            None => return Ok(up_to(trajectory, succeeded)),
+            // The model ends its simulation.
+            Some(_) if discarded && succeeded >= 2 => return Ok(up_to(trajectory, succeeded)),
             Some(why) if !discrete && reach == 1.0 => return Err(NoTrajectory(why, writer.sequence).into()),
             Some(_) => {}
         }
@@ -97,24 +98,25 @@ fn in_steps(checker: &Checker, trajectory: Trajectory) -> anyhow::Result<Traject
     Ok(trajectory)
 }
 
-/// The number of steps before one that fails or ends the simulation, and whether one was discarded.
-fn good_steps(checker: &Checker, run: &Run, sequence: &CallSequence) -> (usize, bool) {
+/// Returns the number of steps before the first that fails, has an event, returns early or ends the simulation, and whether that
+/// step returned Discard.
+fn successful_steps(checker: &Checker, run: &Run, sequence: &CallSequence) -> (usize, bool) {
     let step = |step: &Step| matches!(step, Step::Call { function, .. } if function.ends_with("DoStep"));
     let ids = sequence.iter().filter(|numbered| step(&numbered.step)).map(|numbered| numbered.id);
-    let mut good = 0;
+    let mut succeeded = 0;
     for id in ids {
         let flags = run.outcome(id).map_or(&[][..], |outcome| &outcome.written);
         let flag = |index: usize| flags.get(index).is_some_and(|flag| flag.numbers().first() == Some(&1.0));
-        // A step that returns early counts as failed: the next step would have to begin at lastSuccessfulTime.
+        // After an early return, the next step would have to begin at lastSuccessfulTime.
         if run.status(id).is_none_or(|status| status > 1) || checker.fmi3() && (0..3).any(flag) {
-            return (good, run.status(id) == Some(2));
+            return (succeeded, run.status(id) == Some(2));
         }
-        good += 1;
+        succeeded += 1;
     }
-    (good, false)
+    (succeeded, false)
 }
 
-/// Fails if a run has crashed or hung, or its instantiation has failed.
+/// Fails if the process ended before the last step or the instantiation failed.
 fn made(run: &Run, writer: &Writer, make: u32) -> anyhow::Result<()> {
     match ending(run, &writer.sequence).or_else(|| failure_of(&writer.sequence, run, make)) {
         Some(why) => Err(NoTrajectory(why, writer.sequence.clone()).into()),
@@ -122,14 +124,14 @@ fn made(run: &Run, writer: &Writer, make: u32) -> anyhow::Result<()> {
     }
 }
 
-/// Counts the updates that the initialization needs, and returns the event after them.
+/// Sets the number of updates that the initialization needs; returns the result of the last update.
 fn initialized(checker: &Checker, trajectory: &mut Trajectory) -> anyhow::Result<Option<Event>> {
     for updates in 1..=UPDATES {
         trajectory.updates = updates;
         let mut writer = checker.writer(trajectory);
         let parts = [Part::Make, Part::Enter, Part::Call("ExitInitializationMode"), Part::Update(updates)];
-        let ids = writer.play(0, &parts).ids;
-        let run = checker.play(&writer.sequence)?;
+        let ids = writer.write(0, &parts).ids;
+        let run = checker.execute(&writer.sequence)?;
         made(&run, &writer, ids[0])?;
         if let Some(why) = failure(&writer.sequence, &run, &ids[1..]) {
             return Err(NoTrajectory(why, writer.sequence).into());
@@ -142,26 +144,26 @@ fn initialized(checker: &Checker, trajectory: &mut Trajectory) -> anyhow::Result
     Ok(None)
 }
 
-/// The results at a point.
+/// Results at a point.
 #[derive(Default)]
 struct Reached {
     states: Vec<f64>,
     slopes: Vec<f64>,
     indicators: Vec<f64>,
-    /// The event there, if there was one.
+    /// Result of the last update of the discrete states at the point.
     event: Option<Event>,
-    /// The model ends the simulation, or the step returns early.
+    /// Whether the model ends the simulation or the step returns early.
     ends: bool,
 }
 
-/// Adds a point to a trajectory, with as many updates as an event there needs; `None` if a call there fails after some
-/// points.
+/// Executes the trajectory and the point after it, and sets the number of updates that an event at the point needs. Returns `None`
+/// if a call fails after at least three points.
 fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> anyhow::Result<Option<Reached>> {
     let count = checker.description.states_count().unwrap_or(0);
     let indicators = checker.description.event_indicators.unwrap_or(0);
     loop {
         let mut writer = checker.writer(trajectory);
-        let before = writer.play(0, &[Part::Begin, Part::Points(usize::MAX)]).ids;
+        let before = writer.write(0, &[Part::Begin, Part::Points(usize::MAX)]).ids;
         let here = writer.point(0, point);
         let vectors = [
             ("GetContinuousStates", count),
@@ -171,7 +173,7 @@ fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> any
         let read =
             |(name, count)| (count > 0 && !trajectory.is_stepped()).then(|| writer.vector(0, name, count));
         let vectors = vectors.map(read);
-        let run = checker.play(&writer.sequence)?;
+        let run = checker.execute(&writer.sequence)?;
         made(&run, &writer, before[0])?;
         if let Some(why) = failure(&writer.sequence, &run, &[&before[1..], &here].concat()) {
             let few = trajectory.points.len() < 3;
@@ -181,7 +183,7 @@ fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> any
             let name = step_of(&writer.sequence, **id).map(|numbered| step_name(&numbered.step));
             name.is_some_and(|name| name.ends_with("DoStep") || name.ends_with("CompletedIntegratorStep"))
         };
-        // The flags for an event, the end of the simulation and, in Co-Simulation, an early return.
+        // The results are flags for an event, the end of the simulation and, in Co-Simulation, an early return.
         let outputs = here
             .iter()
             .find(advances)
@@ -205,7 +207,7 @@ fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> any
     }
 }
 
-/// Finds steps of Co-Simulation with Event Mode, and handles the events that the steps report.
+/// Finds successful steps of Co-Simulation with Event Mode, and handles the events that they report.
 fn with_events(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<Trajectory> {
     initialized(checker, &mut trajectory)?;
     let description = &checker.description;
@@ -220,8 +222,8 @@ fn with_events(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<
     Ok(trajectory)
 }
 
-/// Integrates by Euler's method: first every point, then some up to the end of the default experiment, and those
-/// with events.
+/// Integrates by Euler's method up to the end of the default experiment. The trajectory has the first points, then every
+/// twentieth and the points with events.
 fn integrated(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<Trajectory> {
     let description = &checker.description;
     let (count, range) = (description.states_count().unwrap_or(0), range(description));

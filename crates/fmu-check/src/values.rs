@@ -1,11 +1,11 @@
-//! Values for variables: within their ranges, near their start values or other than these.
+//! Values for variables, within their ranges and near their start values or different from them.
 
 use crate::call_sequence::Values;
 use crate::description::{Description, Variable, kind_of};
 use fmi_abi::BaseType;
 
-/// Values other than the start value that a variable can take: a non-ASCII string, bytes with NULs, the next
-/// number, the other boolean value.
+/// Returns values of a variable that differ from its start values: near numbers, the next or previous integer, the other Boolean,
+/// a non-ASCII string, or bytes with NULs. Returns `None` if no such value is within the range.
 pub fn other_values(description: &Description, index: usize) -> Option<Values> {
     let variable = &description.variables[index];
     let (starts, size) = (variable.starts(), variable.start.len());
@@ -33,7 +33,7 @@ pub fn other_values(description: &Description, index: usize) -> Option<Values> {
     })
 }
 
-/// Values for inputs: near their start values, within their ranges.
+/// Returns values for at most 1000 inputs, near their start values and within their ranges; with `discrete`, also for Booleans.
 pub fn input_values(description: &Description, phase: usize, discrete: bool) -> Vec<(usize, Values)> {
     let mut values = Vec::new();
     for (index, variable) in description.variables.iter().enumerate() {
@@ -62,7 +62,7 @@ pub fn input_values(description: &Description, phase: usize, discrete: bool) -> 
     values
 }
 
-/// Returns a number near the start value and within the range: the difference is this part of the range or the nominal value.
+/// Returns a number within the range that differs from the start value by at most `by` times the range or the nominal value.
 pub fn near(variable: &Variable, start: f64, by: f64) -> f64 {
     let range = variable.min.zip(variable.max).map(|(min, max)| max - min).filter(|range| range.is_finite());
     let scale = range.unwrap_or(f64::INFINITY).min(variable.nominal.max(start.abs().min(1e6)));

@@ -1,4 +1,4 @@
-//! Writes call sequences: the calls of an importer that follows the standard, with the numbers of this FMU.
+//! Writes call sequences of an importer that follows the standard.
 
 use crate::call_sequence::{Arg, CallSequence, Kind, Make, Numbered, Run, Step, Values};
 use crate::description::{Description, kind_of, type_name};
@@ -6,7 +6,7 @@ use crate::finding::status_name;
 use fmi_abi::calls::signatures;
 use fmi_abi::{Interface, Standard};
 
-/// A read: the number of the step, and the indices of the variables with the number of values of each.
+/// Step that reads variables: its number, and the index and the number of values of each variable.
 #[derive(Clone, Debug)]
 pub struct Read {
     pub id: u32,
@@ -23,51 +23,51 @@ impl Read {
     }
 }
 
-/// One point of a trajectory.
+/// Point of a trajectory.
 #[derive(Clone, Debug, Default)]
 pub struct Point {
-    /// Time at which the step begins; in Model Exchange the time at which states are set.
+    /// Time at which the step begins; in Model Exchange the time that is set.
     pub time: f64,
-    /// How long it is.
+    /// Step size; in Model Exchange the time since the point before.
     pub size: f64,
-    /// Values that are set before the step.
+    /// Inputs that are set before the step, by the indices of their variables.
     pub inputs: Vec<(usize, Values)>,
     /// Continuous states that are set in Model Exchange.
     pub states: Vec<f64>,
-    /// Number of updates of the discrete states in an event at this point; 0 if there is no event.
+    /// Number of updates of the discrete states in an event at this point; 0 without an event.
     pub updates: usize,
 }
 
-/// A simulation that goes well, as data.
+/// Times, inputs and states of a successful simulation.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
     pub interface: Interface,
-    /// Updates of the discrete states after the initialization.
+    /// Number of updates of the discrete states after the initialization.
     pub updates: usize,
     pub points: Vec<Point>,
-    /// The time at the end.
+    /// Time at the end.
     pub end: f64,
 }
 
 impl Trajectory {
-    /// Whether steps of Co-Simulation advance the time.
+    /// Returns whether the interface type is Co-Simulation.
     pub fn is_stepped(&self) -> bool {
         self.interface == Interface::CoSimulation
     }
 }
 
-/// A part of a simulation.
+/// Part of a simulation.
 #[derive(Clone, Copy, Debug)]
 pub enum Part {
     Make,
     Enter,
-    /// Leaves it for the mode in which time advances.
+    /// Leaves Initialization Mode for the mode in which time advances.
     Leave,
     /// Instantiates and initializes.
     Begin,
-    /// Goes through the first points of the trajectory, at most this many.
+    /// Simulates the first points of the trajectory, at most this many.
     Points(usize),
-    /// Goes from this point to the end, and reads after each.
+    /// Simulates from this point to the end, and reads the variables and vectors after each point.
     Run(usize),
     Read,
     /// Reads the variables and vectors.
@@ -76,34 +76,34 @@ pub enum Part {
     Call(&'static str),
     /// Updates the discrete states this many times.
     Update(usize),
-    /// Saves the state in a slot.
+    /// Saves the state with this index.
     Save(usize),
     Restore(usize),
-    /// Frees the saved state.
+    /// Frees the saved state with this index.
     Drop(usize),
     Free,
 }
 
-/// Numbers of the calls that were written, and the reads.
+/// Numbers of calls that were written, and the reads.
 #[derive(Clone, Default)]
-pub struct Played {
-    /// Calls other than those that read.
+pub struct Calls {
+    /// Numbers of the calls that read nothing.
     pub ids: Vec<u32>,
-    /// Calls that read.
+    /// Calls that read variables.
     pub reads: Vec<Read>,
 }
 
-/// Writes a sequence.
+/// Writer of a call sequence.
 pub struct Writer<'a> {
     pub description: &'a Description,
-    /// The simulation that the sequence varies.
+    /// Simulation that the sequence varies.
     pub trajectory: &'a Trajectory,
-    /// The variables that are read.
+    /// Indices of the variables that are read.
     pub readable: &'a [usize],
-    /// The steps so far.
+    /// Steps that were written.
     pub sequence: CallSequence,
     pub next: u32,
-    /// Whether the steps that follow are forbidden by the standard.
+    /// Whether the standard forbids the next steps.
     pub forbidden: bool,
 }
 
@@ -123,19 +123,19 @@ impl<'a> Writer<'a> {
         id
     }
 
-    /// Name of a function that is given without `fmi2` or `fmi3`. FMI 2.0 spells `FMUState` with another case.
+    /// Returns the name of a function with its prefix and, for FMI 2.0, with `FMUstate` instead of `FMUState`.
     fn named(&self, function: &str) -> String {
         let mut all = signatures(self.description.standard).iter().map(|signature| signature.rule.name);
         let name = all.find(|name| name[4..].eq_ignore_ascii_case(function));
         name.map_or_else(|| function.to_owned(), str::to_owned)
     }
 
-    /// Adds a call of a function, named without `fmi2` or `fmi3`.
+    /// Adds a call of a function, which is named without `fmi2` or `fmi3`.
     pub fn call(&mut self, instance: usize, function: &str, args: Vec<Arg>) -> u32 {
         self.add(Step::Call { instance: Some(instance), function: self.named(function), args })
     }
 
-    /// A call that the standard forbids, or whose arguments it forbids.
+    /// Adds a call that the standard forbids, or whose arguments it forbids.
     pub fn forbidden(&mut self, instance: Option<usize>, function: &str, args: Vec<Arg>) -> u32 {
         let before = std::mem::replace(&mut self.forbidden, true);
         let id = self.add(Step::Call { instance, function: self.named(function), args });
@@ -143,47 +143,47 @@ impl<'a> Writer<'a> {
         id
     }
 
-    pub fn play(&mut self, instance: usize, parts: &[Part]) -> Played {
-        let mut played = Played::default();
+    pub fn write(&mut self, instance: usize, parts: &[Part]) -> Calls {
+        let mut calls = Calls::default();
         let points = &self.trajectory.points;
         for part in parts {
             match *part {
-                Part::Make => played.ids.push(self.make(instance)),
-                Part::Enter => played.ids.push(self.enter(instance)),
-                Part::Leave => played.ids.extend(self.leave(instance)),
-                Part::Begin => played.ids.extend(self.begin(instance)),
+                Part::Make => calls.ids.push(self.make(instance)),
+                Part::Enter => calls.ids.push(self.enter(instance)),
+                Part::Leave => calls.ids.extend(self.leave(instance)),
+                Part::Begin => calls.ids.extend(self.begin(instance)),
                 Part::Points(most) => {
-                    played.ids.extend(points.iter().take(most).flat_map(|point| self.point(instance, point)));
+                    calls.ids.extend(points.iter().take(most).flat_map(|point| self.point(instance, point)));
                 }
                 Part::Run(from) => {
                     for point in &points[from..] {
-                        played.ids.extend(self.point(instance, point));
-                        played.reads.extend(self.read_all(instance));
+                        calls.ids.extend(self.point(instance, point));
+                        calls.reads.extend(self.read_all(instance));
                     }
                 }
-                Part::Read => played.reads.extend(self.read(instance)),
-                Part::ReadAll => played.reads.extend(self.read_all(instance)),
-                Part::Call(function) => played.ids.push(self.call(instance, function, vec![])),
-                Part::Update(times) => played.ids.extend(self.update(instance, times)),
+                Part::Read => calls.reads.extend(self.read(instance)),
+                Part::ReadAll => calls.reads.extend(self.read_all(instance)),
+                Part::Call(function) => calls.ids.push(self.call(instance, function, vec![])),
+                Part::Update(times) => calls.ids.extend(self.update(instance, times)),
                 Part::Save(slot) => {
-                    played.ids.push(self.call(instance, "GetFMUState", vec![Arg::StateOut(slot)]))
+                    calls.ids.push(self.call(instance, "GetFMUState", vec![Arg::StateOut(slot)]))
                 }
                 Part::Restore(slot) => {
-                    played.ids.push(self.call(instance, "SetFMUState", vec![Arg::State(slot)]))
+                    calls.ids.push(self.call(instance, "SetFMUState", vec![Arg::State(slot)]))
                 }
                 Part::Drop(slot) => {
-                    played.ids.push(self.call(instance, "FreeFMUState", vec![Arg::StateOut(slot)]))
+                    calls.ids.push(self.call(instance, "FreeFMUState", vec![Arg::StateOut(slot)]))
                 }
-                Part::Free => played.ids.push(self.free(instance)),
+                Part::Free => calls.ids.push(self.free(instance)),
             }
         }
-        played
+        calls
     }
 
     /// Writes parts of a simulation, and returns the reads of each part that reads.
     pub fn groups<const N: usize>(&mut self, instance: usize, parts: &[Part]) -> [Vec<Read>; N] {
         let groups = parts.iter().filter_map(|part| {
-            let reads = self.play(instance, &[*part]).reads;
+            let reads = self.write(instance, &[*part]).reads;
             matches!(part, Part::Read | Part::ReadAll | Part::Run(_)).then_some(reads)
         });
         let groups: Vec<Vec<Read>> = groups.collect();
@@ -221,7 +221,7 @@ impl<'a> Writer<'a> {
         self.enter_with(instance, None, self.description.start_time, None)
     }
 
-    /// Sets tolerance, start time and stop time.
+    /// Enters Initialization Mode with a tolerance, a start time and a stop time.
     pub fn enter_with(
         &mut self,
         instance: usize,
@@ -243,7 +243,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// Writes this many updates of the discrete states; returns their numbers.
+    /// Writes updates of the discrete states; returns the numbers of the calls.
     pub fn update(&mut self, instance: usize, times: usize) -> Vec<u32> {
         let (name, args) = match self.fmi3() {
             true => {
@@ -251,13 +251,13 @@ impl<'a> Writer<'a> {
                 args.push(Arg::Out(Kind::F64, 1));
                 ("UpdateDiscreteStates", args)
             }
-            // The five flags and the time of fmi2EventInfo, with the gap that C leaves between them.
+            // fmi2EventInfo has five flags, padding and the time.
             false => ("NewDiscreteStates", vec![Arg::Out(Kind::U64, 4)]),
         };
         (0..times).map(|_| self.call(instance, name, args.clone())).collect()
     }
 
-    /// The event at a point: enters Event Mode, updates the discrete states and goes back.
+    /// Writes an event: enters Event Mode, updates the discrete states and returns to the mode before.
     pub fn event(&mut self, instance: usize, updates: usize) -> Vec<u32> {
         let mut ids = vec![self.call(instance, "EnterEventMode", vec![])];
         ids.extend(self.update(instance, updates));
@@ -265,7 +265,7 @@ impl<'a> Writer<'a> {
         ids
     }
 
-    /// Goes from Event Mode back to the mode in which time advances.
+    /// Leaves Event Mode for the mode in which time advances.
     fn resume(&mut self, instance: usize) -> u32 {
         let stepped = self.trajectory.is_stepped();
         self.call(instance, if stepped { "EnterStepMode" } else { "EnterContinuousTimeMode" }, vec![])
@@ -288,7 +288,7 @@ impl<'a> Writer<'a> {
         ids
     }
 
-    /// The positions of the variables of each type, in the order of the first of each.
+    /// Returns the positions of the variables of each type in `indices`, with the name and the C type of the type.
     fn by_type(&self, indices: &[usize]) -> Vec<(&'static str, Kind, Vec<usize>)> {
         let standard = self.description.standard;
         let mut groups: Vec<(&str, Kind, Vec<usize>)> = Vec::new();
@@ -308,7 +308,7 @@ impl<'a> Writer<'a> {
         u64::from(self.description.variables[index].reference)
     }
 
-    /// Sets values: a call for each type.
+    /// Sets values with a call for each type.
     pub fn set(&mut self, instance: usize, values: &[(usize, Values)]) -> Vec<u32> {
         let indices: Vec<usize> = values.iter().map(|(index, _)| *index).collect();
         let mut ids = Vec::new();
@@ -342,7 +342,7 @@ impl<'a> Writer<'a> {
         self.set(instance, &[(index, Values::new(self.description.kind(index), numbers.iter().copied()))])
     }
 
-    /// Reads the variables at these indices: a call for each type.
+    /// Reads the variables at these indices with a call for each type.
     pub fn read_these(&mut self, instance: usize, indices: &[usize]) -> Vec<Read> {
         let mut reads = Vec::new();
         for (name, kind, positions) in self.by_type(indices) {
@@ -362,7 +362,8 @@ impl<'a> Writer<'a> {
         self.read_these(instance, self.readable)
     }
 
-    /// Takes the step of a point in Co-Simulation; sets time, states and inputs in Model Exchange.
+    /// Writes a point: in Co-Simulation sets inputs and advances a step; in Model Exchange sets time, states and inputs. Then writes
+    /// the event at the point.
     pub fn point(&mut self, instance: usize, point: &Point) -> Vec<u32> {
         let mut ids = Vec::new();
         if self.trajectory.is_stepped() {
@@ -396,7 +397,7 @@ impl<'a> Writer<'a> {
         )
     }
 
-    /// Reads a vector of so many numbers.
+    /// Reads a vector of `count` numbers.
     pub fn vector(&mut self, instance: usize, function: &str, count: usize) -> u32 {
         self.call(instance, function, vec![Arg::Out(Kind::F64, count), Arg::Whole(count as i64)])
     }
@@ -423,7 +424,7 @@ impl<'a> Writer<'a> {
         reads
     }
 
-    /// Serializes a saved state: the size, the bytes.
+    /// Serializes a saved state; returns the numbers of the calls for the size and for the bytes.
     pub fn serialize(&mut self, instance: usize, slot: usize) -> [u32; 2] {
         let bytes = vec![Arg::State(slot), Arg::SavedOut(slot), Arg::SavedSize(slot)];
         [
@@ -432,7 +433,7 @@ impl<'a> Writer<'a> {
         ]
     }
 
-    /// Makes a state of the bytes.
+    /// Deserializes the bytes at the index `bytes` to the saved state at the index `slot`.
     pub fn deserialize(&mut self, instance: usize, bytes: usize, slot: usize) -> u32 {
         let args = vec![Arg::Saved(bytes), Arg::SavedSize(bytes), Arg::StateOut(slot)];
         self.call(instance, "DeserializeFMUState", args)
@@ -461,8 +462,8 @@ pub fn step_args(standard: Standard, time: f64, size: f64) -> Vec<Arg> {
 /// Maximum number of variables that most checks read.
 pub const READ: usize = 1000;
 
-/// Returns at most this many of the variables that can be read at any time: no clocks, none of unknown size. Of more,
-/// inputs, outputs and derivatives come first, and others are taken at equal distances.
+/// Returns the indices of at most `most` variables that can be read: no clocks, none of unknown size. If there are more, at most
+/// half are inputs, outputs, derivatives and the independent variable. All are taken at equal distances.
 pub fn sample(description: &Description, most: usize) -> Vec<usize> {
     let known = |index: &usize| {
         let variable = &description.variables[*index];
@@ -488,7 +489,7 @@ pub fn sample(description: &Description, most: usize) -> Vec<usize> {
     found
 }
 
-/// Returns the first difference between corresponding reads: the variable and both values.
+/// Returns the first difference between corresponding reads: the name of the variable and both values.
 pub fn difference(description: &Description, run: &Run, one: &[Read], other: &[Read]) -> Option<[String; 3]> {
     one.iter().zip(other).find_map(|(one, other)| {
         let (of_one, of_other) = (run.outcome(one.id)?, run.outcome(other.id)?);
@@ -519,7 +520,7 @@ fn name_at(description: &Description, read: &Read, index: usize) -> String {
     )
 }
 
-/// Returns the values of the variables of these reads.
+/// Returns the values of the variables of all successful reads.
 pub fn values_of<'r>(run: &'r Run, reads: &'r [Read]) -> impl Iterator<Item = (usize, Values)> {
     reads.iter().filter(|read| run.succeeds(read.id)).flat_map(move |read| {
         let value = move |(variable, begin, size)| Some((variable, run.written(read.id)?.part(begin, size)?));
@@ -527,7 +528,7 @@ pub fn values_of<'r>(run: &'r Run, reads: &'r [Read]) -> impl Iterator<Item = (u
     })
 }
 
-/// Returns the value of a variable in these reads.
+/// Returns the value of a variable in the first read that contains it.
 pub fn value_of(run: &Run, reads: &[Read], variable: usize) -> Option<Values> {
     reads.iter().find_map(|read| {
         let (_, begin, size) = read.parts().find(|(index, ..)| *index == variable)?;

@@ -1,4 +1,4 @@
-//! Checks that the model structure declares the dependencies that the FMU has.
+//! Checks that ModelStructure lists the dependencies that the FMU has.
 
 use super::derivatives::{middle_values, set_known, to_middle};
 use crate::checker::Checker;
@@ -8,7 +8,7 @@ use crate::writer::Part::{Enter, Make};
 use crate::writer::{Read, Trajectory, Writer, value_of};
 use std::collections::HashSet;
 
-/// Returns the unknowns whose dependencies contain neither the known nor an alias of it.
+/// Returns the variables of the unknowns whose `dependencies` attribute contains neither the known nor an alias of it.
 fn undeclared<'a>(
     checker: &Checker,
     unknowns: impl IntoIterator<Item = &'a Unknown>,
@@ -23,8 +23,8 @@ fn undeclared<'a>(
     silent.filter(|index| !aliases.contains(index)).collect()
 }
 
-/// Reads the unknowns with a value of the known, with another one and with the first again: an unknown that changes and
-/// changes back depends on the known.
+/// Checks that no unknown depends on the known. The known is set to `value`, to another value and to `value` again. An unknown
+/// that changes and has its first value at the end depends on the known.
 fn moved(
     checker: &Checker,
     rule: &str,
@@ -55,7 +55,7 @@ fn moved(
     })
 }
 
-/// Checks the dependencies on each input and, in Model Exchange, on each state.
+/// Checks the dependencies of outputs and derivatives on continuous inputs and, in Model Exchange, on states.
 pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let stepped = trajectory.is_stepped();
@@ -78,7 +78,7 @@ pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
             continue;
         }
         let mut writer = checker.writer(trajectory);
-        writer.play(0, &to_middle(trajectory));
+        writer.write(0, &to_middle(trajectory));
         moved(checker, "dependencies.missing", writer, known, &value, unknowns, |writer, numbers| {
             set_known(writer, &states, &vector, known, numbers);
         })?;
@@ -86,7 +86,7 @@ pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     Ok(())
 }
 
-/// Checks the dependencies on each input and exact start value in Initialization Mode.
+/// Checks the dependencies of initial unknowns on inputs and exact start values, except parameters, in Initialization Mode.
 pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let knowns = (0..description.variables.len()).filter(|index| {
@@ -105,7 +105,7 @@ pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
             continue;
         }
         let mut writer = checker.writer(trajectory);
-        writer.play(0, &[Make, Enter]);
+        writer.write(0, &[Make, Enter]);
         let value = description.variables[known].starts();
         moved(checker, "dependencies.initial", writer, known, &value, unknowns, |writer, numbers| {
             writer.set_numbers(0, known, numbers);

@@ -1,14 +1,14 @@
-//! Partial derivatives against differences, adjoint against directional ones, vectors against variables.
+//! Checks partial derivatives against differences, adjoint derivatives against directional ones, and vectors against variables.
 
 use crate::call_sequence::{Arg, Kind, Run, Values};
 use crate::checker::Checker;
 use crate::description::Description;
-use crate::finding::Judges;
+use crate::finding::Criterion;
 use crate::writer::{Part, Read, Trajectory, Writer, value_of};
 use fmi_abi::{BaseType, Interface};
 use std::sync::Arc;
 
-/// Finds a continuous scalar unknown and a continuous scalar known on which the unknown may depend.
+/// Returns a continuous scalar unknown and a continuous scalar known on which it may depend.
 pub fn pair(description: &Description, interface: Interface) -> Option<(usize, usize)> {
     let unknowns = unknowns(description, interface);
     let knowns = knowns(description, interface);
@@ -28,7 +28,7 @@ fn continuous(description: &Description, index: usize) -> bool {
         && !variable.clocked
 }
 
-/// The unknowns: outputs, and in Model Exchange state derivatives.
+/// Returns at most 200 continuous scalar outputs and, in Model Exchange, state derivatives.
 fn unknowns(description: &Description, interface: Interface) -> Vec<usize> {
     let derivatives: &[_] =
         if interface == Interface::ModelExchange { &description.derivatives } else { &[] };
@@ -39,7 +39,7 @@ fn unknowns(description: &Description, interface: Interface) -> Vec<usize> {
     found
 }
 
-/// The knowns: inputs, and in Model Exchange states.
+/// Returns the continuous scalar inputs and, in Model Exchange, states.
 fn knowns(description: &Description, interface: Interface) -> Vec<usize> {
     let inputs =
         (0..description.variables.len()).filter(|index| description.variables[*index].causality == "input");
@@ -70,19 +70,19 @@ pub fn derivative(
     writer.call(0, function, args)
 }
 
-/// The calls up to the point at which partial derivatives are requested: near the middle and outside of events.
+/// Returns the parts of the simulation up to the point in the middle, where partial derivatives are requested.
 pub fn to_middle(trajectory: &Trajectory) -> [Part; 2] {
     [Part::Begin, Part::Points(trajectory.points.len() / 2)]
 }
 
-/// Whether directional and adjoint derivatives are declared.
+/// Returns whether directional derivatives are declared, and whether adjoint derivatives are.
 fn offers(checker: &Checker, interface: Interface) -> [bool; 2] {
     let directional = ["providesDirectionalDerivative", "providesDirectionalDerivatives"];
     [&directional[..], &["providesAdjointDerivatives"]].map(|names| checker.can(interface, names))
 }
 
-/// Checks directional derivatives against differences, adjoint derivatives against directional ones, and the derivative for
-/// a sum of seeds against the sum of derivatives.
+/// Checks derivatives against differences, adjoint derivatives against directional ones, and the derivative for a seed of ones
+/// against the sum of the derivatives for unit seeds.
 pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let [has_directional, has_adjoint] = offers(checker, trajectory.interface);
     let unknowns = unknowns(&checker.description, trajectory.interface);
@@ -92,7 +92,7 @@ pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
         return Ok(());
     }
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &to_middle(trajectory));
+    writer.write(0, &to_middle(trajectory));
     let before = writer.read(0);
     let [outputs, inputs] = [&unknowns, &knowns].map(|indices| references(&checker.description, indices));
     let mut request = |function: &str, seed: &[f64], count: usize| {
@@ -113,18 +113,18 @@ pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
     let sequence = writer.sequence.clone();
     let message = "{} was {}, after derivatives were requested it is {}";
     let is_unchanged = checker.differ(&before, &after, message);
-    let run = checker.judge("derivatives.changed", sequence.clone(), is_unchanged)?;
+    let run = checker.evaluate("derivatives.changed", sequence.clone(), is_unchanged)?;
     if run.end != crate::call_sequence::End::Done {
         return Ok(());
     }
     let names = [&unknowns, &knowns].map(|indices| names(&checker.description, indices));
     if let Some(sum) = sum {
-        let judge = is_linear(columns.clone(), sum, names[0].clone());
-        checker.keep("derivatives.linear", &run, &sequence, judge);
+        let criterion = is_linear(columns.clone(), sum, names[0].clone());
+        checker.record("derivatives.linear", &run, &sequence, criterion);
         let rules = [("derivatives.adjoint", 1e-6), ("derivatives.adjoint-digits", 1e-11)];
         rules.into_iter().filter(|_| has_adjoint).any(|(name, tolerance)| {
-            let judge = is_transposed(columns.clone(), rows.clone(), names.clone(), tolerance);
-            checker.keep(name, &run, &sequence, judge)
+            let criterion = is_transposed(columns.clone(), rows.clone(), names.clone(), tolerance);
+            checker.record(name, &run, &sequence, criterion)
         });
         order(checker, trajectory, &outputs, &inputs)?;
     }
@@ -139,13 +139,13 @@ fn names(description: &Description, indices: &[usize]) -> Vec<String> {
     indices.iter().map(|index| description.variables[*index].name.clone()).collect()
 }
 
-/// The numbers that a successful call wrote.
+/// Returns the numbers that a call wrote if it returned OK.
 fn numbers(run: &Run, id: u32) -> Option<Vec<f64>> {
     run.written(id).filter(|_| run.status(id) == Some(0)).map(Values::numbers)
 }
 
-/// Judges whether the derivatives for unit seeds add up to the derivative for a seed of ones.
-fn is_linear(columns: Vec<u32>, sum: u32, names: Vec<String>) -> impl Judges {
+/// Returns the criterion that the derivatives for unit seeds add up to the derivative for a seed of ones.
+fn is_linear(columns: Vec<u32>, sum: u32, names: Vec<String>) -> impl Criterion {
     move |run: &Run| {
         let columns: Vec<Vec<f64>> = columns.iter().map(|id| numbers(run, *id)).collect::<Option<_>>()?;
         let together = numbers(run, sum)?;
@@ -163,8 +163,13 @@ fn is_linear(columns: Vec<u32>, sum: u32, names: Vec<String>) -> impl Judges {
     }
 }
 
-/// Judges whether the adjoint derivatives are the transposed directional derivatives.
-fn is_transposed(columns: Vec<u32>, rows: Vec<u32>, names: [Vec<String>; 2], tolerance: f64) -> impl Judges {
+/// Returns the criterion that the adjoint derivatives are the transposed directional derivatives.
+fn is_transposed(
+    columns: Vec<u32>,
+    rows: Vec<u32>,
+    names: [Vec<String>; 2],
+    tolerance: f64,
+) -> impl Criterion {
     move |run: &Run| {
         let matrix = |ids: &[u32]| ids.iter().map(|id| numbers(run, *id)).collect::<Option<Vec<_>>>();
         let (columns, rows) = (matrix(&columns)?, matrix(&rows)?);
@@ -183,13 +188,13 @@ fn is_transposed(columns: Vec<u32>, rows: Vec<u32>, names: [Vec<String>; 2], tol
     }
 }
 
-/// Requests the derivatives again with unknowns and knowns in another order.
+/// Checks that the derivatives do not depend on the order of unknowns and knowns.
 fn order(checker: &Checker, trajectory: &Trajectory, unknowns: &[u32], knowns: &[u32]) -> anyhow::Result<()> {
     let reversed = |list: &[u32]| list.iter().rev().copied().collect::<Vec<_>>();
     let seed: Vec<f64> = (1..=knowns.len()).map(|number| number as f64).collect();
     let back: Vec<f64> = seed.iter().rev().copied().collect();
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &to_middle(trajectory));
+    writer.write(0, &to_middle(trajectory));
     let name = "GetDirectionalDerivative";
     let one = derivative(&mut writer, name, unknowns, knowns, &seed, unknowns.len());
     let other = derivative(&mut writer, name, &reversed(unknowns), &reversed(knowns), &back, unknowns.len());
@@ -205,7 +210,7 @@ fn order(checker: &Checker, trajectory: &Trajectory, unknowns: &[u32], knowns: &
     })
 }
 
-/// Sets one known: a state among those that are given, or an input.
+/// Sets a known: an element of the state vector if it is one of `states`, otherwise an input.
 pub fn set_known(writer: &mut Writer, states: &[usize], vector: &[f64], known: usize, numbers: &[f64]) {
     match states.iter().position(|index| *index == known) {
         Some(at) => {
@@ -227,16 +232,16 @@ pub fn middle_values(
     states: &[usize],
 ) -> anyhow::Result<(Vec<Vec<f64>>, Vec<f64>)> {
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &to_middle(trajectory));
+    writer.write(0, &to_middle(trajectory));
     let read = writer.read_these(0, knowns);
     let vector = (!states.is_empty()).then(|| writer.vector(0, "GetContinuousStates", states.len()));
-    let run = checker.play(&writer.sequence)?;
+    let run = checker.execute(&writer.sequence)?;
     let numbers = |values: Option<Values>| values.map(|values| values.numbers()).unwrap_or_default();
     let values = knowns.iter().map(|known| numbers(value_of(&run, &read, *known))).collect();
     Ok((values, numbers(vector.and_then(|id| run.written(id)).cloned())))
 }
 
-/// Checks each derivative against differences with two step sizes, whose disagreement estimates their error.
+/// Checks each derivative against central differences with two step sizes. Their difference estimates the error.
 fn differences(
     checker: &Checker,
     trajectory: &Trajectory,
@@ -264,7 +269,7 @@ fn differences(
             continue;
         }
         let mut writer = checker.writer(trajectory);
-        writer.play(0, &to_middle(trajectory));
+        writer.write(0, &to_middle(trajectory));
         let analytic = column(&mut writer, &references(description, unknowns), variable.reference, by_column);
         let reads = [step, -step, step / 2.0, -step / 2.0, 0.0].map(|by| {
             set_known(&mut writer, &states, &vector, *known, &[value + by]);
@@ -283,10 +288,10 @@ fn differences(
         });
         let precise = Arc::clone(&differences);
         let sequence = writer.sequence.clone();
-        let judge = move |run: &Run| differences.judge(run, 1e-4);
-        let run = checker.judge("derivatives.directional", sequence.clone(), judge)?;
+        let criterion = move |run: &Run| differences.evaluate(run, 1e-4);
+        let run = checker.evaluate("derivatives.directional", sequence.clone(), criterion)?;
         if !checker.has("derivatives.directional") {
-            checker.keep("derivatives.precision", &run, &sequence, move |run| precise.judge(run, 2e-7));
+            checker.record("derivatives.precision", &run, &sequence, move |run| precise.evaluate(run, 2e-7));
         }
     }
     Ok(())
@@ -302,23 +307,23 @@ fn column(writer: &mut Writer, unknowns: &[u32], known: u32, by_column: bool) ->
     unknowns.iter().map(adjoint).collect()
 }
 
-/// The derivatives with respect to one known, and the reads for their differences.
+/// Derivatives with respect to one known, and the reads for the differences.
 struct Differences {
     unknowns: Vec<usize>,
     names: Vec<String>,
     known: String,
-    /// The variables that are the known.
+    /// Indices of the known and its aliases.
     itself: Vec<usize>,
     is_stepped: bool,
     step: f64,
-    /// The call that wrote the derivative of each unknown, and its index there.
+    /// Number of the call that returned the derivative of each unknown, and the index in its result.
     analytic: Vec<(u32, usize)>,
-    /// The unknowns with the known at +step, -step, +step/2, -step/2 and 0.
+    /// Reads of the unknowns with +step, -step, +step/2, -step/2 and 0 added to the known.
     reads: [Vec<Read>; 5],
 }
 
 impl Differences {
-    fn judge(&self, run: &Run, tolerance: f64) -> Option<String> {
+    fn evaluate(&self, run: &Run, tolerance: f64) -> Option<String> {
         for (row, unknown) in self.unknowns.iter().enumerate() {
             if self.itself.contains(unknown) {
                 continue;
@@ -332,13 +337,13 @@ impl Differences {
             let derivative = numbers(run, id)?.get(index).copied()?;
             let (step, here) = (self.step, values[4]);
             let (wide, narrow) = ((values[0] - values[1]) / (2.0 * step), (values[2] - values[3]) / step);
-            // One-sided differences show a kink, where there is no derivative to compare with.
+            // One-sided differences that disagree indicate a kink, where the derivative does not exist.
             let (left, right) = ((here - values[3]) / (step / 2.0), (values[2] - here) / (step / 2.0));
             let rounding = 1e-13 * here.abs().max(values[0].abs()) / step;
             let doubt = (wide - narrow).abs() * 10.0 + rounding * 100.0;
             let scale = narrow.abs().max(derivative.abs());
             let kink = (left - right).abs() > 0.05 * scale + rounding * 100.0;
-            // An output that changes only in the next step has no difference here.
+            // An output of Co-Simulation may change only in the next step, so its differences are 0.
             let silent = self.is_stepped && narrow == 0.0 && wide == 0.0;
             if kink && doubt > 1e-9 || silent {
                 continue;
@@ -355,7 +360,8 @@ impl Differences {
     }
 }
 
-/// The vectors of states and derivatives are the values of their variables, in the order of the model structure.
+/// Checks that the vectors of states and derivatives equal their variables, in the order of ModelStructure, and that nominal
+/// values are positive and finite.
 pub fn vectors(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let count = description.states_count().unwrap_or(0);
@@ -376,7 +382,7 @@ pub fn vectors(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
         }
     }
     let model = description.clone();
-    let run = checker.judge("derivatives.vectors", writer.sequence.clone(), move |run| {
+    let run = checker.evaluate("derivatives.vectors", writer.sequence.clone(), move |run| {
         vectors.iter().filter(|(vector, ..)| run.succeeds(*vector)).find_map(|(vector, reads, indices)| {
             let numbers = run.written(*vector)?.numbers();
             let values = indices.iter().filter_map(|index| value_of(run, reads, *index));
@@ -389,7 +395,7 @@ pub fn vectors(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
             Some(format!("number {} of the vector is {one:?}, {name} is {other:?}", at + 1))
         })
     })?;
-    checker.keep("derivatives.nominals", &run, &writer.sequence, move |run| {
+    checker.record("derivatives.nominals", &run, &writer.sequence, move |run| {
         let numbers = numbers(run, nominals?)?;
         let bad = numbers.iter().find(|number| !(**number > 0.0 && number.is_finite()))?;
         Some(format!("a nominal value is {bad:?}"))

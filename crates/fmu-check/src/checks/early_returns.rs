@@ -1,4 +1,4 @@
-//! Event Mode and early returns of FMI 3.0 in Co-Simulation.
+//! Checks Event Mode and early returns in Co-Simulation of FMI 3.0.
 
 use crate::call_sequence::Run;
 use crate::checker::Checker;
@@ -6,7 +6,7 @@ use crate::values::is_other_time;
 use crate::writer::{Read, Trajectory, Writer, value_of};
 use std::sync::Arc;
 
-/// Checks the outputs of steps over events in FMI 3.0: for importers that handle events, that allow early returns, or both.
+/// Checks the outputs of `fmi3DoStep` at events, with `eventModeUsed`, with `earlyReturnAllowed` and with both.
 pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let time = checker.description.variables.iter().position(|variable| variable.causality == "independent");
     let has_events = checker.can(trajectory.interface, &["hasEventMode"]);
@@ -15,9 +15,9 @@ pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
             continue;
         }
         let mut writer = checker.writer(trajectory);
-        let steps = Arc::new(play(checker, &mut writer, time, event_mode, early_return)?);
+        let steps = Arc::new(run_steps(checker, &mut writer, time, event_mode, early_return)?);
         let again = Arc::clone(&steps);
-        let run = checker.judge("results.early-return", writer.sequence.clone(), move |run| {
+        let run = checker.evaluate("results.early-return", writer.sequence.clone(), move |run| {
             again.iter().find_map(|step| {
                 let (event, early, reached) = ended(&again, run, step.id)?;
                 if early && !early_return {
@@ -35,7 +35,7 @@ pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
                 })
             })
         })?;
-        checker.keep("results.early-unsaid", &run, &writer.sequence, move |run| {
+        checker.record("results.early-unsaid", &run, &writer.sequence, move |run| {
             steps.iter().find_map(|step| {
                 let (event, early, reached) = ended(&steps, run, step.id)?;
                 let end = step.end;
@@ -51,7 +51,7 @@ pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A step: its number, the reads after it, its end, and the call that enters Event Mode after it.
+/// Step: its number, the reads after it, its requested end, and the number of the call that enters Event Mode after it.
 struct Stepped {
     id: u32,
     values: Vec<Read>,
@@ -59,15 +59,15 @@ struct Stepped {
     event: Option<u32>,
 }
 
-/// The outputs eventHandlingNeeded, terminateSimulation, earlyReturn and lastSuccessfulTime of a step that succeeded.
+/// Returns eventHandlingNeeded, terminateSimulation, earlyReturn and lastSuccessfulTime of a successful step.
 fn outputs(run: &Run, id: u32) -> Option<([bool; 3], f64)> {
     let outcome = run.outcome(id).filter(|_| run.succeeds(id))?;
     let reached = outcome.written.get(3)?.numbers()[0];
     Some(([0, 1, 2].map(|index| outcome.written[index].numbers() == [1.0]), reached))
 }
 
-/// Runs the steps of the trajectory, which may end at events between its points.
-fn play(
+/// Writes and executes the steps of the trajectory, which may end at events between its points.
+fn run_steps(
     checker: &Checker,
     writer: &mut Writer<'_>,
     time: Option<usize>,
@@ -96,7 +96,7 @@ fn play(
         }
         let id = writer.step(0, at, size);
         let values = writer.read_these(0, time.as_slice());
-        let run = checker.play(&writer.sequence)?;
+        let run = checker.execute(&writer.sequence)?;
         steps.push(Stepped { id, values, end: goal, event: None });
         let Some(([event, terminate, early], reached)) = outputs(&run, id) else { break };
         // A step that did not advance, without an event, would not advance again.
@@ -113,8 +113,8 @@ fn play(
     Ok(steps)
 }
 
-/// The outputs eventHandlingNeeded, earlyReturn and lastSuccessfulTime of a step that succeeded. In a shortened call sequence,
-/// `None` if an event before the step was not handled.
+/// Returns eventHandlingNeeded, earlyReturn and lastSuccessfulTime of a successful step; `None` if a shortened call sequence
+/// lacks Event Mode after an earlier step.
 fn ended(steps: &[Stepped], run: &Run, id: u32) -> Option<(bool, bool, f64)> {
     let mut before = steps.iter().take_while(|step| step.id != id);
     let is_skipped = |step: &Stepped| {
@@ -124,12 +124,13 @@ fn ended(steps: &[Stepped], run: &Run, id: u32) -> Option<(bool, bool, f64)> {
     (!before.any(is_skipped)).then_some((event, early, reached))
 }
 
-/// Runs the updates to count how many the event needs, and goes back to Step Mode; returns the next time event.
+/// Updates the discrete states, at most ten times, until the event needs no further update, and enters Step Mode. Returns the
+/// time of the next event.
 fn over_event(checker: &Checker, writer: &mut Writer<'_>) -> anyhow::Result<Option<f64>> {
     let mut next = None;
     for _ in 0..10 {
         let ids = writer.update(0, 1);
-        let run = checker.play(&writer.sequence)?;
+        let run = checker.execute(&writer.sequence)?;
         let event = checker.event(&run, ids[0]);
         if !event.is_some_and(|event| event.again) {
             next = event.and_then(|event| event.next);

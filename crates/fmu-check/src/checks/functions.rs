@@ -1,4 +1,4 @@
-//! Functions, versions, an instance for the right token, and the calls that declared capabilities allow.
+//! Checks the exported functions, the version, and the functions of declared capabilities.
 
 use super::derivatives::{derivative, pair, references};
 use crate::call_sequence::{End, Run, Setting, Step};
@@ -9,16 +9,16 @@ use fmi_abi::calls::{fmi2, fmi3, signatures};
 use fmi_abi::{Interface, Mode, Standard};
 use std::sync::Arc;
 
-/// Checks that the loader finds all symbols that the library needs, including those that it looks up late.
+/// Checks that the loader resolves all symbols that the library needs, including those with lazy binding.
 fn symbols(checker: &Checker) -> anyhow::Result<()> {
     let sequence = checker.step(checker.version(), false);
     let [late, now] = [false, true].map(|now| {
         let setting = Setting { now, ..checker.setting.clone() };
-        checker.workers.play(&setting, &sequence, checker.limit)
+        checker.workers.execute(&setting, &sequence, checker.limit)
     });
     if let (End::Done, End::Unloadable(why)) = (late?.end, now?.end) {
-        let judge = Arc::new(|_: &Run| -> Option<String> { None });
-        checker.add(checker.broken("package.symbols", why).shown_by(sequence, judge));
+        let criterion = Arc::new(|_: &Run| -> Option<String> { None });
+        checker.add(checker.broken("package.symbols", why).shown_by(sequence, criterion));
     }
     Ok(())
 }
@@ -88,12 +88,12 @@ pub fn capabilities(checker: &Checker, trajectory: &Trajectory) -> anyhow::Resul
     let (interface, mut calls) = (trajectory.interface, Vec::new());
     if checker.saves(interface) {
         let mut writer = checker.writer(trajectory);
-        let mut ids = writer.play(0, &[Part::Begin, Part::Save(0), Part::Restore(0)]).ids;
+        let mut ids = writer.write(0, &[Part::Begin, Part::Save(0), Part::Restore(0)]).ids;
         if checker.serializes(interface) {
             ids.extend(writer.serialize(0, 0));
             ids.push(writer.deserialize(0, 0, 1));
         }
-        ids.extend(writer.play(0, &[Part::Drop(0)]).ids);
+        ids.extend(writer.write(0, &[Part::Drop(0)]).ids);
         calls.push(("canGetAndSetFMUstate and canSerializeFMUstate", ids, writer.sequence));
     }
     let pair = pair(&checker.description, interface);

@@ -1,4 +1,4 @@
-//! Checks that instances accept every order of calls that the standard allows.
+//! Checks that instances accept orders of calls that the standard allows.
 
 use super::Fits::{self, Always, Integrated, Several, Stepped};
 use crate::call_sequence::{Arg, NULL_INSTANCE, Step};
@@ -9,17 +9,17 @@ use crate::writer::Part::{
 };
 use crate::writer::{Point, Trajectory, Writer};
 
-fn play(checker: &Checker, writer: Writer) -> anyhow::Result<()> {
+fn check_order(checker: &Checker, writer: Writer) -> anyhow::Result<()> {
     let copy = writer.sequence.clone();
     // Discard is allowed: the FMU may need a smaller step.
-    checker.check("life_cycle.refused", writer.sequence, move |run| first_failure(&copy, run, 2))
+    checker.check("life_cycle.rejected", writer.sequence, move |run| first_failure(&copy, run, 2))
 }
 
 const ALL: Part = Points(usize::MAX);
 const TERMINATE: Part = Call("Terminate");
 const RESET: Part = Call("Reset");
 
-/// Orders of the calls of one instance: those that importers use, and edge cases.
+/// Orders of calls of one instance.
 const ORDERS: &[&[Part]] = &[
     &[Make, Free],
     &[Make, Enter, ReadAll, Free],
@@ -28,10 +28,10 @@ const ORDERS: &[&[Part]] = &[
     &[Make, RESET, Enter, RESET, RESET, Enter, Leave, RESET, Enter, Leave, Points(2), Free],
 ];
 
-/// Writes an order of other calls.
+/// Writes an order of calls that needs more than parts of the simulation.
 type Order = fn(&mut Writer, &Trajectory);
 
-/// Orders of other calls, and the simulations that they fit.
+/// Simulations that an order fits, and the function that writes the order.
 const OTHER_ORDERS: &[(Fits, Order)] = &[
     (Several, many),
     (Always, long_name),
@@ -41,30 +41,30 @@ const OTHER_ORDERS: &[(Fits, Order)] = &[
     (Fits::EventMode, event_mode),
 ];
 
-/// Twenty instances, more than a fixed pool may have; four of them are freed in another order.
+/// Makes twenty instances, more than a fixed pool may have. Four of them run and are freed in another order.
 fn many(writer: &mut Writer, _: &Trajectory) {
-    (4..20).for_each(|instance| drop(writer.play(instance, &[Make])));
-    (0..4).for_each(|instance| drop(writer.play(instance, &[Begin])));
-    (4..20).for_each(|instance| drop(writer.play(instance, &[Free])));
+    (4..20).for_each(|instance| drop(writer.write(instance, &[Make])));
+    (0..4).for_each(|instance| drop(writer.write(instance, &[Begin])));
+    (4..20).for_each(|instance| drop(writer.write(instance, &[Free])));
     let two = Points(2);
     for (instance, part) in [(0, Free), (1, two), (3, Free), (2, two), (2, Free), (1, Free)] {
-        writer.play(instance, &[part]);
+        writer.write(instance, &[part]);
     }
 }
 
-/// A name with spaces and letters beyond ASCII; a stop time and a tolerance.
+/// Runs an instance whose name has spaces and characters beyond ASCII, with a stop time and a tolerance.
 fn long_name(writer: &mut Writer, trajectory: &Trajectory) {
     writer.make_with(0, |how| how.name = "a long name, with Gödel in it %s #1#".to_owned());
     let stop = trajectory.end + 1.0 + trajectory.end.abs();
     writer.enter_with(0, Some(1e-6), writer.description.start_time, Some(stop));
-    writer.play(0, &[Leave, Points(3), Free]);
+    writer.write(0, &[Leave, Points(3), Free]);
 }
 
-/// The last step ends at the stop time.
+/// Runs up to the stop time, where the last step ends.
 fn up_to_the_stop(writer: &mut Writer, trajectory: &Trajectory) {
     writer.make(0);
     writer.enter_with(0, None, writer.description.start_time, Some(trajectory.end));
-    writer.play(0, &[Leave, ALL, Free]);
+    writer.write(0, &[Leave, ALL, Free]);
 }
 
 /// Enables all log categories together and one at a time, in each mode.
@@ -72,7 +72,7 @@ fn logging(writer: &mut Writer, _: &Trajectory) {
     let categories: Vec<Option<Vec<u8>>> =
         writer.description.log_categories.iter().map(|name| Some(name.clone().into_bytes())).collect();
     for part in [Make, Enter, Leave, Points(2)] {
-        writer.play(0, &[part]);
+        writer.write(0, &[part]);
         writer.call(0, "SetDebugLogging", vec![Arg::Whole(1), Arg::Whole(0), Arg::Null]);
         let all = std::iter::once(categories.clone()).filter(|all| !all.is_empty());
         for some in all.chain(categories.iter().map(|category| vec![category.clone()])) {
@@ -83,7 +83,7 @@ fn logging(writer: &mut Writer, _: &Trajectory) {
     writer.free(0);
 }
 
-/// An event at every point: importers may enter Event Mode at any time.
+/// Enters Event Mode at every point, which importers may do at any time.
 fn events_everywhere(writer: &mut Writer, trajectory: &Trajectory) {
     writer.begin(0);
     for point in &trajectory.points {
@@ -93,29 +93,29 @@ fn events_everywhere(writer: &mut Writer, trajectory: &Trajectory) {
             writer.event(0, 3);
         }
     }
-    writer.play(0, &[ReadAll, Free]);
+    writer.write(0, &[ReadAll, Free]);
 }
 
 fn event_mode(writer: &mut Writer, trajectory: &Trajectory) {
     writer.make_with(0, |how| how.event_mode = true);
-    writer.play(0, &[Enter, Call("ExitInitializationMode"), Part::Update(3), Call("EnterStepMode")]);
+    writer.write(0, &[Enter, Call("ExitInitializationMode"), Part::Update(3), Call("EnterStepMode")]);
     let size = trajectory.points.first().map_or(1e-3, |point| point.size);
     writer.step(0, writer.description.start_time, size);
     writer.event(0, 3);
-    writer.play(0, &[ReadAll, TERMINATE, Free]);
+    writer.write(0, &[ReadAll, TERMINATE, Free]);
 }
 
-/// Checks all orders of the tables, another token, unloading and steps beyond the stop time.
+/// Checks all orders of the tables, a wrong token, unloading, the exit of the process and a step beyond the stop time.
 pub fn orders(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for order in ORDERS {
         let mut writer = checker.writer(trajectory);
-        writer.play(0, order);
-        play(checker, writer)?;
+        writer.write(0, order);
+        check_order(checker, writer)?;
     }
     for (_, write) in OTHER_ORDERS.iter().filter(|(fits, _)| fits.fit(checker, trajectory)) {
         let mut writer = checker.writer(trajectory);
         write(&mut writer, trajectory);
-        play(checker, writer)?;
+        check_order(checker, writer)?;
     }
     token(checker, trajectory)?;
     unload(checker, trajectory)?;
@@ -133,13 +133,13 @@ fn beyond(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.make(0);
     writer.enter_with(0, None, checker.description.start_time, Some(trajectory.end));
-    let ids = writer.play(0, &[Leave, ALL]).ids;
+    let ids = writer.write(0, &[Leave, ALL]).ids;
     writer.forbidden = true;
     let id = writer.step(0, trajectory.end, last.size);
     let end = trajectory.end;
     checker.check("life_cycle.stop-time", writer.sequence, move |run| {
-        let good = ids.iter().chain([&id]).all(|id| run.succeeds(*id));
-        good.then(|| format!("a step from the stop time {end:?} on succeeds"))
+        let succeeded = ids.iter().chain([&id]).all(|id| run.succeeds(*id));
+        succeeded.then(|| format!("a step from the stop time {end:?} on succeeds"))
     })
 }
 
@@ -148,7 +148,7 @@ fn unload(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for (name, step, times) in [("life_cycle.unload", Step::Unload, 2), ("life_cycle.exit", Step::Quit, 1)] {
         let mut writer = checker.writer(trajectory);
         for _ in 0..times {
-            writer.play(0, &[Begin, Points(2), TERMINATE, Free]);
+            writer.write(0, &[Begin, Points(2), TERMINATE, Free]);
             writer.add(step.clone());
         }
         checker.check(name, writer.sequence, |_| None)?;
@@ -209,13 +209,13 @@ pub fn random(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
                 (1..=3, _) => ReadAll,
                 _ => continue,
             };
-            writer.play(0, &[part]);
+            writer.write(0, &[part]);
         }
         if saved.is_some() && random.below(2) == 0 {
-            writer.play(0, &[Drop(0)]);
+            writer.write(0, &[Drop(0)]);
         }
         writer.free(0);
-        play(checker, writer)?;
+        check_order(checker, writer)?;
     }
     Ok(())
 }
@@ -242,21 +242,20 @@ pub fn events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
             past.then(|| format!("at {time:?} the next event is at {:?}", event.next.unwrap_or_default()))
         })
     })?;
-    // An importer that has skipped time events.
+    // The importer has skipped time events.
     let late = trajectory.end.abs() * 10.0 + 10.0;
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
     writer.forbidden = true;
     writer.call(0, "SetTime", vec![Arg::real(late)]);
-    let ids = writer.play(0, &[Call("EnterEventMode"), Part::Update(3)]).ids;
+    let ids = writer.write(0, &[Call("EnterEventMode"), Part::Update(3)]).ids;
     checker.check("life_cycle.late-event", writer.sequence, move |run| {
         let event = event(run, *ids.last()?, fmi3)?;
         let next = event.next.filter(|next| !event.again && *next <= late)?;
         Some(format!("after events were passed by, at {late:?} the next event is at {next:?}"))
     })?;
-    // An event iteration that does not end.
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &[Make, Enter, Call("ExitInitializationMode")]);
+    writer.write(0, &[Make, Enter, Call("ExitInitializationMode")]);
     let ids = writer.update(0, 100);
     checker.check("life_cycle.event-iteration", writer.sequence, move |run| {
         let all = ids.iter().all(|id| event(run, *id, fmi3).is_some_and(|event| event.again));
@@ -288,8 +287,8 @@ fn changed_states(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<
             let updates = &updates[1..updates.len() - 1];
             let is_reported = |id: &u32| event(run, *id, fmi3).is_none_or(|event| event.states_changed);
             let (was, is) = (run.written(*before)?, run.written(*after)?);
-            let good = [before, after].iter().all(|id| run.succeeds(**id));
-            let index = was.differ(is).filter(|_| good && !updates.iter().any(is_reported))?;
+            let succeeded = [before, after].iter().all(|id| run.succeeds(**id));
+            let index = was.differ(is).filter(|_| succeeded && !updates.iter().any(is_reported))?;
             let (was, is) = (was.show(index), is.show(index));
             Some(format!("at {time:?} state {} was {was}, after the event it is {is}", index + 1))
         })

@@ -1,4 +1,4 @@
-//! Checks that there are no messages while logging is off.
+//! Checks that the FMU logs nothing while logging is off.
 
 use crate::call_sequence::Arg;
 use crate::checker::Checker;
@@ -15,9 +15,9 @@ pub fn switches(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()
             writer.call(0, "SetDebugLogging", vec![Arg::Whole(0), Arg::Whole(0), Arg::Null]);
             ids.clear();
         }
-        let played = writer.play(0, &[Enter, Leave, Points(usize::MAX), ReadAll, Call("Terminate"), Free]);
-        ids.extend(played.ids);
-        ids.extend(played.reads.iter().map(|read| read.id));
+        let calls = writer.write(0, &[Enter, Leave, Points(usize::MAX), ReadAll, Call("Terminate"), Free]);
+        ids.extend(calls.ids);
+        ids.extend(calls.reads.iter().map(|read| read.id));
         checker.check("logs.off", writer.sequence, move |run| {
             let message = ids.iter().find_map(|id| {
                 // For a rejected call, one section of FMI 3.0 requires a message and another forbids it.

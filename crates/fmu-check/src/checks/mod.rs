@@ -1,14 +1,14 @@
-//! The checks, by topics.
+//! Checks, in a module for each topic.
 
 pub mod dependencies;
 pub mod derivatives;
 pub mod early_returns;
 pub mod functions;
-pub mod hostile;
 pub mod life_cycle;
 pub mod logs;
+pub mod malformed;
 pub mod package;
-pub mod refusals;
+pub mod rejections;
 pub mod reset;
 pub mod resources;
 pub mod results;
@@ -21,17 +21,17 @@ use crate::writer::Trajectory;
 use Check::{Each, Malformed, Once};
 use Fits::{Always, Integrated, Saves, Serializes, Several, Stepped, Stepped3};
 
-/// A check.
+/// Function of a check.
 #[derive(Clone, Copy)]
 pub enum Check {
     Once(fn(&Checker) -> anyhow::Result<()>),
-    /// Runs for each simulation that fits.
+    /// Checks each simulation that fits.
     Each(Fits, fn(&Checker, &Trajectory) -> anyhow::Result<()>),
-    /// Plays the malformed call sequences of this rule for each simulation that fits.
+    /// Executes the malformed call sequences of this rule for each simulation that fits.
     Malformed(&'static str, Fits, fn(&Checker, &Trajectory) -> anyhow::Result<Vec<CallSequence>>),
 }
 
-/// The simulations that a check or an order of calls fits.
+/// Condition on the simulations for which a check or an order of calls is executed.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Fits {
     Always,
@@ -52,7 +52,7 @@ pub enum Fits {
 }
 
 impl Fits {
-    /// Whether a simulation fits.
+    /// Returns whether a simulation fits.
     pub fn fit(self, checker: &Checker, trajectory: &Trajectory) -> bool {
         let (interface, stepped) = (trajectory.interface, trajectory.is_stepped());
         match self {
@@ -68,12 +68,12 @@ impl Fits {
     }
 }
 
-/// All checks of the library with their topics.
+/// Topic and function of every check that calls the library.
 pub const ALL: &[(&str, Check)] = &[
     ("life_cycle", Each(Always, life_cycle::orders)),
     ("life_cycle", Once(life_cycle::free_null)),
     ("states", Each(Saves, states::restore)),
-    ("hostile", Malformed("hostile.values", Always, hostile::values)),
+    ("malformed", Malformed("malformed.values", Always, malformed::values)),
     ("resources", Each(Always, resources::cycles)),
     ("results", Each(Always, results::repeat)),
     ("functions", Once(functions::present)),
@@ -86,7 +86,7 @@ pub const ALL: &[(&str, Check)] = &[
     ("derivatives", Each(Integrated, derivatives::vectors)),
     ("dependencies", Each(Always, dependencies::missing)),
     ("dependencies", Each(Always, dependencies::initial)),
-    ("refusals", Each(Always, refusals::change_nothing)),
+    ("rejections", Each(Always, rejections::change_nothing)),
     ("results", Each(Several, results::instances)),
     ("results", Each(Always, results::reading)),
     ("results", Each(Always, results::name)),
@@ -98,10 +98,10 @@ pub const ALL: &[(&str, Check)] = &[
     ("life_cycle", Each(Always, life_cycle::random)),
     ("life_cycle", Each(Integrated, life_cycle::events)),
     ("logs", Each(Always, logs::switches)),
-    ("hostile", Malformed("hostile.null-instance", Always, hostile::null_instances)),
-    ("hostile", Malformed("hostile.null", Always, hostile::nulls)),
-    ("hostile", Malformed("hostile.references", Always, hostile::references)),
-    ("hostile", Malformed("hostile.sizes", Always, hostile::sizes)),
-    ("hostile", Malformed("hostile.times", Always, hostile::times)),
-    ("hostile", Malformed("hostile.bytes", Serializes, hostile::bytes)),
+    ("malformed", Malformed("malformed.null-instance", Always, malformed::null_instances)),
+    ("malformed", Malformed("malformed.null", Always, malformed::nulls)),
+    ("malformed", Malformed("malformed.references", Always, malformed::references)),
+    ("malformed", Malformed("malformed.sizes", Always, malformed::sizes)),
+    ("malformed", Malformed("malformed.times", Always, malformed::times)),
+    ("malformed", Malformed("malformed.bytes", Serializes, malformed::bytes)),
 ];

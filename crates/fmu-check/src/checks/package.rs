@@ -11,10 +11,10 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-/// Unpacks an FMU of at most `most` bytes; returns the findings in its ZIP file.
+/// Unpacks an FMU and returns the findings in its ZIP file.
 ///
 /// # Errors
-/// Fails if the FMU cannot be unpacked.
+/// Fails if the FMU cannot be unpacked or has more than `most` bytes when it is unpacked.
 pub fn unpack(path: &Path, directory: &Path, most: u64) -> anyhow::Result<Vec<Observation>> {
     let at = path.display();
     let file = File::open(path).map_err(|error| anyhow::anyhow!("{at}: cannot be opened ({error})"))?;
@@ -22,7 +22,7 @@ pub fn unpack(path: &Path, directory: &Path, most: u64) -> anyhow::Result<Vec<Ob
         .map_err(|error| anyhow::anyhow!("{at}: is no FMU, which is a ZIP file ({error})"))?;
     let mut found = Vec::new();
     let mut names = BTreeSet::new();
-    let mut left = most;
+    let mut remaining = most;
     for index in 0..archive.len() {
         let name = entry(&mut archive, index, &mut names, &mut found)?;
         if crate::worker::interrupted() {
@@ -38,9 +38,9 @@ pub fn unpack(path: &Path, directory: &Path, most: u64) -> anyhow::Result<Vec<Ob
         }
         std::fs::create_dir_all(target.parent().unwrap_or(directory))?;
         // The size that the entry declares may be wrong.
-        let written = std::io::copy(&mut (&mut entry).take(left + 1), &mut File::create(&target)?)
+        let written = std::io::copy(&mut (&mut entry).take(remaining + 1), &mut File::create(&target)?)
             .map_err(|error| anyhow::anyhow!("{at}: cannot be unpacked ({error})"))?;
-        left = left.checked_sub(written).with_context(|| {
+        remaining = remaining.checked_sub(written).with_context(|| {
             let most = most >> 20;
             format!(
                 "{at}: it has more than {most} MB when it is unpacked; if that is right, give --unpacked MB"
@@ -55,7 +55,7 @@ pub fn unpack(path: &Path, directory: &Path, most: u64) -> anyhow::Result<Vec<Ob
     Ok(found)
 }
 
-/// Inspects an entry of a ZIP file; returns its path below the FMU's directory, `None` if it is outside.
+/// Inspects an entry of a ZIP file. Returns its path below the FMU's directory, or `None` if it is outside.
 fn entry(
     archive: &mut zip::ZipArchive<File>,
     index: usize,
@@ -79,7 +79,7 @@ fn entry(
     Ok(inside)
 }
 
-/// The directories of `binaries/` for this machine.
+/// Returns the names of the directories in `binaries/` for this platform.
 fn directories(standard: Standard) -> Vec<String> {
     let system = if OS == "macos" { "darwin" } else { OS };
     let tuple = format!("{ARCH}-{system}");
@@ -91,7 +91,7 @@ fn directories(standard: Standard) -> Vec<String> {
     }
 }
 
-/// The library for this machine.
+/// Returns the path of the library for this platform.
 ///
 /// # Errors
 /// Fails with the reason if there is none.
@@ -118,7 +118,7 @@ pub fn library(directory: &Path, standard: Standard, offer: &Offer) -> Result<Pa
     }
 }
 
-/// The processor that a library is for.
+/// Returns the processor architecture of a library.
 fn machine(file: &object::File) -> Option<&'static str> {
     Some(match file.architecture() {
         object::Architecture::X86_64 => "x86_64",
@@ -129,7 +129,7 @@ fn machine(file: &object::File) -> Option<&'static str> {
     })
 }
 
-/// Names that a library exports.
+/// Returns the names that a library exports.
 pub fn exported(library: &Path) -> Option<Vec<String>> {
     let bytes = std::fs::read(library).ok()?;
     let file = object::File::parse(bytes.as_slice()).ok()?;
@@ -141,7 +141,7 @@ pub fn exported(library: &Path) -> Option<Vec<String>> {
     Some(exports.flatten().filter_map(|export| export.name().name().map(strip)).collect())
 }
 
-/// Checks directories and libraries.
+/// Checks the directories in `binaries/` and the libraries in them.
 pub fn look(directory: &Path, description: &Description) -> Vec<Observation> {
     let mut found = Vec::new();
     let mut add = |name: &'static str, observed: String| found.push((name, observed));
@@ -176,12 +176,12 @@ pub fn look(directory: &Path, description: &Description) -> Vec<Observation> {
     found
 }
 
-/// Prefixes of the names of the libraries of Linux, Windows and macOS.
+/// Prefixes of the names of system libraries on Linux, Windows and macOS.
 const SYSTEM_LIBRARIES: &str = "libc.so libm.so libdl.so libpthread.so librt.so libgcc_s.so libstdc++.so ld-linux libutil.so \
     kernel32 kernelbase ntdll msvcrt api-ms-win user32 advapi32 ws2_32 shell32 ole32 bcrypt shlwapi ucrtbase \
     /usr/lib/ /system/library/";
 
-/// Checks the system requirements of a library.
+/// Checks the architecture of a library and the libraries, symbols and glibc version that it needs.
 fn needs(path: &Path, platform: &str, add: &mut impl FnMut(&'static str, String)) {
     let Ok(bytes) = std::fs::read(path) else { return };
     let Ok(file) = object::File::parse(bytes.as_slice()) else { return };
@@ -225,8 +225,8 @@ fn needs(path: &Path, platform: &str, add: &mut impl FnMut(&'static str, String)
     }
 }
 
-/// Returns the functions without a version that a library for Linux needs, if others have a version: no library provides them.
-/// The program that loads the library may happen to have them.
+/// Returns the undefined symbols without a version of a library for Linux, if other symbols have a version. No library provides
+/// them, but the program that loads the library may.
 fn unlinked(bytes: &[u8]) -> object::Result<Vec<String>> {
     use object::read::elf::{FileHeader as _, Sym as _};
     let header = object::elf::FileHeader64::<object::Endianness>::parse(bytes)?;
@@ -250,7 +250,7 @@ fn unlinked(bytes: &[u8]) -> object::Result<Vec<String>> {
     Ok(found)
 }
 
-/// Reports the newest version of glibc that a library needs.
+/// Reports the version of glibc that a library needs, from 2.29 on.
 fn glibc(bytes: &[u8], platform: &str, name: &str, add: &mut impl FnMut(&'static str, String)) {
     let marker = b"GLIBC_2.";
     let markers = bytes.windows(marker.len()).enumerate().filter(|(_, window)| window == marker);

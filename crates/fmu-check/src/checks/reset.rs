@@ -7,22 +7,22 @@ use crate::values::other_values;
 use crate::writer::Part::{Call, Enter, Leave, Make, Read, Run};
 use crate::writer::Trajectory;
 
-/// Checks that the values and the simulation after a reset are the values and the simulation of a new instance.
+/// Checks that the values and the simulation after a reset equal the values and the simulation of a new instance.
 pub fn reset(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for end in [&[Call("Terminate")][..], &[]] {
         let mut writer = checker.writer(trajectory);
-        let first = writer.play(0, &[Make, Enter, Read, Leave, Run(0)]).reads;
-        writer.play(0, end);
-        let ids = writer.play(0, &[Call("Reset"), Enter]).ids;
-        let second = writer.play(0, &[Read, Leave, Run(0)]).reads;
+        let first = writer.write(0, &[Make, Enter, Read, Leave, Run(0)]).reads;
+        writer.write(0, end);
+        let ids = writer.write(0, &[Call("Reset"), Enter]).ids;
+        let second = writer.write(0, &[Read, Leave, Run(0)]).reads;
         let message = "{} of the new instance was {}, after the reset it is {}";
-        let judges = [fails(&writer.sequence, ids), checker.differ(&first, &second, message)];
-        checker.check("reset.incomplete", writer.sequence, any(judges))?;
+        let criteria = [fails(&writer.sequence, ids), checker.differ(&first, &second, message)];
+        checker.check("reset.incomplete", writer.sequence, any(criteria))?;
     }
     changed(checker, trajectory)
 }
 
-/// Checks that variables that were set have their start values after a reset.
+/// Checks that a reset restores the start values of variables that were set.
 fn changed(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let (mut values, mut others) = (Vec::new(), Vec::new());
@@ -48,12 +48,12 @@ fn after_values(
     initialized: bool,
 ) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let first = writer.play(0, &[Make, Enter, Read, Call("Reset")]).reads;
+    let first = writer.write(0, &[Make, Enter, Read, Call("Reset")]).reads;
     writer.set(0, values);
     if initialized {
-        writer.play(0, &[Enter, Leave]);
+        writer.write(0, &[Enter, Leave]);
     }
-    let second = writer.play(0, &[Call("Reset"), Enter, Read]).reads;
+    let second = writer.write(0, &[Call("Reset"), Enter, Read]).reads;
     let message = "{} of the new instance was {}, after values were set and a reset it is {}";
     checker.check("reset.values", writer.sequence, checker.differ(&first, &second, message))
 }

@@ -1,4 +1,4 @@
-//! Resources that remain after many simulations, and settings of the process.
+//! Checks the resources after many simulations, and the settings of the process.
 
 use crate::call_sequence::{End, Measured, Run, Step, Values};
 use crate::checker::Checker;
@@ -7,15 +7,15 @@ use crate::writer::Part::{Begin, Call, Drop, Enter, Free, Leave, Make, Points, R
 use crate::writer::{Part, Trajectory, Writer};
 use fmi_abi::BaseType;
 
-/// Checks the resources after many simulations, resets, states and strings.
+/// Checks the resources after many simulations, strings, resets and saved states, and the settings of the process.
 pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let measured = |what: &'static str, before: &[Part], cycle: &dyn Fn(&mut Writer)| {
         let mut writer = checker.writer(trajectory);
-        writer.play(0, before);
+        writer.write(0, before);
         measured(checker, writer, what, cycle)
     };
     measured("instances made, run and freed", &[], &|writer| {
-        writer.play(0, &[Begin, Points(3), ReadAll, Call("Terminate"), Free]);
+        writer.write(0, &[Begin, Points(3), ReadAll, Call("Terminate"), Free]);
     })?;
     let variables = checker.description.variables.iter().enumerate();
     let texts: Vec<(usize, Values)> = variables
@@ -28,28 +28,28 @@ pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
         .filter_map(|(index, variable)| Some((index, Values::texts(variable.start.first()?.as_bytes(), 1))))
         .collect();
     if !texts.is_empty() {
-        measured("texts set", &[Make], &|writer| {
+        measured("strings set", &[Make], &|writer| {
             writer.set(0, &texts);
         })?;
     }
     measured("resets", &[Make], &|writer| {
-        writer.play(0, &[Enter, Leave, Points(2), ReadAll, Call("Reset")]);
+        writer.write(0, &[Enter, Leave, Points(2), ReadAll, Call("Reset")]);
     })?;
     if checker.saves(trajectory.interface) {
         measured("states saved and freed", &[Begin, Points(2)], &|writer| {
-            writer.play(0, &[Save(0), Save(0), Restore(0)]);
+            writer.write(0, &[Save(0), Save(0), Restore(0)]);
             if checker.serializes(trajectory.interface) {
                 writer.serialize(0, 0);
                 writer.deserialize(0, 0, 1);
-                writer.play(0, &[Restore(1), Drop(1)]);
+                writer.write(0, &[Restore(1), Drop(1)]);
             }
-            writer.play(0, &[ReadAll, Drop(0)]);
+            writer.write(0, &[ReadAll, Drop(0)]);
         })?;
     }
     settings(checker, trajectory)
 }
 
-/// Plays a cycle many times, and judges the resources that remain.
+/// Repeats a cycle of calls and compares memory, threads and open files before and after the repetitions.
 fn measured(
     checker: &Checker,
     mut writer: Writer,
@@ -64,40 +64,39 @@ fn measured(
     let many = writer.add(Step::Repeat(10_000, steps.clone()));
     let last = writer.add(Step::Measure);
     let sequence = writer.sequence;
-    let run = checker.play_for(&sequence, checker.setting.repetitions * 3.0 + checker.limit)?;
+    let run = checker.execute_for(&sequence, checker.setting.repetitions * 3.0 + checker.limit)?;
     if run.end != End::Done {
         return checker.check("resources.cycles", sequence, |_| None);
     }
-    checker.keep_always(&sequence, &run);
-    // The resources before and after enough cycles, and the number of these.
+    checker.record_always(&sequence, &run);
+    // The resources before and after the repetitions and their number; `None` for fewer than 50.
     let done = move |run: &Run| -> Option<(Measured, Measured, usize)> {
         let measured = |id| run.outcome(id)?.measured.clone();
         let (before, times) = (measured(warm)?.times, measured(many)?.times);
         (before >= 50 && times >= 50).then_some((measured(first)?, measured(last)?, times))
     };
-    checker.keep("resources.memory", &run, &sequence, move |run| {
+    checker.record("resources.memory", &run, &sequence, move |run| {
         let (one, two, times) = done(run)?;
         let grown = two.memory.saturating_sub(one.memory);
         // The smallest block of glibc is 32 bytes, and glibc may keep a few blocks. Other C libraries are measured in pages.
         let enough = if one.exact { 16 * times as u64 + 4096 } else { 64 * times as u64 + (4 << 20) };
-        (grown > enough).then(|| {
-            format!("{grown} bytes are left after {times} {what}: {} for each", grown / times as u64)
-        })
+        (grown > enough)
+            .then(|| format!("{grown} bytes remain after {times} {what}: {} for each", grown / times as u64))
     });
     type Count = fn(&Measured) -> usize;
     let counts: [(&str, Count, &str); 2] = [
-        ("resources.threads", |measured| measured.threads, "threads are left"),
-        ("resources.files", |measured| measured.files, "files are left open"),
+        ("resources.threads", |measured| measured.threads, "threads remain"),
+        ("resources.files", |measured| measured.files, "files remain open"),
     ];
     for (name, count, are_left) in counts {
-        checker.keep(name, &run, &sequence, move |run| {
+        checker.record(name, &run, &sequence, move |run| {
             let (one, two, times) = done(run)?;
             let more = count(&two).checked_sub(count(&one)).filter(|more| *more > 2)?;
             Some(format!("{more} {are_left} after {times} {what}"))
         });
     }
     let ids: Vec<u32> = steps.iter().map(|numbered| numbered.id).collect();
-    checker.keep("resources.cycles", &run, &sequence, move |run| {
+    checker.record("resources.cycles", &run, &sequence, move |run| {
         let times = run.outcome(many)?.measured.as_ref()?.times;
         let why = failure(&steps, run, &ids)?;
         (times > 1).then(|| format!("after {} {what}: {why}", times - 1))
@@ -110,14 +109,14 @@ fn settings(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.add(checker.version());
     let first = writer.add(Step::Measure);
-    writer.play(0, &[Begin, Points(usize::MAX), ReadAll]);
+    writer.write(0, &[Begin, Points(usize::MAX), ReadAll]);
     let last = writer.add(Step::Measure);
-    let run = checker.judge("resources.settings", writer.sequence.clone(), move |run| {
+    let run = checker.evaluate("resources.settings", writer.sequence.clone(), move |run| {
         let (one, two) = (run.outcome(first)?.measured.as_ref()?, run.outcome(last)?.measured.as_ref()?);
         let (was, is) = one.settings.iter().zip(&two.settings).find(|(was, is)| was != is)?;
         Some(format!("{was} has become {is}"))
     })?;
-    checker.keep("logs.printed", &run, &writer.sequence, |run| {
+    checker.record("logs.printed", &run, &writer.sequence, |run| {
         let line = run.output.lines().find(|line| !line.trim().is_empty())?;
         (run.end == End::Done).then(|| format!("{:?}", line.chars().take(80).collect::<String>()))
     });

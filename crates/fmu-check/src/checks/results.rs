@@ -1,54 +1,54 @@
-//! Checks that results depend only on the calls: not on the process, other instances, threads or reads.
+//! Checks that results do not depend on the process, the instance name, other instances, threads or reads, and checks times.
 
 use crate::call_sequence::{Arg, Kind, Numbered, Run, Step};
 use crate::checker::Checker;
 use crate::description::Description;
-use crate::finding::{Judges, any, status_name};
+use crate::finding::{Criterion, any, status_name};
 use crate::trajectory::steps;
 use crate::values::is_other_time;
 use crate::writer::Part::{Begin, Points, ReadAll, Run as RunFrom};
 use crate::writer::{Part, Point, Read, Trajectory, Writer, access, value_of};
 
-/// The whole trajectory with all that can be read.
+/// Complete simulation, with all variables and vectors read at every point.
 const WHOLE: &[Part] = &[Begin, ReadAll, RunFrom(0)];
 
-/// Repeats the calls in another process with other addresses and other memory contents.
+/// Checks that another process, with other addresses and memory contents, has the same results.
 pub fn repeat(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let one = writer.play(0, WHOLE).reads;
+    let one = writer.write(0, WHOLE).reads;
     writer.add(Step::FreshProcess);
-    let other = writer.play(0, WHOLE).reads;
-    let judge = checker.differ(&one, &other, "{} is {}, in another process {}");
-    checker.check("results.process", writer.sequence, judge)
+    let other = writer.write(0, WHOLE).reads;
+    let criterion = checker.differ(&one, &other, "{} is {}, in another process {}");
+    checker.check("results.process", writer.sequence, criterion)
 }
 
-/// Repeats the calls with an instance of another name. Strings may contain the name.
+/// Checks that an instance with another name has the same results, except strings, which may contain the name.
 pub fn name(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let mut runs = ["instance", "an instance of another name"].map(|name| {
         writer.make_with(0, |how| how.name = name.to_owned());
-        let reads = writer.play(0, &[Part::Enter, Part::Leave, ReadAll, RunFrom(0)]).reads;
+        let reads = writer.write(0, &[Part::Enter, Part::Leave, ReadAll, RunFrom(0)]).reads;
         writer.free(0);
         reads
     });
     let is_number = |(index, _): &(usize, usize)| checker.description.variables[*index].is_number();
     runs.iter_mut().for_each(|reads| reads.retain(|read| read.variables.iter().all(is_number)));
     let [one, other] = runs;
-    let judge = checker.differ(&one, &other, "{} is {}, of an instance of another name {}");
-    checker.check("results.name", writer.sequence, judge)
+    let criterion = checker.differ(&one, &other, "{} is {}, of an instance of another name {}");
+    checker.check("results.name", writer.sequence, criterion)
 }
 
-/// Checks an instance next to a second one, which is called in turns with it.
+/// Checks that two instances that are called in turns have the results of a single instance.
 pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let alone = writer.play(0, WHOLE).reads;
+    let alone = writer.write(0, WHOLE).reads;
     writer.free(0);
-    let (mut one, mut other) = (writer.play(1, &[Begin, ReadAll]).reads, Vec::new());
+    let (mut one, mut other) = (writer.write(1, &[Begin, ReadAll]).reads, Vec::new());
     // The second instance is two points behind, so that the states of both differ.
     let count = trajectory.points.len();
     for number in 0..count + 2 {
         if number == 1 {
-            other.extend(writer.play(2, &[Begin, ReadAll]).reads);
+            other.extend(writer.write(2, &[Begin, ReadAll]).reads);
         }
         if let Some(point) = trajectory.points.get(number) {
             writer.point(1, point);
@@ -63,20 +63,20 @@ pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<(
             other.extend(writer.read_all(2));
         }
     }
-    let judges = [
+    let criteria = [
         checker.differ(&alone, &one, "{} is {}, next to another instance {}"),
         checker.differ(&alone, &other, "{} is {}, of a second instance next to the first {}"),
     ];
-    checker.check("results.instances", writer.sequence, any(judges))
+    checker.check("results.instances", writer.sequence, any(criteria))
 }
 
-/// Returns a message for the first variable that has one value read separately and another read with others.
+/// Returns the criterion that each variable has the same value read separately and read with others.
 fn unlike(
     checker: &Checker,
     singly: Vec<(usize, Vec<Read>)>,
     together: Vec<Read>,
     message: fn(&str, String, String) -> String,
-) -> Box<dyn Judges> {
+) -> Box<dyn Criterion> {
     let description = checker.description.clone();
     Box::new(move |run: &Run| {
         singly.iter().find_map(|(index, reads)| {
@@ -87,12 +87,12 @@ fn unlike(
     })
 }
 
-/// Checks that reading changes nothing, regardless of the variables, their grouping and the number of reads.
+/// Checks that results do not depend on the variables that are read, their grouping and the number of reads.
 pub fn reading(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let silent = writer.play(0, &[Begin, Points(usize::MAX), ReadAll, Part::Free]).reads;
+    let silent = writer.write(0, &[Begin, Points(usize::MAX), ReadAll, Part::Free]).reads;
     let all = &checker.readable;
-    writer.play(1, &[Begin, ReadAll]);
+    writer.write(1, &[Begin, ReadAll]);
     for point in &trajectory.points {
         writer.point(1, point);
         for index in all.iter().rev().take(200) {
@@ -103,35 +103,35 @@ pub fn reading(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     let [read, again] = [(); 2].map(|()| writer.read_all(1));
     let mut single = |index: &usize| (*index, writer.read_these(1, &[*index]));
     let singly: Vec<_> = all.iter().take(400).map(&mut single).collect();
-    let judges = [
+    let criteria = [
         checker.differ(&read, &again, "{} is {}, read a second time {}"),
         unlike(checker, singly, read.clone(), |name, one, together| {
             format!("{name} is {together} read with others and {one} read separately")
         }),
         checker.differ(&silent, &read, "{} is {}, after more was read meanwhile {}"),
     ];
-    checker.check("results.reading", writer.sequence, any(judges))?;
+    checker.check("results.reading", writer.sequence, any(criteria))?;
     repeated(checker, trajectory, all)?;
     first(checker, trajectory)
 }
 
-/// Checks each output when it is read first after a step, in a separate instance.
+/// Checks that each output has the same value if it is the first variable that is read.
 fn first(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let variables = &checker.description.variables;
     let outputs = checker.readable.iter().copied();
     let outputs = outputs.filter(|index| variables[*index].causality == "output").take(checker.most(16));
     let mut writer = checker.writer(trajectory);
-    let together = writer.play(0, &[Begin, Points(3), Part::Read, Part::Free]).reads;
+    let together = writer.write(0, &[Begin, Points(3), Part::Read, Part::Free]).reads;
     let mut alone = Vec::new();
     for output in outputs {
-        writer.play(0, &[Begin, Points(3)]);
+        writer.write(0, &[Begin, Points(3)]);
         alone.push((output, writer.read_these(0, &[output])));
         writer.free(0);
     }
-    let judge = unlike(checker, alone, together, |name, one, other| {
+    let criterion = unlike(checker, alone, together, |name, one, other| {
         format!("{name} is {one} read first and {other} read after others")
     });
-    checker.check("results.reading", writer.sequence, judge)
+    checker.check("results.reading", writer.sequence, criterion)
 }
 
 /// Checks a call that reads each variable twice, and a call that reads none.
@@ -164,29 +164,29 @@ fn repeated(checker: &Checker, trajectory: &Trajectory, all: &[usize]) -> anyhow
     })
 }
 
-/// Checks instances in four threads.
+/// Checks that simulations on four threads have the results of a single simulation.
 pub fn threads(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let alone = writer.play(0, WHOLE).reads;
+    let alone = writer.write(0, WHOLE).reads;
     writer.free(0);
     let mut sequences: Vec<Vec<Numbered>> = Vec::new();
-    let mut judges = Vec::new();
+    let mut criteria = Vec::new();
     for number in 1..=4 {
         let mut thread = Writer { next: writer.next, ..checker.writer(trajectory) };
         // Twenty simulations for each thread, so that simulations overlap.
         for _ in 0..20 {
-            let reads = thread.play(number, WHOLE).reads;
-            judges.push(checker.differ(&alone, &reads, "{} is {}, on a thread next to others {}"));
+            let reads = thread.write(number, WHOLE).reads;
+            criteria.push(checker.differ(&alone, &reads, "{} is {}, on a thread next to others {}"));
             thread.free(number);
         }
         writer.next = thread.next;
         sequences.push(thread.sequence);
     }
     writer.add(Step::Parallel(sequences));
-    checker.check("results.threads", writer.sequence, any(judges))
+    checker.check("results.threads", writer.sequence, any(criteria))
 }
 
-/// Checks simulations to the same time with other step sizes and constant inputs.
+/// Checks that simulations to the same time with different step sizes and constant inputs have similar results.
 pub fn cut(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     if !checker.can(trajectory.interface, &["canHandleVariableCommunicationStepSize"])
         || trajectory.points.len() < 4
@@ -194,7 +194,7 @@ pub fn cut(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     {
         return Ok(());
     }
-    // Half a step must be as good as a whole one.
+    // With a fixed internal step size, half a step must still be a multiple of it.
     let offer = checker.description.co_simulation.as_ref();
     let fixed = offer.and_then(|offer| offer.number("fixedInternalStepSize"));
     let Point { time: start, size, .. } = trajectory.points[0];
@@ -208,7 +208,7 @@ pub fn cut(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         for point in steps(&checker.description, start, &vec![*size; *count], false) {
             writer.point(instance, &Point { inputs: Vec::new(), ..point });
         }
-        ends.push(writer.play(instance, &[Part::Read, Part::Free]).reads);
+        ends.push(writer.write(instance, &[Part::Read, Part::Free]).reads);
     }
     let description = checker.description.clone();
     checker.check("results.cut", writer.sequence, move |run| {
@@ -220,7 +220,7 @@ pub fn cut(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     })
 }
 
-/// Judges the values of a variable after 8, 4, 16 and 24 steps to the same time.
+/// Returns a message if the values of a variable after 8, 4, 16 and 24 steps to the same time are not similar.
 fn unlike_in_steps(description: &Description, index: usize, values: &[Vec<f64>]) -> Option<String> {
     let variable = &description.variables[index];
     let name = &variable.name;
@@ -296,7 +296,7 @@ pub fn time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Checks lastSuccessfulTime of FMI 3.0; it may differ from the end of the step if the solver cannot reach it.
+/// Checks that `lastSuccessfulTime` is the end of each step that returns OK.
 pub fn last_successful(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.begin(0);

@@ -1,10 +1,9 @@
-//! Checks start values, that values that are set are read, and that values have their types and
-//! ranges.
+//! Checks start values, values that are read after they were set, types and ranges of values, and constants.
 
 use crate::call_sequence::{Run, Values};
 use crate::checker::Checker;
 use crate::description::Variable;
-use crate::finding::{Judges, any};
+use crate::finding::{Criterion, any};
 use crate::values::other_values;
 use crate::worker::FILL;
 use crate::writer::Part::{Begin, Enter, Free, Leave, Make, Points};
@@ -12,18 +11,17 @@ use crate::writer::{Part, Read, Trajectory, Writer, sample, value_of, values_of}
 use fmi_abi::BaseType;
 use std::sync::Arc;
 
-/// Checks the values of the variables in Initialization Mode, before any are set.
+/// Checks the start values of the variables, then the values along the simulation and the constants.
 pub fn starts(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let model = Arc::clone(&checker.description);
     // FMI 2.0 has no values before Initialization Mode. FMI 3.0 has the start values there (section 2.3.2).
     let situations = [&[Make, Enter][..], &[Make]];
     for parts in situations.into_iter().take(if checker.fmi3() { 2 } else { 1 }) {
         let (model, mut writer) = (Arc::clone(&model), checker.writer(trajectory));
-        writer.play(0, parts);
+        writer.write(0, parts);
         let reads = writer.read_these(0, &sample(&model, 10_000));
         checker.check("start_values.start", writer.sequence, move |run| {
             values_of(run, &reads).find_map(|(index, value)| {
-                // Only the variables that must have their start values are compared.
                 let variable =
                     Some(&model.variables[index]).filter(|variable| !is_start(variable, &value))?;
                 let (name, starts) = (&variable.name, variable.start.join(" "));
@@ -35,7 +33,7 @@ pub fn starts(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     constants(checker, trajectory)
 }
 
-/// Whether a value is the start value, for variables that must have it.
+/// Returns false if a variable that must have its start value has another value.
 fn is_start(variable: &Variable, value: &Values) -> bool {
     let fixed = variable.initial == "exact" || variable.causality == "input";
     if !fixed || variable.start.is_empty() || variable.clocked || variable.base.is_none() {
@@ -59,10 +57,10 @@ fn is_start(variable: &Variable, value: &Values) -> bool {
     }
 }
 
-/// Tests a value of a variable; returns a description of the error.
+/// Test of a value of a variable; returns a description of the error.
 type ValueTest = fn(&Variable, &Values) -> Option<String>;
 
-/// The rules for each value that is read.
+/// Rules for each value that is read.
 const VALUE_TESTS: [(&str, ValueTest); 5] = [
     ("start_values.unwritten", |_, value| {
         let Values::Numbers(kind, bits) = value else { return None };
@@ -92,7 +90,7 @@ const VALUE_TESTS: [(&str, ValueTest); 5] = [
     }),
 ];
 
-/// Checks that each value that is read along the trajectory is written, valid for its type and within its range.
+/// Checks each value that is read along the trajectory by `VALUE_TESTS`.
 fn values(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
@@ -101,11 +99,11 @@ fn values(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         writer.point(0, point);
         reads.extend(writer.read(0));
     }
-    let run = checker.play(&writer.sequence)?;
-    checker.keep_always(&writer.sequence, &run);
+    let run = checker.execute(&writer.sequence)?;
+    checker.record_always(&writer.sequence, &run);
     for (name, test) in VALUE_TESTS {
         let (model, reads) = (Arc::clone(&checker.description), reads.clone());
-        checker.keep(name, &run, &writer.sequence, move |run| {
+        checker.record(name, &run, &writer.sequence, move |run| {
             values_of(run, &reads).find_map(|(index, value)| {
                 let variable = Some(&model.variables[index]).filter(|variable| !variable.clocked)?;
                 Some(format!("{} {}", variable.name, test(variable, &value)?))
@@ -115,7 +113,7 @@ fn values(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Checks that constants and fixed parameters do not change while time advances.
+/// Checks that constants, parameters and, without tunable variables, fixed variables do not change while time advances.
 fn constants(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let variables = &checker.description.variables;
     let tunable = variables.iter().any(|other| {
@@ -134,13 +132,13 @@ fn constants(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
     let first = writer.read_these(0, &fixed);
-    writer.play(0, &[Points(usize::MAX)]);
+    writer.write(0, &[Points(usize::MAX)]);
     let last = writer.read_these(0, &fixed);
-    let judge = checker.differ(&first, &last, "{} was {} and has become {}");
-    checker.check("start_values.fixed", writer.sequence, judge)
+    let criterion = checker.differ(&first, &last, "{} was {} and has become {}");
+    checker.check("start_values.fixed", writer.sequence, criterion)
 }
 
-/// Checks that values that are set are read: before and in Initialization Mode, and at a communication point.
+/// Checks that getters return the values that were set in Initialization Mode, before it, and at a communication point.
 pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let variable = |index: &usize| &description.variables[*index];
@@ -156,7 +154,7 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let near: Vec<(usize, Values)> = floats.iter().filter_map(with_other).collect();
     // Real values near the start values are set together. A model may reject others, so they are set one at a time.
     let alone = others.iter().take(checker.most(40)).flat_map(|index| {
-        // Longer than usual buffers.
+        // 500 bytes, longer than usual buffers.
         let long = Values::texts(&b"long ".repeat(100), variable(index).start.len());
         let long = (variable(index).base == Some(BaseType::String)).then_some((*index, long));
         with_other(index).into_iter().chain(long).map(|value| vec![value])
@@ -169,7 +167,7 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
             read_back(checker, trajectory, before, values.clone(), after)?;
         }
     }
-    // At a communication point: the variables that can be set there without Event Mode.
+    // Only variables that can be set without Event Mode are set at a communication point.
     for index in indices.iter().take(checker.most(400)) {
         let of = variable(index);
         let late = of.causality == "input" || of.variability == "tunable" && trajectory.is_stepped();
@@ -181,37 +179,37 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     inputs(checker, trajectory)
 }
 
-/// Checks that start values have the same effect before Initialization Mode and in it, regardless of reads in between.
+/// Checks that values set before Initialization Mode have the same effect as values set in it after a read.
 fn when(checker: &Checker, trajectory: &Trajectory, values: &[(usize, Values)]) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let mut sets = Vec::new();
     let [before, within] =
         [(&[Make][..], &[Enter][..]), (&[Make, Enter, Part::Read][..], &[][..])].map(|(before, after)| {
-            writer.play(0, before);
+            writer.write(0, before);
             sets.extend(writer.set(0, values));
-            writer.play(0, after);
-            writer.play(0, &[Part::Read, Leave, Part::ReadAll, Free]).reads
+            writer.write(0, after);
+            writer.write(0, &[Part::Read, Leave, Part::ReadAll, Free]).reads
         });
     let message = "{} is {} with values set before Initialization Mode, {} with values set in it";
     let differ = checker.differ(&before, &within, message);
     checker.check("start_values.when", writer.sequence, move |run| {
-        let good = sets.iter().all(|id| run.succeeds(*id));
-        if good { differ(run) } else { None }
+        let succeeded = sets.iter().all(|id| run.succeeds(*id));
+        if succeeded { differ(run) } else { None }
     })
 }
 
-/// Judges whether all values that were set are read; describes the first that is not.
+/// Returns the criterion that reads have the values that were set.
 fn lost(
     checker: &Checker,
     ids: Vec<u32>,
     reads: Vec<Read>,
     values: Vec<(usize, Values)>,
     has: &'static str,
-) -> Box<dyn Judges> {
+) -> Box<dyn Criterion> {
     let description = checker.description.clone();
     Box::new(move |run: &Run| {
-        let good = ids.iter().all(|id| run.succeeds(*id));
-        values.iter().filter(|_| good).find_map(|(index, value)| {
+        let succeeded = ids.iter().all(|id| run.succeeds(*id));
+        values.iter().filter(|_| succeeded).find_map(|(index, value)| {
             let read = value_of(run, &reads, *index).filter(|read| read.differ(value).is_some())?;
             let name = &description.variables[*index].name;
             Some(format!("{name} was set to {} and {has} {}", value.show(0), read.show(0)))
@@ -227,14 +225,14 @@ fn read_back(
     after: &[Part],
 ) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    writer.play(0, before);
+    writer.write(0, before);
     let sets = writer.set(0, &values);
-    writer.play(0, after);
+    writer.write(0, after);
     let reads = read_again(&mut writer, &values);
     checker.check("start_values.set", writer.sequence, lost(checker, sets, reads, values, "reads"))
 }
 
-/// Reads the variables that were set.
+/// Reads the variables of `values`.
 fn read_again(writer: &mut Writer, values: &[(usize, Values)]) -> Vec<Read> {
     writer.read_these(0, &values.iter().map(|(index, _)| *index).collect::<Vec<_>>())
 }
@@ -243,11 +241,11 @@ fn read_again(writer: &mut Writer, values: &[(usize, Values)]) -> Vec<Read> {
 fn inputs(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
-    let mut judges = Vec::new();
+    let mut criteria = Vec::new();
     for point in &trajectory.points {
         let ids = writer.point(0, point);
         let reads = read_again(&mut writer, &point.inputs);
-        judges.push(lost(checker, ids, reads, point.inputs.clone(), "has become"));
+        criteria.push(lost(checker, ids, reads, point.inputs.clone(), "has become"));
     }
-    checker.check("start_values.inputs", writer.sequence, any(judges))
+    checker.check("start_values.inputs", writer.sequence, any(criteria))
 }

@@ -1,5 +1,5 @@
-//! Checks that a simulation from a restored state repeats the first one: in the same instance, from serialized
-//! bytes, and in a fresh process.
+//! Checks that a simulation from a restored state equals the first one: in the same instance, in a new instance and in a new
+//! process.
 
 use crate::call_sequence::{Step, Values};
 use crate::checker::Checker;
@@ -7,7 +7,7 @@ use crate::finding::{any, fails};
 use crate::writer::Part::{Begin, Call, Drop, Enter, Free, Leave, Make, Points, ReadAll, Restore, Run, Save};
 use crate::writer::Trajectory;
 
-/// The points at which states are saved: the first, one in the middle, one near the end.
+/// Returns the numbers of points before a state is saved: 0, 1, half of them and all but two, if they are less than all.
 fn indices(trajectory: &Trajectory) -> Vec<usize> {
     let count = trajectory.points.len();
     let mut indices = vec![0, 1, count / 2, count.saturating_sub(2)];
@@ -17,7 +17,7 @@ fn indices(trajectory: &Trajectory) -> Vec<usize> {
     indices
 }
 
-/// Checks that saving changes nothing, and that a simulation can be repeated from a restored state, twice.
+/// Checks that saving a state changes nothing, and that simulations after restoring it once and twice equal the first one.
 pub fn restore(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for index in indices(trajectory) {
         let mut writer = checker.writer(trajectory);
@@ -27,14 +27,14 @@ pub fn restore(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
             writer.groups(0, &[Restore(0), ReadAll, Run(index), Restore(0), Run(index)]);
         let sequence = writer.sequence;
         let saving = checker.differ(&before, &after, "{} was {}, after the state was saved it is {}");
-        let run = checker.judge("states.changed-by-saving", sequence.clone(), saving)?;
+        let run = checker.evaluate("states.changed-by-saving", sequence.clone(), saving)?;
         let pairs = [
             ("states.restore-values", &before, &at_once, "{} was {}, after the state was restored it is {}"),
             ("states.restore", &first, &second, "{} was {}, from the restored state it is {}"),
             ("states.twice", &first, &third, "{} was {}, from the state restored a second time it is {}"),
         ];
         pairs.into_iter().any(|(name, one, other, message)| {
-            checker.keep(name, &run, &sequence, checker.differ(one, other, message))
+            checker.record(name, &run, &sequence, checker.differ(one, other, message))
         });
     }
     modes(checker, trajectory)?;
@@ -42,92 +42,92 @@ pub fn restore(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     free_null(checker, trajectory)
 }
 
-/// Checks states that are saved in one mode and restored in another.
+/// Checks states that are saved before and in Initialization Mode and restored after Terminate and while time advances.
 fn modes(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let first = writer.play(0, &[Make, Save(0), Enter, Save(1), Leave, Run(0), Call("Terminate")]).reads;
+    let first = writer.write(0, &[Make, Save(0), Enter, Save(1), Leave, Run(0), Call("Terminate")]).reads;
     // Back to Initialization Mode, then to the new instance.
-    let back = writer.play(0, &[Restore(1), Leave, Run(0)]);
-    let again = writer.play(0, &[Restore(0), Enter, Leave, Run(0)]);
-    let judges = [
+    let back = writer.write(0, &[Restore(1), Leave, Run(0)]);
+    let again = writer.write(0, &[Restore(0), Enter, Leave, Run(0)]);
+    let criteria = [
         fails(&writer.sequence, [back.ids, again.ids].concat()),
         checker.differ(&first, &back.reads, "{} was {}, from the state of Initialization Mode it is {}"),
         checker.differ(&first, &again.reads, "{} was {}, from the state of the new instance it is {}"),
     ];
-    checker.check("states.modes", writer.sequence, any(judges))
+    checker.check("states.modes", writer.sequence, any(criteria))
 }
 
-/// Checks a handle that is used again for another state, and two saved states.
+/// Checks a handle that is used for a second state, and switching between two saved states.
 fn reused(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     if trajectory.points.len() < 3 {
         return Ok(());
     }
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &[Begin, Points(1), Save(0), Save(1)]);
+    writer.write(0, &[Begin, Points(1), Save(0), Save(1)]);
     writer.point(0, &trajectory.points[1]);
     let [values, first] = writer.groups(0, &[ReadAll, Save(1), Run(2)]);
     let [again, second] = writer.groups(0, &[Restore(0), Restore(1), ReadAll, Run(2), Restore(0)]);
     writer.point(0, &trajectory.points[1]);
-    let from_first = writer.play(0, &[ReadAll, Drop(0), Drop(1)]).reads;
+    let from_first = writer.write(0, &[ReadAll, Drop(0), Drop(1)]).reads;
     let used = "{} was {}, from the state in a used handle it is {}";
-    let judges = [
+    let criteria = [
         checker.differ(&values, &again, used),
         checker.differ(&first, &second, used),
         checker.differ(&values, &from_first, "{} was {}, from the other state it is {}"),
     ];
-    checker.check("states.several", writer.sequence, any(judges))
+    checker.check("states.several", writer.sequence, any(criteria))
 }
 
-/// Checks that freeing NULL is ignored and that freeing a state sets its handle to NULL.
+/// Checks that freeing NULL succeeds and that freeing a state sets its handle to NULL.
 fn free_null(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &[Begin, Save(0)]);
-    let ids = writer.play(0, &[Drop(0), Drop(1)]).ids;
+    writer.write(0, &[Begin, Save(0)]);
+    let ids = writer.write(0, &[Drop(0), Drop(1)]).ids;
     checker.check("states.free", writer.sequence, move |run| {
         let (freed, nothing) = (ids[0], ids[1]);
         if run.status(nothing).is_some_and(|status| status > 1) {
             return Some("freeing a state that is NULL is rejected".to_owned());
         }
-        let left = run.status(freed) == Some(0) && run.written(freed)?.numbers() != [0.0];
-        left.then(|| "the handle of a freed state is not NULL".to_owned())
+        let is_kept = run.status(freed) == Some(0) && run.written(freed)?.numbers() != [0.0];
+        is_kept.then(|| "the handle of a freed state is not NULL".to_owned())
     })
 }
 
-/// Deserializes a state in the same instance, in a new one and in a fresh process.
+/// Checks that a simulation from a serialized state equals the first one, in a new instance and in a new process.
 pub fn serialized(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for (index, fresh) in indices(trajectory).into_iter().flat_map(|index| [(index, false), (index, true)]) {
         let mut writer = checker.writer(trajectory);
-        let before = writer.play(0, &[Begin, Points(index), ReadAll, Save(0)]).reads;
+        let before = writer.write(0, &[Begin, Points(index), ReadAll, Save(0)]).reads;
         let [size, bytes] = writer.serialize(0, 0);
-        let first = writer.play(0, &[Run(index)]).reads;
+        let first = writer.write(0, &[Run(index)]).reads;
         if fresh {
             writer.add(Step::FreshProcess);
         } else {
-            writer.play(0, &[Drop(0), Free]);
+            writer.write(0, &[Drop(0), Free]);
         }
-        // States may be set in two situations that importers use: after instantiation and after initialization.
-        writer.play(1, &[if index == 0 && fresh { Make } else { Begin }]);
+        // Importers set states after instantiation or after initialization.
+        writer.write(1, &[if index == 0 && fresh { Make } else { Begin }]);
         let read = writer.deserialize(1, 0, 1);
-        let set = writer.play(1, &[Restore(1), ReadAll]);
-        let second = writer.play(1, &[Run(index)]).reads;
+        let set = writer.write(1, &[Restore(1), ReadAll]);
+        let second = writer.write(1, &[Run(index)]).reads;
         let name = if fresh { "states.fresh-process" } else { "states.serialized" };
         let message = "{} was {}, from the bytes it is {}";
-        let judge = any([
+        let criterion = any([
             fails(&writer.sequence, vec![read, set.ids[0]]),
             checker.differ(&before, &set.reads, message),
             checker.differ(&first, &second, message),
         ]);
         checker.check(name, writer.sequence, move |run| {
-            [bytes, size].iter().all(|id| run.succeeds(*id)).then(|| judge(run))?
+            [bytes, size].iter().all(|id| run.succeeds(*id)).then(|| criterion(run))?
         })?;
     }
     again(checker, trajectory)
 }
 
-/// Checks that a deserialized state is serialized to the same bytes.
+/// Checks that a deserialized state is serialized to the same bytes again.
 fn again(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &[Begin, Points(trajectory.points.len() / 2), Save(0)]);
+    writer.write(0, &[Begin, Points(trajectory.points.len() / 2), Save(0)]);
     let [_, first] = writer.serialize(0, 0);
     writer.deserialize(0, 0, 1);
     let [_, second] = writer.serialize(0, 1);

@@ -1,4 +1,4 @@
-//! The report: for a terminal, as a page, as JSON, as JUnit.
+//! Report for a terminal, as an HTML page, as JSON, as JUnit and as SARIF.
 
 mod page;
 mod sarif;
@@ -10,36 +10,36 @@ use crate::options::{FailOn, Options};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// The report on an FMU.
+/// Report on an FMU.
 #[derive(Clone, serde::Serialize)]
 pub struct Report {
-    /// The version of the report's structure: 1. It changes when a field is changed or removed.
+    /// Version of the structure of the report, which changes when a field is changed or removed.
     pub schema: u32,
-    /// The version of this tool.
+    /// Version of fmu-check.
     pub version: &'static str,
-    /// The exit status: 0, 1 for findings that fail, 2 for an interface or a topic that was not checked.
+    /// Exit status: 1 if a finding fails the check, otherwise 2 if an interface or a topic was not checked, otherwise 0.
     pub status: u8,
-    /// The file.
+    /// Path of the FMU.
     pub fmu: String,
-    /// The name of the model.
+    /// Name of the model.
     pub model: String,
-    /// The edition of the standard.
+    /// FMI version.
     pub standard: String,
-    /// The types of interface that were checked.
+    /// Interface types that were checked.
     pub interfaces: Vec<String>,
-    /// How many sequences of calls were played.
+    /// Number of call sequences that were executed.
     pub sequences: u64,
-    /// How long it took.
+    /// Duration of the check in seconds.
     pub seconds: f64,
     /// Seed of random choices.
     pub seed: u64,
-    /// How many variables there are, and how many of them most checks read.
+    /// Number of variables, and of the variables that most checks read.
     pub variables: [usize; 2],
-    /// The interfaces and topics that were not checked, with the reason of each.
+    /// Interface types and topics that were not checked, with the reason for each.
     pub unreached: Vec<Unchecked>,
-    /// Names in the baseline for which nothing was found.
+    /// Names in the baseline that match no finding and nothing unchecked.
     pub unused: Vec<String>,
-    /// The worst first.
+    /// Findings, the most severe first.
     pub findings: Vec<Finding>,
 }
 
@@ -58,7 +58,7 @@ impl Report {
                 .iter()
                 .map(|trajectory| trajectory.interface.to_string())
                 .collect(),
-            sequences: checker.played(),
+            sequences: checker.executed(),
             seconds: 0.0,
             seed: checker.seed,
             variables: [checker.description.variables.len(), checker.readable.len()],
@@ -67,8 +67,8 @@ impl Report {
         }
     }
 
-    /// Decides which findings fail and what is allowed, for all outputs.
-    pub(crate) fn judge(&mut self, options: &Options, baseline: &Baseline) {
+    /// Applies the options and the baseline: decides which findings fail the check and which unchecked topics are allowed.
+    pub(crate) fn evaluate(&mut self, options: &Options, baseline: &Baseline) {
         let from = match options.fail_on {
             FailOn::Violation => Some(Severity::Violation),
             FailOn::Fragile => Some(Severity::Fragile),
@@ -92,7 +92,7 @@ impl Report {
         self.status = if fails { 1 } else { 2 * u8::from(unchecked) };
     }
 
-    /// How many findings there are of a severity.
+    /// Returns the number of findings of a severity that are not accepted.
     pub fn count(&self, severity: Severity) -> usize {
         self.findings
             .iter()
@@ -100,12 +100,12 @@ impl Report {
             .count()
     }
 
-    /// The interfaces that were checked.
+    /// Returns the names of the interface types that were checked.
     fn offers(&self) -> String {
         if self.interfaces.is_empty() { "no interface".to_owned() } else { self.interfaces.join(" and ") }
     }
 
-    /// Returns the numbers of findings by severity in a sentence.
+    /// Returns the numbers of findings for each severity, of accepted findings and of unchecked topics.
     fn summary(&self) -> String {
         let many =
             |count: usize, one: &str, more: &str| format!("{count} {}", if count == 1 { one } else { more });
@@ -143,7 +143,7 @@ impl Report {
             };
             let calls = match finding.steps {
                 (0, 0) => String::new(),
-                (_, steps) => format!("; {steps} calls show it"),
+                (_, steps) => format!("; {steps} calls reproduce it"),
             };
             let section = if finding.section.is_empty() { "not in the standard" } else { &finding.section };
             let accepted =
@@ -161,7 +161,7 @@ impl Report {
     /// Formats the report as JSON.
     ///
     /// # Errors
-    /// None that is known.
+    /// Fails if the report cannot be serialized.
     pub fn json(&self) -> serde_json::Result<String> {
         serde_json::to_string_pretty(self)
     }
@@ -209,10 +209,10 @@ impl Report {
         )
     }
 
-    /// Writes all of it to a directory.
+    /// Writes all reports and the programs of the findings to a directory.
     ///
     /// # Errors
-    /// When a file cannot be written.
+    /// Fails if a file cannot be written.
     pub fn write(&self, directory: &Path) -> anyhow::Result<()> {
         std::fs::create_dir_all(directory)?;
         std::fs::write(directory.join("report.json"), self.json()?)?;

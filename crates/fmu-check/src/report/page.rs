@@ -1,10 +1,10 @@
-//! The report as an HTML page without other files.
+//! Report as an HTML page that needs no other files.
 
 use super::Report;
 use crate::finding::Severity;
 use std::fmt::Write as _;
 
-/// A string in XML and HTML.
+/// Escapes a string for XML and HTML.
 pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
@@ -45,7 +45,7 @@ pub fn page(report: &Report) -> String {
             if !finding.c.is_empty() {
                 let _ = writeln!(
                     text,
-                    "<details><summary>Program in C with {} calls that shows the finding</summary><pre>{}</pre></details>",
+                    "<details><summary>Program in C with {} calls that reproduces the finding</summary><pre>{}</pre></details>",
                     finding.steps.1,
                     escape(&finding.c)
                 );

@@ -1,4 +1,4 @@
-//! The report in SARIF 2.1.0, which code scanning services read.
+//! Report in SARIF 2.1.0, which code scanning services read.
 
 use super::Report;
 use crate::finding::{Finding, Severity};

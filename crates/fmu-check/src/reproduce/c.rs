@@ -1,6 +1,6 @@
-//! A sequence as a program in C.
+//! Writes a call sequence as a program in C.
 
-use super::evidence::{Evidence, Measure, Proof};
+use super::evidence::{Evidence, Expected, Measure};
 use crate::call_sequence::{Arg, CallSequence, Kind, Make, NULL_INSTANCE, Numbered, Setting, Step};
 use crate::description::Description;
 use crate::finding::Finding;
@@ -25,7 +25,7 @@ pub fn program(
         states: BTreeSet::new(),
         bytes: BTreeSet::new(),
     };
-    // The parts of the sequence, a process for each.
+    // Each part of the sequence is executed in a separate process.
     let parts = sequence.split(|numbered| numbered.step == Step::FreshProcess).enumerate();
     let parts: Vec<String> = parts
         .map(|(number, part)| {
@@ -39,7 +39,7 @@ pub fn program(
     let declared = each(instances, &|index| format!("static void *c{index};\n"))
         + &each(states, &|slot| format!("static void *s{slot};\n"))
         + &each(bytes, &|slot| format!("static size_t *n{slot};\nstatic char *b{slot};\n"));
-    // Serialized bytes are passed on to the next process in files.
+    // Files pass the serialized states to the next process.
     let load = each(bytes, &|slot| {
         format!("    b{slot} = guarded(NULL, 1 << 24);\n    n{slot} = passed_on({slot}, b{slot});\n")
     });
@@ -47,7 +47,7 @@ pub fn program(
     let list: Vec<String> = (0..parts.len()).map(|number| format!("phase{number}")).collect();
     format!(
         "/*\n{} * cc repro.c -o repro -ldl -lpthread && ./repro DIRECTORY_OF_THE_UNPACKED_FMU\n *\n \
-         * Exit status: 1 if the finding shows, 0 if it does not, 3 if that is not known.\n */\n\
+         * Exit status: 1 if the finding is reproduced, 0 if it is not, 3 if that is not known.\n */\n\
          #define FMI {}\n{}{declared}\n{threads}{}static void (*const phases[])(void) = {{{}}};\n\
          static const char library_name[] = \"{}\";\n\nstatic void load(void) {{\n{load}}}\n\n\
          static void save(void) {{\n{save}}}\n\n{}{}",
@@ -62,7 +62,7 @@ pub fn program(
     )
 }
 
-/// The lines of the comment at the top of a program.
+/// Returns the lines of the comment at the top of a program.
 fn head(finding: &Finding, description: &Description) -> String {
     let section = if finding.section.is_empty() { "not in the standard" } else { &finding.section };
     let lines = [
@@ -76,7 +76,7 @@ fn head(finding: &Finding, description: &Description) -> String {
     lines.iter().map(|line| format!(" * {}\n", plain(line))).collect()
 }
 
-/// The library below the directory of the unpacked FMU.
+/// Returns the path of the library in the directory of the unpacked FMU.
 fn library(setting: &Setting, sequence: &CallSequence) -> String {
     let model_exchange =
         sequence.iter().any(|numbered| matches!(&numbered.step, Step::Make(_, make) if !make.co_simulation));
@@ -86,21 +86,21 @@ fn library(setting: &Setting, sequence: &CallSequence) -> String {
     path.strip_prefix(directory).unwrap_or(&path).to_string_lossy().replace('\\', "/")
 }
 
-/// Returns the C function that compares the results of the calls with the results of the finding.
+/// Returns the C function that decides whether the results of the calls reproduce the finding.
 fn shows(evidence: &Evidence) -> String {
     let results = match evidence {
-        Evidence::None | Evidence::End | Evidence::Left => None,
+        Evidence::None | Evidence::End | Evidence::Orphans => None,
         Evidence::Printed => Some("*result(\"printed\", 0) != 0".to_owned()),
         Evidence::Damage => Some("damaged()".to_owned()),
         Evidence::Differ(pairs) => {
             let list: Vec<String> = pairs.iter().map(|[one, other]| format!("{{{one}, {other}}}")).collect();
             Some(format!("any_differ((const int[][2]){{{}}}, {})", list.join(", "), pairs.len()))
         }
-        Evidence::Same(proofs) => {
-            let same = |Proof { id, observed, .. }: &Proof| {
+        Evidence::Same(expected) => {
+            let same = |Expected { id, observed, .. }: &Expected| {
                 format!("strcmp(result(\"r\", {id}), {}) == 0", literal(observed.as_bytes()))
             };
-            Some(proofs.iter().map(same).collect::<Vec<_>>().join("\n        && "))
+            Some(expected.iter().map(same).collect::<Vec<_>>().join("\n        && "))
         }
         Evidence::Grown(Measure::Settings, first, last, _) => {
             let [first, last] = [first, last].map(|id| format!("strchr(result(\"r\", {id}), ';')"));
@@ -114,14 +114,14 @@ fn shows(evidence: &Evidence) -> String {
     let kind = match evidence {
         Evidence::None => "NONE",
         Evidence::End => "END",
-        Evidence::Left => "LEFT",
+        Evidence::Orphans => "ORPHANS",
         _ => "RESULTS",
     };
     let results = results.unwrap_or_else(|| "false".to_owned());
     format!("#define EVIDENCE {kind}\n\nstatic bool shows(void) {{\n    return {results};\n}}\n\n")
 }
 
-/// Writes the calls, and notes the names that they need.
+/// Writes calls, and collects the functions and variables that they need.
 struct Writer<'a> {
     fmi3: bool,
     evidence: &'a Evidence,
@@ -144,10 +144,12 @@ impl Writer<'_> {
         lines.lines().fold(String::new(), |text, line| text + indent + line + "\n")
     }
 
-    /// Parts of the results of a call that matter.
+    /// Returns whether the values and the messages of a call are compared; `None` if the call is not compared.
     fn matters(&self, id: u32) -> Option<[bool; 2]> {
         match self.evidence {
-            Evidence::Same(proofs) => proofs.iter().find(|proof| proof.id == id).map(|proof| proof.matters),
+            Evidence::Same(expected) => {
+                expected.iter().find(|result| result.id == id).map(|result| result.matters)
+            }
             Evidence::Differ(pairs) => pairs.iter().any(|pair| pair.contains(&id)).then_some([true, false]),
             _ => None,
         }
@@ -220,7 +222,7 @@ impl Writer<'_> {
         let mut after = parts.after;
         if let Some([written, log]) = self.matters(id) {
             after.push(format!("FILE *file = begin({id}, status);"));
-            after.extend(parts.proofs.into_iter().filter(|_| written));
+            after.extend(parts.results.into_iter().filter(|_| written));
             after.push(format!("end(file, {});", if log { "messages" } else { "\"\"" }));
         }
         if *self.evidence == Evidence::Damage {
@@ -236,7 +238,7 @@ impl Writer<'_> {
         )
     }
 
-    /// The value that is passed for an argument, with the lines that it needs.
+    /// Returns the C expression for an argument, and adds the lines that it needs to `parts`.
     fn argument(&mut self, parts: &mut Parts, arg: &Arg, name: &str) -> String {
         let number = self.number();
         let string = |text: &Vec<u8>, end: usize| format!("guarded({}, {})", literal(text), text.len() + end);
@@ -263,20 +265,20 @@ impl Writer<'_> {
             Arg::Out(kind, count) => parts.out(name, *kind, *count, number),
             Arg::State(slot) => format!("s{slot}"),
             Arg::StateOut(slot) => {
-                parts.proofs.push(format!("fprintf(file, \"%d,;\", s{slot} != NULL);"));
+                parts.results.push(format!("fprintf(file, \"%d,;\", s{slot} != NULL);"));
                 format!("&s{slot}")
             }
             Arg::Saved(slot) => format!("guarded(b{slot}, *n{slot})"),
             Arg::SavedSize(slot) => format!("*n{slot}"),
             Arg::SizeOut(slot) => {
                 parts.after.push(format!("print(\" -> %zu bytes\", *n{slot});"));
-                parts.proofs.push(format!("put_numbers(file, n{slot}, 1, 8);"));
+                parts.results.push(format!("put_numbers(file, n{slot}, 1, 8);"));
                 format!("n{slot}")
             }
             Arg::SavedOut(slot) => {
                 parts.before.push(format!("void *a{number} = guarded(NULL, *n{slot});"));
                 parts.after.push(format!("memcpy(b{slot}, a{number}, *n{slot});"));
-                parts.proofs.push(format!("put_numbers(file, a{number}, *n{slot}, 1);"));
+                parts.results.push(format!("put_numbers(file, a{number}, *n{slot}, 1);"));
                 format!("a{number}")
             }
         }
@@ -287,9 +289,9 @@ impl Writer<'_> {
 struct Parts {
     before: Vec<String>,
     after: Vec<String>,
-    /// Lines that keep the results.
-    proofs: Vec<String>,
-    /// Lines that look for damage.
+    /// Lines that write the results to a file.
+    results: Vec<String>,
+    /// Lines that detect writes outside of the arrays for results.
     checks: Vec<String>,
 }
 
@@ -316,7 +318,7 @@ impl Parts {
             _ => 'u',
         };
         if name == "fmi2NewDiscreteStates" {
-            // fmi2EventInfo has five flags, then the time.
+            // fmi2EventInfo has five flags, padding and the time.
             let time = format!("show((char *)a{number} + 24, 1, 'f', 8);");
             self.after.push(format!("print(\" ->\"); show(a{number}, 5, 'i', 4); {time}"));
         } else if name != "fmi3GetBinary" {
@@ -324,7 +326,7 @@ impl Parts {
             self.after.push(format!("print(\" ->\"); {guard}show(a{number}, {count}, '{letter}', {width});"));
         }
         if name != "fmi3GetBinary" {
-            self.proofs.push(match letter {
+            self.results.push(match letter {
                 's' => format!("if (status < 2) put_texts(file, a{number}, {count});"),
                 _ => format!("put_numbers(file, a{number}, {count}, {width});"),
             });
@@ -333,7 +335,7 @@ impl Parts {
     }
 }
 
-/// Returns the names of the variables whose value references are the first argument.
+/// Returns the names of at most eight variables whose value references are the first argument.
 fn comment(args: &[Arg], description: &Description) -> Option<String> {
     let Some(Arg::In(Kind::U32, references)) = args.first() else { return None };
     let names: Vec<&str> = references
@@ -373,7 +375,7 @@ fn number_of(kind: Kind, bits: u64) -> String {
     }
 }
 
-/// A string in C; long ones are cut off.
+/// Returns a C string literal of at most 4000 bytes.
 fn literal(bytes: &[u8]) -> String {
     let text = bytes.iter().take(4000).fold(String::new(), |mut text, byte| {
         let _ = match byte {

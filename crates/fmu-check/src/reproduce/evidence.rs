@@ -1,36 +1,35 @@
-//! The results that show a finding, found by leaving out those that the judge does not need. A program that reproduces a
-//! finding compares them.
+//! Results that are compared by the program that reproduces a finding: those without which the criterion is fulfilled.
 
 use crate::call_sequence::{Arg, CallSequence, End, Numbered, Outcome, Run, Step, Values, step_of};
-use crate::finding::{Finding, Judge, step_name};
+use crate::finding::{Finding, SharedCriterion, step_name};
 use std::fmt::Write as _;
 
-/// Comparison by which a program decides whether a finding shows.
+/// Comparison by which a program decides whether it reproduces the finding.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Evidence {
-    /// No comparison is known.
+    /// No known comparison.
     #[default]
     None,
-    /// A process does not end as it should, or the library cannot be loaded.
+    /// Crash, hang, exit or too many processes, or a library that cannot be loaded.
     End,
-    /// Processes are left at the end.
-    Left,
-    /// Something was printed.
+    /// Processes that are alive after the end of the call sequence.
+    Orphans,
+    /// Output on the standard output or the standard error.
     Printed,
-    /// Something was written before an array or to one that is for reading.
+    /// Writes outside of the arrays for results.
     Damage,
-    /// The results of any of these pairs of calls differ.
+    /// Pairs of calls, at least one of which has different results.
     Differ(Vec<[u32; 2]>),
-    /// The results of these calls are those that were observed.
-    Same(Vec<Proof>),
-    /// Bytes, threads or files between two measurements grow by more than a number, or settings change.
+    /// Calls that all have the expected results.
+    Same(Vec<Expected>),
+    /// Quantity that grows by more than a number between the measurements of two steps; settings only differ.
     Grown(Measure, u32, u32, u64),
 }
 
-/// Maximum number of repetitions in a program, which should end in seconds.
+/// Maximum number of repetitions in a program.
 const REPETITIONS: usize = 500;
 
-/// The quantity of a measurement.
+/// Quantity of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Measure {
     Memory,
@@ -39,29 +38,29 @@ pub enum Measure {
     Settings,
 }
 
-/// A call whose results matter.
+/// Expected results of a call.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Proof {
+pub struct Expected {
     pub id: u32,
-    /// Whether the values that it wrote matter, and its messages.
+    /// Whether the values that the call wrote are compared, and whether its messages are.
     pub matters: [bool; 2],
-    /// The results that were observed.
+    /// Results of the run, in the format of the programs.
     pub observed: String,
 }
 
-/// Finds the results that show a finding in a run of its call sequence.
+/// Returns the comparison for a finding, from a run of its call sequence.
 pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
-    let Some(judge) = &finding.judge else { return Evidence::None };
+    let Some(criterion) = &finding.criterion else { return Evidence::None };
     if run.end != End::Done || finding.name == "package.symbols" {
         return Evidence::End;
     }
     let without = |change: &dyn Fn(&mut Run)| {
         let mut changed = run.clone();
         change(&mut changed);
-        judge(&changed).is_none()
+        criterion(&changed).is_none()
     };
-    if without(&|run| run.left.clear()) {
-        return Evidence::Left;
+    if without(&|run| run.orphans.clear()) {
+        return Evidence::Orphans;
     }
     if without(&|run| run.output.clear()) {
         return Evidence::Printed;
@@ -73,7 +72,7 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     if !pairs.is_empty() {
         return Evidence::Differ(pairs);
     }
-    let needed = needed(judge, run);
+    let needed = needed(criterion, run);
     let measured = |outcome: &&Outcome| outcome.measured.as_ref().is_some_and(|measured| measured.times == 0);
     if needed.outcomes.values().any(|outcome| measured(&outcome)) {
         return grown(finding, &needed);
@@ -81,19 +80,19 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     let calls = needed.outcomes.values().filter(|outcome| outcome.measured.is_none());
     let mut ids: Vec<u32> = calls.map(|outcome| outcome.id).collect();
     ids.sort_unstable();
-    let proofs: Vec<Proof> = ids.iter().map(|id| proof(judge, &needed, *id)).collect();
-    let calls: Vec<_> = proofs.iter().filter_map(|proof| function(&finding.sequence, proof.id)).collect();
+    let expected: Vec<Expected> = ids.iter().map(|id| expected_result(criterion, &needed, *id)).collect();
+    let calls: Vec<_> = expected.iter().filter_map(|result| function(&finding.sequence, result.id)).collect();
     match &calls[..] {
-        [one, other] if one == other && proofs[0].observed != proofs[1].observed => {
-            Evidence::Differ(vec![[proofs[0].id, proofs[1].id]])
+        [one, other] if one == other && expected[0].observed != expected[1].observed => {
+            Evidence::Differ(vec![[expected[0].id, expected[1].id]])
         }
         [] => Evidence::None,
-        _ => Evidence::Same(proofs),
+        _ => Evidence::Same(expected),
     }
 }
 
-/// Returns each read of a thread with the corresponding read of the simulation before the threads. Which of them differ
-/// depends on chance.
+/// Returns each read on a thread with the corresponding read of the simulation before the threads. The pairs that differ are
+/// not the same in every run.
 fn pairs(sequence: &CallSequence) -> Vec<[u32; 2]> {
     let queries = |sequence: &[Numbered]| -> Vec<u32> {
         let query = |numbered: &&Numbered| matches!(&numbered.step, Step::Call { function, .. } if function[4..].starts_with("Get"));
@@ -111,8 +110,8 @@ fn pairs(sequence: &CallSequence) -> Vec<[u32; 2]> {
         .collect()
 }
 
-/// The run with as few outcomes as the judge needs.
-fn needed(judge: &Judge, run: &Run) -> Run {
+/// Returns the run without the outcomes that the criterion does not need.
+fn needed(criterion: &SharedCriterion, run: &Run) -> Run {
     let mut needed = run.clone();
     let mut ids: Vec<u32> = run.outcomes.keys().copied().collect();
     ids.sort_unstable();
@@ -121,7 +120,7 @@ fn needed(judge: &Judge, run: &Run) -> Run {
         for some in ids.chunks(size) {
             let mut tried = needed.clone();
             some.iter().for_each(|id| drop(tried.outcomes.remove(id)));
-            if tried.outcomes.len() < needed.outcomes.len() && judge(&tried).is_some() {
+            if tried.outcomes.len() < needed.outcomes.len() && criterion(&tried).is_some() {
                 needed = tried;
             }
         }
@@ -130,12 +129,12 @@ fn needed(judge: &Judge, run: &Run) -> Run {
     needed
 }
 
-/// The parts of an outcome without which there is no finding.
-fn proof(judge: &Judge, run: &Run, id: u32) -> Proof {
+/// Returns the parts of an outcome that the criterion needs.
+fn expected_result(criterion: &SharedCriterion, run: &Run, id: u32) -> Expected {
     let without = |change: &dyn Fn(&mut Outcome)| {
         let mut changed = run.clone();
         changed.outcomes.entry(id).and_modify(change);
-        judge(&changed).is_none()
+        criterion(&changed).is_none()
     };
     let matters = [
         without(&|outcome| outcome.written.clear())
@@ -143,7 +142,11 @@ fn proof(judge: &Judge, run: &Run, id: u32) -> Proof {
         without(&|outcome| outcome.log.clear())
             || run.outcome(id).is_some_and(|outcome| outcome.log.is_empty() && outcome.status > Some(1)),
     ];
-    Proof { id, matters, observed: run.outcome(id).map_or(String::new(), |outcome| shown(outcome, matters)) }
+    Expected {
+        id,
+        matters,
+        observed: run.outcome(id).map_or(String::new(), |outcome| shown(outcome, matters)),
+    }
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -153,7 +156,7 @@ fn hex(bytes: &[u8]) -> String {
     })
 }
 
-/// The results as the programs write them.
+/// Formats the results as the programs do.
 fn shown(outcome: &Outcome, [written, log]: [bool; 2]) -> String {
     let mut text = String::new();
     let or_null = |bytes: &Option<Vec<u8>>| bytes.as_ref().map_or("-".to_owned(), |bytes| hex(bytes));
@@ -194,7 +197,7 @@ fn function(sequence: &[Numbered], id: u32) -> Option<String> {
     })
 }
 
-/// A growth between two measurements.
+/// Returns the comparison of two measurements.
 fn grown(finding: &Finding, needed: &Run) -> Evidence {
     let mut ids: Vec<(u32, bool)> = needed
         .outcomes
@@ -219,7 +222,7 @@ fn grown(finding: &Finding, needed: &Run) -> Evidence {
     }
 }
 
-/// The sequence with as many repetitions as were made.
+/// Returns the sequence with the numbers of repetitions of a run, at most `REPETITIONS`.
 pub fn as_repeated(sequence: &CallSequence, run: &Run) -> CallSequence {
     let mut sequence = sequence.clone();
     for numbered in &mut sequence {
@@ -236,10 +239,10 @@ pub fn as_repeated(sequence: &CallSequence, run: &Run) -> CallSequence {
 mod tests {
     use super::{Evidence, evidence};
     use crate::call_sequence::{Arg, End, Kind, Message, Numbered, Outcome, Run, Step, Values};
-    use crate::finding::{Finding, Judge};
+    use crate::finding::{Finding, SharedCriterion};
     use std::sync::Arc;
 
-    fn finding(judge: Judge) -> Finding {
+    fn finding(criterion: SharedCriterion) -> Finding {
         let call = |id: u32, function: &str| {
             let args = vec![Arg::Out(Kind::F64, 1)];
             Numbered {
@@ -249,7 +252,7 @@ mod tests {
             }
         };
         let sequence = vec![call(1, "fmi2GetReal"), call(2, "fmi2DoStep"), call(3, "fmi2GetReal")];
-        Finding::default().shown_by(sequence, judge)
+        Finding::default().shown_by(sequence, criterion)
     }
 
     fn run() -> Run {
@@ -268,35 +271,37 @@ mod tests {
 
     #[test]
     fn two_reads_that_are_compared_must_differ() {
-        let judge: Judge = Arc::new(|run| {
+        let criterion: SharedCriterion = Arc::new(|run| {
             let (one, other) = (run.written(1)?, run.written(3)?);
             one.differ(other).map(|_| "they differ".to_owned())
         });
-        assert_eq!(evidence(&finding(judge), &run()), Evidence::Differ(vec![[1, 3]]));
+        assert_eq!(evidence(&finding(criterion), &run()), Evidence::Differ(vec![[1, 3]]));
     }
 
     #[test]
     fn a_call_that_fails_must_fail_again() {
-        let judge: Judge =
+        let criterion: SharedCriterion =
             Arc::new(|run| run.status(2).filter(|status| *status == 3).map(|_| "it fails".to_owned()));
-        let Evidence::Same(proofs) = evidence(&finding(judge), &run()) else { panic!("a call") };
-        assert_eq!(proofs.iter().map(|proof| proof.observed.as_str()).collect::<Vec<_>>(), ["3;"]);
+        let Evidence::Same(expected) = evidence(&finding(criterion), &run()) else { panic!("a call") };
+        assert_eq!(expected.iter().map(|result| result.observed.as_str()).collect::<Vec<_>>(), ["3;"]);
     }
 
     #[test]
     fn messages_are_compared_where_they_matter() {
-        let judge: Judge = Arc::new(|run| run.outcome(2)?.log.first().map(|_| "a message".to_owned()));
-        let Evidence::Same(proofs) = evidence(&finding(judge), &run()) else { panic!("a call") };
-        assert_eq!(proofs[0].observed, "3;3 - 6e6f;");
+        let criterion: SharedCriterion =
+            Arc::new(|run| run.outcome(2)?.log.first().map(|_| "a message".to_owned()));
+        let Evidence::Same(expected) = evidence(&finding(criterion), &run()) else { panic!("a call") };
+        assert_eq!(expected[0].observed, "3;3 - 6e6f;");
     }
 
     #[test]
     fn the_end_of_a_process_is_evidence() {
-        let judge: Judge = Arc::new(|run| (run.end != End::Done).then(|| "it crashes".to_owned()));
+        let criterion: SharedCriterion =
+            Arc::new(|run| (run.end != End::Done).then(|| "it crashes".to_owned()));
         let crashed = Run { end: End::Crash(String::new()), ..run() };
-        assert_eq!(evidence(&finding(judge), &crashed), Evidence::End);
-        let left: Judge = Arc::new(|run| run.left.first().cloned());
-        let run = Run { left: vec!["sleep".to_owned()], ..run() };
-        assert_eq!(evidence(&finding(left), &run), Evidence::Left);
+        assert_eq!(evidence(&finding(criterion), &crashed), Evidence::End);
+        let orphans: SharedCriterion = Arc::new(|run| run.orphans.first().cloned());
+        let run = Run { orphans: vec!["sleep".to_owned()], ..run() };
+        assert_eq!(evidence(&finding(orphans), &run), Evidence::Orphans);
     }
 }

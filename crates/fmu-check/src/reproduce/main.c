@@ -93,8 +93,8 @@ int main(int count, char **arguments) {
         if (status) { orphans(); clear(); return EVIDENCE == END ? 1 : 3; }
     }
     found = orphans();
-    if (EVIDENCE != LEFT) found = EVIDENCE == RESULTS && shows();
+    if (EVIDENCE != ORPHANS) found = EVIDENCE == RESULTS && shows();
     clear();
-    printf("%s\n", found ? "The finding shows." : "The finding does not show.");
+    printf("%s\n", found ? "The finding is reproduced." : "The finding is not reproduced.");
     return EVIDENCE == NONE ? 3 : found;
 }

@@ -1,4 +1,4 @@
-//! Call sequences as programs in C, which show a finding without this tool.
+//! Programs in C that reproduce a finding without fmu-check.
 
 mod c;
 mod evidence;
@@ -7,7 +7,7 @@ use crate::call_sequence::{Run, Setting};
 use crate::description::Description;
 use crate::finding::Finding;
 
-/// Writes the program of a finding, which compares its results with the results of the last run.
+/// Writes the program that reproduces a finding. The program compares its results with the results of `run`.
 pub fn program(finding: &mut Finding, run: &Run, setting: &Setting, description: &Description) {
     let evidence = evidence::evidence(finding, run);
     let sequence = evidence::as_repeated(&finding.sequence, run);

@@ -29,16 +29,16 @@ typedef struct {
     void *environment;
 } Callbacks;
 
-enum { NONE, END, LEFT, RESULTS };
+enum { NONE, END, ORPHANS, RESULTS };
 
 static void *library;
 static char library_path[5000];
-/* The output of this program; the standard output is the library's. */
+/* Output of this program; the standard output belongs to the library. */
 static FILE *out;
 static bool quiet, at_once;
-/* The directory for the results of calls, which other processes read. */
+/* Directory for the results of calls, which other processes read. */
 static const char *scratch = ".";
-/* The messages since the last call. */
+/* Messages that were logged since the last call. */
 static __thread char messages[1 << 16];
 
 #define print(...) (quiet ? 0 : fprintf(out ? out : stdout, __VA_ARGS__))
@@ -116,7 +116,7 @@ static void *function(const char *name) {
 static __thread struct { void *map; size_t length; } *maps;
 static __thread size_t arrays, capacity;
 
-/* Allocates an array that ends at a guard page: access beyond the array is a crash. */
+/* Allocates an array that ends at a guard page: an access beyond the array is a crash. */
 static __attribute__((unused)) void *guarded(const void *bytes, size_t size) {
     size_t page = (size_t)sysconf(_SC_PAGESIZE), length = ((size + page - 1) / page + 2) * page;
     char *map = mmap(NULL, length, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -205,7 +205,7 @@ static __attribute__((unused)) void *make(int index, const char *name, const cha
     return made;
 }
 
-/* The results of a call: its status, the values that it wrote, its messages. */
+/* Results of a call: its status, the values that it wrote, its messages. */
 static __attribute__((unused)) FILE *begin(int number, int status) {
     FILE *file = results("r", number, "w");
     fprintf(file, "%d;", status);
@@ -225,7 +225,7 @@ static __attribute__((unused)) void version(int number, const char *name) {
     fclose(file);
 }
 
-/* Shows numbers that a call wrote; f is for floating-point, the width is in bytes. */
+/* Prints numbers that a call wrote; the kind f is floating-point, the width is in bytes. */
 static __attribute__((unused)) void show(const void *array, size_t count, char kind, size_t width) {
     size_t i;
     for (i = 0; i < count; i++) {
@@ -250,7 +250,7 @@ static long entries(const char *path) {
     return count;
 }
 
-/* Memory, threads and files, then settings of the process. */
+/* Measures memory, threads and files, then settings of the process. */
 static __attribute__((unused)) void measure(int number) {
     long pages = 0, all = 0, memory;
     char here[5000] = "";
@@ -282,7 +282,7 @@ static __attribute__((unused)) long measured(int number, int index) {
     return numbers[index];
 }
 
-/* Bytes of a saved state, from one process to the next. */
+/* Passes the bytes of a saved state to the next process. */
 static __attribute__((unused)) void pass_on(int number, const char *bytes, size_t size) {
     FILE *file = results("bytes", number, "wb");
     fwrite(bytes, 1, size, file);

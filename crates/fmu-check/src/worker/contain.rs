@@ -1,16 +1,16 @@
-//! Limits for the processes of an FMU: a session for each call sequence, no signals to other processes, and an end for
-//! every descendant.
+//! Containment of the processes of an FMU: a session for each call sequence, no signals to the processes of the checker, and the
+//! end of all descendants.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// Whether the user has interrupted the check.
+/// Returns whether the user has interrupted the check.
 pub fn interrupted() -> bool {
     INTERRUPTED.load(Ordering::Relaxed)
 }
 
-/// The first interrupt ends the check in order; a second one ends the process.
+/// Handles SIGINT, SIGTERM and SIGHUP: the first signal ends the check in order, a second one ends the process.
 #[cfg(unix)]
 pub fn listen_for_interrupts() {
     extern "C" fn interrupt(_: libc::c_int) {
@@ -31,7 +31,7 @@ pub fn listen_for_interrupts() {
     }
 }
 
-/// Elsewhere an interrupt ends the process.
+/// Does nothing: on Windows, an interrupt ends the process.
 #[cfg(not(unix))]
 pub fn listen_for_interrupts() {}
 
@@ -42,7 +42,7 @@ pub fn end_group(leader: u32) {
     unsafe { libc::kill(-(leader as libc::pid_t), libc::SIGKILL) };
 }
 
-/// Elsewhere there are no process groups.
+/// Does nothing: Windows has no process groups.
 #[cfg(not(unix))]
 pub fn end_group(_: u32) {}
 
@@ -55,10 +55,10 @@ mod linux {
     use std::os::fd::AsRawFd;
     use std::time::{Duration, Instant};
 
-    /// Processes of a call sequence at once; more are a finding.
+    /// Maximum number of processes of a call sequence at a time; more are a finding.
     pub const MOST_PROCESSES: usize = 64;
 
-    /// A process that adopts the orphans among its descendants, in a separate session.
+    /// Starts a session, and makes this process adopt the orphans among its descendants.
     pub fn adopt_descendants() {
         // SAFETY: both calls concern only this process.
         unsafe {
@@ -67,7 +67,7 @@ mod linux {
         }
     }
 
-    /// Waits up to 50 ms for data or the end of data.
+    /// Waits at most 50 ms for data or the end of the file; returns whether either is there.
     pub fn readable(file: &impl AsRawFd) -> std::io::Result<bool> {
         let mut poll = libc::pollfd { fd: file.as_raw_fd(), events: libc::POLLIN, revents: 0 };
         // SAFETY: one descriptor, which is open.
@@ -79,20 +79,20 @@ mod linux {
         }
     }
 
-    /// Whether the process at the other end of the standard input has ended.
+    /// Returns whether the process at the other end of the standard input has ended.
     pub fn abandoned() -> bool {
         let mut poll = libc::pollfd { fd: 0, events: 0, revents: 0 };
         // SAFETY: one descriptor.
         unsafe { libc::poll(&raw mut poll, 1, 0) > 0 && poll.revents & libc::POLLHUP != 0 }
     }
 
-    /// Living descendants with their names.
+    /// Returns the descendants that are alive, with their names.
     pub fn descendants() -> Vec<(libc::pid_t, String)> {
         let mut children: HashMap<libc::pid_t, Vec<(libc::pid_t, String)>> = HashMap::new();
         for entry in std::fs::read_dir("/proc").into_iter().flatten().flatten() {
             let Some(pid) = entry.file_name().to_str().and_then(|name| name.parse().ok()) else { continue };
             let stat = std::fs::read_to_string(entry.path().join("stat")).unwrap_or_default();
-            // The name is in parentheses, and may contain some.
+            // The name is in parentheses and may contain parentheses.
             let Some((name, rest)) = stat.split_once('(').and_then(|(_, rest)| rest.rsplit_once(") ")) else {
                 continue;
             };
@@ -116,7 +116,7 @@ mod linux {
         found
     }
 
-    /// Waits for children that have ended; returns whether there are others.
+    /// Reaps the children that have ended; returns whether other children are alive.
     fn reap() -> bool {
         loop {
             // SAFETY: waits for no child that others wait for.
@@ -128,7 +128,7 @@ mod linux {
         }
     }
 
-    /// Ends all descendants, the group of `leader` first; returns the names of those that were alive after `grace`.
+    /// Ends all descendants, first the process group of `leader`. Returns the names of the descendants that were alive after `grace`.
     pub fn end_descendants(leader: libc::pid_t, grace: Duration) -> Vec<String> {
         let begin = Instant::now();
         while reap() {
@@ -140,11 +140,11 @@ mod linux {
         if !reap() {
             return Vec::new();
         }
-        let left = descendants().into_iter().map(|(_, name)| name).collect();
+        let orphans = descendants().into_iter().map(|(_, name)| name).collect();
         let begin = Instant::now();
         while reap() && begin.elapsed() < Duration::from_secs(10) {
-            // SAFETY: the group and the processes descend from this one. A group is ended at once, so that none of it escapes
-            // by starting another process.
+            // SAFETY: the processes descend from this one. One signal ends a group, so that no process of it escapes by starting
+            // another one.
             unsafe {
                 libc::kill(-leader, libc::SIGKILL);
                 for (pid, _) in descendants() {
@@ -157,11 +157,11 @@ mod linux {
             }
             std::thread::sleep(Duration::from_micros(200));
         }
-        left
+        orphans
     }
 
-    /// A session for this process, from which it cannot send signals to the processes of the checker or to all processes:
-    /// the attempt ends it with SIGSYS.
+    /// Starts a session, and installs a filter for system calls: a signal to the processes of the checker or to all processes ends
+    /// this process with SIGSYS.
     pub fn isolate(checker: libc::pid_t) {
         // SAFETY: starts a session; the other calls only return numbers.
         let (keeper, group, caller) = unsafe {
@@ -176,7 +176,7 @@ mod linux {
         let equals = |number: i32, jt, jf| step(libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K, jt, jf, number);
         let end = |action: u32| step(libc::BPF_RET | libc::BPF_K, 0, 0, action as i32);
         let count = targets.len() as u8;
-        // The number of the call is first in seccomp_data, its first argument after 16 bytes.
+        // seccomp_data has the number of the system call at offset 0 and the first argument at offset 16.
         let mut program = vec![
             load(0),
             equals(libc::SYS_kill as i32, 2, 0),
@@ -189,7 +189,7 @@ mod linux {
         }
         program.extend([end(libc::SECCOMP_RET_ALLOW), end(libc::SECCOMP_RET_KILL_PROCESS)]);
         let filter = libc::sock_fprog { len: program.len() as u16, filter: program.as_mut_ptr() };
-        // SAFETY: a filter of system calls for this process and its descendants; without it, all is allowed.
+        // SAFETY: the filter is for this process and its descendants. Without support for it, all system calls are allowed.
         unsafe {
             libc::prctl(libc::PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
             libc::prctl(libc::PR_SET_SECCOMP, libc::SECCOMP_MODE_FILTER, &raw const filter);

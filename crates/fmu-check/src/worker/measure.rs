@@ -1,4 +1,4 @@
-//! Resources that the process uses, and settings that belong to the whole process.
+//! Measures the resources and settings of the process.
 
 use crate::call_sequence::Measured;
 
@@ -15,7 +15,7 @@ pub fn now() -> Measured {
     }
 }
 
-/// The bytes in use, and whether the C library has counted them. It does from glibc 2.33 on.
+/// Returns the allocated bytes and true with glibc 2.33 and later, otherwise the resident memory and false.
 fn memory() -> (u64, bool) {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {
@@ -31,7 +31,8 @@ fn memory() -> (u64, bool) {
     (pages * 4096, false)
 }
 
-/// Rounding, locale, directory and signals: an FMU must leave them as they are.
+/// Returns the settings of the process that an FMU must not change: working directory, floating-point control word, locale and
+/// signal handlers.
 fn settings() -> Vec<String> {
     let mut found = Vec::new();
     found.push(format!("working directory {}", std::env::current_dir().unwrap_or_default().display()));

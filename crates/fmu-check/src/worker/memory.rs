@@ -1,21 +1,21 @@
-//! Arrays that end at a guard page. Access beyond an array is a crash; a write before it is detected after the call.
+//! Arrays that end at a guard page. An access beyond an array is a crash; a write before it is detected after the call.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 
-/// Number of accessible bytes after an array: 0 if an access beyond it should crash, more if it should be detected.
+/// Number of accessible bytes after an array: 0 if an access beyond the array should crash, more if a write should be detected.
 pub static AFTER: AtomicUsize = AtomicUsize::new(0);
 
-/// Whether freed arrays stay mapped for reuse. Mapping takes time in repetitions and makes threads wait for each other.
+/// Whether freed arrays remain mapped for reuse, because mapping takes time in repetitions and makes threads wait for each other.
 pub static KEEP: AtomicBool = AtomicBool::new(false);
 
-/// The byte that fills memory before a call.
+/// Byte that fills memory before a call.
 pub const FILL: u8 = 0x5a;
 
-/// A page of this byte.
+/// Block of `FILL` bytes for comparisons.
 static FILLED: [u8; 4096] = [FILL; 4096];
 
-/// Returns the number of functions of the FMU that have not returned, in memory that a forked process shares with its parent.
+/// Returns the number of calls into the FMU that have not returned, in memory that a forked process shares with its parent.
 pub fn calls_under_way() -> &'static AtomicU32 {
     static COUNT: OnceLock<&AtomicU32> = OnceLock::new();
     COUNT.get_or_init(|| {
@@ -32,7 +32,7 @@ pub fn calls_under_way() -> &'static AtomicU32 {
     })
 }
 
-/// Runs code of the FMU, and counts it while it has not returned.
+/// Runs code of the FMU, and counts it in `calls_under_way` until it returns.
 pub fn in_fmu<T>(run: impl FnOnce() -> T) -> T {
     calls_under_way().fetch_add(1, Ordering::Relaxed);
     let result = run();
@@ -53,7 +53,7 @@ mod pages {
     /// Lengths and addresses of the pages that are kept for reuse.
     static KEPT: Mutex<Vec<(usize, usize)>> = Mutex::new(Vec::new());
 
-    /// Pages of which the last may not be touched.
+    /// Mapped pages, the last of which is a guard page.
     pub struct Pages {
         map: *mut u8,
         length: usize,
@@ -72,7 +72,7 @@ mod pages {
             if let Some(index) = kept.iter().position(|(other, _)| *other == length) {
                 return Self { map: kept.swap_remove(index).1 as *mut u8, length };
             }
-            // SAFETY: new memory, the last page of which is closed.
+            // SAFETY: new memory, the last page of which becomes inaccessible.
             let map = unsafe {
                 let map = libc::mmap(
                     null_mut(),
@@ -89,7 +89,7 @@ mod pages {
             Self { map, length }
         }
 
-        /// The accessible bytes.
+        /// Returns the address and the number of the accessible bytes.
         pub fn open(&self) -> (*mut u8, usize) {
             (self.map, self.length - page())
         }
@@ -97,7 +97,7 @@ mod pages {
 
     impl Drop for Pages {
         fn drop(&mut self) {
-            // If arrays have room after them, freed memory stays readable, too.
+            // With accessible memory after arrays, freed arrays remain accessible, too.
             if KEEP.load(Ordering::Relaxed) {
                 KEPT.lock().unwrap_or_else(PoisonError::into_inner).push((self.length, self.map as usize));
             } else if AFTER.load(Ordering::Relaxed) == 0 {
@@ -110,7 +110,7 @@ mod pages {
 
 #[cfg(not(unix))]
 mod pages {
-    /// No guard pages: a write beyond an array is detected after the call.
+    /// Memory without a guard page: a write beyond an array is detected after the call.
     pub struct Pages(Box<[std::cell::UnsafeCell<u8>]>);
 
     impl Pages {
@@ -124,7 +124,7 @@ mod pages {
     }
 }
 
-/// An array for one call.
+/// Array for one call.
 pub struct Guarded {
     pages: pages::Pages,
     begin: usize,
@@ -133,7 +133,7 @@ pub struct Guarded {
 }
 
 impl Guarded {
-    /// An array with these bytes.
+    /// Makes an array with these bytes.
     pub fn new(bytes: &[u8]) -> Self {
         let after = match cfg!(unix) {
             true => AFTER.load(Ordering::Relaxed),
@@ -151,7 +151,7 @@ impl Guarded {
         Self { pages, begin, size: bytes.len(), before: bytes.to_vec() }
     }
 
-    /// Room for so many bytes.
+    /// Makes an array of `size` bytes for results.
     pub fn room(size: usize) -> Self {
         Self::new(&vec![FILL; size])
     }
@@ -162,7 +162,7 @@ impl Guarded {
 
     fn all(&self) -> &[u8] {
         let (map, open) = self.pages.open();
-        // SAFETY: so many bytes are initialized, and no call is under way.
+        // SAFETY: `open` bytes are initialized, and no call is under way.
         unsafe { std::slice::from_raw_parts(map, open) }
     }
 
@@ -170,7 +170,7 @@ impl Guarded {
         &self.all()[self.begin..self.begin + self.size]
     }
 
-    /// Damage: bytes around the array that were written, or bytes of the array if it is an input.
+    /// Describes a write before or after the array, or to the array if it is for reading.
     pub fn damage(&self, for_reading: bool) -> Option<String> {
         let all = self.all();
         if !untouched(&all[..self.begin]) {

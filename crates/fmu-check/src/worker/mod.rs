@@ -1,4 +1,4 @@
-//! The process that loads the library and plays a call sequence. The FMU may crash it, so each result is written to a file
+//! Process that loads the library and executes a call sequence. The FMU may crash the process, so each result is written to a file
 //! before the next call.
 
 mod contain;
@@ -34,43 +34,43 @@ use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// The variable that names the job of a worker.
+/// Environment variable with the path of the job of a worker; empty for a server.
 pub const VARIABLE: &str = "FMU_CHECK_JOB";
 
-/// The variable that names the temporary directory of a check.
+/// Environment variable with the path of the temporary directory of a check.
 pub const SCRATCH: &str = "FMU_CHECK_SCRATCH";
 
-/// The exit status of a worker that fails for a reason other than the FMU.
+/// Exit status of a worker that fails for a reason other than the FMU.
 pub const OWN_FAULT: i32 = 97;
 
-/// The exit status of a worker that has played its sequence.
-pub const PLAYED: i32 = 96;
+/// Exit status of a worker that has executed its call sequence.
+pub const EXECUTED: i32 = 96;
 
 #[derive(Serialize, Deserialize)]
 pub struct Job {
-    /// The setting that all call sequences share.
+    /// Parameters that all call sequences share.
     pub setting: Setting,
     pub sequence: CallSequence,
-    /// Serialized bytes of processes before.
+    /// Serialized states of earlier processes of the call sequence, by index.
     pub bytes: HashMap<usize, Vec<u8>>,
 }
 
-/// The results of a process. It did not end in time if it has neither an exit status nor a signal.
+/// Results of a process. A process that exceeded the limit has neither an exit status nor a signal.
 #[derive(Default, Serialize, Deserialize)]
 pub struct Ended {
-    /// Its exit status.
+    /// Exit status.
     pub code: Option<i32>,
-    /// The signal that has ended it.
+    /// Signal that ended the process.
     pub signal: Option<i32>,
-    /// Its standard output and standard error.
+    /// Standard output and standard error.
     pub output: String,
-    /// Its outcomes, a line of JSON for each.
+    /// Outcomes of the steps, a line of JSON for each.
     pub outcomes: String,
-    /// Names of the processes that it has left.
-    pub left: Vec<String>,
-    /// The number of its processes, if that is why it was ended.
+    /// Names of the child processes that were alive after its end.
+    pub orphans: Vec<String>,
+    /// Number of processes, if it exceeded the maximum.
     pub flood: Option<usize>,
-    /// Whether it ended in a function of the FMU.
+    /// Whether the process ended in code of the FMU.
     pub inside: bool,
 }
 
@@ -84,14 +84,14 @@ impl From<ExitStatus> for Ended {
     }
 }
 
-/// The last line that a worker writes.
+/// Last line that a worker writes.
 #[derive(Serialize, Deserialize)]
 pub struct Last {
     pub bytes: HashMap<usize, Vec<u8>>,
 }
 
-/// Plays call sequences and ends the process if it was started as a worker. A program that offers checks must call this before
-/// anything else.
+/// Executes call sequences and ends the process if it was started as a worker. A program that offers checks must call this function
+/// first in `main`.
 pub fn work_if_asked() {
     let Some(job) = std::env::var_os(VARIABLE) else { return };
     #[cfg(target_os = "linux")]
@@ -101,7 +101,7 @@ pub fn work_if_asked() {
     end(work_from_files(Path::new(&job)))
 }
 
-/// Plays the job in a file, and writes the outcomes to a file next to it.
+/// Executes the job in a file, and writes the outcomes to a file next to it.
 fn work_from_files(job: &Path) -> Result<(), String> {
     let message = |error: std::io::Error| error.to_string();
     let read = std::fs::read(job).map_err(message)?;
@@ -110,10 +110,10 @@ fn work_from_files(job: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// Ends the process without the exit handlers of the library, which are not tested. Its buffered output is written.
+/// Writes the buffered output, and ends the process without the exit handlers of the library, which are tested by `Step::Quit`.
 fn end(result: Result<(), String>) -> ! {
     let status = match result {
-        Ok(()) => PLAYED,
+        Ok(()) => EXECUTED,
         Err(error) => {
             eprintln!("{error}");
             OWN_FAULT
@@ -129,14 +129,14 @@ fn end(result: Result<(), String>) -> ! {
     std::process::exit(status)
 }
 
-/// Plays a call sequence, and writes a line to the file for the outcome of each step.
+/// Executes a call sequence, and writes a line to the file for the outcome of each step.
 fn work(job: Job, file: File) {
     limit(job.setting.memory);
     PROCESS.store(std::process::id(), Ordering::Relaxed);
     if job.setting.soft {
         memory::AFTER.store(4096, std::sync::atomic::Ordering::Relaxed);
     }
-    let player = Player {
+    let executor = Executor {
         setting: job.setting,
         libraries: Mutex::default(),
         instances: Mutex::default(),
@@ -145,8 +145,8 @@ fn work(job: Job, file: File) {
         sizes: Mutex::default(),
         file: Mutex::new(file),
     };
-    player.play(&job.sequence, true);
-    player.write(&Last { bytes: std::mem::take(&mut locked(&player.bytes)) });
+    executor.execute(&job.sequence, true);
+    executor.write(&Last { bytes: std::mem::take(&mut locked(&executor.bytes)) });
 }
 
 fn limit(memory: u64) {
@@ -162,7 +162,7 @@ fn limit(memory: u64) {
         #[cfg(target_os = "linux")]
         {
             set(libc::RLIMIT_AS, memory as _);
-            // SAFETY: ends with the process that started it.
+            // SAFETY: this process is killed when its parent process ends.
             unsafe { libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) };
         }
     }
@@ -173,13 +173,13 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Messages with the environment pointer that came with them.
+/// Messages, each with the environment pointer that the FMU passed to the logger.
 static MESSAGES: Mutex<Vec<(usize, Message)>> = Mutex::new(Vec::new());
 
-/// The process that plays the call sequence.
+/// Identifier of the process that executes the call sequence.
 static PROCESS: AtomicU32 = AtomicU32::new(0);
 
-/// An instance: its handle and the environment it was given.
+/// Instance: its handle and the environment pointer that it received.
 struct Instance {
     handle: usize,
     environment: usize,
@@ -188,15 +188,15 @@ struct Instance {
     _callbacks: Option<Box<fmi2CallbackFunctions>>,
 }
 
-/// The next environment.
+/// Environment pointer of the next instance.
 static ENVIRONMENTS: AtomicUsize = AtomicUsize::new(0x10_0000);
 
 // SAFETY: the callbacks are only read.
 unsafe impl Send for Instance {}
 
-struct Player {
+struct Executor {
     setting: Setting,
-    /// The libraries of Co-Simulation and Model Exchange, once they are loaded.
+    /// Loaded libraries of Co-Simulation and Model Exchange.
     libraries: Mutex<[Option<&'static libloading::Library>; 2]>,
     instances: Mutex<HashMap<usize, Instance>>,
     states: Mutex<HashMap<usize, usize>>,
@@ -221,8 +221,9 @@ unsafe fn remember(environment: *mut c_void, status: c_int, category: *const c_c
     }
 }
 
-/// The logger of FMI 2.0. Stable Rust cannot define its `...`, so it has named arguments: integers and pointers, then
-/// floating-point numbers, which have separate registers. Linux and macOS on Intel processors pass both the same way.
+/// Logger of FMI 2.0. Stable Rust cannot define variadic functions, so it has named arguments: integers and pointers, then
+/// floating-point numbers, which have separate registers. On Linux, and on macOS with Intel processors, variadic functions
+/// receive their arguments in these registers, too.
 #[allow(clippy::too_many_arguments, reason = "the values of the message")]
 unsafe extern "C" fn log_of_fmi2(
     environment: *mut c_void,
@@ -241,8 +242,8 @@ unsafe extern "C" fn log_of_fmi2(
     z: f64,
     w: f64,
 ) {
-    // SAFETY: section 2.1.5 of FMI 2.0: the strings end with NUL, and `text` is a format of printf for the values. The name
-    // is read as by importers that show it.
+    // SAFETY: section 2.1.5 of FMI 2.0: the strings end with NUL, and `text` is a format of printf for the values. The name is
+    // read because importers print it.
     unsafe {
         std::hint::black_box(text_at(instance_name));
         #[cfg(all(unix, not(all(target_vendor = "apple", target_arch = "aarch64"))))]
@@ -268,13 +269,13 @@ unsafe extern "C" fn log_of_fmi3(
     unsafe { remember(environment, status, category, text) }
 }
 
-/// An array of a call, which is freed after the call.
+/// Array of a call, which is freed after the call.
 struct Kept {
     array: Guarded,
     content: Content,
 }
 
-/// Content of an array: one that the FMU reads, or one that it writes, with the index that receives the content.
+/// Content of an array: input for the FMU, values, or the handle, size or bytes of the saved state at an index.
 enum Content {
     Input,
     Output(Kind, usize),
@@ -283,11 +284,11 @@ enum Content {
     Saved(usize),
 }
 
-impl Player {
+impl Executor {
     fn write(&self, line: &impl Serialize) {
         #[cfg(unix)]
         if std::process::id() != PROCESS.load(Ordering::Relaxed) {
-            // The FMU has duplicated this process: the duplicate waits to be found and ended.
+            // The FMU has forked this process. The child process waits until the server ends it.
             loop {
                 // SAFETY: waits.
                 unsafe { libc::pause() };
@@ -295,11 +296,11 @@ impl Player {
         }
         let mut line = serde_json::to_vec(line).unwrap_or_default();
         line.push(b'\n');
-        // If the disk is full, the results are lost, which the checker reports as the end of the process.
+        // If the disk is full, the results are lost, and the checker reports an end of the process.
         let _ = locked(&self.file).write_all(&line);
     }
 
-    fn play(&self, sequence: &[Numbered], report: bool) -> Vec<Outcome> {
+    fn execute(&self, sequence: &[Numbered], report: bool) -> Vec<Outcome> {
         let mut outcomes = Vec::new();
         for numbered in sequence {
             let mut outcome = Outcome { id: numbered.id, ..Outcome::default() };
@@ -309,7 +310,7 @@ impl Player {
                     memory::KEEP.store(true, Ordering::Relaxed);
                     let (mut done, mut last) = (0, Vec::new());
                     while done < *times && begin.elapsed().as_secs_f64() < self.setting.repetitions {
-                        last = self.play(steps, false);
+                        last = self.execute(steps, false);
                         done += 1;
                         if last.iter().any(|outcome| outcome.status.is_some_and(|status| status > 2)) {
                             break;
@@ -326,7 +327,7 @@ impl Player {
                     memory::KEEP.store(true, Ordering::Relaxed);
                     std::thread::scope(|scope| {
                         for sequence in sequences {
-                            scope.spawn(|| self.play(sequence, report));
+                            scope.spawn(|| self.execute(sequence, report));
                         }
                     });
                     memory::KEEP.store(false, Ordering::Relaxed);
@@ -388,7 +389,7 @@ impl Player {
             }
             Step::Quit => {
                 self.write(&Last { bytes: HashMap::new() });
-                in_fmu(|| std::process::exit(PLAYED))
+                in_fmu(|| std::process::exit(EXECUTED))
             }
             Step::Repeat(..) | Step::Parallel(_) | Step::FreshProcess => {}
         }
@@ -414,7 +415,7 @@ impl Player {
                         let why = std::error::Error::source(&error)
                             .map_or_else(|| error.to_string(), |source| source.to_string());
                         self.write(&Unloadable { unloadable: why });
-                        std::process::exit(PLAYED)
+                        std::process::exit(EXECUTED)
                     }
                 }
             }
@@ -425,14 +426,14 @@ impl Player {
     }
 
     fn make(&self, index: usize, make: &Make, outcome: &mut Outcome) {
-        // Strings are unmapped after the call: an FMU must copy what it keeps.
+        // Strings are unmapped after the call: an FMU must copy the strings that it uses later.
         let text = |text: &str| Guarded::new(&CString::new(text).unwrap_or_default().into_bytes_with_nul());
         let (name, token) = (text(&make.name), text(&make.token));
         let standard = if self.setting.fmi3 { Standard::Fmi3 } else { Standard::Fmi2 };
         let location = standard.resources(&self.setting.resources);
         let resources = Guarded::new(location.as_bytes_with_nul());
         let word = |text: &Guarded| text.address() as usize as *const c_char;
-        // Each instance has a different environment, an address that the FMU must not access.
+        // Each instance has a different environment pointer, which the FMU must not dereference.
         let environment = ENVIRONMENTS.fetch_add(16, Ordering::Relaxed) as *mut c_void;
         let mut callbacks = None;
         let logger = log_of_fmi2 as *const ();
@@ -494,14 +495,14 @@ impl Player {
         outcome.log = messages(environment as usize);
         let co_simulation = make.co_simulation;
         let environment = environment as usize;
-        self.keep(
+        self.store(
             index,
             Instance { handle: handle as usize, environment, co_simulation, _callbacks: callbacks },
         );
     }
 
-    /// Replaces an instance. Arguments of an instance that was not freed stay allocated.
-    fn keep(&self, index: usize, instance: Instance) {
+    /// Stores an instance. The callbacks of an earlier instance with this index, which was not freed, remain allocated.
+    fn store(&self, index: usize, instance: Instance) {
         let before = match instance.handle {
             0 => locked(&self.instances).remove(&index),
             _ => locked(&self.instances).insert(index, instance),
@@ -606,7 +607,7 @@ impl Player {
     }
 }
 
-/// The loader's reason, as the only line.
+/// Line of a worker that cannot load the library: the message of the loader.
 #[derive(Serialize, Deserialize)]
 pub struct Unloadable {
     pub unloadable: String,
@@ -634,7 +635,7 @@ fn read(array: &Guarded, kind: Kind, count: usize, succeeded: bool) -> Values {
     Values::Numbers(kind, words.collect())
 }
 
-/// Returns the bytes that fmi3GetBinary has returned as pointers and sizes.
+/// Returns the binary values that fmi3GetBinary returned as pointers and sizes.
 fn blobs(pointers: &Guarded, sizes: &Values) -> Values {
     let (Values::Numbers(_, pointers), Values::Numbers(_, sizes)) =
         (read(pointers, Kind::Size, usize::MAX, true), sizes)
@@ -650,7 +651,7 @@ fn blobs(pointers: &Guarded, sizes: &Values) -> Values {
     Values::Texts(pointers.into_iter().zip(sizes).map(blob).collect())
 }
 
-/// Takes the messages that were logged with this environment.
+/// Removes and returns the messages that were logged with this environment pointer.
 fn messages(environment: usize) -> Vec<Message> {
     let mut messages = locked(&MESSAGES);
     let mut own = Vec::new();

@@ -1,5 +1,5 @@
-//! A process that forks for every call sequence, because starting a program takes several times as long. It adopts
-//! and ends the descendants that a call sequence leaves.
+//! Server process that forks a child process for every call sequence, because starting a program takes several times as long.
+//! The server adopts and ends the orphaned processes of a call sequence.
 
 use super::contain::{MOST_PROCESSES, abandoned, adopt_descendants, descendants, end_descendants, isolate};
 use super::memory::calls_under_way;
@@ -11,15 +11,15 @@ use std::process::ExitStatus;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-/// Bytes of the standard output and standard error of a process that are kept.
+/// Maximum number of bytes of the standard output and standard error of a process that are recorded.
 const MOST_OUTPUT: u64 = 1 << 20;
 
-/// Plays the jobs of the standard input, in lines with the limit of each in seconds, until it ends.
+/// Executes the jobs of the standard input until it ends. Each line has the limit in seconds and the job.
 pub fn serve() -> Result<(), String> {
     adopt_descendants();
     let result = jobs();
     if abandoned() {
-        // The checker removes its directory itself, unless it was killed.
+        // A checker that was killed has not removed its directory.
         if let Some(scratch) = std::env::var_os(SCRATCH) {
             let _ = std::env::set_current_dir("/");
             let _ = std::fs::remove_dir_all(Path::new(&scratch));
@@ -32,7 +32,7 @@ fn jobs() -> std::io::Result<()> {
     let mut files = [tempfile::tempfile()?, tempfile::tempfile()?];
     // SAFETY: only returns a number.
     let checker = unsafe { libc::getppid() };
-    let mut times_left = 0;
+    let mut sequences_with_orphans = 0;
     for line in std::io::stdin().lines() {
         let line = line?;
         let Some((limit, job)) = line.split_once(' ') else { continue };
@@ -42,28 +42,28 @@ fn jobs() -> std::io::Result<()> {
             -1 => return Err(std::io::Error::last_os_error()),
             0 => {
                 isolate(checker);
-                play(job, files)
+                execute(job, files)
             }
             child => {
                 let (ended, flood) = wait(child, limit.parse().unwrap_or_default());
-                // Processes that end soon after the instance are no finding. After three sequences with others, the server does not wait.
-                let patient = ended.is_some() && times_left < 3;
-                let left = end_descendants(child, Duration::from_millis(if patient { 300 } else { 0 }));
-                times_left += usize::from(ended.is_some() && !left.is_empty());
+                // Orphans that end within 300 ms are no finding. After three call sequences with orphans, the server does not wait.
+                let patient = ended.is_some() && sequences_with_orphans < 3;
+                let orphans = end_descendants(child, Duration::from_millis(if patient { 300 } else { 0 }));
+                sequences_with_orphans += usize::from(ended.is_some() && !orphans.is_empty());
                 if abandoned() {
                     return Ok(());
                 }
                 let inside = calls_under_way().load(Ordering::Relaxed) > 0;
                 let ended = ended.map(Ended::from).unwrap_or_default();
-                pass_on(Ended { left, flood, inside, ..ended }, &mut files)?;
+                pass_on(Ended { orphans, flood, inside, ..ended }, &mut files)?;
             }
         }
     }
     Ok(())
 }
 
-/// Plays a job in the process that was forked for it.
-fn play(job: &str, [output, outcomes]: [File; 2]) -> ! {
+/// Executes a job in the process that was forked for it.
+fn execute(job: &str, [output, outcomes]: [File; 2]) -> ! {
     use std::os::fd::AsRawFd as _;
     let nothing = File::open("/dev/null");
     for (file, number) in [(nothing.as_ref().unwrap_or(&output), 0), (&output, 1), (&output, 2)] {
@@ -75,8 +75,8 @@ fn play(job: &str, [output, outcomes]: [File; 2]) -> ! {
     super::end(read.map(|job| work(job, outcomes)))
 }
 
-/// The wait status of a process that ends within so many seconds. Any other is ended, as is one with too many processes or
-/// whose checker has ended.
+/// Waits for a process for at most `limit` seconds. Returns its wait status if it ended, or the number of processes if there are
+/// too many. Returns neither after the limit or if the checker has ended.
 fn wait(child: libc::pid_t, limit: f64) -> (Option<ExitStatus>, Option<usize>) {
     let (begin, mut status, mut looked) = (Instant::now(), 0, Instant::now());
     loop {
@@ -85,7 +85,7 @@ fn wait(child: libc::pid_t, limit: f64) -> (Option<ExitStatus>, Option<usize>) {
             -1 => return (None, None),
             pid if pid == child => return (Some(ExitStatus::from_raw(status)), None),
             0 => {}
-            // An adopted orphan has ended.
+            // The process that ended is an adopted orphan.
             _ => continue,
         }
         if looked.elapsed() > Duration::from_millis(20) {

@@ -9,12 +9,12 @@ use std::process::Command;
 use tempfile::TempDir;
 use zip::write::SimpleFileOptions;
 
-/// The model description without a fault.
+/// Returns the model description without a fault.
 fn description(fmi: u32) -> String {
     if fmi == 2 { include_str!("wagon2.xml") } else { include_str!("wagon3.xml") }.to_owned()
 }
 
-/// The compiled library of the wagon, which the tests share. The environment variable `WAGON_FAULT` chooses the fault when
+/// Returns the path of the compiled library, which the tests share. The environment variable `WAGON_FAULT` chooses the fault when
 /// the library is loaded. Each fault in linking has a separate library.
 fn library(fmi: u32, macro_name: &str) -> PathBuf {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mutants/wagon.c");
@@ -41,7 +41,7 @@ fn library(fmi: u32, macro_name: &str) -> PathBuf {
     library
 }
 
-/// The FMU with its description changed.
+/// Packs the FMU with a changed description.
 fn fmu(directory: &Path, fmi: u32, library: &Path, change: impl Fn(String) -> String) -> PathBuf {
     let path = directory.join("wagon.fmu");
     let mut zip = zip::ZipWriter::new(std::fs::File::create(&path).expect("a file"));
@@ -61,7 +61,7 @@ fn fmu(directory: &Path, fmi: u32, library: &Path, change: impl Fn(String) -> St
     path
 }
 
-/// A check of an FMU.
+/// Returns the command that checks an FMU.
 fn check(fmu: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_fmu-check"));
     command.arg(fmu);
@@ -74,7 +74,7 @@ fn unpack(fmu: &Path, directory: &Path) {
     zip::ZipArchive::new(file).expect("a ZIP").extract(directory).expect("a directory");
 }
 
-/// The findings in an FMU with a fault: names and observations.
+/// Returns the names and observations of the findings in an FMU with a fault, and the report.
 fn found(fmu: &Path, fault: &str, options: &[&str]) -> (Vec<(String, String)>, serde_json::Value) {
     let output = check(fmu).args(options).arg("--json").env("WAGON_FAULT", fault).output().expect("runs");
     let report: serde_json::Value = serde_json::from_slice(&output.stdout)
@@ -95,9 +95,9 @@ fn caught(
     let directory = TempDir::new().expect("a directory");
     let path = fmu(directory.path(), fmi, &library(fmi, macro_name), change);
     let out = directory.path().join("out");
-    // A call that hangs is waited for as long as the limit.
+    // A check waits for a call that hangs until the limit.
     let limit = if name.ends_with("hang") { "0.3" } else { "2" };
-    // The repetitions are enough for 50 cycles on a busy machine; fewer are not judged.
+    // The duration is enough for 50 repetitions on a busy machine; fewer are not evaluated.
     let options = ["--only", topic, "--no-shrink", "--limit", limit, "--repeat", "0.3"];
     let (found, report) = found(&path, fault, &[&options[..], &["--out", &out.to_string_lossy()]].concat());
     assert!(
@@ -112,11 +112,11 @@ fn caught(
     }
 }
 
-/// The program of a finding shows the finding in the FMU with the fault, and not in the FMU without.
+/// Asserts that the program of a finding reproduces the finding in the FMU with the fault, and not in the FMU without.
 fn reproduced(out: &Path, name: &str, unpacked: &Path, fault: &str) {
     let program = out.join("repro");
     let source = out.join(format!("{name}.c"));
-    // Only a hang is waited for.
+    // Only the program of a hang waits until its limit.
     let patience = if name.ends_with("hang") { "-DPATIENCE=5" } else { "-DPATIENCE=60" };
     let compiled = Command::new("cc")
         .args(["-w", patience, "-o"])
@@ -140,15 +140,15 @@ macro_rules! mutants {
             caught(($fmi, stringify!($mutant), ""), $topic, $name, |text| text);
         }
     )+
-        /// The faults above.
+        /// Names of the faults of this table.
         const FAULTS: &[&str] = &[$(stringify!($mutant)),+];
     };
 }
 
 mutants! {
-    2 half_set "refusals" "refusals.changed";
-    3 discard_changes "refusals" "refusals.discarded";
-    2 step_rejected_halfway "refusals" "refusals.changed";
+    2 half_set "rejections" "rejections.changed";
+    3 discard_changes "rejections" "rejections.discarded";
+    2 step_rejected_halfway "rejections" "rejections.changed";
     2 getter_changes "results" "results.reading";
     3 reading_once "results" "results.reading";
     2 lossy_state "states" "states.restore-values";
@@ -199,20 +199,20 @@ mutants! {
     3 state_not_supported "functions" "functions.capability";
     2 status_unknown "results" "functions.status";
     3 free_null_crashes "life_cycle" "life_cycle.free-null.crash";
-    2 terminate_rejected "life_cycle" "life_cycle.refused";
+    2 terminate_rejected "life_cycle" "life_cycle.rejected";
     3 reset_rejected "reset" "reset.incomplete";
-    2 get_after_end_rejected "life_cycle" "life_cycle.refused";
+    2 get_after_end_rejected "life_cycle" "life_cycle.rejected";
     3 crash_amid "results" "results.crash";
     3 token_ignored "life_cycle" "life_cycle.token";
-    2 category_unknown "refusals" "logs.category";
-    3 log_latin1 "refusals" "logs.text";
-    3 silent "refusals" "logs.silent";
+    2 category_unknown "rejections" "logs.category";
+    3 log_latin1 "rejections" "logs.text";
+    3 silent "rejections" "logs.silent";
     3 log_when_off "logs" "logs.off";
-    2 endless_step "hostile" "hostile.times.hang";
-    3 null_crashes "hostile" "hostile.null.crash";
-    2 bytes_crash "hostile" "hostile.bytes.crash";
-    3 reference_crashes "hostile" "hostile.references.crash";
-    2 reference_exits "hostile" "hostile.references.exit";
+    2 endless_step "malformed" "malformed.times.hang";
+    3 null_crashes "malformed" "malformed.null.crash";
+    2 bytes_crash "malformed" "malformed.bytes.crash";
+    3 reference_crashes "malformed" "malformed.references.crash";
+    2 reference_exits "malformed" "malformed.references.exit";
     2 text_cut "start_values" "start_values.set";
     2 event_loses_input "start_values" "start_values.inputs";
     3 start_in_mode_ignored "start_values" "start_values.when";
@@ -223,7 +223,7 @@ mutants! {
     3 directional_added "derivatives" "derivatives.directional";
     3 event_again_now "life_cycle" "life_cycle.next-event-time";
     2 event_moves_silently "life_cycle" "life_cycle.states-changed";
-    2 last_step_rejected "life_cycle" "life_cycle.refused";
+    2 last_step_rejected "life_cycle" "life_cycle.rejected";
     3 early_time_wrong "results" "results.early-return";
     3 early_unsaid "results" "results.early-unsaid";
     2 name_in_result "results" "results.name";
@@ -235,14 +235,14 @@ mutants! {
     2 name_gone "life_cycle" "arrays.read-beyond";
     3 stop_ignored "life_cycle" "life_cycle.stop-time";
     2 order_ignored "derivatives" "derivatives.order";
-    3 pool_of_eight "life_cycle" "life_cycle.refused";
+    3 pool_of_eight "life_cycle" "life_cycle.rejected";
     2 output_stale "results" "results.reading";
     2 unload_crashes "life_cycle" "life_cycle.unload.crash";
     3 exit_hangs "life_cycle" "life_cycle.unload.hang";
     3 early_read_wrong "start_values" "start_values.start";
-    2 set_after_end "refusals" "refusals.tolerated";
-    3 set_after_end_crashes "refusals" "refusals.crash";
-    2 long_step_hangs "hostile" "hostile.times.hang";
+    2 set_after_end "rejections" "rejections.tolerated";
+    3 set_after_end_crashes "rejections" "rejections.crash";
+    2 long_step_hangs "malformed" "malformed.times.hang";
 }
 
 #[test]
@@ -257,7 +257,7 @@ fn symbol_missing() {
     caught((2, "none", "SYMBOL_MISSING"), "functions", "package.symbols", |text| text);
 }
 
-/// Faults of the description: FMI version, name of the finding, the text that is replaced, and the replacement.
+/// Faults of the description: FMI version, name of the finding, the string that is replaced, and the replacement.
 #[rustfmt::skip]
 const DESCRIPTIONS: [(u32, &str, &str, &str); 13] = [
     (2, "description.combination", r#""parameter" variability="fixed""#, r#""parameter" variability="discrete""#),
@@ -298,7 +298,7 @@ const ATTACKS: [(u32, &str, &str); 8] = [
     (3, "stops_parent", "life_cycle.crash"),
 ];
 
-/// The processes whose environment has this mark.
+/// Returns the processes whose environment contains this mark.
 #[cfg(target_os = "linux")]
 fn marked(mark: &str) -> usize {
     let processes = std::fs::read_dir("/proc").expect("the processes").flatten();
@@ -306,7 +306,7 @@ fn marked(mark: &str) -> usize {
     environments.filter(|environment| String::from_utf8_lossy(environment).contains(mark)).count()
 }
 
-/// A check with its temporary files in a directory and its processes marked.
+/// Returns the command of a check with its temporary files in a directory and a mark in the environment of its processes.
 #[cfg(target_os = "linux")]
 fn contained(directory: &Path, fmi: u32, fault: &str) -> Command {
     let path = fmu(directory, fmi, &library(fmi, ""), |text| text);
@@ -318,8 +318,8 @@ fn contained(directory: &Path, fmi: u32, fault: &str) -> Command {
     command
 }
 
-/// FMUs that start processes or send signals to other processes have a finding. No process or file is left, and the caller
-/// of the check goes on.
+/// Asserts that FMUs that start processes or send signals to other processes have a finding, that no process or file remains, and
+/// that the caller of the check continues.
 #[cfg(target_os = "linux")]
 #[test]
 fn attacks_are_contained() {
@@ -339,7 +339,7 @@ fn attacks_are_contained() {
     }
 }
 
-/// No process and no file is left, regardless of the signal that ends the check.
+/// Asserts that no process and no file remains, regardless of the signal that ends the check.
 #[cfg(target_os = "linux")]
 #[test]
 fn interrupts_leave_nothing() {
@@ -350,7 +350,7 @@ fn interrupts_leave_nothing() {
         let mut child =
             command.args(["--limit", "60"]).stdout(std::process::Stdio::null()).spawn().expect("runs");
         let mark = directory.path().to_string_lossy().into_owned();
-        // The process itself, one that forks, and the one that hangs.
+        // The checker, its server and the process that hangs.
         wait_until(|| marked(&mark) >= 3);
         let sent = Command::new("kill").args(["-s", signal, &child.id().to_string()]).status();
         assert!(sent.expect("kill").success());
@@ -364,7 +364,7 @@ fn interrupts_leave_nothing() {
     }
 }
 
-/// Waits 20 seconds at most.
+/// Waits for a condition, at most 20 seconds.
 #[cfg(target_os = "linux")]
 fn wait_until(holds: impl Fn() -> bool) {
     let begin = std::time::Instant::now();
@@ -374,7 +374,7 @@ fn wait_until(holds: impl Fn() -> bool) {
     }
 }
 
-/// Every report lists the parts that were not checked. They fail the check unless an option allows them by name.
+/// Asserts that every report lists the parts that were not checked, which fail the check unless an option allows them by name.
 #[test]
 fn nothing_passes_unchecked() {
     let both = "co-simulation,model-exchange";
@@ -416,7 +416,7 @@ fn nothing_passes_unchecked() {
         }
         assert_eq!(run(&["--allow-unchecked", names]).status.code(), Some(0), "{names}");
     }
-    // A hang is a violation; after it nothing of the interface is checked.
+    // A hang is a violation, after which the interface type is not checked.
     let directory = TempDir::new().expect("a directory");
     let path = fmu(directory.path(), 2, &library(2, ""), |text| text);
     let (found, report) = found(&path, "make_hangs", &["--only", "states", "--no-shrink", "--limit", "0.3"]);
@@ -427,7 +427,7 @@ fn nothing_passes_unchecked() {
     assert_eq!(names, ["co-simulation", "model-exchange"]);
 }
 
-/// A finding that a baseline accepts does not fail, in any report; one of another observation does.
+/// Asserts that a finding that a baseline accepts does not fail in any report, and that one with another observation does.
 #[test]
 fn a_baseline_accepts_with_a_reason() {
     let directory = TempDir::new().expect("a directory");
@@ -454,7 +454,7 @@ fn a_baseline_accepts_with_a_reason() {
     }
 }
 
-/// A quick check ends in time, names the topics that it leaves out, and passes.
+/// Asserts that a quick check ends within its limit, names the topics that it does not check, and passes.
 #[test]
 fn a_quick_check_is_quick() {
     let directory = TempDir::new().expect("a directory");
@@ -464,11 +464,11 @@ fn a_quick_check_is_quick() {
     assert!(begin.elapsed().as_secs() < 30);
     let unchecked = report["unreached"].as_array().expect("a list").iter();
     let names: Vec<_> = unchecked.map(|of| (of["name"].clone(), of["allowed"].clone())).collect();
-    assert_eq!(names, [("resources".into(), true.into()), ("hostile".into(), true.into())]);
+    assert_eq!(names, [("resources".into(), true.into()), ("malformed".into(), true.into())]);
     assert_eq!(report["status"], 0);
 }
 
-/// A check of 100,000 variables ends in the time of --time, with little memory.
+/// Asserts that a check of 100,000 variables ends within `--time` and needs at most 1 GB.
 #[cfg(target_os = "linux")]
 #[test]
 fn many_variables_take_little_time_and_memory() {
@@ -495,7 +495,7 @@ fn many_variables_take_little_time_and_memory() {
     assert!(names.clone().all(|name| name == "package.glibc"), "{:?}", names.collect::<Vec<_>>());
 }
 
-/// An FMU that is larger than it may be is not unpacked.
+/// Asserts that an FMU above the maximum size is not unpacked.
 #[test]
 fn unpacking_has_a_limit() {
     let directory = TempDir::new().expect("a directory");
@@ -510,7 +510,7 @@ fn unpacking_has_a_limit() {
     assert_eq!(run("4").status.code(), Some(0));
 }
 
-/// The source has no fault that is not tested, and the documentation counts them.
+/// Asserts that every fault of the source is tested, and that the documentation has the number of faults.
 #[test]
 fn no_fault_is_forgotten() {
     let read = |path: &str| {
@@ -535,7 +535,7 @@ fn no_fault_is_forgotten() {
     assert!(page.contains(&count), "{count}");
 }
 
-/// The wagon without a fault has no finding.
+/// Asserts that the wagon without a fault has no finding.
 fn clean(fmi: u32) {
     let directory = TempDir::new().expect("a directory");
     let path = fmu(directory.path(), fmi, &library(fmi, ""), |text| text);
@@ -557,7 +557,7 @@ fn none_in_fmi3() {
     clean(3);
 }
 
-/// The shortest calls are few, and both programs show the fault without this tool.
+/// Asserts that a shortened call sequence has few calls and that its program reproduces the fault.
 #[test]
 fn programs_show_it() {
     let directory = TempDir::new().expect("a directory");

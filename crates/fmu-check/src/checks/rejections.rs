@@ -1,26 +1,25 @@
-//! Checks that a rejected call changes nothing.
+//! Checks that invalid calls are rejected and that a rejected call changes nothing.
 
 use crate::call_sequence::{Arg, Kind, Run};
 use crate::checker::Checker;
 use crate::description::{Variable, kind_of, type_name};
 use crate::finding::status_name;
 use crate::values::{near, other_values};
-use crate::writer::{Part, Played, Point, Read, Trajectory, Writer, access, difference, step_args};
+use crate::writer::{Calls, Part, Point, Read, Trajectory, Writer, access, difference, step_args};
 use fmi_abi::Interface;
 use std::sync::Arc;
 
-/// A call that ought to be rejected: the function, its arguments, a description, and the rule that is broken if
-/// the call is accepted.
+/// Invalid call: the function, its arguments, a description, and the rule that the FMU breaks if it accepts the call.
 type Attack = (String, Vec<Arg>, String, Option<&'static str>);
 
-const TOLERATED: Option<&str> = Some("refusals.tolerated");
-const ACCEPTED: Option<&str> = Some("refusals.accepted");
+const TOLERATED: Option<&str> = Some("rejections.tolerated");
+const ACCEPTED: Option<&str> = Some("rejections.accepted");
 
 fn attack(function: &str, args: Vec<Arg>, what: &str, rule: Option<&'static str>) -> Attack {
     (function.to_owned(), args, what.to_owned(), rule)
 }
 
-/// A value reference that no variable has.
+/// Returns a value reference that no variable has.
 pub fn unknown_reference(checker: &Checker) -> u64 {
     let used: Vec<u32> = checker.description.variables.iter().map(|variable| variable.reference).collect();
     let most = used.iter().copied().max().unwrap_or(0);
@@ -33,7 +32,7 @@ fn set(checker: &Checker, references: Vec<u64>, kind: Kind, bits: Vec<u64>) -> V
     access(checker.description.standard, references, [Arg::In(kind, bits)], total)
 }
 
-/// Returns calls that set variables that cannot be set, alone or together with an input that can.
+/// Returns calls that set variables that cannot be set, separately or together with an input.
 fn variable_attacks(checker: &Checker, interface: Interface) -> Vec<Attack> {
     let description = &checker.description;
     let unknown = unknown_reference(checker);
@@ -74,14 +73,14 @@ fn variable_attacks(checker: &Checker, interface: Interface) -> Vec<Attack> {
             attacks.extend(input_attacks(checker, variable, &function, kind, other));
         }
         let (group, rule, what) = if variable.variability == "constant" {
-            ("constant", Some("refusals.constant"), format!("a value for the constant {}", variable.name))
+            ("constant", Some("rejections.constant"), format!("a value for the constant {}", variable.name))
         } else if variable.causality == "output" && variable.initial == "calculated" {
             ("output", TOLERATED, format!("a value for the output {}", variable.name))
         } else if is("parameter", "fixed") {
             let what = format!("a value for the fixed parameter {} after the initialization", variable.name);
             let group = match name {
                 "Real" | "Float64" => "fixed",
-                "Integer" | "Int32" => "fixed whole",
+                "Integer" | "Int32" => "fixed integer",
                 _ => "fixed other",
             };
             (group, TOLERATED, what)
@@ -98,7 +97,7 @@ fn variable_attacks(checker: &Checker, interface: Interface) -> Vec<Attack> {
     attacks
 }
 
-/// Returns calls that set an input to a valid value and another to an invalid one.
+/// Returns calls that set one input to a valid value and another input to NaN or a value beyond its maximum.
 fn input_attacks(
     checker: &Checker,
     variable: &Variable,
@@ -123,7 +122,7 @@ fn input_attacks(
     values.map(invalid).collect()
 }
 
-/// Returns calls with unknown references, calls of other modes, and malformed states.
+/// Returns calls with unknown value references, calls that only another mode allows, and a malformed serialized state.
 fn call_attacks(checker: &Checker, interface: Interface, time: f64) -> Vec<Attack> {
     let (unknown, fmi3) = (unknown_reference(checker), checker.fmi3());
     let (get_float, set_float) = if fmi3 { ("GetFloat64", "SetFloat64") } else { ("GetReal", "SetReal") };
@@ -137,10 +136,10 @@ fn call_attacks(checker: &Checker, interface: Interface, time: f64) -> Vec<Attac
         attack(get_float, get, "the value of a reference that no variable has", ACCEPTED),
         attack(set_float, set, "a value for a reference that no variable has", ACCEPTED),
         attack(exit, vec![], "leaving Initialization Mode, which it is not in", TOLERATED),
-        attack(enter, nothing, "entering Initialization Mode amid the simulation", TOLERATED),
+        attack(enter, nothing, "entering Initialization Mode during the simulation", TOLERATED),
     ];
     if !fmi3 {
-        let what = "another experiment amid the simulation";
+        let what = "another experiment during the simulation";
         attacks.push(attack("SetupExperiment", experiment, what, TOLERATED));
     }
     if checker.serializes(interface) {
@@ -151,7 +150,7 @@ fn call_attacks(checker: &Checker, interface: Interface, time: f64) -> Vec<Attac
     attacks
 }
 
-/// Returns impossible steps and invalid derivatives of inputs.
+/// Returns steps with invalid times or sizes, and invalid derivatives of inputs.
 fn step_attacks(checker: &Checker, time: f64, size: f64) -> Vec<Attack> {
     let step = |(time, size, what): (f64, f64, &str)| {
         attack("DoStep", step_args(checker.description.standard, time, size), what, TOLERATED)
@@ -220,14 +219,19 @@ fn input_of(checker: &Checker, kind: Kind) -> Option<u64> {
     input.map(|variable| u64::from(variable.reference))
 }
 
-/// A trajectory, with an attack in its middle or without: the attack, the reads after it, and the rest.
-fn play(writer: &mut Writer, instance: usize, attack: Option<&Attack>) -> (Option<u32>, Vec<Read>, Played) {
+/// Writes a simulation with or without an attack in its middle. Returns the number of the attack, the reads after it, and the
+/// calls and reads of the remaining points.
+fn write_simulation(
+    writer: &mut Writer,
+    instance: usize,
+    attack: Option<&Attack>,
+) -> (Option<u32>, Vec<Read>, Calls) {
     let trajectory = writer.trajectory;
     let to = trajectory.points.len() / 2;
-    writer.play(instance, &[Part::Begin, Part::Points(to)]);
+    writer.write(instance, &[Part::Begin, Part::Points(to)]);
     let attack = attack.map(|(function, args, ..)| writer.forbidden(Some(instance), function, args.clone()));
     let at_once = writer.read_all(instance);
-    let mut later = Played::default();
+    let mut later = Calls::default();
     for (number, point) in trajectory.points[to..].iter().enumerate() {
         // The first two steps set no inputs, so that a value that the attack has set takes effect.
         let inputs = if number < 2 { Vec::new() } else { point.inputs.clone() };
@@ -238,7 +242,7 @@ fn play(writer: &mut Writer, instance: usize, attack: Option<&Attack>) -> (Optio
     (attack, at_once, later)
 }
 
-/// Checks each attack in the middle of a trajectory: the simulation must continue as without the attack.
+/// Checks attacks in the middle of a simulation, and a value for an input after Terminate.
 pub fn change_nothing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let interface = trajectory.interface;
     let to = trajectory.points.len() / 2;
@@ -269,21 +273,21 @@ fn after_end(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         return Ok(());
     };
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &[Part::Begin, Part::Points(2), Part::Call("Terminate")]);
+    writer.write(0, &[Part::Begin, Part::Points(2), Part::Call("Terminate")]);
     writer.forbidden = true;
     let ids = writer.set(0, &[(index, value)]);
     let name = description.variables[index].name.clone();
-    checker.check("refusals.tolerated", writer.sequence, move |run| {
+    checker.check("rejections.tolerated", writer.sequence, move |run| {
         let accepted = ids.iter().all(|id| run.succeeds(*id));
         accepted.then(|| format!("a value for the input {name} is accepted after Terminate"))
     })
 }
 
-/// Checks that an attack is rejected and changes nothing.
+/// Checks that an attack is rejected and that the simulation continues as without it.
 fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let (_, alone_at_once, alone) = play(&mut writer, 0, None);
-    let (Some(id), at_once, later) = play(&mut writer, 1, Some(&attack)) else { return Ok(()) };
+    let (_, alone_at_once, alone) = write_simulation(&mut writer, 0, None);
+    let (Some(id), at_once, later) = write_simulation(&mut writer, 1, Some(&attack)) else { return Ok(()) };
     let (function, _, what, accepted) = attack;
     let call = format!("{function} with {what} returns");
     let named = call.clone();
@@ -303,16 +307,16 @@ fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyho
     });
     // In FMI 2.0, a discarded step may have advanced the time.
     let discarded = match checker.fmi3() {
-        true => Some("refusals.discarded"),
-        false => Some("refusals.changed").filter(|_| function != "DoStep"),
+        true => Some("rejections.discarded"),
+        false => Some("rejections.changed").filter(|_| function != "DoStep"),
     };
     let error = Arc::clone(&changed);
-    let run = checker.judge("refusals.changed", writer.sequence.clone(), move |run| error(run, 3))?;
+    let run = checker.evaluate("rejections.changed", writer.sequence.clone(), move |run| error(run, 3))?;
     if let Some(rule) = discarded {
-        checker.keep(rule, &run, &writer.sequence, move |run| changed(run, 2));
+        checker.record(rule, &run, &writer.sequence, move |run| changed(run, 2));
     }
     if let Some(rule) = accepted {
-        checker.keep(rule, &run, &writer.sequence, move |run| {
+        checker.record(rule, &run, &writer.sequence, move |run| {
             let status = run.status(id).filter(|_| run.succeeds(id))?;
             Some(format!("{call} {}", status_name(status)))
         });

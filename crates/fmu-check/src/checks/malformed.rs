@@ -1,6 +1,6 @@
-//! Malformed calls, as faulty importers make them. A crash or a hang is fragile.
+//! Malformed calls, as a faulty importer may make them. A crash or a hang is a finding of the severity fragile.
 
-use super::refusals::unknown_reference;
+use super::rejections::unknown_reference;
 use crate::call_sequence::{Arg, CallSequence, End, Kind, Values};
 use crate::checker::{Checker, Random};
 use crate::description::{kind_of, type_name};
@@ -8,18 +8,18 @@ use crate::writer::{Part, Point, Trajectory, Writer, access};
 use fmi_abi::calls::{Signature, signatures};
 use fmi_abi::{BaseType, Mode};
 
-/// Crashes after which no further call sequences of a rule are played.
+/// Number of crashes after which no further call sequence of a rule is executed.
 const CRASHES: usize = 40;
-/// Hangs after which no further call sequences of a rule are played.
+/// Number of hangs after which no further call sequence of a rule is executed.
 const HANGS: usize = 2;
 
 type Sequences = anyhow::Result<Vec<CallSequence>>;
 
-/// Plays sequences until `CRASHES` of them have crashed or `HANGS` have hung.
+/// Executes call sequences until `CRASHES` of them have crashed or exited, or `HANGS` have hung.
 pub fn all(checker: &Checker, name: &str, sequences: Vec<CallSequence>) -> anyhow::Result<()> {
     let (mut crashes, mut hangs) = (0, 0);
     for sequence in sequences {
-        match checker.judge(name, sequence, |_| None)?.end {
+        match checker.evaluate(name, sequence, |_| None)?.end {
             End::Hang(_) => hangs += 1,
             End::Done => {}
             _ => crashes += 1,
@@ -31,7 +31,7 @@ pub fn all(checker: &Checker, name: &str, sequences: Vec<CallSequence>) -> anyho
     Ok(())
 }
 
-/// Returns a call sequence of legal parts and, after them, forbidden calls.
+/// Returns a call sequence of allowed parts followed by the calls of `write`, which are marked as forbidden.
 fn after(
     checker: &Checker,
     trajectory: &Trajectory,
@@ -39,13 +39,14 @@ fn after(
     write: impl FnOnce(&mut Writer),
 ) -> CallSequence {
     let mut writer = checker.writer(trajectory);
-    writer.play(0, legal);
+    writer.write(0, legal);
     writer.forbidden = true;
     write(&mut writer);
     writer.sequence
 }
 
-/// The functions that an instance has, without `fmi2` and `fmi3`, each with the calls up to the last mode that allows it.
+/// Returns the signature of each function that the interface type allows, its name without prefix, and the parts that lead to
+/// the first of `MODES` in which the function is allowed.
 fn callable(
     checker: &Checker,
     trajectory: &Trajectory,
@@ -67,7 +68,7 @@ fn callable(
     })
 }
 
-/// NULL for the instance, and zero or NULL for every argument.
+/// Passes NULL as the instance, and zero or NULL as every argument.
 pub fn null_instances(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let sequences = callable(checker, trajectory).map(|(signature, name, _)| {
         let args = signature.arguments.iter().map(|argument| harmless(argument.of)).collect();
@@ -78,7 +79,7 @@ pub fn null_instances(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     Ok(sequences.collect())
 }
 
-/// NULL for one array of a call.
+/// Passes NULL for one array of a call at a time.
 pub fn nulls(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let sequences = callable(checker, trajectory).flat_map(|(signature, name, parts)| {
         let arrays = signature.arguments.iter().filter(|argument| argument.of.starts_with('*')).count();
@@ -92,7 +93,7 @@ pub fn nulls(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     Ok(sequences.collect())
 }
 
-/// An argument of a type: zero, or NULL.
+/// Returns zero or NULL as an argument of a type.
 fn harmless(name: &str) -> Arg {
     match name.trim_start_matches("fmi2").trim_start_matches("fmi3") {
         "Real" | "Float64" => Arg::real(0.0),
@@ -103,7 +104,7 @@ fn harmless(name: &str) -> Arg {
     }
 }
 
-/// The arguments of a call for one value, in which one array is NULL.
+/// Returns the arguments of a call for one value, with NULL for the array at the index `null`.
 fn with_null(checker: &Checker, signature: &Signature, null: usize) -> Vec<Arg> {
     let standard = checker.description.standard;
     let name = &signature.rule.name[4..];
@@ -133,7 +134,7 @@ fn with_null(checker: &Checker, signature: &Signature, null: usize) -> Vec<Arg> 
     args.collect()
 }
 
-/// Passes references that no variable has to all getters and setters.
+/// Passes value references that no variable has to all getters and setters except those of Binary.
 pub fn references(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let description = &checker.description;
     let standard = description.standard;
@@ -164,7 +165,8 @@ pub fn references(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     Ok(wrong)
 }
 
-/// Passes sizes that do not fit: for arrays of FMI 3.0, and in Model Exchange for the vectors of states.
+/// Passes wrong sizes for the values of variables in FMI 3.0, and in Model Exchange for the vectors of states, derivatives,
+/// nominal values and event indicators.
 pub fn sizes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let description = &checker.description;
     let mut sizes = Vec::new();
@@ -208,7 +210,8 @@ pub fn sizes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     Ok(sizes)
 }
 
-/// Extreme values of a type that is not floating-point. A large count asks for much memory, which the machine may not have.
+/// Returns extreme values of a type that is not floating-point. Unsigned 64-bit values stay below 2^32: an FMU may allocate
+/// as many elements.
 fn extreme_values(name: &str, kind: Kind, size: usize) -> Vec<Values> {
     let numbers: &[f64] = match kind {
         Kind::Pointer => {
@@ -228,7 +231,7 @@ fn extreme_values(name: &str, kind: Kind, size: usize) -> Vec<Values> {
     numbers.iter().map(|number| Values::new(kind, vec![*number; size])).collect()
 }
 
-/// Sets NaN, infinite, extreme and malformed values of parameters and inputs.
+/// Sets NaN, infinite, extreme and malformed values of inputs and of variables with `initial` = `exact`.
 pub fn values(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let (description, mut sequences) = (&checker.description, Vec::new());
     let mut settable = checker.readable.clone();
@@ -240,8 +243,8 @@ pub fn values(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     });
     let is_input = |index: usize| description.variables[index].causality == "input";
     let size = |index: usize| description.variables[index].size.unwrap_or(1);
-    // Inputs are set again at every point.
-    let mut play = |values: Vec<(usize, Values)>, again: bool| {
+    // If `again` is true, the values are set again at every point.
+    let mut add = |values: Vec<(usize, Values)>, again: bool| {
         sequences.push(after(checker, trajectory, &[Part::Make, Part::Enter], |writer| {
             writer.set(0, &values);
             writer.leave(0);
@@ -262,7 +265,7 @@ pub fn values(checker: &Checker, trajectory: &Trajectory) -> Sequences {
                 .map(|index| (index, Values::new(description.kind(index), vec![number; size(index)])))
                 .collect();
             if !values.is_empty() {
-                play(values, input);
+                add(values, input);
             }
         }
     }
@@ -270,19 +273,19 @@ pub fn values(checker: &Checker, trajectory: &Trajectory) -> Sequences {
         let Some(base) = description.variables[index].base else { continue };
         let (name, kind) = (type_name(description.standard, base), kind_of(description.standard, base));
         for value in extreme_values(name, kind, size(index)) {
-            play(vec![(index, value)], is_input(index) && trajectory.is_stepped());
+            add(vec![(index, value)], is_input(index) && trajectory.is_stepped());
         }
     }
     sequences.truncate(120);
     Ok(sequences)
 }
 
-/// Passes times and step sizes that are NaN, infinite, negative, zero, tiny or huge.
+/// Passes NaN, infinite, negative, zero, tiny and huge numbers as step size or time, and as start time.
 pub fn times(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let start = checker.description.start_time;
     let size = trajectory.points.first().map_or(1e-3, |point| point.size).max(1e-9);
     let mut sequences = Vec::new();
-    // 2e3: an importer that takes milliseconds for seconds makes steps of 2000 s.
+    // 2e3: an importer that confuses milliseconds and seconds requests a step of 2000 s.
     let numbers = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308, 1e12 * size, -size, 0.0, 5e-324, 2e3];
     for number in numbers {
         sequences.push(after(checker, trajectory, &[Part::Begin], |writer| {
@@ -290,9 +293,9 @@ pub fn times(checker: &Checker, trajectory: &Trajectory) -> Sequences {
                 writer.step(0, start, number);
             } else {
                 writer.call(0, "SetTime", vec![Arg::real(number)]);
-                writer.play(0, &[Part::ReadAll, Part::Call("EnterEventMode"), Part::Update(1)]);
+                writer.write(0, &[Part::ReadAll, Part::Call("EnterEventMode"), Part::Update(1)]);
             }
-            writer.play(0, &[Part::Read, Part::Free]);
+            writer.write(0, &[Part::Read, Part::Free]);
         }));
         sequences.push(after(checker, trajectory, &[Part::Make], |writer| {
             writer.enter_with(0, None, number, None);
@@ -300,18 +303,18 @@ pub fn times(checker: &Checker, trajectory: &Trajectory) -> Sequences {
             if trajectory.is_stepped() {
                 writer.step(0, number, size);
             }
-            writer.play(0, &[Part::Read, Part::Free]);
+            writer.write(0, &[Part::Read, Part::Free]);
         }));
     }
     Ok(sequences)
 }
 
-/// Passes malformed bytes as a serialized state: empty, constant, cut, doubled and damaged ones.
+/// Passes malformed bytes as a serialized state: none, constant bytes, and a state that is truncated, doubled or damaged.
 pub fn bytes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let mut writer = checker.writer(trajectory);
-    writer.play(0, &[Part::Begin, Part::Save(0)]);
+    writer.write(0, &[Part::Begin, Part::Save(0)]);
     let [_, saved] = writer.serialize(0, 0);
-    let run = checker.play(&writer.sequence)?;
+    let run = checker.execute(&writer.sequence)?;
     let Some(Values::Numbers(_, bytes)) = run.written(saved) else { return Ok(Vec::new()) };
     let mut tries: Vec<Vec<u64>> = vec![
         Vec::new(),
@@ -335,7 +338,7 @@ pub fn bytes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
             let count = Arg::Whole(bytes.len() as i64);
             let args = vec![Arg::In(Kind::U8, bytes), count, Arg::StateOut(1)];
             writer.call(0, "DeserializeFMUState", args);
-            writer.play(0, &[Part::Restore(1), Part::ReadAll]);
+            writer.write(0, &[Part::Restore(1), Part::ReadAll]);
             if let Some(point) = trajectory.points.first().filter(|_| trajectory.is_stepped()) {
                 writer.step(0, point.time, point.size);
             }
