@@ -1,4 +1,4 @@
-"""Fixtures: the closed loop made of them, and its runs under the masters that are installed."""
+"""Fixtures: the controller FMU, the closed loop, and the installed masters."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ def controller_fmu() -> Path:
 
 @pytest.fixture(scope="session")
 def closed_loop() -> system.System:
-    """The closed loop as build_closed_loop has written it."""
+    """The closed loop that build_closed_loop wrote."""
     return system.read(built("prw_closed_loop.ssp"), built("prw_closed_loop"))
 
 
 @pytest.fixture(scope="session", params=masters.MASTERS, ids=lambda master: master.name)
 def master(request) -> importers.Tool:
-    """Every master in turn, as far as it is installed."""
+    """Each installed master."""
     if request.param.version() is None:
         pytest.skip(f"{request.param.package} is not installed")
     return request.param

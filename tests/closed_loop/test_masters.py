@@ -1,4 +1,4 @@
-"""The closed loop under third-party masters: settling, limits, agreement, and the order of the coupling's error."""
+"""The closed loop under third-party masters: settling, limits, agreement, and the order of the coupling error."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from tools.validation.closed_loop import settling_time
 
 
 def by_fmu_run(closed_loop, starts_late: bool) -> np.ndarray:
-    """The variables that masters record, (steps, RECORDED), from fmu_run in the masters' order of calls."""
+    """Returns the variables that masters record, (steps, RECORDED), from fmu_run in the call order of the masters."""
     with fmu_run.System(closed_loop.ssp, order="jacobi") as loop:
         if not starts_late:
-            # libcosim counts nanoseconds, and makes seconds of them for each step.
+            # libcosim counts nanoseconds and converts them to seconds for each step.
             time = np.arange(closed_loop.steps + 1) * round(closed_loop.step * 1e9) / 1e9
             runs = loop.run(time, outputs=masters.RECORDED)
             return np.column_stack([runs[name][0, 1:] for name in masters.RECORDED])
-        # FMPy feeds the inputs of the system after its first step, and adds its steps up.
+        # FMPy sets the inputs of the system after the first step, and its time is the sum of the steps.
         goals = {name: value for name, (_, value) in closed_loop.inputs.items()}
         one = loop.instances(start=dict.fromkeys(goals, 0.0))
         one.step(closed_loop.step)
@@ -42,12 +42,12 @@ def response(master, closed_loop):
 def test_there_are_at_least_two_masters():
     installed = [master for master in masters.MASTERS if master.version()]
     if masters.MASTERS[1].version() is None:
-        pytest.skip("libcosim does not come for this Python or platform")
+        pytest.skip("libcosim is not available for this Python or platform")
     assert len(installed) >= 2
 
 
-def test_the_wrist_gets_where_it_shall(response, closed_loop):
-    """30 degrees of pitch and 60 of roll to 0.1 degree, well within a second, and for good."""
+def test_the_wrist_reaches_its_goal(response, closed_loop):
+    """Pitch and roll settle within 0.1 degrees of 30 and 60 degrees in less than 0.6 s."""
     for axis in ("pitch", "roll"):
         goal = closed_loop.inputs[f"{axis}_ref"][1]
         assert settling_time(response["time"], response[f"testbed.{axis}"], goal) < 0.6
@@ -62,7 +62,7 @@ def test_the_motors_keep_their_limits(response, closed_loop):
         assert np.max(np.abs(response[f"testbed.tau{i}"])) < 10
 
 
-def test_systems_of_fmu_run_agree_to_the_bit(master, response, closed_loop):
+def test_systems_of_fmu_run_are_bit_identical(master, response, closed_loop):
     if master.name == "Ecos":
         pytest.skip("Ecos reads outputs after it has set the next inputs")
     own = by_fmu_run(closed_loop, starts_late=master.name == "FMPy")
@@ -70,14 +70,14 @@ def test_systems_of_fmu_run_agree_to_the_bit(master, response, closed_loop):
         assert np.array_equal(response[name], column), name
 
 
-def test_masters_agree_to_rounding(response, closed_loop):
-    """All couple by Jacobi's method, so they differ from our own such master by rounding only. Torques may be read before
-    or after the next input is set, and differ then by the jump of that input."""
+def test_masters_agree_within_rounding_error(response, closed_loop):
+    """All masters use Jacobi coupling, so they differ from this project's Jacobi master only by rounding. Torques are not
+    compared: masters read them before or after setting the next input, whose jump changes them."""
     wanted = ["testbed.pitch", "testbed.roll", "controller.theta1", "controller.theta2", "controller.omega1"]
     own = coupling.couple(closed_loop, closed_loop.step, closed_loop.stop_time, derivatives=False, outputs=wanted)
     assert len(own) == closed_loop.steps + 1
     for name, column in zip(wanted, own[1:].T):
-        # An omega is the difference of angles over a step: it loses three digits.
+        # An omega is a difference of angles divided by the step, so it loses three digits.
         tolerance = 1e-10 if "omega" in name else 1e-13
         assert np.max(np.abs(response[name] - column)) < tolerance, name
 
@@ -119,7 +119,7 @@ def study(closed_loop):
 
 
 def test_up_to_the_sample_time_derivatives_change_nothing_and_the_order_is_two(study):
-    """The controller sees every sample as it is; what is left is the testbed's line for the motors' parabola."""
+    """Each sample of the controller uses exact inputs. The remaining error is the testbed's line for the motors' parabola."""
     fine = study.step <= 1.001e-3
     np.testing.assert_allclose(study.held[fine], study.derivatives[fine], rtol=1e-6)
     order = np.diff(np.log(study.held[fine])) / np.diff(np.log(study.step[fine]))
@@ -132,7 +132,7 @@ def test_beyond_it_derivatives_keep_the_order(study):
     step, held, derivatives = study.step[coarse], study.held[coarse], study.derivatives[coarse]
     order = np.diff(np.log(derivatives)) / np.diff(np.log(step))
     assert np.all((order > 1.8) & (order < 2.2)), order
-    # Held inputs reach the samples inside a step late: of first order.
+    # Held inputs reach the samples inside a step late, so the error is first order.
     assert np.all(held[1:] > 1.5 * derivatives[1:])
     order = np.diff(np.log(held[1:])) / np.diff(np.log(step[1:]))
     assert np.all(order < 1.8), order

@@ -50,25 +50,25 @@ def test_the_script_for_omsimulator(closed_loop):
     assert dict(added.args for added in loop.addComponent.mock_calls) == {
         component: f"resources/{fmu}" for component, fmu in closed_loop.fmus.items()
     }
-    assert sorted(wire.args for wire in loop.addConnection.mock_calls) == sorted(closed_loop.connections)
+    assert sorted(connection.args for connection in loop.addConnection.mock_calls) == sorted(closed_loop.connections)
     values = {**closed_loop.start, **dict(closed_loop.inputs.values())}
     assert dict(value.args for value in wrist.setValue.mock_calls) == pytest.approx(values)
     wrist.setFixedStepSize.assert_called_once_with(closed_loop.step)
 
 
-def test_the_model_for_openmodelica_has_the_wires_of_the_ssp(closed_loop):
-    """Nothing here can read Modelica; the names and values at least are those of what is run elsewhere."""
+def test_the_model_for_openmodelica_has_the_connections_of_the_ssp(closed_loop):
+    """No Modelica compiler is installed here, so the test compares only names and values with the SSP."""
     model = (ROOT / "examples/openmodelica/ClosedLoop.mo").read_text(encoding="utf-8")
-    wires = re.findall(r"^  connect\(([\w.]+), ([\w.]+)\);$", model, flags=re.M)
-    # Not connected, but sampled: without `pre` it is an algebraic loop to omc.
+    connections = re.findall(r"^  connect\(([\w.]+), ([\w.]+)\);$", model, flags=re.M)
+    # The controller's inputs are sampled with `pre`; otherwise omc finds an algebraic loop.
     (sampled,) = re.findall(
         r"^  when sample\(0, controller\.sample_time\) then\n    y = \{(.*?)\};\n  end when;$", model, flags=re.M
     )
     (inputs,) = re.findall(r"^  \{(.*?)\} = y;$", model, flags=re.M)
     outputs = [re.fullmatch(r"pre\((testbed\.\w+)\)", value)[1] for value in sampled.split(", ")]
     assert f"  discrete Real y[{len(outputs)}](each fixed = true) " in model
-    wires += zip(outputs, inputs.split(", "), strict=True)
-    assert sorted(wires) == sorted(tuple(wire) for wire in closed_loop.connections)
+    connections += zip(outputs, inputs.split(", "), strict=True)
+    assert sorted(connections) == sorted(tuple(connection) for connection in closed_loop.connections)
     for name, (end, value) in closed_loop.inputs.items():
         assert f"  parameter Real {name} = {value} " in model and f"  {end} = {name};" in model
     for component, page in (("testbed", TESTBED), ("controller", CONTROLLER)):
@@ -77,7 +77,7 @@ def test_the_model_for_openmodelica_has_the_wires_of_the_ssp(closed_loop):
 
 
 def test_the_script_for_openmodelica_gives_each_fmu_a_folder(closed_loop):
-    """In one folder the second FMU's modelDescription.xml replaces the first one's; with a relative one `simulate` fails."""
+    """In a shared directory the second modelDescription.xml replaces the first; with a relative path `simulate` fails."""
     script = (ROOT / "examples/openmodelica/closed_loop.mos").read_text(encoding="utf-8")
     model = (ROOT / "examples/openmodelica/ClosedLoop.mo").read_text(encoding="utf-8")
     imports = dict(
@@ -114,7 +114,7 @@ def test_every_part_is_valid(archive):
     assert {Path(name).suffix for name in archive.namelist()} == {".ssd", ".ssv", ".fmu"}
 
 
-def test_the_fmus_in_it_are_those_that_were_built(archive, closed_loop, fmu, controller_fmu):
+def test_the_ssp_contains_the_built_fmus(archive, closed_loop, fmu, controller_fmu):
     for each in (fmu, controller_fmu):
         assert archive.read(f"resources/{each.name}") == each.read_bytes()
         assert (closed_loop.osp / each.name).read_bytes() == each.read_bytes()
@@ -141,7 +141,7 @@ def test_connections_have_the_units_of_the_fmus(archive, closed_loop):
             assert unit == units[connector.get("name")] and unit in defined
 
 
-def test_it_is_the_same_every_time_and_says_what_is_wrong(closed_loop, tmp_path):
+def test_the_files_are_reproducible_and_errors_are_reported(closed_loop, tmp_path):
     fmus = {f"--{name}": closed_loop.osp / fmu for name, fmu in closed_loop.fmus.items()}
 
     def build(options, folder):

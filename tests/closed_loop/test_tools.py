@@ -26,7 +26,7 @@ def tools(*arguments):
     return subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
 
 
-def test_it_writes_figures_and_tables_and_says_what_it_saw(closed_loop, tmp_path):
+def test_the_command_writes_figures_and_tables_and_reports_results(closed_loop, tmp_path):
     run = tools("--fmus", str(FMUS), "--out", str(tmp_path))
     assert run.returncode == 0, run.stderr
     for text in ("pitch_ref 30 deg, roll_ref 60 deg", "within 0.1 deg after", "FMPy", "with input derivatives"):
@@ -37,7 +37,7 @@ def test_it_writes_figures_and_tables_and_says_what_it_saw(closed_loop, tmp_path
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
 
 
-def test_what_is_missing_is_named(tmp_path):
+def test_a_missing_file_is_named(tmp_path):
     run = tools("--fmus", str(tmp_path))
     assert run.returncode == 1 and run.stderr.count("\n") == 1
     assert "prw_closed_loop.ssp: no such file; `make closed-loop` builds it" in run.stderr
