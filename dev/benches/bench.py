@@ -1,7 +1,7 @@
-"""Times the FMUs against programs in C and other tools, and writes Markdown tables to out/bench.md; `make bench`.
+"""Compares the speed of the FMUs with C programs and other tools, and writes Markdown tables to out/bench.md (`make bench`).
 
-With --profile it counts the instructions of a step with callgrind, which repeat exactly on a busy machine.
-All programs of a table are measured in turn; a figure is the least of several rounds. With BENCH_QUICK in the environment
+With --profile it counts the instructions of a step with callgrind. The counts do not depend on the load of the machine.
+All programs of a table are measured in turn; each time is the minimum of several rounds. With BENCH_QUICK in the environment
 counts are small, and the tables in target/bench/quick.md are meaningless.
 """
 
@@ -40,7 +40,7 @@ SAMPLES, RUNS, ROUNDS, LOOPS = (21, 4, 1, 2) if QUICK else (2001, 2000, 7, 1000)
 #: Numbers of instances, each with the number of steps.
 SIZES = ((1, 50), (8, 5)) if QUICK else ((1, 50_000), (1024, 300), (16384, 40))
 MOTORS, OUTPUTS = ("theta1", "theta2"), ("tau1", "tau2", "pitch", "roll")
-#: The ways to step of bench.c, each with the number of steps of a measurement.
+#: The ways to step in bench.c, each with the number of steps of a measurement.
 WAYS = {
     "angles set, step, 4 outputs, as vectors": 100_000,
     "the same, one scalar per call": 100_000,
@@ -55,7 +55,7 @@ VECTORS, RATES, OMEGA, ALTERNATING, NEW_SIZES = 0, 2, 3, 4, 5
 
 
 def table(*rows: Iterable[object]) -> None:
-    """Prints a table and adds it to the page."""
+    """Prints a table and appends it to the page."""
     lines = [f"| {' | '.join(f'{x:,.3g}' if isinstance(x, float) else str(x) for x in row)} |\n" for row in rows]
     lines.insert(1, "|---" * lines[0].count(" |") + "|\n")
     print("", *lines, sep="", flush=True)
@@ -71,7 +71,7 @@ def compile_c(output: str, *arguments: object) -> None:
 
 
 def prepare(fmu: Path) -> str:
-    """Compiles and unpacks what the benchmarks load into target/bench. Returns the guid."""
+    """Compiles and unpacks the files of the benchmarks into target/bench. Returns the guid."""
     (ROOT / "out").mkdir(exist_ok=True)
     shutil.rmtree(WORK, ignore_errors=True)
     WORK.mkdir(parents=True)
@@ -87,7 +87,7 @@ def prepare(fmu: Path) -> str:
 
 
 def bench(library: object, guid: str, *arguments: object, stdin: bytes = b"") -> tuple[float, np.ndarray]:
-    """The number that bench.c prints, and the outputs as rows of four."""
+    """Returns the number that bench.c prints, and the outputs as rows of four."""
     command = [str(word) for word in (WORK / "bench", library, guid, *arguments)]
     done = subprocess.run(command, input=stdin, capture_output=True)
     if done.returncode:
@@ -96,7 +96,7 @@ def bench(library: object, guid: str, *arguments: object, stdin: bytes = b"") ->
 
 
 def steps(guid: str, sources: Path | None) -> None:
-    """Whole steps of the FMU against C, and its C sources, if given, against its library."""
+    """Compares whole steps of the FMU with C, and its C sources, if given, with its library."""
 
     def of(library: str, way: int, count: int, threads: int = 1) -> float:
         return bench(WORK / f"{library}.so", guid, way, count // 100 if QUICK else count, threads)[0]
@@ -143,7 +143,7 @@ def steps(guid: str, sources: Path | None) -> None:
 
 
 def profile(guid: str) -> None:
-    """Instructions of a step."""
+    """Counts the instructions of a step."""
     ways = ("angles as vectors", "one scalar per call", "with input derivatives", "with use_omega")[: 1 if QUICK else 4]
 
     def count(library: str, way: int, steps: int) -> dict[str, int]:
@@ -160,7 +160,7 @@ def profile(guid: str) -> None:
     rows = []
     for library in ("fmu",) if QUICK else ("fmu", "bare_exact", "empty"):
         for way, label in enumerate(ways):
-            # The difference of a long run and a short run is without the start.
+            # The difference of a long run and a short run excludes the start.
             short, long = (count(library, way, number) for number in (1000, 11000))
             found = [f"{(long.get(name, 0) - short.get(name, 0)) / 10000:.0f}" for name in names]
             rows.append((f"{library}, {label}", *found))
@@ -179,7 +179,7 @@ class Case:
         self.table = np.ascontiguousarray(np.column_stack(list(inputs.values())))
         self.slave = instantiate_fmu(self.folder, self.description, fmi_type="CoSimulation")
         self.loaded = fmu_run.Fmu(fmu)
-        # One start value for each run makes as many runs.
+        # The number of start values is the number of runs.
         self.start = {next(iter(inputs)): np.full(runs, self.table[0, 0])}
 
     def close(self) -> None:
@@ -188,7 +188,7 @@ class Case:
         shutil.rmtree(self.folder)
 
     def in_c(self) -> tuple[float, np.ndarray]:
-        """Seconds per run in C, and the outputs (samples, n) of the last run."""
+        """Returns the seconds per run in C, and the outputs (samples, n) of the last run."""
         library = Path(self.folder, "binaries", "linux64", f"{self.description.coSimulation.modelIdentifier}.so")
         lists = (",".join(map(str, references)) for references in self.references)
         arguments = (self.runs, SAMPLES, STEP, *lists, 1)
@@ -202,7 +202,7 @@ class Case:
         return (time.perf_counter() - begin) / self.runs, runs.check()
 
     def by_fmpy(self) -> tuple[float, np.ndarray]:
-        """Seconds of one run by FMPy's bare calls, reading and writing rows of arrays in place, and its outputs."""
+        """Returns the seconds of one run by FMPy's bare calls, which access rows of arrays in place, and the outputs."""
         slave, component = self.slave, self.slave.component
         (n_in, n_out), found = map(len, self.references), np.empty((SAMPLES, len(self.outputs)))
         into, out_of = ((c_uint32 * len(vr))(*vr) for vr in self.references)
@@ -234,7 +234,7 @@ class Case:
 
 
 def many_runs() -> None:
-    """Many runs from Python against a loop in C and FMPy. All store the same outputs at every step."""
+    """Compares many runs from Python with a loop in C and FMPy. All store the same outputs at every step."""
     wave = 2 * np.sin(10 * np.pi * np.arange(SAMPLES) * STEP / 2) ** 2 / (10 * np.pi)
     motors = {"theta1": wave, "theta2": -wave}
     wrist = {"pitch_ref": 3 * wave, "roll_ref": -2 * wave, "pitch": 2 * wave, "roll": -wave}
@@ -256,7 +256,7 @@ def least(body: Callable[..., tuple[float, Any]], *arguments: Any) -> float:
 
 
 def instances(guid: str) -> None:
-    """Stateful instances against a loop in C over as many; bit-identical."""
+    """Compares instances with a loop in C over the same number of instances; the results are bit-identical."""
     with fmu_run.Fmu(FMUS / "prw_testbed.fmu") as fmu:
 
         def in_c(count: int, moves: np.ndarray) -> tuple[float, np.ndarray]:
@@ -291,7 +291,7 @@ def instances(guid: str) -> None:
 
 
 def loops() -> None:
-    """Closed loops against other masters."""
+    """Compares closed loops in fmu_run with other masters."""
     system = read(FMUS / "prw_closed_loop.ssp", FMUS / "prw_closed_loop")
     # libcosim counts nanoseconds.
     instants = np.arange(system.steps + 1) * round(system.step * 1e9) / 1e9
