@@ -20,7 +20,7 @@ typedef struct {
 
 typedef struct {
     State now;
-    double h;                 /* step size of growth and ramp, the derivatives of z after a step with respect to z before and w */
+    double h;                 /* step size for growth and ramp: factors of z and w in a step */
     Lanes growth[3][3], ramp[3];
     Lanes A[3][3], b[3], torque[3];
     System sides;
