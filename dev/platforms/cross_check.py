@@ -1,5 +1,5 @@
-"""The reference experiments as tool vendors exchange them, by the rules of the FMI Cross-Check (4.1, section 9.1.4): for
-each a folder with the FMU, its inputs, its outputs and options."""
+"""Packs the reference experiments by the rules of the FMI Cross-Check (4.1, section 9.1.4): one directory for each, with
+the FMU, inputs, outputs and options."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
-#: Within the FMU.
+#: Directory of the experiments in the FMU.
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
-#: For comparisons that know one tolerance for all variables.
+#: For tools that use one tolerance for all variables.
 RELATIVE_TOLERANCE = 1e-3
-#: What zip files say of every file, so that the same content gives the same bytes.
+#: Fixed time of every file in the zip file, for reproducible bytes.
 TIME = (1980, 1, 1, 0, 0, 0)
 
 
 def pack(fmu: Path, destination: Path) -> None:
-    """Write the experiments in `fmu` to the zip file `destination`, a folder each."""
+    """Writes the experiments in `fmu` to the zip file `destination`, one directory for each."""
     with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(destination, "w", zipfile.ZIP_DEFLATED) as archive:
 
         def write(name: str, content: bytes) -> None:
@@ -36,7 +36,7 @@ def pack(fmu: Path, destination: Path) -> None:
 
 
 def options(experiment: dict[str, Any]) -> str:
-    """NAME_ref.opt."""
+    """Returns the content of NAME_ref.opt."""
     values = {
         "StartTime": experiment["start_time"],
         "StopTime": experiment["stop_time"],
@@ -48,7 +48,7 @@ def options(experiment: dict[str, Any]) -> str:
 
 
 def readme(experiment: dict[str, Any]) -> str:
-    """README.md."""
+    """Returns the content of README.md."""
     interfaces = experiment["interfaces"]
     name = experiment["name"]
     heads = "".join(f" {interface} |" for interface in interfaces)

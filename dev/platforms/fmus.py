@@ -1,4 +1,4 @@
-"""Packs the FMUs of a release, and the system that two of them make."""
+"""Packs the FMUs of a release, and the closed loop of testbed and controller."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from libraries import environment, run, say, target_directory
 from targets import ARM_FOLDERS, CONTROLLER, FMI3_FOLDERS, FOLDERS, MODEL, PACKERS, Target
 
 SYSTEM = "prw_closed_loop"
-#: The page that runs the FMU, which is also a file of a release.
+#: The page that runs the FMU; a release also contains it as a file.
 PAGE = "documentation/index.html"
 
 Folders = Mapping[str, tuple[Target, ...]]
 
 
 def make(libraries: Mapping[str, Mapping[Target, Path]], out: Path, scratch: Path) -> None:
-    """The files of a release that are made of the libraries of each model."""
+    """Builds the files of a release that contain the libraries of the models."""
     packages = [argument for _, package in PACKERS.values() for argument in ("--package", package)]
     run("cargo", "build", "--locked", "--release", "--bins", *packages)
     for model, found in libraries.items():
@@ -42,8 +42,8 @@ def make(libraries: Mapping[str, Mapping[Target, Path]], out: Path, scratch: Pat
 def _pack(
     model: str, fmi: int, folders: Folders, libraries: Mapping[Target, Path], scratch: Path, *options: str
 ) -> Path:
-    """An FMU for this version of FMI with a library in each of these folders of `binaries/`."""
-    # The program joins the libraries for macOS.
+    """Returns an FMU for this FMI version with a library in each of these directories of `binaries/`."""
+    # The program joins the macOS libraries into a universal library.
     binaries = [f"--binary={folder}={libraries[targets[0]]}" for folder, targets in folders.items()]
     _run(PACKERS[model][0], f"--fmi={fmi}", f"--out={scratch}", *binaries, *options)
     return scratch / ("fmi3" if fmi == 3 else "") / f"{model}.fmu"

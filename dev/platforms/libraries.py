@@ -19,7 +19,7 @@ from pathlib import Path
 import macos_linker
 from targets import GLIBC, LINUX, MODEL, MODELS, PACKERS, ROOT, TARGETS, WINDOWS, Target
 
-#: Compiles the standard library too, without the code that prints backtraces, a third of a library. Importers print none.
+#: Compiles the standard library too, without the code that prints backtraces, which is a third of a library. Importers print no backtraces.
 STD = ("-Zbuild-std=std,panic_unwind", "-Zbuild-std-features=panic-unwind")
 #: The earliest time in a zip file. A fixed time makes archives reproducible.
 EPOCH = "315532800"
@@ -116,7 +116,7 @@ def guid(model: str) -> str:
 
 @cache
 def library(model: str, target: Target) -> Path:
-    """Compiles the library of a model for a target. The library for Linux shows the exports of the others."""
+    """Compiles the library of a model for a target. The exports for Windows are read from the library for Linux."""
     exports: list[str] = []
     if target is WINDOWS:
         listed = run("nm", "-D", "--defined-only", str(library(model, LINUX)))
@@ -147,7 +147,7 @@ def export_from_object() -> list[str]:
 
 
 def wheel(target: Target, out: Path) -> Path:
-    """The wheel of fmu-run for a target and every Python from 3.11 on, in `out`."""
+    """Builds the wheel of fmu-run for a target and all Python versions from 3.11 on, in `out`."""
     command = ["maturin", "build", "--profile", "library", *STD, "--target", target.triple, "--out", str(out)]
     if not target.macos:
         command += ["--zig"]
@@ -160,7 +160,7 @@ def wheel(target: Target, out: Path) -> Path:
 
 
 def compile_all(out: Path) -> dict[str, dict[Target, Path]]:
-    """The libraries of all models for all targets, and the wheels in `out`."""
+    """Compiles the libraries of all models for all targets, and the wheels in `out`."""
     found: dict[str, dict[Target, Path]] = {model: {} for model in MODELS}
     for number, target in enumerate(TARGETS, start=1):
         say(f"[{number}/{len(TARGETS)}] {target.triple}")

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Rust's own linker for macOS, in RUST_LLD. maturin adds arguments for a C compiler, which begin with -Wl."""
+"""Starts Rust's linker for macOS, named by RUST_LLD. Converts the -Wl arguments of maturin, which are for a C compiler."""
 
 import os
 import sys

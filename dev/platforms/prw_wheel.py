@@ -1,4 +1,4 @@
-"""Makes the wheel of the Python package prw, with the FMU for all platforms inside: one wheel for all."""
+"""Builds the wheel of the Python package prw, which contains the FMU and runs on all platforms."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def check_version(version: str) -> None:
 
 
 def build(fmu: Path, out: Path) -> Path:
-    """Build the wheel in `out`."""
+    """Builds the wheel in `out`."""
     with tempfile.TemporaryDirectory() as folder:
         copy, made = Path(folder, "python", "prw"), Path(folder, "made")
         inside = copy / "src" / "prw" / "fmu"
@@ -37,13 +37,13 @@ def build(fmu: Path, out: Path) -> Path:
         own = (PACKAGE / name for name in ("pyproject.toml", "setup.py", "README.md"))
         for path in (*own, *(ROOT / name for name in LICENCES)):
             shutil.copyfile(path, copy / path.name)
-        # setup.py copies the files of the page from there.
+        # setup.py copies the files of the page from these directories.
         for name in ("crates", "docs"):
             Path(folder, name).symlink_to(ROOT / name)
         shutil.copyfile(fmu, inside / f"{MODEL}.fmu")
         command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", str(made), str(copy)]
         environment = {**os.environ, "SOURCE_DATE_EPOCH": EPOCH}
-        # A wheel has the modes of its files.
+        # The wheel stores the file modes.
         for path in copy.rglob("*"):
             path.chmod(0o755 if path.is_dir() else 0o644)
         if subprocess.run(command, env=environment, umask=0o022).returncode:

@@ -1,6 +1,6 @@
-"""Makes the release again, as somebody else would, and compares all bytes.
+"""Builds the release again in a different environment and compares all bytes.
 
-The directories of the sources and of the target, the time zone, the language and the mask of new files are different.
+The source and target directories, the time zone, the locale and the umask differ.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ def main() -> None:
             shutil.rmtree(kept, ignore_errors=True)
             shutil.copytree(copy / "dist", kept)
             differing = sorted({line.split("  ")[1] for line in ours ^ theirs})
-            raise SystemExit(f"error: made twice, these differ: {', '.join(differing)}; the second are in {kept}")
-    print(f"made twice, bit-identical: {len(ours)} files")
+            raise SystemExit(f"error: these files differ in the second build, {kept}: {', '.join(differing)}")
+    print(f"two builds are bit-identical: {len(ours)} files")
 
 
 def copy_sources(destination: Path) -> None:
-    """Copies the files that git has or would add."""
+    """Copies the files that git tracks or would add."""
     command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
     names = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout.split("\0")
     for name in filter(None, names):
@@ -45,7 +45,7 @@ def copy_sources(destination: Path) -> None:
             path = destination / name
             path.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(ROOT / name, path)
-            # git keeps only whether a file can be executed.
+            # git stores only whether a file is executable.
             path.chmod(0o700 if os.access(ROOT / name, os.X_OK) else 0o600)
 
 

@@ -1,7 +1,7 @@
-"""Makes dist/, all that a release has, or nothing: FMUs for all platforms and as C sources, the closed loop, reference
+"""Builds dist/, the files of a release, atomically: FMUs for all platforms and as C sources, the closed loop, reference
 experiments, wheels, bills of materials, release notes, and the checksums of all of them.
 
-    python dev/platforms/release.py              makes dist/
+    python dev/platforms/release.py              builds dist/
     python dev/platforms/release.py --tag TAG    exits with an error unless TAG names the newest version in the changelog
 """
 
@@ -59,13 +59,13 @@ def main() -> None:
 
 
 def cargo_version() -> str:
-    """The version of all packages."""
+    """Returns the version of all packages."""
     workspace = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]
     return str(workspace["package"]["version"])
 
 
 def release_notes(changelog: str, version: str) -> str:
-    """The section of this version in the changelog, without its heading."""
+    """Returns the section of this version in the changelog, without its heading."""
     found = re.search(rf"^## {re.escape(version)}(?![\w.-]).*\n((?:(?!## ).*\n)*)", changelog, re.MULTILINE)
     if found is None:
         raise SystemExit(
@@ -85,13 +85,13 @@ def check_tag(tag: str, changelog: str, version: str) -> None:
 
 
 def checksums(folder: Path) -> str:
-    """The input of `sha256sum --check`."""
+    """Returns the input of `sha256sum --check`."""
     files = sorted(path for path in folder.iterdir() if path.name != SUMS)
     return "".join(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in files)
 
 
 def put(made: Path) -> None:
-    """Makes this folder dist/, without any file of the previous dist/."""
+    """Replaces dist/ by this directory."""
     if DIST.exists():
         os.replace(DIST, made.with_name("previous"))
     os.replace(made, DIST)

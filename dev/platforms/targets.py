@@ -1,4 +1,4 @@
-"""The platforms of the FMU: what is compiled for which, and where it goes."""
+"""The platforms of the FMU: Rust targets, and directories in the FMU."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ MODELS = (MODEL, CONTROLLER)
 #: The program that packs the FMUs of a model, and the package of the program.
 PACKERS = {MODEL: ("build_fmu", "build_fmu"), CONTROLLER: ("build_controller", CONTROLLER)}
 
-#: Enterprise Linux 7 and everything since.
+#: The glibc of Enterprise Linux 7, the oldest supported system.
 GLIBC = "2.17"
 
 
 @dataclass(frozen=True)
 class Target:
-    """A Rust target and how the libraries of its kind are called."""
+    """A Rust target and the file names of its libraries."""
 
     triple: str
     suffix: str
@@ -28,17 +28,17 @@ class Target:
     macos: str = ""
 
     def library(self, model: str) -> str:
-        """The file that cargo makes of a model."""
+        """Returns the file name of the library of a model."""
         return f"{'' if 'windows' in self.triple else 'lib'}{model}{self.suffix}"
 
     @property
     def processor(self) -> str:
-        """The processor."""
+        """The processor in the name of the target."""
         return self.triple.split("-")[0]
 
     @property
     def wheel(self) -> str:
-        """How pip calls the platform in the name of a wheel."""
+        """The platform tag in the file name of a wheel."""
         processor = self.processor
         if self.macos:
             return f"macosx_{self.macos.replace('.', '_')}_{'arm64' if processor == 'aarch64' else processor}"
@@ -51,13 +51,13 @@ WINDOWS = Target("x86_64-pc-windows-gnu", ".dll")
 MAC = Target("x86_64-apple-darwin", ".dylib", macos="10.12")
 MAC_ARM = Target("aarch64-apple-darwin", ".dylib", macos="11.0")
 
-#: What `make release` compiles.
+#: Targets that `make release` compiles.
 TARGETS = (LINUX, LINUX_ARM, WINDOWS, MAC, MAC_ARM)
 
-#: What is made into C, for all others.
+#: Target that is translated to C, for all other platforms.
 WEBASSEMBLY = Target("wasm32-unknown-unknown", ".wasm")
 
-#: The folders of `binaries/` in FMI 2.0 and what each holds; two targets make a universal library. FMI 2.0.5 names
+#: The folders of `binaries/` in FMI 2.0 and the targets of their libraries; two targets make a universal library. FMI 2.0.5 names
 #: the ARM folders as FMI 3.0 does; importers on ARM Macs look in darwin64.
 FOLDERS = {
     "linux64": (LINUX,),
@@ -67,10 +67,10 @@ FOLDERS = {
     "aarch64-darwin": (MAC_ARM,),
 }
 
-#: With FMI 2.0, importers on ARM Linux look in linux64, where an FMU for both cannot have it.
+#: With FMI 2.0, importers on ARM Linux look in linux64, where an FMU for both has the Intel library.
 ARM_FOLDERS = {"linux64": (LINUX_ARM,)}
 
-#: FMI 3.0 has a name for each.
+#: FMI 3.0 has a directory for each target.
 FMI3_FOLDERS = {
     "x86_64-linux": (LINUX,),
     "aarch64-linux": (LINUX_ARM,),

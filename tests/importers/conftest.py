@@ -1,4 +1,4 @@
-"""Fixtures: FMUs for importers, and a place for what tests have seen, from which docs/compatibility.md is written."""
+"""Fixtures: FMUs for importers, and a function that records results for docs/compatibility.md."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from built import ROOT, built
 from tools.compatibility import HEADING, PAGE
 from tools.documentation.sources import read_table
 
-#: What tests have seen, a file each.
-SEEN = ROOT / "target" / "importers"
+#: Directory of the results, one file for each test.
+RESULTS = ROOT / "target" / "importers"
 
 
 @pytest.fixture(scope="session")
@@ -31,22 +31,22 @@ def closed_loop() -> Path:
 
 
 @pytest.fixture
-def saw(request):
-    """Call it at the end of a test with what was seen: (tool, its pip package, which FMU, what was run, what was seen)."""
+def record(request):
+    """Records the result of a test: tool, pip package of the tool, FMU, run, result."""
 
-    def saw(tool: str, package: str, fmu: str, run: str, seen: str) -> None:
-        SEEN.mkdir(parents=True, exist_ok=True)
+    def record(tool: str, package: str, fmu: str, run: str, seen: str) -> None:
+        RESULTS.mkdir(parents=True, exist_ok=True)
         row = {"tool": tool, "version": metadata.version(package), "fmu": fmu, "run": run, "seen": seen}
         row["date"] = datetime.date.today().isoformat()
         name = "".join(c if c.isalnum() else "_" for c in request.node.name)
-        (SEEN / f"{request.path.stem}-{name}.json").write_text(json.dumps(row), encoding="utf-8")
-        written = [said[:4] for said in read_table(ROOT / PAGE, HEADING).rows]
+        (RESULTS / f"{request.path.stem}-{name}.json").write_text(json.dumps(row), encoding="utf-8")
+        written = [cells[:4] for cells in read_table(ROOT / PAGE, HEADING).rows]
         assert list(row.values())[:4] in written, (
-            f"{PAGE} is out of date; `python dev/tools compatibility` writes it anew"
+            f"{PAGE} is out of date; update it with `python dev/tools compatibility`"
         )
         name, glance = re.split(r",| \(", tool)[0], read_table(ROOT / PAGE, "At a glance").rows
-        assert any(name in said and row["version"] in said for said, *_ in glance), (
+        assert any(name in cell and row["version"] in cell for cell, *_ in glance), (
             f"{PAGE}: “At a glance” lacks {tool}"
         )
 
-    return saw
+    return record

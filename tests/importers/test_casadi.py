@@ -19,24 +19,24 @@ def model():
 
 
 def right(model, x, u):
-    """x' (6,) and outputs (8,) at states x (6,) and inputs u (4,): angles and rates of the motors."""
+    """Returns x' (6,) and outputs (8,) at states x (6,) and inputs u (4,): angles and rates of the motors."""
     outputs = model.outputs(x, u[:2], u[2:])
     return model.a @ x + model.b_angle @ u[:2] + model.b_rate @ u[2:], np.array([outputs[name] for name in OUTPUTS])
 
 
 def share(found, expected) -> float:
-    """Largest difference in terms of the largest value."""
+    """Returns the largest difference, relative to the largest value."""
     off = np.abs(np.array(found).reshape(np.shape(expected)) - expected).max()
     return float(off / (np.abs(expected).max() or 1.0))
 
 
-def test_values_and_jacobians(testbed, version, unpack, model, saw):
+def test_values_and_jacobians(testbed, version, unpack, model, record):
     dae = casadi.DaeBuilder("testbed", unpack(testbed))
     assert dae.y() == list(OUTPUTS) and dae.u() == ["theta1", "theta2", "omega1", "omega2"]
     f = dae.create("f", ["x", "u"], ["ode", "y"])
     jacobians = f.factory("j", ["x", "u"], [f"jac:{of}:{by}" for of in ("ode", "y") for by in ("x", "u")])
     rng, worst = np.random.default_rng(3), 0.0
-    # Linear in states and inputs: columns of the Jacobians are differences of values, exactly.
+    # The model is linear in states and inputs, so differences of values are exact columns of the Jacobians.
     base = right(model, np.zeros(6), np.zeros(4))
     unit = np.eye(10)
     whole = [np.column_stack([right(model, e[:6], e[6:])[i] - base[i] for e in unit]) for i in (0, 1)]
@@ -48,11 +48,11 @@ def test_values_and_jacobians(testbed, version, unpack, model, saw):
     assert worst < 1e-13
     seen = f"agree with the equations to {worst:.0e} of the largest value"
     of = f"testbed for FMI {'3.0' if version else '2.0'}, ME"
-    saw("CasADi, `DaeBuilder`", "casadi", of, "right-hand side, outputs and their four Jacobians", seen)
+    record("CasADi, `DaeBuilder`", "casadi", of, "right-hand side, outputs and their four Jacobians", seen)
 
 
-def test_cvodes(testbed, version, unpack, model, saw):
-    """The testbed let go with its couplings wound up, the motors held."""
+def test_cvodes(testbed, version, unpack, model, record):
+    """The testbed starts with wound-up couplings and fixed motors."""
     dae = casadi.DaeBuilder("testbed", unpack(testbed))
     x, u = casadi.MX.sym("x", 6), casadi.MX.sym("u", 4)
     equations = {"x": x, "u": u, "ode": dae.create("f", ["x", "u"], ["ode"])(x, u)}
@@ -66,10 +66,10 @@ def test_cvodes(testbed, version, unpack, model, saw):
     assert worst < 1e-7
     of = f"testbed for FMI {'3.0' if version else '2.0'}, ME"
     seen = f"2 s from a wound-up start agree with the matrix exponential to {worst:.0e} of the largest angle"
-    saw("CasADi, `cvodes`", "casadi", of, "integration with relative tolerance 1e-10", seen)
+    record("CasADi, `cvodes`", "casadi", of, "integration with relative tolerance 1e-10", seen)
 
 
-def test_derivatives_by_parameters(tunable, version, unpack, saw):
+def test_derivatives_with_respect_to_parameters(tunable, version, unpack, record):
     """`fixed` parameters are constants to CasADi; those of the variant made with `--tunable` are its `p`."""
     dae = casadi.DaeBuilder("testbed", unpack(tunable))
     physical = [name in REAL for name in dae.p()]
@@ -80,7 +80,7 @@ def test_derivatives_by_parameters(tunable, version, unpack, saw):
     rng, worst = np.random.default_rng(4), 0.0
     for _ in range(5):
         x, u = rng.normal(size=6), rng.normal(size=4)
-        # Where it would have started says nothing of a state that is given.
+        # The start parameters have no effect, because the states are set.
         p = np.array([table_1().get(name, 1.0) * rng.uniform(0.7, 1.3) for name in dae.p()])
 
         def at(values, x=x, u=u):
@@ -90,7 +90,7 @@ def test_derivatives_by_parameters(tunable, version, unpack, saw):
         for i, found in enumerate(jacobian(x, u, p)):
             columns = []
             for step in np.diag(1e-3 * p):
-                # Richardson's extrapolation of central differences, of fourth order in the step.
+                # Richardson extrapolation of central differences: fourth order in the step.
                 wide, narrow = ((at(p + k * step)[i] - at(p - k * step)[i]) / (2 * k * step.sum()) for k in (2, 1))
                 columns.append((4 * narrow - wide) / 3)
             expected = np.column_stack(columns)
@@ -99,7 +99,7 @@ def test_derivatives_by_parameters(tunable, version, unpack, saw):
             assert not found[:, np.logical_not(physical)].any()
     assert worst < 1e-9
     of = f"testbed for FMI {'3.0' if version else '2.0'} made with `--tunable`, ME"
-    saw(
+    record(
         "CasADi, `DaeBuilder`",
         "casadi",
         of,

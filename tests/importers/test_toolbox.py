@@ -20,26 +20,26 @@ TOOLBOX = "fmu-manipulation-toolbox"
 
 
 def toolbox(command: str, *arguments: str, folder: Path) -> str:
-    """What a command of the toolbox says."""
+    """Returns the output of a command of the toolbox."""
     code = f"import sys; from fmu_manipulation_toolbox.cli.{command} import {command}; sys.argv[0] = {command!r}; {command}()"
     process = subprocess.run(
         [sys.executable, "-c", code, *arguments], cwd=folder, capture_output=True, text=True, timeout=120
     )
-    said = process.stdout + process.stderr
-    assert process.returncode == 0, said
-    return said
+    output = process.stdout + process.stderr
+    assert process.returncode == 0, output
+    return output
 
 
-def test_fmutool_has_nothing_to_say(testbed, version, saw):
-    said = toolbox("fmutool", "-input", str(testbed), "-check", folder=testbed.parent)
+def test_fmutool_reports_no_error(testbed, version, record):
+    output = toolbox("fmutool", "-input", str(testbed), "-check", folder=testbed.parent)
     verdict = f"No semantic error against the FMI-{'3' if version else '2'} standard."
-    assert verdict in said and "ERROR" not in said.replace("semantic error", "")
+    assert verdict in output and "ERROR" not in output.replace("semantic error", "")
     of = f"testbed for FMI {'3.0' if version else '2.0'}"
-    saw("fmutool", TOOLBOX, of, "`-check`", f"“{verdict}”")
+    record("fmutool", TOOLBOX, of, "`-check`", f"“{verdict}”")
 
 
-def test_the_closed_loop_as_one_fmu(closed_loop, tmp_path, saw):
-    """A container steps its FMUs one after the other's outputs, like any master; FMPy runs it."""
+def test_the_closed_loop_as_one_fmu(closed_loop, tmp_path, record):
+    """A container steps its FMUs like any master; FMPy runs the container."""
     (tmp_path / closed_loop.name).write_bytes(closed_loop.read_bytes())
     toolbox("fmucontainer", "-container", f"{closed_loop.name}:0.001", "-auto-local", folder=tmp_path)
     container = tmp_path / "prw_closed_loop.fmu"
@@ -58,4 +58,4 @@ def test_the_closed_loop_as_one_fmu(closed_loop, tmp_path, saw):
     assert share < 0.6 and len(agreement.variables) == 6
     seen = f"agrees with the reference experiment closed_loop, within {share:.0%} of its tolerance"
     run = "`fmucontainer` with `-auto-local` at 1 ms, the result run by FMPy"
-    saw("FMU containers (fmucontainer)", TOOLBOX, "SSP of controller and testbed, CS", run, seen)
+    record("FMU containers (fmucontainer)", TOOLBOX, "SSP of controller and testbed, CS", run, seen)

@@ -1,20 +1,20 @@
-// Put into a copy of the page by test_browsers.py: does what a visitor does, and tells what came of it.
+// Script that test_browsers.py adds to a copy of the page: acts like a visitor and reports the results.
 (async () => {
-  const told = { agent: navigator.userAgent, runs: {}, errors: [], requests: 0 };
-  addEventListener("error", (event) => told.errors.push(event.message));
-  addEventListener("unhandledrejection", (event) => told.errors.push(String(event.reason)));
+  const report = { agent: navigator.userAgent, runs: {}, errors: [], requests: 0 };
+  addEventListener("error", (event) => report.errors.push(event.message));
+  addEventListener("unhandledrejection", (event) => report.errors.push(String(event.reason)));
   const wait = (ms) => new Promise((done) => setTimeout(done, ms));
-  const until = async (what, ms = 20000) => {
+  const until = async (condition, ms = 20000) => {
     for (const begin = performance.now(); performance.now() - begin < ms; await wait(20)) {
-      if (what()) {
+      if (condition()) {
         return;
       }
     }
-    throw new Error(`this never happens: ${what}`);
+    throw new Error(`the condition stays false: ${condition}`);
   };
   const find = (selector) => document.querySelector(selector);
   const button = (text) => [...document.querySelectorAll(".live button")].find((one) => one.textContent === text);
-  // What is saved is caught, and not downloaded: a browser that asks where to stops drawing.
+  // Saved files are kept here, not downloaded: a browser that asks for a location stops drawing.
   let saved = null;
   HTMLAnchorElement.prototype.click = () => {};
   URL.createObjectURL = (blob) => ((saved = blob), "data:,");
@@ -35,33 +35,33 @@
   try {
     await until(() => find("#try"));
     const clock = find(".live-clock");
-    // Some browsers say so where they run without a screen.
-    told.reduced = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    if (told.reduced) {
+    // Some browsers prefer reduced motion if they run without a screen.
+    report.reduced = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    if (report.reduced) {
       await wait(500);
-      told.waits = parseFloat(clock.textContent) === 0;
+      report.waits = parseFloat(clock.textContent) === 0;
       button("Play").click();
     }
     await until(() => parseFloat(clock.textContent) > 0);
-    told.first = performance.now();
+    report.first = performance.now();
     let frames = 0;
     const begin = performance.now();
     await new Promise((done) => {
       const count = () => (performance.now() - begin > 2000 ? done() : (frames++, requestAnimationFrame(count)));
       requestAnimationFrame(count);
     });
-    told.frames = (1000 * frames) / (performance.now() - begin);
+    report.frames = (1000 * frames) / (performance.now() - begin);
     for (const [name, parameters] of Object.entries(window.settings)) {
       await go({ motion: name, speed: "Infinity", ...parameters });
-      told.runs[name] = { parameters, csv: await csv() };
+      report.runs[name] = { parameters, csv: await csv() };
     }
     for (const { value } of find("#live-motion").options) {
       if (value !== "hand" && !(value in window.settings)) {
         await go({ motion: value, speed: "Infinity" });
-        told.runs[value] = { parameters: { use_omega: true }, csv: await csv() };
+        report.runs[value] = { parameters: { use_omega: true }, csv: await csv() };
       }
     }
-    // By hand from the middle of a motion, then with another parameter: the same inputs again.
+    // Sets a motor angle during a motion, then a parameter; the inputs stay the same.
     await go({ motion: "tour", speed: "1" });
     await until(() => parseFloat(clock.textContent) > 0.2 && parseFloat(clock.textContent) < 0.9);
     change(find("#live-theta1"), "30");
@@ -69,21 +69,21 @@
     change(find("#live-k1"), "1");
     await wait(200);
     button("Pause").click();
-    told.runs.hand = { parameters: { use_omega: true, k1: (1 / Math.PI) * 180 }, csv: await csv() };
-    told.motion = find("#live-motion").value;
+    report.runs.hand = { parameters: { use_omega: true, k1: (1 / Math.PI) * 180 }, csv: await csv() };
+    report.motion = find("#live-motion").value;
     change(find("#live-k1"), "-1");
     await until(() => find(".live-error"));
-    told.refusal = find(".live-status").textContent;
+    report.error = find(".live-status").textContent;
     change(find("#live-k1"), "2");
     await until(() => !find(".live-error"));
     button("Link to this").click();
     await wait(50);
-    told.link = location.hash;
-    told.wide = document.documentElement.scrollWidth > innerWidth;
-    told.guid = find(".live code").textContent;
-    told.requests = performance.getEntriesByType("resource").length;
+    report.link = location.hash;
+    report.wide = document.documentElement.scrollWidth > innerWidth;
+    report.guid = find(".live code").textContent;
+    report.requests = performance.getEntriesByType("resource").length;
   } catch (error) {
-    told.errors.push(String(error));
+    report.errors.push(String(error));
   }
-  await fetch(window.report, { method: "POST", mode: "no-cors", body: JSON.stringify(told) });
+  await fetch(window.address, { method: "POST", mode: "no-cors", body: JSON.stringify(report) });
 })();

@@ -1,5 +1,4 @@
-"""The page in the FMU, opened from a file in real browsers: what they calculate has the library's bits, and nothing is asked of
-a network."""
+"""The page in the FMU, opened from a file in real browsers: results are bit-identical to the library, without network requests."""
 
 from __future__ import annotations
 
@@ -31,7 +30,7 @@ from prw.checking.experiments import read_experiments
 INPUTS = ("theta1", "theta2", "omega1", "omega2")
 CONTROLLED = {"pitch_ref", "roll_ref", "pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2"}
 WEBKIT = "/usr/lib/x86_64-linux-gnu/webkit2gtk-4.1/MiniBrowser"
-#: What starts a browser that was never here before, for a window of 360, 1000 and 2000 px.
+#: Commands that start a browser with a new profile and a window of 360, 1000 or 2000 px.
 BROWSERS = {
     "chromium": lambda home, width: [
         *("chromium", "--headless=new", "--no-sandbox", f"--user-data-dir={home}", f"--window-size={width},1000"),
@@ -61,12 +60,12 @@ WIDTHS = {"chromium": 360, "firefox": 1000, "webkit": 2000}
 
 @pytest.fixture(scope="module")
 def reports() -> Iterator[tuple[str, queue.Queue[Any]]]:
-    """Where pages tell what they have seen, and what they have told."""
-    told: queue.Queue[Any] = queue.Queue()
+    """Returns the address to which pages send their reports, and the queue of reports."""
+    reported: queue.Queue[Any] = queue.Queue()
 
     class Listener(BaseHTTPRequestHandler):
         def do_POST(self) -> None:
-            told.put(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
+            reported.put(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
             self.send_response(204)
             self.end_headers()
 
@@ -75,20 +74,20 @@ def reports() -> Iterator[tuple[str, queue.Queue[Any]]]:
 
     server = HTTPServer(("127.0.0.1", 0), Listener)
     threading.Thread(target=server.serve_forever, daemon=True).start()
-    yield f"http://127.0.0.1:{server.server_port}/", told
+    yield f"http://127.0.0.1:{server.server_port}/", reported
     server.shutdown()
 
 
 @pytest.fixture(scope="module", params=BROWSERS)
-def told(request: pytest.FixtureRequest, fmu: Path, reports: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """What a browser says of the page."""
+def report(request: pytest.FixtureRequest, fmu: Path, reports: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Returns the report of a browser that has opened the page."""
     folder = tmp_path_factory.mktemp(request.param)
     command = BROWSERS[request.param](folder / "home", WIDTHS[request.param])
     toolchain.need(command[0], *([WEBKIT] if WEBKIT in command else []))
     (folder / "home").mkdir()
     page = folder / "index.html"
     page.write_text(with_visitor(fmu, reports[0]), encoding="utf-8")
-    # With all that it starts, it is a group of its own to be ended.
+    # A separate process group, so that the browser ends with all processes that it starts.
     quiet: Any = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
     with subprocess.Popen([*command, page.as_uri()], **quiet) as browser:
         try:
@@ -97,8 +96,8 @@ def told(request: pytest.FixtureRequest, fmu: Path, reports: Any, tmp_path_facto
             os.killpg(browser.pid, signal.SIGTERM)
 
 
-def with_visitor(fmu: Path, report: str) -> str:
-    """The page with the reference experiments among its motions, and with one who visits it."""
+def with_visitor(fmu: Path, address: str) -> str:
+    """Returns the page with the reference experiments as motions, and with the script of a visitor."""
     with zipfile.ZipFile(fmu) as archive:
         page = archive.read("documentation/index.html").decode()
     # The page's policy admits the page's own scripts only.
@@ -120,14 +119,14 @@ def with_visitor(fmu: Path, report: str) -> str:
     page = SCRIPT.sub(lambda _: f"\n{script[:begin]}{given}{script[begin:]}", page)
     end = page.rindex("</body>")
     settings = {one.name: {name: float(value) for name, value in one.parameters.items()} for one in experiments}
-    values = f"window.settings = {json.dumps(settings)}; window.report = {json.dumps(report)};"
+    values = f"window.settings = {json.dumps(settings)}; window.address = {json.dumps(address)};"
     visitor = Path(__file__).with_name("inside.js").read_text(encoding="utf-8")
     return f"{page[:end]}<script>{values}\n{visitor}</script>{page[end:]}"
 
 
-def test_the_browser_has_the_librarys_bits(fmu: Path, told: Any) -> None:
-    """Over the reference experiments, the motions of the page, and one by hand: as its CSV has them."""
-    assert told["errors"] == []
+def test_the_browser_is_bit_identical_to_the_library(fmu: Path, report: Any) -> None:
+    """Compares the CSV files of the reference experiments, of the page's motions, and of a run with a motor moved by hand."""
+    assert report["errors"] == []
     assert {one.name for one in read_experiments(fmu)} | {
         "tour",
         "fig4",
@@ -135,9 +134,9 @@ def test_the_browser_has_the_librarys_bits(fmu: Path, told: Any) -> None:
         "closed-loop",
         "open-loop",
         "hand",
-    } <= set(told["runs"])
+    } <= set(report["runs"])
     with Fmu(fmu) as loaded:
-        for name, run in told["runs"].items():
+        for name, run in report["runs"].items():
             header, *lines = csv.reader(line for line in io.StringIO(run["csv"]) if not line.startswith("#"))
             rows = np.array(lines, dtype=np.float64)
             assert header[:5] == ["time", *INPUTS] and len(rows) > 400, name
@@ -155,32 +154,32 @@ def test_the_browser_has_the_librarys_bits(fmu: Path, told: Any) -> None:
 
 
 def without_controller(rows: np.ndarray, header: list[str], name: str) -> np.ndarray:
-    """The rows without the set points, which the controller FMU answers with the motors' motion that they have."""
+    """Returns the rows without the setpoints. Checks that the controller FMU returns the motor motion in the rows."""
     off = {"Kp": 0.0, "Ki": 0.0, "Kd": 0.0} if name == "open-loop" else {}
-    read = [place for place, one in enumerate(header) if one in CONTROLLED]
+    read = [index for index, one in enumerate(header) if one in CONTROLLED]
     with Fmu(built("prw_controller.fmu")) as loaded:
         controller = loaded.instances(start=off)
         for number, row in enumerate(rows):
             np.testing.assert_array_equal(controller.get(INPUTS)[0], row[1:5], f"the controller, {name}, {row[0]} s")
-            controller.set([header[place] for place in read], row[read])
+            controller.set([header[index] for index in read], row[read])
             if number + 1 < len(rows):
                 controller.step(to=rows[number + 1, 0])
     return rows[:, :-2]
 
 
-def test_it_asks_for_nothing_and_fits(fmu: Path, told: Any) -> None:
-    assert told["requests"] == 0
-    assert not told["wide"]
-    assert told["guid"] == read_model_description(str(fmu)).guid
+def test_the_page_sends_no_requests_and_fits(fmu: Path, report: Any) -> None:
+    assert report["requests"] == 0
+    assert not report["wide"]
+    assert report["guid"] == read_model_description(str(fmu)).guid
     print(
-        told["agent"],
-        f"{told['first']:.0f} ms to the first movement, {told['frames']:.0f} frames a second",
+        report["agent"],
+        f"{report['first']:.0f} ms to the first movement, {report['frames']:.0f} frames per second",
         file=sys.stderr,
     )
 
 
-def test_by_hand_and_what_the_fmu_refuses(told: Any) -> None:
-    assert told["motion"] == "hand"
-    assert not told["reduced"] or told["waits"]
-    assert "k1 must not be below" in told["refusal"]
-    assert "motion=hand" in told["link"] and "k1=114.59" in told["link"] and "theta1=0.5235" in told["link"]
+def test_a_motor_moved_by_hand_and_a_rejected_value(report: Any) -> None:
+    assert report["motion"] == "hand"
+    assert not report["reduced"] or report["waits"]
+    assert "k1 must not be below" in report["error"]
+    assert "motion=hand" in report["link"] and "k1=114.59" in report["link"] and "theta1=0.5235" in report["link"]

@@ -1,4 +1,4 @@
-"""Who visits the page in the FMU: with a mouse, a finger, the keyboard alone, and where scripts or WebAssembly are blocked."""
+"""Visitors of the page in the FMU: with a mouse, a finger or only the keyboard, and with blocked scripts or WebAssembly."""
 
 from __future__ import annotations
 
@@ -45,18 +45,18 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture
 def visit(browser: Browser, address: str) -> Iterator[Any]:
-    """Opens the page in a context of these settings; nothing but the page may be asked for, and no script may fail."""
-    seen: list[str] = []
+    """Opens the page in a context with these settings. Only the page may be requested, and no script may fail."""
+    requested: list[str] = []
     contexts = []
 
     def visit(fragment: str = "", script: str = "", **settings: Any) -> Page:
         contexts.append(browser.new_context(**{"viewport": SIZE, **settings}))
         page = contexts[-1].new_page()
         page.route("**/*", lambda route: route.continue_())
-        page.on("request", lambda request: seen.append(request.url))
-        page.on("pageerror", lambda error: seen.append(f"error: {error}"))
-        # What the page's policy forbids is reported there.
-        page.on("console", lambda message: seen.append(message.text) if message.type == "error" else None)
+        page.on("request", lambda request: requested.append(request.url))
+        page.on("pageerror", lambda error: requested.append(f"error: {error}"))
+        # The browser reports violations of the page's policy there.
+        page.on("console", lambda message: requested.append(message.text) if message.type == "error" else None)
         if script:
             page.add_init_script(script)
         page.goto(address + fragment)
@@ -65,11 +65,11 @@ def visit(browser: Browser, address: str) -> Iterator[Any]:
     yield visit
     for context in contexts:
         context.close()
-    assert {url.split("#")[0] for url in seen if not url.startswith("blob:")} == {address}
+    assert {url.split("#")[0] for url in requested if not url.startswith("blob:")} == {address}
 
 
 def drawn(page: Page) -> None:
-    """What was done is seen with the screen's next picture."""
+    """Waits until the next frame shows the effect of the last action."""
     page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
@@ -79,7 +79,7 @@ def until(page: Page, condition: str) -> None:
         if page.evaluate(condition):
             return
         page.wait_for_timeout(20)
-    raise AssertionError(f"it does not come true: {condition}")
+    raise AssertionError(f"the condition stays false: {condition}")
 
 
 def clock(page: Page) -> float:
@@ -87,13 +87,13 @@ def clock(page: Page) -> float:
     return float(page.locator(".live-clock").inner_text().split()[0])
 
 
-def middle(place: Locator) -> tuple[float, float]:
-    box = place.bounding_box()
+def middle(element: Locator) -> tuple[float, float]:
+    box = element.bounding_box()
     assert box
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
 
-def picture(page: Page) -> str:
+def image(page: Page) -> str:
     drawn(page)
     return str(page.locator(".live-scene").evaluate("canvas => canvas.toDataURL()"))
 
@@ -103,7 +103,7 @@ def button(page: Page, name: str) -> Locator:
 
 
 def test_with_a_mouse(visit: Any, tmp_path: Path) -> None:
-    """What is chosen is seen, saved, and passed on by a link."""
+    """Settings take effect, are saved, and are included in the link."""
     page = visit()
     page.get_by_label("Speed").select_option("0.05")
     page.get_by_label("Motion", exact=True).select_option("step")
@@ -114,7 +114,7 @@ def test_with_a_mouse(visit: Any, tmp_path: Path) -> None:
     expect(stiffness).to_contain_text("N.m/deg > 0")
     stiffness.get_by_role("spinbutton").fill("1.5")
     stiffness.get_by_role("spinbutton").press("Enter")
-    # The time by its slider, and where a course is touched.
+    # Sets the time by its slider and by a click on a plot.
     time = page.get_by_label("Time", exact=True)
     box = time.bounding_box()
     assert box
@@ -144,12 +144,12 @@ def test_with_a_mouse(visit: Any, tmp_path: Path) -> None:
     button(again, "Default parameters").click()
     expect(again.locator("#live-k1")).not_to_have_value("1.5")
     expect(again.locator("#live-use_omega")).not_to_be_checked()
-    # A motor is turned where it is, the wrist beside it.
+    # A drag on a motor turns the motor; a drag next to it turns the view of the wrist.
     button(again, "Pause").click()
-    before = picture(again)
+    before = image(again)
     x, y = middle(again.locator(".live-scene"))
     drag(again, (x, y + 120), (x + 80, y + 120))
-    assert picture(again) != before
+    assert image(again) != before
     again.get_by_label("Motion", exact=True).select_option("hand")
     find_motor(again)
     again.mouse.down()
@@ -166,7 +166,7 @@ def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> No
 
 
 def find_motor(page: Page) -> tuple[float, float]:
-    """The place of motor 1 in the picture, by the cursor there; the mouse is left on it."""
+    """Returns the position of motor 1 in the image, found by the cursor's shape. The mouse stays there."""
     scene = page.locator(".live-scene")
     box = scene.bounding_box()
     assert box
@@ -179,9 +179,9 @@ def find_motor(page: Page) -> tuple[float, float]:
     raise AssertionError("no motor is found")
 
 
-def swipe(touch: CDPSession, start: tuple[float, float], way: tuple[float, float]) -> None:
+def swipe(touch: CDPSession, start: tuple[float, float], shift: tuple[float, float]) -> None:
     def points(share: float) -> list[dict[str, float]]:
-        return [{"x": start[0] + share * way[0], "y": start[1] + share * way[1]}]
+        return [{"x": start[0] + share * shift[0], "y": start[1] + share * shift[1]}]
 
     touch.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": points(0)})
     for step in range(1, 9):
@@ -196,14 +196,14 @@ def test_with_a_finger_on_a_phone(visit: Any) -> None:
     scene = page.locator(".live-scene")
     scene.scroll_into_view_if_needed()
     x, y = middle(scene)
-    before = picture(page)
+    before = image(page)
     swipe(touch, (x, y + 40), (120, 0))
     expect(page.locator("#live-theta1")).to_have_value("0")
-    assert picture(page) != before
+    assert image(page) != before
     swipe(touch, (x, y + 40), (-120, 0))
-    # A finger on a motor turns it, and the page stays where it is.
-    place, scrolled = find_motor(page), page.evaluate("scrollY")
-    swipe(touch, place, (0, 60))
+    # A finger on a motor turns the motor, and the page does not scroll.
+    motor, scrolled = find_motor(page), page.evaluate("scrollY")
+    swipe(touch, motor, (0, 60))
     until(page, "document.querySelector('#live-theta1').value > 10")
     assert page.evaluate("scrollY") == scrolled
     slider = page.get_by_role("slider", name="Motor 2")
@@ -212,8 +212,8 @@ def test_with_a_finger_on_a_phone(visit: Any) -> None:
     until(page, "document.querySelector('#live-theta2').value > 10")
 
 
-def test_with_the_keyboard_alone(visit: Any) -> None:
-    """Everything is reached, in its order, and seen to be; and what is reached does what it is for."""
+def test_with_the_keyboard_only(visit: Any) -> None:
+    """Every control gets the focus, in order and visibly, and works with keys."""
     page = visit("#try&motion=chirp&speed=0.01")
     button(page, "Pause").wait_for()
     page.keyboard.press("Tab")
@@ -228,11 +228,11 @@ def test_with_the_keyboard_alone(visit: Any) -> None:
         reached[page.evaluate(name)] = None
         assert page.evaluate(f"getComputedStyle({focused}).outlineStyle") != "none", list(reached)[-1]
         page.keyboard.press("Tab")
-    there = page.evaluate(
+    expected = page.evaluate(
         "[...document.querySelectorAll('.live :is(a, button, input, select, summary, [tabindex])')]"
         ".filter(e => e.checkVisibility({visibilityProperty: true})).map(e => e.id || e.getAttribute('aria-labelledby') || e.getAttribute('aria-label') || e.textContent)"
     )
-    assert list(reached) == list(dict.fromkeys(there))
+    assert list(reached) == list(dict.fromkeys(expected))
     page.get_by_label("Motion", exact=True).focus()
     page.keyboard.press("ArrowDown")
     expect(page.get_by_label("Motion", exact=True)).to_have_value("move")
@@ -244,16 +244,16 @@ def test_with_the_keyboard_alone(visit: Any) -> None:
     page.get_by_label("Time", exact=True).focus()
     page.keyboard.press("Home")
     assert clock(page) == 0 < before
-    before_turn = picture(page)
+    before_turn = image(page)
     page.locator(".live-scene").focus()
     page.keyboard.press("ArrowLeft")
-    assert picture(page) != before_turn
+    assert image(page) != before_turn
     page.get_by_role("slider", name="Motor 1").focus()
     page.keyboard.press("PageUp")
     expect(page.get_by_label("Motion", exact=True)).to_have_value("hand")
 
 
-def test_where_motion_is_not_wanted(visit: Any) -> None:
+def test_with_reduced_motion(visit: Any) -> None:
     page = visit(reduced_motion="reduce")
     button(page, "Play").wait_for()
     page.get_by_label("Motion", exact=True).select_option("move")
@@ -263,9 +263,9 @@ def test_where_motion_is_not_wanted(visit: Any) -> None:
     until(page, "parseFloat(document.querySelector('.live-clock').textContent) > 0")
 
 
-def test_without_scripts_it_is_the_page_alone(visit: Any, address: str) -> None:
+def test_without_scripts_only_the_page_is_shown(visit: Any, address: str) -> None:
     page = visit(java_script_enabled=False)
-    assert page.locator("noscript > p").bounding_box(), "it says that scripts are missing"
+    assert page.locator("noscript > p").bounding_box(), "the page reports that scripts are missing"
     assert page.locator(".live, canvas").count() == 0
     expect(page.locator("main > section h2").first).to_have_text("The testbed")
 
@@ -278,7 +278,7 @@ def test_without_scripts_it_is_the_page_alone(visit: Any, address: str) -> None:
         ("WebAssembly.compile = () => Promise.reject(new Error('it is forbidden'))", "it is forbidden"),
     ],
 )
-def test_why_it_cannot_run_the_fmu(visit: Any, script: str, reason: str) -> None:
+def test_the_page_reports_why_it_cannot_run_the_fmu(visit: Any, script: str, reason: str) -> None:
     page = visit(script=script)
     expect(page.locator("main > :first-child")).to_contain_text(reason)
     assert page.locator("canvas").count() == 0
@@ -299,7 +299,7 @@ def test_a_field_can_be_filled_in_while_a_motion_plays(visit: Any) -> None:
 
 
 def test_a_value_that_the_fmu_rejects(visit: Any) -> None:
-    """The run stands still until another value is given, and goes on from there."""
+    """The run stops until another value is set, and continues from there."""
     page = visit("#try&motion=hand&theta1=0.5&speed=1")
     page.locator(".live-clock").wait_for()
     until(page, "parseFloat(document.querySelector('.live-clock').textContent) > 0.1")
@@ -329,31 +329,31 @@ def test_integers_are_integers(visit: Any) -> None:
     field(page, "M").fill("2.5")
     field(page, "M").press("Enter")
     expect(page.locator("#live-M-message")).to_have_text("M must be an integer below 2\u00b3\u00b9")
-    before = picture(page)
+    before = image(page)
     field(page, "M").fill("6")
     field(page, "M").press("Enter")
     expect(page.locator("#live-M-message")).to_have_text("")
-    assert picture(page) != before
+    assert image(page) != before
 
 
 def test_a_motor_follows_the_hand(visit: Any) -> None:
-    """Its surface moves as the mouse does, also as seen from behind."""
+    """The motor's surface moves with the mouse, also in the view from behind."""
     page = visit("#try&motion=hand")
     scene = page.locator(".live-scene")
-    for turns, way in [(0, 1), (36, -1)]:
+    for turns, sign in [(0, 1), (36, -1)]:
         button(page, "Start again").click()
         scene.focus()
         for _ in range(turns):
             page.keyboard.press("ArrowLeft")
-        place = find_motor(page)
-        drag(page, place, (place[0], place[1] + 40))
+        motor = find_motor(page)
+        drag(page, motor, (motor[0], motor[1] + 40))
         page.wait_for_timeout(500)
         moved = [float(field(page, name).input_value()) for name in ("theta1", "theta2")]
-        assert way * sum(moved) > 5, moved
+        assert sign * sum(moved) > 5, moved
 
 
 def test_the_depth_buffer_draws_the_same_wrist(visit: Any) -> None:
-    """With WebGL, even if it is slow, and without: the images differ at edges only."""
+    """The images with WebGL, even if WebGL is slow, and without WebGL differ only at edges."""
     slow = "const get = HTMLCanvasElement.prototype.getContext; HTMLCanvasElement.prototype.getContext = function (kind, options) { return "
     images = []
     for context in (
@@ -362,7 +362,7 @@ def test_the_depth_buffer_draws_the_same_wrist(visit: Any) -> None:
     ):
         page = visit("#try&motion=fig4", script=f"{slow}{context} }};", reduced_motion="reduce")
         button(page, "Play").wait_for()
-        data = picture(page).partition(",")[2]
+        data = image(page).partition(",")[2]
         images.append(np.asarray(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGBA"), dtype=float))
     differs = (np.abs(images[0] - images[1]).max(axis=2) > 60).mean()
     drawn = (images[1][:, :, 3] > 0).mean()
@@ -376,14 +376,14 @@ WebAssembly.Instance = function (...all) {
   const { exports } = new Instance(...all);
   return { exports: { ...exports,
     fmi2DoStep: (fmu, time, ...more) => time < 0.5 - 1e-9 ? exports.fmi2DoStep(fmu, time, ...more) : 2,
-    fmi2GetBooleanStatus: (_, kind, place) => (new Int32Array(exports.memory.buffer, place, 1)[0] = kind === 3, 0),
+    fmi2GetBooleanStatus: (_, kind, pointer) => (new Int32Array(exports.memory.buffer, pointer, 1)[0] = kind === 3, 0),
   } };
 };
 """
 
 
 def test_the_guide(visit: Any, tmp_path: Path) -> None:
-    """Each paragraph shows its run. Its numbers are dragged, or changed by keys, and are in the link."""
+    """Each paragraph shows its run. Its numbers can be dragged or changed by keys, and are included in the link."""
     page = visit("#try", reduced_motion="reduce")
     response = page.locator(".live-plots .live-plots .live-number")
     for name, motion in [("1. Pitch", "pitch"), ("2. Roll", "roll"), ("4. Shape", "shaped"), ("3. Shake", "shake")]:
@@ -395,20 +395,20 @@ def test_the_guide(visit: Any, tmp_path: Path) -> None:
     for key, value in [("Home", 0.5), ("ArrowRight", 0.6), ("PageUp", 1.6), ("ArrowDown", 1.5), ("End", 15)]:
         frequency.press(key)
         assert float(frequency.get_attribute("aria-valuenow") or "") == value, key
-    place = middle(frequency)
-    drag(page, place, (place[0] - 200, place[1]))
+    start = middle(frequency)
+    drag(page, start, (start[0] - 200, start[1]))
     expect(frequency).to_have_text("3.4\u00a0Hz")
     stiffness = page.get_by_role("slider", name="Stiffness k2").and_(page.locator(".live-dial:visible"))
     stiffness.press("PageUp")
     expect(field(page, "k2")).to_have_value("0.5")
-    # The response at the cursor is that of the run, whose motors move by 4 degrees.
+    # The response at the cursor equals the response of the run, in which the motors move by 4 degrees.
     with page.expect_download() as download:
         button(page, "Save as CSV").click()
     download.value.save_as(tmp_path / "run.csv")
     run = np.genfromtxt(tmp_path / "run.csv", delimiter=",", names=True, skip_header=2)
     swing = np.ptp(run["pitch"][run["time"] > 2]) / np.deg2rad(4)
     assert float(response.inner_text()) == pytest.approx(swing, rel=5e-3)
-    # A place of the response chooses its frequency.
+    # A click on the response chooses its frequency.
     page.mouse.click(*middle(page.locator(".live-plots .live-plots canvas")))
     assert 7 < float(frequency.get_attribute("aria-valuenow") or "") < 8.5
     button(page, "Link to this").click()
@@ -419,7 +419,7 @@ def test_the_guide(visit: Any, tmp_path: Path) -> None:
 
 
 def test_a_run_that_the_fmu_ends(visit: Any) -> None:
-    """It is no refusal, and the time stays where there is something to be seen."""
+    """The end of a run is no error, and the time stays at the last result."""
     page = visit("#try&motion=tour&speed=2", script=ENDING)
     expect(page.locator(".live-status")).to_have_text("The FMU has ended the run at 0.5 s.")
     expect(page.locator(".live-error")).to_have_count(0)
@@ -428,7 +428,7 @@ def test_a_run_that_the_fmu_ends(visit: Any) -> None:
 
 
 def test_a_model_reads_its_resources(browser: Browser, tmp_path: Path) -> None:
-    """The page of `cargo fmu build` has the files, and the model the values of the library."""
+    """The page of `cargo fmu build` contains the resources, and its results equal the results of the library."""
     cargo_fmu = [ROOT / "target/debug/cargo-fmu", "fmu"]
     subprocess.run([*cargo_fmu, "new", "house", "--from", "house"], cwd=tmp_path, check=True, capture_output=True)
     environment = {**os.environ, "CARGO_TARGET_DIR": str(ROOT / "target/models")}
@@ -455,7 +455,7 @@ def test_a_model_reads_its_resources(browser: Browser, tmp_path: Path) -> None:
 
 
 def test_a_link_in_the_page_leads_there(visit: Any) -> None:
-    """What is below is laid out only when it is seen."""
+    """The browser lays out lower sections only when they become visible."""
     page = visit()
     button(page, "Pause").click()
     page.get_by_role("link", name="The equations").click()

@@ -1,4 +1,4 @@
-"""READMEs and pages are read in many places: on the project's page, with a crate, in its documentation."""
+"""READMEs and pages have valid links on the project's page, in a crate and in its documentation."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from tools.documentation.sources import read_table
 LISTED = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
 FILES = [name for name in LISTED.split("\0") if name]
 PAGES = [name for name in FILES if name.endswith(".md") or name in ("CITATION.cff",)]
-#: Whoever follows a link gets documentation or sources, not the page of a package registry.
+#: Links lead to documentation or sources, not to package registries.
 HOSTS = {"docs.rs", "github.com", "rustup.rs", "semver.org"}
 LINK = re.compile(r"\]\(<?([^)>\s]+)[^)]*\)|^\[[^\]]+\]:\s*(\S+)|(?:href|src)=\"([^\"]+)\"", re.MULTILINE)
 
 
 def links(text: str) -> list[str]:
-    """The targets of a page's links and pictures, without code."""
+    """Returns the targets of a page's links and images, except those in code."""
     text = re.sub(r"^```.*?^```|`[^`\n]*`", "", text, flags=re.DOTALL | re.MULTILINE)
     return ["".join(found) for found in LINK.findall(text)]
 
 
 def leads_out(page: Path, link: str, home: Path) -> bool:
-    """Whether a relative link leads out of the folder that is published."""
+    """Returns whether a relative link leads out of the published directory."""
     return not re.match(r"[a-z]+:|#", link) and not (page.parent / link).resolve().is_relative_to(home)
 
 
 def published() -> list[Path]:
-    """The folders of what is published with a README: crates, and the Python package beside one of them."""
+    """Returns the directories of the crates that are published."""
     manifests = [ROOT / name for name in FILES if name.endswith("Cargo.toml")]
     packages = {path: tomllib.loads(path.read_text(encoding="utf-8")).get("package", {}) for path in manifests}
     return [path.parent for path, package in packages.items() if package.get("publish", True)]
@@ -66,17 +66,17 @@ def test_a_crate_has_all_that_its_page_needs(home: Path) -> None:
         assert (home / name).read_bytes() == (ROOT / name).read_bytes()
     found = links(readme.read_text(encoding="utf-8"))
     outside = [link for link in found if leads_out(readme, link, home)]
-    assert not outside, f"{readme.relative_to(ROOT)} leads out of the crate, where it is read without the repository"
+    assert not outside, f"{readme.relative_to(ROOT)} links out of the crate, which is read without the repository"
     # The page of the documentation is the README.
     code = next(path for path in (home / "src/lib.rs", home / "src/main.rs") if path.exists())
     assert code.read_text(encoding="utf-8").startswith('#![doc = include_str!("../README.md")]')
     assert ("in no registry yet" in readme.read_text(encoding="utf-8")) != released(), (
-        f"{readme.relative_to(ROOT)}: until a release, say where the crate is; with it, no longer"
+        f"{readme.relative_to(ROOT)}: state that the crate is in no registry only until it is released"
     )
 
 
 def anchors(page: Path) -> set[str]:
-    """Where a link may lead within a page: what has an id, and in Markdown the headings as GitHub names them."""
+    """Returns the anchors of a page: ids, and in Markdown the headings as GitHub names them."""
     text = page.read_text(encoding="utf-8")
     headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE) if page.suffix == ".md" else []
     return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings} | {
@@ -95,7 +95,7 @@ def test_relative_links_lead_somewhere(name: str) -> None:
 
 
 def test_the_marks_in_the_table_of_importers() -> None:
-    """At a glance only with few and short marks; a tool's name leads to what they mean of it."""
+    """The table "At a glance" contains only these marks, and each tool's name links to its section."""
     for tool, *marks in read_table(ROOT / "docs/compatibility.md", "At a glance").rows:
         assert re.fullmatch(r"\[[^\]]+\]\(#[\w-]+\)[\w .,-]{,20}", tool), tool
         assert set(marks) <= {"✓", "(✓)", "✗", "–", "?"}, tool
@@ -104,10 +104,10 @@ def test_the_marks_in_the_table_of_importers() -> None:
 @pytest.mark.parametrize("name", PAGES)
 def test_other_sites_are_documentation_or_sources(name: str) -> None:
     hosts = set(re.findall(r"https?://([\w.-]+)", (ROOT / name).read_text(encoding="utf-8")))
-    assert hosts <= HOSTS, "if a new one is no registry of packages, name it above"
+    assert hosts <= HOSTS, "add a new host to HOSTS, unless it is a package registry"
 
 
 def test_the_release_notes_have_no_relative_links() -> None:
-    """They are cut out of the changelog and read elsewhere."""
+    """The release notes are copied from the changelog to other pages."""
     found = links((ROOT / "CHANGELOG.md").read_text(encoding="utf-8"))
     assert all(link.startswith("https://") for link in found), found

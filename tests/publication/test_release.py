@@ -1,4 +1,4 @@
-"""The release: its notes, its tag, and dist/, in which no file of an earlier release stays."""
+"""The notes and the tag of a release; dist/ keeps no file of an earlier release."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_a_tag_names_the_dated_newest_version() -> None:
             release.check_tag(tag, text, version)
 
 
-def test_nothing_is_left_of_an_earlier_release(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_dist_keeps_no_file_of_an_earlier_release(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(release, "DIST", tmp_path / "dist")
     for version in ("0.1.0", "0.2.0"):
         made = tmp_path / "made" / version / "dist"
@@ -59,6 +59,6 @@ def test_nothing_is_left_of_an_earlier_release(tmp_path: Path, monkeypatch: pyte
         assert (release.DIST / release.SUMS).read_text().endswith(f"  prw-{version}-py3-none-any.whl\n")
 
 
-def test_prw_has_the_version_of_the_rest() -> None:
+def test_a_different_version_of_prw_is_an_error() -> None:
     with pytest.raises(SystemExit, match=r"in python/prw/pyproject.toml is [\d.]+, in Cargo.toml it is 9.9.9"):
         prw_wheel.check_version("9.9.9")

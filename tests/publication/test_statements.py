@@ -1,4 +1,4 @@
-"""Statements of pages and messages that can be computed: names of make targets, paths, dependencies, what can be installed."""
+"""Statements in pages and messages that tests can check: make targets, paths, dependencies, install commands."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RULES = dict(re.findall(r"^([\w-]+):(?!=)(.*)$", MAKEFILE, re.MULTILINE))
 HELP = set(re.findall(r"^\t@echo 'make ([\w-]+)", MAKEFILE, re.MULTILINE))
 CODE = re.compile(r"^```.*?^```|`[^`\n]+`", re.DOTALL | re.MULTILINE)
 PATH = re.compile(r"`([\w.-]+/[\w./-]*|[\w-]+\.(?:rs|py|md|xml|lock))`")
-#: Directories that are made, not kept.
+#: Directories that builds create; git does not track them.
 MADE = ("out/", "dist/", "target/", ".venv")
 INSTALL = re.compile(r"(?:pip|cargo) install ([^`\n#;)]*)")
 TEXTS = [name for name in FILES if name.endswith((".md", ".py", ".rs", ".toml", ".html", ".yml", "Makefile"))]
@@ -40,14 +40,14 @@ def test_help_lists_every_target_that_no_other_needs() -> None:
 
 @pytest.mark.parametrize("name", [name for name in PAGES if not name.startswith(("CHANGELOG", "crates/"))])
 def test_named_paths_exist(name: str) -> None:
-    """Checks all paths of the tour; of other pages, those that begin with a directory of the project."""
+    """Checks all paths in CONTRIBUTING.md; in other pages, paths that begin with a directory of the project."""
     kept, folders = [f"/{path}/" for path in FILES], {path.split("/")[0] for path in FILES if "/" in path}
     for path in PATH.findall(text(name)):
         if not path.startswith(MADE) and (name == "CONTRIBUTING.md" or path.split("/")[0] in folders):
             assert any(f"/{path.rstrip('/')}/" in other for other in kept), path
 
 
-def test_the_tour_has_every_directory_and_every_file_of_the_model() -> None:
+def test_contributing_lists_every_directory_and_every_file_of_the_model() -> None:
     tree, tables = re.split(r"^```\n?", text("CONTRIBUTING.md"), flags=re.MULTILINE)[1:3]
     named = set(re.findall(r"^([\w/-]+)/ ", tree, re.MULTILINE))
     assert all((ROOT / path).is_dir() for path in named)
@@ -72,8 +72,8 @@ def test_dependencies_are_as_stated() -> None:
 
 
 @pytest.mark.skipif(released(), reason="the packages are in their registries")
-def test_no_package_of_the_project_is_asked_of_a_registry() -> None:
-    """Anyone may register a name that is free."""
+def test_no_package_of_the_project_is_installed_from_a_registry() -> None:
+    """Anyone can register a free name."""
     own = {*own_packages(), "fmu-run", "prw"}
     for name in TEXTS:
         for arguments in INSTALL.findall(text(name)):

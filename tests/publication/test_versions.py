@@ -1,4 +1,4 @@
-"""`[workspace.package]` in Cargo.toml has the version; all files that must repeat it have the same."""
+"""All files that repeat the version agree with `[workspace.package]` in Cargo.toml."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ VERSION: str = WORKSPACE["package"]["version"]
 
 
 def own_packages() -> dict[str, Path]:
-    """The workspace's packages, each with its manifest."""
+    """Returns the manifest of each package of the workspace."""
     manifests = [ROOT / member / "Cargo.toml" for member in (".", *WORKSPACE["members"])]
     return {read(manifest)["package"]["name"]: manifest for manifest in manifests}
 
 
-def test_packages_have_this_version_and_ask_for_it() -> None:
+def test_packages_have_this_version_and_require_it() -> None:
     tables = {"Cargo.toml": WORKSPACE["dependencies"]}
     for name, manifest in own_packages().items():
         content = read(manifest)
@@ -55,8 +55,8 @@ def test_the_python_packages_have_this_version() -> None:
     assert "version" in read("crates/fmu-run/pyproject.toml")["project"]["dynamic"]
 
 
-def test_the_changelog_and_the_citation_have_this_version_and_its_day() -> None:
-    """A version that is not released has no day."""
+def test_the_changelog_and_the_citation_have_this_version_and_its_date() -> None:
+    """An unreleased version has no date."""
     changelog, citation = ((ROOT / name).read_text(encoding="utf-8") for name in ("CHANGELOG.md", "CITATION.cff"))
     headings = re.findall(r"^## (.*)$", changelog, re.MULTILINE)
     form = r"(\d+\.\d+\.\d+)(?: \((?:unreleased|(\d{4}-\d\d-\d\d))\))?"

@@ -1,4 +1,4 @@
-"""What runs on GitHub's machines: nothing wrong in it, nothing from others that can change, no more rights than needed."""
+"""The GitHub workflows pass the linters, pin third-party actions, and have minimal permissions."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ import pytest
 from built import ROOT
 
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
-#: A commit, and for people its version.
+#: An action pinned to a commit, with its version as a comment.
 PINNED = re.compile(r"uses: [\w./-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+$")
 
 
 def checked(program: str, *arguments: object) -> subprocess.CompletedProcess[str]:
-    """What a checker of this environment says."""
+    """Runs a linter of this environment."""
     command = [f"{sysconfig.get_path('scripts')}/{program}", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True)
 
 
 def unpinned(workflow: str) -> list[str]:
-    """The lines that use an action in whatever version it will have."""
+    """Returns the lines that use an action without a pinned commit."""
     used = [line.strip() for line in workflow.splitlines() if re.search(r"\buses:", line)]
     return [line for line in used if not PINNED.search(line)]
 
@@ -43,7 +43,7 @@ def test_zizmor(path: Path) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_they_find_faults(tmp_path: Path) -> None:
+def test_the_linters_find_faults(tmp_path: Path) -> None:
     faulty = WORKFLOWS[0].read_text(encoding="utf-8").replace("needs: release\n", "needs: relaese\n")
     path = tmp_path / "fmu.yml"
     path.write_text(faulty.replace("contents: read", "contents: write"), encoding="utf-8")
@@ -59,7 +59,7 @@ def test_actions_are_commits(path: Path) -> None:
 
 
 @pytest.mark.parametrize("version", ["v7", "main", "3d3c42e # v7.0.1", "3d3c42e5aac5ba805825da76410c181273ba90b1"])
-def test_what_is_not_pinned_is_found(version: str) -> None:
+def test_unpinned_actions_are_found(version: str) -> None:
     assert unpinned(f"      - uses: actions/checkout@{version}") == [f"- uses: actions/checkout@{version}"]
 
 

@@ -1,4 +1,4 @@
-//! Makes the FMUs of a model.
+//! Builds the FMUs of a model.
 
 use crate::project::Project;
 use anyhow::{Context, Result};
@@ -14,15 +14,15 @@ use std::process::Command;
 pub enum Purpose {
     /// For users: the library is compiled with the author's profile `release`.
     Use,
-    /// For the author, who changes it again: the library is compiled fast.
+    /// For the author during development: the library is compiled with fast settings.
     Trial,
 }
 
-/// Settings with which a library is compiled fast.
+/// Cargo settings for a short compile time.
 const FAST: [&str; 2] = ["profile.release.lto=\"off\"", "profile.release.incremental=true"];
 
-/// Makes the FMUs in the directory of the options, or in `target/fmu` of the workspace. If the package has its own program, starts it
-/// with these arguments. Returns false if that program failed, which has printed the reason.
+/// Builds the FMUs in the directory of the options, or in `target/fmu` of the workspace. If the package has its own program, starts it
+/// with these arguments. Returns false if that program failed and printed the reason.
 pub fn build(
     project: &Project,
     options: &BuildOptions,

@@ -2,8 +2,8 @@
 //!
 //! ## Inside
 //!
-//! `new` writes a new model, `project` gets the metadata of the package from cargo, `builder` compiles, describes and packs it, `run`
-//! simulates the FMU, `plot` draws the results.
+//! `new` writes a new model, `project` gets the metadata of the package from cargo, `builder` builds the FMUs, `run` simulates an
+//! FMU, and `plot` draws the results.
 
 mod builder;
 mod new;
@@ -28,12 +28,12 @@ enum Cargo {
     Fmu(Command),
 }
 
-/// Begin, build and run an FMU that is written in Rust
+/// Create, build, run and check FMUs that are written in Rust
 #[derive(clap::Subcommand)]
 enum Command {
-    /// Begin a model: a crate with equations to change, and tests
+    /// Create a model: a crate with equations to change, and tests
     New(new::Options),
-    /// Make the FMUs, for FMI 2.0 and for FMI 3.0
+    /// Build the FMUs for FMI 2.0 and FMI 3.0
     Build {
         #[command(flatten)]
         package: Package,
@@ -43,13 +43,13 @@ enum Command {
         #[arg(last = true, value_name = "OPTIONS")]
         _own: Vec<OsString>,
     },
-    /// Make the FMUs and simulate one: a table (CSV) and a plot (SVG) of the outputs
+    /// Build the FMUs and simulate one: writes a table (CSV) and a plot (SVG) of the outputs
     Run(run::Options),
-    /// Make the FMUs and attack them: which requirements of the standard do they violate?
+    /// Build the FMUs and check them with valid and invalid calls: reports violated requirements of the standard
     Check {
         #[command(flatten)]
         package: Package,
-        /// Check this FMU, of any origin, instead of making FMUs; repeat it for several
+        /// Check this FMU from any tool instead of building FMUs; repeat the option for several FMUs
         #[arg(long)]
         fmu: Vec<PathBuf>,
         #[command(flatten)]

@@ -1,4 +1,4 @@
-//! Makes a new crate from one of the models that this command contains.
+//! Creates a crate from one of the models that this command contains.
 
 use crate::builder::{tested, write};
 use anyhow::{Context, Result, bail, ensure};
@@ -13,10 +13,10 @@ use std::process::Command;
 pub struct Options {
     /// The directory of the new model
     path: PathBuf,
-    /// Its name [default: the name of the directory]
+    /// Name of the model [default: the name of the directory]
     #[arg(long)]
     name: Option<String>,
-    /// The model to begin with: lag (the smallest), ball (events where a sign changes, an end), motor (events at times),
+    /// Model to start from: lag (the smallest), ball (state events, an early end), motor (time events),
     /// house (a file, strings, units with an offset)
     #[arg(long, value_enum, value_name = "MODEL", default_value_t, hide_possible_values = true)]
     from: Begin,
@@ -25,7 +25,7 @@ pub struct Options {
     git: Option<String>,
 }
 
-/// The models to begin with.
+/// Models to start from.
 #[derive(clap::ValueEnum, Clone, Copy, Debug, Default, PartialEq)]
 enum Begin {
     #[default]
@@ -55,7 +55,7 @@ impl Begin {
     }
 }
 
-/// Makes the crate.
+/// Creates the crate.
 pub fn new(options: &Options) -> Result<()> {
     let directory = &options.path;
     ensure!(!directory.exists(), "{} exists already; name a new directory", directory.display());
@@ -78,7 +78,7 @@ pub fn new(options: &Options) -> Result<()> {
     for (file, text) in files {
         let path = directory.join(file.replace("lag", &crate_name));
         let parent = path.parent().context("a file is in a directory")?;
-        fs::create_dir_all(parent).with_context(|| format!("cannot make {}", parent.display()))?;
+        fs::create_dir_all(parent).with_context(|| format!("cannot create {}", parent.display()))?;
         let text = match options.from {
             // The smallest model gets the name of the crate; others keep their names.
             Begin::Lag => renamed(&renamed(text, "lag", &crate_name), "Lag", &camel(&crate_name)),
@@ -96,7 +96,7 @@ pub fn new(options: &Options) -> Result<()> {
     if !lock.is_empty() && !in_workspace {
         write(&directory.join("Cargo.lock"), &lock)?;
     }
-    // The names have other lengths now. Without rustfmt, the lines are not wrapped again.
+    // The new names change line lengths. Without rustfmt, the lines keep their breaks.
     let _ = Command::new(&cargo).args(["fmt", "--quiet"]).current_dir(directory).output();
     println!(
         "{0} begins with {model}: change {0}/src/{1}, then\n  cd {0}\n  cargo test        # the model before changes\n  {2:<16}  # the FMU, a table and a plot",
@@ -116,7 +116,7 @@ pub fn new(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// Whether the `Cargo.lock` in another directory is in force.
+/// Returns whether cargo uses the `Cargo.lock` of another directory.
 fn in_workspace(directory: &Path) -> bool {
     let mut command = Command::new(cargo());
     command.args(["locate-project", "--workspace", "--message-format", "plain"]).current_dir(directory);
@@ -153,7 +153,7 @@ impl Dependency {
             return Ok(Self::Registry);
         }
         let directory = fs::canonicalize(directory).with_context(|| short(directory))?;
-        // cargo may have made the directory itself a repository.
+        // `cargo new` may have created a repository in the directory itself.
         let parent = directory.parent().unwrap_or(&directory);
         let root = git(parent, &["rev-parse", "--show-toplevel"]).map(PathBuf::from);
         Ok(match root.filter(|root| package.starts_with(root)) {
@@ -182,7 +182,7 @@ fn git(directory: &Path, arguments: &[&str]) -> Option<String> {
     output.status.success().then(|| text.trim().to_owned())
 }
 
-/// The path from one directory to another.
+/// Returns the path from one directory to another.
 fn relative(from: &Path, to: &Path) -> String {
     let common = from.components().zip(to.components()).take_while(|(one, other)| one == other).count();
     let up = from.components().skip(common).map(|_| "..".to_owned());
@@ -235,7 +235,7 @@ fn renamed(text: &str, word: &str, replacement: &str) -> String {
     result + rest
 }
 
-/// Returns the name of a type in Rust.
+/// Returns a crate name as the name of a Rust type.
 fn camel(name: &str) -> String {
     let capital = |word: &str| {
         let mut letters = word.chars();

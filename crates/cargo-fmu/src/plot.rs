@@ -9,9 +9,9 @@ use std::path::Path;
 pub struct Trajectory<'a> {
     pub name: &'a str,
     pub unit: &'a str,
-    /// Whether it is constant between jumps.
+    /// Whether the variable is constant between jumps.
     pub jumps: bool,
-    /// Whether its values 0 and 1 are false and true.
+    /// Whether the values 0 and 1 mean false and true.
     pub is_boolean: bool,
     pub values: &'a [f64],
 }
@@ -45,7 +45,7 @@ pub fn plot(path: &Path, title: &str, time: &[f64], trajectories: &[Trajectory])
     Ok(fs::write(path, format!("{begin}>{rest}"))?)
 }
 
-/// Factor by which the image is larger.
+/// Factor by which the drawn image is larger than the SVG.
 const FINE: u32 = 10;
 
 fn draw(
@@ -121,7 +121,7 @@ fn draw(
     Ok(())
 }
 
-/// Returns a label at an axis of this length, with enough digits to distinguish the labels, and without a sign of 0.
+/// Returns a label for an axis with this range, with enough digits to distinguish the labels. Zero has no sign.
 fn label(value: f64, range: f64) -> String {
     let value = if value.abs() < 1e-6 * range { 0.0 } else { value };
     let digits = 4.0 - range.log10().ceil();

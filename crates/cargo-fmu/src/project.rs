@@ -9,10 +9,10 @@ use std::path::{Path, PathBuf};
 /// The options that name the package of the model.
 #[derive(clap::Args, Clone, Debug)]
 pub struct Package {
-    /// The model's package, in a workspace with several
+    /// Package of the model, in a workspace with several packages
     #[arg(short, long)]
     pub package: Option<String>,
-    /// Its Cargo.toml [default: the one in this directory, or in the nearest directory above]
+    /// Cargo.toml of the package [default: in this directory or the nearest directory above]
     #[arg(long, value_name = "FILE")]
     pub manifest_path: Option<PathBuf>,
 }
@@ -44,7 +44,7 @@ impl Project {
             );
         }
         if !list(&package["dependencies"]).iter().any(|used| used["name"] == "fmu-export") {
-            bail!("{name} does not use fmu-export: cargo fmu new begins a model that does");
+            bail!("{name} does not use fmu-export: cargo fmu new creates a model that does");
         }
         let programs = targets.iter().filter(|target| list(&target["kind"]).contains(&"bin".into()));
         let mut programs = programs.map(|target| text(&target["name"]));

@@ -21,29 +21,29 @@ use std::time::{Duration, Instant, SystemTime};
 pub struct Options {
     #[command(flatten)]
     package: Package,
-    /// A start value: a number, true, false, a name of an enumeration, or a string; of an array one for each element, with
-    /// commas; repeat it for several
+    /// Start value: a number, true, false, an enumeration item, or a string; for an array, one value for each element,
+    /// separated by commas; repeat the option for several variables
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
-    /// Inputs over time: a table (CSV) with a column time and one for each input
+    /// Inputs over time: a CSV file with a column time and one column for each input
     #[arg(long, value_name = "FILE")]
     input: Option<PathBuf>,
-    /// Stop time, s [default: the proposal of the model]
+    /// Stop time, s [default: from the model's default experiment]
     #[arg(long, value_name = "S")]
     stop: Option<f64>,
-    /// Step size, s [default: the proposal of the model]
+    /// Step size, s [default: from the model's default experiment]
     #[arg(long, value_name = "S")]
     step: Option<f64>,
     /// Variables to show, with commas between the names [default: all outputs]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     show: Vec<String>,
-    /// Simulate the FMU for FMI 2.0 or for FMI 3.0 [default: 2, if it has all types of the model]
+    /// Simulate the FMU for FMI 2.0 or for FMI 3.0 [default: 2, if FMI 2.0 has all types of the model]
     #[arg(long, value_parser = fmi_version, value_name = "2|3")]
     fmi: Option<Standard>,
-    /// Show all messages of the model, not only its warnings
+    /// Show all messages of the model, not only warnings
     #[arg(long)]
     log: bool,
-    /// Repeat it after every change of a file of the model
+    /// Build and simulate again after every change of a model file
     #[arg(long)]
     watch: bool,
 }
@@ -74,7 +74,7 @@ pub fn run(options: &Options) -> Result<bool> {
         while changes(watched.clone()) == before {
             sleep(Duration::from_millis(300));
         }
-        // An editor writes several files.
+        // An editor may write several files.
         sleep(Duration::from_millis(100));
     }
 }
@@ -107,11 +107,11 @@ pub fn check(package: &Package, given: &[PathBuf], options: &fmu_check::Options)
                 .filter_map(|directory| newest(directory, begin)),
         );
     }
-    // All are checked, regardless of the findings in the first.
+    // All FMUs are checked, regardless of the findings in the first.
     let mut good = true;
     for fmu in &fmus {
         let directory = fmu.parent().and_then(Path::file_name).unwrap_or_default();
-        // Reports of several FMUs would have the same names.
+        // Reports of several FMUs have the same file names, so each FMU gets a directory.
         let out = options.out.as_ref().filter(|_| fmus.len() > 1).map(|out| out.join(directory));
         let options = fmu_check::Options { out: out.or(options.out.clone()), ..options.clone() };
         good &= fmu_check::command(fmu, &options) == ExitCode::SUCCESS;
@@ -141,7 +141,7 @@ fn once(options: &Options) -> Result<bool> {
     simulate(options, &fmu, &directory)
 }
 
-/// Returns the FMU in a directory that was just made.
+/// Returns the newest FMU in a directory that was written after `since`.
 fn newest(directory: &Path, since: SystemTime) -> Option<PathBuf> {
     let made = |path: &PathBuf| {
         let is_new = |data: fs::Metadata| {
@@ -156,7 +156,7 @@ fn newest(directory: &Path, since: SystemTime) -> Option<PathBuf> {
     made.pop()
 }
 
-/// Simulates an FMU, and writes the table and the plot. Returns false if the run failed.
+/// Simulates an FMU and writes the table and the plot. Returns false if the run failed.
 fn simulate(options: &Options, path: &Path, directory: &Path) -> Result<bool> {
     // SAFETY: the FMU is the user's own model, which was just compiled.
     #[allow(unsafe_code)]
@@ -164,8 +164,8 @@ fn simulate(options: &Options, path: &Path, directory: &Path) -> Result<bool> {
     let description = fmu.description();
     ensure!(
         description.offer(Interface::CoSimulation).is_some(),
-        "{} is for Model Exchange only, whose equations an importer with a solver integrates; add CoSimulation, or \
-         simulate it there (with FMPy: `fmpy simulate {} --show-plot`)",
+        "{} is for Model Exchange only and needs an importer with a solver; add CoSimulation, or \
+         use such an importer (FMPy: `fmpy simulate {} --show-plot`)",
         description.model_name,
         short(path)
     );
@@ -233,7 +233,7 @@ fn simulate(options: &Options, path: &Path, directory: &Path) -> Result<bool> {
     Ok(!failed)
 }
 
-/// Runs the FMU over these times. The watch has its messages.
+/// Runs the FMU over these times. The watch contains the messages of the FMU.
 fn follow(
     fmu: &Fmu,
     time: &[f64],
@@ -259,17 +259,17 @@ fn follow(
     Ok((runs, watch))
 }
 
-/// Prints the messages of the FMU: warnings, or all.
+/// Prints the warnings of the FMU, or all its messages.
 fn print_messages(watch: &Watch, all: bool) {
     for (_, time, message) in watch.messages() {
-        // Errors are the reason of a failure, which is shown first.
+        // Errors are not warnings: `simulate` prints the reason of a failure.
         if all || message.status == Status::Warning {
             println!("t = {time} s, {}: {}", message.category, message.text.trim());
         }
     }
 }
 
-/// The number of values at the end that the run has not reached.
+/// Returns the number of values at the end that the run did not reach.
 fn unreached(values: &[f64]) -> usize {
     values.iter().rev().take_while(|value| value.is_nan()).count()
 }
@@ -305,7 +305,7 @@ fn times(options: &Options, description: &Description, table: Option<&Table>) ->
     let steps = ((stop - start) / step).round();
     ensure!(
         (1.0..=1e7).contains(&steps),
-        "{steps} steps of {step} s are too few or too many; see --stop and --step"
+        "{steps} steps of {step} s are too few or too many; change --stop or --step"
     );
     // A sum of steps would accumulate rounding errors.
     Ok((0..=steps as u32).map(|number| start + f64::from(number) * step).collect())
@@ -357,11 +357,11 @@ fn starts<'a>(description: &'a Description, name: &str, value: &'a str) -> Resul
     let values: Vec<&str> = if is_array { value.split(',').map(str::trim).collect() } else { vec![value] };
     ensure!(
         values.len() == found.len() || values.len() == 1,
-        "{name} has {} elements, --set gives {} values; give one for each, with commas between them, or one for all",
+        "{name} has {} elements, --set gives {} values; give one value for all, or one for each, separated by commas",
         found.len(),
         values.len()
     );
-    // Strings are for strings and Booleans, and name the items of enumerations.
+    // Start::Text is a value of a string or a Boolean, or the name of an enumeration item.
     let start = |variable: &Variable, value: &'a str| match value.parse() {
         Ok(number) if variable.base != BaseType::String => Start::Same(number),
         _ => Start::Text(value),
@@ -418,7 +418,7 @@ impl Table {
         };
         let (_, time) = columns.remove(time);
         ensure!(time.len() > 1, "{} needs at least two times", path());
-        ensure!(time.is_sorted_by(|a, b| a < b), "{}: its times must rise", path());
+        ensure!(time.is_sorted_by(|a, b| a < b), "{}: times must increase", path());
         Ok(Self { time, inputs: columns })
     }
 

@@ -14,14 +14,14 @@
 //! This is PI control. If the motors are at their goal, rigid = reference + correction. Then, with Kd = 0,
 //! windup - correction is the error e = reference - measured, correction = Kp e + I, and I' = Ki e. In this
 //! form, only the twist of the couplings counts as error, not the remaining distance to the goal. The
-//! integral pauses while a motor moves or backs off (anti-windup), so a move leaves no error to correct
-//! afterwards.
+//! integral pauses while a motor moves or is limited by its torque (anti-windup), so a move leaves no error
+//! to correct afterwards.
 //!
 //! D damps the vibration of the couplings, because of which the wrist lags behind its motors. A stiff wrist
 //! follows at once. Without the filter, the motors' own rate would be fed back with the gain Kd /
 //! sample_time, far above 1, and cause a limit cycle. With the filter, the gain at high frequencies is 1/2.
 //!
-//! A motor backs off from torque. Its goal is limited to the angle at which, with a blocked wrist, the
+//! Torque limiting: The goal of a motor is limited to the angle at which, with a blocked wrist, the
 //! couplings would reach the torque limit. Beyond the torque limit, this goal lies behind the motor. The
 //! motor always moves so slowly that it can stop at its goal, so it does not exceed the limit by its motion.
 

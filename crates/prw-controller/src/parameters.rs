@@ -17,9 +17,9 @@ pub struct Parameters {
     pub max_rate: f64,
     /// Highest acceleration of a motor, rad/s2.
     pub max_acceleration: f64,
-    /// Torque beyond which a motor backs off, N.m.
+    /// Torque limit of a motor, N.m.
     pub max_torque: f64,
-    /// Assumed stiffness between motor and wrist, for backing off, N.m/rad.
+    /// Assumed stiffness between motor and wrist, for torque limiting, N.m/rad.
     pub stiffness: f64,
     /// Proportional gain.
     pub Kp: f64,

@@ -30,9 +30,9 @@ const COUNT: Type = Type::integer("Integer_from_1").min_integer(1);
 variables! {
     for Controller, memory in slopes, motors, integral, damping, correction, on_goal, schedule, sampled_at;
 
-    /// Pitch angle to go to
+    /// Pitch setpoint
     pitch_ref = input(&ANGLE) in inputs.reference[0];
-    /// Roll angle to go to
+    /// Roll setpoint
     roll_ref = input(&ANGLE) in inputs.reference[1];
     /// Measured pitch angle
     pitch = input(&ANGLE) in inputs.angle[0];
@@ -42,35 +42,35 @@ variables! {
     pitch_rate = input(&RATE) in inputs.rate[0];
     /// Measured roll rate, for damping; may be left unconnected
     roll_rate = input(&RATE) in inputs.rate[1];
-    /// Measured torque of sensor 1, negative while the motor drives, for backing off; may be left unconnected
+    /// Measured torque of sensor 1, negative while the motor drives, for torque limiting; may be left unconnected
     tau1 = input(&TORQUE) in inputs.torque[0];
-    /// Measured torque of sensor 2, negative while the motor drives, for backing off; may be left unconnected
+    /// Measured torque of sensor 2, negative while the motor drives, for torque limiting; may be left unconnected
     tau2 = input(&TORQUE) in inputs.torque[1];
 
     // Inputs and parameters act from the next sample on: at a communication point nothing depends on them.
 
-    /// Angle of motor 1; its start value is where the motor stands when the simulation begins
+    /// Angle of motor 1; its start value is the initial angle
     theta1 = output(&ANGLE).exact().depends_on(&[Index::TIME]) in motors[0].angle by |c| c.motion()[0].angle;
-    /// Angle of motor 2; its start value is where the motor stands when the simulation begins
+    /// Angle of motor 2; its start value is the initial angle
     theta2 = output(&ANGLE).exact().depends_on(&[Index::TIME]) in motors[1].angle by |c| c.motion()[1].angle;
     /// Angular velocity of motor 1
     omega1 = output(&RATE).depends_on(&[Index::TIME]) by |c| c.motion()[0].rate;
     /// Angular velocity of motor 2
     omega2 = output(&RATE).depends_on(&[Index::TIME]) by |c| c.motion()[1].rate;
-    /// What the control adds to pitch_ref, as of the last sample
+    /// Correction added to pitch_ref at the last sample
     pitch_correction = output(&ANGLE).discrete().depends_on(&[]) by |c| c.correction[0];
-    /// What the control adds to roll_ref, as of the last sample
+    /// Correction added to roll_ref at the last sample
     roll_correction = output(&ANGLE).discrete().depends_on(&[]) by |c| c.correction[1];
 
-    /// Time between samples, whatever the communication step size
+    /// Time between samples, independent of the communication step size
     sample_time = parameter(&SAMPLE_TIME) in parameters.sample_time;
     /// Highest rate of a motor
     max_rate = parameter(&RATE_LIMIT) in parameters.max_rate;
     /// Highest acceleration of a motor
     max_acceleration = parameter(&ACCELERATION_LIMIT) in parameters.max_acceleration;
-    /// Torque at which a motor backs off
+    /// Torque limit of a motor
     max_torque = parameter(&TORQUE_LIMIT) in parameters.max_torque;
-    /// Stiffness between motor and wrist that backing off assumes: k1 k2 / (k1 + k2) of the testbed
+    /// Stiffness between motor and wrist that torque limiting assumes: k1 k2 / (k1 + k2) of the testbed
     stiffness = parameter(&STIFFNESS) in parameters.stiffness;
     /// Proportional gain
     Kp = parameter(&GAIN) in parameters.Kp;

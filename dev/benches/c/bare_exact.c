@@ -1,5 +1,5 @@
-/* The FMU's exact update as a specialist writes it for this testbed alone: no checks, no state machine, no logging,
- * one set of parameters. The yardstick for what the FMU's checks and its generality cost. Written from the paper.
+/* The FMU's exact update, specialized for this testbed: no checks, no state machine, no logging, one set of parameters.
+ * The reference for the cost of the FMU's checks and generality. Derived from the paper.
  *
  * Pitch and roll, the mean of the two sides and half their difference, are the two lanes of a vector; each has the
  * state z = [q_I - u, q_II - u, v] relative to its motor angle u. While the motor turns at rate w,
@@ -11,7 +11,7 @@ typedef double Lanes __attribute__((vector_size(16)));
 
 typedef struct {
     double input[4], set_rate[2];
-    Lanes z[3], u, w;    /* at the end of the last step, w by the parabola through the last samples */
+    Lanes z[3], u, w;    /* at the end of the last step; w from the parabola through the last samples */
     Lanes sample[2];     /* the last motor angles and those before */
     Lanes rate[3], bend[3]; /* the parabola's slope and curvature now, per sample: current, last, before */
     double h1, h2;       /* the last steps */
@@ -20,7 +20,7 @@ typedef struct {
 
 typedef struct {
     State now;
-    double h;                 /* step size of the next two: z after a step, per z before and per w */
+    double h;                 /* step size for growth and ramp: factors of z and w in a step */
     Lanes growth[3][3], ramp[3];
     Lanes A[3][3], b[3], torque[3];
     System sides;
@@ -29,7 +29,7 @@ typedef struct {
 static Lanes lanes(double side1, double side2) { return 0.5 * (Lanes){side1 + side2, side1 - side2}; }
 static double side(Lanes x, int i) { return i ? x[0] - x[1] : x[0] + x[1]; }
 
-/* Of a row of eq. (11), whose columns come in pairs of sides. */
+/* Coefficients of pitch and roll from a row of eq. (11), whose columns come in pairs of sides. */
 static Lanes pair(const double *row) { return (Lanes){row[0] + row[1], row[0] - row[1]}; }
 
 void *fmi2Instantiate(const char *n, int t, const char *g, const char *r, const void *f, int v, int l) {
@@ -80,7 +80,7 @@ static __attribute__((noinline)) void make_matrices(Instance *i, double h) {
     i->h = h;
 }
 
-/* The parabola through the last samples; a line through two, rest with one. */
+/* The parabola through the last samples; a line if there are two, constant if there is one. */
 static __attribute__((noinline)) void make_parabola(State *s, double h) {
     const Lanes one = {1, 1};
     s->h2 = s->h1, s->h1 = h, s->samples++, s->uneven--;
@@ -89,7 +89,7 @@ static __attribute__((noinline)) void make_parabola(State *s, double h) {
     s->rate[0] = one * p + s->bend[0] * h, s->rate[1] = s->bend[1] * h - p * one, s->rate[2] = s->bend[2] * h;
 }
 
-/* With rates that are set, of motor angles or as omega. */
+/* Replaces rates by input derivatives or omega, if they are set. */
 static __attribute__((noinline)) void take_rates(State *s, Lanes *w, Lanes *bend) {
     double rate[2], curve[2];
     for (int m = 0; m < 2; m++) {

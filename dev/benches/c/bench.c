@@ -75,16 +75,16 @@ static void make_motion(void) {
         for (int m = 0; m < 2; m++) motion[k][4 + m] = (motion[(k + 1) % PERIOD][m] - motion[k][m]) / 1e-3;
 }
 
-/* Writes the inputs one by one right before they are set, as a master does. A library that reads two at once has to wait
- * until both have left the processor. */
+/* Writes the inputs one by one right before they are set, as a master does. A library that reads two inputs at once must
+ * wait until the processor has stored both. */
 static inline void write_inputs(double *inputs, const double *u, int count) {
     for (int k = 0; k < count; k++) {
         inputs[k] = u[k];
-        __asm__ volatile("" ::: "memory"); /* not two at once */
+        __asm__ volatile("" ::: "memory"); /* prevents one store of two inputs */
     }
 }
 
-/* bench.py has their names. */
+/* bench.py lists their names in this order. */
 typedef enum { VECTORS, SCALARS, RATES, OMEGA, ALTERNATING, NEW_SIZES, STATES, DERIVATIVES } Way;
 
 typedef struct {

@@ -1,4 +1,4 @@
-/* Functions that do nothing: what the loop and the calls cost. */
+/* Empty functions, to measure the cost of the loop and the calls. */
 #include <stddef.h>
 
 static int something;

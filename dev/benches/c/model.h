@@ -1,5 +1,5 @@
-/* What the two comparison programs share: Table 1, eq. (11) and the layout of the FMU's variables.
- * Written from the paper, without a line of the FMU's code. */
+/* Shared by the two comparison programs: Table 1, eq. (11) and the layout of the FMU's variables.
+ * Derived from the paper; shares no code with the FMU. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
