@@ -5,7 +5,9 @@ use fmu_export::{Causality, Exported, Mode, Status, Variability, Variable};
 use fmu_test_kit::calls::{Argument, signature};
 use fmu_test_kit::careless::{bases_of, element_size};
 use fmu_test_kit::{Either, serialized};
+use std::ffi::c_void;
 use std::mem::MaybeUninit;
+use std::ptr::without_provenance;
 
 /// Arguments of a call, as words, with the memory to which they point. Memory that the function writes is
 /// uninitialized.
@@ -49,21 +51,26 @@ impl ValidCall {
         for argument in arguments {
             let word = match (argument.pointee(), argument.of, argument.name) {
                 (Some((of, read)), _, name) => {
-                    let content = match (of, name) {
+                    let number = match (of, name) {
                         ("ValueReference", _) => reference::<F, M>(name, function, mode).unwrap_or(0).into(),
-                        _ if is_handle(of) && function.contains("Free") => handle(fmu),
                         ("Real" | "Float64", _) => 1.0_f64.to_bits(),
                         ("Float32", _) => 1.0_f32.to_bits().into(),
                         ("UInt16", _) => 2000,
-                        ("String", _) if read => c"text".as_ptr().expose_provenance() as u64,
-                        ("Binary", _) if read => c"bytes".as_ptr().expose_provenance() as u64,
                         _ if is_handle(of) => 0,
                         _ => 1,
+                    };
+                    // A pointer that is stored as an integer has no provenance.
+                    let content = match of {
+                        "String" if read => c"text".as_ptr().cast(),
+                        "Binary" if read => c"bytes".as_ptr().cast(),
+                        _ if is_handle(of) && function.contains("Free") => fmu.save().cast_const().cast(),
+                        _ => without_provenance(number as usize),
                     };
                     let mut memory = Box::new_uninit_slice(bytes.len().div_ceil(8).max(16));
                     if read || is_handle(of) {
                         memory.fill(MaybeUninit::new(if name == "x" { 0.5_f64.to_bits() } else { 0 }));
-                        memory[0].write(content);
+                        // SAFETY: the memory has the size and alignment of at least one pointer.
+                        unsafe { memory.as_mut_ptr().cast::<*const c_void>().write(content) };
                     }
                     if name == "bytes" && read {
                         for (word, chunk) in memory.iter_mut().zip(bytes.chunks(8)) {
