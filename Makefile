@@ -35,22 +35,25 @@ LOCKED ?= --locked
 
 # Rust target of the page in the FMU and of the C sources.
 WEBASSEMBLY := wasm32-unknown-unknown
-# Without these variables: make closes its job server to rustc, and rustc warns that it cannot be reached.
-HAS_WEBASSEMBLY = ls "$$(env -u MAKEFLAGS -u MFLAGS rustc --print target-libdir --target $(WEBASSEMBLY))" 2>/dev/null | grep -q libstd
+# make closes its job server to programs, and rustc would warn that it cannot be reached.
+NO_JOBS := env -u MAKEFLAGS -u MFLAGS
+HAS_WEBASSEMBLY = ls "$$($(NO_JOBS) rustc --print target-libdir --target $(WEBASSEMBLY))" 2>/dev/null | grep -q libstd
 ADD_WEBASSEMBLY = $(HAS_WEBASSEMBLY) || rustup target add $(WEBASSEMBLY)
 
 # Directory of the compiled programs that build FMUs. If empty, cargo compiles them.
 PROGRAMS ?=
-BUILD_FMU = $(if $(PROGRAMS),$(PROGRAMS)/build_fmu,$(CARGO) run $(LOCKED) --release --bin build_fmu --)
-BUILD_CONTROLLER = $(if $(PROGRAMS),$(PROGRAMS)/build_controller,$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller --)
-BUILD_CLOSED_LOOP = $(if $(PROGRAMS),$(PROGRAMS)/build_closed_loop,$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_closed_loop --)
+BUILD_FMU = $(NO_JOBS) $(if $(PROGRAMS),$(PROGRAMS)/build_fmu,$(CARGO) run $(LOCKED) --release --bin build_fmu --)
+BUILD_CONTROLLER = $(NO_JOBS) $(if $(PROGRAMS),$(PROGRAMS)/build_controller,$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller --)
+BUILD_CLOSED_LOOP = $(NO_JOBS) $(if $(PROGRAMS),$(PROGRAMS)/build_closed_loop,$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_closed_loop --)
 # Succeeds if the existing FMU contains the page that runs it.
 HAS_PAGE = $(PYTHON) -c 'import sys, zipfile; sys.exit(b".catch(showFailure)" not in zipfile.ZipFile("$(FMU)").read("documentation/index.html"))' 2>/dev/null
+
+TWO_JOBS = $(if $(findstring jobserver,$(MAKEFLAGS)),,-j2)
 
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-fmu check check-release test test-rust test-python test-fmu test-newest-fmpy test-page fmu bench profile figures docs reference experiments validation closed-loop closed-loop-fmus test-closed-loop importer-fmus test-importers examples test-examples test-faults release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo demo-fmu check check-release test compile-tests test-rust test-crates test-docs test-python test-fmu test-newest-fmpy test-page fmu bench profile figures docs reference experiments validation closed-loop closed-loop-fmus test-closed-loop importer-fmus test-importers examples test-examples test-faults release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -95,14 +98,14 @@ help:
 # Downloads and the compiler run in parallel. If one fails, both run again in sequence, so the error message comes last.
 # The page that runs the FMU takes longest to build. If the existing FMU contains the page, the new one does too.
 demo: need-rust need-python
-	@$(MAKE) --no-print-directory $(if $(findstring jobserver,$(MAKEFLAGS)),,-j2) $(VENV)/demo.stamp demo-fmu || \
+	@$(MAKE) --no-print-directory $(TWO_JOBS) $(VENV)/demo.stamp demo-fmu || \
 	  $(MAKE) --no-print-directory $(VENV)/demo.stamp demo-fmu
 	@$(VENV)/bin/prw simulate --fmu $(FMU) $(if $(INPUT),--input "$(INPUT)") $(ARGS)
 
 demo-fmu: need-rust
 	@$(BUILD_FMU) $$($(HAS_PAGE) || echo --no-page)
 
-fmu: need-rust
+fmu: need-rust $(if $(PROGRAMS),compile-tests)
 	@$(ADD_WEBASSEMBLY) || true
 	@$(BUILD_FMU)
 
@@ -114,26 +117,35 @@ check: $(VENV)/test.stamp need-rust
 check-release: $(VENV)/importers.stamp need-rust
 	@$(PY) dev/tools/release_check.py $(ARGS)
 
-# The Python tests use the programs that the Rust tests compiled.
-test: test-rust test-python $(VENV)/importers.stamp $(VENV)/examples.stamp
-	@$(MAKE) --no-print-directory PROGRAMS=target/debug importer-fmus
+# Two targets run at a time, so that installations and documentation use the time in which a processor would wait.
+# The FMUs are built by the programs that the Rust tests compiled.
+test: need-rust need-python
+	@$(MAKE) --no-print-directory $(TWO_JOBS) PROGRAMS=target/debug test-crates test-python $(VENV)/importers.stamp \
+	  $(VENV)/examples.stamp test-docs importer-fmus
 	$(PY) dev/platforms/bill_of_materials.py --check
 	$(PYTEST) $(FMU_TESTS) tests/closed_loop tests/importers tests/examples
 
 # C programs are compiled against the standard's headers, which FMPy brings.
 headers: $(VENV)/test.stamp
 
-# Many tests wait, for a time limit or for cargo's lock, so there are two for each processor.
-test-rust: need-rust headers
+test-rust: test-crates test-docs
+
+compile-tests: need-rust
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy $(LOCKED) --workspace --all-targets -- -D warnings
-	RUSTDOCFLAGS='-D warnings' $(CARGO) doc $(LOCKED) --workspace --no-deps --quiet
+	$(CARGO) test $(LOCKED) --workspace --no-run --quiet
+
+# Many tests wait for a time limit, so there are two for each processor.
+test-crates: compile-tests headers
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
-	  set -ex; $(CARGO) nextest run $(LOCKED) --workspace --test-threads $$((2 * $$(getconf _NPROCESSORS_ONLN))); \
-    $(CARGO) test $(LOCKED) --workspace --doc; \
+	  set -x; $(NO_JOBS) $(CARGO) nextest run $(LOCKED) --workspace --test-threads $$((2 * $$(getconf _NPROCESSORS_ONLN))); \
 	else \
-	  set -ex; $(CARGO) test $(LOCKED) --workspace; \
+	  set -x; $(NO_JOBS) $(CARGO) test $(LOCKED) --workspace --lib --bins --tests; \
 	fi
+
+test-docs: compile-tests
+	RUSTDOCFLAGS='-D warnings' $(CARGO) doc $(LOCKED) --workspace --no-deps --quiet
+	$(NO_JOBS) $(CARGO) test $(LOCKED) --workspace --doc --quiet
 
 # ruff and mypy; pyproject.toml lists the files.
 test-python: $(VENV)/test.stamp
@@ -191,8 +203,8 @@ closed-loop-fmus: fmu
 	@$(BUILD_CONTROLLER)
 	@$(BUILD_CLOSED_LOOP)
 	@$(if $(PROGRAMS),,$(CARGO) build $(LOCKED) --quiet -p cargo-fmu)
-	@rm -rf target/lag && target/debug/cargo-fmu fmu new target/lag --name lag > /dev/null
-	@cd target/lag && CARGO_TARGET_DIR=$(CURDIR)/target/models ../debug/cargo-fmu fmu build --out ../fmu
+	@rm -rf target/lag && $(NO_JOBS) target/debug/cargo-fmu fmu new target/lag --name lag > /dev/null
+	@cd target/lag && CARGO_TARGET_DIR=$(CURDIR)/target/models $(NO_JOBS) ../debug/cargo-fmu fmu build --out ../fmu
 
 closed-loop: need-rust $(VENV)/importers.stamp closed-loop-fmus
 	@$(PY) dev/tools closed-loop $(ARGS)

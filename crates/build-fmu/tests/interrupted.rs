@@ -5,12 +5,10 @@
 use fmu_package::{Platform, Standard};
 use std::env::consts::DLL_SUFFIX;
 use std::fs;
-use std::io::Read;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::sync::OnceLock;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use zip::ZipArchive;
 
 const OLD: &[u8] = b"the FMU of yesterday";
@@ -19,34 +17,28 @@ const LIMIT: libc::rlim_t = 50_000;
 
 const ROUNDS: u32 = 20;
 
-/// Packs a compiled library: within the limits of these tests, none can be compiled.
-fn build_fmu(out: &Path) -> Command {
-    static LIBRARY: OnceLock<Vec<u8>> = OnceLock::new();
-    let platform = Platform::host().unwrap().directory(Standard::Fmi2);
-    let library = LIBRARY.get_or_init(|| {
-        let directory = tempfile::tempdir().unwrap();
-        let mut command = Command::new(env!("CARGO_BIN_EXE_build_fmu"));
-        assert!(
-            command
-                .args(["--no-page", "--fmi", "2", "--out"])
-                .arg(directory.path())
-                .output()
-                .unwrap()
-                .status
-                .success()
-        );
-        let fmu = fs::File::open(directory.path().join("prw_testbed.fmu")).unwrap();
-        let mut fmu = ZipArchive::new(fmu).unwrap();
-        let name = format!("binaries/{platform}/prw_testbed{DLL_SUFFIX}");
-        let mut library = Vec::new();
-        fmu.by_name(&name).unwrap().read_to_end(&mut library).unwrap();
-        library
-    });
-    let path = out.with_extension("library");
-    fs::write(&path, library).unwrap();
+/// Returns a library of the FMU.
+fn library(directory: &Path) -> PathBuf {
+    let out = directory.join("whole");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_build_fmu"));
+    let output = command.args(["--no-page", "--fmi", "2", "--out"]).arg(&out).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let mut fmu = ZipArchive::new(fs::File::open(out.join("prw_testbed.fmu")).unwrap()).unwrap();
+    let path = directory.join("library");
+    let mut entry = fmu.by_name(&format!("binaries/{}/prw_testbed{DLL_SUFFIX}", platform())).unwrap();
+    std::io::copy(&mut entry, &mut fs::File::create(&path).unwrap()).unwrap();
+    path
+}
+
+fn platform() -> &'static str {
+    Platform::host().unwrap().directory(Standard::Fmi2)
+}
+
+/// Packs a library. The compiler does not work within the limits of this test.
+fn build_fmu(library: &Path, out: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_build_fmu"));
     command.args(["--no-page", "--fmi", "2", "--out"]).arg(out);
-    command.arg("--binary").arg(format!("{platform}={}", path.display()));
+    command.arg("--binary").arg(format!("{}={}", platform(), library.display()));
     command
 }
 
@@ -77,9 +69,11 @@ fn error(output: &Output) -> String {
     last.to_owned()
 }
 
+/// One test, because the library takes long to compile.
 #[test]
-fn an_interrupted_write_leaves_the_old_fmu() {
+fn the_old_fmu_remains_until_the_new_one_is_complete() {
     let directory = tempfile::tempdir().unwrap();
+    let library = library(directory.path());
     let out = &directory.path().join("out");
     let fmu = out.join("prw_testbed.fmu");
     fs::create_dir(out).unwrap();
@@ -90,41 +84,34 @@ fn an_interrupted_write_leaves_the_old_fmu() {
         entries.filter(|name| name != "prw_testbed.fmu").collect()
     };
 
-    let text = error(&limited(build_fmu(out), libc::SIG_IGN));
+    let text = error(&limited(build_fmu(&library, out), libc::SIG_IGN));
     assert!(text.contains(&format!("cannot write {}", fmu.display())), "{text}");
     assert_eq!(fs::read(&fmu).unwrap(), OLD);
     assert_eq!(names(), [""; 0]);
 
-    let output = limited(build_fmu(out), libc::SIG_DFL);
+    let output = limited(build_fmu(&library, out), libc::SIG_DFL);
     assert_eq!(output.status.signal(), Some(libc::SIGXFSZ), "{output:?}");
     assert_eq!(fs::read(&fmu).unwrap(), OLD);
     let left = names();
     assert!(left.len() == 1 && left[0].starts_with(".unfinished-"), "{left:?}");
 
-    let output = build_fmu(out).output().unwrap();
+    let begin = Instant::now();
+    let output = build_fmu(&library, out).output().unwrap();
     assert!(output.status.success(), "{output:?}");
-    assert!(fs::read(&fmu).unwrap().starts_with(b"PK"));
+    killed_at_any_time(|| build_fmu(&library, out), begin.elapsed(), &fmu);
 }
 
-/// After `kill -9` at any time, the file is the old FMU or the new one.
-#[test]
-fn killed_at_any_moment() {
-    let directory = tempfile::tempdir().unwrap();
-    let out = &directory.path().join("out");
-    let fmu = out.join("prw_testbed.fmu");
-    fs::create_dir(out).unwrap();
-    let mut command = build_fmu(out);
-    let begin = Instant::now();
-    assert!(command.output().unwrap().status.success());
-    let whole = begin.elapsed();
-    let new = fs::read(&fmu).unwrap();
+/// Asserts that the file is the old FMU or the new one after `kill -9` at any time.
+fn killed_at_any_time(build_fmu: impl Fn() -> Command, duration: Duration, fmu: &Path) {
+    let new = fs::read(fmu).unwrap();
+    assert!(new.starts_with(b"PK"));
     for round in 0..ROUNDS {
-        fs::write(&fmu, OLD).unwrap();
-        let mut process = build_fmu(out).stdout(Stdio::null()).spawn().unwrap();
-        std::thread::sleep(whole * round / (ROUNDS - 1));
+        fs::write(fmu, OLD).unwrap();
+        let mut process = build_fmu().stdout(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(duration * round / (ROUNDS - 1));
         process.kill().unwrap();
         process.wait().unwrap();
-        let found = fs::read(&fmu).unwrap();
+        let found = fs::read(fmu).unwrap();
         assert!(found == OLD || found == new, "{} bytes after round {round}", found.len());
     }
 }

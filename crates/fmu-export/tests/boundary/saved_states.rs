@@ -120,8 +120,10 @@ fn restores(fmu: &Importer, bytes: &[u8]) -> bool {
     status == Status::Ok
 }
 
-/// Checks that any changed byte is detected and the state of the handle stays unchanged. Miri, which is slow,
-/// changes one bit of each byte.
+/// Distance of the positions that are changed or cut. Miri is slow and tries a tenth.
+const STRIDE: usize = if cfg!(miri) { 10 } else { 1 };
+
+/// Checks that any changed byte is detected and the state of the handle stays unchanged. Miri changes one bit.
 fn no_changed_byte_goes_unseen<F: Either, M: Exported>() {
     let changes = || 1..=if cfg!(miri) { 1 } else { u8::MAX };
     for (interface, mode) in [(CoSimulation, StepComplete), (ModelExchange, ContinuousTime)] {
@@ -129,7 +131,7 @@ fn no_changed_byte_goes_unseen<F: Either, M: Exported>() {
         let mut bytes = fmu.bytes();
         let (mut state, handle) = (fmu.save(), fmu.save());
         fmu.take_log();
-        for i in 0..bytes.len() {
+        for i in (0..bytes.len()).step_by(STRIDE) {
             for change in changes() {
                 bytes[i] ^= change;
                 let status = fmu.deserialize(bytes.as_ptr(), bytes.len(), &mut state);
@@ -137,7 +139,11 @@ fn no_changed_byte_goes_unseen<F: Either, M: Exported>() {
                 bytes[i] ^= change;
             }
         }
-        assert_eq!(fmu.take_log().len(), changes().count() * bytes.len(), "each was reported");
+        assert_eq!(
+            fmu.take_log().len(),
+            changes().count() * bytes.len().div_ceil(STRIDE),
+            "each was reported"
+        );
         assert_eq!(fmu.bytes(), bytes);
         fmu.ok(fmu.set_state(state));
         assert_eq!(fmu.bytes(), bytes);
@@ -148,7 +154,7 @@ fn no_changed_byte_goes_unseen<F: Either, M: Exported>() {
 fn no_cut_and_no_extension_goes_unseen<F: Either, M: Exported>() {
     let fmu = F::in_mode::<M>(CoSimulation, StepComplete);
     let bytes = fmu.bytes();
-    for length in 0..bytes.len() {
+    for length in (0..bytes.len()).step_by(STRIDE) {
         fmu.rejected_bytes(&bytes[..length]);
         if length > GUID_HASH.end + CHECKSUM {
             fmu.rejected_bytes(&sealed(bytes[..length].to_vec()));
