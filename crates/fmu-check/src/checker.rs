@@ -84,7 +84,7 @@ pub struct Checker {
     pub limit: f64,
     /// Instant after which no call sequence is started.
     pub deadline: Instant,
-    /// Whether fewer values and orders of calls are tried.
+    /// Whether fewer values and call sequences are tried.
     pub quick: bool,
     found: Mutex<Vec<Finding>>,
     unchecked: Mutex<Vec<Unchecked>>,

@@ -26,10 +26,10 @@ pub struct Options {
     /// Maximum size of the unpacked FMU in megabytes.
     #[arg(long, default_value_t = 1000)]
     pub unpacked: u64,
-    /// Seed of the random orders of calls.
+    /// Seed of the random call sequences.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Checks in at most 30 seconds, without malformed calls and resources, and with fewer values and orders of calls.
+    /// Checks in at most 30 seconds, without malformed calls and resources, and with fewer values and call sequences.
     #[arg(long, conflicts_with = "time")]
     pub quick: bool,
     /// Accepts the findings in this file, which has a line for each: NAME: REASON.

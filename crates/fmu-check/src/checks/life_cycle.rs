@@ -1,4 +1,4 @@
-//! Checks that instances accept orders of calls that the standard allows.
+//! Checks that instances accept the call sequences that the standard allows.
 
 use super::Fits::{self, Always, Integrated, Several, Stepped};
 use crate::call_sequence::{Arg, NULL_INSTANCE, Step};
@@ -9,7 +9,7 @@ use crate::writer::Part::{
 };
 use crate::writer::{Point, Trajectory, Writer};
 
-fn check_order(checker: &Checker, writer: Writer) -> anyhow::Result<()> {
+fn check_sequence(checker: &Checker, writer: Writer) -> anyhow::Result<()> {
     let copy = writer.sequence.clone();
     // Discard is allowed: the FMU may need a smaller step.
     checker.check("life_cycle.rejected", writer.sequence, move |run| first_failure(&copy, run, 2))
@@ -19,8 +19,8 @@ const ALL: Part = Points(usize::MAX);
 const TERMINATE: Part = Call("Terminate");
 const RESET: Part = Call("Reset");
 
-/// Orders of calls of one instance.
-const ORDERS: &[&[Part]] = &[
+/// Call sequences of one instance.
+const SEQUENCES: &[&[Part]] = &[
     &[Make, Free],
     &[Make, Enter, ReadAll, Free],
     &[Begin, TERMINATE, ReadAll, Free],
@@ -28,11 +28,11 @@ const ORDERS: &[&[Part]] = &[
     &[Make, RESET, Enter, RESET, RESET, Enter, Leave, RESET, Enter, Leave, Points(2), Free],
 ];
 
-/// Writes an order of calls that needs more than parts of the simulation.
-type Order = fn(&mut Writer, &Trajectory);
+/// Writes a call sequence that cannot be expressed as a list of `Part`.
+type WriteSequence = fn(&mut Writer, &Trajectory);
 
-/// Simulations that an order fits, and the function that writes the order.
-const OTHER_ORDERS: &[(Fits, Order)] = &[
+/// Call sequences that a function writes, each with the condition on the simulation.
+const WRITTEN_SEQUENCES: &[(Fits, WriteSequence)] = &[
     (Several, many),
     (Always, long_name),
     (Stepped, up_to_the_stop),
@@ -41,7 +41,7 @@ const OTHER_ORDERS: &[(Fits, Order)] = &[
     (Fits::EventMode, event_mode),
 ];
 
-/// Makes twenty instances, more than a fixed pool may have. Four of them run and are freed in another order.
+/// Makes twenty instances, more than a fixed pool may have. Four of them run and are freed in a different order.
 fn many(writer: &mut Writer, _: &Trajectory) {
     (4..20).for_each(|instance| drop(writer.write(instance, &[Make])));
     (0..4).for_each(|instance| drop(writer.write(instance, &[Begin])));
@@ -67,7 +67,7 @@ fn up_to_the_stop(writer: &mut Writer, trajectory: &Trajectory) {
     writer.write(0, &[Leave, ALL, Free]);
 }
 
-/// Enables all log categories together and one at a time, in each mode.
+/// Enables all log categories together and one at a time: after instantiation, in Initialization Mode, after it, and after two steps.
 fn logging(writer: &mut Writer, _: &Trajectory) {
     let categories: Vec<Option<Vec<u8>>> =
         writer.description.log_categories.iter().map(|name| Some(name.clone().into_bytes())).collect();
@@ -105,17 +105,18 @@ fn event_mode(writer: &mut Writer, trajectory: &Trajectory) {
     writer.write(0, &[ReadAll, TERMINATE, Free]);
 }
 
-/// Checks all orders of the tables, a wrong token, unloading, the exit of the process and a step beyond the stop time.
-pub fn orders(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    for order in ORDERS {
+/// Checks the call sequences of `SEQUENCES` and `WRITTEN_SEQUENCES`, a wrong token, unloading the library, the exit of the process
+/// and a step beyond the stop time.
+pub fn sequences(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    for parts in SEQUENCES {
         let mut writer = checker.writer(trajectory);
-        writer.write(0, order);
-        check_order(checker, writer)?;
+        writer.write(0, parts);
+        check_sequence(checker, writer)?;
     }
-    for (_, write) in OTHER_ORDERS.iter().filter(|(fits, _)| fits.fit(checker, trajectory)) {
+    for (_, write) in WRITTEN_SEQUENCES.iter().filter(|(fits, _)| fits.fit(checker, trajectory)) {
         let mut writer = checker.writer(trajectory);
         write(&mut writer, trajectory);
-        check_order(checker, writer)?;
+        check_sequence(checker, writer)?;
     }
     token(checker, trajectory)?;
     unload(checker, trajectory)?;
@@ -139,7 +140,7 @@ fn beyond(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let end = trajectory.end;
     checker.check("life_cycle.stop-time", writer.sequence, move |run| {
         let succeeded = ids.iter().chain([&id]).all(|id| run.succeeds(*id));
-        succeeded.then(|| format!("a step from the stop time {end:?} on succeeds"))
+        succeeded.then(|| format!("a step that starts at the stop time {end:?} succeeds"))
     })
 }
 
@@ -162,11 +163,12 @@ fn token(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     writer.forbidden = true;
     let id = writer.make_with(0, |how| how.token = "no token of this FMU".to_owned());
     checker.check("life_cycle.token", writer.sequence, move |run| {
-        (run.status(id) == Some(1)).then(|| "an instance is made for another one".to_owned())
+        (run.status(id) == Some(1))
+            .then(|| "instantiation succeeds with the token \"no token of this FMU\"".to_owned())
     })
 }
 
-/// Checks random orders of allowed calls.
+/// Checks random sequences of allowed calls.
 pub fn random(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut random = Random::new(checker.seed);
     for _ in 0..checker.most(20) {
@@ -215,12 +217,13 @@ pub fn random(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
             writer.write(0, &[Drop(0)]);
         }
         writer.free(0);
-        check_order(checker, writer)?;
+        check_sequence(checker, writer)?;
     }
     Ok(())
 }
 
-/// Checks that the next time event is in the future, also for a late importer, and that event iterations end.
+/// Checks that the next time event is in the future, also if the importer has skipped time events; that event iterations end; and
+/// that changed states are reported.
 pub fn events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     changed_states(checker, trajectory)?;
     let fmi3 = checker.fmi3();
@@ -252,7 +255,7 @@ pub fn events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     checker.check("life_cycle.late-event", writer.sequence, move |run| {
         let event = event(run, *ids.last()?, fmi3)?;
         let next = event.next.filter(|next| !event.again && *next <= late)?;
-        Some(format!("after events were passed by, at {late:?} the next event is at {next:?}"))
+        Some(format!("after time events were skipped, at {late:?} the next event is at {next:?}"))
     })?;
     let mut writer = checker.writer(trajectory);
     writer.write(0, &[Make, Enter, Call("ExitInitializationMode")]);

@@ -31,7 +31,7 @@ pub enum Check {
     Malformed(&'static str, Fits, fn(&Checker, &Trajectory) -> anyhow::Result<Vec<CallSequence>>),
 }
 
-/// Condition on the simulations for which a check or an order of calls is executed.
+/// Condition on the simulations for which a check or a call sequence is executed.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Fits {
     Always,
@@ -70,7 +70,7 @@ impl Fits {
 
 /// Topic and function of every check that calls the library.
 pub const ALL: &[(&str, Check)] = &[
-    ("life_cycle", Each(Always, life_cycle::orders)),
+    ("life_cycle", Each(Always, life_cycle::sequences)),
     ("life_cycle", Once(life_cycle::free_null)),
     ("states", Each(Saves, states::restore)),
     ("malformed", Malformed("malformed.values", Always, malformed::values)),

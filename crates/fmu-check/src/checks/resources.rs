@@ -1,4 +1,4 @@
-//! Checks the resources after many simulations, and the settings of the process.
+//! Checks for leaks of memory, threads and files, and for changed settings of the process.
 
 use crate::call_sequence::{End, Measured, Run, Step, Values};
 use crate::checker::Checker;
@@ -7,7 +7,7 @@ use crate::writer::Part::{Begin, Call, Drop, Enter, Free, Leave, Make, Points, R
 use crate::writer::{Part, Trajectory, Writer};
 use fmi_abi::BaseType;
 
-/// Checks the resources after many simulations, strings, resets and saved states, and the settings of the process.
+/// Checks for leaks after repeated simulations, string setters, resets and saved states. Then checks the settings of the process.
 pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let measured = |what: &'static str, before: &[Part], cycle: &dyn Fn(&mut Writer)| {
         let mut writer = checker.writer(trajectory);
@@ -69,7 +69,7 @@ fn measured(
         return checker.check("resources.cycles", sequence, |_| None);
     }
     checker.record_always(&sequence, &run);
-    // The resources before and after the repetitions and their number; `None` for fewer than 50.
+    // Measurements before and after the repetitions, and the number of repetitions; `None` if there were fewer than 50.
     let done = move |run: &Run| -> Option<(Measured, Measured, usize)> {
         let measured = |id| run.outcome(id)?.measured.clone();
         let (before, times) = (measured(warm)?.times, measured(many)?.times);
@@ -78,7 +78,8 @@ fn measured(
     checker.record("resources.memory", &run, &sequence, move |run| {
         let (one, two, times) = done(run)?;
         let grown = two.memory.saturating_sub(one.memory);
-        // The smallest block of glibc is 32 bytes, and glibc may keep a few blocks. Other C libraries are measured in pages.
+        // The smallest block of glibc is 32 bytes, and glibc may keep a few blocks. With other C libraries, the resident
+        // memory is measured, in pages.
         let enough = if one.exact { 16 * times as u64 + 4096 } else { 64 * times as u64 + (4 << 20) };
         (grown > enough)
             .then(|| format!("{grown} bytes remain after {times} {what}: {} for each", grown / times as u64))

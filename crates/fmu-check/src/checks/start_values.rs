@@ -14,7 +14,8 @@ use std::sync::Arc;
 /// Checks the start values of the variables, then the values along the simulation and the constants.
 pub fn starts(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let model = Arc::clone(&checker.description);
-    // FMI 2.0 has no values before Initialization Mode. FMI 3.0 has the start values there (section 2.3.2).
+    // FMI 2.0 forbids getters before Initialization Mode. FMI 3.0 allows them in the Instantiated state, where they return
+    // the start values (section 2.3.2).
     let situations = [&[Make, Enter][..], &[Make]];
     for parts in situations.into_iter().take(if checker.fmi3() { 2 } else { 1 }) {
         let (model, mut writer) = (Arc::clone(&model), checker.writer(trajectory));
@@ -73,10 +74,10 @@ const VALUE_TESTS: [(&str, ValueTest); 5] = [
         wrong.then(|| format!("is {}", value.show(0)))
     }),
     ("start_values.range", |variable, value| {
-        let whole = variable.base.is_some_and(|base| !base.is_float())
+        let ranged = variable.base.is_some_and(|base| !base.is_float())
             && ["local", "output"].contains(&variable.causality.as_str());
         let (min, max) = (variable.min.unwrap_or(f64::NEG_INFINITY), variable.max.unwrap_or(f64::INFINITY));
-        let wrong = whole && value.numbers().iter().any(|number| *number < min || *number > max);
+        let wrong = ranged && value.numbers().iter().any(|number| *number < min || *number > max);
         wrong.then(|| format!("is {}, outside of {min} to {max}", value.show(0)))
     }),
     ("start_values.text", |variable, value| {
@@ -113,7 +114,8 @@ fn values(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Checks that constants, parameters and, without tunable variables, fixed variables do not change while time advances.
+/// Checks that constants and parameters do not change while time advances. Fixed variables are included only if the model has no
+/// tunable variables.
 fn constants(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let variables = &checker.description.variables;
     let tunable = variables.iter().any(|other| {
@@ -152,7 +154,8 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let (floats, others): (Vec<usize>, Vec<usize>) =
         indices.iter().partition(|index| variable(index).is_float());
     let near: Vec<(usize, Values)> = floats.iter().filter_map(with_other).collect();
-    // Real values near the start values are set together. A model may reject others, so they are set one at a time.
+    // Floating-point variables get values near their start values, all in one group. A model may reject new values of
+    // integers, Booleans and strings, so these variables are set one at a time.
     let alone = others.iter().take(checker.most(40)).flat_map(|index| {
         // 500 bytes, longer than usual buffers.
         let long = Values::texts(&b"long ".repeat(100), variable(index).start.len());
@@ -179,7 +182,8 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     inputs(checker, trajectory)
 }
 
-/// Checks that values set before Initialization Mode have the same effect as values set in it after a read.
+/// Checks that values have the same effect whether they are set before Initialization Mode, or in Initialization Mode after a getter
+/// call.
 fn when(checker: &Checker, trajectory: &Trajectory, values: &[(usize, Values)]) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let mut sets = Vec::new();
@@ -198,8 +202,8 @@ fn when(checker: &Checker, trajectory: &Trajectory, values: &[(usize, Values)]) 
     })
 }
 
-/// Returns the criterion that reads have the values that were set.
-fn lost(
+/// Returns the criterion that getters return the values that were set.
+fn values_are_kept(
     checker: &Checker,
     ids: Vec<u32>,
     reads: Vec<Read>,
@@ -229,7 +233,7 @@ fn read_back(
     let sets = writer.set(0, &values);
     writer.write(0, after);
     let reads = read_again(&mut writer, &values);
-    checker.check("start_values.set", writer.sequence, lost(checker, sets, reads, values, "reads"))
+    checker.check("start_values.set", writer.sequence, values_are_kept(checker, sets, reads, values, "reads"))
 }
 
 /// Reads the variables of `values`.
@@ -245,7 +249,7 @@ fn inputs(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for point in &trajectory.points {
         let ids = writer.point(0, point);
         let reads = read_again(&mut writer, &point.inputs);
-        criteria.push(lost(checker, ids, reads, point.inputs.clone(), "has become"));
+        criteria.push(values_are_kept(checker, ids, reads, point.inputs.clone(), "has become"));
     }
     checker.check("start_values.inputs", writer.sequence, any(criteria))
 }
