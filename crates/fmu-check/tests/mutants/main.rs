@@ -313,7 +313,7 @@ fn contained(directory: &Path, fmi: u32, fault: &str) -> Command {
     let scratch = directory.join("scratch");
     std::fs::create_dir_all(&scratch).expect("a directory");
     let mut command = check(&path);
-    command.args(["--json", "--no-shrink", "--repeat", "0.3"]);
+    command.args(["--json", "--no-shrink", "--repeat", "0.02"]);
     command.env("WAGON_FAULT", fault).env("TMPDIR", scratch).env("WAGON_MARK", directory);
     command
 }
