@@ -6,11 +6,11 @@ use crate::fmu::Loaded;
 use crate::library::{Functions, Library};
 use crate::log::{Log, log_of_fmi3, logger_of_fmi2};
 use crate::rejection::{Message, Rejection, reason};
-use crate::values::EarlyValues;
 use fmi_abi::c_types::{c_int, c_void};
 use fmi_abi::fmi2::types::*;
 use fmi_abi::fmi3::types::*;
 use fmi_abi::{Interface, Status};
+use std::collections::HashMap;
 use std::ffi::CString;
 use std::ptr::null_mut;
 use std::rc::Rc;
@@ -32,6 +32,13 @@ pub struct Instance {
     pub(crate) arrays: Arc<Arrays>,
     /// Values of arrays set before the initialization, when they cannot be read; `None` after its start.
     pub(crate) early: Option<EarlyValues>,
+}
+
+/// Values of arrays that were set before the initialization, by array index. They cannot be read then.
+#[derive(Debug, Default)]
+pub(crate) struct EarlyValues {
+    pub(crate) numbers: HashMap<usize, Vec<f64>>,
+    pub(crate) texts: HashMap<usize, Vec<CString>>,
 }
 
 /// Index of a state that an instance has saved.

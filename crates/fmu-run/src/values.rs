@@ -6,17 +6,9 @@ use crate::rejection::Rejection;
 use fmi_abi::BaseType;
 use fmi_abi::c_types::c_int;
 use fmi_abi::fmi3::types::fmi3String;
-use std::collections::HashMap;
 use std::ffi::{CStr, CString};
 use std::ptr::null;
 use std::sync::Arc;
-
-/// Values of arrays that were set before the initialization, by array index. They cannot be read then.
-#[derive(Debug, Default)]
-pub(crate) struct EarlyValues {
-    numbers: HashMap<usize, Vec<f64>>,
-    texts: HashMap<usize, Vec<CString>>,
-}
 
 /// Number type of an FMI function.
 trait Number: Copy + Default {
