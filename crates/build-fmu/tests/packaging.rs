@@ -67,6 +67,50 @@ fn knowns(names: [&[&'static str]; 2], rows: [Vec<f64>; 2]) -> BTreeSet<&'static
     pairs.filter(|(_, factor)| *factor != 0.0).map(|(name, _)| *name).collect()
 }
 
+/// Unknowns and their dependencies in the initialization, in addition to `start_at_rest`: start values of states, then
+/// variables that depend on states.
+const INITIAL: [(&str, &[&str]); 11] = [
+    ("theta3", &["theta1", "theta3_start"]),
+    ("theta4", &["theta2", "theta4_start"]),
+    ("theta5", &["theta1", "theta5_start"]),
+    ("theta6", &["theta2", "theta6_start"]),
+    ("omega5", &["omega5_start"]),
+    ("omega6", &["omega6_start"]),
+    (
+        "tau1",
+        &[
+            "theta1",
+            "omega1",
+            "theta3_start",
+            "theta5_start",
+            "omega5_start",
+            "k1",
+            "k2",
+            "c1",
+            "c2",
+            "use_omega",
+        ],
+    ),
+    (
+        "der(theta4)",
+        &[
+            "theta2",
+            "omega2",
+            "theta4_start",
+            "theta6_start",
+            "omega6_start",
+            "k1",
+            "k2",
+            "c1",
+            "c2",
+            "use_omega",
+        ],
+    ),
+    ("roll_rate", &["omega5_start", "omega6_start", "M", "N"]),
+    ("pitch", &["theta1", "theta2", "theta5_start", "theta6_start"]),
+    ("der(theta5)", &["omega5_start"]),
+];
+
 /// The dependencies are found from the model's partial derivatives; independent code calculates the matrices of eq. (11).
 #[test]
 fn dependencies_are_the_sparsity_of_the_matrices() {
@@ -109,48 +153,7 @@ fn dependencies_are_the_sparsity_of_the_matrices() {
     ] {
         assert_eq!(listed(&structure.outputs.unknowns, output), owned(expected.into()));
     }
-    for (unknown, expected) in [
-        // The start values of states, then variables that depend on states.
-        ("theta3", &["theta1", "theta3_start"][..]),
-        ("theta4", &["theta2", "theta4_start"]),
-        ("theta5", &["theta1", "theta5_start"]),
-        ("theta6", &["theta2", "theta6_start"]),
-        ("omega5", &["omega5_start"]),
-        ("omega6", &["omega6_start"]),
-        (
-            "tau1",
-            &[
-                "theta1",
-                "omega1",
-                "theta3_start",
-                "theta5_start",
-                "omega5_start",
-                "k1",
-                "k2",
-                "c1",
-                "c2",
-                "use_omega",
-            ],
-        ),
-        (
-            "der(theta4)",
-            &[
-                "theta2",
-                "omega2",
-                "theta4_start",
-                "theta6_start",
-                "omega6_start",
-                "k1",
-                "k2",
-                "c1",
-                "c2",
-                "use_omega",
-            ],
-        ),
-        ("roll_rate", &["omega5_start", "omega6_start", "M", "N"]),
-        ("pitch", &["theta1", "theta2", "theta5_start", "theta6_start"]),
-        ("der(theta5)", &["omega5_start"]),
-    ] {
+    for (unknown, expected) in INITIAL {
         let expected: BTreeSet<&str> = expected.iter().copied().chain(["start_at_rest"]).collect();
         assert_eq!(listed(&structure.initial_unknowns.unknowns, unknown), owned(expected));
     }
