@@ -1,4 +1,4 @@
-"""Where the project is, what `make` has built, and what is installed."""
+"""Paths of the project and of the files that `make` has built, and tests for installed packages."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SCRIPT = re.compile(r'\nbegin\("([^"]*)"\)\.catch\(showFailure\);\n')
 
 
 def built(name: str, target: str = "closed-loop-fmus") -> Path:
-    """The file of that name that `make TARGET` leaves."""
+    """Returns the path of a file in target/fmu, which `make TARGET` builds."""
     path = FMUS / name
     if not path.exists():
         pytest.exit(f"{path} is missing; build it with `make {target}`", returncode=1)
@@ -25,7 +25,7 @@ def built(name: str, target: str = "closed-loop-fmus") -> Path:
 
 
 def needed(module: str, package: str) -> None:
-    """Skip the tests of a file where the package is not installed."""
+    """Skips the tests of a file if the package is not installed."""
     if importlib.util.find_spec(module) is None:
         pytest.skip(f"{package} is not installed; `make test-importers` installs it", allow_module_level=True)
 

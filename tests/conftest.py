@@ -23,7 +23,7 @@ def fmu() -> Path:
 
 @pytest.fixture(scope="session", params=["", "fmi3/"], ids=["fmi2", "fmi3"])
 def version(request: pytest.FixtureRequest) -> str:
-    """The folder of the FMUs for FMI 2.0, and that of those for FMI 3.0."""
+    """The directory of the FMUs for FMI 2.0, then the directory of the FMUs for FMI 3.0."""
     return str(request.param)
 
 
@@ -41,7 +41,7 @@ def controller(version: str) -> Path:
 
 @pytest.fixture(scope="session")
 def unpack() -> Iterator[Callable[[Path], str]]:
-    """Unpacks an FMU into a folder that is removed in the end."""
+    """Unpacks an FMU into a directory that is removed after the tests."""
     folders: list[str] = []
 
     def unpack(fmu: Path) -> str:

@@ -38,7 +38,7 @@ class Instance:
         self.fmi.freeInstance()
 
     def complaints(self) -> list:
-        """Messages other than events."""
+        """Messages that are warnings or errors, or whose category is not logEvents."""
         return [message for message in self.messages if message[0] > 0 or message[1] != "logEvents"]
 
     def set(self, **values) -> None:
@@ -93,7 +93,7 @@ class Instance:
 
 
 def assert_close(found, expected, tolerance: float) -> None:
-    """Every output within `tolerance` of the expected one, relative to the largest value that one takes."""
+    """Every output within `tolerance` of the expected one, relative to the largest absolute value of the expected output."""
     for name in OUTPUTS:
         scale = max(np.max(np.abs(expected[name])), 1e-300)
         error = np.max(np.abs(found[name] - expected[name])) / scale

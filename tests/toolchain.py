@@ -1,4 +1,4 @@
-"""Programs that tests start and that are no Python packages."""
+"""Programs that tests start and that are not Python packages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""fmu-check on the packed FMUs: nothing is found but the notes that docs/checking.md lists with their reasons."""
+"""fmu-check reports only the notes on the packed FMUs that docs/checking.md lists with their reasons."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def listed(model: str) -> list[tuple[str, str, str]]:
 
 
 def needs_new_system(fmu: Path) -> bool:
-    """Whether the library needs a glibc that is newer than 2.28, which depends on the system it was linked on."""
+    """Whether the library needs a glibc newer than 2.28. This depends on the system that linked it."""
     with zipfile.ZipFile(fmu) as files:
         library = files.read(next(name for name in files.namelist() if name.endswith((".so", ".dll", ".dylib"))))
     return any(int(minor) > 28 for minor in re.findall(rb"GLIBC_2\.(\d+)", library))

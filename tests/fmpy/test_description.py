@@ -1,4 +1,4 @@
-"""The model descriptions: valid for FMPy and the schemas, and equal in both versions of FMI, as are the results."""
+"""The model descriptions are valid for FMPy and the schemas. Both FMI versions have the same variables and results."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
 INPUTS = ("theta1", "theta2", "omega1", "omega2")
 
 
-#: Let go with the couplings wound up, while both motors turn.
+#: Starts with twisted couplings and moving carriers, while both motors turn.
 START = {
     "start_at_rest": False, "theta3_start": 0.5, "theta4_start": -0.3, "theta5_start": 0.1, "theta6_start": 0.4,
     "omega5_start": 3.0, "omega6_start": -2.0, "k1": 130.0,
@@ -69,8 +69,8 @@ def test_units_and_nominal_values_are_in_the_types(fmu3):
         assert (variable.get("declaredType") in units) == is_real, variable.get("name")
 
 
-def test_the_terminals_are_valid_and_in_fmi3_alone(fmu, fmu3):
-    """FMI 2.0 may have them since 2.0.4 (section 2.3), but FMI Library calls that a fatal mismatch."""
+def test_the_terminals_are_valid_and_only_in_fmi3(fmu, fmu3):
+    """FMI 2.0.4 and later allow terminals (section 2.3), but FMI Library rejects an FMU for FMI 2.0 that has them."""
     file = "terminalsAndIcons/terminalsAndIcons.xml"
     assert file not in ZipFile(fmu).namelist()
     root = etree.fromstring(ZipFile(fmu3).read(file))
@@ -82,8 +82,8 @@ def test_the_terminals_are_valid_and_in_fmi3_alone(fmu, fmu3):
 
 
 def test_the_variables_are_the_same(fmu, fmu3):
-    """Names, causality, variability, start values, units and ranges; the time is one more. Only the value references
-    count from 0 in one, in the other from 1 in the order of the variables, which OMSimulator 3.0.0 needs."""
+    """Compares names, causality, variability, start values, units and ranges. FMI 3.0 has the additional variable `time`.
+    Value references start at 0 in FMI 2.0. They start at 1 in FMI 3.0, because OMSimulator 3.0.0 needs that."""
 
     def variables(path, first):
         kind = {"Real": "Float64", "Integer": "Int32"}
@@ -124,7 +124,7 @@ def test_results_are_the_same_bits(fmu, fmu3, options):
 
     two, three = run(fmu), run(fmu3)
     assert np.ptp(two[OUTPUTS[0]]) > 0.1
-    # FMPy before 0.3.22 has steps for FMI 3.0 in Co-Simulation that differ in the last digits.
+    # In Co-Simulation of FMI 3.0, step sizes of FMPy before 0.3.22 differ in the last digits.
     same_steps = "CoSimulation" not in options.values() or Version(fmpy.__version__) >= Version("0.3.22")
     for name in ("time", *OUTPUTS):
         if same_steps:
@@ -134,7 +134,7 @@ def test_results_are_the_same_bits(fmu, fmu3, options):
 
 
 def test_dependencies_are_the_sparsity_of_the_equations(description, model):
-    """Each output and derivative lists the states and inputs that enter it."""
+    """Each output and state derivative lists exactly the states and inputs on which it depends."""
     knowns = (*STATES, *INPUTS)
     rows = dict(zip((f"der({s})" for s in STATES), np.hstack([model.a, model.b_angle, model.b_rate])))
     zeros = np.zeros(4)
@@ -149,7 +149,7 @@ def test_dependencies_are_the_sparsity_of_the_equations(description, model):
         name = unknown.variable.name
         expected = {known for known, value in zip(knowns, rows.pop(name)) if abs(value) > 1e-12}
         assert {v.name for v in unknown.dependencies} == expected, name
-        # The factors of angles and rates also depend on where Co-Simulation takes the rates from, and on its steps.
+        # In Co-Simulation, the factors of angles and rates also depend on the source of the rates and on the step size.
         for known, kind in zip(unknown.dependencies, unknown.dependenciesKind, strict=True):
             assert kind in (["dependent"] if known.causality == "input" else ["fixed", "constant"]), name
     assert rows == {}

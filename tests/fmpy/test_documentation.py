@@ -1,4 +1,4 @@
-"""The page in the FMU and the figures: up to date, self-contained, and its programs run as printed."""
+"""The page in the FMU and its figures are up to date and self-contained, and the programs on the page run as printed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from tools.figures.gallery import figures
 from tools.figures.results import numbers, results
 from tools.figures.writing import write_for_page, write_small_png
 
-#: Two sines from rest.
+#: The motors turn by two sines and start at rest.
 END, AMPLITUDE, FREQUENCY = 0.5, np.array([0.3, -0.2]), np.array([14.0, 23.0])
 EPSILON = np.finfo(float).eps
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
@@ -106,7 +106,7 @@ def run(text: str, fmu: Path, folder: Path) -> np.ndarray:
 
 
 def roll_at_2(model, time=2.0) -> float:
-    """Roll at 2 s for motors that turn by sin(t) and -sin(t): the forced motion, for transients are gone."""
+    """Roll at 2 s if the motors turn by sin(t) and -sin(t). Transients have decayed, so this is the forced response."""
     b = (model.b_angle + 1j * model.b_rate) @ np.array([1, -1])
     theta5, theta6 = (np.linalg.solve(1j * np.eye(6) - model.a, b) * np.exp(1j * time)).imag[2:4]
     return 7 / 8 * (theta5 - theta6)
@@ -133,7 +133,7 @@ def rate(t):
 
 
 def test_reported_errors_of_model_exchange_in_fmpy(fmu, model):
-    """The percentages in docs/compatibility.md and on the page: FMPy holds inputs over a step."""
+    """The percentages in docs/compatibility.md are the errors that arise because FMPy holds inputs over a step."""
     reported = (ROOT / "docs/compatibility.md").read_text(encoding="utf-8").split("For two sines")[1].split("\n* ")[0]
     percents = [float(number) for number in re.findall(r"([\d.]+) %", reported)]
     found = []
@@ -148,12 +148,12 @@ def test_reported_errors_of_model_exchange_in_fmpy(fmu, model):
         exact = integrate(model, t, angle, rate)
         error = {name: np.max(np.abs(result[name] - exact[name])) / np.max(np.abs(exact[name])) for name in OUTPUTS}
         found += [100 * error["roll"], 100 * max(error["tau1"], error["tau2"])]
-    # One digit is quoted.
+    # The document states one digit.
     assert percents == [float(f"{value:.1g}") for value in found]
 
 
 def test_numbers_are_up_to_date(found):
-    """Two digits are quoted of the measured deviations, more of the rest; the last one may differ between machines."""
+    """The page states two digits of deviations and more of other numbers. The last digit may differ between machines."""
     committed, fresh = (
         json.loads((ROOT / COMMITTED / "numbers.json").read_text(encoding="utf-8")),
         json.loads(numbers(found)),
@@ -174,7 +174,7 @@ def test_numbers_are_up_to_date(found):
 
 
 def write(folder: Path, found) -> dict[str, bytes]:
-    """The files that `make figures` keeps with the sources, by name."""
+    """Writes the files that `make figures` commits. Returns their content by name."""
     (folder / "numbers.json").write_text(numbers(found), encoding="utf-8")
     for name, drawn in figures(found).items():
         if drawn.for_page:
@@ -190,7 +190,7 @@ def written(found, tmp_path_factory):
 
 
 def test_figures_are_up_to_date(written):
-    """The committed figures show the present results of the FMU: the same drawing, to a fiftieth of a point."""
+    """Coordinates in the committed figures differ by at most a fiftieth of a point from figures of the present FMU."""
     made_with = json.loads((ROOT / COMMITTED / "numbers.json").read_text(encoding="utf-8"))["made_with"]
     if made_with != f"matplotlib {matplotlib.__version__}":
         pytest.skip(f"the figures were drawn by {made_with}")
@@ -203,7 +203,7 @@ def test_figures_are_up_to_date(written):
 
 
 def in_the_last_digit(value, random):
-    """The results of another processor. Times and steps are quotients, which are equal on all."""
+    """Changes results in the last digit, as another processor may. Times and steps are quotients, which do not differ."""
     if isinstance(value, np.ndarray):
         return value * (1 + EPSILON * random.integers(-2, 3, value.shape))
     if isinstance(value, dict):
@@ -219,7 +219,7 @@ def in_the_last_digit(value, random):
 
 
 def test_another_processor_writes_the_same_files(found, written, tmp_path, monkeypatch):
-    """`make figures` on another machine changes no file that is kept with the sources."""
+    """`make figures` on another machine changes no committed file."""
     random = np.random.default_rng(1)
     monkeypatch.setattr(gallery, "COLUMN", gallery.COLUMN * (1 + EPSILON))
     monkeypatch.setattr(bode, "CURVE", in_the_last_digit(bode.CURVE, random))

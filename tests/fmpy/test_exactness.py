@@ -1,5 +1,5 @@
-"""Between communication points nothing is approximated: 1e-11 of the exact solution for any parameters and steps. With angles only,
-every output converges with the square of the step."""
+"""A step of the FMU is exact within 1e-11 for any parameters and step sizes. If only the angles are set, every output converges with
+the second order of the step size."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from reference import backward_slope, follow, integrate
 
 
 def random_case(seed: int, points: int, decades: float):
-    """Parameters within `decades` of Table 1, uneven times, a continuous piecewise-linear path from rest."""
+    """Returns parameters within `decades` of Table 1, uneven times, and continuous piecewise-linear angles that start at rest."""
     rng = np.random.default_rng(seed)
     spread = {name: 10 ** rng.uniform(-decades, decades) for name in REAL}
     parameters = {name: value * spread[name] for name, value in table_1().items() if name in REAL}
@@ -25,7 +25,7 @@ def random_case(seed: int, points: int, decades: float):
 
 
 def exact(parameters, t, theta, slope):
-    """The oracle with 40 digits, rounded to doubles at the end."""
+    """Returns the results of the oracle, calculated with 40 digits and rounded to doubles."""
     with mpmath.workdps(40):
         many = np.vectorize(mpmath.mpf, otypes=[object])
         model = linear_model({name: mpmath.mpf(value) for name, value in parameters.items()})
@@ -43,7 +43,7 @@ def check(instance, parameters, t, theta, slope, expected):
 
 @pytest.mark.parametrize("seed", range(12))
 def test_random_parameters_paths_and_steps(instance, seed):
-    # Further from Table 1 the oracle's own doubles lose digits; test_extremes.py has more of them.
+    # Further from Table 1, an oracle with doubles loses digits. test_extremes.py calculates with more digits there.
     parameters, t, theta, slope = random_case(seed, points=200, decades=0.3)
     model = linear_model({name: float(value) for name, value in parameters.items()})
     check(instance, parameters, t, theta, slope, follow(model, t, theta, slope))
@@ -72,7 +72,7 @@ def test_hard_parameters(instance, change):
 
 
 def test_rates_from_omega(instance, model):
-    """With use_omega the path follows the given rates, regardless of the next angles."""
+    """With use_omega, the motors turn at the given rates, regardless of the next angles."""
     rng = np.random.default_rng(6)
     t = np.cumsum(10 ** rng.uniform(-3, -1, 100))
     theta, omega = rng.normal(0, 0.1, (100, 2)), rng.normal(0, 1, (100, 2))
@@ -90,7 +90,7 @@ def test_rates_from_angles(instance, model):
     at, after = instance.run(t, theta)
     expected_at, expected_after = follow(model, t, theta, backward_slope(t, theta))
     assert_close(at, expected_at, 1e-11)
-    # Right after a step the torques use the rate the parabola predicts; the tests of second order below judge them.
+    # After a step, the torques use the rate that the parabola predicts. The tests of second order below check them.
     assert_close({**after, "tau1": expected_after["tau1"], "tau2": expected_after["tau2"]}, expected_after, 1e-11)
 
 
@@ -108,7 +108,7 @@ def test_omega_has_no_effect_without_use_omega(make_instance):
 
 
 def test_cvode_meets_its_tolerance(fmu, model):
-    """In Model Exchange, let go with the couplings wound up and the motors held."""
+    """In Model Exchange, the testbed starts with twisted couplings, and the motors are at rest."""
     states, held = [0.5, -0.3, 0.1, 0.4, 3.0, -2.0], np.array([0.2, -0.1])
     start = dict(zip(("theta3", "theta4", "theta5", "theta6", "omega5", "omega6"), states))
     start = {f"{name}_start": value for name, value in start.items()}

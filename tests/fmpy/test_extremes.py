@@ -1,6 +1,6 @@
-"""Parameters a billion times smaller or larger than Table 1, steps from a nanosecond to hours, a million steps.
+"""Parameters a billion times smaller or larger than Table 1, step sizes from a nanosecond to hours, and a million steps.
 
-PRW_EXTREME_CASES sets how many random testbeds are tried.
+PRW_EXTREME_CASES sets the number of random testbeds.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ many = np.vectorize(mpmath.mpf, otypes=[object])
 
 
 def either_side(values):
-    """The larger of the two sides: (theta3, theta4, ...) -> the same for 3 and 4, and so on."""
+    """Replaces both values of each pair (theta3 and theta4, ...) by the larger one."""
     pairs = np.asarray(values).reshape(-1, 2)
     return np.repeat(pairs.max(axis=1), 2)
 
 
 class Exact:
-    """One testbed and step size, with so many digits that the matrix exponential is exact."""
+    """Exact step of one testbed with one step size. The matrix exponential has enough digits for all parameters."""
 
     def __init__(self, parameters, h):
         self.model = linear_model({name: mpmath.mpf(value) for name, value in parameters.items()})
@@ -37,12 +37,12 @@ class Exact:
         self.step_matrix = exponential(augmented(self.model) * self.h)[:6]
 
     def step(self, x, theta, slope, jump=None):
-        """States and outputs (14,) after a step, and the size of error that rounding must be forgiven.
+        """Returns the states and outputs (14,) after a step, and their scales (14,), to which errors are compared.
 
-        That is what one rounding of each number that goes in, state x (6,), motor angles theta (2,), slopes (2,) and
-        their jump (2,) at the begin, makes of the result if the worst comes together on both sides; relative to it an
-        error of 1e-16 could not be smaller. Neither side knows less than the other, for they are stepped as sum and
-        difference; and an angle cannot be better than the angle it is added to.
+        The arguments are the states x (6,), the motor angles theta (2,), their slopes (2,) and their jump (2,) at the
+        begin of the step. An argument with a relative error of 1e-16 changes a result by at most 1e-16 of its scale.
+        The two sides have the same scale, because the FMU steps their sum and difference. The scale of an angle is at
+        least the angle at the begin, to which its change is added.
         """
         x, theta, slope = many(x), many(theta), many(slope)
         model, size = self.model, np.abs(x)
@@ -67,7 +67,7 @@ class Exact:
 
 
 def check(instance, parameters, h, seed, steps=3):
-    """The largest error of any state or output after any of some steps with jumps of the motor angles between."""
+    """Returns the largest error of the states and outputs after `steps` steps, with jumps of the motor angles in between."""
     rng = np.random.default_rng(seed)
     instance.fmi.setupExperiment(startTime=0.0)
     instance.set(**{name: int(value) if name in "MN" else float(value) for name, value in parameters.items()})
@@ -91,7 +91,7 @@ def check(instance, parameters, h, seed, steps=3):
 
 
 def random_parameters(rng):
-    """Each parameter on its own, between a billionth and a billion times Table 1; one case in three at the ends."""
+    """Scales each parameter of Table 1 separately by 1e-9 to 1e9. A third of the cases has only the extreme scales."""
     ends = rng.uniform() < 1 / 3
     decades = rng.choice([-9, 0, 9], 8) if ends else rng.uniform(-9, 9, 8)
     table = table_1()
@@ -119,7 +119,7 @@ def test_far_from_table_1(instance, seed):
     ],
 )
 def test_a_million_steps(instance, factors):
-    # A straight path whose points are exact in binary is, to the testbed, one long step.
+    # The motor angles are linear in time and exact in binary, so all steps together equal one long step.
     steps, h, slope = 1_000_000, 2.0**-10, np.array([0.75, -0.5])
     parameters = {name: value * factors.get(name, 1) for name, value in table_1().items()}
     parameters.update(M=4, N=7)
@@ -138,7 +138,7 @@ def test_a_million_steps(instance, factors):
     with mpmath.workdps(DIGITS):
         exact = Exact(parameters, steps * h)
         true_values, size = exact.step(np.zeros(6), np.zeros(2), slope)
-        # Each step rounds the angles, which the springs turn into velocities.
+        # Each step rounds the angles. The springs convert these errors to errors of the velocities.
         rate = mpmath.sqrt(abs(exact.model.a[4:, :4]).max())
         for velocity, angle in (4, 2), (5, 3), (10, 8), (11, 9):
             size[velocity] += rate * size[angle]

@@ -1,4 +1,4 @@
-"""The page in the FMU without a browser: its module is the model, with bit-identical results, and the page loads nothing else."""
+"""Tests of the page in the FMU without a browser: its module gives bit-identical results, and the page loads no other file."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ class WebAssembly:
 
 
 def test_the_page_equals_sources_and_fmus(testbed, page, packed):
-    """Only the scripts are added. The page in the FMU for FMI 3.0 runs the module for FMI 2.0."""
+    """The page in the FMU is the page in the sources with scripts. In the FMU for FMI 3.0, it runs the module for FMI 2.0."""
     assert LIVE.sub("", page) == (ROOT / TESTBED.path).read_text(encoding="utf-8")
     folder = testbed.parents[testbed.parent.name == "fmi3"]
     for offset, name in enumerate([testbed.name, "prw_controller.fmu"]):

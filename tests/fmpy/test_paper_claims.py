@@ -1,4 +1,4 @@
-"""The statements of Sec. 4 on Figs. 4 and 5 hold for the FMU: for its linear model, and for stepped sines measured on it."""
+"""The statements of Sec. 4 on Figs. 4 and 5 hold for the linear model of the FMU and for its responses to sines."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ def linear(fmu):
 
 
 def h_of_eq_15(frequency):
-    """H(s) with M, Delta and K from the energies, (k, 4, 2)."""
+    """H(s) of eq. (15), shape (k, 4, 2); M, Delta and K follow from the energies."""
     m, delta, k = (hessian(form, P)[2:, 2:] for form in (kinetic_energy, dissipation, potential_energy))
     s = 2j * np.pi * np.asarray(frequency)[:, None, None]
     return np.linalg.solve(s**2 * m + s * delta + k, np.eye(4)[:, :2] * (P["c1"] * s + P["k1"]))
 
 
 def torques_of_eq_9(frequency):
-    """Torques for motor angles, (k, 2, 2): (k1 + c1 s) (q_I - theta)."""
+    """Transfer functions from motor angles to torques, shape (k, 2, 2): (k1 + c1 s) (q_I - theta)."""
     s = 2j * np.pi * np.asarray(frequency)[:, None, None]
     return (P["k1"] + P["c1"] * s) * (h_of_eq_15(frequency)[:, :2] - np.eye(2))
 
 
 def test_h_of_the_linear_model_is_eq_15(linear):
-    """Over eleven decades: also the slopes and levels at both ends of Fig. 5, and its symmetry."""
+    """Compares eleven decades of frequency. Also checks the slopes, the levels and the symmetry of Fig. 5."""
     frequency = np.geomspace(1e-4, 1e7, 89)
     found = linear.response_at_hz(frequency, ANGLE_OF)
     np.testing.assert_allclose(found[:, :4], h_of_eq_15(frequency), rtol=1e-8)
@@ -42,7 +42,7 @@ def test_h_of_the_linear_model_is_eq_15(linear):
 
 
 def test_swept_sines_lie_on_the_curves(fmu):
-    """Below 50 Hz within 0.1 dB and 1 degree, as promised; the method is much better than that."""
+    """Below 50 Hz, differences are within 0.1 dB and 1 degree, as documented."""
     frequency = np.array([0.1, 0.37, 1.1, 2.9, 4.6, 5.3, 6.1, 9.0, 17.0, 31.0, 49.9])
     measured = sweep(fmu, frequency, slowest=9.68)
     ratio = measured / np.concatenate([h_of_eq_15(frequency), torques_of_eq_9(frequency)], axis=1)
@@ -58,7 +58,7 @@ def test_swept_sines_above(fmu):
 
 @pytest.mark.parametrize("opposite, still, moving", [(True, "pitch", "roll"), (False, "roll", "pitch")])
 def test_fig4_and_its_counterpart(fmu, opposite, still, moving):
-    """Opposite motors leave the pitch rate zero, equal ones the roll rate."""
+    """Opposite motor velocities leave the pitch rate at zero; equal motor velocities leave the roll rate at zero."""
     with prw.testbed.Testbed(fmu) as testbed:
         response = testbed.respond(fig4(opposite=opposite))
     assert np.abs(response[f"{still}_rate"]).max() < 1e-13 and np.abs(response[still]).max() < 1e-13

@@ -1,5 +1,7 @@
-"""The packed FMUs against the reference experiments inside them, under several importers, with a margin; and the
-tolerances detect a testbed whose stiffness is off by 1 %."""
+"""Compares the packed FMUs with their reference experiments in several importers, with a margin.
+
+The tolerances detect a testbed whose stiffness is wrong by 1 %.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,7 @@ from prw.checking.agreement import compare
 from prw.checking.experiments import FOLDER, read_experiments
 from tools.validation.importers import IMPORTERS
 
-#: Shares of the tolerance: the largest of the FMU, and the smallest of a change of k1 by 1 %.
+#: Largest error of the FMU, and smallest effect of a change of k1 by 1 %, as fractions of the tolerance.
 PASSES, FAILS = 0.5, 1.4
 NAMES = ["fig4_opposite", "fig4_equal", "rate_step", "from_40_degrees", "other_parameters", "closed_loop"]
 

@@ -1,4 +1,4 @@
-"""A model with arrays, which are scalars in FMI 2.0: one program runs both FMUs, with bit-identical results. They equal FMPy's."""
+"""A model with arrays, which are scalars in FMI 2.0. One program runs both FMUs; results are bit-identical and equal FMPy's."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fmpy.validation import validate_fmu
 
 PIECES = range(1, 9)
 TEMPERATURES = [f"T[{piece}]" for piece in PIECES]
-#: One output of each kind that can be read as a number.
+#: One output of each type that can be read as a number.
 OUTPUTS = [
     "mean",
     "means[2]",
@@ -32,7 +32,7 @@ OUTPUTS = [
 def rods(tmp_path_factory) -> tuple[Path, Path]:
     """The FMUs of crates/fmu-export/tests/models/rod.rs, for FMI 2.0 and FMI 3.0."""
     folder = tmp_path_factory.mktemp("rods")
-    # Built in the whole workspace, like the Rust tests: with --package, cargo compiles other features.
+    # Built in the whole workspace, like the Rust tests. With --package, cargo would compile crates again with other features.
     build = ["cargo", "build", "--quiet", "--locked", "--workspace", "--example", "rod"]
     subprocess.run(build, cwd=ROOT, check=True)
     examples = ROOT / "target/debug/examples"
@@ -117,7 +117,7 @@ def test_elements_of_stateful_instances(rods) -> None:
     assert of_fmi3[0][1].tolist() == [20.0, 2.0, 22.0, 23.0, 3.0, 25.0, 26.0, 27.0]
     assert of_fmi3[3].tolist() == [[10.0, 5.0, 3.0, 3.0], [10.0, 6.0, 3.0, 3.0]]
     assert of_fmi3[-1][:2] == ["the near half"] * 2 and of_fmi3[-1][2].startswith("zwei is ")
-    # der(T[2]) with respect to T[2]: minus two neighbours' conductance over its capacity; der(T[3]) has one of them.
+    # der(T[2]) depends on T[2] by -2 times, der(T[3]) by +1 times the conductance between neighbours divided by the capacity.
     assert np.allclose(of_fmi3[6], [[-1.0 / 2.125, 0.5 / 2.25, 1 / 8]] * 2)
 
 

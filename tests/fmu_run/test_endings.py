@@ -55,7 +55,7 @@ def test_moods(request, moods, fixture, first, read_before_set):
         signal = np.where(np.arange(11) < count, first + TIME, np.nan)
         np.testing.assert_allclose(runs["y"][run], signal, atol=1e-15)
         np.testing.assert_allclose(thinned["y"][run], signal[::2], atol=1e-15)
-        # If the FMU ends the simulation, there are statistics until then; a failed run has none.
+        # If the FMU ends the simulation, statistics include the results until then. A failed run has no statistics.
         has_measures = runs.ok[run] or runs.errors[run].startswith("ended")
         measures = [signal[count - 1], signal[:count].mean()] if has_measures else [np.nan, np.nan]
         np.testing.assert_allclose([runs["y", "end"][run], runs["y", "mean"][run]], measures, atol=1e-14)
@@ -76,7 +76,7 @@ def test_silent_runs_are_repeated_once_with_logging(unruly):
         runs = fmu.run(TIME, start={"mood": moods}, outputs=["y", "logged", "instances"])
         after = fmu.run(TIME, outputs=["logged", "instances"])
     assert runs.errors.keys() == {0, 2, 3, 4} and np.nanmax(runs["logged"]) == 0
-    # Three runs failed without a message. Their six steps were repeated, with at most one instance at a time.
+    # Three runs failed without a message. They were repeated with logging, one at a time, six steps each.
     assert after["logged"].max() == 3 * 6 and after["instances"].max() == 1
 
 
@@ -84,7 +84,7 @@ def test_an_fmu_that_is_slow_with_logging(unruly):
     with fmu_run.Fmu(unruly) as fmu:
         begin = clock.monotonic()
         runs = fmu.run(np.linspace(0, 0.6, 101), start={"mood": len(MOODS)}, outputs=["y"])
-    # 76 steps of 0.3 s each would be 23 s.
+    # If all 76 steps were repeated, at 0.3 s each, this would take 23 s.
     assert clock.monotonic() - begin < 10
     assert runs.errors[0].endswith("fmi2DoStep returned Error without a message")
 

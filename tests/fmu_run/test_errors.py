@@ -133,7 +133,7 @@ def test_no_library_for_this_platform(tmp_path, testbed):
         fmu_run.Fmu(path)
 
 
-# Libraries in FMPy for other systems, and the processor's number in an ELF header (ELF-64, e_machine).
+# FMPy contains libraries for other systems. The field e_machine of an ELF header names the processor.
 FMPY = Path(fmpy.__file__).parent
 FOREIGN = {
     "Windows on x86_64": lambda _: (FMPY / "logging/win64/logging.dll").read_bytes(),
@@ -161,7 +161,7 @@ def test_a_damaged_library(tmp_path, testbed):
         return content[:200] if name.startswith("binaries/") else content
 
     path = repacked(testbed, tmp_path / "damaged.fmu", change)
-    # The message of the system.
+    # The message comes from the operating system.
     with pytest.raises(fmu_run.FmuError, match=r"its library cannot be loaded: dlopen failed: .*\.so: "):
         fmu_run.Fmu(path)
 
@@ -291,7 +291,7 @@ with fmu_run.Fmu(sys.argv[1]) as fmu:
 
 @pytest.mark.parametrize("times", [10_000, 100_000_000], ids=["short runs", "in a run"])
 def test_ctrl_c_stops_runs(testbed, times):
-    """Each of the long runs takes minutes."""
+    """Ctrl-C stops runs that would take minutes."""
     command = [sys.executable, "-c", LONG, testbed, str(times)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:

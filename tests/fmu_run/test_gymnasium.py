@@ -38,7 +38,7 @@ def task(testbed) -> Task:
 
 
 def played(envs, steps, seed=5):
-    """All results of random actions."""
+    """Returns all results of random actions."""
     envs.action_space.seed(seed)
     found = [envs.reset(seed=seed)[0]]
     for _ in range(steps):
@@ -90,7 +90,7 @@ def test_a_system_is_an_environment_with_the_bounds_of_its_description(task) -> 
 
 @pytest.mark.parametrize("mode", AutoresetMode)
 def test_environments_equal_instances(task, mode) -> None:
-    """Results are bit-identical, also after the end of an episode, with parameters of the same generator."""
+    """Results are bit-identical, also in the second episode, if the parameters come from the same random generator."""
     count, envs = 4, VectorEnv(task, 4, autoreset_mode=mode)
     rng, actions = np.random.default_rng(3), np.random.default_rng(4).uniform(-1, 1, (50, count, 2))
 
@@ -127,7 +127,7 @@ def test_environments_equal_instances(task, mode) -> None:
                 observed, _ = envs.reset(options={"reset_mask": np.ones(count, dtype=bool)})
                 expected, k = begun(), 0
             assert np.array_equal(observed, expected) and not terminated.any()
-            observed[:] = np.nan  # the caller owns the array
+            observed[:] = np.nan  # The caller owns the array.
     envs.close()
     with pytest.raises(fmu_run.FmuError, match="closed"):
         envs._own.instances()
@@ -178,7 +178,7 @@ def test_a_failure_ends_one_episode(task, mode, count) -> None:
     ],
 )
 def test_termination_and_infinite_observations_end_the_episode(unruly, mood, slope, message) -> None:
-    """The FMU may have one instance in a process, so each environment is closed before the next."""
+    """The FMU allows one instance in a process, so each environment is closed before the next one is created."""
     task = Task(
         fmu=unruly,
         actions="slope",
@@ -204,7 +204,7 @@ def test_termination_and_infinite_observations_end_the_episode(unruly, mood, slo
 
 
 def test_inputs_from_actions(task) -> None:
-    """Integrates a rate from the previous inputs; also checks that all instances may fail."""
+    """Calculates inputs from a rate and the previous inputs. Also checks an episode in which all instances fail."""
     by_rate = replace(
         task,
         actions={"rate": (-6.0, 6.0)},

@@ -1,4 +1,4 @@
-"""Stateful instances are bit-identical to `Fmu.run`, to FMPy's bare calls and to each other."""
+"""Results of instances are bit-identical to `Fmu.run`, to direct calls with FMPy, and to each other."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_advance_equals_three_calls(testbed) -> None:
 
 
 def test_derivatives_of_inputs_and_outputs(fmu) -> None:
-    """Input derivatives of straight lines equal runs; output derivatives equal difference quotients."""
+    """With input derivatives, linear inputs give the results of a run. Output derivatives equal difference quotients."""
     time = np.arange(30) * 1e-3
     with fmu_run.Fmu(fmu) as loaded:
         slopes = {"theta1": 3.0, "theta2": -2.0}

@@ -1,4 +1,4 @@
-"""Compares runs with FMPy's calls of C functions, and statistics with NumPy."""
+"""Compares runs with direct calls of the C functions by FMPy, and statistics with NumPy."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def motion(samples: int = 400, scale: float = 1.0) -> tuple[np.ndarray, dict[str
 
 
 def by_fmpy(path, time, inputs, start, outputs, slopes=None, read_before_set=False) -> dict[str, np.ndarray]:
-    """Performs a run, call by call, with FMPy's classes for the C functions."""
+    """Simulates with direct calls of the C functions, by the classes of FMPy."""
     description = fmpy.read_model_description(str(path))
     by_name = {v.name: v for v in description.modelVariables}
     folder = fmpy.extract(str(path))
@@ -150,7 +150,7 @@ def test_measures_and_kept_times(testbed):
 
 
 def test_frames_and_datasets(testbed, monkeypatch):
-    """Checks that each number is at its run, time and start values, and that rejected runs have NaN."""
+    """Checks that numbers have the coordinates of their run, time and start values, and that rejected runs contain NaN."""
     time, inputs = motion(5)
     start = {"k1": [80.0, -1.0, 90.0], "use_omega": True, "theta1": 0.25}
     with fmu_run.Fmu(testbed) as fmu:

@@ -31,14 +31,14 @@ def fmus(request):
 
 
 def by_hand(fmus, order: str, steps: int, k1: float) -> np.ndarray:
-    """SHOWN at each communication point, with an instance of each FMU."""
+    """Returns the variables SHOWN at each communication point. The test connects one instance of each FMU."""
     start = {name.split(".")[1]: value for name, value in GOAL.items()}
     law, wrist = fmus["controller"].instances(start=start), fmus["testbed"].instances(start={"k1": k1})
     rows = []
     sensed, moved = wrist.get(SENSED), law.get(MOVED)
     for _ in range(steps):
         if order == "dependencies":
-            # Only the torques depend on the motors without a step.
+            # Of the connected outputs, only the torques depend directly on the motor angles.
             wrist.set(MOVED, law.get(MOVED))
             law.set(SENSED, wrist.get(SENSED))
         by_name = {"testbed": wrist, "controller": law}
@@ -141,7 +141,7 @@ def test_connected_inputs_cannot_be_set() -> None:
             pair.directional_derivative("testbed.tau1", "controller.roll_ref", 1.0)
         with pytest.raises(fmu_run.FmuError, match="system is a system, which has Co-Simulation only"):
             loop.instances(interface="model-exchange")
-        # The error of an FMU has the name of its component.
+        # The error message of an FMU contains the name of its component.
         runs = loop.run([0, 1e-3], start={"testbed.k1": [-1.0, 90.0]}, outputs=["testbed.roll"])
         assert list(runs.errors) == [0] and "testbed: " in runs.errors[0] and "k1" in runs.errors[0]
 

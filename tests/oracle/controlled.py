@@ -1,8 +1,8 @@
-"""The closed loop of testbed and controller, from the energies and from the controller's law in its documentation.
+"""Closed loop of testbed and controller, which shares no code with the FMUs.
 
-Shares nothing with the FMUs: the wrist is the linear model of lagrange.py, propagated exactly while the motors follow
-their parabolas from sample to sample; how fast a motor may go is looked up on the curve of its braking distance, which
-is summed up sample by sample.
+The testbed is the linear model of lagrange.py. Between samples, the motors have constant acceleration and the model is
+propagated exactly. The controller follows the law in its documentation. It takes the rate of a motor from a table of
+braking distances, which are summed sample by sample.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ MOTORS = ("theta1", "theta2", "omega1", "omega2")
 
 @dataclass(frozen=True)
 class Law:
-    """The controller's parameters, with the start values that its documentation gives: s, rad, N.m."""
+    """Parameters of the controller in s, rad and N.m, with the start values of its documentation."""
 
     sample_time: float = 1e-3
     max_rate: float = 3.0
@@ -36,13 +36,16 @@ class Law:
 
     @property
     def to_wrist(self) -> Any:
-        """Pitch and roll of a rigid wrist from the motors' angles; eq. (1), (2, 2)."""
+        """Matrix (2, 2) from motor angles to pitch and roll of a rigid wrist; eq. (1)."""
         ratio = self.N / (2 * self.M)
         return np.array([[0.5, 0.5], [ratio, -ratio]])
 
     def braking_curve(self) -> tuple[Any, Any]:
-        """Rates from which a motor brakes in whole samples, and how far it gets that goes over to one within a sample,
-        starting from standstill, and then brakes. Between them the distance is linear in the rate."""
+        """Returns rates from which a motor brakes in a whole number of samples, and a distance for each rate.
+
+        A motor at rest covers this distance if it accelerates to the rate within one sample and then brakes. Between
+        the rates, the distance is linear in the rate.
+        """
         count = int(np.ceil(self.max_rate / (self.max_acceleration * self.sample_time))) + 2
         rates = self.max_acceleration * self.sample_time * np.arange(count)
         braking = cumulative_trapezoid(rates, dx=self.sample_time, initial=0)
@@ -51,7 +54,7 @@ class Law:
 
 @dataclass
 class Controller:
-    """The law with its memory. Motors start at rest at 0."""
+    """Controller with its state. Motors start at rest at 0."""
 
     law: Law
     angle: Any = field(default_factory=lambda: np.zeros(2))
@@ -61,21 +64,23 @@ class Controller:
     arrived: bool = False
 
     def sample(self, reference: Any, measured: dict[str, float]) -> Any:
-        """Accelerations (2,) rad/s2 of the motors until the next sample, from the reference (2,) rad for pitch and roll
-        and the measured outputs of the testbed by name."""
+        """Returns the accelerations (2,) of the motors in rad/s2 until the next sample.
+
+        Arguments are the reference (2,) in rad for pitch and roll, and the measured outputs of the testbed by name.
+        """
         law, T = self.law, self.law.sample_time
         angles, rates, torques = (
             np.array([measured[name] for name in names])
             for names in (("pitch", "roll"), ("pitch_rate", "roll_rate"), ("tau1", "tau2"))
         )
-        windup = law.to_wrist @ self.angle - angles
+        twist = law.to_wrist @ self.angle - angles
         b, limit = law.Kp / (1 + law.Kp), law.max_correction
         if self.arrived:
-            self.integral = np.clip(self.integral + T * law.Ki * (1 - b) * (windup - self.integral), -limit, limit)
-        # First-order lag with the time constant 2 Kd, by Euler's implicit rule.
+            self.integral = np.clip(self.integral + T * law.Ki * (1 - b) * (twist - self.integral), -limit, limit)
+        # First-order lag with the time constant 2 Kd, integrated by the implicit Euler method.
         wanted = np.clip(law.Kd * rates, -limit, limit)
         self.damping = (2 * law.Kd * self.damping + T * wanted) / (2 * law.Kd + T)
-        correction = np.clip(b * windup + (1 - b) * self.integral - self.damping, -limit, limit)
+        correction = np.clip(b * twist + (1 - b) * self.integral - self.damping, -limit, limit)
         goal = np.linalg.solve(law.to_wrist, reference + correction)
         allowed = np.clip(
             goal,
@@ -93,17 +98,17 @@ class Controller:
         return acceleration
 
     def move(self, acceleration: Any) -> None:
-        """Go on to the next sample."""
+        """Moves the motors to the next sample."""
         T = self.law.sample_time
         self.angle = self.angle + self.rate * T + acceleration * T**2 / 2
         self.rate = self.rate + acceleration * T
 
 
 def control(model: LinearModel, law: Law, reference: Any, samples: int) -> dict[str, Any]:
-    """The closed loop from rest at 0 with the constant reference `reference` (2,) rad for pitch and roll.
+    """Simulates the closed loop from rest at 0 with the constant reference `reference` (2,) in rad for pitch and roll.
 
-    Returns MOTORS and the testbed's outputs by name, each (samples + 1,): at every sample of the controller. The
-    two are coupled continuously, without the delay of an importer's communication points.
+    Returns MOTORS and the outputs of the testbed by name at the samples of the controller, each (samples + 1,).
+    Controller and testbed exchange values without the delay of communication points.
     """
     g = np.zeros((12, 12))
     g[:6, :6], g[:6, 6:8], g[:6, 8:10] = model.a, model.b_angle, model.b_rate

@@ -1,8 +1,7 @@
 """The reference experiments: motion of the motors, parameters, and response of the testbed.
 
-The oracle calculates the response. Motors that turn at constant rates are exact in both interface types and at any step size;
-of other motions the samples are exact, and the tolerances allow for the interpolation of importers
-between them.
+The oracle calculates the response. If the motors turn at constant rates, the FMU is exact in both interface types and at any
+step size. Other motions are given by samples, and the tolerances allow for the interpolation of importers between them.
 """
 
 from __future__ import annotations
@@ -16,18 +15,18 @@ from controlled import MOTORS, Law, control
 from lagrange import OUTPUTS, linear_model, table_1
 from reference import follow, integrate
 
-#: How far a result may be off, as a fraction of the largest value that any variable of its kind takes: of angles,
-#: rates and torques. In Co-Simulation the motors' rates are held over a step, and many importers read torques before
-#: they set the next rates: a step late.
+#: Tolerances of angles, rates and torques, as fractions of the largest value of the variables of the same kind. In
+#: Co-Simulation, the rates of the motors are constant during a step. Many importers read torques before they set the next
+#: rates, so torques lag one step.
 Fractions = Mapping[str, tuple[float, float, float]]
 INTERFACES = {"CoSimulation": 1e-3, "ModelExchange": 1e-3}
 QUICK: Fractions = {"CoSimulation": (5e-4, 1e-3, 2e-2), "ModelExchange": (5e-4, 1e-3, 2e-3)}
 SLOW: Fractions = {"CoSimulation": (1e-4, 3e-4, 2e-2), "ModelExchange": (1e-4, 3e-4, 2e-3)}
 EXACT: Fractions = {"CoSimulation": (1e-6,) * 3, "ModelExchange": (1e-5,) * 3}
 KINDS = (("pitch", "roll", "theta3", "theta4"), ("pitch_rate", "roll_rate"), ("tau1", "tau2"))
-#: Between rows of the reference, and of the motors where they do not turn at constant rates; s.
+#: Interval in s between rows of the reference, and between samples of motors that do not turn at constant rates.
 INTERVAL, SAMPLE = 0.01, 1e-3
-#: Length of the experiments, and of the move from point to point; s.
+#: Duration in s of the experiments, and of the move from point to point.
 STOP, MOVE = 1.0, 0.4
 
 Function = Callable[[float], Any]
@@ -35,8 +34,11 @@ Function = Callable[[float], Any]
 
 @dataclass(frozen=True)
 class Experiment:
-    """inputs: `time` and MOTORS by name, to be interpolated linearly. reference: `time` and OUTPUTS by name. parameters:
-    of the FMU, in SI. tolerances: see Fractions."""
+    """Reference experiment.
+
+    `inputs` has `time` and MOTORS by name, which importers interpolate linearly. `reference` has `time` and OUTPUTS by
+    name. `parameters` are parameters of the FMU in SI units. `tolerances` are Fractions.
+    """
 
     name: str
     description: str
@@ -46,7 +48,7 @@ class Experiment:
     tolerances: Fractions = field(default_factory=lambda: QUICK)
 
     def allowed(self, interface: str) -> dict[str, float]:
-        """How far each output may be off, rad, rad/s or N.m."""
+        """Returns the tolerance of each output in rad, rad/s or N.m."""
         found = {}
         for names, fraction in zip(KINDS, self.tolerances[interface]):
             largest = max(np.abs(self.reference[name]).max() for name in names)
@@ -55,7 +57,7 @@ class Experiment:
 
 
 def experiments() -> list[Experiment]:
-    """All of them; takes some seconds."""
+    """Returns all reference experiments. This takes some seconds."""
     table = with_counts(table_1())
     return [
         fig4("fig4_opposite", "Fig. 4: motors with opposite rates, sin(10 pi t) rad/s; the wrist rolls", -1),
@@ -90,12 +92,12 @@ def experiments() -> list[Experiment]:
 
 
 def with_counts(parameters: dict[str, Any]) -> dict[str, Any]:
-    """M and N as integers."""
+    """Converts M and N to integers."""
     return {**parameters, "M": int(parameters["M"]), "N": int(parameters["N"])}
 
 
 def rigid_motors(wrist: Any) -> Any:
-    """Motor angles (2,) rad at which the wrist rests at pitch and roll (2,) rad; eq. (1)."""
+    """Returns the motor angles (2,) in rad that belong to pitch and roll (2,) in rad at rest; eq. (1)."""
     return np.linalg.solve(Law().to_wrist, wrist)
 
 
@@ -141,11 +143,11 @@ def moved(
     rate: Function,
     tolerances: Fractions = QUICK,
 ) -> Experiment:
-    """Motors that follow the smooth functions of time angle(t) rad and rate(t) rad/s from rest."""
+    """Returns the motion of motors with the smooth functions angle(t) in rad and rate(t) in rad/s, starting at rest."""
     model = linear_model({key: float(value) for key, value in parameters.items()})
     t, fine = times(STOP, INTERVAL), times(STOP, SAMPLE)
     motion = np.array([(*angle(s), *rate(s)) for s in fine])
-    # Motions here are smooth but where a move ends; the solver restarts there.
+    # The motions are smooth except at the end of a move, where the solver restarts.
     true_values = integrate(model, t, angle, rate, breaks=(MOVE,))
     return Experiment(
         name,
@@ -158,7 +160,7 @@ def moved(
 
 
 def rate_step() -> Experiment:
-    """Motor 1 turns at 0.5 rad/s from the first instant on, with the wrist at rest; motor 2 is at rest."""
+    """Motor 1 turns at 0.5 rad/s from the start; motor 2 and the wrist are at rest at the start."""
     t, speed = times(0.5, INTERVAL), np.array([0.5, 0.0])
     parameters = with_counts(table_1())
     model = linear_model({key: float(value) for key, value in parameters.items()})
@@ -176,7 +178,7 @@ def rate_step() -> Experiment:
 
 
 def closed_loop(parameters: dict[str, Any]) -> Experiment:
-    """The testbed with its controller, which takes it to a pitch of 30 and a roll of 60 degrees."""
+    """The controller moves the testbed to a pitch of 30 and a roll of 60 degrees."""
     model = linear_model({key: float(value) for key, value in parameters.items()})
     law = Law()
     loop = control(model, law, np.deg2rad([30.0, 60.0]), round(STOP / law.sample_time))

@@ -1,10 +1,10 @@
 """The testbed's equations of motion from its energies only: eqs. (1), (3)-(7) and Lagrange's equation (2).
 
 Nothing here comes from eqs. (8)-(11). M, Delta and K are the second derivatives of T, the Rayleigh function and V,
-obtained exactly, for T, V and the Rayleigh function are quadratic forms. The number type is the caller's: floats for
-speed, mpmath numbers where doubles lose digits.
+which are exact, because T, V and the Rayleigh function are quadratic forms. The caller chooses the number type: floats
+for speed, or mpmath numbers for more digits.
 
-Errata applied, as the paper's own text settles them: theta7 is pitch and theta8 is roll (eq. 1, eq. 4a, Sec. 4), the
+These errata of the paper are applied; its text confirms them: theta7 is pitch and theta8 is roll (eq. 1, eq. 4a, Sec. 4), the
 last spring of eq. (6) is k2 (K of eq. 8), and Table 1 is per degree.
 """
 
@@ -113,8 +113,8 @@ class LinearModel:
     def impulse(self, jump):
         """Change of x when the motor angles jump by `jump` (2,) rad at once.
 
-        Lagrange's equation integrated over the instant: only rates weigh in, and theta5, theta6 cannot jump for they
-        carry inertia; so Delta [q] + M [q'] = -(dissipative coupling) jump.
+        Lagrange's equation is integrated over the instant of the jump. Terms with angles vanish. theta5 and theta6 do
+        not jump, because they have inertia. The result is Delta [q] + M [q'] = -(dissipative coupling) jump.
         """
         h_d, h_t = hessian(dissipation, self.parameters), hessian(kinetic_energy, self.parameters)
         jump_shaft = -inverse2(h_d[SHAFT, SHAFT]) @ (h_d[SHAFT, MOTOR] @ jump)
@@ -138,13 +138,13 @@ def linear_model(p) -> LinearModel:
 
     d/dt dT/dq' + dV/dq + dDelta/dq' = 0. The rows of the massless shafts (theta3, theta4) give their rates; the rows of
     the carriers (theta5, theta6) give the accelerations. The torque on a sensor is the torque of its coupling:
-    tau = -(dV/dtheta_motor + dDelta/dtheta_motor'), which is eq. (9) in the paper's sign.
+    tau = -(dV/dtheta_motor + dDelta/dtheta_motor'), which is eq. (9) with the sign of the paper.
     """
     h_t, h_v, h_d = hessian(kinetic_energy, p), hessian(potential_energy, p), hessian(dissipation, p)
     zero = 0 * h_v[:2, :2]
     one = zero + np.eye(2, dtype=int)
 
-    # Every row as coefficients of z = (theta_motor, theta_motor', theta_shaft, theta_carrier, theta_carrier').
+    # Writes a row as the coefficients of z = (theta_motor, theta_motor', theta_shaft, theta_carrier, theta_carrier').
     def in_z(m, m_rate, s, k, k_rate):
         return np.hstack([m, m_rate, s, k, k_rate])
 

@@ -1,8 +1,8 @@
-"""Exact and independently integrated responses of the testbed, to judge the FMU by.
+"""Exact and independently integrated responses of the testbed, with which the FMU is compared.
 
 `follow` is exact for motor angles that are linear between communication points, with jumps allowed at the points; it
 exponentiates the system augmented by the motion of the motors, in doubles (scipy) or to any precision (mpmath).
-`integrate` takes any smooth motion of the motors and uses scipy's DOP853; the two share the energies and nothing else.
+`integrate` takes any smooth motion of the motors and uses scipy's DOP853. The two functions share only the linear model.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ def augmented(model: LinearModel) -> np.ndarray:
 
 
 def exponential(g: np.ndarray) -> np.ndarray:
-    """exp(g) in the precision of g's numbers: mpmath for arrays of objects, else scipy."""
+    """Returns exp(g), calculated by mpmath for arrays of objects and by scipy for doubles."""
     if g.dtype == object:
         return np.array(mpmath.expm(mpmath.matrix(g.tolist()), method="taylor").tolist(), dtype=object)
     return expm(g)
 
 
 def follow(model: LinearModel, t, theta, slope, x0=None):
-    """Exact outputs when the motors follow theta[k] + slope[k] (s - t[k]) on each [t[k], t[k+1]].
+    """Returns exact outputs if the motors follow theta[k] + slope[k] (s - t[k]) on each [t[k], t[k+1]].
 
-    t (n,) in s, theta (n, 2) in rad, slope (n, 2) in rad/s; x0 (6,) defaults to rest at theta[0]. Where the path does
-    not meet the next theta, the angles jump and the testbed takes the impulse; there is no jump at t[0].
+    t (n,) in s, theta (n, 2) in rad, slope (n, 2) in rad/s; x0 (6,) defaults to rest at theta[0]. If the path
+    does not end at the next theta, the angles jump, which is an impulse on the testbed. There is no jump at t[0].
 
-    Returns (at, after), dicts of arrays by output name. `at` has n values: at t[k], with theta[k] and slope[k] and
-    before the jump works (it belongs to the step that follows). `after` has n - 1: the end of each step, on the path.
+    Returns (at, after), dicts of arrays by output name. `at` has the n values at t[k], with theta[k] and slope[k] but
+    without the effect of the jump, which belongs to the next step. `after` has the n - 1 values at the end of each step.
     """
     g, powers = augmented(model), {}
     x = at_rest(theta[0]) if x0 is None else np.asarray(x0)
@@ -63,9 +63,9 @@ def follow(model: LinearModel, t, theta, slope, x0=None):
 
 
 def integrate(model: LinearModel, t, theta, rate, x0=None, breaks=()):
-    """Outputs at the times t (n,) when the motors follow the functions theta(s) -> (2,) rad, rate(s) -> (2,) rad/s.
+    """Returns outputs at the times t (n,) if the motors follow the functions theta(s) -> (2,) rad, rate(s) -> (2,) rad/s.
 
-    Relative tolerance 1e-12. `breaks` are times where the motion is not smooth; the integration restarts there.
+    The relative tolerance is 1e-12. `breaks` are times where the motion is not smooth; the integration restarts there.
     """
     t = np.asarray(t, dtype=float)
     x = at_rest(np.asarray(theta(t[0]))) if x0 is None else np.asarray(x0, dtype=float)
@@ -91,9 +91,9 @@ def integrate(model: LinearModel, t, theta, rate, x0=None, breaks=()):
 
 
 def backward_slope(t, theta) -> np.ndarray:
-    """Slopes (n, 2) a sampled-angles importer can know: at t[k], of the parabola through the last three samples.
+    """Returns slopes (n, 2) that follow from samples: at t[k], the slope of the parabola through the last three samples.
 
-    The first sample knows no slope (0), the second a straight line's. Written with Lagrange's interpolation basis.
+    The slope is 0 at the first sample, and that of a straight line at the second. Uses Lagrange polynomials.
     """
     slope = np.zeros_like(theta)
     for k in range(1, len(t)):

@@ -1,4 +1,4 @@
-"""The reference experiments as they are kept with the sources: they are up to date, and the two oracles agree."""
+"""The committed reference experiments are up to date, and the two oracles agree."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_the_committed_files_are_up_to_date(texts):
 
 
 def test_both_oracles_agree(found):
-    """`integrate` and the closed loop against `follow`, whose straight lines are of second order in the step."""
+    """Compares `integrate` and the closed loop with `follow`, whose error is of second order in the interval of samples."""
     for experiment in found:
         if experiment.name == "rate_step":
             continue
@@ -65,7 +65,7 @@ def test_both_oracles_agree(found):
 
 
 def test_the_parameter_sets_are_valid_and_complete(texts):
-    """All parameters, so that none keeps an earlier value; the start, too."""
+    """The sets contain all parameters, including the start values of states, so that none keeps an earlier value."""
     schema = Path(fmpy.__file__).parent / "ssp" / "schema" / "SystemStructureParameterValues.xsd"
     valid = etree.XMLSchema(etree.parse(schema))
     variables = etree.parse(COMMITTED / "modelDescription.xml").iter("ScalarVariable")
@@ -78,6 +78,6 @@ def test_the_parameter_sets_are_valid_and_complete(texts):
 
 
 def test_a_motor_brakes_in_whole_samples():
-    """From 0.09 rad/s, three samples of braking at 30 rad/s2: 0.045, 0.015 and half a sample to get there."""
+    """Braking from 0.09 rad/s at 30 rad/s2 takes three samples. Half a sample at this rate is added."""
     rates, reached = Law().braking_curve()
     assert np.interp(0.09, rates, reached) == pytest.approx(0.09 / 2 * 1e-3 + 0.09**2 / 2 / 30)

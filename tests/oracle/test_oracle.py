@@ -1,4 +1,4 @@
-"""The oracle is judged before it judges: against numbers derived by hand, and its two methods against each other."""
+"""Compares the oracle with numbers that were derived by hand, and its two methods with each other."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_torque_is_equation_9():
 
 
 def test_energy_balance():
-    """Power in through the motors = change of T + V + twice Rayleigh's function."""
+    """The power of the motors equals the rate of change of T + V plus twice the Rayleigh function."""
     p = table_1()
     x, theta, rate = np.array([0.3, -0.2, 0.1, 0.5, -1.0, 2.0]), np.array([0.4, 0.1]), np.array([1.5, -0.5])
     dx = MODEL.a @ x + MODEL.b_angle @ theta + MODEL.b_rate @ rate

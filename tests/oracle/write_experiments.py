@@ -3,7 +3,7 @@
 
     python tests/oracle/write_experiments.py [DIRECTORY]
 
-DIRECTORY is copied into the FMU, by default modelDescription.
+The content of DIRECTORY, by default modelDescription, becomes part of the FMU.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from lxml import etree
 
 ROOT = Path(__file__).resolve().parents[2]
 LAYER = "org.fmi-standard.fmi-ls-ref"
-#: Within the directory; the second is a document for readers, as the standard recommends.
+#: Paths in the directory. The standard recommends a document for readers, which is the second path.
 FILES, ABOUT = Path("extra", LAYER), Path("documentation", "fmi-ls-ref.txt")
 LS = "http://fmi-standard.org/fmi-ls-manifest"
 SSV, SSC = (f"http://ssp-standard.org/SSP1/SystemStructure{kind}" for kind in ("ParameterValues", "Common"))
-#: Decimals of all numbers: a hundredth of the smallest tolerance and less.
+#: Decimals of all numbers. The last one is at most a hundredth of the smallest tolerance.
 DECIMALS = 8
-#: The start of every experiment: at rest at any motor angles. Start values of states, which are then ignored, are the FMU's.
+#: Every experiment starts at rest. The start values of states, which are then ignored, are the FMU's.
 START = {"start_at_rest": True} | {
     f"{state}_start": 0.0 for state in ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
 }
-#: Relative tolerance of solvers for which the tolerances in Model Exchange are meant.
+#: Relative tolerance of solvers to which the tolerances in Model Exchange apply.
 SOLVER = 1e-7
 
 
 def files(found: list[Experiment]) -> dict[Path, str]:
-    """The content of every file by its path in the directory."""
+    """Returns the content of every file by its path in the directory."""
     texts = {}
     for experiment in found:
         for kind, columns in (("in", experiment.inputs), ("ref", experiment.reference)):
@@ -47,14 +47,14 @@ def files(found: list[Experiment]) -> dict[Path, str]:
 
 
 def table(columns: dict[str, Any]) -> str:
-    """CSV as the FMI Cross-Check has it: names in quotes, commas, nothing else."""
-    rows = np.round(np.column_stack(list(columns.values())), DECIMALS) + 0.0  # no -0.0
+    """Returns a table as CSV in the format of the FMI Cross-Check, with quoted names and commas."""
+    rows = np.round(np.column_stack(list(columns.values())), DECIMALS) + 0.0  # Adding 0.0 turns -0.0 into 0.0.
     lines = [",".join(f'"{name}"' for name in columns), *(",".join(f"{v:.10g}" for v in row) for row in rows)]
     return "\n".join(lines) + "\n"
 
 
 def parameter_set(experiment: Experiment) -> str:
-    """All parameters as an SSV file of SSP 1.0, in the FMU's units."""
+    """Returns all parameters as an SSV file of SSP 1.0, in the units of the FMU."""
     root = etree.Element(
         f"{{{SSV}}}ParameterSet",
         nsmap={"ssv": SSV, "ssc": SSC},
@@ -71,7 +71,7 @@ def parameter_set(experiment: Experiment) -> str:
 
 
 def entry(experiment: Experiment) -> dict[str, Any]:
-    """The entry of one experiment in experiments.json."""
+    """Returns the entry of an experiment in experiments.json."""
     t = experiment.reference["time"]
     return {
         "name": experiment.name,
