@@ -21,7 +21,7 @@ const WASM2C: &str = "1.0.42";
 const RUNTIME: &str = include_str!("c/runtime.h");
 const FMI2: &str = include_str!("c/fmi2.c");
 
-/// Turns off warnings on unused code, as generated code need not be used.
+/// Turns off warnings about unused code, because parts of the generated code are unused.
 const UNUSED: &str = "#ifdef __GNUC__\n#pragma GCC diagnostic ignored \"-Wunused-parameter\"\n\
                       #pragma GCC diagnostic ignored \"-Wunused-const-variable\"\n#endif\n";
 
@@ -94,7 +94,8 @@ struct Names<'a> {
 }
 
 impl Names<'_> {
-    /// Returns the generated code without the runtime of wasm2c, which another one replaces, and without the unused get_func_type.
+    /// Returns the generated code without the unused get_func_type and without the runtime of wasm2c, which
+    /// `c/runtime.h` replaces.
     fn code(&self, code: &str) -> Result<String> {
         let Names { identifier, prefix } = self;
         let declaration = format!(" w2c_{prefix}_f");
@@ -145,7 +146,7 @@ impl Names<'_> {
         define("FMU_STACK", "w2c_g0")?;
         define("FMU_TABLE", &functions.to_string())?;
         define("FMU_INITIAL_PAGES", &pages.to_string())?;
-        // The import would have the same name in every model.
+        // Without the identifier, the imported function would have the same name in every model.
         define("w2c_fmu_fmu_log", &format!("{identifier}_log"))?;
         define("FMU_log", &format!("{identifier}_log"))?;
         let instantiate = format!("wasm2c_{prefix}_instantiate");
@@ -172,7 +173,7 @@ impl Names<'_> {
     }
 }
 
-/// Removes `return` before calls without value, which C forbids.
+/// Removes `return` before calls of void functions, which strict C forbids.
 fn strict(code: &str) -> String {
     let mut in_void = false;
     let lines = code.lines().map(|line| {
@@ -256,7 +257,7 @@ mod tests {
         );
     }
 
-    /// Cargo also prints a version, which differs from that of wasm2c.
+    /// Cargo stands for a wasm2c of another version.
     #[test]
     fn another_version_is_named() {
         let text = error(check_version(OsStr::new(env!("CARGO"))));

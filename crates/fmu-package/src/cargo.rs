@@ -39,7 +39,7 @@ impl LibraryBuild<'_> {
         let (cargo, target) = rustc_for(self.target);
         let mut command = Command::new(&cargo);
         command
-            // If a package also makes an rlib, cargo leaves link-time optimization out.
+            // Cargo skips link-time optimization for a package that also has the crate type rlib.
             .args(["rustc", "--lib", "--crate-type", "cdylib", "--locked", "--no-default-features"])
             .args(["--message-format", "json-render-diagnostics"])
             .args(["--profile", self.profile, "--package", self.package])
@@ -52,7 +52,7 @@ impl LibraryBuild<'_> {
         if self.target == Some(WEBASSEMBLY) {
             command.args(["--config", &remap_standard_library(&self.directory)?]);
         }
-        // The library needs no debug information; for macOS, this linker has no tool to strip it.
+        // The library needs no debug information. cargo-zigbuild cannot strip libraries for macOS.
         if cargo == ZIGBUILD {
             let strip = !target.is_some_and(|target| target.contains("-apple-"));
             command.env(format!("CARGO_PROFILE_{}_STRIP", self.profile.to_uppercase()), strip.to_string());

@@ -77,7 +77,7 @@ fn is_number(text: &str) -> bool {
     !text.is_empty() && text.bytes().all(|digit| digit.is_ascii_digit())
 }
 
-/// Whether this is a list of names, with or without indices, with dots between them.
+/// Whether this is a sequence of names, with or without indices, separated by dots.
 fn is_path(mut rest: &str) -> bool {
     loop {
         rest = match rest.strip_prefix('\'') {
@@ -311,7 +311,7 @@ fn check_starts(table: &Table) -> Result<Starts> {
             }
         }
     }
-    // An indicator that is never written would be an event that never happens.
+    // The event of an indicator that is never written would never occur.
     if let Some(number) = forgotten {
         bail!("{}: indicators() does not fill in indicator {number}", table.info.name);
     }
@@ -354,7 +354,7 @@ fn check_value(label: &str, variable_type: &Type, value: &Value) -> Result<()> {
     Ok(())
 }
 
-/// Checks that the model accepts its start values, or the FMU could not be instantiated.
+/// Checks that the model accepts its start values. Otherwise, every instantiation would fail.
 fn check_model(model: &LoadedModel, starts: &Starts) -> Result<()> {
     for interface in model.table.interfaces() {
         let mut instance =

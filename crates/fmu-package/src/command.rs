@@ -34,7 +34,7 @@ pub struct BuildOptions {
     /// Declare the parameters tunable instead of fixed (OpenModelica does not let users change tunable parameters)
     #[arg(long)]
     pub tunable: bool,
-    /// Make the FMU for FMI 2.0 or for FMI 3.0 only
+    /// Build only the FMU for FMI 2.0 or for FMI 3.0
     #[arg(long, value_parser = fmi_version, value_name = "2|3")]
     pub fmi: Option<Standard>,
     /// Directory for the FMU of FMI 2.0, with a directory fmi3 for the FMU of FMI 3.0 [default: target/fmu of the workspace]
@@ -43,7 +43,7 @@ pub struct BuildOptions {
     /// Write only modelDescription.xml of FMI 2.0, into the directory modelDescription of the sources or DIR
     #[arg(long, conflicts_with_all = ["target", "binary"])]
     pub describe: bool,
-    /// Print only the guid, which libraries that are compiled elsewhere get from the environment variable FMU_GUID
+    /// Print only the guid; to compile a library elsewhere, set the environment variable FMU_GUID to it
     #[arg(long, conflicts_with = "describe")]
     pub guid: bool,
     /// Compile for this Rust target instead of this machine; repeat it for several
@@ -55,13 +55,13 @@ pub struct BuildOptions {
     /// Add this compiled library, for example win64=model.dll, or the one in an FMU, x86_64-windows=model.fmu; repeat it for several
     #[arg(long, value_name = "PLATFORM=PATH", value_parser = binary)]
     pub binary: Vec<(String, PathBuf)>,
-    /// Make the FMU of C sources instead, for targets with no Rust (FMI 2.0, in the directory source; needs wasm2c)
+    /// Build an FMU of C sources instead, for targets without Rust (FMI 2.0, in the directory source; needs wasm2c)
     #[arg(long, conflicts_with_all = ["target", "binary", "describe"])]
     pub c_sources: bool,
     /// Leave out the page documentation/index.html that runs the FMU in a browser (as with --c-sources)
     #[arg(long)]
     pub no_page: bool,
-    /// Accept a library for another processor than its platform names (with FMI 2.0, importers on ARM look in linux64)
+    /// Accept a library for another processor than that of its platform (in FMI 2.0, importers on ARM look in linux64)
     #[arg(long, requires = "binary")]
     pub any_processor: bool,
 }
@@ -94,7 +94,7 @@ pub struct Builder {
     pub command: &'static str,
     /// The files that the FMU is made from.
     pub sources: Sources,
-    /// The versions that FMUs are made for by default. The description of the first is kept with the sources.
+    /// FMI versions of the FMUs that are built by default. The description for the first version is committed.
     pub fmi: Vec<Standard>,
     /// The terminals of the FMU for FMI 3.0.
     pub terminals: Vec<Terminal>,
@@ -148,8 +148,8 @@ impl Builder {
         }
     }
 
-    /// Compiles the libraries, tries the model of the library for this machine, writes the descriptions and packs the FMUs, and
-    /// reports them on stdout.
+    /// Compiles the libraries, checks the model with the library for this machine, writes the descriptions, packs the
+    /// FMUs, and reports them on stdout.
     ///
     /// # Errors
     /// When the model contradicts itself, a library cannot be compiled or does not belong to the sources, or a file cannot
@@ -234,7 +234,7 @@ impl Builder {
         })
     }
 
-    /// Notes that the library for this machine needs a newer glibc than a library that is compiled for a target.
+    /// Prints a note if the library for this machine needs a newer glibc than a library for a named target.
     fn warn_of_glibc(&self, options: &BuildOptions, libraries: &[Library]) {
         // A library that is compiled with other settings is only for trials on this machine.
         let is_shipped = self.settings.is_empty() && options.target.is_empty() && options.binary.is_empty();
@@ -250,7 +250,7 @@ impl Builder {
         }
     }
 
-    /// Notes that the description that is kept with the sources is out of date.
+    /// Prints a note if the committed description is out of date.
     fn compare_with_kept(&self, kept: &Path, descriptions: &[(Standard, String)], guid: &str) {
         if let Some((fmi, description)) = descriptions.first()
             && self.fmi.first() == Some(fmi)
@@ -449,7 +449,7 @@ fn pack_in(out: &Path, parts: &Parts) -> Result<()> {
     Ok(())
 }
 
-/// Waits until no other build of the same workspace runs, unless the lock cannot be made.
+/// Waits until no other build of the same workspace runs, unless the lock file cannot be created.
 fn lock(directory: &Path) -> Option<fs::File> {
     fs::create_dir_all(directory).ok()?;
     let file = fs::File::create(directory.join(".fmu-package.lock")).ok()?;
@@ -461,7 +461,8 @@ fn wasm2c() -> OsString {
     std::env::var_os("WASM2C").unwrap_or_else(|| "wasm2c".into())
 }
 
-/// Checks that a library is for its platform and from these sources. Another one would not load, or reject every instance.
+/// Checks that a library is for its platform and from these sources. Otherwise, it would fail to load or reject every
+/// instantiation.
 fn check_library(library: &Library, guid: &str, any_processor: bool) -> Result<()> {
     let Library { platform, path } = library;
     let bytes = fs::read(path)

@@ -25,8 +25,8 @@ pub const TARGETS: [&str; 5] = [
 /// The glibc that libraries for Linux need: the version of Enterprise Linux 7, which all later systems have.
 pub const GLIBC: &str = "2.17";
 
-/// Checks that the tools for these targets are installed, or names all missing tools and their sources. Only `all` targets need
-/// cargo-zigbuild, as cargo's configuration may have a linker for one.
+/// Checks that the tools for these targets are installed; the error names all missing tools and their sources. Only
+/// `all` requires cargo-zigbuild, because cargo's configuration may have a linker for a named target.
 pub fn check_targets(targets: &[String], all: bool) -> Result<()> {
     let mut missing = Vec::new();
     for target in targets.iter().filter(|target| !has_std(target)) {

@@ -8,7 +8,8 @@ use crate::table::Attributes;
 use anyhow::{Result, bail};
 use fmi_abi::{BaseType, Interface, Standard};
 
-/// Number of points that are tried. A derivative must be wrong at two of them, as one may lie at a kink.
+/// Number of points that are tried. A derivative is rejected if it is wrong at two of them, because one may lie at a
+/// kink.
 const POINTS: usize = 16;
 
 /// Rejects a model whose partial derivatives differ from differences of its values: at communication points and in
@@ -29,7 +30,7 @@ pub(crate) fn check(
     let mut points = Vec::new();
     for _ in 0..POINTS {
         let (mut point, mut instance) = sampler.draw(None, true, |_| true)?;
-        // A value that is set in Co-Simulation may act in the step that follows.
+        // A value that is set in Co-Simulation may take effect only in the next step.
         if running && table.model_exchange.is_some() && point.interface != Interface::ModelExchange {
             point.interface = Interface::ModelExchange;
             let Ok(same) = model_at(model, &point, running, Standard::Fmi3) else { continue };
@@ -124,7 +125,7 @@ impl Check<'_> {
                 0.0 => variable.map_or(1.0, |known| known.variable_type.nominal_or_one()),
                 size => size,
             };
-            // Central differences of two widths: their distance bounds their error.
+            // Central differences of two widths. Their distance is a bound for their error.
             let mut slopes = |width: f64| -> Option<Vec<f64>> {
                 let pairs = self.values(base, at + width)?.into_iter().zip(self.values(base, at - width)?);
                 Some(pairs.map(|(above, below)| (above - below) / (2.0 * width)).collect())
@@ -134,7 +135,7 @@ impl Check<'_> {
                 let (Some(partial), wide, narrow) = (*partial, wide[number], narrow[number]) else {
                     continue;
                 };
-                // The time of Co-Simulation is varied by the start time, from which some models count.
+                // In Co-Simulation, the start time is varied. Some models depend only on the time since the start.
                 let is_unknown =
                     variable.is_none() && base.point.interface == Interface::CoSimulation && narrow == 0.0;
                 if !(wide - narrow).is_finite() || is_unknown {
@@ -157,7 +158,7 @@ impl Check<'_> {
     fn values(&self, base: &mut Base, value: f64) -> Option<Vec<f64>> {
         let is_time = self.known == self.model.table.time();
         if is_time && base.point.interface == Interface::CoSimulation {
-            // No function sets the time there. If the FMU also offers Model Exchange, the time is varied in that.
+            // No function of Co-Simulation sets the time. If the FMU also offers Model Exchange, the time is varied there.
             if self.model.table.model_exchange.is_some() {
                 return None;
             }

@@ -45,7 +45,7 @@ pub fn describe(model: &LoadedModel, fmi: Standard, changes: &Changes) -> Result
     Description { table, fmi, changes }.document(starts, &structure)
 }
 
-/// The position that counts from 1: an index in FMI 2.0, a value reference in FMI 3.0.
+/// Returns the position, counted from 1: an index in FMI 2.0, a value reference in FMI 3.0.
 fn position(index: u32) -> u32 {
     index + 1
 }
@@ -89,7 +89,7 @@ impl Description<'_> {
         self.root().containing(children.into_iter().flatten()).document()
     }
 
-    /// The root, with the facts about the model.
+    /// Returns the root element with the attributes of the model.
     fn root(&self) -> Element {
         let Self { table: Table { info, arrays, .. }, fmi, changes } = self;
         let (version, guid) = match fmi {
@@ -97,7 +97,7 @@ impl Description<'_> {
             Standard::Fmi3 => ("3.0", "instantiationToken"),
         };
         let indicators = self.table.model_exchange.as_ref().map(|offer| offer.indicators);
-        // The time of generation would make every build a different file.
+        // There is no generationDateAndTime, because every build would give a different file.
         Element::new("fmiModelDescription")
             .with("fmiVersion", version)
             .with("modelName", &info.name)
@@ -239,7 +239,7 @@ impl Description<'_> {
                 .containing([with_attributes(value, &variable.variable_type)]);
         }
         let starts = starts.map(|start| match start {
-            // As short as single precision allows.
+            // Writes as few digits as single precision needs.
             Value::Real(value) if variable.base() == BaseType::Float32 => (*value as f32).to_string(),
             other => other.to_string(),
         });

@@ -124,7 +124,7 @@ fn live(page: &str, script: &str) -> Result<String> {
     let text = format!(
         "<style>\n{STYLE}</style>\n<script>\n{BEGIN}begin(\"{packed}\").catch(showFailure);\n</script>\n"
     );
-    // At the end, where the elements exist that the scripts change.
+    // The script comes last, after the elements that it changes.
     let end = page.rfind("</body>").unwrap_or(page.len());
     let begin = ["<main>", "<body>"].iter().find_map(|tag| Some(page.find(tag)? + tag.len())).unwrap_or(end);
     let (head, content, tail) = (&page[..begin], &page[begin..end], &page[end..]);

@@ -102,7 +102,7 @@ struct Point {
 
 impl<'a> Rehearsal<'a> {
     fn run(&self) -> Result<()> {
-        // A model is not judged by the calls that it rejects.
+        // A rejected call is not an error here.
         let Ok(mut trial) = self.initialized() else { return Ok(()) };
         let mut points: Vec<Point> = Vec::new();
         let mut path: Vec<Values> = Vec::new();
@@ -184,12 +184,12 @@ impl<'a> Rehearsal<'a> {
         scales: &[f64],
     ) -> Option<String> {
         let read = other.save().ok()?;
-        // Importers set the inputs of the next step before they save, or after they have read.
+        // Importers set the inputs of the next step before they save a state, or after they restore it.
         [false, true].into_iter().find_map(|again| {
             other.restore(read).ok()?;
             let (steps, numbers) = self.first_difference(other, point, again, path, scales)?;
             own.restore(point.saved).ok()?;
-            // A random model differs from itself as well.
+            // A model with random results also differs from its own repetition.
             if self.first_difference(own, point, again, path, scales).is_some() {
                 return None;
             }

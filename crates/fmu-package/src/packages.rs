@@ -28,7 +28,7 @@ pub(crate) struct Neighbourhood {
 }
 
 impl Neighbourhood {
-    /// The neighbourhood of the package in this directory.
+    /// Returns the workspace of the package in this directory, and the packages that it uses by path.
     pub fn of(directory: &Path) -> Result<Self> {
         let mut known = BTreeMap::new();
         let own = find(&mut known, directory)?;
