@@ -1,4 +1,4 @@
-function wrist_in_simulink(folder)
+function wrist_in_simulink(directory)
 % Runs the testbed's FMU in Simulink and compares it with the reference experiments in it.
 %
 %     wrist_in_simulink('../../target/fmu')
@@ -8,11 +8,11 @@ function wrist_in_simulink(folder)
 % other people's scripts: nobody has run it in Simulink yet. Tell us what you see.
 
 if nargin < 1
-    folder = fullfile('..', '..', 'target', 'fmu');
+    directory = fullfile('..', '..', 'target', 'fmu');
 end
 % The block takes the name of a file on the path, no path.
-addpath(folder);
-restore = onCleanup(@() rmpath(folder));
+addpath(directory);
+restore = onCleanup(@() rmpath(directory));
 
 fig4();
 closed_loop();
