@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 #: Directory of the experiments in the FMU.
-FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
+DIRECTORY = "extra/org.fmi-standard.fmi-ls-ref"
 #: For tools that use one tolerance for all variables.
 RELATIVE_TOLERANCE = 1e-3
 #: Fixed time of every file in the zip file, for reproducible bytes.
@@ -26,11 +26,11 @@ def pack(fmu: Path, destination: Path) -> None:
             archive.writestr(about, content)
 
         whole = fmu.read_bytes()
-        for experiment in json.loads(source.read(f"{FOLDER}/experiments.json")):
+        for experiment in json.loads(source.read(f"{DIRECTORY}/experiments.json")):
             name = experiment["name"]
             write(f"{name}/{name}.fmu", whole)
             for kind in ("inputs", "reference", "parameters"):
-                write(f"{name}/{experiment[kind]}", source.read(f"{FOLDER}/{experiment[kind]}"))
+                write(f"{name}/{experiment[kind]}", source.read(f"{DIRECTORY}/{experiment[kind]}"))
             write(f"{name}/{name}_ref.opt", options(experiment).encode())
             write(f"{name}/README.md", readme(experiment).encode())
 

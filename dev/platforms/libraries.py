@@ -98,12 +98,12 @@ def macos_sdk() -> Path:
 
     text = (Path(ziglang.__file__).parent / "lib/libc/darwin/libSystem.tbd").read_text(encoding="utf-8")
     text = re.sub(r"targets:\s*\[[^\]]*\]", "targets: [ x86_64-macos, arm64-macos ]", text)
-    folder = target_directory() / "macos-sdk" / "usr" / "lib"
-    folder.mkdir(parents=True, exist_ok=True)
+    directory = target_directory() / "macos-sdk" / "usr" / "lib"
+    directory.mkdir(parents=True, exist_ok=True)
     # The other libraries that Rust names are parts of libSystem, or (iconv) are not used.
     for name in ("System", "c", "m", "iconv"):
-        (folder / f"lib{name}.tbd").write_text(text, encoding="utf-8")
-    return folder.parents[1]
+        (directory / f"lib{name}.tbd").write_text(text, encoding="utf-8")
+    return directory.parents[1]
 
 
 @cache

@@ -13,7 +13,7 @@ import lief
 import pytest
 from conftest import DIST, binaries, wheel
 from libraries import EPOCH
-from targets import FOLDERS, GLIBC, MODELS, TARGETS, WINDOWS, Target
+from targets import DIRECTORIES, GLIBC, MODELS, TARGETS, WINDOWS, Target
 
 #: Bytes per target.
 LARGEST = 450_000
@@ -47,9 +47,9 @@ def native(target: Target) -> bytes:
 def libraries() -> Iterator[object]:
     """All libraries, each with its targets, exports and name, and the names of further libraries that it may load."""
     for model in MODELS:
-        for folder, content in binaries(DIST / f"{model}.fmu").items():
-            name = f"@rpath/{model}.dylib" if "darwin" in folder else f"{model}.dll"
-            yield pytest.param(content, FOLDERS[folder], FUNCTIONS, name, set(), id=f"{model} {folder}")
+        for directory, content in binaries(DIST / f"{model}.fmu").items():
+            name = f"@rpath/{model}.dylib" if "darwin" in directory else f"{model}.dll"
+            yield pytest.param(content, DIRECTORIES[directory], FUNCTIONS, name, set(), id=f"{model} {directory}")
     for target in TARGETS:
         name, others = "@rpath/fmu_run._native.abi3.so", set()
         if target is WINDOWS:

@@ -41,9 +41,9 @@ def test_help_lists_every_target_that_no_other_needs() -> None:
 @pytest.mark.parametrize("name", [name for name in PAGES if not name.startswith(("CHANGELOG", "crates/"))])
 def test_named_paths_exist(name: str) -> None:
     """Checks all paths in CONTRIBUTING.md; in other pages, paths that begin with a directory of the project."""
-    kept, folders = [f"/{path}/" for path in FILES], {path.split("/")[0] for path in FILES if "/" in path}
+    kept, directories = [f"/{path}/" for path in FILES], {path.split("/")[0] for path in FILES if "/" in path}
     for path in PATH.findall(text(name)):
-        if not path.startswith(MADE) and (name == "CONTRIBUTING.md" or path.split("/")[0] in folders):
+        if not path.startswith(MADE) and (name == "CONTRIBUTING.md" or path.split("/")[0] in directories):
             assert any(f"/{path.rstrip('/')}/" in other for other in kept), path
 
 

@@ -84,8 +84,8 @@ def test_the_reference_experiments_are_written(tmp_path: Path) -> None:
 
 
 def test_docs_are_written(tmp_path: Path) -> None:
-    for folder in ("docs", TESTBED.content, CONTROLLER.content):
-        shutil.copytree(ROOT / folder, tmp_path / folder)
+    for directory in ("docs", TESTBED.content, CONTROLLER.content):
+        shutil.copytree(ROOT / directory, tmp_path / directory)
     (tmp_path / TESTBED.path).unlink()
     run(sys.executable, "dev/tools", "docs", "--project", tmp_path)
     assert (tmp_path / TESTBED.path).read_bytes() == (ROOT / TESTBED.path).read_bytes()

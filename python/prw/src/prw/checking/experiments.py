@@ -16,7 +16,7 @@ from prw.arguments import check_names
 from prw.errors import UserError
 from prw.motion import Array
 
-FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
+DIRECTORY = "extra/org.fmi-standard.fmi-ls-ref"
 
 Value = float | int | bool
 
@@ -73,7 +73,7 @@ def find(known: Sequence[Experiment], name: str) -> Experiment:
 
 
 def _text(archive: zipfile.ZipFile, name: str) -> str:
-    return archive.read(f"{FOLDER}/{name}").decode("utf-8")
+    return archive.read(f"{DIRECTORY}/{name}").decode("utf-8")
 
 
 def _columns(text: str) -> dict[str, Array]:
