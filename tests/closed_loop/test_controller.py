@@ -1,4 +1,4 @@
-"""prw_controller.fmu under FMPy, and with a testbed whose references jump."""
+"""prw_controller.fmu under FMPy, and coupled to the testbed while its references jump."""
 
 from __future__ import annotations
 
@@ -40,7 +40,8 @@ def start(instance: Instance, **values) -> None:
 
 
 def run(make, duration: float, reference):
-    """Controller and testbed, step by step. reference(t): (2,) rad. Returns time (n,), pitch and roll (n, 2) rad, motors (n, 4)."""
+    """Runs controller and testbed, step by step. reference(t): pitch and roll (2,) in rad. Returns time (n,) in s, pitch and
+    roll (n, 2) in rad, and the motors' angles and rates (n, 4)."""
     testbed, controller = make("prw_testbed"), make("prw_controller")
     start(testbed, use_omega=True)
     start(controller)
@@ -64,7 +65,7 @@ def test_the_validator_reports_nothing(controller):
 
 
 def moved_by_fmpy(fmu, **options) -> np.ndarray:
-    """The motors' motion (samples, 4) at each sample; all inputs follow a straight line, which every importer knows."""
+    """Returns the motors' motion (samples, 4) at each sample. All inputs are linear in time, so every importer interpolates them exactly."""
     time = np.arange(0.0, 1.0 + STEP / 2, STEP)
     slopes = {
         "pitch_ref": 0.5,
@@ -83,7 +84,7 @@ def moved_by_fmpy(fmu, **options) -> np.ndarray:
         str(fmu), stop_time=1.0, output_interval=STEP, step_size=STEP, input=inputs, output=MOTORS, **options
     )
     moments = np.round(result["time"] / STEP).astype(int)
-    # Before and after an event there are two rows; the motion is the same in both.
+    # An event has two rows, before and after it; the motion is equal in both.
     last = np.searchsorted(moments, np.arange(len(time)), side="right") - 1
     return np.array([[row[name] for name in MOTORS] for row in result[last]])
 
@@ -106,7 +107,7 @@ def test_samples_are_events_that_fmpy_handles(controller, options):
     np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-13)
 
 
-def test_a_reference_that_jumps_to_and_fro_is_followed_within_limits(make):
+def test_a_jumping_reference_is_followed_within_limits(make):
     goals = np.deg2rad([[30, 60], [-30, 60], [0, -90], [10, 0]])
     time, wrist, motors = run(make, 4.0, lambda t: goals[int(t)])
     for k, goal in enumerate(goals):
@@ -114,19 +115,19 @@ def test_a_reference_that_jumps_to_and_fro_is_followed_within_limits(make):
         assert np.max(np.abs(np.rad2deg(wrist[end] - goal))) < 0.1
     assert np.max(np.abs(motors[:, 2:])) <= 3 + 1e-9
     assert np.max(np.abs(np.diff(motors[:, 2:], axis=0))) <= 30 * STEP * (1 + 1e-6)
-    # omega is the derivative of theta: between samples, which are a step apart, exactly.
+    # omega is the derivative of theta: exactly, between two samples, whose distance is one step.
     moved, mean = np.diff(motors[:, :2], axis=0), STEP * (motors[1:, 2:] + motors[:-1, 2:]) / 2
     np.testing.assert_allclose(moved, mean, atol=1e-14)
 
 
-def test_output_derivatives_are_those_of_the_motion(make):
+def test_output_derivatives_are_derivatives_of_the_motion(make):
     controller = make("prw_controller")
     start(controller, pitch_ref=0.5)
     controller.step(0.0, 2.5e-3)
     references = [controller.variables[name].valueReference for name in MOTORS]
     first = controller.fmi.getRealOutputDerivatives(references, [1] * 4)
     np.testing.assert_allclose(first, [*controller.get("omega1", "omega2"), 30.0, 30.0])
-    # More than maxOutputDerivativeOrder, which is all that OMSimulator asks for: theta' must be it.
+    # The order 2 exceeds maxOutputDerivativeOrder, so the FMU rejects it.
     with pytest.raises(FMICallException):
         controller.fmi.getRealOutputDerivatives(references[:2], [2, 2])
 

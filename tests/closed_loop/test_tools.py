@@ -1,4 +1,4 @@
-"""`tools closed-loop` and `tools validation`, and the example FMU to copy."""
+"""`tools closed-loop` and `tools validation`, and the smallest example FMU, lag.fmu."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def tools(*arguments):
 def test_it_writes_figures_and_tables_and_prints_results(closed_loop, tmp_path):
     run = tools("--fmus", str(FMUS), "--out", str(tmp_path))
     assert run.returncode == 0, run.stderr
-    for text in ("pitch_ref 30 deg, roll_ref 60 deg", "within 0.1 deg after", "FMPy", "with input derivatives"):
-        assert text in run.stdout, run.stdout
+    for part in ("pitch_ref 30 deg, roll_ref 60 deg", "within 0.1 deg after", "FMPy", "with input derivatives"):
+        assert part in run.stdout, run.stdout
     table = np.genfromtxt(tmp_path / "closed_loop.csv", delimiter=",", names=True)
     assert len(table) == closed_loop.steps and "testbedpitch" in "".join(table.dtype.names).replace("_", "")
     for name in ("closed_loop.png", "coupling.png"):
@@ -51,7 +51,7 @@ def test_the_compatibility_table_names_the_versions_that_run_here():
 
 
 @pytest.mark.parametrize("interface", ["CoSimulation", "ModelExchange"])
-def test_the_example_to_copy_works(interface):
+def test_the_smallest_example_works(interface):
     """lag.fmu: x' = u - x."""
     fmu = str(built("lag.fmu"))
     assert validate_fmu(fmu) == []
@@ -88,13 +88,13 @@ def test_the_report(validate, fmu, closed_loop):
     assert status == 0 and all(row["agrees"] and row["share"] < 0.5 for row in found["rows"])
     assert len(found["rows"]) == 2 * len(known) + 1 and found["guid"] in page
     assert "No measured data of the real testbed were available" in page
-    text = html.unescape(re.sub(r"<[^>]*>", " ", page))
+    shown = html.unescape(re.sub(r"<[^>]*>", " ", page))
     for row in found["rows"]:
-        assert row["importer"] in text and f"{row['share']:.1%}" in text
+        assert row["importer"] in shown and f"{row['share']:.1%}" in shown
     # Every experiment detects 1 % of a stiffness.
     for name, shares in found["sensitivity"].items():
         assert shares["k1"] > 1.4 and shares["k2"] > 1.4, name
-        assert f"{shares['c3']:.1f}" in text
+        assert f"{shares['c3']:.1f}" in shown
 
 
 def test_a_file_of_another_tool(validate, fmu, tmp_path, capsys):

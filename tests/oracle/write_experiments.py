@@ -47,7 +47,7 @@ def files(found: list[Experiment]) -> dict[Path, str]:
 
 
 def table(columns: dict[str, Any]) -> str:
-    """CSV as the FMI Cross-Check has it: names in quotes, commas, nothing else."""
+    """CSV in the format of the FMI Cross-Check: names in quotes, commas, nothing else."""
     rows = np.round(np.column_stack(list(columns.values())), DECIMALS) + 0.0  # no -0.0
     lines = [",".join(f'"{name}"' for name in columns), *(",".join(f"{v:.10g}" for v in row) for row in rows)]
     return "\n".join(lines) + "\n"
@@ -118,7 +118,7 @@ def about(found: list[Experiment]) -> str:
     kinds = ", ".join(" ".join(names) for names in KINDS)
     return f"""Reference experiments
 
-The folder extra/{LAYER} has experiments to test an importer. A program that shares no code with
+The folder extra/{LAYER} contains experiments to test an importer. A program that shares no code with
 the FMU calculated the outputs from the energies of the testbed's parts.
 
 {listed}
