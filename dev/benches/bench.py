@@ -80,7 +80,7 @@ def prepare(fmu: Path) -> str:
     with zipfile.ZipFile(fmu) as archive:
         (WORK / "fmu.so").write_bytes(archive.read("binaries/linux64/prw_testbed.so"))
     strict, directory = ("-Wall", "-Wextra", "-Werror"), ROOT / "dev" / "benches" / "c"
-    for library in ("bare_exact", "euler", "empty"):
+    for library in ("bare_exact", "euler"):
         compile_c(f"{library}.so", "-O3", *strict, "-shared", "-fPIC", directory / f"{library}.c")
     compile_c("bench", "-O2", *strict, directory / "bench.c")
     return str(fmpy.read_model_description(str(fmu)).guid)
@@ -158,7 +158,7 @@ def profile(guid: str) -> None:
 
     names = {"PROGRAM TOTALS": "all"} | {name: name for name in ("fmi2SetReal", "fmi2DoStep", "fmi2GetReal")}
     rows = []
-    for library in ("fmu",) if QUICK else ("fmu", "bare_exact", "empty"):
+    for library in ("fmu",) if QUICK else ("fmu", "bare_exact"):
         for way, label in enumerate(ways):
             # The difference between a long run and a short run does not contain the start of the program.
             short, long = (count(library, way, number) for number in (1000, 11000))

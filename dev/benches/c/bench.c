@@ -16,7 +16,7 @@
 
 #include "fmi2FunctionTypes.h"
 
-/* fmi2Terminate and fmi2Reset are NULL for bare_exact.c, euler.c and empty.c, which do not define them. */
+/* fmi2Terminate and fmi2Reset are NULL for bare_exact.c and euler.c, which do not define them. */
 #define FUNCTIONS(F) \
     F(Instantiate) F(SetupExperiment) F(EnterInitializationMode) F(ExitInitializationMode) F(SetReal) F(GetReal) \
     F(SetBoolean) F(SetRealInputDerivatives) F(DoStep) F(GetFMUstate) F(SetFMUstate) F(FreeFMUstate) \
