@@ -104,8 +104,8 @@ def main(count: int = 1024, rounds: int = ROUNDS, fresh: int = 1000) -> tuple[Fi
     ):
         pitch, _ = play(envs, np.repeat(rates, fresh, axis=0), np.repeat(gains, fresh, axis=0), fresh, seed=10**6)
         left[name] = np.sort(np.ptp(pitch[round(duration / STEP) :], axis=0))
-        mid, high, most = np.percentile(left[name], [50, 95, 100])
-        print(f"{name:<11} in {duration:g} s: median vibration {mid:.2f} deg, 95 % below {high:.2f}, at most {most:.2f}")
+        mid, p95, most = np.percentile(left[name], [50, 95, 100])
+        print(f"{name:<11} in {duration:g} s: median vibration {mid:.2f} deg, 95 % below {p95:.2f}, at most {most:.2f}")
         shares.semilogx(left[name], np.linspace(0, 100, fresh), color=colour, label=f"{name} ({duration:.2f} s)")
         band = np.percentile(pitch, [2.5, 97.5], axis=1)
         motions.fill_between(STEP * np.arange(len(pitch)), *band, color=colour, linewidth=0)

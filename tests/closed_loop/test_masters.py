@@ -36,7 +36,7 @@ def by_fmu_run(closed_loop, starts_late: bool) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def response(master, closed_loop):
-    return masters.run_apart(master, closed_loop)
+    return masters.run_separately(master, closed_loop)
 
 
 def test_there_are_at_least_two_masters():
@@ -90,7 +90,7 @@ def python_loop(tmp_path_factory, fmu):
 
 @pytest.fixture(scope="module")
 def python_response(master, python_loop):
-    return masters.run_apart(master, python_loop)
+    return masters.run_separately(master, python_loop)
 
 
 def test_the_python_controller_settles(python_response, python_loop):
@@ -100,7 +100,7 @@ def test_the_python_controller_settles(python_response, python_loop):
 
 
 def test_masters_agree_on_the_python_controller(python_response, python_loop):
-    reference = masters.run_apart(masters.MASTERS[0], python_loop)
+    reference = masters.run_separately(masters.MASTERS[0], python_loop)
     for name in ("testbed.pitch", "testbed.roll", "controller.theta1", "controller.theta2"):
         assert np.max(np.abs(python_response[name] - reference[name])) < 1e-12, name
 

@@ -152,30 +152,21 @@ def test_numbers_of_many_rows(tmp_path: Path, delimiter: Any, end: Any) -> None:
 
 
 def test_units_of_the_header_and_of_the_option(file: Any) -> None:
-    path = file(lines("time [ms],theta1 (deg),theta2 [rev],pitch"))
-    measured = read(path, units={"pitch": "mrad"})
-    assert measured.time[-1] == pytest.approx(0.29e-3)
-    np.testing.assert_allclose(measured.theta[0], [np.deg2rad(0.1), 0.4 * np.pi])
-    assert measured["pitch"][6] == pytest.approx(0.6e-3)
-    assert list(measured.measured) == ["pitch"]
-    assert read(path)["pitch"][6] == pytest.approx(0.6)
-    assert read(path, degrees=True)["pitch"][6] == pytest.approx(np.deg2rad(0.6))
-
-
-def test_units_of_time_angles_and_rates(file: Any) -> None:
-    motion = read_motion(
-        file("time [ms],theta1 [deg],theta2 [deg],omega1_rpm,omega2_rpm,tau1 [N.m]\n0,180,90,30,0,1\n5,180,90,30,0,1\n")
+    path = file(
+        "time [ms],theta1 (deg),theta2 [rev],omega1_rpm,omega2,tau1,pitch\n0,180,2,30,0,1,6\n5,180,2,30,0,1,6\n"
     )
-    assert motion.omega is not None and "columns ignored: tau1 [N.m]" in motion.notes
-    np.testing.assert_allclose(motion.time, [0, 5e-3], rtol=1e-15)
-    np.testing.assert_allclose(motion.theta, [[np.pi, np.pi / 2]] * 2, rtol=1e-15)
-    np.testing.assert_allclose(motion.omega, [[np.pi, 0]] * 2, rtol=1e-15)
-
-
-@pytest.mark.parametrize("unit, factor", [("N.m", 1), ("Nm", 1), ("N·m", 1), ("mN.m", 1e-3), ("N cm", 1e-2)])
-def test_torque_units(file: Any, unit: Any, factor: Any) -> None:
-    measured = read(file(lines(f"time,theta1,theta2,tau1 [{unit}]")))
-    assert measured["tau1"][6] == pytest.approx(0.6 * factor)
+    measured, motion = read(path, units={"pitch": "mrad"}), read_motion(path)
+    for time, theta, omega in ((m.time, m.theta, m.omega) for m in (measured, motion)):
+        np.testing.assert_allclose(time, [0, 5e-3], rtol=1e-15)
+        np.testing.assert_allclose(theta, [[np.pi, 4 * np.pi]] * 2, rtol=1e-15)
+        np.testing.assert_allclose(omega, [[np.pi, 0]] * 2, rtol=1e-15)
+    assert measured["pitch"][1] == pytest.approx(6e-3) and list(measured.measured) == ["tau1", "pitch"]
+    assert "columns ignored: tau1, pitch" in motion.notes
+    assert read(path)["pitch"][1] == 6 and read(path, degrees=True)["pitch"][1] == pytest.approx(np.deg2rad(6))
+    for unit, factor in {"N.m": 1, "Nm": 1, "N·m": 1, "mN.m": 1e-3, "N cm": 1e-2}.items():
+        assert read(path, units={"tau1": unit})["tau1"][1] == pytest.approx(factor)
+    with pytest.raises(UserError, match="column theta1: in deg by its header, but in rad by the units given"):
+        read(path, units={"theta1": "rad"})
 
 
 @pytest.mark.parametrize(
@@ -223,19 +214,6 @@ def test_degrees(file: Any) -> None:
     np.testing.assert_allclose(motion.omega, np.deg2rad([[0, 0], [60, 0]]), rtol=1e-15)
     assert motion.notes == []
     assert any("if it is in degrees, call it theta1 [deg]" in note for note in read_motion(path).notes)
-
-
-def test_units_that_contradict(file: Any) -> None:
-    with pytest.raises(UserError, match="column pitch: in deg by its header, but in rad by the units given"):
-        read(file(lines("time,theta1,theta2,pitch [deg]")), units={"pitch": "rad"})
-
-
-def test_a_slow_sensor_leaves_cells_empty(file: Any) -> None:
-    text = lines("time,theta1,theta2,pitch,tau1", 60, "{t},0.1,0.2,,{x}").splitlines()
-    for k in range(1, 61, 2):
-        text[k] = text[k].replace(",,", f",{k / 100},")
-    measured = read(file("\n".join(text)))
-    assert {name: np.isfinite(column).sum() for name, column in measured.measured.items()} == {"tau1": 60, "pitch": 30}
 
 
 @pytest.mark.parametrize(
