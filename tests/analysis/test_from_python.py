@@ -97,10 +97,10 @@ def test_wrong_arguments(recording, fmu, options, message):
     assert message in str(error.value)
 
 
-def test_sources_that_are_no_recording():
+def test_sources_that_are_not_recordings():
     for files, message in (
-        (None, "None is no recording"),
-        ([None], "None is no recording"),
+        (None, "None is not a recording"),
+        ([None], "None is not a recording"),
         ([], "files: there are none"),
     ):
         with pytest.raises(prw.UserError, match=message):

@@ -91,7 +91,7 @@ def test_transfer_matrices(testbed: Path) -> None:
     )
     np.testing.assert_array_equal(found.response_at_hz(s.imag / (2 * np.pi), RATES), found.transfer(s, RATES))
     assert found.moved(RATES) == ("theta1", "theta2")
-    with pytest.raises(prw.UserError, match="rates: omega9 is no input; there are theta1, theta2"):
+    with pytest.raises(prw.UserError, match="rates: omega9 is not an input; there are theta1, theta2"):
         found.transfer(1j, {"omega9": "theta1"})
 
 

@@ -159,6 +159,7 @@ def test_units_of_the_header_and_of_the_option(file: Any) -> None:
     for time, theta, omega in ((m.time, m.theta, m.omega) for m in (measured, motion)):
         np.testing.assert_allclose(time, [0, 5e-3], rtol=1e-15)
         np.testing.assert_allclose(theta, [[np.pi, 4 * np.pi]] * 2, rtol=1e-15)
+        assert omega is not None
         np.testing.assert_allclose(omega, [[np.pi, 0]] * 2, rtol=1e-15)
     assert measured["pitch"][1] == pytest.approx(6e-3) and list(measured.measured) == ["tau1", "pitch"]
     assert "columns ignored: tau1, pitch" in motion.notes
@@ -174,7 +175,7 @@ def test_units_of_the_header_and_of_the_option(file: Any) -> None:
     ["t_ms,theta1_deg,theta2/deg,tau1_Nm,pitch_rate_wanted", "# Time (ms),THETA1 deg,theta2 [°],Tau1/N.m,tau1_raw"],
 )
 def test_headers_as_others_write_them(file: Any, header: Any) -> None:
-    """Units after `_`, `/` or a space, capitals, numpy's `#` before the header; a suffix that is no unit makes another name."""
+    """Units after `_`, `/` or a space, capitals, numpy's `#` before the header; a suffix that is not a unit is part of the name."""
     path = file("# rig 2; 13 May\n\n" + lines(header, row="{t},0.1,0.2,{x},0"))
     measured = read(path)
     assert measured.time[-1] == pytest.approx(0.29e-3)
@@ -322,7 +323,7 @@ def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
         ({**good, "time": [1.0, 0.0]}, "recording, column time: time must increase"),
         (dict.fromkeys(good, [0.0]), "recording: has 1 rows; at least two are needed"),
         ({**good, "theta1 [deg]": [0.0, 1.0]}, "recording, column theta1: appears twice"),
-        (None, "None is no recording: neither a file nor a DataFrame"),
+        (None, "None is not a recording: neither a file nor a DataFrame"),
     ]
     for source, complaint in wrong:
         with pytest.raises(UserError, match=complaint):

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from prw.errors import UserError
 
 #: A larger relative standard deviation is a mistake: percent instead of a fraction.
-MOST_RELATIVE = 1.0
+MAX_RELATIVE = 1.0
 #: Rows of CSV, in memory.
 Table = Mapping[str, Any]
 
@@ -58,7 +58,7 @@ def spread_of(argument: str, name: str, given: Any, start: float) -> tuple[float
     then the central value is `start`."""
     value, relative = given if isinstance(given, Sequence) and len(given) == 2 else (start, given)
     value, relative = positive(argument, value, name), positive(argument, relative, name)
-    if relative > MOST_RELATIVE:
+    if relative > MAX_RELATIVE:
         raise UserError(
             f"{name} has a standard deviation of {relative:.0%}; 100 % is the most, as a fraction 1", argument=argument
         )

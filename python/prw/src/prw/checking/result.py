@@ -172,11 +172,11 @@ def _modelica(path: Path, content: Mapping[str, Any]) -> dict[str, Array]:
     titles = ["".join(row).rstrip("\0 ") for row in upright("name")]
     about = ["".join(row).rstrip("\0 ") for row in upright("description")]
     columns = {}
-    for title, text, (table, index, *_) in zip(titles, about, upright("dataInfo")):
+    for title, description, (table, index, *_) in zip(titles, about, upright("dataInfo")):
         data = upright(f"data_{table or 2}")
         if table == 1:  # does not change
             continue
-        unit = re.search(r"\[([^\]|:#]+)[^\]]*\]\s*$", text)
+        unit = re.search(r"\[([^\]|:#]+)[^\]]*\]\s*$", description)
         values = np.sign(index) * data[:, abs(int(index)) - 1].astype(np.float64)
         columns[f"{title} [{unit[1]}]" if unit else title] = values
     if not columns:

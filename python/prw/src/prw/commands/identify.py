@@ -129,12 +129,12 @@ def run(arguments: argparse.Namespace) -> None:
     print(f"next        look at the report; then: prw simulate {arguments.files[0]} --parameters {parameters}")
 
 
-def _quantum(text: str | None) -> float:
-    if text is None:
+def _quantum(string: str | None) -> float:
+    if string is None:
         return 0.0
-    match = re.fullmatch(r"\s*([-+.\deE]+)\s*([^\d\s].*)?", text)
+    match = re.fullmatch(r"\s*([-+.\deE]+)\s*([^\d\s].*)?", string)
     if not match:
-        raise UserError("write an angle like 0.036deg", argument="quantum", given=text)
+        raise UserError("write an angle like 0.036deg", argument="quantum", given=string)
     try:
         return number(match[1]) * factor("theta1", match[2] or "rad")
     except ValueError as error:
