@@ -3,61 +3,34 @@
 from __future__ import annotations
 
 import fmpy
+import fmu_run
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 from instance import Instance
 
-MEASURED = ("pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2")
 MOTORS = ("theta1", "theta2", "omega1", "omega2")
 STEP = 1e-3
 
 
-@pytest.fixture(scope="module")
-def directories(fmu, controller_fmu, unpack):
-    return {each.stem: unpack(each) for each in (fmu, controller_fmu)}
-
-
 @pytest.fixture
-def make(directories):
+def start(controller_fmu, unpack):
+    """Returns a function that creates and initializes a controller with the given start values."""
     instances = []
 
-    def make(name: str) -> Instance:
-        instances.append(Instance(directories[name], fmpy.read_model_description(directories[name]), name))
+    def start(**values) -> Instance:
+        description = fmpy.read_model_description(controller_fmu)
+        instances.append(Instance(unpack(controller_fmu), description, "prw_controller"))
+        instances[-1].fmi.setupExperiment(startTime=0.0)
+        instances[-1].set(**values)
+        instances[-1].fmi.enterInitializationMode()
+        instances[-1].fmi.exitInitializationMode()
         return instances[-1]
 
-    yield make
+    yield start
     for instance in instances:
         instance.free()
-
-
-def start(instance: Instance, **values) -> None:
-    instance.fmi.setupExperiment(startTime=0.0)
-    instance.set(**values)
-    instance.fmi.enterInitializationMode()
-    instance.fmi.exitInitializationMode()
-
-
-def run(make, duration: float, reference):
-    """Runs controller and testbed, step by step. reference(t): pitch and roll (2,) in rad. Returns time (n,) in s, pitch and
-    roll (n, 2) in rad, and the motors' angles and rates (n, 4)."""
-    testbed, controller = make("prw_testbed"), make("prw_controller")
-    start(testbed, use_omega=True)
-    start(controller)
-    wrist, motors, n = [], [], round(duration / STEP)
-    for k in range(n):
-        t = k * STEP
-        values = dict(zip(MEASURED, testbed.get(*MEASURED)))
-        motion = dict(zip(MOTORS, controller.get(*MOTORS)))
-        controller.set(**dict(zip(("pitch_ref", "roll_ref"), reference(t))), **values)
-        testbed.set(**motion)
-        controller.step(t, STEP)
-        testbed.step(t, STEP)
-        wrist.append(testbed.get("pitch", "roll"))
-        motors.append(controller.get(*MOTORS))
-    assert not testbed.complaints() and not controller.complaints()
-    return STEP * np.arange(1, n + 1), np.array(wrist), np.array(motors)
 
 
 def test_the_validator_reports_nothing(controller):
@@ -107,9 +80,13 @@ def test_samples_are_events_that_fmpy_handles(controller, options):
     np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-13)
 
 
-def test_a_jumping_reference_is_followed_within_limits(make):
-    goals = np.deg2rad([[30, 60], [-30, 60], [0, -90], [10, 0]])
-    time, wrist, motors = run(make, 4.0, lambda t: goals[int(t)])
+def test_a_jumping_reference_is_followed_within_limits(closed_loop):
+    goals, time = np.deg2rad([[30, 60], [-30, 60], [0, -90], [10, 0]]), STEP * np.arange(4001)
+    inputs = dict(zip(("pitch_ref", "roll_ref"), goals[np.minimum(time.astype(int), 3)].T))
+    names = ["testbed.pitch", "testbed.roll", *(f"controller.{name}" for name in MOTORS)]
+    with fmu_run.System(closed_loop.ssp) as loop:
+        runs = loop.run(time, inputs=inputs, outputs=names).check()
+    wrist, motors = np.hsplit(np.column_stack([runs[name][0] for name in names]), [2])
     for k, goal in enumerate(goals):
         end = (time > k + 0.9) & (time < k + 1.0)
         assert np.max(np.abs(np.rad2deg(wrist[end] - goal))) < 0.1
@@ -120,9 +97,8 @@ def test_a_jumping_reference_is_followed_within_limits(make):
     np.testing.assert_allclose(moved, mean, atol=1e-14)
 
 
-def test_output_derivatives_are_derivatives_of_the_motion(make):
-    controller = make("prw_controller")
-    start(controller, pitch_ref=0.5)
+def test_output_derivatives_are_derivatives_of_the_motion(start):
+    controller = start(pitch_ref=0.5)
     controller.step(0.0, 2.5e-3)
     references = [controller.variables[name].valueReference for name in MOTORS]
     first = controller.fmi.getRealOutputDerivatives(references, [1] * 4)
@@ -132,9 +108,8 @@ def test_output_derivatives_are_derivatives_of_the_motion(make):
         controller.fmi.getRealOutputDerivatives(references[:2], [2, 2])
 
 
-def test_motors_start_at_their_given_angles(make):
-    controller = make("prw_controller")
-    start(controller, theta1=0.7, theta2=0.7, pitch_ref=0.7, pitch=0.7)
+def test_motors_start_at_their_given_angles(start):
+    controller = start(theta1=0.7, theta2=0.7, pitch_ref=0.7, pitch=0.7)
     for k in range(100):
         controller.step(k * STEP, STEP)
     np.testing.assert_array_equal(controller.get(*MOTORS), [0.7, 0.7, 0.0, 0.0])
