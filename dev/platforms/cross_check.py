@@ -1,5 +1,5 @@
-"""Packs the reference experiments by the rules of the FMI Cross-Check (4.1, section 9.1.4): one directory for each, with
-the FMU, inputs, outputs and options."""
+"""Packs the reference experiments by the rules of the FMI Cross-Check (4.1, section 9.1.4). Each experiment has a directory
+with the FMU, inputs, outputs and options."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 #: Directory of the experiments in the FMU.
 DIRECTORY = "extra/org.fmi-standard.fmi-ls-ref"
-#: For tools that use one tolerance for all variables.
+#: Relative tolerance for tools that use one tolerance for all variables.
 RELATIVE_TOLERANCE = 1e-3
 #: Fixed time of every file in the zip file, for reproducible bytes.
 TIME = (1980, 1, 1, 0, 0, 0)

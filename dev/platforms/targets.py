@@ -67,7 +67,8 @@ DIRECTORIES = {
     "aarch64-darwin": (MAC_ARM,),
 }
 
-#: With FMI 2.0, importers on ARM Linux look in linux64, where an FMU for both has the Intel library.
+#: With FMI 2.0, importers on ARM Linux also look in linux64. An FMU for Intel and ARM has the Intel library there, so the
+#: library for ARM needs a separate FMU.
 ARM_DIRECTORIES = {"linux64": (LINUX_ARM,)}
 
 #: FMI 3.0 has a directory for each target.

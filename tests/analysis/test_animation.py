@@ -60,7 +60,7 @@ def test_roll_turns_the_gripper_in_the_ring() -> None:
 
 @pytest.mark.parametrize("carrier, side, roll", [("theta5", -1, 1), ("theta6", 1, -1)])
 def test_cam_moves_with_the_rollers_that_touch_it(carrier: str, side: int, roll: int) -> None:
-    """At the contact above the input shaft of a side, both move to the viewer, as in eq. (1)."""
+    """At the contact above the input shaft of a side, carrier and cam both move to the viewer, as in eq. (1)."""
     contact, small = np.array([side * 0.6, 0.6, 0.0]), 1e-3
     assert (about_x(small) @ contact)[2] > 0, carrier
     assert (about_y(roll * small) @ contact)[2] > 0, carrier

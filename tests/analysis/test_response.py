@@ -114,7 +114,7 @@ def test_logged_rates_help_and_their_noise_is_found():
 
 
 def test_errors_drawn_at_two_angles_differ():
-    """At each of two angles the motor rests at, an encoder errs by anything up to half a quantum."""
+    """At each of two angles at which the motor rests, the error of the encoder is any value up to half a quantum."""
     t = np.arange(4001) * 1e-3
     quantum = 2 * np.pi / 10_000
     angle = 0.4 / (1 + np.exp(-(t - 2) / 0.02))

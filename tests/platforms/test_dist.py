@@ -1,4 +1,4 @@
-"""The files in dist/ belong together."""
+"""The files in dist/ are complete and consistent."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_fmus_for_fmi_3_have_the_same_libraries_and_documents(model: str) -> Non
 
 
 def test_the_variants_of_the_fmu() -> None:
-    """One for importers on ARM, which look in linux64, and one as C sources, which tests/source_fmu compiles."""
+    """One variant is for importers on ARM, which look in linux64. Another contains C sources, which tests/source_fmu compiles."""
     fmu = DIST / f"{MODEL}.fmu"
     assert binaries(DIST / ARM)["linux64"] == binaries(fmu)["aarch64-linux"]
     assert others(ARM) == others(fmu.name)
@@ -118,7 +118,7 @@ def test_the_bills_of_materials(product: Product) -> None:
     components = {component["name"] for component in json.loads(text)["components"]}
     assert {"libc", "std"} <= components
     if product in (FMU, CONTROLLER_FMU):
-        # These packages only pack FMUs.
+        # These packages are used to pack FMUs, and are not in their libraries.
         assert not {"clap", "zip", "serde_json", "anyhow"} & components
         assert others(f"{product.name}.fmu")[f"documentation/licenses/{product.bill.name}"].decode() == text
 

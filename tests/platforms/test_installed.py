@@ -1,5 +1,5 @@
-"""The wheels of fmu-run and prw as users have them: installed on Linux with neither Rust nor a compiler, where README and
-tutorial are followed. On Windows (Wine) and ARM Linux (QEMU) they and FMPy give the same bits as on this machine."""
+"""Installs the wheels of fmu-run and prw on Linux without Rust and compilers, and runs the programs of READMEs and tutorial.
+On Windows (Wine) and ARM Linux (QEMU) the wheels and FMPy give results that are bit-identical to this machine."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def test_the_programs_in_the_readmes(student: Installed, page: str) -> None:
 
 
 def test_the_tutorial(student: Installed) -> None:
-    """All but the commands that need the sources. Where the tutorial builds an FMU, the FMU in the wheel is used."""
+    """Runs all commands except those that need the sources. If the tutorial builds an FMU, the FMU in the wheel replaces it."""
     done = []
     for language, block in BLOCK.findall((ROOT / "python" / "prw" / "tutorial.md").read_text()):
         if language == "python":
@@ -162,7 +162,7 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> System:
         for needed in ("archives/partial", "lists/partial"):
             (directory / needed).mkdir(parents=True)
         (directory / "installed").touch()
-        # As on a machine of that kind where nothing is installed.
+        # Options for an ARM machine on which nothing is installed.
         options = {"Dir::State": directory, "Dir::State::status": directory / "installed", "Dir::Cache": directory}
         options |= {"APT::Architecture": "arm64", "APT::Architectures": "arm64", "Debug::NoLocking": "true"}
         apt = ["apt-get", "--quiet", "--yes", *(f"--option={name}={value}" for name, value in options.items())]
@@ -170,7 +170,7 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> System:
             run(*apt, *command)
         for package in (directory / "archives").glob("*.deb"):
             run("dpkg-deb", "--extract", package, directory / "root")
-        # Complete or absent, also across disks.
+        # The directory is complete or absent, also if temporary files are on another disk.
         shutil.rmtree(partial := root.with_suffix(".partial"), ignore_errors=True)
         shutil.move(directory / "root", partial)
         partial.rename(root)
@@ -201,7 +201,7 @@ def test_both_versions_of_fmi_give_the_same_bits(here: str) -> None:
 
 
 def test_every_system_gives_the_same_bits(system: System, here: str, tmp_path: Path) -> None:
-    """In an empty directory, where prw finds no FMU but that in its wheel."""
+    """Runs in an empty directory, where prw finds only the FMU in its wheel."""
     files = (HERE / "elsewhere.py", ROOT / "examples" / "point_to_point.csv", system.fmu, FMUS[1])
     command = (*system.start, system.python, *map(system.path, files))
     printed = run(*command, environment=system.environment, directory=tmp_path)

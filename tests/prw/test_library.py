@@ -273,7 +273,7 @@ def test_the_command_linearize(testbed: Path, tmp_path: Path) -> None:
 
 
 def test_the_programs_in_the_readme(monkeypatch: pytest.MonkeyPatch) -> None:
-    """They run unchanged, in the repository root."""
+    """The programs run unchanged in the repository root."""
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     short, program = re.findall(r"^```python\n(.*?)^```", readme, flags=re.S | re.M)
     monkeypatch.chdir(ROOT)

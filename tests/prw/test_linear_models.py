@@ -69,7 +69,7 @@ def test_the_point_of_operation_does_not_matter(testbed: Path) -> None:
 
 
 def test_given_flags_count(testbed: Path) -> None:
-    """On the first sample the estimated rates are 0, and at rest the states follow the motors."""
+    """At the first sample the estimated rates are 0. While the testbed starts at rest, the states follow the motors."""
     model = prw.linearize(
         {"use_omega": False, "start_at_rest": True}, fmu=testbed, fmi_type="CoSimulation", outputs=["pitch"]
     )

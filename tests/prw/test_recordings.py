@@ -116,8 +116,8 @@ def test_spellings_of_one_recording(file: Any, content: Any) -> None:
 
 @pytest.mark.parametrize("delimiter, end", [(",", "\n"), (";", "\r\n"), ("\t", "\n")])
 def test_numbers_of_many_rows(tmp_path: Path, delimiter: Any, end: Any) -> None:
-    """They are bit-identical to Python's conversion of each cell, empty or not, also next to columns of text. Errors name
-    the row."""
+    """Numbers are bit-identical to Python's conversion of each cell, also next to empty cells and columns of strings. Errors
+    name the row."""
     draws = np.random.default_rng(6)
     numbers = draws.standard_normal((500, 5)) * 10.0 ** draws.integers(-310, 300, (500, 5))
     cells = [[repr(k * 1e-3), "up", *map(repr, row.tolist())] for k, row in enumerate(numbers)]
@@ -257,7 +257,7 @@ def moving(rows: Any) -> str:
 
 
 def test_a_gap_is_an_error_or_a_note(file: Any) -> None:
-    """For all readers of recordings. The motors may have done anything in 0.2 s; a path goes through 20 ms."""
+    """Motor motion in a gap of 0.2 s is unknown, which is an error. A smooth path bridges a gap of 20 ms."""
     with pytest.raises(UserError, match=r"no rows from 0.299 to 0.5 s, 0.201 s instead of the usual 0.001 s"):
         read_motion(file(moving([*range(300), *range(500, 900)])))
     measured = read(file(moving([*range(300), *range(320, 900)])))

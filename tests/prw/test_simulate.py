@@ -75,7 +75,7 @@ def test_examples(prw: Any, tmp_path: Path, name: Any) -> None:
 
 
 def test_other_parameters(prw: Any, tmp_path: Path) -> None:
-    """In units of the FMU's choice in the file that identification writes, in SI by --set, which is stronger."""
+    """Parameters have their own units in the file that identification writes, and SI units in --set, which has precedence."""
     entries = {"k1": {"value": 2.0, "unit": "N.m/deg"}, "c3": {"value": 0.2, "unit": "N.m.s/rad"}, "N": 9, "k2": 77.0}
     (tmp_path / "mine.json").write_text(json.dumps(entries))
     (tmp_path / "report.json").write_text(json.dumps({"fmu": {}, "parameters": entries}))

@@ -73,7 +73,7 @@ def _run(fmu: Path, motion: Motion) -> Run:
 
 def _step(fmu: Path, sides: tuple[int, int]) -> Step:
     before, end, coarse = -0.02, 0.6, 0.025
-    # At 0 the outputs are unchanged; the impulse through the dampers acts directly afterwards.
+    # At t = 0 the outputs are unchanged. The impulse through the dampers acts immediately afterwards.
     times = np.array([before, 0, 1e-9, *np.arange(1, 601) * 1e-3]), np.array([before, *np.arange(0, end, coarse), end])
     runs = []
     for time in times:

@@ -17,7 +17,7 @@ UNITS: dict[str, dict[str, float]] = {
     "rate": {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": pi / 180, "rev/s": 2 * pi, "rpm": pi / 30},
     "torque": {"N.m": 1.0, "mN.m": 1e-3, "N.cm": 1e-2, "N.mm": 1e-3, "kN.m": 1e3},
 }
-#: Other ways to write them.
+#: Other spellings of units.
 ALIASES = {
     "sec": "s",
     "µs": "us",
@@ -145,7 +145,7 @@ def column(title: str) -> tuple[str, str]:
         return "", ""
     name = "time" if match.group(1).lower() == "t" else match.group(1).lower()
     if match.group(4):
-        # pitch_deg is pitch in deg, but pitch_wanted is something else
+        # pitch_deg is pitch in deg, but pitch_wanted is another column
         try:
             factor(name, match.group(4))
         except UserError:
@@ -160,5 +160,5 @@ def _unit(name: str, in_header: str, given: str, degrees: bool) -> str:
     if degrees and QUANTITIES[name] in ("angle", "rate"):
         default = default.replace("rad", "deg")
     unit = in_header or given or default
-    factor(name, unit)  # raises if it does not fit
+    factor(name, unit)  # raises UserError for a unit of another quantity
     return unit

@@ -112,7 +112,7 @@ def certainty(solution: Solution, widening: Array) -> Certainty:
         expected += comparison.score_variance(jacobian)
         shown += scores(comparison, jacobian, inverse)
     expected, shown = inverse @ expected @ inverse, inverse @ shown @ inverse
-    # If a combination is undetermined, rounding makes some of these negative.
+    # If a combination is undetermined, rounding errors make some variances negative.
     scale = np.sqrt(np.maximum(np.diag(expected), np.finfo(float).tiny))
     errors = np.maximum(np.sqrt(np.maximum(np.diag(shown), 0.0)), scale)
     whiteness = errors / scale
