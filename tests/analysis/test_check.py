@@ -241,7 +241,7 @@ def test_mat_files_that_cannot_be_read(fmu, tmp_path):
     with pytest.raises(prw.UserError, match=r"format 7.3; save it with: save\('run.mat', ..., '-v7'\)"):
         prw.check(path, fmu=fmu)
     path.write_bytes(b"something else")
-    with pytest.raises(prw.UserError, match="no .mat file"):
+    with pytest.raises(prw.UserError, match="cannot be read as a .mat file"):
         prw.check(path, fmu=fmu)
     savemat(path, {"roll": np.zeros(3)})
     with pytest.raises(prw.UserError, match="no vector time or tout; it has .*roll; save time and signals as vectors"):

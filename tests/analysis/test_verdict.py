@@ -71,7 +71,7 @@ def test_two_faults_are_both_named(experiment, fmu):
     assert first.startswith("friction about pitch and roll of 0.1")
     assert second.startswith("besides, tau1") and "ms late" in second and "(delay tau1,tau2" in second
     one = prw.identify(recording(simulated), starts=1, fmu=fmu)
-    assert len(one.diagnosis) == 1, "one fault is one"
+    assert len(one.diagnosis) == 1, "one fault has one cause"
 
 
 def test_a_common_fault_is_found_if_parameters_compensate_for_each_single_one(fmu):
@@ -79,7 +79,7 @@ def test_a_common_fault_is_found_if_parameters_compensate_for_each_single_one(fm
     simulated = rig.late(rig.experiment(400004, 6, pattern="slow"), 7e-4)
     found = prw.identify(recording(simulated, ("tau1", "tau2", "pitch", "roll")), starts=1, fmu=fmu)
     assert {misfit.channel for misfit in found.verdict.misfits} == {"tau1", "tau2"}, found.misfits
-    assert "(delay tau1,tau2 estimates it along)" in found.diagnosis[0], found.diagnosis
+    assert "(delay tau1,tau2 estimates it, too)" in found.diagnosis[0], found.diagnosis
 
 
 @pytest.mark.parametrize("pattern", ["independent", "equal", "slow", "fig4", "moves"])
@@ -92,8 +92,8 @@ def test_a_rig_without_faults_fits(fmu, pattern):
     assert at_rest == {"equal": {"roll"}, "fig4": {"pitch"}}.get(pattern, set())
 
 
-def test_coarse_encoders_on_the_motors_are_no_fault(fmu):
-    # A step of 0.8 mrad is 0.1 N.m of torque, behind which 3 mN.m of noise vanish.
+def test_coarse_encoders_on_the_motors_are_not_a_fault(fmu):
+    # A step of 0.8 mrad changes the torque by 0.1 N.m, which hides 3 mN.m of noise.
     simulated = rig.experiment(151, 6, 250, "moves")
     found = prw.identify(recording(simulated, counts=8000, noise=0.003), starts=1, fmu=fmu)
     assert found.fits, found.misfits

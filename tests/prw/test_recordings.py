@@ -1,4 +1,4 @@
-"""Reading recordings: units, formats, notes, and one clear line for each mistake."""
+"""Reading recordings: units, formats, notes, and one line for each mistake."""
 
 from __future__ import annotations
 

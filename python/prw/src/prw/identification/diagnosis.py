@@ -175,9 +175,9 @@ def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
     for kind, (gain, new, found) in best.items():
         if gain >= max(SHARE * greatest, CLEAR**2):
             good = judge(found).fits
-            then = "with that, the data fit" if good else "that explains a part of it"
+            then = "with that, the data fit" if good else "that explains a part of the misfit"
             channels = ",".join(distortion.channel for distortion in new)
-            message = f"{_sizes(found, new)}: {then} ({kind} {channels} estimates it along)"
+            message = f"{_sizes(found, new)}: {then} ({kind} {channels} estimates it, too)"
             yield _Cause(gain, kind, message, good, partial(refitted, solution, new))
 
 

@@ -210,7 +210,7 @@ class Identification:
         if self.fits:
             lines.append("verdict     the FMU explains the data")
         else:
-            lines.append("verdict     THE FMU DOES NOT EXPLAIN THE DATA; the values below are not to be trusted")
+            lines.append("verdict     THE FMU DOES NOT EXPLAIN THE DATA; the values below are not reliable")
             lines += [f"  {misfit}" for misfit in self.misfits]
             lines += [f"perhaps     {cause}" for cause in self.diagnosis or ["no known cause"]]
         for name, found in self.parameters.items():
