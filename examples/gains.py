@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 SSP = Path("target/fmu/prw_closed_loop.ssp")
-STEP, LENGTH, KEPT = 1e-3, 1.2, 5  # s, s, and one of so many samples is kept
+STEP, LENGTH, KEPT = 1e-3, 1.2, 5  # s; s; every fifth sample is kept
 WRISTS = 100
 GOAL = {"pitch_ref": np.deg2rad(20.0), "roll_ref": np.deg2rad(30.0)}
 CLOSE = np.deg2rad(0.05)
@@ -23,7 +23,7 @@ KI, KD = np.linspace(1.0, 10.0, 10), np.linspace(0.0, 0.0225, 10)  # 1/s, s
 
 
 def settling(loop: fmu_run.System, wrists: int) -> np.ndarray:
-    """When pitch and roll are within CLOSE of the goal for good, (Ki, Kd, wrists) s; LENGTH where they are not."""
+    """Settling times (Ki, Kd, wrists) in s, after which pitch and roll stay within CLOSE of the goal; LENGTH if they do not settle."""
     numbers, count = np.random.default_rng(1), len(KI) * len(KD)
     start: dict[str, fmu_run.Start] = dict(GOAL)
     for name, share in TOLERANCES.items():

@@ -29,7 +29,9 @@ def main(out: Path = Path("out/identify")) -> prw.Identification:
     found = prw.identify(out / "run.csv")
     for name, estimate in found.parameters.items():
         low, high = estimate.interval
-        print(f"{name}: {estimate.value:.4g} +- {estimate.standard_error:.2g}, 95 % between {low:.4g} and {high:.4g}")
+        print(
+            f"{name}: {estimate.value:.4g} +- {estimate.standard_error:.2g} {estimate.unit}, 95 % interval {low:.4g} to {high:.4g}"
+        )
     print(found.summary())
     found.report(out / "report.html")
     return found

@@ -1,6 +1,6 @@
 """A move without vibration, learned on 1,024 wrists at a time
 
-You learn to make Gymnasium environments from an FMU (`fmu_run.gymnasium`), each with other stiffness and load. The
+You learn to create Gymnasium environments from an FMU (`fmu_run.gymnasium`), each with other stiffness and load. The
 cross-entropy method finds a motor trajectory and feedback gains. The result is tested on 1,000 other wrists
 with noisy sensors, and compared with input shapers (ZV, ZVD), which need no sensors.
 
@@ -19,11 +19,11 @@ POLE = -9.683 + 34.678j  # of pitch, 1/s: needed by the shapers
 VARIED = {"k1": 2.11 * 180 / np.pi, "J3": 1.275e-2, "H3": 4.236e-2}  # Table 1; each varies by 20 % either way
 NOISE = {"theta1": 0.0, "pitch": np.deg2rad(0.02), "tau1": 0.02}  # noise of the observed variables, rad and N.m
 RATE = 6.0  # limit of the motors, rad/s
-WRISTS, HATS, ROUNDS = 8, 8, 150  # each candidate meets 8 wrists, and has 8 heights of the motors' trajectory
+WRISTS, HATS, ROUNDS = 8, 8, 150  # wrists per candidate, interpolation points of the motors' trajectory, rounds
 
 
 def shaped(impulses: int, duration: float) -> np.ndarray:
-    """The motors' rates (times,) of a quintic after an input shaper: of 1 impulse (none), 2 (ZV) or 3 (ZVD)."""
+    """The motors' rates (times,) of a quintic after an input shaper with 1 impulse (no shaper), 2 (ZV) or 3 (ZVD)."""
     half, time = np.pi / POLE.imag, STEP * np.arange(round((duration + AFTER) / STEP) + 1)
     weights = np.atleast_1d(np.poly(np.full(impulses - 1, -np.exp(POLE.real * half))))  # 1; 1, K; 1, 2 K, K2
     s = np.clip((time[:, None] - half * np.arange(impulses)) / (duration - half * (impulses - 1)), 0, 1)
@@ -31,7 +31,7 @@ def shaped(impulses: int, duration: float) -> np.ndarray:
 
 
 def draw(value: float, unlike: int, rng: np.random.Generator, count: int) -> np.ndarray:
-    """Returns `count` values, of which the first `unlike` are repeated."""
+    """Returns `count` values: `unlike` random values, repeated."""
     return np.resize(rng.uniform(0.8 * value, 1.2 * value, unlike), count)
 
 
@@ -75,7 +75,7 @@ def policy(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def learn(count: int, rounds: int) -> np.ndarray:
-    """The numbers of the policy: in each round the mean of the best quarter of the candidates."""
+    """The parameters of the policy. Each round moves them to the weighted mean of the best quarter of the candidates."""
     envs, rng, candidates = wrists(count, WRISTS), np.random.default_rng(1), count // WRISTS
     middle = np.hstack([[0.5, 0, 0], np.sin(np.linspace(0, np.pi, HATS + 2)[1:-1])])
     spread = np.diag(np.hstack([np.ones(3), np.full(HATS, 0.16)]))
@@ -90,7 +90,7 @@ def learn(count: int, rounds: int) -> np.ndarray:
 
 
 def main(count: int = 1024, rounds: int = ROUNDS, fresh: int = 1000) -> tuple[Figure, dict[str, np.ndarray]]:
-    """Learn, try, print and draw; returns the figure, and the vibration left (fresh,) by name, deg peak to peak."""
+    """Learn, test, print and draw; returns the figure, and the remaining vibration (fresh,) by name, deg peak to peak."""
     begun, still = perf_counter(), np.zeros((1, 3))
     learned = policy(learn(count, rounds)[None])
     print(f"learned in {perf_counter() - begun:.0f} s, from {count * rounds:,} moves")
@@ -104,8 +104,8 @@ def main(count: int = 1024, rounds: int = ROUNDS, fresh: int = 1000) -> tuple[Fi
     ):
         pitch, _ = play(envs, np.repeat(rates, fresh, axis=0), np.repeat(gains, fresh, axis=0), fresh, seed=10**6)
         left[name] = np.sort(np.ptp(pitch[round(duration / STEP) :], axis=0))
-        middle, most, worst = np.percentile(left[name], [50, 95, 100])
-        print(f"{name:<11} in {duration:.2f} s: {middle:.2f} deg left, 95 % below {most:.2f}, at most {worst:.2f}")
+        mid, p95, most = np.percentile(left[name], [50, 95, 100])
+        print(f"{name:<11} in {duration:g} s: median vibration {mid:.2f} deg, 95 % below {p95:.2f}, at most {most:.2f}")
         shares.semilogx(left[name], np.linspace(0, 100, fresh), color=colour, label=f"{name} ({duration:.2f} s)")
         band = np.percentile(pitch, [2.5, 97.5], axis=1)
         motions.fill_between(STEP * np.arange(len(pitch)), *band, color=colour, linewidth=0)

@@ -17,22 +17,23 @@ import prw
 
 STEP, STEPS = 1e-3, 3000  # s
 NOISE = np.deg2rad(0.02)  # standard deviation of the encoders of pitch and roll, rad
-ACCELERATION = 30.0  # limit of the motors, that of the PI controller, rad/s2
+ACCELERATION = 30.0  # limit of the motors, equal to the limit of the PI controller, rad/s2
 MOTORS = ("theta1", "theta2", "omega1", "omega2")
-TO_SIDES = np.array([[1, 4 / 7], [1, -4 / 7]])  # from pitch and roll to the two sides: eq. (1) solved, M = 4, N = 7
+TO_SIDES = np.array([[1, 4 / 7], [1, -4 / 7]])  # motor angles per pitch and roll: inverse of eq. (1), M = 4, N = 7
 
 
 def design() -> tuple[np.ndarray, ...]:
-    """The sampled model z+ = A z + B a, y = C z (z: states, motors' angles and rates), and the gains of both."""
+    """The sampled model z+ = A z + B a, y = C z (z: states, motors' angles and rates; a: accelerations), and the gains of
+    the feedback and of the filter."""
     model = prw.linearize(outputs=("pitch", "roll"))
     (angles, rates), zero, one = np.hsplit(model.B, 2), np.zeros, np.eye(2)
-    # Motors turn at a steady rate for a sample, so the angles are states and the rates are held.
+    # Motors turn at a constant rate during a sample, so the angles are states and the rates are inputs.
     wrist = control.ss(np.block([[model.A, angles], [zero((2, 8))]]), np.vstack([rates, one]), np.eye(8), zero((8, 2)))
     held = control.c2d(wrist, STEP)
     A = np.block([[held.A, held.B], [zero((2, 8)), one]])
-    B = STEP * A[:, 8:]  # an acceleration changes the rate at once, for the sample that begins
+    B = STEP * A[:, 8:]  # an acceleration changes the rate at the start of a sample
     C = np.block([[model.C, zero((2, 4))], [zero((2, 6)), one, zero((2, 2))]])
-    # A degree of pitch or roll weighs as much as 30 rad/s2.
+    # The cost of an error of one degree equals the cost of an acceleration of 30 rad/s2.
     weight = C[:2].T @ C[:2] / np.deg2rad(1) ** 2 + 1e-6 * np.eye(10)
     feedback, *_ = control.dlqr(A, B, weight, np.eye(2) / ACCELERATION**2)
     gain, *_ = control.dlqe(A, B, C, 0.5 * np.eye(2), np.diag([NOISE, NOISE, 1e-5, 1e-5]) ** 2)
@@ -56,7 +57,7 @@ def lqr(angle: np.ndarray) -> Any:
     """State feedback of the estimate of the Kalman filter; unlike the PI controller it uses the rate of the reference."""
     A, B, C, feedback, gain = design()
     side = angle @ TO_SIDES.T
-    wanted = np.hstack([side, side, rate := np.gradient(side, STEP, axis=0), side, rate])  # without twist
+    wanted = np.hstack([side, side, rate := np.gradient(side, STEP, axis=0), side, rate])  # of the untwisted wrist
     estimate, motor, turning, motion = np.zeros(10), np.zeros(2), np.zeros(2), None
     while True:
         k, measured = yield motion
@@ -67,7 +68,7 @@ def lqr(angle: np.ndarray) -> Any:
 
 
 def pi(controller: Instances, angle: np.ndarray) -> Any:
-    """The controller FMU, which goes to the reference as it is at each sample."""
+    """The controller FMU, which gets the reference at each sample and does not use its rate."""
     motion = None
     while True:
         k, measured = yield motion
@@ -88,8 +89,8 @@ def main() -> tuple[Figure, dict[str, np.ndarray]]:
     for (name, error), colour in zip(errors.items(), ("#D55E00", "#0072B2")):
         rms = np.rad2deg(np.sqrt(np.mean(error**2, axis=0)))
         print(f"{name:<4} pitch {rms[0]:.2f} deg, roll {rms[1]:.2f} deg (root mean square of the error)")
-        for axis, course, title in zip(axes, np.rad2deg(error).T, ("pitch", "roll")):
-            axis.plot(time, course, color=colour, label=name)
+        for axis, trajectory, title in zip(axes, np.rad2deg(error).T, ("pitch", "roll")):
+            axis.plot(time, trajectory, color=colour, label=name)
             axis.set(title=title, xlabel="time (s)", ylabel="error (deg)")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
     return figure, errors

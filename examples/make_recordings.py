@@ -1,4 +1,4 @@
-"""Writes the recordings in this folder: simulated logs of a controller in point-to-point moves of the wrist.
+"""Writes the recordings in this directory: simulated logs of a controller in point-to-point moves of the wrist.
 
     python make_recordings.py
 

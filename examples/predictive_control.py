@@ -13,11 +13,11 @@ import numpy as np
 from fmu_run import Fmu, Instances
 from matplotlib.figure import Figure
 
-STEP, AHEAD, EACH, LENGTH = 0.01, 16, 0.5, 2.0  # s; steps that are planned; s to a goal; s
+STEP, AHEAD, EACH, LENGTH = 0.01, 16, 0.5, 2.0  # s; number of planned steps; duration of a goal, s; duration, s
 GOALS = np.array([(20, 0), (20, 40), (-10, 40), (0, 0)])  # one after the other, pitch and roll, deg
-RATE, SPREAD = 6.0, 2.0  # limit of the motors, and deviation of the candidates, rad/s
+RATE, SPREAD = 6.0, 2.0  # limit of the motors, and standard deviation of the candidates, rad/s
 MOTORS, WRIST = ("theta1", "theta2", "omega1", "omega2"), ("pitch", "roll")
-TO_SIDES = np.array([[1, 4 / 7], [1, -4 / 7]])  # from pitch and roll to the two motors: eq. (1) solved, M = 4, N = 7
+TO_SIDES = np.array([[1, 4 / 7], [1, -4 / 7]])  # motor angles per pitch and roll: inverse of eq. (1), M = 4, N = 7
 
 
 def advance(wrists: Instances, rates: np.ndarray) -> np.ndarray:
@@ -44,7 +44,8 @@ def planned(wrist: Instances, copies: Instances, goal: np.ndarray, plan: np.ndar
 
 
 def follow(copies: Instances | None, wrist: Instances, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Goals and wrist (times, 2), deg: planned with copies, or with motors that go straight to where they belong."""
+    """Goals, and pitch and roll, (times, 2) each in deg. With `copies` the motion is planned; without them the motors move
+    directly to the angles of the goal."""
     rng, plan, rows = np.random.default_rng(1), np.zeros((AHEAD, 2)), []
     for k in range(round(length / STEP)):
         goal = GOALS[int(k * STEP / EACH) % len(GOALS)]
@@ -59,7 +60,7 @@ def follow(copies: Instances | None, wrist: Instances, length: float) -> tuple[n
 
 
 def main(rollouts: int = 1024, length: float = LENGTH) -> tuple[Figure, dict[str, np.ndarray]]:
-    """Control, print and draw; returns the figure, and by name how far pitch and roll are from the goal (times, 2), deg."""
+    """Control, print and draw; returns the figure, and the errors of pitch and roll (times, 2) by name, deg."""
     figure, errors = Figure(figsize=(8, 3.2), layout="constrained"), {}
     axes = figure.subplots(1, 2, sharex=True)
     with Fmu("target/fmu/prw_testbed.fmu") as fmu:
@@ -70,14 +71,21 @@ def main(rollouts: int = 1024, length: float = LENGTH) -> tuple[Figure, dict[str
             rate, errors[name] = len(goal) / (perf_counter() - begun), wrist - goal
             since = np.arange(len(goal)) * STEP % EACH
             worst = np.abs(errors[name][since > 0.2]).max()
-            print(f"{name:<8} {worst:.2f} deg off at most from 0.2 s after each change of the goal on")
-            for axis, course, title in zip(axes, wrist.T, WRIST):
-                axis.plot(STEP * np.arange(1, len(goal) + 1), course, color=colour, label=name)
+            print(f"{name:<8} largest error from 0.2 s after each change of the goal: {worst:.2f} deg")
+            for axis, trajectory, title in zip(axes, wrist.T, WRIST):
+                axis.plot(STEP * np.arange(1, len(goal) + 1), trajectory, color=colour, label=name)
                 axis.set(title=title, xlabel="time (s)", ylabel="angle (deg)")
-    print(f"{rate:.0f} decisions a second, {rollouts} rollouts of {AHEAD} steps each")
-    for axis, course in zip(axes, goal.T):
+    print(f"{rate:.0f} decisions per second, {rollouts} rollouts of {AHEAD} steps each")
+    for axis, trajectory in zip(axes, goal.T):
         axis.step(
-            STEP * np.arange(len(goal)), course, "--", color="0.5", where="post", linewidth=1, label="goal", zorder=0
+            STEP * np.arange(len(goal)),
+            trajectory,
+            "--",
+            color="0.5",
+            where="post",
+            linewidth=1,
+            label="goal",
+            zorder=0,
         )
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
     return figure, errors

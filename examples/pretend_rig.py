@@ -2,9 +2,9 @@
 
     python examples/pretend_rig.py MOTION.csv RUN.csv [--seed N] [--noise N] [--measure tau1,tau2,theta3,theta4,pitch,roll]
 
-It runs the FMU with parameters of its own choice (a seed, a rig), and then spoils its answers: encoders of 10000
-counts, torques with 20 mN.m of noise, an inertial sensor with 0.06 deg, and an unknown offset on each of them:
-others in each experiment, unless --noise selects them.
+The FMU runs with random parameters, which --seed selects. The sensors add errors to its outputs: encoders have 10000 counts,
+torques 20 mN.m of noise, the inertial sensor 0.06 deg of noise, and each sensor an unknown offset. The errors differ from run to
+run, unless --noise selects them.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from prw.recording import read_motion
 from prw.testbed import Testbed
 
 ENCODER = 360 / 10_000
-#: Motors move smoothly between the rows of a file: the FMU is stepped this many times from one row to the next.
+#: Number of FMU steps between two rows of the file. Motors move smoothly between the rows.
 STEPS = 20
 CHOSEN = ("k1", "k2", "c1", "c2", "c3")
 
 
 def smoothly(motion: prw.Motion) -> prw.Motion:
-    """The motion with STEPS communication points for each of its own."""
+    """The motion with STEPS communication points for each point of `motion`."""
     rows = np.arange(len(motion.time))
     time = np.interp(np.arange(STEPS * (len(rows) - 1) + 1) / STEPS, rows, motion.time)
     if motion.omega is None:
@@ -52,11 +52,7 @@ def main() -> None:
     with Testbed(options.fmu) as testbed:
         truth = {name: testbed.starts[name] * float(rig.uniform(0.75, 1.3)) for name in CHOSEN}
         response = {name: values[::STEPS] for name, values in testbed.respond(smoothly(motion), start=truth).items()}
-    # All of them are per radian, and shown per degree.
-    shown = {
-        name: f"{np.radians(value):.5g} {'N.m/deg' if name.startswith('k') else 'N.m.s/deg'}"
-        for name, value in truth.items()
-    }
+    shown = (f"{name} {value:.5g} {'N.m/rad' if name[0] == 'k' else 'N.m.s/rad'}" for name, value in truth.items())
 
     def encoder(angle: NDArray[np.float64]) -> NDArray[np.float64]:
         counts: NDArray[np.float64] = np.round(np.degrees(angle) / ENCODER + sensors.uniform(-0.5, 0.5))
@@ -75,7 +71,7 @@ def main() -> None:
             noise = sensors.normal(0, 0.06, len(motion.time)) + sensors.uniform(-1, 1)
             columns[f"{name} [deg]"] = np.degrees(response[name]) + noise
     np.savetxt(options.run, np.column_stack(list(columns.values())), "%.6f", ",", header=",".join(columns), comments="")
-    print(f"wrote {options.run}; the rig behind it: " + ", ".join(f"{name} {text}" for name, text in shown.items()))
+    print(f"wrote {options.run}; true parameters of the rig: {', '.join(shown)}")
 
 
 if __name__ == "__main__":

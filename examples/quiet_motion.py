@@ -25,11 +25,11 @@ RATE = 6.0  # limit of the motors, rad/s
 
 
 def sampled() -> tuple[np.ndarray, np.ndarray]:
-    """z+ = A z + B w over a step: z are the six states and both motors' angles, w the motors' rates, which are held."""
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder, zipfile.ZipFile(FMU) as archive:
-        archive.extractall(folder)
-        wrist = casadi.DaeBuilder("wrist", folder).create("wrist", ["x", "u"], ["ode"])
-        # The testbed is linear: its derivatives are the same everywhere, and CasADi has them from the FMU, exactly.
+    """z+ = A z + B w over a step: z is the six states and both motors' angles; w is the motors' rates, which are constant in a step."""
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as directory, zipfile.ZipFile(FMU) as archive:
+        archive.extractall(directory)
+        wrist = casadi.DaeBuilder("wrist", directory).create("wrist", ["x", "u"], ["ode"])
+        # The testbed is linear, so its derivatives are constant. CasADi gets them from the FMU.
         derivatives = wrist.jacobian()(np.zeros(6), np.zeros(4), np.zeros(6))
     generator = np.zeros((10, 10))
     generator[:6] = np.hstack([np.array(part) for part in derivatives])
@@ -53,33 +53,34 @@ def quietest() -> np.ndarray:
 
 
 def minimum_jerk() -> np.ndarray:
-    """The same for motors on the usual quintic."""
+    """The motors' rates (n, 2) in rad/s on the polynomial of degree 5 with the least jerk."""
     s = np.arange(round(MOVE / STEP) + 1)[:, None] * STEP / MOVE
     return np.asarray(np.diff(SIDES * s**3 * (10 - 15 * s + 6 * s**2), axis=0) / STEP)
 
 
 def replay(rates: np.ndarray, parameters: dict[str, float] | None = None) -> prw.Run:
-    """The FMU's response to motors with these rates, which then stop."""
+    """The FMU's response to motors that turn at these rates and then stop."""
     omega = np.vstack([rates, np.zeros((round(AFTER / STEP) + 1, 2))])
     theta = np.vstack([np.zeros(2), np.cumsum(STEP * omega[:-1], axis=0)])
     return prw.simulate(prw.Motion(np.linspace(0, MOVE + AFTER, len(theta)), theta, omega), parameters)
 
 
 def left(run: prw.Run) -> float:
-    """The largest deviation of pitch or roll from the goal after the move, deg."""
+    """The largest error of pitch or roll after the move, deg."""
     after = run.time >= MOVE - STEP / 2
     return float(np.rad2deg(max(np.abs(run[name] - goal)[after].max() for name, goal in zip(("pitch", "roll"), GOAL))))
 
 
 def main() -> tuple[Figure, dict[str, float]]:
-    """Find, replay, print and draw; returns the figure, and how far pitch or roll is off after each motion, deg."""
+    """Find, replay, print and draw; returns the figure, and the largest error after each motion, deg."""
     rates = {"quintic": minimum_jerk(), "quietest": quietest()}
     runs = {name: replay(trajectory) for name, trajectory in rates.items()}
     runs["quietest, k2 10 % less"] = replay(rates["quietest"], {"k2": 0.9 * runs["quietest"].parameters["k2"]})
     figure = Figure(figsize=(8, 4.2), layout="constrained")
     axes = figure.subplots(2, 2, sharex=True)
+    print("largest error of pitch or roll after the move:")
     for (name, run), style in zip(runs.items(), ("C1-", "C0-", "k:")):
-        print(f"{name:<23} {left(run):.2f} deg off after the move")
+        print(f"  {name:<23} {left(run):.2f} deg")
         for axis, angle in zip(axes[:, 0], ("pitch", "roll")):
             axis.plot(run.time, np.rad2deg(run[angle]), style, label=name)
             axis.set_ylabel(f"{angle} (deg)")

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 FMU = Path("target/fmu/prw_testbed.fmu")
 RUNS, STEP, MOVE, LENGTH = 10_000, 2e-3, 0.35, 0.7  # s
 GOAL = np.deg2rad([20, 30])  # pitch and roll, rad
-SIDES = np.array([[1, 4 / 7], [1, -4 / 7]])  # from pitch and roll to the two motors: eq. (1) solved, M = 4, N = 7
+SIDES = np.array([[1, 4 / 7], [1, -4 / 7]])  # motor angles per pitch and roll: inverse of eq. (1), M = 4, N = 7
 TOLERANCES = {"k1": 0.1, "k2": 0.1, "c1": 0.3, "c2": 0.3, "c3": 0.3}  # standard deviation / value
 
 
@@ -27,7 +27,7 @@ def motion() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def draw(nominal: dict[str, float], runs: int) -> dict[str, np.ndarray]:
-    """Parameters (runs,) by name, drawn from lognormal distributions, which have no negative stiffness."""
+    """Parameters (runs,) by name, drawn from lognormal distributions, whose values are never negative."""
     numbers = np.random.default_rng(1)
     return {name: nominal[name] * np.exp(numbers.normal(0, share, runs)) for name, share in TOLERANCES.items()}
 
@@ -42,13 +42,13 @@ def errors(runs: int = RUNS) -> tuple[np.ndarray, dict[str, np.ndarray], dict[st
     return time, drawn, {name: found[name] - wrist[:, k] for k, name in enumerate(("pitch", "roll"))}
 
 
-def blame(drawn: dict[str, np.ndarray], measure: np.ndarray) -> dict[str, float]:
-    """Each parameter's share in the variance of a measure (runs,), by linear regression on the logarithms. The
-    remainder to 1 is nonlinear, or an interaction of two parameters."""
+def blame(drawn: dict[str, np.ndarray], statistic: np.ndarray) -> dict[str, float]:
+    """Each parameter's share in the variance of a statistic (runs,), by linear regression on the logarithms. The shares add
+    up to less than 1 if the statistic is nonlinear or depends on combinations of parameters."""
     columns = np.column_stack([np.log(values) for values in drawn.values()])
     columns -= columns.mean(axis=0)
-    slopes, *_ = np.linalg.lstsq(columns, measure - measure.mean(), rcond=None)
-    return dict(zip(drawn, slopes**2 * columns.var(axis=0) / measure.var()))
+    slopes, *_ = np.linalg.lstsq(columns, statistic - statistic.mean(), rcond=None)
+    return dict(zip(drawn, slopes**2 * columns.var(axis=0) / statistic.var()))
 
 
 def main(runs: int = RUNS) -> tuple[Figure, dict[str, dict[str, float]]]:
@@ -60,7 +60,9 @@ def main(runs: int = RUNS) -> tuple[Figure, dict[str, dict[str, float]]]:
         peak = np.rad2deg(np.abs(trajectory).max(axis=1))
         shares[name] = blame(drawn, peak)
         low, middle, high = np.percentile(peak, [2.5, 50, 97.5])
-        print(f"{name:<6} largest error {middle:.2f} deg, 95 % of {runs} wrists between {low:.2f} and {high:.2f} deg")
+        print(
+            f"{name:<6} peak error: median {middle:.2f} deg, 95 % of {runs} wrists between {low:.2f} and {high:.2f} deg"
+        )
         for inner, outer, alpha in ((0, 100, 0.2), (2.5, 97.5, 0.5)):
             band = np.rad2deg(np.percentile(trajectory, [inner, outer], axis=0))
             row[0].fill_between(time, *band, color=colour, alpha=alpha, linewidth=0, label=f"{outer - inner:g} %")

@@ -1,8 +1,8 @@
 """Times the FMUs against programs in C and other tools, and writes Markdown tables to out/bench.md; `make bench`.
 
 With --profile it counts the instructions of a step with callgrind, which repeat exactly on a busy machine.
-All programs of a table are measured in turn; a figure is the least of several rounds. With BENCH_QUICK in the environment
-counts are small, and the tables in target/bench/quick.md are meaningless.
+The programs of a table are measured alternately. Each time is the minimum of several rounds. If the environment variable
+BENCH_QUICK is set, counts are small, and the tables go to target/bench/quick.md: they only show that the benchmarks run.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ SAMPLES, RUNS, ROUNDS, LOOPS = (21, 4, 1, 2) if QUICK else (2001, 2000, 7, 1000)
 #: Numbers of instances, each with the number of steps.
 SIZES = ((1, 50), (8, 5)) if QUICK else ((1, 50_000), (1024, 300), (16384, 40))
 MOTORS, OUTPUTS = ("theta1", "theta2"), ("tau1", "tau2", "pitch", "roll")
-#: The ways to step of bench.c, each with the number of steps of a measurement.
+#: Kinds of steps of bench.c, in its order, each with the number of steps of a measurement.
 WAYS = {
     "angles set, step, 4 outputs, as vectors": 100_000,
     "the same, one scalar per call": 100_000,
@@ -55,12 +55,12 @@ VECTORS, RATES, OMEGA, ALTERNATING, NEW_SIZES = 0, 2, 3, 4, 5
 
 
 def table(*rows: Iterable[object]) -> None:
-    """Prints a table and adds it to the page."""
+    """Prints a table and appends it to out/bench.md."""
     lines = [f"| {' | '.join(f'{x:,.3g}' if isinstance(x, float) else str(x) for x in row)} |\n" for row in rows]
     lines.insert(1, "|---" * lines[0].count(" |") + "|\n")
     print("", *lines, sep="", flush=True)
-    page = WORK / "quick.md" if QUICK else ROOT / "out" / "bench.md"
-    with page.open("a", encoding="utf-8") as file:
+    target = WORK / "quick.md" if QUICK else ROOT / "out" / "bench.md"
+    with target.open("a", encoding="utf-8") as file:
         file.writelines(["\n", *lines])
 
 
@@ -71,7 +71,7 @@ def compile_c(output: str, *arguments: object) -> None:
 
 
 def prepare(fmu: Path) -> str:
-    """Compiles and unpacks into target/bench the files that the benchmarks load. Returns the guid."""
+    """Writes the libraries and programs of the benchmarks into target/bench. Returns the guid of the FMU."""
     (ROOT / "out").mkdir(exist_ok=True)
     shutil.rmtree(WORK, ignore_errors=True)
     WORK.mkdir(parents=True)
@@ -80,14 +80,14 @@ def prepare(fmu: Path) -> str:
     with zipfile.ZipFile(fmu) as archive:
         (WORK / "fmu.so").write_bytes(archive.read("binaries/linux64/prw_testbed.so"))
     strict, directory = ("-Wall", "-Wextra", "-Werror"), ROOT / "dev" / "benches" / "c"
-    for library in ("bare_exact", "euler", "empty"):
+    for library in ("bare_exact", "euler"):
         compile_c(f"{library}.so", "-O3", *strict, "-shared", "-fPIC", directory / f"{library}.c")
     compile_c("bench", "-O2", *strict, directory / "bench.c")
     return str(fmpy.read_model_description(str(fmu)).guid)
 
 
 def bench(library: object, guid: str, *arguments: object, stdin: bytes = b"") -> tuple[float, np.ndarray]:
-    """The number that bench.c prints, and the outputs as rows of four."""
+    """Runs bench.c. Returns the number that it prints, and all outputs as one array."""
     command = [str(word) for word in (WORK / "bench", library, guid, *arguments)]
     done = subprocess.run(command, input=stdin, capture_output=True)
     if done.returncode:
@@ -96,9 +96,9 @@ def bench(library: object, guid: str, *arguments: object, stdin: bytes = b"") ->
 
 
 def steps(guid: str, sources: Path | None) -> None:
-    """Whole steps of the FMU against C, and its C sources, if given, against its library."""
+    """Compares steps of the FMU with the C programs, and its C sources, if they are given, with its library."""
 
-    def of(library: str, way: int, count: int, threads: int = 1) -> float:
+    def seconds(library: str, way: int, count: int, threads: int = 1) -> float:
         return bench(WORK / f"{library}.so", guid, way, count // 100 if QUICK else count, threads)[0]
 
     def outputs(library: str, way: int) -> np.ndarray:
@@ -118,11 +118,11 @@ def steps(guid: str, sources: Path | None) -> None:
     for _ in range(1 if QUICK else 25):
         for way, count in enumerate(WAYS.values()):
             for library in ("fmu", "bare_exact"):
-                measured.setdefault((library, way), []).append(of(library, way, count))
+                measured.setdefault((library, way), []).append(seconds(library, way, count))
         for library, way, count in others:
-            measured.setdefault(library, []).append(of(library, way, count))
+            measured.setdefault(library, []).append(seconds(library, way, count))
         for threads in (1, 2):
-            measured.setdefault(threads, []).append(of("fmu", VECTORS, 400_000, threads))
+            measured.setdefault(threads, []).append(seconds("fmu", VECTORS, 400_000, threads))
     least = {name: min(found) for name, found in measured.items()}
     ratios = [(name, least["fmu", way] / least["bare_exact", way]) for way, name in enumerate(WAYS)]
     table(("time of the FMU / time of bare_exact.c", "ratio"), *ratios)
@@ -143,7 +143,7 @@ def steps(guid: str, sources: Path | None) -> None:
 
 
 def profile(guid: str) -> None:
-    """Instructions of a step."""
+    """Counts the instructions of a step."""
     ways = ("angles as vectors", "one scalar per call", "with input derivatives", "with use_omega")[: 1 if QUICK else 4]
 
     def count(library: str, way: int, steps: int) -> dict[str, int]:
@@ -152,15 +152,15 @@ def profile(guid: str) -> None:
         command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={file}", *program]
         subprocess.run(command, check=True, capture_output=True)
         command = ["callgrind_annotate", "--threshold=100", file]
-        text = subprocess.run(command, check=True, capture_output=True, text=True).stdout.replace(",", "")
-        lines = re.findall(r"^ *(\d+) .*?(PROGRAM TOTALS|fmi2\w+)", text, re.MULTILINE)
+        report = subprocess.run(command, check=True, capture_output=True, text=True).stdout.replace(",", "")
+        lines = re.findall(r"^ *(\d+) .*?(PROGRAM TOTALS|fmi2\w+)", report, re.MULTILINE)
         return {name: int(number) for number, name in reversed(lines)}
 
     names = {"PROGRAM TOTALS": "all"} | {name: name for name in ("fmi2SetReal", "fmi2DoStep", "fmi2GetReal")}
     rows = []
-    for library in ("fmu",) if QUICK else ("fmu", "bare_exact", "empty"):
+    for library in ("fmu",) if QUICK else ("fmu", "bare_exact"):
         for way, label in enumerate(ways):
-            # The difference of a long run and a short run is without the start.
+            # The difference between a long run and a short run does not contain the start of the program.
             short, long = (count(library, way, number) for number in (1000, 11000))
             found = [f"{(long.get(name, 0) - short.get(name, 0)) / 10000:.0f}" for name in names]
             rows.append((f"{library}, {label}", *found))
@@ -168,18 +168,18 @@ def profile(guid: str) -> None:
 
 
 class Case:
-    """An FMU with time series of its inputs (samples, n) and names of its outputs."""
+    """An FMU with time series (samples,) of its inputs by name, the names of its outputs, and a number of runs."""
 
     def __init__(self, name: str, fmu: Path, inputs: dict[str, np.ndarray], outputs: list[str], runs: int):
         self.name, self.inputs, self.outputs, self.runs = name, inputs, outputs, runs
         self.description = fmpy.read_model_description(str(fmu))
         self.directory = fmpy.extract(str(fmu))
-        of = {v.name: v.valueReference for v in self.description.modelVariables}
-        self.references = [of[name] for name in inputs], [of[name] for name in outputs]
+        references = {v.name: v.valueReference for v in self.description.modelVariables}
+        self.references = [references[name] for name in inputs], [references[name] for name in outputs]
         self.table = np.ascontiguousarray(np.column_stack(list(inputs.values())))
         self.slave = instantiate_fmu(self.directory, self.description, fmi_type="CoSimulation")
         self.loaded = fmu_run.Fmu(fmu)
-        # One start value for each run makes as many runs.
+        # An array of start values makes as many runs as it has elements.
         self.start = {next(iter(inputs)): np.full(runs, self.table[0, 0])}
 
     def close(self) -> None:
@@ -202,7 +202,7 @@ class Case:
         return (time.perf_counter() - begin) / self.runs, runs.check()
 
     def by_fmpy(self) -> tuple[float, np.ndarray]:
-        """Seconds of one run by FMPy's bare calls, reading and writing rows of arrays in place, and its outputs."""
+        """Seconds of one run by FMPy's wrappers of the C functions, which read and write rows of arrays in place; and the outputs."""
         slave, component = self.slave, self.slave.component
         (n_in, n_out), found = map(len, self.references), np.empty((SAMPLES, len(self.outputs)))
         into, out_of = ((c_uint32 * len(vr))(*vr) for vr in self.references)
@@ -234,7 +234,7 @@ class Case:
 
 
 def many_runs() -> None:
-    """Many runs from Python against a loop in C and FMPy. All store the same outputs at every step."""
+    """Compares many runs from Python with a loop in C and with FMPy. All of them store equal outputs at every step."""
     wave = 2 * np.sin(10 * np.pi * np.arange(SAMPLES) * STEP / 2) ** 2 / (10 * np.pi)
     motors = {"theta1": wave, "theta2": -wave}
     wrist = {"pitch_ref": 3 * wave, "roll_ref": -2 * wave, "pitch": 2 * wave, "roll": -wave}
@@ -256,7 +256,7 @@ def least(body: Callable[..., tuple[float, Any]], *arguments: Any) -> float:
 
 
 def instances(guid: str) -> None:
-    """Stateful instances against a loop in C over as many; bit-identical."""
+    """Compares stateful instances with a loop in C over as many instances. The results are bit-identical."""
     with fmu_run.Fmu(FMUS / "prw_testbed.fmu") as fmu:
 
         def in_c(count: int, moves: np.ndarray) -> tuple[float, np.ndarray]:
@@ -291,9 +291,9 @@ def instances(guid: str) -> None:
 
 
 def loops() -> None:
-    """Closed loops against other masters."""
+    """Compares closed loops in fmu_run with other masters."""
     system = read(FMUS / "prw_closed_loop.ssp", FMUS / "prw_closed_loop")
-    # libcosim counts nanoseconds.
+    # libcosim rounds communication points to nanoseconds.
     instants = np.arange(system.steps + 1) * round(system.step * 1e9) / 1e9
     with fmu_run.System(FMUS / "prw_closed_loop.ssp", order="jacobi") as loop:
         gains = {"controller.pitch_ref": np.full(LOOPS, system.inputs["pitch_ref"][1])}

@@ -1,4 +1,4 @@
-//! The parts of a step, without the C interface.
+//! Times the calculations of a step without the C interface.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use prw_testbed::propagator::{Propagator, StepMatrices};

@@ -31,17 +31,17 @@ class Product:
     kind: str
     name: str
     package: str
-    folder: Path
+    directory: Path
 
     @property
     def bill(self) -> Path:
         """Returns the list for tools."""
-        return self.folder / "bill-of-materials.cdx.json"
+        return self.directory / "bill-of-materials.cdx.json"
 
     @property
     def notice(self) -> Path:
         """The list for people."""
-        return self.folder / "third-party.txt"
+        return self.directory / "third-party.txt"
 
 
 LICENCES = Path("modelDescription", "licenses")
@@ -140,16 +140,16 @@ def bill(product: Product) -> str:
 
 def notice(product: Product) -> str:
     """Returns the list for people, with the licence files of packages that are not available under the Apache License."""
-    rows, texts = [("package", "version", "licence", "copyright")], []
+    rows, licences = [("package", "version", "licence", "copyright")], []
     for package in packages(product):
         if package["source"]:
             name, version, licence = package["name"], package["version"], licence_of(package)
             rows.append((name, version, licence, copyright_of(package)))
             if "Apache-2.0" not in licence:
                 paths = sorted(Path(package["manifest_path"]).parent.glob("LICEN[CS]E*"))
-                texts += [f"\n\n==== {name} {version} ====\n\n{path.read_text(encoding='utf-8')}" for path in paths]
+                licences += [f"\n\n==== {name} {version} ====\n\n{path.read_text(encoding='utf-8')}" for path in paths]
     others = [("no packages", "licence", "copyright", "in the libraries for"), *NO_CRATES]
-    return "".join([HEADER.format(kind=product.kind), _table(rows), "\n", _table(others), FOOTER, *texts])
+    return "".join([HEADER.format(kind=product.kind), _table(rows), "\n", _table(others), FOOTER, *licences])
 
 
 def _table(rows: Sequence[tuple[str, ...]]) -> str:
@@ -161,13 +161,13 @@ def _table(rows: Sequence[tuple[str, ...]]) -> str:
 def check(write: bool = False) -> None:
     """Exits if a list is out of date, or writes it."""
     for product in PRODUCTS:
-        for path, text in ((product.bill, bill(product)), (product.notice, notice(product))):
-            if path.is_file() and path.read_text("utf-8") == text:
+        for path, content in ((product.bill, bill(product)), (product.notice, notice(product))):
+            if path.is_file() and path.read_text("utf-8") == content:
                 continue
             name = path.relative_to(ROOT).as_posix()
             if not write:
                 raise SystemExit(f"error: {name} is out of date; run python3 dev/platforms/bill_of_materials.py")
-            path.write_bytes(text.encode())
+            path.write_bytes(content.encode())
             print(f"{name} written")
 
 

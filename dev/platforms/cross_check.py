@@ -1,5 +1,5 @@
-"""Packs the reference experiments by the rules of the FMI Cross-Check (4.1, section 9.1.4): one directory for each, with
-the FMU, inputs, outputs and options."""
+"""Packs the reference experiments by the rules of the FMI Cross-Check (4.1, section 9.1.4). Each experiment has a directory
+with the FMU, inputs, outputs and options."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 #: Directory of the experiments in the FMU.
-FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
-#: For tools that use one tolerance for all variables.
+DIRECTORY = "extra/org.fmi-standard.fmi-ls-ref"
+#: Relative tolerance for tools that use one tolerance for all variables.
 RELATIVE_TOLERANCE = 1e-3
 #: Fixed time of every file in the zip file, for reproducible bytes.
 TIME = (1980, 1, 1, 0, 0, 0)
@@ -26,11 +26,11 @@ def pack(fmu: Path, destination: Path) -> None:
             archive.writestr(about, content)
 
         whole = fmu.read_bytes()
-        for experiment in json.loads(source.read(f"{FOLDER}/experiments.json")):
+        for experiment in json.loads(source.read(f"{DIRECTORY}/experiments.json")):
             name = experiment["name"]
             write(f"{name}/{name}.fmu", whole)
             for kind in ("inputs", "reference", "parameters"):
-                write(f"{name}/{experiment[kind]}", source.read(f"{FOLDER}/{experiment[kind]}"))
+                write(f"{name}/{experiment[kind]}", source.read(f"{DIRECTORY}/{experiment[kind]}"))
             write(f"{name}/{name}_ref.opt", options(experiment).encode())
             write(f"{name}/README.md", readme(experiment).encode())
 

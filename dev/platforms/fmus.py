@@ -8,13 +8,13 @@ from pathlib import Path
 
 import cross_check
 from libraries import environment, run, say, target_directory
-from targets import ARM_FOLDERS, CONTROLLER, FMI3_FOLDERS, FOLDERS, MODEL, PACKERS, Target
+from targets import ARM_DIRECTORIES, CONTROLLER, DIRECTORIES, FMI3_DIRECTORIES, MODEL, PACKERS, Target
 
 SYSTEM = "prw_closed_loop"
 #: The page that runs the FMU; a release also contains it as a file.
 PAGE = "documentation/index.html"
 
-Folders = Mapping[str, tuple[Target, ...]]
+Directories = Mapping[str, tuple[Target, ...]]
 
 
 def make(libraries: Mapping[str, Mapping[Target, Path]], out: Path, scratch: Path) -> None:
@@ -23,10 +23,10 @@ def make(libraries: Mapping[str, Mapping[Target, Path]], out: Path, scratch: Pat
     run("cargo", "build", "--locked", "--release", "--bins", *packages)
     for model, found in libraries.items():
         say(f"packing {model}")
-        _pack(model, 2, FOLDERS, found, scratch).rename(out / f"{model}.fmu")
-        _pack(model, 3, FMI3_FOLDERS, found, scratch).rename(out / f"{model}-fmi3.fmu")
+        _pack(model, 2, DIRECTORIES, found, scratch).rename(out / f"{model}.fmu")
+        _pack(model, 3, FMI3_DIRECTORIES, found, scratch).rename(out / f"{model}-fmi3.fmu")
     say(f"packing the variants of {MODEL}, and {SYSTEM}")
-    arm = _pack(MODEL, 2, ARM_FOLDERS, libraries[MODEL], scratch, "--any-processor")
+    arm = _pack(MODEL, 2, ARM_DIRECTORIES, libraries[MODEL], scratch, "--any-processor")
     arm.rename(out / f"{MODEL}-linux-arm64.fmu")
     _run(PACKERS[MODEL][0], "--c-sources", f"--out={scratch}")
     (scratch / "source" / f"{MODEL}.fmu").rename(out / f"{MODEL}-source.fmu")
@@ -40,15 +40,15 @@ def make(libraries: Mapping[str, Mapping[Target, Path]], out: Path, scratch: Pat
 
 
 def _pack(
-    model: str, fmi: int, folders: Folders, libraries: Mapping[Target, Path], scratch: Path, *options: str
+    model: str, fmi: int, directories: Directories, libraries: Mapping[Target, Path], scratch: Path, *options: str
 ) -> Path:
     """Returns an FMU for this FMI version with a library in each of these directories of `binaries/`."""
     # The program joins the macOS libraries into a universal library.
-    binaries = [f"--binary={folder}={libraries[targets[0]]}" for folder, targets in folders.items()]
+    binaries = [f"--binary={name}={libraries[targets[0]]}" for name, targets in directories.items()]
     _run(PACKERS[model][0], f"--fmi={fmi}", f"--out={scratch}", *binaries, *options)
     return scratch / ("fmi3" if fmi == 3 else "") / f"{model}.fmu"
 
 
 def _run(program: str, *arguments: str) -> None:
-    # These programs compile WebAssembly for the page and the C sources.
+    # These programs compile the model to WebAssembly, for the page and for the C sources.
     run(str(target_directory() / "release" / program), *arguments, environment=environment())

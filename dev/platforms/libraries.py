@@ -54,14 +54,14 @@ def environment(target: Target | None = None) -> dict[str, str]:
     cargo = Path(os.environ.get("CARGO_HOME") or Path.home() / ".cargo")
     (commit,) = re.findall(r"^commit-hash: (\w+)$", run("rustc", "-vV"), re.MULTILINE)
     sysroot = Path(run("rustc", "--print", "sysroot"))
-    # rustc takes the last prefix that fits.
+    # rustc uses the last prefix that matches.
     names = {ROOT: MODEL, target_directory(): "target", sysroot / "lib/rustlib/src/rust": f"/rustc/{commit}"}
     names |= dict.fromkeys(sorted((cargo / "registry" / "src").glob("*/")), "crates")
     flags = [f"--remap-path-prefix={path}={name}" for path, name in names.items()]
     path = os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])
     found = {**os.environ, "PATH": path}
     if target:
-        # Cargo has the unstable options STD with any compiler.
+        # With this variable, a stable cargo accepts the unstable options STD.
         found["RUSTC_BOOTSTRAP"] = "1"
     if target is WINDOWS:
         # The linker writes this time, the earliest in a zip file, into the library.
@@ -80,7 +80,7 @@ def link(target: Target, name: str, exports: Sequence[str]) -> list[str]:
     """Flags of rustc for the library `name` that exports these functions."""
     arguments: Sequence[str] = ()
     if target is WINDOWS:
-        # cargo-zigbuild drops rustc's own list, and zig would export all functions.
+        # cargo-zigbuild drops the list of exports that rustc writes, and zig would export all functions.
         listed = ROOT / "target" / f"{name}.def"
         listed.parent.mkdir(exist_ok=True)
         listed.write_text("\n".join(["EXPORTS", *exports, ""]), encoding="utf-8")
@@ -93,17 +93,17 @@ def link(target: Target, name: str, exports: Sequence[str]) -> list[str]:
 
 
 def macos_sdk() -> Path:
-    """The part of a macOS SDK that Rust links with: zig's list of the functions in libSystem, declared for all Macs."""
+    """Returns the part of a macOS SDK that Rust links: zig's list of the functions in libSystem, declared for all Macs."""
     import ziglang
 
     text = (Path(ziglang.__file__).parent / "lib/libc/darwin/libSystem.tbd").read_text(encoding="utf-8")
     text = re.sub(r"targets:\s*\[[^\]]*\]", "targets: [ x86_64-macos, arm64-macos ]", text)
-    folder = target_directory() / "macos-sdk" / "usr" / "lib"
-    folder.mkdir(parents=True, exist_ok=True)
+    directory = target_directory() / "macos-sdk" / "usr" / "lib"
+    directory.mkdir(parents=True, exist_ok=True)
     # The other libraries that Rust names are parts of libSystem, or (iconv) are not used.
     for name in ("System", "c", "m", "iconv"):
-        (folder / f"lib{name}.tbd").write_text(text, encoding="utf-8")
-    return folder.parents[1]
+        (directory / f"lib{name}.tbd").write_text(text, encoding="utf-8")
+    return directory.parents[1]
 
 
 @cache

@@ -28,8 +28,8 @@ def check_version(version: str) -> None:
 
 def build(fmu: Path, out: Path) -> Path:
     """Builds the wheel in `out`."""
-    with tempfile.TemporaryDirectory() as folder:
-        copy, made = Path(folder, "python", "prw"), Path(folder, "made")
+    with tempfile.TemporaryDirectory() as temporary:
+        copy, made = Path(temporary, "python", "prw"), Path(temporary, "made")
         inside = copy / "src" / "prw" / "fmu"
         ignored = shutil.ignore_patterns("__pycache__", "*.egg-info", "fmu", "page")
         shutil.copytree(PACKAGE / "src", copy / "src", ignore=ignored)
@@ -39,7 +39,7 @@ def build(fmu: Path, out: Path) -> Path:
             shutil.copyfile(path, copy / path.name)
         # setup.py copies the files of the page from these directories.
         for name in ("crates", "docs"):
-            Path(folder, name).symlink_to(ROOT / name)
+            Path(temporary, name).symlink_to(ROOT / name)
         shutil.copyfile(fmu, inside / f"{MODEL}.fmu")
         command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", str(made), str(copy)]
         environment = {**os.environ, "SOURCE_DATE_EPOCH": EPOCH}

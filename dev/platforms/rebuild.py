@@ -19,11 +19,11 @@ from targets import ROOT
 def main() -> None:
     if not (DIST / SUMS).is_file():
         raise SystemExit(f"error: {DIST / SUMS} is missing; make it with `make release`")
-    with tempfile.TemporaryDirectory(prefix="rebuilt-") as folder:
-        copy = Path(folder) / "sources"
+    with tempfile.TemporaryDirectory(prefix="rebuilt-") as temporary:
+        copy = Path(temporary) / "sources"
         os.umask(0o077)
         copy_sources(copy)
-        others = {"CARGO_TARGET_DIR": str(Path(folder) / "target"), "TZ": "Asia/Kolkata", "LC_ALL": "C"}
+        others = {"CARGO_TARGET_DIR": str(Path(temporary) / "target"), "TZ": "Asia/Kolkata", "LC_ALL": "C"}
         command = [sys.executable, str(copy / "dev" / "platforms" / "release.py")]
         subprocess.run(command, cwd=copy, env={**os.environ, **others}, check=True)
         ours, theirs = (set((path / SUMS).read_text(encoding="utf-8").splitlines()) for path in (DIST, copy / "dist"))

@@ -84,9 +84,9 @@ def check_tag(tag: str, changelog: str, version: str) -> None:
         )
 
 
-def checksums(folder: Path) -> str:
+def checksums(directory: Path) -> str:
     """Returns the input of `sha256sum --check`."""
-    files = sorted(path for path in folder.iterdir() if path.name != SUMS)
+    files = sorted(path for path in directory.iterdir() if path.name != SUMS)
     return "".join(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in files)
 
 

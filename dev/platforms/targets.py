@@ -57,9 +57,9 @@ TARGETS = (LINUX, LINUX_ARM, WINDOWS, MAC, MAC_ARM)
 #: Target that is translated to C, for all other platforms.
 WEBASSEMBLY = Target("wasm32-unknown-unknown", ".wasm")
 
-#: The folders of `binaries/` in FMI 2.0 and the targets of their libraries; two targets make a universal library. FMI 2.0.5 names
-#: the ARM folders as FMI 3.0 does; importers on ARM Macs look in darwin64.
-FOLDERS = {
+#: The directories of `binaries/` in FMI 2.0 and the targets of their libraries; two targets make a universal library. FMI 2.0.5 and
+#: FMI 3.0 have equal names for ARM. Importers on ARM Macs look in darwin64.
+DIRECTORIES = {
     "linux64": (LINUX,),
     "win64": (WINDOWS,),
     "darwin64": (MAC, MAC_ARM),
@@ -67,11 +67,12 @@ FOLDERS = {
     "aarch64-darwin": (MAC_ARM,),
 }
 
-#: With FMI 2.0, importers on ARM Linux look in linux64, where an FMU for both has the Intel library.
-ARM_FOLDERS = {"linux64": (LINUX_ARM,)}
+#: With FMI 2.0, importers on ARM Linux also look in linux64. An FMU for Intel and ARM has the Intel library there, so the
+#: library for ARM needs a separate FMU.
+ARM_DIRECTORIES = {"linux64": (LINUX_ARM,)}
 
 #: FMI 3.0 has a directory for each target.
-FMI3_FOLDERS = {
+FMI3_DIRECTORIES = {
     "x86_64-linux": (LINUX,),
     "aarch64-linux": (LINUX_ARM,),
     "x86_64-windows": (WINDOWS,),

@@ -85,7 +85,7 @@ def _error(fmu: Path, model: StateSpace, n: int, rates: bool) -> dict[str, float
 def _broken_line_error(fmu: Path, n: int) -> dict[str, float]:
     corners = _sines(n)
     slope = np.diff(corners.theta, axis=0) * n
-    # Each line has its corner and CUTS - 1 points; the rate at a corner is the rate of the next line.
+    # Each line consists of a corner and CUTS - 1 further points. The rate at a corner is the rate of the next line.
     way = np.arange(CUTS)[None, :, None] / CUTS
     theta = np.vstack([(corners.theta[:-1, None] + way * slope[:, None] / n).reshape(-1, 2), corners.theta[-1:]])
     rate = np.vstack([np.repeat(slope, CUTS, axis=0), slope[-1:]])

@@ -15,19 +15,19 @@ from prw.testbed import Testbed
 SHAFTS = ("theta3", "theta4", "theta5", "theta6")
 TORQUES = ("tau1", "tau2")
 
-#: Steps in a period, at least. A motor follows its tangent over a step, which raises the amplitude of its motion by the
+#: Minimum number of steps in a period. A motor follows its tangent over a step, which raises the amplitude of its motion by the
 #: fraction (2 pi / STEPS)^2 / 6: 0.0014 dB.
 STEPS = 200
 #: The longest step, s. At low frequencies tau and the other side's shaft are small differences of large angles.
 LONGEST_STEP = 2e-3
-#: Whole periods that are evaluated.
+#: Number of evaluated periods.
 PERIODS = 2
-#: Transients are waited for until they have shrunk to this fraction.
+#: The evaluation begins when transients have decreased to this fraction.
 SETTLED = 1e-7
 
 
 def sweep(fmu: Path, frequency: ArrayLike, slowest: float, outputs: Sequence[str] = (*SHAFTS, *TORQUES)) -> np.ndarray:
-    """Turn one motor of the Co-Simulation FMU at a time to and fro, theta = sin(2 pi f t), and compare the outputs.
+    """Measure the frequency response of the Co-Simulation FMU: one motor at a time moves as theta = sin(2 pi f t).
 
     frequency: (k,) Hz. slowest: decay rate of the slowest transient, 1/s. After it has settled, the component of each
     output at f over whole periods (one bin of its discrete Fourier transform) is divided by the component of the motor's angle.

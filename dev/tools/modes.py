@@ -38,7 +38,7 @@ class Mode(NamedTuple):
         """
         b = self.b + self.A @ self.b_rate
         numerator = np.poly(self.A - np.outer(b, self.c)) - np.poly(self.A)
-        # The leading coefficients that vanish but for rounding: there are fewer zeros than poles.
+        # Leading coefficients that are rounding errors are set to zero: there are fewer zeros than poles.
         numerator[np.abs(numerator) < 1e-9 * np.abs(np.poly(self.A))] = 0
         return np.roots(np.trim_zeros(numerator, "f"))
 

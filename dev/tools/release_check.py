@@ -1,4 +1,4 @@
-"""Runs all that exists for a release candidate and writes a table of the results; `make check-release`.
+"""Runs all checks of a release candidate and writes a table of the results; `make check-release`.
 
 Each part is a target of the Makefile. A part that fails does not stop the others. The table is printed at the end and
 written to out/release-check.md; each part's output is in out/release-check/.

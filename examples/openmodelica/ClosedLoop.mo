@@ -1,24 +1,26 @@
-// The closed loop in OpenModelica: both FMUs, imported for Model Exchange, wired to each other. closed_loop.mos imports them and
-// runs this.
+// The closed loop in OpenModelica: both FMUs, imported for Model Exchange and connected. closed_loop.mos imports the FMUs and
+// simulates this model.
 //
-// A test compares the wires with those of prw_closed_loop.ssp; the names are those that OpenModelica's import gives.
+// A test compares the connections with prw_closed_loop.ssp. OpenModelica's import chooses the names of the two classes.
 
-model ClosedLoop "The wrist goes to a pitch and a roll angle"
-  parameter Real pitch_ref = 0.5235987755982988 "Pitch angle to go to, rad";
-  parameter Real roll_ref = 1.0471975511965976 "Roll angle to go to, rad";
+model ClosedLoop "The wrist moves to a pitch and a roll angle"
+  parameter Real pitch_ref = 0.5235987755982988 "Pitch reference, rad";
+  parameter Real roll_ref = 1.0471975511965976 "Roll reference, rad";
   prw_controller_me_FMU controller;
   prw_testbed_me_FMU testbed;
-  discrete Real y[6](each fixed = true) "What the controller sees: the testbed as it was just before the sample";
+  discrete Real y[6](each fixed = true) "Inputs of the controller: outputs of the testbed just before the sample";
 equation
   controller.pitch_ref = pitch_ref;
   controller.roll_ref = roll_ref;
   connect(controller.theta1, testbed.theta1);
   connect(controller.theta2, testbed.theta2);
-  // In Model Exchange the rates are not derived from the angles: without these two the dampers hold the shafts back.
+  // In Model Exchange the FMU does not derive the rates from the angles. Without these two connections all rates would be zero, and
+  // the dampers would brake the shafts.
   connect(controller.omega1, testbed.omega1);
   connect(controller.omega2, testbed.omega2);
-  // Sampled, not connected. To OpenModelica all outputs of an FMU depend on all of its inputs: with six connections the two make
-  // a nonlinear system of size 24, solved at every step, and take 50 times as long. Without `pre` the model does not build.
+  // These values are sampled, not connected. OpenModelica assumes that all outputs of an FMU depend on all of its inputs. Six
+  // connections would give a nonlinear system of size 24, which is solved at every step and takes 50 times as long. Without `pre`
+  // OpenModelica cannot build the model.
   when sample(0, controller.sample_time) then
     y = {pre(testbed.pitch), pre(testbed.roll), pre(testbed.pitch_rate), pre(testbed.roll_rate), pre(testbed.tau1), pre(testbed.tau2)};
   end when;

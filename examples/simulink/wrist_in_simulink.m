@@ -1,18 +1,18 @@
-function wrist_in_simulink(folder)
-% Runs the testbed's FMU in Simulink and compares it with the reference experiments in it.
+function wrist_in_simulink(directory)
+% Runs the testbed's FMU in Simulink, and compares the results with the reference experiments in the FMU.
 %
 %     wrist_in_simulink('../../target/fmu')
 %
-% FOLDER has prw_testbed.fmu and prw_controller.fmu (`make closed-loop`, or from a release). Needs Simulink R2023a or
-% later, for its block FMU, and the command `prw` on the system's path (pip install prw). Written from documentation and
-% other people's scripts: nobody has run it in Simulink yet. Tell us what you see.
+% The directory contains prw_testbed.fmu and prw_controller.fmu (`make closed-loop`, or from a release). The script needs
+% Simulink R2023a or later, which has the block FMU, and the command `prw` on the system's path (python/prw/README.md). The
+% script was written from documentation and has not been run in Simulink. Please report your results.
 
 if nargin < 1
-    folder = fullfile('..', '..', 'target', 'fmu');
+    directory = fullfile('..', '..', 'target', 'fmu');
 end
-% The block takes the name of a file on the path, no path.
-addpath(folder);
-restore = onCleanup(@() rmpath(folder));
+% The block needs the name of a file on MATLAB's path.
+addpath(directory);
+restore = onCleanup(@() rmpath(directory));
 
 fig4();
 closed_loop();
@@ -52,12 +52,12 @@ end
 for name = {'theta1', 'theta2', 'omega1', 'omega2'}
     add_line(model, port(controller, 'output', name{1}), port(testbed, 'input', name{1}));
 end
-% Pitch, roll and their rates do not depend on the motors at the same instant, and go straight back.
+% Pitch, roll and their rates do not depend on the motors at the same instant, so they are connected directly.
 for name = {'pitch', 'roll', 'pitch_rate', 'roll_rate'}
     add_line(model, port(testbed, 'output', name{1}), port(controller, 'input', name{1}));
 end
-% The torques do (eq. 9): where Simulink takes the controller for a block with direct feedthrough, these two wires close
-% an algebraic loop. A delay of one step breaks it; the controller reads torques to stay below their limit only.
+% The torques do (eq. 9). If Simulink assumes direct feedthrough of the controller, these two connections close an algebraic
+% loop. A delay of one step breaks the loop. The controller uses the torques only to stay below their limit.
 for name = {'tau1', 'tau2'}
     delay = ['delay_' name{1}];
     add_block('simulink/Discrete/Unit Delay', [model '/' delay], 'SampleTime', '0.001');
@@ -69,7 +69,7 @@ simulate(model, 'closed_loop');
 end
 
 function model = fresh(model)
-% An empty model with a fixed step of 1 ms.
+% Creates an empty model with a fixed step of 1 ms.
 if bdIsLoaded(model)
     close_system(model, 0);
 end
@@ -78,7 +78,7 @@ set_param(model, 'SolverType', 'Fixed-step', 'Solver', 'FixedStepDiscrete', 'Fix
 end
 
 function fmu = add_fmu(model, file)
-% The FMU as a block that steps every millisecond: its name, and those of its ports in their order.
+% Adds the FMU as a block with steps of 1 ms. Returns its name, and the names of its ports in their order.
 [~, fmu.name] = fileparts(file);
 fmu.block = [model '/' fmu.name];
 add_block('simulink_extras/FMU Import/FMU', fmu.block);
@@ -86,7 +86,7 @@ set_param(fmu.block, 'FMUName', file);
 set_param(fmu.block, 'FMUMode', 'CoSimulation', 'FMUSampleTime', '0.001');
 set_param(fmu.block, 'FMUInputMapping', 'Flat', 'FMUOutputMapping', 'Flat');
 if strcmp(fmu.name, 'prw_testbed')
-    % The motors' rates are wired, so the testbed need not find them from the angles.
+    % The motors' rates are connected, so the testbed need not estimate them from the angles.
     set_param(fmu.block, 'use_omega', 'on');
 end
 unpacked = tempname;
@@ -105,12 +105,12 @@ end
 end
 
 function text = port(fmu, causality, name)
-% A port of the FMU's block as add_line takes it.
+% Returns a port of the FMU's block in the format of add_line.
 text = sprintf('%s/%d', fmu.name, find(strcmp(fmu.(causality), name)));
 end
 
 function add_outports(model, fmu)
-% An outport of the model for each output: what is not connected may be optimized away.
+% Adds an outport of the model for each output, because Simulink may optimize unconnected signals away.
 for k = 1:numel(fmu.output)
     add_block('simulink/Sinks/Out1', [model '/' fmu.output{k}]);
     add_line(model, sprintf('%s/%d', fmu.name, k), [fmu.output{k} '/1']);
@@ -118,7 +118,7 @@ end
 end
 
 function simulate(model, experiment)
-% Run it, save all outputs with time in a form that others can read, and compare.
+% Runs the model, saves time and all outputs for prw check, and compares them with the reference.
 out = sim(model, 'SaveOutput', 'on', 'OutputSaveName', 'yout', 'SaveFormat', 'StructureWithTime', ...
           'ReturnWorkspaceOutputs', 'on');
 yout = out.yout;

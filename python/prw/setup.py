@@ -12,7 +12,7 @@ from setuptools.command.build_py import build_py
 
 CLONE = Path(__file__).resolve().parents[2]
 #: Directories as in prw.files, and the files that prw.frames needs.
-PAGE_FOLDERS = ("crates/fmu-package/page", "docs/fmu-page/wrist")
+PAGE_DIRECTORIES = ("crates/fmu-package/page", "docs/fmu-page/wrist")
 PAGE_FILES = ("live.css", "player.js", "plot.js", "animation.js", "wrist.js", "wrist.json")
 
 
@@ -25,7 +25,7 @@ class WithClone(build_py):
             return
         package = Path(self.build_lib, "prw")
         (package / "page").mkdir(exist_ok=True)
-        for path in (CLONE / folder / name for folder in PAGE_FOLDERS for name in PAGE_FILES):
+        for path in (CLONE / directory / name for directory in PAGE_DIRECTORIES for name in PAGE_FILES):
             if path.is_file():
                 shutil.copyfile(path, package / "page" / path.name)
         if (CLONE / "build_fmu.rs").is_file():

@@ -1,4 +1,4 @@
-"""Is `prw identify` unbiased, and are its intervals honest? Repetitions on simulated rigs; `make monte-carlo` runs it.
+"""Tests on simulated rigs whether `prw identify` is unbiased and its intervals have the stated coverage; `make monte-carlo`.
 
     python tests/analysis/monte_carlo.py target/fmu/prw_testbed.fmu [--repetitions 300] [--sensors all|torque]
         [--motion independent|equal|opposite|fig4|slow|moves] [--seed 0]
@@ -111,8 +111,8 @@ def commit() -> str:
 
 
 def campaign(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[dict, bool]:
-    """The verdicts on rigs with faults, by fault and size; and whether the verdict is never "fits" if an interval
-    misses by more than two of its widths, but in 1 %."""
+    """The verdicts on rigs with faults, by fault and size. Also returns whether, of the rigs with an interval that misses by more
+    than two of its widths, at most 1 % have the verdict "fits"."""
     rows, rigs = {}, options.faulty
     print(
         f"{rigs} rigs for each fault and size, all sensors: share that does not fit (worst miss where it fits, in widths)"
@@ -123,10 +123,10 @@ def campaign(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[di
         for case in cases
         for i in range(rigs)
     ]
-    everything = iter(pool.map(repetition, *zip(*jobs)))
+    results = iter(pool.map(repetition, *zip(*jobs)))
     grossly = missed = 0
     for fault, size in cases:
-        found = list(itertools.islice(everything, rigs))
+        found = list(itertools.islice(results, rigs))
         rejected = float(np.mean([not each[4] for each in found]))
         grossly += sum(each[5] > 2 for each in found)
         missed += sum(each[5] > 2 and each[4] for each in found)
@@ -171,7 +171,7 @@ def write(found: dict, path: Path | None) -> None:
 
 
 def is_too_rare(hits: np.ndarray, least: float, expected: float) -> bool:
-    """Whether the share of hits is less than `least`, and so small only once in twenty times at the expected share."""
+    """Whether the share of hits is less than `least`, and has a probability below 5 % if the true share is `expected`."""
     return bool(hits.mean() < least and binom.cdf(hits.sum(), hits.size, expected) < 0.05)
 
 

@@ -1,7 +1,7 @@
-"""A testbed to be identified: the oracle's equations of motion, driven smoothly, behind sensors that are not perfect.
+"""A simulated testbed for identification: the oracle's equations of motion, smooth motor motions, and sensors with errors.
 
-Nothing here comes from the FMU or from `prw`. The motors follow sums of sines between which there is no common period;
-the response to each is exact (transfer function), and so is the transient from rest (eigenvalues).
+The module uses neither the FMU nor `prw`. The motors follow sums of sines without a common period. The response to each
+sine (transfer function) and the transient from rest (eigenvalues) are exact.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The animation: bodies turn as in eq. (1), files have the format of their suffix, the film loops and is small."""
+"""Animations: bodies turn as in eq. (1), and files have the format of their suffix; the film of the README loops."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_roll_turns_the_gripper_in_the_ring() -> None:
 
 @pytest.mark.parametrize("carrier, side, roll", [("theta5", -1, 1), ("theta6", 1, -1)])
 def test_cam_moves_with_the_rollers_that_touch_it(carrier: str, side: int, roll: int) -> None:
-    """At the contact above the input shaft of a side, both move to the viewer, as in eq. (1)."""
+    """At the contact above the input shaft of a side, carrier and cam both move to the viewer, as in eq. (1)."""
     contact, small = np.array([side * 0.6, 0.6, 0.0]), 1e-3
     assert (about_x(small) @ contact)[2] > 0, carrier
     assert (about_y(roll * small) @ contact)[2] > 0, carrier
@@ -73,7 +73,7 @@ def test_carriers_follow_from_pitch_and_roll(fmu: Path) -> None:
         np.testing.assert_allclose(shown[name], run[name], rtol=0, atol=1e-14)
 
 
-def test_gif_has_its_frames_and_ends_as_it_began(tmp_path: Path) -> None:
+def test_gif_has_all_frames_and_ends_at_the_first_position(tmp_path: Path) -> None:
     animate(swing(), tmp_path / "run.gif", speed=1.0)
     with Image.open(tmp_path / "run.gif") as film:
         assert film.info["duration"] == 1000 / RATES[".gif"]
@@ -93,7 +93,7 @@ def test_page_has_the_run_and_needs_nothing_else(tmp_path: Path) -> None:
     assert not re.search(r"https?:|<link|@import| src=", page)
     noted = json.loads(re.findall(r"^animation\((.*)\);$", page, flags=re.M)[0])
     assert noted["speed"] == 0.5 and noted["captions"] == [[0.0, "</script>"]]
-    columns = {name: np.frombuffer(base64.b64decode(text)) for name, text in noted["columns"].items()}
+    columns = {name: np.frombuffer(base64.b64decode(content)) for name, content in noted["columns"].items()}
     np.testing.assert_array_equal(columns["time"], run.time)
     for name, signal in angles_and_torques(run).items():
         np.testing.assert_array_equal(columns[name], signal)
@@ -135,7 +135,7 @@ def test_command(prw: Any, tmp_path: Path) -> None:
 
 
 def test_film_of_the_readme() -> None:
-    """Small enough for a README; begins where it ends; panels stand still."""
+    """The film is small, its first and last positions are equal, and the axes do not move."""
     path = ROOT / "docs" / "wrist.gif"
     assert path.stat().st_size < 500_000
     images = frames_of(path)

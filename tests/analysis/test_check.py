@@ -48,29 +48,33 @@ def write_csv(path, columns, titles=None, delimiter=","):
     return path
 
 
-def text_matrix(texts, across):
-    """Texts as a matrix of characters, one a row, or one a column."""
-    width = max(map(len, texts), default=1)
-    rows = [text.ljust(width) for text in texts]
+def character_matrix(strings, across):
+    """Strings as a matrix of characters, one in each row, or one in each column."""
+    width = max(map(len, strings), default=1)
+    rows = [string.ljust(width) for string in strings]
     return np.array(["".join(column) for column in zip(*rows)] if across else rows)
 
 
 def write_modelica(path, columns, units=False, across=True):
     """Writes a file in OpenModelica's format: MATLAB 4; constants in data_1, trajectories in data_2, aliases by index and sign."""
     time = columns["time"]
-    names, infos, texts = ["time", "testbed.k1"], [(0, 1, 0, -1), (1, 2, 0, 0)], ["Simulation time [s]", "Stiffness"]
+    names, infos, descriptions = (
+        ["time", "testbed.k1"],
+        [(0, 1, 0, -1), (1, 2, 0, 0)],
+        ["Simulation time [s]", "Stiffness"],
+    )
     table = [time]
     for name, values in columns.items():
         if name != "time":
             table.append(-values if name == "tau2" else values)
             names.append(f"testbed.{name}")
             infos.append((2, -len(table) if name == "tau2" else len(table), 0, -1))
-            texts.append(f"of the testbed [{UNITS.get(name, 'rad')}]" if units else "of the testbed")
+            descriptions.append(f"of the testbed [{UNITS.get(name, 'rad')}]" if units else "of the testbed")
     constants, table = np.array([[0.0, 1.0], [120.0, 120.0]]), np.array(table)
     content = {
-        "Aclass": text_matrix(["Atrajectory", "1.1", "", "binTrans" if across else "binNormal"], False),
-        "name": text_matrix(names, across),
-        "description": text_matrix(texts, across),
+        "Aclass": character_matrix(["Atrajectory", "1.1", "", "binTrans" if across else "binNormal"], False),
+        "name": character_matrix(names, across),
+        "description": character_matrix(descriptions, across),
         "dataInfo": np.array(infos, dtype=np.int32).T if across else np.array(infos, dtype=np.int32),
         "data_1": constants if across else constants.T,
         "data_2": table if across else table.T,
@@ -138,7 +142,7 @@ def test_simulink(right, soft, fmu, tmp_path, layout):
         assert found.agrees == (name == "right") and len(found.variables) == len(OUTPUTS)
 
 
-def test_names_units_and_separators_of_others(right, fmu, tmp_path):
+def test_names_units_and_separators_of_other_tools(right, fmu, tmp_path):
     """Semicolons and decimal commas, degrees in the header, and components before the names."""
     degrees = {n: np.rad2deg(v) if n in DEGREES else v for n, v in right.items()}
     titles = {n: f"wrist/testbed/{n} [deg]" if n in DEGREES else f"wrist.root.testbed.{n}" for n in right}
@@ -237,7 +241,7 @@ def test_mat_files_that_cannot_be_read(fmu, tmp_path):
     with pytest.raises(prw.UserError, match=r"format 7.3; save it with: save\('run.mat', ..., '-v7'\)"):
         prw.check(path, fmu=fmu)
     path.write_bytes(b"something else")
-    with pytest.raises(prw.UserError, match="no .mat file"):
+    with pytest.raises(prw.UserError, match="cannot be read as a .mat file"):
         prw.check(path, fmu=fmu)
     savemat(path, {"roll": np.zeros(3)})
     with pytest.raises(prw.UserError, match="no vector time or tout; it has .*roll; save time and signals as vectors"):

@@ -48,7 +48,7 @@ def test_a_run_without_rates(run, fmu):
 
 
 def test_a_run_of_a_recording(fmu):
-    """Its motors rest at first, and are as rough as the encoder that recorded them: so were the FMU's inputs."""
+    """The motors rest at first, and their angles have the steps of the encoder that recorded them, as in the simulation."""
     run = prw.simulate(ROOT / "examples" / "point_to_point.csv", {"k1": K1}, fmu=fmu)
     check(prw.identify(run, starts=1, fmu=fmu), K1, 1e-5)
 
@@ -78,7 +78,7 @@ def test_an_encoder_with_two_values(run, fmu):
 
 @pytest.mark.parametrize("rate, pattern", [(1000, "independent"), (250, "moves"), (500, "fig4"), (250, "opposite")])
 def test_a_rig_with_exact_sensors(fmu, rate, pattern):
-    """Its motors move smoothly between the samples."""
+    """The motors of the rig move smoothly between the samples."""
     simulated = rig.experiment(23, 6, rate, pattern)
     check(prw.identify(exact(simulated), starts=1, fmu=fmu), simulated.parameters["k1"], 2e-4)
 

@@ -76,7 +76,7 @@ def test_either_version_of_fmi(recording, fmu, found):
     [
         ({"estimate": ["k9"]}, "estimate: k9 is not known; there are J2, J3, H3, k1"),
         ({"estimate": []}, "estimate: nothing is named"),
-        ({"estimate": None}, "estimate: None is neither a name nor several"),
+        ({"estimate": None}, "estimate: None is neither a name nor a sequence of names"),
         ({"priors": {"k1": -0.1}}, "priors: k1 -0.1 is not a positive number"),
         ({"priors": {"J3": 10}}, "priors: J3 has a standard deviation of 1000%; 100 % is the most"),
         ({"priors": {"J3": (None, 0.1)}}, "priors: J3 None is not a positive number"),
@@ -97,10 +97,10 @@ def test_wrong_arguments(recording, fmu, options, message):
     assert message in str(error.value)
 
 
-def test_sources_that_are_no_recording():
+def test_sources_that_are_not_recordings():
     for files, message in (
-        (None, "None is no recording"),
-        ([None], "None is no recording"),
+        (None, "None is not a recording"),
+        ([None], "None is not a recording"),
         ([], "files: there are none"),
     ):
         with pytest.raises(prw.UserError, match=message):

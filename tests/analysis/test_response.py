@@ -31,7 +31,7 @@ def fixed(simulated: rig.Rig, model) -> dict[str, float]:
 
 @pytest.mark.parametrize("rows", [slice(None), slice(1234, 3235)], ids=["from rest", "in motion"])
 def test_perfect_sensors_leave_nothing(model, simulated, rows):
-    """A recording that starts and ends anywhere is explained to one part in a million."""
+    """The relative residual is below 1e-6, also if the recording starts and ends in motion."""
     task = task_of(model.known, rig.NAMES, parameters=fixed(simulated, model), offsets=False)
     fitter = Fitter(model, [prepare(recording(simulated, rows))], task, dict.fromkeys(rig.ALL, 1.0))
     modelled = fitter.modelled(task.first())[0]
@@ -64,7 +64,7 @@ def test_derivatives_with_respect_to_the_parameters(model, simulated):
     step = 1e-5
     for i, direction in enumerate(np.eye(len(at))):
         differences = (fitter.residuals(at + step * direction) - fitter.residuals(at - step * direction)) / (2 * step)
-        # Kaufman's form leaves out a part that is perpendicular to the residual's motion and vanishes with it.
+        # Kaufman's approximation omits a term that is proportional to the residual.
         assert np.linalg.norm(found[:, i] - differences) < 5e-3 * np.linalg.norm(differences), task.names[i]
 
 
@@ -114,7 +114,7 @@ def test_logged_rates_help_and_their_noise_is_found():
 
 
 def test_errors_drawn_at_two_angles_differ():
-    """At each of two angles the motor rests at, an encoder errs by anything up to half a quantum."""
+    """At each of two angles at which the motor rests, the error of the encoder is any value up to half a quantum."""
     t = np.arange(4001) * 1e-3
     quantum = 2 * np.pi / 10_000
     angle = 0.4 / (1 + np.exp(-(t - 2) / 0.02))
@@ -150,9 +150,8 @@ def test_quanta():
 
 
 @pytest.mark.parametrize("counts", [4096, 65_536])
-def test_an_encoder_s_errors_in_every_period_are_no_motion(counts):
-    """In the motion of Fig. 4 all of the quantisation is at multiples of 5 Hz. The motor moves at 5 Hz and nowhere
-    else."""
+def test_periodic_errors_of_an_encoder_are_not_taken_for_motion(counts):
+    """In the motion of Fig. 4 the motor moves at 5 Hz only. All quantisation errors are at multiples of 5 Hz."""
     t = np.arange(10_001) * 1e-3
     quantum = 2 * np.pi / counts
     angle = (1 - np.cos(10 * np.pi * t)) / (10 * np.pi)

@@ -18,7 +18,7 @@ def rows(directory):
 def test_grid_random_and_failures(prw, tmp_path, fmu):
     result = prw(
         "sweep", "--grid", "k1=-50:150:3", "--random", "c3=0.4:20%", "--runs", 4, "--workers", 2
-    )  # as 0.2.0 called threads
+    )  # the name of --threads in 0.2.0
     assert result.returncode == 0, result.stderr
     assert "ran         12 runs on 2 threads" in result.stdout
     assert "failed      4 runs; run 0: the FMU stopped: fmi2SetReal: k1 must not be below 1e-300" in result.stdout

@@ -1,4 +1,4 @@
-"""Fixtures: the controller, the closed loop, and its runs under the masters that are installed."""
+"""Fixtures: the controller, the closed loop, and the installed masters."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def controller_fmu() -> Path:
 
 @pytest.fixture(scope="session")
 def closed_loop() -> system.System:
-    """The closed loop as build_closed_loop has written it."""
+    """The closed loop that build_closed_loop wrote."""
     return system.read(built("prw_closed_loop.ssp"), built("prw_closed_loop"))
 
 

@@ -1,62 +1,36 @@
-"""prw_controller.fmu under FMPy, and with a testbed whose references jump."""
+"""prw_controller.fmu under FMPy, and coupled to the testbed while its references jump."""
 
 from __future__ import annotations
 
 import fmpy
+import fmu_run
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 from instance import Instance
 
-MEASURED = ("pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2")
 MOTORS = ("theta1", "theta2", "omega1", "omega2")
 STEP = 1e-3
 
 
-@pytest.fixture(scope="module")
-def directories(fmu, controller_fmu, unpack):
-    return {each.stem: unpack(each) for each in (fmu, controller_fmu)}
-
-
 @pytest.fixture
-def make(directories):
+def start(controller_fmu, unpack):
+    """Returns a function that creates and initializes a controller with the given start values."""
     instances = []
 
-    def make(name: str) -> Instance:
-        instances.append(Instance(directories[name], fmpy.read_model_description(directories[name]), name))
+    def start(**values) -> Instance:
+        description = fmpy.read_model_description(controller_fmu)
+        instances.append(Instance(unpack(controller_fmu), description, "prw_controller"))
+        instances[-1].fmi.setupExperiment(startTime=0.0)
+        instances[-1].set(**values)
+        instances[-1].fmi.enterInitializationMode()
+        instances[-1].fmi.exitInitializationMode()
         return instances[-1]
 
-    yield make
+    yield start
     for instance in instances:
         instance.free()
-
-
-def start(instance: Instance, **values) -> None:
-    instance.fmi.setupExperiment(startTime=0.0)
-    instance.set(**values)
-    instance.fmi.enterInitializationMode()
-    instance.fmi.exitInitializationMode()
-
-
-def run(make, duration: float, reference):
-    """Controller and testbed, step by step. reference(t): (2,) rad. Returns time (n,), pitch and roll (n, 2) rad, motors (n, 4)."""
-    testbed, controller = make("prw_testbed"), make("prw_controller")
-    start(testbed, use_omega=True)
-    start(controller)
-    wrist, motors, n = [], [], round(duration / STEP)
-    for k in range(n):
-        t = k * STEP
-        values = dict(zip(MEASURED, testbed.get(*MEASURED)))
-        motion = dict(zip(MOTORS, controller.get(*MOTORS)))
-        controller.set(**dict(zip(("pitch_ref", "roll_ref"), reference(t))), **values)
-        testbed.set(**motion)
-        controller.step(t, STEP)
-        testbed.step(t, STEP)
-        wrist.append(testbed.get("pitch", "roll"))
-        motors.append(controller.get(*MOTORS))
-    assert not testbed.complaints() and not controller.complaints()
-    return STEP * np.arange(1, n + 1), np.array(wrist), np.array(motors)
 
 
 def test_the_validator_reports_nothing(controller):
@@ -64,7 +38,7 @@ def test_the_validator_reports_nothing(controller):
 
 
 def moved_by_fmpy(fmu, **options) -> np.ndarray:
-    """The motors' motion (samples, 4) at each sample; all inputs follow a straight line, which every importer knows."""
+    """Returns the motors' motion (samples, 4) at each sample. All inputs are linear in time, so every importer interpolates them exactly."""
     time = np.arange(0.0, 1.0 + STEP / 2, STEP)
     slopes = {
         "pitch_ref": 0.5,
@@ -83,7 +57,7 @@ def moved_by_fmpy(fmu, **options) -> np.ndarray:
         str(fmu), stop_time=1.0, output_interval=STEP, step_size=STEP, input=inputs, output=MOTORS, **options
     )
     moments = np.round(result["time"] / STEP).astype(int)
-    # Before and after an event there are two rows; the motion is the same in both.
+    # An event has two rows, before and after it; the motion is equal in both.
     last = np.searchsorted(moments, np.arange(len(time)), side="right") - 1
     return np.array([[row[name] for name in MOTORS] for row in result[last]])
 
@@ -106,34 +80,36 @@ def test_samples_are_events_that_fmpy_handles(controller, options):
     np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-13)
 
 
-def test_a_reference_that_jumps_to_and_fro_is_followed_within_limits(make):
-    goals = np.deg2rad([[30, 60], [-30, 60], [0, -90], [10, 0]])
-    time, wrist, motors = run(make, 4.0, lambda t: goals[int(t)])
+def test_a_jumping_reference_is_followed_within_limits(closed_loop):
+    goals, time = np.deg2rad([[30, 60], [-30, 60], [0, -90], [10, 0]]), STEP * np.arange(4001)
+    inputs = dict(zip(("pitch_ref", "roll_ref"), goals[np.minimum(time.astype(int), 3)].T))
+    names = ["testbed.pitch", "testbed.roll", *(f"controller.{name}" for name in MOTORS)]
+    with fmu_run.System(closed_loop.ssp) as loop:
+        runs = loop.run(time, inputs=inputs, outputs=names).check()
+    wrist, motors = np.hsplit(np.column_stack([runs[name][0] for name in names]), [2])
     for k, goal in enumerate(goals):
         end = (time > k + 0.9) & (time < k + 1.0)
         assert np.max(np.abs(np.rad2deg(wrist[end] - goal))) < 0.1
     assert np.max(np.abs(motors[:, 2:])) <= 3 + 1e-9
     assert np.max(np.abs(np.diff(motors[:, 2:], axis=0))) <= 30 * STEP * (1 + 1e-6)
-    # omega is the derivative of theta: between samples, which are a step apart, exactly.
+    # omega is the derivative of theta: exactly, between two samples, whose distance is one step.
     moved, mean = np.diff(motors[:, :2], axis=0), STEP * (motors[1:, 2:] + motors[:-1, 2:]) / 2
     np.testing.assert_allclose(moved, mean, atol=1e-14)
 
 
-def test_output_derivatives_are_those_of_the_motion(make):
-    controller = make("prw_controller")
-    start(controller, pitch_ref=0.5)
+def test_output_derivatives_are_derivatives_of_the_motion(start):
+    controller = start(pitch_ref=0.5)
     controller.step(0.0, 2.5e-3)
     references = [controller.variables[name].valueReference for name in MOTORS]
     first = controller.fmi.getRealOutputDerivatives(references, [1] * 4)
     np.testing.assert_allclose(first, [*controller.get("omega1", "omega2"), 30.0, 30.0])
-    # More than maxOutputDerivativeOrder, which is all that OMSimulator asks for: theta' must be it.
+    # The order 2 exceeds maxOutputDerivativeOrder, so the FMU rejects it.
     with pytest.raises(FMICallException):
         controller.fmi.getRealOutputDerivatives(references[:2], [2, 2])
 
 
-def test_motors_start_at_their_given_angles(make):
-    controller = make("prw_controller")
-    start(controller, theta1=0.7, theta2=0.7, pitch_ref=0.7, pitch=0.7)
+def test_motors_start_at_their_given_angles(start):
+    controller = start(theta1=0.7, theta2=0.7, pitch_ref=0.7, pitch=0.7)
     for k in range(100):
         controller.step(k * STEP, STEP)
     np.testing.assert_array_equal(controller.get(*MOTORS), [0.7, 0.7, 0.0, 0.0])

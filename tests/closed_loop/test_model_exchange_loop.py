@@ -1,5 +1,7 @@
-"""The closed loop with both FMUs in Model Exchange: the controller's samples are time events, and Runge and Kutta's method takes the
-testbed from one to the next. The Co-Simulation loop must tend to it as its steps become small."""
+"""The closed loop with both FMUs in Model Exchange, where the controller's samples are time events.
+
+The classical Runge-Kutta method integrates the testbed between samples. The Co-Simulation results must converge to this
+solution as the communication step decreases."""
 
 from __future__ import annotations
 
@@ -19,7 +21,8 @@ WATCHED = ("testbed.pitch", "testbed.roll", "testbed.tau1", "controller.theta1")
 
 
 def run(system: System, steps: int) -> np.ndarray:
-    """The watched variables at every sample, (SAMPLES + 1, WATCHED), with `steps` of the integrator between two samples.
+    """Returns the watched variables at each sample, shape (SAMPLES + 1, len(WATCHED)). The integrator makes `steps` steps
+    between two samples.
 
     Between samples the motors' motion depends only on time, so there is no algebraic loop."""
     references = {end.split(".")[1]: value for end, value in system.inputs.values()}
@@ -61,16 +64,16 @@ def run(system: System, steps: int) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def exact(closed_loop: System) -> np.ndarray:
-    """The response with steps so small that half of them change it by less than 1e-9."""
+    """Response with so small a step size that halving it changes the result by less than 1e-9."""
     coarse, fine = run(closed_loop, 8), run(closed_loop, 16)
     assert np.abs(fine - coarse).max() < 1e-9
     pitch, roll, torque, motor = np.abs(fine).max(axis=0)
-    assert pitch > 0.5 and roll > 1.0 and torque > 0.5 and motor > 1.0, "it moves"
+    assert pitch > 0.5 and roll > 1.0 and torque > 0.5 and motor > 1.0, "the system hardly moves"
     return fine
 
 
-def test_co_simulation_tends_to_it(exact, closed_loop: System):
-    """Angles, of second order in the communication step, which divides a sample evenly."""
+def test_co_simulation_converges_to_it(exact, closed_loop: System):
+    """The error of the angles is second order in the communication step, of which a sample period contains an integer number."""
 
     def error(steps: int) -> np.ndarray:
         rows = coupling.couple(closed_loop, SAMPLE / steps, SAMPLE * SAMPLES, False, WATCHED)[::steps]

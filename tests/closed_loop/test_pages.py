@@ -1,4 +1,4 @@
-"""The files of the closed loop: its programs and models in the documentation, and its SSP, valid against the schemas of SSP 1.0."""
+"""The files of the closed loop: programs and models in the documentation and in examples/, and the SSP."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ def test_the_programs(closed_loop, tmp_path, master, package):
 
 
 def test_the_script_for_omsimulator(closed_loop):
-    """OMSimulator is replaced by a mock that records the calls of the script; they are the content of the SSP."""
+    """A mock of OMSimulator records the calls of the script, which must equal the content of the SSP."""
     page = (ROOT / TESTBED.path).read_text(encoding="utf-8")
-    (script,) = re.findall(r'<pre data-wires="oms" tabindex="0"><code>(.*?)</code></pre>', page, flags=re.S)
+    (script,) = re.findall(r'<pre data-script="oms" tabindex="0"><code>(.*?)</code></pre>', page, flags=re.S)
     library = Mock(CRef=lambda system, *names: ".".join(names))
     with patch.dict(sys.modules, {"OMSimulator": library}):
         exec(html.unescape(script), {})
@@ -57,10 +57,10 @@ def test_the_script_for_omsimulator(closed_loop):
 
 
 def test_the_model_for_openmodelica_has_the_connections_of_the_ssp(closed_loop):
-    """Nothing here can read Modelica; the names and values are checked against the loop that runs elsewhere."""
+    """Compares names and values with the SSP, because no Modelica compiler is installed here."""
     model = (ROOT / "examples/openmodelica/ClosedLoop.mo").read_text(encoding="utf-8")
     connections = re.findall(r"^  connect\(([\w.]+), ([\w.]+)\);$", model, flags=re.M)
-    # Not connected, but sampled: without `pre` it is an algebraic loop to omc.
+    # These signals are sampled, not connected. Without `pre`, OpenModelica assumes an algebraic loop.
     (sampled,) = re.findall(
         r"^  when sample\(0, controller\.sample_time\) then\n    y = \{(.*?)\};\n  end when;$", model, flags=re.M
     )
@@ -77,7 +77,7 @@ def test_the_model_for_openmodelica_has_the_connections_of_the_ssp(closed_loop):
 
 
 def test_the_script_for_openmodelica_gives_each_fmu_a_directory(closed_loop):
-    """In one directory the second FMU's modelDescription.xml replaces the first one's; with a relative one `simulate` fails."""
+    """In a shared directory the second modelDescription.xml would replace the first. With a relative `workdir`, `simulate` fails."""
     script = (ROOT / "examples/openmodelica/closed_loop.mos").read_text(encoding="utf-8")
     model = (ROOT / "examples/openmodelica/ClosedLoop.mo").read_text(encoding="utf-8")
     imports = dict(
@@ -102,7 +102,7 @@ def archive(closed_loop):
         yield archive
 
 
-def test_every_part_is_valid(archive):
+def test_the_files_are_valid_against_the_schemas_of_ssp(archive):
     for name in archive.namelist():
         schema = {
             ".ssd": "SystemStructureDescription.xsd",

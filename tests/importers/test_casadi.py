@@ -34,7 +34,9 @@ def test_values_and_jacobians(testbed, version, unpack, model, record):
     dae = casadi.DaeBuilder("testbed", unpack(testbed))
     assert dae.y() == list(OUTPUTS) and dae.u() == ["theta1", "theta2", "omega1", "omega2"]
     f = dae.create("f", ["x", "u"], ["ode", "y"])
-    jacobians = f.factory("j", ["x", "u"], [f"jac:{of}:{by}" for of in ("ode", "y") for by in ("x", "u")])
+    jacobians = f.factory(
+        "j", ["x", "u"], [f"jac:{result}:{argument}" for result in ("ode", "y") for argument in ("x", "u")]
+    )
     rng, worst = np.random.default_rng(3), 0.0
     # The model is linear in states and inputs, so differences of values are exact columns of the Jacobians.
     base = right(model, np.zeros(6), np.zeros(4))
@@ -47,12 +49,12 @@ def test_values_and_jacobians(testbed, version, unpack, model, record):
         worst = max(worst, share(np.hstack(found[:2]), whole[0]), share(np.hstack(found[2:]), whole[1]))
     assert worst < 1e-13
     seen = f"agree with the equations to {worst:.0e} of the largest value"
-    of = f"testbed for FMI {'3.0' if version else '2.0'}, ME"
-    record("CasADi, `DaeBuilder`", "casadi", of, "right-hand side, outputs and their four Jacobians", seen)
+    fmu = f"testbed for FMI {'3.0' if version else '2.0'}, ME"
+    record("CasADi, `DaeBuilder`", "casadi", fmu, "right-hand side, outputs and their four Jacobians", seen)
 
 
 def test_cvodes(testbed, version, unpack, model, record):
-    """The testbed starts with wound-up couplings and fixed motors."""
+    """The testbed starts with twisted couplings and fixed motors."""
     dae = casadi.DaeBuilder("testbed", unpack(testbed))
     x, u = casadi.MX.sym("x", 6), casadi.MX.sym("u", 4)
     equations = {"x": x, "u": u, "ode": dae.create("f", ["x", "u"], ["ode"])(x, u)}
@@ -64,13 +66,15 @@ def test_cvodes(testbed, version, unpack, model, record):
     at, _ = follow(model, t, np.tile(held, (21, 1)), np.zeros((21, 2)), x0=start)
     worst = max(share(found[row], at[name][1:]) for row, name in ((0, "theta3"), (1, "theta4")))
     assert worst < 1e-7
-    of = f"testbed for FMI {'3.0' if version else '2.0'}, ME"
-    seen = f"2 s from a wound-up start agree with the matrix exponential to {worst:.0e} of the largest angle"
-    record("CasADi, `cvodes`", "casadi", of, "integration with relative tolerance 1e-10", seen)
+    fmu = f"testbed for FMI {'3.0' if version else '2.0'}, ME"
+    seen = (
+        f"2 s from a start with twisted couplings agree with the matrix exponential to {worst:.0e} of the largest angle"
+    )
+    record("CasADi, `cvodes`", "casadi", fmu, "integration with relative tolerance 1e-10", seen)
 
 
 def test_derivatives_with_respect_to_parameters(tunable, version, unpack, record):
-    """`fixed` parameters are constants to CasADi; those of the variant made with `--tunable` are its `p`."""
+    """CasADi treats `fixed` parameters as constants. The parameters of the FMU built with `--tunable` are its `p`."""
     dae = casadi.DaeBuilder("testbed", unpack(tunable))
     physical = [name in REAL for name in dae.p()]
     assert {name for name, real in zip(dae.p(), physical) if real} == set(REAL)
@@ -98,11 +102,11 @@ def test_derivatives_with_respect_to_parameters(tunable, version, unpack, record
             worst = max(worst, *(share(found[:, k], expected[:, k]) for k in np.flatnonzero(physical)))
             assert not found[:, np.logical_not(physical)].any()
     assert worst < 1e-9
-    of = f"testbed for FMI {'3.0' if version else '2.0'} made with `--tunable`, ME"
+    fmu = f"testbed for FMI {'3.0' if version else '2.0'} made with `--tunable`, ME"
     record(
         "CasADi, `DaeBuilder`",
         "casadi",
-        of,
+        fmu,
         "derivatives with respect to all eight Real parameters",
         f"agree with differences to {worst:.0e}",
     )

@@ -169,7 +169,7 @@ def rate_step() -> Experiment:
     motors = np.column_stack([np.outer(ends, speed), np.tile(speed, (2, 1))])
     return Experiment(
         "rate_step",
-        "The rate of motor 1 steps from 0 to 0.5 rad/s at the first instant, motor 2 stands; exact at any step size",
+        "The rate of motor 1 steps from 0 to 0.5 rad/s at the first instant, motor 2 is at rest; exact at any step size",
         {**parameters, "use_omega": True},
         {"time": ends, **dict(zip(MOTORS, motors.T))},
         {"time": t, **true_values},

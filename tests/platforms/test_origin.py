@@ -14,8 +14,8 @@ import pytest
 from conftest import DIST, ROOT
 
 #: Directories of this machine, and patterns of directories of others.
-FOLDERS = {str(ROOT), str(Path.home()), f"{tempfile.gettempdir()}/", "/.cargo/", "/.rustup/", "rustlib", "/usr/src"}
-FOLDERS |= {os.environ[name] for name in ("CARGO_HOME", "CARGO_TARGET_DIR") if os.environ.get(name)}
+DIRECTORIES = {str(ROOT), str(Path.home()), f"{tempfile.gettempdir()}/", "/.cargo/", "/.rustup/", "rustlib", "/usr/src"}
+DIRECTORIES |= {os.environ[name] for name in ("CARGO_HOME", "CARGO_TARGET_DIR") if os.environ.get(name)}
 OTHERS = re.compile(rb"/home/\w+/|/Users/\w+/|[A-Z]:\\(?:Users|a)\\", re.IGNORECASE)
 
 
@@ -34,16 +34,16 @@ def origins(name: str, content: bytes) -> list[str]:
     """Returns the directories that a file names, each with its location."""
     found = []
     for path, text in contents(name, content):
-        for folder in FOLDERS:
+        for directory in DIRECTORIES:
             # Windows has strings with two bytes per character.
-            if any(folder.encode(encoding) in text for encoding in ("utf-8", "utf-16-le")):
-                found.append(f"{folder} in {path}")
+            if any(directory.encode(encoding) in text for encoding in ("utf-8", "utf-16-le")):
+                found.append(f"{directory} in {path}")
         found += [f"{match.decode()} in {path}" for match in OTHERS.findall(text)]
     return found
 
 
 @pytest.mark.parametrize("path", sorted(DIST.iterdir()), ids=lambda path: path.name)
-def test_no_names_of_folders(path):
+def test_no_names_of_directories(path):
     assert origins(path.name, path.read_bytes()) == []
 
 

@@ -1,4 +1,4 @@
-"""`import prw`: its functions as a notebook calls them, and their errors."""
+"""The functions of the package prw, and their errors."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOTION = ROOT / "examples" / "point_to_point.csv"
 
 
 def python(program: str, directory: Path) -> str:
-    """The output of a program in a separate Python."""
+    """Runs a program in a separate Python process. Returns its output."""
     result = subprocess.run([sys.executable, "-c", program], cwd=directory, capture_output=True, text=True, timeout=120)
     assert result.returncode == 0, result.stderr
     assert result.stderr == ""
@@ -203,7 +203,7 @@ def test_wrong_simulations(testbed: Path, tmp_path: Path) -> None:
         ({"parameters": {"k1": "stiff"}}, "k1 is 'stiff', not a number"),
         ({"parameters": {"k1": None}}, "k1 is None, not a number"),
         ({"outputs": ["yaw"]}, "outputs: yaw is not known; there are theta1"),
-        ({"outputs": None}, "outputs: None is neither a name nor several"),
+        ({"outputs": None}, "outputs: None is neither a name nor a sequence of names"),
         ({"fmu": tmp_path / "absent.fmu"}, "absent.fmu: no such FMU$"),
         ({"motion": tmp_path / "absent.csv"}, "absent.csv: cannot be read"),
     ]:
@@ -273,7 +273,7 @@ def test_the_command_linearize(testbed: Path, tmp_path: Path) -> None:
 
 
 def test_the_programs_in_the_readme(monkeypatch: pytest.MonkeyPatch) -> None:
-    """They run unchanged, in the repository root."""
+    """The programs run unchanged in the repository root."""
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     short, program = re.findall(r"^```python\n(.*?)^```", readme, flags=re.S | re.M)
     monkeypatch.chdir(ROOT)

@@ -69,7 +69,7 @@ def test_the_point_of_operation_does_not_matter(testbed: Path) -> None:
 
 
 def test_given_flags_count(testbed: Path) -> None:
-    """On the first sample the estimated rates are 0, and at rest the states follow the motors."""
+    """At the first sample the estimated rates are 0. While the testbed starts at rest, the states follow the motors."""
     model = prw.linearize(
         {"use_omega": False, "start_at_rest": True}, fmu=testbed, fmi_type="CoSimulation", outputs=["pitch"]
     )
@@ -77,7 +77,7 @@ def test_given_flags_count(testbed: Path) -> None:
 
 
 def test_transfer_matrices(testbed: Path) -> None:
-    """G(s) of eq. (13) entry by entry from the oracle, and the motors' rates folded in."""
+    """Compares all entries of G(s), eq. (13), with the oracle; also if the rates follow from the angles."""
     found = prw.linearize(fmu=testbed, outputs=MEASURED)
     s = 2j * np.pi * np.array([0.1, 3.0, 5.6, 80.0])
     a, b, c, d = expected(linear_model(table_1()))
@@ -91,11 +91,11 @@ def test_transfer_matrices(testbed: Path) -> None:
     )
     np.testing.assert_array_equal(found.response_at_hz(s.imag / (2 * np.pi), RATES), found.transfer(s, RATES))
     assert found.moved(RATES) == ("theta1", "theta2")
-    with pytest.raises(prw.UserError, match="rates: omega9 is no input; there are theta1, theta2"):
+    with pytest.raises(prw.UserError, match="rates: omega9 is not an input; there are theta1, theta2"):
         found.transfer(1j, {"omega9": "theta1"})
 
 
-def test_pitch_and_roll_are_apart(testbed: Path) -> None:
+def test_pitch_and_roll_are_separate(testbed: Path) -> None:
     p = table_1()
     for mode, inertia, load, gain in zip(
         pitch_and_roll(prw.linearize(fmu=testbed)),
@@ -112,7 +112,7 @@ def test_pitch_and_roll_are_apart(testbed: Path) -> None:
         assert -mode.c @ np.linalg.solve(mode.A, mode.b) == pytest.approx(gain, rel=1e-12)
 
 
-def test_a_pendulum_where_it_hangs(pendulum: Path) -> None:
+def test_a_pendulum_at_any_angle(pendulum: Path) -> None:
     for start, (angle, k) in (({}, (0.5, 9.0)), ({"angle": 2.0, "stiffness": 4.0, "torque": 7.0}, (2.0, 4.0))):
         model = prw.linearize(start, fmu=pendulum)
         assert (model.states, model.inputs, model.outputs) == (("angle", "rate"), ("torque",), ("angle", "height"))
@@ -204,7 +204,7 @@ def test_no_fmu(tmp_path: Path) -> None:
 
 def test_an_fmu_in_place_of_the_parameters(testbed: Path) -> None:
     with pytest.raises(
-        prw.UserError, match="parameters: .* is no JSON file with values by name; an FMU is named by `fmu`"
+        prw.UserError, match="parameters: .* is not a JSON file with values by name; an FMU is named by `fmu`"
     ):
         prw.linearize(testbed)
 

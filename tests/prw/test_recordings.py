@@ -1,4 +1,4 @@
-"""Reading recordings: units, formats, notes, and one clear line for each mistake."""
+"""Reading recordings: units, formats, notes, and one line for each mistake."""
 
 from __future__ import annotations
 
@@ -116,8 +116,8 @@ def test_spellings_of_one_recording(file: Any, content: Any) -> None:
 
 @pytest.mark.parametrize("delimiter, end", [(",", "\n"), (";", "\r\n"), ("\t", "\n")])
 def test_numbers_of_many_rows(tmp_path: Path, delimiter: Any, end: Any) -> None:
-    """They are bit-identical to Python's conversion of each cell, empty or not, also next to columns of text. Errors name
-    the row."""
+    """Numbers are bit-identical to Python's conversion of each cell, also next to empty cells and columns of strings. Errors
+    name the row."""
     draws = np.random.default_rng(6)
     numbers = draws.standard_normal((500, 5)) * 10.0 ** draws.integers(-310, 300, (500, 5))
     cells = [[repr(k * 1e-3), "up", *map(repr, row.tolist())] for k, row in enumerate(numbers)]
@@ -152,30 +152,22 @@ def test_numbers_of_many_rows(tmp_path: Path, delimiter: Any, end: Any) -> None:
 
 
 def test_units_of_the_header_and_of_the_option(file: Any) -> None:
-    path = file(lines("time [ms],theta1 (deg),theta2 [rev],pitch"))
-    measured = read(path, units={"pitch": "mrad"})
-    assert measured.time[-1] == pytest.approx(0.29e-3)
-    np.testing.assert_allclose(measured.theta[0], [np.deg2rad(0.1), 0.4 * np.pi])
-    assert measured["pitch"][6] == pytest.approx(0.6e-3)
-    assert list(measured.measured) == ["pitch"]
-    assert read(path)["pitch"][6] == pytest.approx(0.6)
-    assert read(path, degrees=True)["pitch"][6] == pytest.approx(np.deg2rad(0.6))
-
-
-def test_units_of_time_angles_and_rates(file: Any) -> None:
-    motion = read_motion(
-        file("time [ms],theta1 [deg],theta2 [deg],omega1_rpm,omega2_rpm,tau1 [N.m]\n0,180,90,30,0,1\n5,180,90,30,0,1\n")
+    path = file(
+        "time [ms],theta1 (deg),theta2 [rev],omega1_rpm,omega2,tau1,pitch\n0,180,2,30,0,1,6\n5,180,2,30,0,1,6\n"
     )
-    assert motion.omega is not None and "columns ignored: tau1 [N.m]" in motion.notes
-    np.testing.assert_allclose(motion.time, [0, 5e-3], rtol=1e-15)
-    np.testing.assert_allclose(motion.theta, [[np.pi, np.pi / 2]] * 2, rtol=1e-15)
-    np.testing.assert_allclose(motion.omega, [[np.pi, 0]] * 2, rtol=1e-15)
-
-
-@pytest.mark.parametrize("unit, factor", [("N.m", 1), ("Nm", 1), ("N·m", 1), ("mN.m", 1e-3), ("N cm", 1e-2)])
-def test_torque_units(file: Any, unit: Any, factor: Any) -> None:
-    measured = read(file(lines(f"time,theta1,theta2,tau1 [{unit}]")))
-    assert measured["tau1"][6] == pytest.approx(0.6 * factor)
+    measured, motion = read(path, units={"pitch": "mrad"}), read_motion(path)
+    for time, theta, omega in ((m.time, m.theta, m.omega) for m in (measured, motion)):
+        np.testing.assert_allclose(time, [0, 5e-3], rtol=1e-15)
+        np.testing.assert_allclose(theta, [[np.pi, 4 * np.pi]] * 2, rtol=1e-15)
+        assert omega is not None
+        np.testing.assert_allclose(omega, [[np.pi, 0]] * 2, rtol=1e-15)
+    assert measured["pitch"][1] == pytest.approx(6e-3) and list(measured.measured) == ["tau1", "pitch"]
+    assert "columns ignored: tau1, pitch" in motion.notes
+    assert read(path)["pitch"][1] == 6 and read(path, degrees=True)["pitch"][1] == pytest.approx(np.deg2rad(6))
+    for unit, factor in {"N.m": 1, "Nm": 1, "N·m": 1, "mN.m": 1e-3, "N cm": 1e-2}.items():
+        assert read(path, units={"tau1": unit})["tau1"][1] == pytest.approx(factor)
+    with pytest.raises(UserError, match="column theta1: in deg by its header, but in rad by the units given"):
+        read(path, units={"theta1": "rad"})
 
 
 @pytest.mark.parametrize(
@@ -183,7 +175,7 @@ def test_torque_units(file: Any, unit: Any, factor: Any) -> None:
     ["t_ms,theta1_deg,theta2/deg,tau1_Nm,pitch_rate_wanted", "# Time (ms),THETA1 deg,theta2 [°],Tau1/N.m,tau1_raw"],
 )
 def test_headers_as_others_write_them(file: Any, header: Any) -> None:
-    """Units after `_`, `/` or a space, capitals, numpy's `#` before the header; a suffix that is no unit makes another name."""
+    """Units after `_`, `/` or a space, capitals, numpy's `#` before the header; a suffix that is not a unit is part of the name."""
     path = file("# rig 2; 13 May\n\n" + lines(header, row="{t},0.1,0.2,{x},0"))
     measured = read(path)
     assert measured.time[-1] == pytest.approx(0.29e-3)
@@ -223,19 +215,6 @@ def test_degrees(file: Any) -> None:
     np.testing.assert_allclose(motion.omega, np.deg2rad([[0, 0], [60, 0]]), rtol=1e-15)
     assert motion.notes == []
     assert any("if it is in degrees, call it theta1 [deg]" in note for note in read_motion(path).notes)
-
-
-def test_units_that_contradict(file: Any) -> None:
-    with pytest.raises(UserError, match="column pitch: in deg by its header, but in rad by the units given"):
-        read(file(lines("time,theta1,theta2,pitch [deg]")), units={"pitch": "rad"})
-
-
-def test_a_slow_sensor_leaves_cells_empty(file: Any) -> None:
-    text = lines("time,theta1,theta2,pitch,tau1", 60, "{t},0.1,0.2,,{x}").splitlines()
-    for k in range(1, 61, 2):
-        text[k] = text[k].replace(",,", f",{k / 100},")
-    measured = read(file("\n".join(text)))
-    assert {name: np.isfinite(column).sum() for name, column in measured.measured.items()} == {"tau1": 60, "pitch": 30}
 
 
 @pytest.mark.parametrize(
@@ -278,7 +257,7 @@ def moving(rows: Any) -> str:
 
 
 def test_a_gap_is_an_error_or_a_note(file: Any) -> None:
-    """For all readers of recordings. The motors may have done anything in 0.2 s; a path goes through 20 ms."""
+    """Motor motion in a gap of 0.2 s is unknown, which is an error. A smooth path bridges a gap of 20 ms."""
     with pytest.raises(UserError, match=r"no rows from 0.299 to 0.5 s, 0.201 s instead of the usual 0.001 s"):
         read_motion(file(moving([*range(300), *range(500, 900)])))
     measured = read(file(moving([*range(300), *range(320, 900)])))
@@ -344,7 +323,7 @@ def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
         ({**good, "time": [1.0, 0.0]}, "recording, column time: time must increase"),
         (dict.fromkeys(good, [0.0]), "recording: has 1 rows; at least two are needed"),
         ({**good, "theta1 [deg]": [0.0, 1.0]}, "recording, column theta1: appears twice"),
-        (None, "None is no recording: neither a file nor a DataFrame"),
+        (None, "None is not a recording: neither a file nor a DataFrame"),
     ]
     for source, complaint in wrong:
         with pytest.raises(UserError, match=complaint):

@@ -1,4 +1,4 @@
-"""The command `prw simulate`: its files, and one clear line for each mistake."""
+"""The command `prw simulate`: its files, and one line on standard error for each mistake."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_examples(prw: Any, tmp_path: Path, name: Any) -> None:
 
 
 def test_other_parameters(prw: Any, tmp_path: Path) -> None:
-    """In units of the FMU's choice in the file that identification writes, in SI by --set, which is stronger."""
+    """Parameters have their own units in the file that identification writes, and SI units in --set, which has precedence."""
     entries = {"k1": {"value": 2.0, "unit": "N.m/deg"}, "c3": {"value": 0.2, "unit": "N.m.s/rad"}, "N": 9, "k2": 77.0}
     (tmp_path / "mine.json").write_text(json.dumps(entries))
     (tmp_path / "report.json").write_text(json.dumps({"fmu": {}, "parameters": entries}))
@@ -100,7 +100,7 @@ def test_other_parameters(prw: Any, tmp_path: Path) -> None:
             'mine.json: k1 can be given in N.m/rad or N.m/deg, not in "N.m/rev"',
         ),
         ({"k1": {"unit": "N.m/rad"}}, "mine.json: k1 is None, not a number"),
-        ([1.0], "--parameters: mine.json is no JSON file with values by name"),
+        ([1.0], "--parameters: mine.json is not a JSON file with values by name"),
     ]:
         (tmp_path / "mine.json").write_text(json.dumps(entry))
         result = prw("simulate", "--parameters", "mine.json")
@@ -144,7 +144,7 @@ def test_no_hint_leads_to_a_clone(prw: Any) -> None:
     assert re.fullmatch(r"prw \d+\.\d+\.\d+\n", prw("--version", with_fmu=False).stdout)
 
 
-def test_examples_are_what_their_script_writes(tmp_path: Path) -> None:
+def test_the_script_writes_the_example_recordings(tmp_path: Path) -> None:
     script = tmp_path / "make_recordings.py"
     script.write_bytes((EXAMPLES / "make_recordings.py").read_bytes())
     subprocess.run([sys.executable, str(script)], check=True)

@@ -107,7 +107,7 @@ def test_faults_are_found(page: str, fault: str) -> None:
     assert any(found.startswith(fault) for found in faults(page)), faults(page)
 
 
-def test_code_and_messages_are_no_prose() -> None:
+def test_code_and_messages_are_not_prose() -> None:
     page = "Run `that of`.\n\n```sh\necho to the bit anew\n```\n\n    toy = 1\n\n*cannot be told apart*: see [it](what.md). <b>x</b>\n"
     assert faults(page) == []
     assert faults(f"| {'word ' * 50}|\n") == []

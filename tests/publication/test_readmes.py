@@ -50,13 +50,13 @@ def test_links_are_found() -> None:
 
 
 def test_the_published_crates() -> None:
-    names = {folder.name for folder in published()}
+    names = {directory.name for directory in published()}
     assert names == {"cargo-fmu", "fmi-abi", "fmu-check", "fmu-export", "fmu-package", "fmu-run", "fmu-system"}, (
         "a package without `publish = false`"
     )
 
 
-@pytest.mark.parametrize("home", published(), ids=lambda folder: folder.name)
+@pytest.mark.parametrize("home", published(), ids=lambda directory: directory.name)
 def test_a_crate_has_all_that_its_page_needs(home: Path) -> None:
     readme = home / "README.md"
     package = tomllib.loads((home / "Cargo.toml").read_text(encoding="utf-8"))["package"]

@@ -1,8 +1,12 @@
-"""Statements in pages and messages that tests can check: make targets, paths, dependencies, install commands."""
+"""Statements in pages and messages that tests can check: make targets, paths, dependencies, install commands; and the reference
+of the Python packages."""
 
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from built import ROOT
@@ -41,9 +45,9 @@ def test_help_lists_every_target_that_no_other_needs() -> None:
 @pytest.mark.parametrize("name", [name for name in PAGES if not name.startswith(("CHANGELOG", "crates/"))])
 def test_named_paths_exist(name: str) -> None:
     """Checks all paths in CONTRIBUTING.md; in other pages, paths that begin with a directory of the project."""
-    kept, folders = [f"/{path}/" for path in FILES], {path.split("/")[0] for path in FILES if "/" in path}
+    kept, directories = [f"/{path}/" for path in FILES], {path.split("/")[0] for path in FILES if "/" in path}
     for path in PATH.findall(text(name)):
-        if not path.startswith(MADE) and (name == "CONTRIBUTING.md" or path.split("/")[0] in folders):
+        if not path.startswith(MADE) and (name == "CONTRIBUTING.md" or path.split("/")[0] in directories):
             assert any(f"/{path.rstrip('/')}/" in other for other in kept), path
 
 
@@ -82,3 +86,12 @@ def test_no_package_of_the_project_is_installed_from_a_registry() -> None:
             assert {"--no-index", "--git"} & set(words) or not asked & own, f"{name}: {arguments}"
         links = re.findall(r"docs\.rs/([\w-]+)", text(name))
         assert name.endswith(".toml") or not own & {*links}, name
+
+
+def test_docstrings_make_a_reference_without_warnings(tmp_path: Path) -> None:
+    """A warning is an unresolved link, an undocumented parameter or a missing section."""
+    options = ["--quiet", "--fail-on-warning", "--keep-going", "--doctree-dir", str(tmp_path / "trees")]
+    command = [sys.executable, "-m", "sphinx", *options, str(ROOT / "docs/reference"), str(tmp_path / "html")]
+    finished = subprocess.run(command, capture_output=True, text=True)
+    assert finished.returncode == 0 and not finished.stderr, finished.stderr
+    assert "Estimate parameters of the testbed" in (tmp_path / "html/prw.html").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""`make check` and `make check-release` choose what they run from files that change."""
+"""`make check` selects commands by the changed files. `make check-release` has all targets that check something."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from built import ROOT
 
 from tools import changed, release_check
 
-#: Targets that check nothing, that a part contains, or that run on one machine only.
+#: Targets that check nothing, that another part contains, or that need a particular machine.
 NO_PARTS = {
     "help", "demo", "demo-fmu", "check", "check-release", "fmu", "closed-loop", "release", "source-fmu", "study", "examples", "clean",
     "test-python", "test-fmu", "test-closed-loop", "test-importers", "test-examples", "reference",

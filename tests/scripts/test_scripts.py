@@ -1,4 +1,4 @@
-"""Benchmarks and generators run to their end: those that `make test` starts nowhere else, with small counts."""
+"""Runs benchmarks and generators that `make test` starts nowhere else, with small counts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tools import compatibility, figures
 from tools.documentation.pages import CONTROLLER, TESTBED
 from tools.figures import film, gallery, visit
 
-#: One fault that the tests of fmi-abi find, and a change that they cannot find.
+#: A fault that the tests of fmi-abi find, and a change without effect.
 FAULTS = """
 directory = "crates/fmi-abi/src"
 tests = ["--package fmi-abi --lib"]
@@ -84,15 +84,15 @@ def test_the_reference_experiments_are_written(tmp_path: Path) -> None:
 
 
 def test_docs_are_written(tmp_path: Path) -> None:
-    for folder in ("docs", TESTBED.content, CONTROLLER.content):
-        shutil.copytree(ROOT / folder, tmp_path / folder)
+    for directory in ("docs", TESTBED.content, CONTROLLER.content):
+        shutil.copytree(ROOT / directory, tmp_path / directory)
     (tmp_path / TESTBED.path).unlink()
     run(sys.executable, "dev/tools", "docs", "--project", tmp_path)
     assert (tmp_path / TESTBED.path).read_bytes() == (ROOT / TESTBED.path).read_bytes()
 
 
 def test_figures_are_written(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Writes all that `make figures` renews, with two figures and short films; a film that shows the same stays."""
+    """Writes the files of `make figures`, with two figures and short films. An unchanged film is not replaced."""
     if shutil.which("chromium") is None:
         pytest.skip("chromium is not installed")
     built("prw_controller.fmu")

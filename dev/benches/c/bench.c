@@ -16,7 +16,7 @@
 
 #include "fmi2FunctionTypes.h"
 
-/* The C programs to compare with have no fmi2Terminate and no fmi2Reset. */
+/* fmi2Terminate and fmi2Reset are NULL for bare_exact.c and euler.c, which do not define them. */
 #define FUNCTIONS(F) \
     F(Instantiate) F(SetupExperiment) F(EnterInitializationMode) F(ExitInitializationMode) F(SetReal) F(GetReal) \
     F(SetBoolean) F(SetRealInputDerivatives) F(DoStep) F(GetFMUstate) F(SetFMUstate) F(FreeFMUstate) \
@@ -84,7 +84,7 @@ static inline void write_inputs(double *inputs, const double *u, int count) {
     }
 }
 
-/* bench.py lists their names in this order. */
+/* WAYS in bench.py has this order. */
 typedef enum { VECTORS, SCALARS, RATES, OMEGA, ALTERNATING, NEW_SIZES, STATES, DERIVATIVES } Way;
 
 typedef struct {
@@ -158,9 +158,9 @@ static double memory(void) {
     return (double)(after - before) / COUNT;
 }
 
-static size_t references(const char *text, fmi2ValueReference *vr) {
+static size_t references(const char *list, fmi2ValueReference *vr) {
     size_t n = 0;
-    for (char *end; *text != '\0'; text = *end == ',' ? end + 1 : end) vr[n++] = (fmi2ValueReference)strtoul(text, &end, 10);
+    for (char *end; *list != '\0'; list = *end == ',' ? end + 1 : end) vr[n++] = (fmi2ValueReference)strtoul(list, &end, 10);
     return n;
 }
 

@@ -22,7 +22,7 @@ int fmi2SetupExperiment(void *c, int d, double tol, double start, int sd, double
 int fmi2EnterInitializationMode(void *c) { return (void)c, 0; }
 int fmi2ExitInitializationMode(void *c) { return (void)c, 0; }
 int fmi2SetBoolean(void *c, const unsigned *vr, size_t n, const int *value) {
-    return (void)c, (void)vr, (void)n, (void)value, 0; /* Euler always uses omega */
+    return (void)c, (void)vr, (void)n, (void)value, 0; /* Euler always uses the rates */
 }
 int fmi2SetReal(void *c, const unsigned *vr, size_t n, const double *value) {
     double *v = ((Instance *)c)->v;

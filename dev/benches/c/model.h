@@ -1,5 +1,5 @@
-/* Shared by the two comparison programs: Table 1, eq. (11) and the layout of the FMU's variables.
- * Derived from the paper; shares no code with the FMU. */
+/* Table 1, eq. (11) and the value references of the FMU, for bare_exact.c and euler.c.
+ * The code is derived from the paper and shares nothing with the FMU. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -26,11 +26,11 @@ def run(arguments: argparse.Namespace) -> None:
     from tools.documentation.pages import PAGES, render
 
     project = arguments.project
-    texts = {page.path: render(project, page) for page in PAGES}
-    for name, text in texts.items():
+    contents = {page.path: render(project, page) for page in PAGES}
+    for name, content in contents.items():
         path = project / name
-        if path.is_file() and path.read_bytes() == text.encode():
+        if path.is_file() and path.read_bytes() == content.encode():
             print(f"{path} is up to date")
             continue
-        write_text(path, text)
-        print(f"{path} written, {len(text.encode()) // 1000} kB")
+        write_text(path, content)
+        print(f"{path} written, {len(content.encode()) // 1000} kB")

@@ -86,7 +86,7 @@ def _in_order(directory: Path) -> list[Path]:
     """The files 0_header.html, 1_....html to the last."""
     paths = sorted(directory.glob("*_*.html"), key=lambda path: int(path.stem.split("_")[0]))
     if not paths:
-        raise UserError(f"{directory}: there is no text; run this in the repository root")
+        raise UserError(f"{directory}: there are no files N_NAME.html; run this in the repository root")
     return paths
 
 

@@ -1,4 +1,4 @@
-"""Tables as HTML. In narrow windows a row becomes a paragraph."""
+"""Tables as HTML. The style sheet shows a row as a paragraph in narrow windows."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def variable_table(description: Any, causality: str, title: str) -> str:
 
 
 def parameter_table(description: Any, printed: dict[str, Any]) -> str:
-    """The parameters with their start values, and as a paper prints them if it does."""
+    """The parameters with their start values, and the values and units that the paper prints."""
     rows = []
     for variable in description.modelVariables:
         if variable.causality != "parameter":
@@ -56,11 +56,11 @@ def parameter_table(description: Any, printed: dict[str, Any]) -> str:
 def order_table(numbers: dict[str, Any]) -> str:
     """Orders of convergence, and the error at a step of 1 ms."""
     rows = []
-    for name, words in OUTPUT_NAMES.items():
+    for name, label in OUTPUT_NAMES.items():
         orders = f"{numbers['order_angles'][name]:.2f}", f"{numbers['order_rates'][name]:.2f}"
         cells = (*orders, str(numbers["error_1ms_percent"][name]))
-        rows.append(f"<tr><td>{words}</td>" + "".join(f'<td class="number">{cell}</td>' for cell in cells) + "</tr>")
-    heads = ("output", "order, angles alone", "order, use_omega", "error at 1 ms (%)")
+        rows.append(f"<tr><td>{label}</td>" + "".join(f'<td class="number">{cell}</td>' for cell in cells) + "</tr>")
+    heads = ("output", "order, angles only", "order, use_omega", "error at 1 ms (%)")
     return _table("", heads, rows, numbers=(1, 2, 3))
 
 
@@ -80,14 +80,14 @@ def _inline(text: str) -> str:
 
 
 def _table(title: str, heads: Sequence[str], rows: Iterable[str], numbers: Sequence[int] = (), kind: str = "") -> str:
-    """`numbers` are the columns that are set flush right."""
-    classes = (' class="number"' if column in numbers else "" for column in range(len(heads)))
-    head = "".join(f"<th{of_number}>{text}</th>" for of_number, text in zip(classes, heads))
+    """numbers: indices of the columns with right-aligned numbers."""
+    attributes = (' class="number"' if column in numbers else "" for column in range(len(heads)))
+    head = "".join(f"<th{attribute}>{title}</th>" for attribute, title in zip(attributes, heads))
     heading = f"<h3>{title}</h3>\n" if title else ""
     body = "\n".join(rows)
-    of_kind = f' class="{kind}"' if kind else ""
+    attribute = f' class="{kind}"' if kind else ""
     parts = f"<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>"
-    return f'{heading}<div class="scroll" tabindex="0"><table{of_kind}>\n{parts}\n</table></div>'
+    return f'{heading}<div class="scroll" tabindex="0"><table{attribute}>\n{parts}\n</table></div>'
 
 
 def _pretty(unit: str) -> str:

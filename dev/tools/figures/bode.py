@@ -59,7 +59,7 @@ def draw_bode(figure: Any, panel: Transfer) -> None:
     for axis, convert in ((magnitude, decibels), (phase, degrees)):
         curve, points = convert(panel.curve), convert(panel.points)
         if axis is phase:
-            # Both unwrapped; the points may have begun on another turn.
+            # Both phases are unwrapped, but may differ by full turns.
             points = points + 360 * np.round((curve[0] - points[0]) / 360)
         axis.plot(CURVE, curve, color=BLUE, label="linear model")
         axis.plot(POINTS, points, "o", color=VERMILION, fillstyle="none", markersize=3.6, label="stepped sine")

@@ -25,9 +25,9 @@ CONTROLLED = ("pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2")
 
 
 def story(testbed_fmu: Path, controller_fmu: Path) -> tuple[Run, list[tuple[float, str]]]:
-    """Run the testbed, first with motors that are led, then with the controller: it begins and ends at rest at zero.
+    """Run the testbed, first with prescribed motor motions, then with the controller. The run begins and ends at rest at zero.
     Returns the run and its captions, each with the time (s) from which it is shown."""
-    led = _there_and_back()
+    prescribed = _there_and_back()
     with Fmu(testbed_fmu) as loaded_testbed, Fmu(controller_fmu) as loaded_controller:
         testbed, controller = loaded_testbed.instances(start={"use_omega": True}), loaded_controller.instances()
         rows, captions = [], []
@@ -38,7 +38,7 @@ def story(testbed_fmu: Path, controller_fmu: Path) -> tuple[Run, list[tuple[floa
 
         for caption, second in (("Equal motors: the wrist pitches", 1), ("Opposite motors: the wrist rolls", -1)):
             captions.append((testbed.time[0], caption))
-            for theta, omega in led:
+            for theta, omega in prescribed:
                 motors((theta, second * theta), (omega, second * omega))
                 testbed.step(STEP)
         captions.append((testbed.time[0], "With a controller: both at once"))

@@ -18,7 +18,7 @@ COLUMN = 4.5  # inches
 OF_MOTOR_1 = "abcdij"
 #: Relative errors up to this value are rounding errors.
 ROUNDING = 1e-13
-#: Seconds of the two of Fig. 4 that fit into a column.
+#: Duration, s, of the part of Fig. 4 that is drawn.
 SHOWN = 1.0
 
 

@@ -17,10 +17,10 @@ from tools.convergence import Convergence, convergence, order
 from tools.frequency import SHAFTS, TORQUES, decibels, sweep
 from tools.modes import Mode, pitch_and_roll
 
-#: Hz. The curves of the Bode plots run over CURVE, the measured points lie at POINTS.
+#: Frequencies in Hz of the curves of the Bode plots, and of the measured points.
 CURVE = np.geomspace(0.1, 1000, 321)
 POINTS = 10 ** (np.arange(-6, 16) / 6)
-#: Up to here, in Hz, the deviations of the points are stated.
+#: Highest frequency in Hz of the points whose deviations are stated.
 STATED = 50.0
 
 Run = tuple[Motion, dict[str, np.ndarray]]
@@ -34,7 +34,7 @@ class Step(NamedTuple):
 
 
 class Results(NamedTuple):
-    """The linear model of the FMU (outputs SHAFTS, TORQUES, and once more all OUTPUTS), and its runs.
+    """The linear model of the FMU, whose outputs are SHAFTS, TORQUES and then all OUTPUTS; and runs of the FMU.
 
     sweep: the measured response of SHAFTS and TORQUES at POINTS. fig4, fig4_equal: the experiment of Fig. 4 and its counterpart. pitch_step: both motors step by 1 degree. roll_step:
     motor 2 steps by -1 degree instead.
@@ -73,7 +73,7 @@ def _run(fmu: Path, motion: Motion) -> Run:
 
 def _step(fmu: Path, sides: tuple[int, int]) -> Step:
     before, end, coarse = -0.02, 0.6, 0.025
-    # At 0 the outputs are unchanged; the impulse through the dampers acts directly afterwards.
+    # At t = 0 the outputs are unchanged. The impulse through the dampers acts immediately afterwards.
     times = np.array([before, 0, 1e-9, *np.arange(1, 601) * 1e-3]), np.array([before, *np.arange(0, end, coarse), end])
     runs = []
     for time in times:

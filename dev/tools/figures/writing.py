@@ -122,14 +122,14 @@ def _name_apart(element: Any, name: str, used: set[str]) -> None:
 
 
 def _shorter(numbers: str) -> str:
-    """Two decimals are a hundredth of a point."""
+    """Rounds numbers to two decimals, a hundredth of a point, and removes spaces."""
     text = re.sub(r"-?\d+\.\d+", lambda match: f"{float(match[0]):.2f}".rstrip("0").rstrip("."), numbers)
     text = re.sub(r"-0(?![.\d])", "0", re.sub(r"\s+", " ", text))
     return re.sub(r" ?([A-Za-z]) (?=-?\d)", r"\1", text).strip()
 
 
 def _restyle(element: Any) -> None:
-    """Replace matplotlib's colours and fonts by the page's."""
+    """Replace the colours and fonts of matplotlib by the colours and fonts of the page."""
     style = element.attrib.pop("style", "")
     if not style and element.tag != f"{SVG}text":
         return

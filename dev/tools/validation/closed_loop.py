@@ -1,6 +1,6 @@
-"""Runs the closed loop prw_closed_loop.ssp (and its twin OspSystemStructure.xml) under FMPy, libcosim and Ecos, if
-they are installed; compares them, and studies the error of the coupling over the communication step. Writes
-closed_loop.csv, closed_loop.png, coupling.csv and coupling.png."""
+"""Runs the closed loop, prw_closed_loop.ssp or OspSystemStructure.xml, under FMPy, libcosim and Ecos, if they are installed.
+Compares the results, and calculates the error of the coupling over the communication step. Writes closed_loop.csv,
+closed_loop.png, coupling.csv and coupling.png."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> None:
         if master.version() is None:
             absent.append(master)
         else:
-            runs[f"{master.name} {master.version()}"] = masters.run_apart(master, system)
+            runs[f"{master.name} {master.version()}"] = masters.run_separately(master, system)
     if not runs:
         raise UserError("no co-simulation master is installed; `make closed-loop` installs them")
     name, first = next(iter(runs.items()))
@@ -74,7 +74,7 @@ def _experiment(system: System) -> str:
 
 
 def settling_time(time: np.ndarray, values: np.ndarray, goal: float) -> float:
-    """When values (n,) rad over time (n,) s come within SETTLED of goal (rad) for good; infinite if they do not."""
+    """The time, s, after which values (n,) rad over time (n,) s stay within SETTLED of goal (rad); infinite if there is none."""
     outside = np.nonzero(np.abs(np.rad2deg(values - goal)) > SETTLED)[0]
     if not len(outside):
         return float(time[0])

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Mapping
-from ctypes import c_double
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from fmu_run import Fmu
 
 from prw.checking.experiments import Experiment, Value
 from prw.checking.result import Result
@@ -41,17 +40,9 @@ class Tool:
             return None
 
 
-def at_rest(description: Any, experiment: Experiment) -> dict[str, float]:
-    """Start values of the motors, and of the states if they are settable."""
-    first = {name: float(experiment.inputs[name][0]) for name in ANGLES}
-    states = {f"theta{i}": first["theta1" if i % 2 else "theta2"] for i in (3, 4, 5, 6)}
-    settable = {v.name for v in description.modelVariables if v.initial == "exact"}
-    return {**first, **{name: value for name, value in states.items() if name in settable}}
-
-
 def by_fmpy(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value]) -> Result:
     """FMPy's simulate_fmu in Co-Simulation; it reads outputs before it sets the next inputs."""
-    from fmpy import read_model_description, simulate_fmu
+    from fmpy import simulate_fmu
 
     step = experiment.step["CoSimulation"]
     table = np.zeros(len(experiment.inputs["time"]), dtype=[(name, np.float64) for name in experiment.inputs])
@@ -64,61 +55,36 @@ def by_fmpy(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value]) 
         step_size=step,
         output_interval=step,
         input=table,
-        start_values={**parameters, **at_rest(read_model_description(str(fmu)), experiment)},
+        start_values={**parameters, **{name: float(table[name][0]) for name in ANGLES}},
         output=list(OUTPUTS),
     )
     return Result(fmu, np.asarray(rows["time"], dtype=np.float64), {name: np.asarray(rows[name]) for name in OUTPUTS})
 
 
 def by_scipy(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value]) -> Result:
-    """Model Exchange through FMPy's calls, solved by SciPy, with inputs interpolated at every evaluation. (FMPy's
-    own master holds inputs between communication points, and so is of first order in the inputs.)"""
-    import fmpy
-    from fmpy.simulation import apply_start_values, instantiate_fmu
+    """Model Exchange solved by SciPy, with inputs interpolated at every evaluation. (FMPy's solver holds inputs between
+    communication points, so its error is first order.)"""
     from scipy.integrate import solve_ivp
 
-    description, directory = fmpy.read_model_description(str(fmu)), fmpy.extract(str(fmu))
-    instance = instantiate_fmu(directory, description, fmi_type="ModelExchange")
-    references = {v.name: v.valueReference for v in description.modelVariables}
-    inputs, outputs = [references[name] for name in (*ANGLES, *RATES)], [references[name] for name in OUTPUTS]
-    fmi2 = description.fmiVersion.startswith("2.")
-    set_reals, get_reals = (instance.setReal, instance.getReal) if fmi2 else (instance.setFloat64, instance.getFloat64)
-    derivatives_of = instance.getDerivatives if fmi2 else instance.getContinuousStateDerivatives
-    x, dx = (c_double * 6)(), (c_double * 6)()
+    table, time, motors = experiment.inputs, experiment.reference["time"], (*ANGLES, *RATES)
+    with Fmu(fmu) as loaded:
+        first = {name: float(table[name][0]) for name in motors}
+        instance = loaded.instances(interface="model-exchange", start={**parameters, **first})
 
-    def move_to(t: float) -> None:
-        instance.setTime(t)
-        table = experiment.inputs
-        set_reals(inputs, [float(np.interp(t, table["time"], table[name])) for name in (*ANGLES, *RATES)])
+        def right_hand_side(t: float, state: Array) -> Array:
+            instance.set_time(t)
+            instance.set(motors, [float(np.interp(t, table["time"], table[name])) for name in motors])
+            instance.set_continuous_states(state)
+            derivatives: Array = instance.get_derivatives()[0]
+            return derivatives
 
-    def right_hand_side(t: float, state: Array) -> list[float]:
-        move_to(t)
-        x[:] = state.tolist()
-        instance.setContinuousStates(x, len(x))
-        derivatives_of(dx, len(dx))
-        return list(dx)
-
-    try:
-        if fmi2:
-            instance.setupExperiment(startTime=0.0)
-        apply_start_values(instance, description, {**parameters, **at_rest(description, experiment)})
-        instance.enterInitializationMode()
-        instance.exitInitializationMode()
-        (instance.newDiscreteStates if fmi2 else instance.updateDiscreteStates)()
-        instance.enterContinuousTimeMode()
-        instance.getContinuousStates(x, len(x))
-        time = experiment.reference["time"]
         # Interpolated inputs bend at every row.
-        step = experiment.step["CoSimulation"]
-        solved = solve_ivp(right_hand_side, time[[0, -1]], list(x), t_eval=time, rtol=SOLVER_TOLERANCE, max_step=step)
+        step, start = experiment.step["CoSimulation"], instance.get_continuous_states()[0]
+        solved = solve_ivp(right_hand_side, time[[0, -1]], start, t_eval=time, rtol=SOLVER_TOLERANCE, max_step=step)
         rows = []
         for t, state in zip(time, solved.y.T):
             right_hand_side(t, state)
-            rows.append(get_reals(outputs))
-        instance.terminate()
-    finally:
-        instance.freeInstance()
-        shutil.rmtree(directory, ignore_errors=True)
+            rows.append(instance.get(OUTPUTS)[0])
     return Result(fmu, time, dict(zip(OUTPUTS, np.array(rows).T)))
 
 
@@ -138,5 +104,5 @@ def by_fmu_run(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value
 IMPORTERS = (
     Tool("FMPy", "fmpy", "CoSimulation", by_fmpy),
     Tool("fmu_run", "fmu-run", "CoSimulation", by_fmu_run),
-    Tool("SciPy's RK45 through FMPy's calls", "fmpy", "ModelExchange", by_scipy),
+    Tool("SciPy's RK45 through fmu_run", "fmu-run", "ModelExchange", by_scipy),
 )

@@ -31,8 +31,8 @@ ABOVE = Path(__file__).resolve().parents[2]
 
 
 def fmpy_ssp(system: System) -> np.ndarray:
-    """FMPy's simulate_ssp. It leaves the start values in the SSP to its caller, and feeds the system's inputs to the
-    FMUs after the first step only. Results therefore lag one step, and the first row is dropped."""
+    """FMPy's simulate_ssp. It ignores the start values in the SSP, and sets the inputs of the system only after the first
+    step. Results lag one step, so the first row is dropped."""
     from fmpy.ssp.simulation import simulate_ssp
     from fmpy.ssp.ssd import Parameter, ParameterSet
 
@@ -70,7 +70,7 @@ def libcosim(system: System) -> np.ndarray:
 
 
 def ecos(system: System) -> np.ndarray:
-    """Ecos, connected call by call: its SSP import knows no connectors of the system itself ("No element named").
+    """Ecos, connected by calls, because its SSP import rejects connectors of the system ("No element named").
 
     Ecos returns outputs after the inputs of the next step have been set. Torques depend on these inputs directly, so they differ
     from the other masters' by the jump of an input at a communication point. Signals that are fed back do not differ.
@@ -105,7 +105,7 @@ MASTERS = (
 )
 
 
-def run_apart(master: Tool, system: System) -> dict[str, np.ndarray]:
+def run_separately(master: Tool, system: System) -> dict[str, np.ndarray]:
     """Run the system under the master in a separate process.
 
     Returns `time` and RECORDED by name, each (steps,): the values at the end of every step. Raises UserError with the

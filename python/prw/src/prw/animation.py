@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 RATES = {".gif": 10, ".html": 10, ".mp4": 15, "": 10}
 #: Shortest and longest duration of an animation without a given speed, s.
 SHORTEST, LONGEST = 6.0, 40.0
-#: Most frames; more take long to draw and to open.
-MOST = 1500
+#: Maximum number of frames; more take long to draw and to open.
+MAX_FRAMES = 1500
 
 
 def animate(
@@ -64,9 +64,9 @@ def animate(
     if not 0 < speed < np.inf:
         raise UserError(f"the speed of the animation must be positive, it is {speed:g}")
     count = round(length / speed * rate) + 1
-    if count > MOST:
+    if count > MAX_FRAMES:
         raise UserError(
-            f"an animation of {count / rate:.0f} s is too long; choose a speed of {1.1 * speed * count / MOST:.2g}"
+            f"an animation of {count / rate:.0f} s is too long; choose a speed of {1.1 * speed * count / MAX_FRAMES:.2g}"
         )
     from prw.frames import drawn
 
@@ -74,7 +74,7 @@ def animate(
 
 
 def suffix_of(path: Path) -> str:
-    """The suffix of the file. Raises UserError if it is no suffix of an animation, or if a package is missing."""
+    """The suffix of the file. Raises UserError if it is not a suffix of an animation, or if a package is missing."""
     suffix = path.suffix.lower()
     if not suffix or suffix not in RATES:
         raise UserError(f"{path}: an animation is a .gif, an .mp4 or an .html")

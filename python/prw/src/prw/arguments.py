@@ -18,17 +18,17 @@ from numpy.typing import NDArray
 from prw.errors import UserError
 
 #: A larger relative standard deviation is a mistake: percent instead of a fraction.
-MOST_RELATIVE = 1.0
+MAX_RELATIVE = 1.0
 #: Rows of CSV, in memory.
 Table = Mapping[str, Any]
 
 
 def names_of(argument: str, given: str | Iterable[str]) -> tuple[str, ...]:
-    """A name or several, as a tuple."""
+    """One or more names, as a tuple."""
     if isinstance(given, str):
         return (given,)
     if not isinstance(given, Iterable):
-        raise UserError(f"{given!r} is neither a name nor several", argument=argument)
+        raise UserError(f"{given!r} is neither a name nor a sequence of names", argument=argument)
     return tuple(given)
 
 
@@ -58,7 +58,7 @@ def spread_of(argument: str, name: str, given: Any, start: float) -> tuple[float
     then the central value is `start`."""
     value, relative = given if isinstance(given, Sequence) and len(given) == 2 else (start, given)
     value, relative = positive(argument, value, name), positive(argument, relative, name)
-    if relative > MOST_RELATIVE:
+    if relative > MAX_RELATIVE:
         raise UserError(
             f"{name} has a standard deviation of {relative:.0%}; 100 % is the most, as a fraction 1", argument=argument
         )
@@ -109,7 +109,9 @@ def values_of(given: Given, loaded: fmu_run.Fmu) -> dict[str, Any]:
     if isinstance(given, Mapping):
         return {name: in_own_unit(name, value, loaded) for name, value in given.items()}
     if not is_path(given):
-        raise UserError(f"{given!r} are neither values by name nor a JSON file with them", argument="parameters")
+        raise UserError(
+            f"{given!r} is neither a mapping from names to values nor a JSON file with one", argument="parameters"
+        )
     path = Path(given)
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -119,7 +121,7 @@ def values_of(given: Given, loaded: fmu_run.Fmu) -> dict[str, Any]:
         raise UserError(f"{path} cannot be read ({error.strerror or error})", argument="parameters") from None
     except (ValueError, AttributeError):
         raise UserError(
-            f"{path} is no JSON file with values by name; an FMU is named by `fmu`", argument="parameters"
+            f"{path} is not a JSON file with values by name; an FMU is named by `fmu`", argument="parameters"
         ) from None
     return {name: _value(path, name, entry, loaded) for name, entry in entries.items()}
 

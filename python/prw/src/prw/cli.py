@@ -35,8 +35,8 @@ def run(program: str, description: str, commands: Mapping[str, ModuleType], argv
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, command in commands.items():
         examples, add_options = getattr(command, "EXAMPLES", None), getattr(command, "add_options", lambda _: None)
-        texts = {"help": command.HELP, "description": command.__doc__, "epilog": examples}
-        subparser = subparsers.add_parser(name, formatter_class=Formatter, **texts)
+        strings = {"help": command.HELP, "description": command.__doc__, "epilog": examples}
+        subparser = subparsers.add_parser(name, formatter_class=Formatter, **strings)
         add_options(subparser)
         subparser.set_defaults(run=command.run)
     arguments = argparse.Namespace(options={})

@@ -17,7 +17,7 @@ UNITS: dict[str, dict[str, float]] = {
     "rate": {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": pi / 180, "rev/s": 2 * pi, "rpm": pi / 30},
     "torque": {"N.m": 1.0, "mN.m": 1e-3, "N.cm": 1e-2, "N.mm": 1e-3, "kN.m": 1e3},
 }
-#: Other ways to write them.
+#: Other spellings of units.
 ALIASES = {
     "sec": "s",
     "µs": "us",
@@ -62,10 +62,10 @@ def factor(name: str, unit: str) -> float:
     if slash and count.strip().isdigit() and int(count) > 0:
         return factor(name, whole) / int(count)
     known = UNITS[QUANTITIES[name]]
-    text = unit.strip().replace("·", ".").replace("*", ".").replace(" ", ".")
-    text = ALIASES.get(text, text)
+    spelt = unit.strip().replace("·", ".").replace("*", ".").replace(" ", ".")
+    spelt = ALIASES.get(spelt, spelt)
     for spelling, value in known.items():
-        if text in (spelling, spelling.replace(".", "")):
+        if spelt in (spelling, spelling.replace(".", "")):
             return value
     raise UserError(f"{name} cannot be in {unit!r}; use {', '.join(known)}")
 
@@ -110,10 +110,10 @@ def columns(
     found: dict[str, int] = {}
     chosen: dict[str, str] = {}
     ignored = []
-    for index, text in enumerate(header):
-        name, unit = column(text)
+    for index, title in enumerate(header):
+        name, unit = column(title)
         if name not in wanted:
-            ignored.append(text or "(blank)")
+            ignored.append(title or "(blank)")
             continue
         if name in found:
             raise UserError(f"{where}, column {name}: appears twice in the header")
@@ -135,17 +135,17 @@ def columns(
 
 def shown(header: Sequence[str]) -> str:
     """The first names of the header, for an error message."""
-    return ", ".join(text or "(blank)" for text in header[:SHOWN]) + (", ..." if len(header) > SHOWN else "")
+    return ", ".join(title or "(blank)" for title in header[:SHOWN]) + (", ..." if len(header) > SHOWN else "")
 
 
-def column(text: str) -> tuple[str, str]:
-    """The name in QUANTITIES and the unit of the column title `text`; both "" if it is unknown."""
-    match = COLUMN.match(text)
+def column(title: str) -> tuple[str, str]:
+    """The name in QUANTITIES and the unit of the column title; both "" if it is unknown."""
+    match = COLUMN.match(title)
     if not match:
         return "", ""
     name = "time" if match.group(1).lower() == "t" else match.group(1).lower()
     if match.group(4):
-        # pitch_deg is pitch in deg, but pitch_wanted is something else
+        # pitch_deg is pitch in deg, but pitch_wanted is another column
         try:
             factor(name, match.group(4))
         except UserError:
@@ -160,5 +160,5 @@ def _unit(name: str, in_header: str, given: str, degrees: bool) -> str:
     if degrees and QUANTITIES[name] in ("angle", "rate"):
         default = default.replace("rad", "deg")
     unit = in_header or given or default
-    factor(name, unit)  # raises if it does not fit
+    factor(name, unit)  # raises UserError for a unit of another quantity
     return unit

@@ -27,12 +27,12 @@ CLONE = (
     else Path(os.path.normpath(PACKAGE / "../../../.."))
 )
 #: Directories of a clone with the files of the pages.
-PAGE_FOLDERS = ("crates/fmu-package/page", "docs/fmu-page/wrist")
+PAGE_DIRECTORIES = ("crates/fmu-package/page", "docs/fmu-page/wrist")
 
 
 def page_file(name: str) -> Path:
     """A script, style sheet or table of the pages that show the wrist."""
-    locations = [PACKAGE / "page" / name, *(CLONE / folder / name for folder in PAGE_FOLDERS)]
+    locations = [PACKAGE / "page" / name, *(CLONE / directory / name for directory in PAGE_DIRECTORIES)]
     return next((path for path in locations if path.is_file()), locations[0])
 
 

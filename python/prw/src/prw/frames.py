@@ -113,7 +113,7 @@ SIZE, DPI = (720, 405), 92
 #: Twist at which the largest coupling twist of a run is drawn, rad.
 SHOWN_TWIST = 0.9
 #: Largest factor on the twist.
-MOST_TWISTED = 100.0
+MAX_TWIST_FACTOR = 100.0
 #: Direction of the viewer, deg: from the left of motor 2, and above.
 AZIMUTH, ELEVATION = -64, 20
 #: Directions to the viewer and to the lamp in matplotlib's axes.
@@ -161,7 +161,7 @@ class Moving(NamedTuple):
 
 class _Animation(FuncAnimation):
     def __del__(self) -> None:
-        """Omits matplotlib's warning about animations that are not shown: one that is written to a file is finished."""
+        """Omits matplotlib's warning about animations that were not shown, because they may have been written to a file."""
 
 
 def drawn(
@@ -218,7 +218,7 @@ class _Frame:
         self._ground: Any = None
         pairs = (("theta1", "theta3"), ("theta3", "theta5"), ("theta2", "theta4"), ("theta4", "theta6"))
         twist = max(float(np.abs(signals[a] - signals[b]).max()) for a, b in pairs)
-        factor = _round_below(min(SHOWN_TWIST / max(twist, 1e-6), MOST_TWISTED))
+        factor = _round_below(min(SHOWN_TWIST / max(twist, 1e-6), MAX_TWIST_FACTOR))
         self.wrist = Wrist(factor)
         with matplotlib.rc_context({**STYLE, "font.size": 9, "axes.titlesize": 9}):
             self.figure = Figure(figsize=(SIZE[0] / DPI, SIZE[1] / DPI), dpi=DPI, facecolor="white", edgecolor="0.7")
@@ -279,7 +279,7 @@ class _Frame:
         colours = _lit(corners, colours)
         self.bodies = Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.8)
         self.scene.add_collection3d(self.bodies, autolim=False)
-        passed = [text for begin, text in self.captions if begin <= instant + 1e-9]
+        passed = [caption for begin, caption in self.captions if begin <= instant + 1e-9]
         self.caption.set_text(passed[-1] if passed else "")
         before = self.time <= instant
         for name, panel, line, dot, shown in self.moving:
@@ -297,7 +297,7 @@ class _Frame:
         canvas: Any = self.figure.canvas
         moved = [self.bodies, *(artist for one in self.moving for artist in one[2:]), self.caption]
         if self._ground is None:
-            # Axes and whole curves never move and take longest: they are drawn once.
+            # Axes and whole curves never move and take most of the time, so they are drawn once.
             for artist in moved:
                 artist.set_visible(False)
             canvas.draw()
@@ -321,7 +321,7 @@ def _colours() -> Iterator[ArrayLike]:
 
 
 def _lit(corners: Array, colours: Array) -> Array:
-    """The colours (n, 3) of faces (n, k, 3) in the light: of the sides which the viewer sees."""
+    """The colours (n, 3) of faces (n, k, 3) under the lamp, for the sides of the faces that the viewer sees."""
     first, second, third = np.moveaxis(corners[:, :3], 1, 0)
     normal = np.cross(second - first, third - second)
     normal *= (np.sign(normal @ VIEWER) / np.maximum(np.linalg.norm(normal, axis=1), 1e-12))[:, None]

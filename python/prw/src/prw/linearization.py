@@ -91,13 +91,13 @@ class Linearizer:
         self.fmu = existing_fmu(fmu)
         self.loaded = loaded(self.fmu)
         try:
-            self._look(outputs, fmi_type)
+            self._select(outputs, fmi_type)
         except UserError:
             self.loaded.close()
             raise
 
-    def _look(self, outputs: str | Iterable[str] | None, fmi_type: str | None) -> None:
-        """Find states, inputs and outputs. Raises UserError."""
+    def _select(self, outputs: str | Iterable[str] | None, fmi_type: str | None) -> None:
+        """Select the states, inputs and outputs of the model. Raises UserError."""
         loaded, variables = self.loaded, self.loaded.variables
         self._interface = HELD[self._chosen(fmi_type)]
         self.states = tuple(loaded.derivatives)
@@ -107,7 +107,7 @@ class Linearizer:
             if name not in loaded.outputs and name not in self.states:
                 choice = ", ".join(dict.fromkeys([*loaded.outputs, *self.states]))
                 raise UserError(f"{self.fmu}: {name} is neither a continuous output nor a state; there are {choice}")
-        # A state is no unknown of FMI's directional derivatives, and its row of C needs none.
+        # FMI does not allow states as unknowns of directional derivatives. Their rows of C are known.
         self._calculated = [row for row, name in enumerate(self.outputs) if name not in self.states]
         self._unknowns = (*loaded.derivatives.values(), *(self.outputs[row] for row in self._calculated))
         self._knowns = (*self.states, *self.inputs)

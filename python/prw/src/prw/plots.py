@@ -15,10 +15,10 @@ from matplotlib.figure import Figure
 from prw.motion import Array, Motion
 
 BLUE, VERMILION = "#0072B2", "#D55E00"
-#: Colours of pitch and roll if the sides have the other two.
+#: Colours of pitch and roll in figures where the sides have the first two.
 GREEN, PURPLE = "#009E73", "#CC79A7"
 STYLE: Any = {
-    "font.family": "DejaVu Sans",  # matplotlib brings it along
+    "font.family": "DejaVu Sans",  # included in matplotlib
     "font.size": 10,
     "axes.titlesize": 10,
     "axes.titlelocation": "left",
@@ -44,7 +44,7 @@ PAGE_STYLE: Any = {
 }
 #: Time intervals that a long curve is reduced to, each drawn by its extremes; more than the figure has pixels.
 INTERVALS = 4000
-#: A panel whose curves all stay below this shows zero, not rounding errors blown up to its full height.
+#: If all curves of a panel are below this, the scale is -1 to 1, so that rounding errors look like zero.
 ROUNDING = 1e-9
 
 

@@ -158,7 +158,7 @@ def _read(
     encoding: str,
 ) -> Recording:
     if not is_path(source) and not is_table(source):
-        raise UserError(f"{source!r} is no recording: neither a file nor a DataFrame or a dict of arrays")
+        raise UserError(f"{source!r} is not a recording: neither a file nor a DataFrame or a dict of arrays")
     path = Path(source) if isinstance(source, (str, os.PathLike)) else IN_MEMORY
     check_names("units", units or {}, QUANTITIES)
     check_names("names", names, QUANTITIES)
@@ -171,9 +171,9 @@ def _read(
     def choose(header: Sequence[str], line: int) -> Sequence[tuple[str, int]]:
         nonlocal found
         for name in called:
-            if not any(text.startswith(name) for text in header):
+            if not any(title.startswith(name) for title in header):
                 raise UserError(f"{path}, row {line}: no column {name!r}; the header has {shown(header)}")
-        found = columns(path, [_renamed(text, called) for text in header], line, measured, units, degrees)
+        found = columns(path, [_renamed(title, called) for title in header], line, measured, units, degrees)
         return found.taken
 
     values = (
@@ -211,10 +211,10 @@ def _gathered(table: Any, choose: Choice, may_be_empty: Container[str]) -> Array
     return np.column_stack(found)
 
 
-def _renamed(text: str, names: Mapping[str, str]) -> str:
-    """The header `text` with its name replaced as in `names`; a unit after the name is kept."""
-    name = max((n for n in names if re.fullmatch(re.escape(n) + r"\s*([\[(].*[\])])?", text)), key=len, default="")
-    return names[name] + text.removeprefix(name) if name else text
+def _renamed(title: str, names: Mapping[str, str]) -> str:
+    """The column title with its name replaced as in `names`; a unit after the name is kept."""
+    name = max((n for n in names if re.fullmatch(re.escape(n) + r"\s*([\[(].*[\])])?", title)), key=len, default="")
+    return names[name] + title.removeprefix(name) if name else title
 
 
 def _gaps(path: Path, time: Array, theta: Array) -> list[str]:
@@ -248,7 +248,7 @@ def doubts(time: Array, theta: Array, omega: Array | None, units: Mapping[str, s
     if len(time) > 1 and (step := (time[-1] - time[0]) / (len(time) - 1)) > SLOW_SAMPLING:
         notes.append(f"a sample every {step:.3g} s; if time is in ms, call its column time [ms]")
     for side, name in enumerate(ANGLES):
-        # A percentile, for a single step of a coarse encoder is no speed.
+        # A percentile, because a single step of a coarse encoder is not a speed.
         speed = np.percentile(np.abs(np.diff(theta[:, side]) / np.diff(time)), 99)
         reach = np.abs(theta[:, side]).max()
         hint = f"if it is in degrees, call it {name} [deg]" if units[name] == "rad" else "are these the right units?"

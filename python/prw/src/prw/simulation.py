@@ -19,9 +19,9 @@ from prw.motion import Array, Motion, fig4
 from prw.recording import Recording, read_motion
 from prw.testbed import OUTPUTS, Testbed
 
-#: A sampling error (fraction of the peak) that is worth a warning; the fewest times that it is estimated from; a peak that is
-#: rounding.
-DOUBTFUL, FEWEST, ROUNDING = 0.01, 8, 1e-12
+#: Sampling error, as a fraction of the peak, above which there is a warning; minimum number of times for its estimate; peak below
+#: which an output is a rounding error.
+DOUBTFUL, MIN_TIMES, ROUNDING = 0.01, 8, 1e-12
 
 if TYPE_CHECKING:
     import pandas
@@ -181,7 +181,7 @@ def simulate(
         check_names("outputs", names, testbed.loaded.variables)
         found = testbed.respond(moved, names, given)
         coarse = Motion(moved.time[::2], moved.theta[::2], None if moved.omega is None else moved.omega[::2])
-        other = testbed.respond(coarse, names, given) if len(coarse.time) >= FEWEST else {}
+        other = testbed.respond(coarse, names, given) if len(coarse.time) >= MIN_TIMES else {}
     errors = {name: _sampling_error(found[name], other[name]) for name in other}
     run = Run(moved, found, values, errors)
     if run.doubt:

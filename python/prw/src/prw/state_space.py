@@ -51,7 +51,7 @@ class StateSpace:
 
         rates: inputs that are the derivative of another input, by name: {"omega1": "theta1"}. Their columns, times s, are
         added to the column of the other input and left out, see `moved`. Raises UserError for
-        names that are no inputs.
+        names that are not inputs.
         """
         s = np.atleast_1d(np.asarray(s, dtype=np.complex128))
         kept = [self.inputs.index(name) for name in self.moved(rates or {})]
@@ -66,7 +66,7 @@ class StateSpace:
         """The inputs that are not among `rates`: the columns of `transfer` and `response_at_hz`."""
         for name in (*rates, *rates.values()):
             if name not in self.inputs:
-                raise UserError(f"{name} is no input; there are {', '.join(self.inputs)}", argument="rates")
+                raise UserError(f"{name} is not an input; there are {', '.join(self.inputs)}", argument="rates")
         return tuple(name for name in self.inputs if name not in rates)
 
     def response_at_hz(self, frequency: ArrayLike, rates: Mapping[str, str] | None = None) -> Complex:

@@ -28,7 +28,7 @@ from prw.testbed import OUTPUTS, Testbed, driven_by, existing_fmu, stopped
 if TYPE_CHECKING:
     import pyarrow
 
-MOST_RUNS = 10_000_000
+MAX_RUNS = 10_000_000
 #: The distribution of a parameter, see `sweep`.
 Spread = float | tuple[float, float] | tuple[str, float, float]
 
@@ -99,7 +99,7 @@ def sweep(
         values, moved = layout(grid or {}, random or {}, runs, seed, testbed, fixed), motion_of(motion)
         # The file is created first, so that a directory that cannot be written costs no runs.
         temporary = None if out is None else stack.enter_context(replacing(Path(out) / "runs.parquet"))
-        table = _made(testbed, moved, values, fixed, threads, scheduler)
+        table = _run_all(testbed, moved, values, fixed, threads, scheduler)
         if temporary is not None:
             import pyarrow.parquet
 
@@ -109,7 +109,7 @@ def sweep(
     return table
 
 
-def _made(
+def _run_all(
     testbed: Testbed,
     motion: Motion,
     values: Mapping[str, Array],
@@ -176,8 +176,8 @@ def layout(
     draws = counted("runs", runs) if random else 1
     axes = {name: _column(name, in_own_unit(name, values, testbed.loaded)) for name, values in grid.items()}
     total = math.prod(map(len, axes.values())) * draws
-    if total > MOST_RUNS:
-        raise UserError(f"{total} runs are more than {MOST_RUNS}; take fewer steps or runs")
+    if total > MAX_RUNS:
+        raise UserError(f"{total} runs are more than {MAX_RUNS}; take fewer steps or runs")
     combinations = np.array(list(itertools.product(*axes.values())), dtype=np.float64).reshape(
         total // draws, len(axes)
     )

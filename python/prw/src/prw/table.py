@@ -142,17 +142,17 @@ def _rows(
 
 def _number(where: str, cell: str, comma: bool, may_be_empty: bool) -> float:
     """The number in a cell, perhaps with a decimal comma. Raises UserError that begins with `where`."""
-    text = cell.strip()
-    if may_be_empty and text.lower() in ("", "nan"):
+    content = cell.strip()
+    if may_be_empty and content.lower() in ("", "nan"):
         return math.nan
     try:
-        value = None if "_" in text else float(text.replace(",", ".") if comma else text)
+        value = None if "_" in content else float(content.replace(",", ".") if comma else content)
     except ValueError:
         value = None
     if value is None:
-        raise UserError(f"{where}: {f'{text[:40]!r} is not a number' if text else 'empty cell'}")
+        raise UserError(f"{where}: {f'{content[:40]!r} is not a number' if content else 'empty cell'}")
     if not math.isfinite(value):
-        raise UserError(f"{where}: {text} is not finite")
+        raise UserError(f"{where}: {content} is not finite")
     return value
 
 

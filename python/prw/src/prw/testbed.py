@@ -101,7 +101,7 @@ class Testbed:
 
     def with_starts(self, parameters: Mapping[str, Value]) -> dict[str, Value]:
         """The value of every numeric parameter, in the FMU's units: `parameters`, and the start values of the others.
-        Raises UserError for a name that is no parameter, or a value that is no number."""
+        Raises UserError for a name that is not a parameter, or a value that is not a number."""
         known = {
             v.name: _value(v.type, v.start or "0")
             for v in self.loaded.variables.values()
@@ -147,8 +147,8 @@ def driven_by(motion: Motion, start: Mapping[str, Any] = {}) -> dict[str, Any]:
     return {"inputs": inputs, "start": {"use_omega": motion.omega is not None, **start}}
 
 
-def _value(kind: str, text: str) -> Value:
+def _value(kind: str, start: str) -> Value:
     """A start value in the format of the model description."""
     if kind == "Boolean":
-        return text in ("true", "1")
-    return float(text) if kind in CONTINUOUS else int(text)
+        return start in ("true", "1")
+    return float(start) if kind in CONTINUOUS else int(start)

@@ -1,7 +1,8 @@
-"""The testbed in 3D: bodies of flat faces, and their positions at an instant.
+"""The testbed in 3D: bodies with flat faces, and their positions at an instant.
 
-wrist.json defines the bodies, also for the pages that show the wrist. The frame is the frame of eq. (4a): X,
-the pitch axis, along the input shafts from motor 1 to motor 2; Y, the roll axis, up to the gripper; Z to the viewer. Lengths are not to scale: the roller-carriers have a radius of 0.8.
+wrist.json defines the bodies, also for the pages that show the wrist. The frame is the frame of eq. (4a). X is the pitch
+axis, along the input shafts from motor 1 to motor 2. Y is the roll axis, up to the gripper. Z points to the viewer. Lengths
+are not to scale: the roller-carriers have a radius of 0.8.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ Array = np.ndarray
 PARTS: dict[str, Any] = json.loads(page_file("wrist.json").read_text(encoding="utf-8"))
 COLOURS: dict[str, str] = PARTS["colours"]
 STEEL, DARK, PALE = COLOURS["steel"], COLOURS["dark"], COLOURS["pale"]
-#: Corners that a face has at most: the end of a roller.
+#: Maximum number of corners of a face; the end of a roller has six.
 CORNERS = 6
 #: Sides of round bodies.
 ROUND: int = PARTS["round"]

@@ -55,7 +55,7 @@ def check(
     UserError
         A file cannot be read, a name is not known, or the result has no output at any of the experiment's times.
     """
-    # They take a while to load.
+    # These imports are slow.
     from prw.checking.agreement import compare, nearest
     from prw.checking.experiments import find, read_experiments
     from prw.checking.result import read_result

@@ -16,7 +16,7 @@ from prw.arguments import check_names
 from prw.errors import UserError
 from prw.motion import Array
 
-FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
+DIRECTORY = "extra/org.fmi-standard.fmi-ls-ref"
 
 Value = float | int | bool
 
@@ -51,13 +51,13 @@ def read_experiments(fmu: Path) -> list[Experiment]:
                     entry["name"],
                     entry["description"],
                     entry["stop_time"],
-                    _columns(_text(archive, entry["inputs"])),
-                    _columns(_text(archive, entry["reference"])),
-                    _parameters(_text(archive, entry["parameters"])),
+                    _columns(_content(archive, entry["inputs"])),
+                    _columns(_content(archive, entry["reference"])),
+                    _parameters(_content(archive, entry["parameters"])),
                     {kind: values["step_size"] for kind, values in entry["interfaces"].items()},
                     {kind: values["tolerance"] for kind, values in entry["interfaces"].items()},
                 )
-                for entry in json.loads(_text(archive, "experiments.json"))
+                for entry in json.loads(_content(archive, "experiments.json"))
             ]
     except (OSError, zipfile.BadZipFile) as error:
         raise UserError(f"{fmu}: cannot be read ({error})") from None
@@ -72,19 +72,19 @@ def find(known: Sequence[Experiment], name: str) -> Experiment:
     return by_name[name]
 
 
-def _text(archive: zipfile.ZipFile, name: str) -> str:
-    return archive.read(f"{FOLDER}/{name}").decode("utf-8")
+def _content(archive: zipfile.ZipFile, name: str) -> str:
+    return archive.read(f"{DIRECTORY}/{name}").decode("utf-8")
 
 
-def _columns(text: str) -> dict[str, Array]:
-    names = [name.strip('"') for name in text[: text.index("\n")].split(",")]
-    return dict(zip(names, np.loadtxt(io.StringIO(text), delimiter=",", skiprows=1, ndmin=2).T))
+def _columns(table: str) -> dict[str, Array]:
+    names = [name.strip('"') for name in table[: table.index("\n")].split(",")]
+    return dict(zip(names, np.loadtxt(io.StringIO(table), delimiter=",", skiprows=1, ndmin=2).T))
 
 
-def _parameters(text: str) -> dict[str, Value]:
+def _parameters(ssv: str) -> dict[str, Value]:
     """The values of an SSV file."""
     found: dict[str, Value] = {}
-    for parameter in ElementTree.fromstring(text.encode()).iterfind(".//{*}Parameter"):
+    for parameter in ElementTree.fromstring(ssv.encode()).iterfind(".//{*}Parameter"):
         kind, value = parameter[0].tag.rpartition("}")[2], parameter[0].attrib["value"]
         number = int(value) if kind == "Integer" else float(value) if kind == "Real" else value == "true"
         found[parameter.attrib["name"]] = number

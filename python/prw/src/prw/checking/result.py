@@ -47,7 +47,7 @@ def read_result(path: Path, units: Mapping[str, str], component: str | None) -> 
     table = np.column_stack([time, *chosen.values()])
     if not np.isfinite(table).all():
         row = int(np.flatnonzero(~np.isfinite(table).all(axis=1))[0])
-        raise UserError(f"{path}: row {row + 1} of the numbers has one that is not finite")
+        raise UserError(f"{path}: row {row + 1} below the header contains a number that is not finite")
     if (np.diff(time) < 0).any():
         raise UserError(f"{path}: time runs backwards after {time[np.argmax(np.diff(time) < 0)]:g} s")
     last = np.append(np.diff(time) > 0, True)
@@ -125,7 +125,7 @@ def _mat(path: Path) -> dict[str, Array]:
     except NotImplementedError:
         raise UserError(f"{path}: is of MATLAB's format 7.3; save it with: save('{path.name}', ..., '-v7')") from None
     except (OSError, ValueError, TypeError, MatReadError) as error:
-        raise UserError(f"{path}: is no .mat file that can be read ({error})") from None
+        raise UserError(f"{path}: cannot be read as a .mat file ({error})") from None
     columns: dict[str, Array] = {}
     for name, value in content.items():
         if not name.startswith("__"):
@@ -172,11 +172,11 @@ def _modelica(path: Path, content: Mapping[str, Any]) -> dict[str, Array]:
     titles = ["".join(row).rstrip("\0 ") for row in upright("name")]
     about = ["".join(row).rstrip("\0 ") for row in upright("description")]
     columns = {}
-    for title, text, (table, index, *_) in zip(titles, about, upright("dataInfo")):
+    for title, description, (table, index, *_) in zip(titles, about, upright("dataInfo")):
         data = upright(f"data_{table or 2}")
         if table == 1:  # does not change
             continue
-        unit = re.search(r"\[([^\]|:#]+)[^\]]*\]\s*$", text)
+        unit = re.search(r"\[([^\]|:#]+)[^\]]*\]\s*$", description)
         values = np.sign(index) * data[:, abs(int(index)) - 1].astype(np.float64)
         columns[f"{title} [{unit[1]}]" if unit else title] = values
     if not columns:

@@ -34,21 +34,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--measure", type=listed, default="all", metavar="NAMES", help="channels that will be measured (default: all)"
     )
-    parser.add_argument(
-        "--angle", type=float, default=40.0, metavar="DEG", help="motor limit, deg (default: %(default)g)"
-    )
-    parser.add_argument(
-        "--speed", type=float, default=450.0, metavar="DEG/S", help="motor limit, deg/s (default: %(default)g)"
-    )
-    parser.add_argument(
-        "--acceleration",
-        type=float,
-        default=20000.0,
-        metavar="DEG/S2",
-        help="motor limit, deg/s2 (default: %(default)g)",
-    )
-    parser.add_argument("--duration", type=float, default=10.0, metavar="S", help="of a motion (default: %(default)g)")
-    parser.add_argument("--rate", type=float, default=1000.0, metavar="HZ", help="of sampling (default: %(default)g)")
+    for name, default, unit, meaning in (
+        ("angle", 40.0, "DEG", "limit of the motors' angles"),
+        ("speed", 450.0, "DEG/S", "limit of the motors' rates"),
+        ("acceleration", 20000.0, "DEG/S2", "limit of the motors' accelerations"),
+        ("duration", 10.0, "S", "duration of a motion"),
+        ("rate", 1000.0, "HZ", "samples per second"),
+    ):
+        about = f"{meaning} (default: %(default)g)"
+        parser.add_argument(f"--{name}", type=float, default=default, metavar=unit, help=about)
     add_task_options(parser)
     add_paths(parser, "directory of the motions and ranking.json", "excite")
 

@@ -1,5 +1,5 @@
 """Estimates parameters of the testbed from measurements: the values with which the FMU, driven by the measured motor
-angles, comes closest to the measurements. Sensor offsets and the state at the first row are unknown and estimated along.
+angles, comes closest to the measurements. Sensor offsets and the state at the first row are estimated, too.
 
 Each FILE is one experiment, a CSV table with the columns
   time, theta1, theta2        and, if logged, the motors' rates omega1, omega2
@@ -125,16 +125,16 @@ def run(arguments: argparse.Namespace) -> None:
     found.to_ssv(ssv)
     print(f"wrote       {report}, {numbers_}, {parameters}, {ssv}")
     if not found.fits:
-        raise DoesNotFit("the FMU does not explain the data; the parameters that were written are not to be trusted")
+        raise DoesNotFit("the FMU does not explain the data; the parameters that were written are not reliable")
     print(f"next        look at the report; then: prw simulate {arguments.files[0]} --parameters {parameters}")
 
 
-def _quantum(text: str | None) -> float:
-    if text is None:
+def _quantum(string: str | None) -> float:
+    if string is None:
         return 0.0
-    match = re.fullmatch(r"\s*([-+.\deE]+)\s*([^\d\s].*)?", text)
+    match = re.fullmatch(r"\s*([-+.\deE]+)\s*([^\d\s].*)?", string)
     if not match:
-        raise UserError("write an angle like 0.036deg", argument="quantum", given=text)
+        raise UserError("write an angle like 0.036deg", argument="quantum", given=string)
     try:
         return number(match[1]) * factor("theta1", match[2] or "rad")
     except ValueError as error:

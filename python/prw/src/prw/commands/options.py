@@ -113,32 +113,32 @@ class Named(argparse.Action):
         """Add the pairs in the string `values`. Raises UserError naming the option."""
         option, found = str(option), dict(getattr(namespace, self.dest))
         for part in filter(None, (part.strip() for part in values.split(","))):
-            name, _, text = (word.strip() for word in part.partition("="))
-            if not name or not text:
+            name, _, string = (word.strip() for word in part.partition("="))
+            if not name or not string:
                 raise UserError("write NAME=VALUE", argument=option, given=part)
             if name in found:
                 raise UserError(f"{name} is given twice", argument=option)
             try:
-                found[name] = self.read(text)
+                found[name] = self.read(string)
             except ValueError as error:
                 raise UserError(str(error), argument=option, given=part) from None
         setattr(namespace, self.dest, found)
 
 
-def number(text: str) -> float:
+def number(string: str) -> float:
     """A positive number. Raises ValueError."""
     try:
-        value = float(text)
+        value = float(string)
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value > 0):
-        raise ValueError(f"{text!r} is not a positive number")
+        raise ValueError(f"{string!r} is not a positive number")
     return value
 
 
-def listed(text: str) -> tuple[str, ...]:
+def listed(string: str) -> tuple[str, ...]:
     """Names with commas, each once."""
-    return tuple(dict.fromkeys(filter(None, (part.strip() for part in text.split(",")))))
+    return tuple(dict.fromkeys(filter(None, (part.strip() for part in string.split(",")))))
 
 
 def add_parameter_options(parser: argparse.ArgumentParser, unit: str) -> None:
@@ -170,26 +170,26 @@ def parameters_of(arguments: argparse.Namespace) -> dict[str, Any]:
     return {**found, **arguments.set}
 
 
-def value(text: str) -> float | bool:
+def value(string: str) -> float | bool:
     """A number, or `true` or `false`. Raises ValueError."""
     try:
-        return text == "true" if text in ("true", "false") else float(text)
+        return string == "true" if string in ("true", "false") else float(string)
     except ValueError:
-        raise ValueError(f"{text!r} is not a number") from None
+        raise ValueError(f"{string!r} is not a number") from None
 
 
-def spread(text: str) -> float | tuple[float, float]:
+def spread(string: str) -> float | tuple[float, float]:
     """[VALUE:]PERCENT% as a fraction, or (value, fraction). Raises ValueError."""
-    match = re.fullmatch(r"(?:([^:]+):)?\s*([^:%]+)%", text)
+    match = re.fullmatch(r"(?:([^:]+):)?\s*([^:%]+)%", string)
     if not match:
         raise ValueError("write NAME=10%, or NAME=VALUE:10%")
     fraction = number(match[2]) / 100
     return (number(match[1]), fraction) if match[1] else fraction
 
 
-def bounds(text: str) -> tuple[float, float]:
+def bounds(string: str) -> tuple[float, float]:
     """LOW:HIGH. Raises ValueError."""
-    low, colon, high = text.partition(":")
+    low, colon, high = string.partition(":")
     if not colon:
         raise ValueError("write NAME=LOW:HIGH")
     return number(low), number(high)

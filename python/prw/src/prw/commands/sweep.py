@@ -31,9 +31,9 @@ then:
 """
 
 
-def _steps(text: str) -> Array:
+def _steps(string: str) -> Array:
     """N even steps from LOW to HIGH. Raises ValueError."""
-    parts = text.split(":")
+    parts = string.split(":")
     try:
         low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
         if len(parts) != 3 or count < 1 or not np.isfinite([low, high]).all():

@@ -1,6 +1,6 @@
-"""Parameters of the testbed from measurements: the values with which the FMU comes closest to the measurements.
+"""Estimates parameters of the testbed: the values with which the FMU comes closest to the measurements.
 
-In the order of dependence: path (smoothed motor angles), experiment (spectra of inputs, measurements and their errors),
+The modules in the order of dependence: path (smoothed motor angles), experiment (spectra of inputs, measurements and their errors),
 model (the FMU's equations), response (the model's outputs), fit (least squares), verdict (whether the model explains the
 data), diagnosis (possible causes if not), statistics (standard errors and intervals), design (more informative
 experiments), results and report. `identify` below combines them.
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 #: The parameters that are estimated by default.
 DEFAULT_ESTIMATE = ("k1", "k2", "c1", "c2", "c3")
-#: Default bounds: this factor about the start value.
+#: Default bounds: the start value divided and multiplied by this factor.
 REACH = 100.0
 
 

@@ -1,7 +1,7 @@
-"""Motor motions for identification, and the information that each of them gives.
+"""Motor motions for identification, and the information about the parameters that each of them gives.
 
-The information about the logarithms of the parameters is the information of the fit, see `statistics`, with unknown
-offsets and initial state, for a planned experiment. Multisines have harmonics of 1/duration with Schroeder's
+The information is calculated as in the fit (see `statistics`), with unknown offsets and initial state, for a planned
+experiment. Multisines have harmonics of 1/duration with Schroeder's
 phases (IEEE Trans. Inf. Theory 16 (1970) 85), which keep their peaks low. All motions start and end at rest.
 """
 
@@ -23,11 +23,11 @@ from prw.testbed import ANGLE_OF, OUTPUTS
 
 #: Seconds in which a motion fades in and out.
 FADE = 0.5
-#: Most frequencies in a multisine.
-MOST_LINES = 60
-#: Frequencies in Hz: of the slow multisine, up to; and of the widest motions, up to.
+#: Maximum number of frequencies in a multisine.
+MAX_LINES = 60
+#: Highest frequency in Hz of the slow multisine, and of all motions.
 SLOW, WIDEST = 4.0, 40.0
-#: Condition of an information matrix from which its weakest combination is rounding error.
+#: Condition number of an information matrix above which its least eigenvalue is a rounding error.
 SINGULAR = 1e12
 #: The default noise by channel, in SI.
 DEFAULT_NOISE = {name: channel.noise for name, channel in MEASURED.items()}
@@ -64,7 +64,7 @@ def motions(
     return found
 
 
-#: Shares of two waves in the motions of motors 1 and 2.
+#: Factors of two waves in the motion of motor 1, and in the motion of motor 2.
 PATTERNS = {
     "equal": ((1, 0), (1, 0)),
     "opposite": ((1, 0), (-1, 0)),
@@ -87,20 +87,20 @@ def information(
 def _lines(duration: float, top: float) -> Array:
     """Harmonics of 1/duration up to `top` Hz, thinned out evenly in the logarithm."""
     harmonics = np.arange(1, int(top * duration) + 1)
-    if len(harmonics) > MOST_LINES:
-        harmonics = np.unique(np.rint(np.geomspace(1, harmonics[-1], 2 * MOST_LINES)).astype(int))[-MOST_LINES * 2 :]
+    if len(harmonics) > MAX_LINES:
+        harmonics = np.unique(np.rint(np.geomspace(1, harmonics[-1], 2 * MAX_LINES)).astype(int))[-MAX_LINES * 2 :]
     return harmonics / duration
 
 
 def _natural(frequency: Array, limits: Limits) -> Array:
-    """Amplitudes that use the limits alike: of angle at low, of rate at middle, of acceleration at high
-    frequencies."""
+    """The largest amplitudes within the limits. The angle limits them at low frequencies, the rate at middle frequencies, and
+    the acceleration at high frequencies."""
     w = 2 * np.pi * frequency
     return np.minimum(np.minimum(limits.angle, limits.rate / w), limits.acceleration / w**2)
 
 
 def _multisine(time: Array, frequency: Array, size: Array, shift: int) -> Array:
-    """Angle, rate and acceleration, (3, n), of a sum of sines. shift: another one gives other phases."""
+    """Angle, rate and acceleration, (3, n), of a sum of sines. shift: selects the phases."""
     k = np.arange(len(frequency))
     power = size**2 / max(np.sum(size**2), np.finfo(float).tiny)
     phase = -2 * np.pi * np.concatenate([[0], np.cumsum(np.cumsum(power))[:-1]]) + 2.4 * shift * (k**2 + 1)

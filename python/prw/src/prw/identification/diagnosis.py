@@ -20,7 +20,7 @@ from prw.identification.verdict import CLEAR, PAIRS, Verdict, groups, judge, nam
 from prw.motion import Array
 from prw.progress import Progress
 
-#: Gains that a wrong unit causes, within the factor TOLERANCE, and the description of the unit.
+#: Gains that a wrong unit causes, within the factor TOLERANCE, each with the description of the fault.
 SLIPS = {57.3: "in degrees, not radians", 1 / 57.3: "in radians, not degrees", 1000.0: "in thousandths of its unit"}
 TOLERANCE = 1.7
 #: Correlation above which two signals are alike, and below which they are unlike.
@@ -38,28 +38,28 @@ SHARE, SECOND = 0.6, 0.05
 
 def diagnose(solution: Solution, verdict: Verdict) -> list[str]:
     """Possible causes, a sentence each, the most likely first."""
-    found = [text for i, e in enumerate(solution.fitter.experiments) for text in _looks(solution, i, e)]
+    found = [cause for i, e in enumerate(solution.fitter.experiments) for cause in _looks(solution, i, e)]
     if found:
         return list(dict.fromkeys(found))
     causes = _causes(solution, verdict)
-    reported = [cause.text for cause in causes[:2] if cause.gain > SHARE * causes[0].gain]
+    reported = [cause.message for cause in causes[:2] if cause.gain > SHARE * causes[0].gain]
     if causes and not causes[0].explains:
-        # Causes that remain with the first one included.
+        # Further causes, while the first one is included in the fit.
         after = causes[0].after()
         left = judge(after)
         others = [] if left.fits else _causes(after, left)
         others = [c for c in others if c.name != causes[0].name and c.gain > SECOND * causes[0].gain]
-        reported = [causes[0].text, *(f"besides, {other.text}" for other in others[:1])] if others else reported
+        reported = [causes[0].message, *(f"besides, {other.message}" for other in others[:1])] if others else reported
     return reported
 
 
 class _Cause(NamedTuple):
-    """A possible cause. gain: rise of twice the log likelihood. name: of the fault. text: its description. explains: whether
+    """A possible cause. gain: rise of twice the log likelihood. name: of the fault. message: its description. explains: whether
     the data fit then. after: the fit with the fault."""
 
     gain: float
     name: str
-    text: str
+    message: str
     explains: bool
     after: Callable[[], Solution]
 
@@ -70,8 +70,8 @@ def _causes(solution: Solution, verdict: Verdict) -> list[_Cause]:
     signs = [fault for fault in verdict.faults if fault.clear > CLEAR and fault.signs]
     for fault in sorted(signs, key=lambda fault: -fault.gain)[:1]:
         size = f"{fault.size:.2g} +- {fault.error:.1g} {fault.unit}"
-        text = f"{fault.name} of {size} would explain it: the residual follows the sign of a rate"
-        causes.append(_Cause(fault.gain, fault.name, text, False, partial(_with_fault, solution, fault.name)))
+        message = f"{fault.name} of {size} would explain it: the residual follows the sign of a rate"
+        causes.append(_Cause(fault.gain, fault.name, message, False, partial(_with_fault, solution, fault.name)))
     return sorted(causes, key=lambda cause: -cause.gain)
 
 
@@ -133,7 +133,7 @@ def _flat(name: str, time: Array, column: Array, moving: NDArray[np.bool_]) -> I
     edges = np.flatnonzero(np.diff(column) != 0)
     first, last = np.concatenate([[0], edges + 1]), np.concatenate([edges, [len(column) - 1]])
     long = last - first + 1
-    # Channels without noise are often constant, which is no fault.
+    # Channels without noise are often constant, which is not a fault.
     usual = float(np.median(long))
     if usual > 2:
         return
@@ -175,10 +175,10 @@ def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
     for kind, (gain, new, found) in best.items():
         if gain >= max(SHARE * greatest, CLEAR**2):
             good = judge(found).fits
-            then = "with that, the data fit" if good else "that explains a part of it"
+            then = "with that, the data fit" if good else "that explains a part of the misfit"
             channels = ",".join(distortion.channel for distortion in new)
-            text = f"{_sizes(found, new)}: {then} ({kind} {channels} estimates it along)"
-            yield _Cause(gain, kind, text, good, partial(refitted, solution, new))
+            message = f"{_sizes(found, new)}: {then} ({kind} {channels} estimates it, too)"
+            yield _Cause(gain, kind, message, good, partial(refitted, solution, new))
 
 
 def _sizes(found: Solution, new: tuple[Distortion, ...]) -> str:

@@ -14,8 +14,8 @@ from prw.errors import UserError, need
 from prw.identification import DEFAULT_ESTIMATE, task_of
 from prw.motion import Motion
 
-#: Most samples, and fewest samples per second.
-MOST_SAMPLES, SLOWEST = 2_000_000, 50.0
+#: Maximum number of samples, and minimum number of samples per second.
+MAX_SAMPLES, MIN_RATE = 2_000_000, 50.0
 
 
 class Excitation(NamedTuple):
@@ -104,10 +104,10 @@ def excite(
     check_names("measure", channels, MEASURED)
     if not channels:
         raise UserError(f"nothing is named; there are {', '.join(MEASURED)}", argument="measure")
-    if not 4 * design.FADE <= duration <= MOST_SAMPLES / rate:
+    if not 4 * design.FADE <= duration <= MAX_SAMPLES / rate:
         least = f"it must be {4 * design.FADE:g} s or more, and at most 2 million samples"
         raise UserError(least, argument="duration", given=f"{duration:g}")
-    if rate < SLOWEST:
+    if rate < MIN_RATE:
         reason = "the testbed moves at up to 30 Hz; sample with 50 Hz or more"
         raise UserError(reason, argument="rate", given=f"{rate:g}")
     ranking = []

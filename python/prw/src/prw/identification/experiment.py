@@ -26,25 +26,25 @@ from prw.state_space import Complex
 #: highest frequency of the fit, and a factor on that frequency.
 CLEARLY_MOVING, MARGIN = 10.0, 1.15
 NEIGHBOURS = 9
-#: Share of the greatest power that counts as zero.
+#: Share of the greatest power below which power is a rounding error.
 ROUNDING = 1e-10
 #: Least relative error of a spectral line (limited by doubles, CSV digits and the linear model), and least error of a
 #: value in SI.
 FINEST, LEAST = 1e-7, 1e-15
-#: Fraction of its default noise within which a channel counts as constant.
+#: A channel is constant if its range is at most this fraction of its default noise.
 STILL = 1e-6
 #: Motion of the motors between the rows of a recording: smooth; or as in a simulation of the FMU in Co-Simulation with a
 #: step from row to row, with the motors' rates as inputs, or with rates that the FMU estimates from the angles.
 Rates = Literal["motors", "inputs", "angles"]
-#: Fractions of the motion. Recordings whose motors have at most this noise and these steps may come from a simulation. Samples
-#: with less than the last noise are used without smoothing.
+#: Fractions of a motor's range. A recording may come from a simulation if the noise is at most EXACT and the quantum at most
+#: DIGITS. Samples with a noise of at most ROUNDED are used without smoothing.
 EXACT, DIGITS, ROUNDED = 1e-3, 1e-4, 1e-6
 #: Number of draws of encoders' errors, and the number of neighbouring frequencies into which a line of them leaks.
 DRAWS, FURTHEST = 64, 100
 #: Largest deviation of even times, as a fraction of a step.
 EVEN = 1e-3
-#: The fewest frequencies that are compared, and the fewest values from which a channel's noise is estimated.
-FEWEST, FEWEST_VALUES = 8, 20
+#: Minimum numbers of compared frequencies, and of values from which a channel's noise is estimated.
+MIN_FREQUENCIES, MIN_VALUES = 8, 20
 
 
 @dataclass(frozen=True)
@@ -186,7 +186,7 @@ def prepare(recording: Recording, quantum: float = 0.0, rates_of: Rates = "motor
         notes += ("it is taken for a simulation of the FMU, with a step from row to row",)
         jumps = np.vstack([np.zeros((1, 2)), theta[1:] - theta[:-1] - spacing * rates[:-1]])
     bins = max(_clear(t, e, path.rate_noise, spacing) for t, e, path in zip(theta.T, errors, paths))
-    bins = min(max(bins, FEWEST), len(time) // 2 + 1)
+    bins = min(max(bins, MIN_FREQUENCIES), len(time) // 2 + 1)
     channel_errors = np.zeros((DRAWS, bins, len(channels)), dtype=np.complex128)
     for i, column in enumerate(values.T):
         there = np.isfinite(column)
@@ -238,9 +238,9 @@ def _measured(recording: Recording) -> tuple[tuple[str, ...], Array, tuple[str, 
     moving = {}
     for name, column in recording.measured.items():
         count = int(np.isfinite(column).sum())
-        if count < FEWEST_VALUES:
+        if count < MIN_VALUES:
             raise UserError(
-                f"{recording.source}, column {name}: {count} values; at least {FEWEST_VALUES} are needed to fit anything"
+                f"{recording.source}, column {name}: {count} values; at least {MIN_VALUES} are needed to fit anything"
             )
         if np.nanmax(column) - np.nanmin(column) > STILL * MEASURED[name].noise:
             moving[name] = column
@@ -256,7 +256,7 @@ def planned(motion: Motion, channels: Sequence[str]) -> Experiment:
     assert motion.omega is not None
     step = float(motion.time[-1] - motion.time[0]) / (len(motion.time) - 1)
     exact = np.zeros((1, len(motion.time)))
-    bins = max(FEWEST, *(_clear(theta, exact, None, step) for theta in motion.theta.T))
+    bins = max(MIN_FREQUENCIES, *(_clear(theta, exact, None, step) for theta in motion.theta.T))
     bins = min(bins, len(motion.time) // 2 + 1)
     known, none = (np.zeros((1, bins, count), dtype=np.complex128) for count in (2, len(channels)))
     motors = motion.name, motion.time, motion.theta, motion.omega

@@ -33,17 +33,17 @@ from prw.state_space import Complex, StateSpace
 DIFFERENCE = 1e-4
 #: Relative singular value below which a direction of the initial state is not estimated.
 UNDETERMINED = 1e-9
-#: Most rounds of fitting and estimating the noise, in a comparison too; the change that ends them, and most rounds of the
-#: latter only.
+#: Maximum number of rounds that fit and then estimate the noise; the same for the comparison of causes; and the change of the
+#: noise that ends the rounds. Maximum number of rounds that only estimate the noise.
 ROUNDS, FEW_ROUNDS, SETTLED = 12, 2, 0.003
 NOISE_ROUNDS = 30
-#: A search starts at least this far inside its bounds.
+#: Least distance of the start of a search from the bounds.
 INSIDE = 1e-6
 #: Tolerances of a search.
 FINE, COARSE = {"ftol": 1e-12, "xtol": 1e-9, "max_nfev": 100}, {"ftol": 1e-5, "xtol": 1e-4, "max_nfev": 25}
 #: Two minima are the same if no parameter differs by more than this fraction.
 SAME = 0.01
-#: Another minimum is reported if it is no more than this worse, in terms of -2 log likelihood.
+#: Another minimum is reported if its -2 log likelihood exceeds the least one by at most this.
 RIVAL = 9.0
 
 
@@ -156,7 +156,7 @@ class Comparison:
         """Derivatives (2, bins, c, p) of `residual`, and the part (p, p) of their squares that is noise.
 
         change: the model's derivatives with respect to the parameters; derivatives with respect to the distortions follow.
-        The contribution of encoders' errors to the squares is no information. For example, with equal motors the difference
+        The contribution of encoders' errors to the squares is not information. For example, with equal motors the difference
         of two encoders' steps seems to roll the wrist a little, and J3 would look determined."""
         outputs, transfer = self.response.slopes(change, self.initial)
         bins, whiten = self.experiment.bins, self._whiten

@@ -39,7 +39,7 @@ class Parameters:
         self._units = fmu.units
         for v in fmu.variables.values():
             unit, start = v.unit or "", v.start or "0"
-            # Initial states of a run are no properties of the testbed.
+            # Initial states belong to a run, not to the testbed.
             if v.causality == "parameter" and v.type in CONTINUOUS and not v.name.endswith("_start"):
                 shown = v.display_unit or unit
                 factor = float(fmu.converted(v.name, 1.0, shown)) if v.display_unit else 1.0

@@ -1,9 +1,9 @@
 """Smooth paths of the motors through quantised or noisy samples of their angles (and rates).
 
-The FMU derives rates from angles as a simulation must, from the past; the steps of an encoder then become noise in the
-torque that is far above the sensor's noise. Here the whole recording is known. The path is a quintic spline, its
-coefficients the most probable ones if the jerk is a white process and the samples carry white noise. The strength of both
-follows from the recording by maximum likelihood; an encoder's noise is at least quantum^2 / 12.
+A simulation can derive rates only from past angles. The steps of an encoder then cause noise in the torque that is far
+above the noise of the sensor. Identification knows the whole recording. The path is a quintic spline. Its coefficients are
+the most probable ones if the jerk is a white process and the samples contain white noise. The variances of both are
+estimated by maximum likelihood; the variance of an encoder's errors is at least quantum^2 / 12.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ from prw.motion import Array
 #: Sparse rows from coefficients to measured quantities, and the measured values.
 Block = tuple[csr_matrix, Array]
 DEGREE = 5
-#: The penalty is on third differences of the coefficients: jerk.
+#: Order of the differences of coefficients that are penalized; third differences are proportional to jerk.
 ORDER = 3
 #: Range of log10 of the penalty: below, the path interpolates; above, the normal equations lose their digits.
 STIFFNESS = (-6.0, 10.0)
 #: Range of log10 of the weight of logged rates, s^2, and where the search for it begins, for one block and for two.
 RATIO = (-14.0, 4.0)
 GUESSES: dict[int, list[list[float]]] = {1: [[]], 2: [[-2.0], [-4.0], [-6.0]]}
-#: The most probable penalty is divided by this. Angles smoothed too little add a little noise; smoothed too much they
-#: bias the parameters. It raises the frequency up to which the path follows by its sixth root, 1.6.
+#: Divisor of the most probable penalty. Too little smoothing adds some noise, too much biases the parameters. The highest
+#: frequency that the path follows rises by the sixth root of the divisor, 1.6.
 UNDERSMOOTHING = 16.0
-#: Encoders' errors are drawn along a path whose penalty is this many times the most probable one, and that is longer or
-#: shorter by up to a fraction. A path that follows the encoder's steps would be rounded to the same steps again if
-#: the motor is slow, and the errors drawn would be up to three times too large.
+#: Errors of encoders are drawn along a path whose penalty is the most probable one times the first number, and whose
+#: angles are rescaled by up to the second. If the motor is slow, a path that follows the encoder's steps would be rounded
+#: to these steps again, and the drawn errors would be up to three times too large.
 OVERSMOOTHING, RESCALED = 64.0, 0.05
 #: A column is a multiple of a quantum if all its values are, to this fraction of the quantum.
 ON_GRID = 0.05
-#: Most quanta between neighbouring values of a typical column.
-MOST_STEPS = 50
+#: Maximum number of quanta between neighbouring values of a typical column.
+MAX_STEPS = 50
 #: Ratio of variance to the variance of the steps from which samples have other noise.
 NOISIER = 1.2
 #: Number of values from which the quantum is found.
@@ -76,31 +76,31 @@ def smooth(time: Array, theta: Array, omega: Array | None = None, quantum: float
 
 
 def quantum_of(values: Array) -> float:
-    """The step that all `values` (n,) are multiples of, give or take a constant, or 0 if there is none."""
+    """The largest step of which all `values` (n,) are multiples, apart from a common constant; 0 if there is none."""
     levels = np.unique(values[:QUANTUM_VALUES])
     if len(levels) < 3:
         return float(np.ptp(levels))
     gaps = np.diff(levels)
     # Truncated digits split a level into two values. The remaining gaps are multiples of the quantum.
-    gaps = gaps[gaps > np.median(gaps) / MOST_STEPS]
+    gaps = gaps[gaps > np.median(gaps) / MAX_STEPS]
     quantum = gaps.min()
     for _ in range(3):
         multiples = np.rint(gaps / quantum)
         quantum = gaps.sum() / multiples.sum()
     off = np.abs(gaps / quantum - np.rint(gaps / quantum))
-    return float(quantum) if off.max() < ON_GRID and np.median(np.rint(gaps / quantum)) < MOST_STEPS else 0.0
+    return float(quantum) if off.max() < ON_GRID and np.median(np.rint(gaps / quantum)) < MAX_STEPS else 0.0
 
 
 def rough_noise(values: Array) -> float:
-    """An estimate, rather too large, of the standard deviation of white noise on smooth values (n,): third differences
-    nearly remove smooth values and multiply the noise's variance by 20."""
+    """An upper estimate of the standard deviation of white noise on smooth values (n,). Third differences nearly remove smooth
+    values, and multiply the variance of the noise by 20."""
     return float(np.std(np.diff(values, 3)) / np.sqrt(20)) if len(values) > 3 else np.inf
 
 
 def rounding(values: Array, quantum: float, random: np.random.Generator) -> Array:
     """A draw of an encoder's errors at the values (n,). An encoder has the same error at the same angle, and so in every
     period of a motion."""
-    # Remains of the samples' own errors in `values` must not meet their grid again: another zero and another scale.
+    # `values` contain remainders of the samples' errors. Another zero and scale avoid that they are rounded to the same grid.
     level = values * (1 + random.uniform(-RESCALED, RESCALED)) / quantum + random.uniform()
     return (np.rint(level) - level) * quantum
 
@@ -113,7 +113,7 @@ class _Spline:
         pieces = max(1, int(np.ceil((time[-1] - time[0]) / self.spacing - 1e-6)))
         self.spacing = (time[-1] - time[0]) / pieces
         self._knots = time[0] + self.spacing * np.arange(-DEGREE, pieces + DEGREE + 1)
-        # Not the first and last time themselves, which may lie outside by rounding.
+        # The outer knots, because the first and last time may be outside of them by rounding errors.
         self._ends = self._knots[DEGREE], self._knots[-DEGREE - 1]
         self.size = pieces + DEGREE
         self.penalties = self.size - ORDER

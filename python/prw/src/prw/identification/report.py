@@ -103,11 +103,11 @@ def _shown(channel: ChannelFit) -> ChannelFit:
 
 def _digits(value: float, count: int = 4) -> str:
     """A number with `count` significant digits."""
-    text = f"{value:.{count}g}"
-    if "e" in text:
-        mantissa, exponent = text.split("e")
+    number = f"{value:.{count}g}"
+    if "e" in number:
+        mantissa, exponent = number.split("e")
         return f"{mantissa}·10{str(int(exponent)).translate(RAISED)}"
-    return text.replace("-", "−")
+    return number.replace("-", "−")
 
 
 def _percent(value: float | None) -> str:

@@ -109,7 +109,7 @@ class Response:
         from_motors: Complex = model.C @ self._states + model.D @ self._motors
         #: Spectra of the channels (f, c), periodic.
         self.outputs: Complex = from_motors[..., 0]
-        #: From the motors' angles, moving with their rates, to the channels: (f, c, 2).
+        #: Transfer from the motors' angles, whose rates follow, to the channels: (f, c, 2).
         self.transfer: Complex = from_motors[..., 1:]
         #: Contribution of each of the six numbers d, (f, c, 6).
         self.transients: Complex = self._z * (model.C @ self._resolvent)

@@ -210,9 +210,9 @@ class Identification:
         if self.fits:
             lines.append("verdict     the FMU explains the data")
         else:
-            lines.append("verdict     THE FMU DOES NOT EXPLAIN THE DATA; the values below are not to be trusted")
+            lines.append("verdict     THE FMU DOES NOT EXPLAIN THE DATA; the values below are not reliable")
             lines += [f"  {misfit}" for misfit in self.misfits]
-            lines += [f"perhaps     {text}" for text in self.diagnosis or ["no known cause"]]
+            lines += [f"perhaps     {cause}" for cause in self.diagnosis or ["no known cause"]]
         for name, found in self.parameters.items():
             factor, unit = (found.factor, found.shown) if shown else (1.0, found.unit)
             value, low, high = (v / factor for v in (found.value, *found.interval))
@@ -258,7 +258,7 @@ class Identification:
             rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
         head = "".join(f"<th>{h}</th>" for h in ("parameter", "estimate", "standard error", "95 % interval", "unit"))
         notes = "".join(
-            f"<p>{escape(text)}</p>" for text in [*self.misfits, *self.diagnosis, *self.undetermined, *self.notes]
+            f"<p>{escape(line)}</p>" for line in [*self.misfits, *self.diagnosis, *self.undetermined, *self.notes]
         )
         return f"<table><tr>{head}</tr>{''.join(rows)}</table>{notes}"
 

@@ -20,7 +20,7 @@ from prw.motion import Array
 
 #: Standard errors (of the logarithm) below which the model counts as linear, and above which there is no interval.
 LINEAR, HOPELESS = 0.01, 1.0
-#: Most trials for an end, tolerance of the rise of the misfit's root, and longest step relative to the trial before.
+#: Maximum number of trials for an end of an interval, relative tolerance of the step, and maximum ratio of two steps.
 TRIALS, CLOSE, LONGEST = 8, 0.02, 2.0
 #: Tolerances of the search over the other parameters.
 FOLLOWED = {"ftol": 1e-5, "xtol": 1e-5}
@@ -53,7 +53,7 @@ def _end(solution: Solution, i: int, step: Array, wanted: float) -> float:
     return float(point[i])
 
 
-#: Larger condition numbers are only rounding errors.
+#: Larger condition numbers are limited to this; they are rounding errors.
 WORST_CONDITION = 1e15
 #: Largest distance of an interval's end from the estimate, as a logarithm; larger ones overflow.
 WIDEST = 600.0
@@ -112,7 +112,7 @@ def certainty(solution: Solution, widening: Array) -> Certainty:
         expected += comparison.score_variance(jacobian)
         shown += scores(comparison, jacobian, inverse)
     expected, shown = inverse @ expected @ inverse, inverse @ shown @ inverse
-    # If a combination is undetermined, rounding makes some of these negative.
+    # If a combination is undetermined, rounding errors make some variances negative.
     scale = np.sqrt(np.maximum(np.diag(expected), np.finfo(float).tiny))
     errors = np.maximum(np.sqrt(np.maximum(np.diag(shown), 0.0)), scale)
     whiteness = errors / scale

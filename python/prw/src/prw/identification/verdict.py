@@ -25,14 +25,15 @@ from prw.testbed import OUTPUTS
 #: Probability below which a coherence with the motion is a misfit. It is small, because the steps of encoders are not normally
 #: distributed; 1e-8 occurs in slow motion.
 CHANCE = 1e-10
-#: A fault's estimate in standard errors from which it is significant, and from which intervals are widened by it.
+#: Ratio of the size of a fault to its standard error above which the fault is significant, and above which it widens intervals.
 CLEAR, SMALL = 4.7, 2.5
-#: As CLEAR, for residuals that follow the sign of a rate, as encoders' steps do in a periodic motion.
+#: As CLEAR, for faults that follow the sign of a rate. In a periodic motion, steps of encoders also follow that sign.
 CLEAR_SIGN = 7.0
-#: Largest ratio of a channel's noise in the band to its noise above, and its tolerance in standard errors.
+#: Largest ratio of a channel's noise in the compared band to its noise above the band, and the tolerance of the ratio in
+#: standard errors.
 EXCESS, LUCK = 1.3, 5.0
-#: Frequencies per piece of the local regression, and most pieces.
-PIECE, MOST_PIECES = 16, 6
+#: Frequencies per piece of the local regression, and maximum number of pieces.
+PIECE, MAX_PIECES = 16, 6
 #: Least ratio of the power of a moving signal to the power of encoders' errors in it.
 CLEARLY_MOVING = 30.0
 #: Least share of a direction that is independent of the others.
@@ -41,7 +42,7 @@ NEW = 0.02
 TURNING = 0.02
 
 
-#: Channels that come in pairs, through one amplifier or converter.
+#: Pairs of channels, which often share an amplifier or converter.
 PAIRS = (("tau1", "tau2"), ("theta3", "theta4"), ("pitch", "roll"), ("pitch_rate", "roll_rate"))
 
 
@@ -124,15 +125,15 @@ def judge(solution: Solution) -> Verdict:
         for j, name in enumerate(experiment.channels):
             there = score(_following(experiment, comparison, j))
             chance = there.chance(2 * experiment.bins)
-            texts = []
+            reasons = []
             if chance < CHANCE:
-                texts.append("the unexplained part follows the motors")
+                reasons.append("the unexplained part follows the motors")
             if spread[j] > EXCESS * (1 + LUCK * luck[j]):
-                texts.append(
+                reasons.append(
                     f"the residual is {float(f'{spread[j]:.2g}'):g} times the noise at frequencies at which the motors rest"
                 )
-            if texts:
-                misfits.append(Misfit(experiment.name, name, *_where(experiment, comparison, j), "; ".join(texts)))
+            if reasons:
+                misfits.append(Misfit(experiment.name, name, *_where(experiment, comparison, j), "; ".join(reasons)))
         for name, unit, column in single_faults(solution, experiment, comparison):
             fault = score(column[None]).fault(name, unit)
             # Neither friction nor backlash is ever negative.
@@ -147,9 +148,9 @@ def judge(solution: Solution) -> Verdict:
     if clear and not misfits:
         fault = clear[0]
         e = solution.fitter.experiments[0]
-        text = f"{fault.name} of {fault.size:.3g} +- {fault.error:.1g} {fault.unit}".rstrip()
+        description = f"{fault.name} of {fault.size:.3g} +- {fault.error:.1g} {fault.unit}".rstrip()
         for channel in [name for name in e.channels if name in fault.name.split()] or ["all"]:
-            misfits.append(Misfit(e.name, channel, 0.0, e.band, f"{text} would explain more of the data"))
+            misfits.append(Misfit(e.name, channel, 0.0, e.band, f"{description} would explain more of the data"))
     return Verdict(tuple(misfits), tuple(faults), widening)
 
 
@@ -206,7 +207,7 @@ def _following(experiment: Experiment, comparison: Comparison, j: int) -> Comple
     """Columns (q, f, c), smooth over frequencies, that follow the motors and the channel itself in channel j. They are 0 at
     frequencies with large encoders' errors, because the residual contains the same errors."""
     bins, response = experiment.bins, comparison.response
-    pieces = int(np.clip(bins // PIECE, 1, MOST_PIECES))
+    pieces = int(np.clip(bins // PIECE, 1, MAX_PIECES))
     position = np.linspace(0, pieces - 1 + 1e-9, bins)
     hats = np.maximum(0, 1 - np.abs(position - np.arange(pieces)[:, None]))
     own = response.outputs[:, j] + response.transients[:, j] @ comparison.initial
