@@ -82,7 +82,7 @@ help:
 	@echo 'make reference               write the reference of the Python packages -> target/reference/index.html'
 	@echo 'make examples                install and build what the examples need (see docs/examples.md)'
 	@echo 'make experiments             update the reference experiments in the FMU'
-	@echo 'make validation              compare the FMUs with them in every installed importer -> out/validation.json'
+	@echo 'make validation              compare the FMUs with them in every installed importer -> out/validation.html, .json'
 	@echo 'make closed-loop             run the FMU with a controller FMU in several masters -> out/closed_loop.png'
 	@echo 'make release                 build the files of a release -> dist/: FMUs and Python wheels for Linux, Windows and macOS,'
 	@echo '                             Intel and ARM, reference experiments, checksums, release notes'

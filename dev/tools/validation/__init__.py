@@ -1,6 +1,6 @@
-"""Runs the reference experiments with the testbed for FMI 2.0 and FMI 3.0 under all installed importers, and the closed
-loop under all installed masters. Compares the results with the reference, finds the changes of parameters that the
-tolerances detect, and writes all numbers into validation.json."""
+"""Runs the reference experiments with the testbed for FMI 2.0 and FMI 3.0 under every importer that is installed, and the
+closed loop under every master; compares with the reference, and finds the parameters that the tolerances distinguish.
+Writes validation.html and validation.json."""
 
 from __future__ import annotations
 
@@ -40,21 +40,19 @@ def add_directories(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `tools validation`. Raises UserError with a message of one line, also if a run does not agree."""
+    """Carry out `tools validation`. Raises UserError with a message of one line, also if a run does not
+    agree."""
     # SciPy and FMPy take a while to load.
     from prw.files import write_text
-    from tools.validation.runs import CHANGE, validate
+    from tools.validation.page import page
+    from tools.validation.runs import validate
 
     found = validate(arguments.fmus, arguments.result)
     write_text(arguments.out / "validation.json", found.to_json())
+    write_text(arguments.out / "validation.html", page(found))
     for row in found.rows:
         print(f"{'agrees' if row.agrees else 'TOO FAR':<8} {row.share:6.1%} of the tolerance  {row}")
-    for name, shares in found.sensitivity.items():
-        changes = ", ".join(f"{parameter} {share:.1f}" for parameter, share in shares.items())
-        print(f"{name}: difference in terms of the tolerance if a parameter is {CHANGE:.0%} larger: {changes}")
-    for absent in found.absent:
-        print(f"absent   {absent} is not installed")
-    print(f"wrote    {arguments.out / 'validation.json'}")
+    print(f"wrote    {arguments.out / 'validation.html'}, {arguments.out / 'validation.json'}")
     far = [str(row) for row in found.rows if not row.agrees]
     if far:
         raise UserError(f"too far from the reference: {'; '.join(far)}")

@@ -27,8 +27,8 @@ CHANGED, CHANGE = ("J2", "J3", "H3", "k1", "k2", "c1", "c2", "c3"), 0.01
 
 @dataclass(frozen=True)
 class Row:
-    """One run. version, interface, fmi: empty for the result file of another tool. share: the largest difference in terms of its
-    tolerance. largest: largest difference by quantity (angle, rate, torque), in rad, rad/s and N.m."""
+    """One run. version, interface, fmi: empty if a file does not contain it. share: the largest difference in terms of its tolerance.
+    largest: difference by quantity (angle, rate, torque), in rad, rad/s and N.m."""
 
     importer: str
     version: str
@@ -90,7 +90,7 @@ def validate(fmus: Path, results: Mapping[str, Path] = {}) -> Validation:
                 rows.append(row(importer.name, str(importer.version()), fmi, agreement))
     loop = system.read(fmus / "prw_closed_loop.ssp", fmus / "prw_closed_loop")
     for master in filter(Tool.version, masters.MASTERS):
-        found = testbed_result(masters.run_separately(master, loop))
+        found = of_testbed(masters.run_apart(master, loop))
         agreement = compare(found, find(known, "closed_loop"), master.interface)
         rows.append(row(f"{master.name}, with the controller's FMU", str(master.version()), "2.0", agreement))
     for tool, file in results.items():
@@ -122,8 +122,8 @@ def share(agreement: Agreement) -> float:
     return max(difference.largest / difference.allowed for difference in agreement.variables.values())
 
 
-def testbed_result(values: Mapping[str, Array]) -> Result:
-    """The testbed's outputs in the results of a master."""
+def of_testbed(values: Mapping[str, Array]) -> Result:
+    """The testbed's outputs in a master's results."""
     outputs = {name.removeprefix("testbed."): v for name, v in values.items() if name.startswith("testbed.")}
     return Result(Path("closed loop"), values["time"], outputs)
 
