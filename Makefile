@@ -124,7 +124,7 @@ test: need-rust need-python
 	@$(MAKE) --no-print-directory $(TWO_JOBS) PROGRAMS=target/debug test-crates test-python $(VENV)/importers.stamp \
 	  $(VENV)/examples.stamp test-docs importer-fmus
 	$(PY) dev/platforms/bill_of_materials.py --check
-	$(PYTEST) $(FMU_TESTS) tests/closed_loop tests/importers tests/examples
+	PROGRAMS=target/debug $(PYTEST) $(FMU_TESTS) tests/closed_loop tests/importers tests/examples
 
 # C programs are compiled against the standard's headers, which FMPy brings.
 headers: $(VENV)/test.stamp

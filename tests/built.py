@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import importlib.util
+import os
 import re
 import zlib
 from pathlib import Path
@@ -22,6 +23,13 @@ def built(name: str, target: str = "closed-loop-fmus") -> Path:
     if not path.exists():
         pytest.exit(f"{path} is missing; build it with `make {target}`", returncode=1)
     return path
+
+
+def program(name: str, package: str = "build_fmu") -> list[str]:
+    """Returns the command of a program that builds FMUs. `make test` names the directory of compiled programs in PROGRAMS."""
+    if directory := os.environ.get("PROGRAMS"):
+        return [str(ROOT / directory / name)]
+    return ["cargo", "run", "--quiet", "--locked", "--release", "--package", package, "--bin", name, "--"]
 
 
 def needed(module: str, package: str) -> None:

@@ -12,7 +12,7 @@ import fmpy
 import numpy as np
 import pytest
 import rig
-from built import ROOT
+from built import ROOT, program
 from lxml import etree
 
 DEGREES = dict.fromkeys(("theta1", "theta2", "theta3", "theta4", "pitch", "roll"), ("deg", np.pi / 180))
@@ -99,7 +99,7 @@ def test_other_tools_read_the_parameters(prw, tmp_path, experiment):
         assert float(element[0].get("value")) == entry["value"] and element[0].get("unit") == entry["unit"]
     if not shutil.which("cargo"):
         pytest.skip("no cargo")
-    command = ["cargo", "run", "--quiet", "--locked", "--release", "--bin", "build_fmu", "--", "--describe"]
+    command = [*program("build_fmu"), "--describe"]
     command += ["--parameters", str(out / "identified.json"), "--out", str(tmp_path / "mine")]
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert result.returncode == 0, result.stderr

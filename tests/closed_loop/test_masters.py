@@ -8,7 +8,7 @@ import sys
 import fmu_run
 import numpy as np
 import pytest
-from built import ROOT
+from built import ROOT, program
 
 from tools.validation import coupling, masters, system
 from tools.validation.closed_loop import settling_time
@@ -82,7 +82,7 @@ def python_loop(tmp_path_factory, fmu):
     subprocess.run(
         [sys.executable, "-m", "pythonfmu", "build", "-f", source, "-d", directory], check=True, capture_output=True
     )
-    build = ["cargo", "run", "--quiet", "--release", "-p", "prw_controller", "--bin", "build_closed_loop", "--"]
+    build = program("build_closed_loop", "prw_controller")
     options = ["--testbed", fmu, "--controller", directory / "PythonController.fmu", "--out", directory]
     subprocess.run([*build, *options], check=True, cwd=ROOT, capture_output=True)
     return system.read(directory / "prw_closed_loop.ssp", directory / "prw_closed_loop")

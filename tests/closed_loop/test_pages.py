@@ -13,7 +13,7 @@ from unittest.mock import Mock, call, patch
 
 import fmpy.ssp
 import pytest
-from built import ROOT
+from built import ROOT, program
 from lxml import etree
 
 from tools.documentation.pages import CONTROLLER, TESTBED
@@ -93,7 +93,7 @@ def test_the_script_for_openmodelica_gives_each_fmu_a_directory(closed_loop):
 
 
 SCHEMAS = Path(fmpy.ssp.__file__).parent / "schema"
-BUILD = ["cargo", "run", "--quiet", "--release", "-p", "prw_controller", "--bin", "build_closed_loop", "--"]
+BUILD = program("build_closed_loop", "prw_controller")
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from tools import changed, release_check
 #: Targets that check nothing, that another part contains, or that need a particular machine.
 NO_PARTS = {
     "help", "demo", "demo-fmu", "check", "check-release", "fmu", "closed-loop", "release", "source-fmu", "study", "examples", "clean",
-    "test-python", "test-fmu", "test-closed-loop", "test-importers", "test-examples", "reference",
+    "test-rust", "test-python", "test-fmu", "test-closed-loop", "test-importers", "test-examples", "reference",
 }  # fmt: skip
 
 
