@@ -514,7 +514,7 @@ fn unpacking_has_a_limit() {
 #[test]
 fn no_fault_is_forgotten() {
     let read = |path: &str| {
-        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).expect("a text")
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).expect("a file")
     };
     let source = read("tests/mutants/wagon.c");
     let faults = source.split("IS(").skip(1).filter_map(|rest| rest.split_once(')')).map(|(name, _)| name);
@@ -528,7 +528,7 @@ fn no_fault_is_forgotten() {
     assert_eq!(faults, tested);
     let page = read("../../docs/checking.md").split_whitespace().collect::<Vec<_>>().join(" ");
     let count = format!(
-        "{} faults that are put into its library one at a time, {} more into its description",
+        "{} faults into its library, one at a time, and {} more into its description",
         tested.len() + ["SYMBOL_MISSING", "WITHOUT_NOMINALS"].len(),
         DESCRIPTIONS.len()
     );
