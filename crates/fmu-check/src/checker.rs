@@ -46,7 +46,7 @@ const STEPS: &[&str] = &["SetTime", "DoStep", "CompletedIntegratorStep"];
 
 /// Findings whose criterion compares no calls, so calls are removed separately.
 #[rustfmt::skip]
-const ALONE: [&str; 5] = [
+const REMOVED_SEPARATELY: [&str; 5] = [
     "life_cycle.rejected", "life_cycle.states-changed", "results.early-return", "results.early-unsaid", "start_values.inputs",
 ];
 
@@ -90,7 +90,7 @@ pub struct Checker {
     unchecked: Mutex<Vec<Unchecked>>,
     /// Lock that each call sequence holds for reading. A suspected hang is repeated with the lock held for writing, so that no
     /// other call sequence is executed at the same time.
-    alone: RwLock<()>,
+    exclusive: RwLock<()>,
     /// Functions that did not return in a repetition with three times the limit and no other call sequence.
     hung: Mutex<HashSet<String>>,
     executed: Mutex<u64>,
@@ -147,7 +147,7 @@ impl Checker {
             quick: options.quick,
             found: Mutex::default(),
             unchecked: Mutex::default(),
-            alone: RwLock::default(),
+            exclusive: RwLock::default(),
             hung: Mutex::default(),
             executed: Mutex::default(),
         }
@@ -204,7 +204,7 @@ impl Checker {
             return Err(Stop::TimeOver.into());
         }
         let run = {
-            let _with_others = self.alone.read().unwrap_or_else(PoisonError::into_inner);
+            let _with_others = self.exclusive.read().unwrap_or_else(PoisonError::into_inner);
             self.execute_until(sequence, limit)?
         };
         // The machine may be busy, so a suspected hang is repeated with no other call sequence at the same time and three times
@@ -215,7 +215,7 @@ impl Checker {
         if !matches!(run.end, End::Hang(_)) || locked(&self.hung).contains(&name(&run)) {
             return Ok(run);
         }
-        let _alone = self.alone.write().unwrap_or_else(PoisonError::into_inner);
+        let _exclusive = self.exclusive.write().unwrap_or_else(PoisonError::into_inner);
         let run = self.execute_until(sequence, 3.0 * limit)?;
         if matches!(run.end, End::Hang(_)) {
             locked(&self.hung).insert(name(&run));
@@ -407,9 +407,10 @@ impl Checker {
             _ => 400,
         };
         // If the criterion compares no calls, calls are removed separately.
-        let alone = ALONE.contains(&finding.name.as_str());
+        let removes_separately = REMOVED_SEPARATELY.contains(&finding.name.as_str());
         let ends = ["crash", "hang", "exit"].iter().any(|end| finding.name.ends_with(end));
-        let pinned = PINNED.iter().find(|(topic, _)| *topic == finding.topic() && !ends && !alone);
+        let pinned =
+            PINNED.iter().find(|(topic, _)| *topic == finding.topic() && !ends && !removes_separately);
         let pinned = pinned.map_or(&[][..], |(_, calls)| calls);
         // The observation of a shorter sequence may differ only in its numbers.
         let (same, mut observed) = (outline(&finding.observed), finding.observed.clone());
@@ -421,7 +422,7 @@ impl Checker {
                 true
             })
         };
-        let mut short = shrink(&self.description, &finding.sequence, pinned, !alone, |tried| {
+        let mut short = shrink(&self.description, &finding.sequence, pinned, !removes_separately, |tried| {
             remaining -= 1;
             remaining >= 0 && Instant::now() <= self.deadline && reproduces(tried)
         });

@@ -4,17 +4,17 @@
 //! correction:
 //!
 //! ```text
-//! windup     = rigid - measured          rigid: eq. (1) of the motors' angles as they are
-//! correction = b windup + (1 - b) I - D               b = Kp / (1 + Kp)
-//! I'         = Ki (1 - b) (windup - I)
+//! twist     = rigid - measured          rigid: eq. (1) of the motors' angles as they are
+//! correction = b twist + (1 - b) I - D               b = Kp / (1 + Kp)
+//! I'         = Ki (1 - b) (twist - I)
 //! D          = Kd rate, filtered with the time constant 2 Kd
 //! goal       = inverse of eq. (1) of (reference + correction)
 //! ```
 //!
 //! This is PI control. If the motors are at their goal, rigid = reference + correction. Then, with Kd = 0,
-//! windup - correction is the error e = reference - measured, correction = Kp e + I, and I' = Ki e. In this
+//! twist - correction is the error e = reference - measured, correction = Kp e + I, and I' = Ki e. In this
 //! form, only the twist of the couplings counts as error, not the remaining distance to the goal. The
-//! integral pauses while a motor moves or is limited by its torque (anti-windup), so a move leaves no error
+//! integral pauses while a motor moves or is limited by its torque (anti-twist), so a move leaves no error
 //! to correct afterwards.
 //!
 //! D damps the vibration of the couplings, because of which the wrist lags behind its motors. A stiff wrist
@@ -240,14 +240,14 @@ impl Controller {
         let smoothing = p.sample_time / (2.0 * p.Kd + p.sample_time);
         let bounded = |correction: f64| correction.clamp(-p.max_correction, p.max_correction);
         for (axis, rigid) in rigid.into_iter().enumerate() {
-            let windup = rigid - inputs.angle[axis];
+            let twist = rigid - inputs.angle[axis];
             let integral = &mut self.integral[axis];
             if self.on_goal {
-                *integral = bounded(*integral + gain * (windup - *integral));
+                *integral = bounded(*integral + gain * (twist - *integral));
             }
             let damping = &mut self.damping[axis];
             *damping += smoothing * (bounded(p.Kd * inputs.rate[axis]) - *damping);
-            let correction = share * windup + (1.0 - share) * *integral - *damping;
+            let correction = share * twist + (1.0 - share) * *integral - *damping;
             self.correction[axis] = bounded(correction);
         }
         let goals = kinematics.motors(from_fn(|axis| inputs.reference[axis] + self.correction[axis]));

@@ -134,7 +134,7 @@ def _convergence(found: Results) -> Figure:
     axis = figure.subplots()
     milliseconds = 1e3 * step
     for label, marker, name in (("torque", "s", "tau1"), ("roll rate", "^", "roll_rate"), ("roll", "o", "roll")):
-        axis.loglog(milliseconds, angles[name], f"{marker}-", color=BLUE, markersize=4, label=f"{label}, angles alone")
+        axis.loglog(milliseconds, angles[name], f"{marker}-", color=BLUE, markersize=4, label=f"{label}, angles only")
     # Values below ROUNDING are rounding errors, which differ between machines.
     rounding = np.maximum(np.max(list(broken.values()), axis=0), ROUNDING)
     label = f"all, broken line with its slopes (below {ROUNDING:g})"

@@ -286,7 +286,7 @@ fn after_end(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
 /// Checks that an attack is rejected and that the simulation continues as without it.
 fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let (_, alone_at_once, alone) = write_simulation(&mut writer, 0, None);
+    let (_, single_at_once, single) = write_simulation(&mut writer, 0, None);
     let (Some(id), at_once, later) = write_simulation(&mut writer, 1, Some(&attack)) else { return Ok(()) };
     let (function, _, what, accepted) = attack;
     let call = format!("{function} with {what} returns");
@@ -300,8 +300,8 @@ fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyho
             return None;
         }
         let ends = rejects(&later.reads) || !later.ids.iter().all(|id| run.succeeds(*id));
-        let at_once = difference(&description, run, &alone_at_once, &at_once);
-        let later = || difference(&description, run, &alone.reads, &later.reads).filter(|_| !ends);
+        let at_once = difference(&description, run, &single_at_once, &at_once);
+        let later = || difference(&description, run, &single.reads, &later.reads).filter(|_| !ends);
         let [variable, was, is] = at_once.or_else(later)?;
         Some(format!("{named} {}, and {variable} is {is} after it instead of {was}", status_name(status)))
     });

@@ -41,7 +41,7 @@ pub fn name(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
 /// Checks that two instances that are called in turns have the results of a single instance.
 pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let alone = writer.write(0, WHOLE).reads;
+    let single = writer.write(0, WHOLE).reads;
     writer.free(0);
     let (mut one, mut other) = (writer.write(1, &[Begin, ReadAll]).reads, Vec::new());
     // The second instance is two points behind, so that the states of both differ.
@@ -64,8 +64,8 @@ pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<(
         }
     }
     let criteria = [
-        checker.differ(&alone, &one, "{} is {}, next to another instance {}"),
-        checker.differ(&alone, &other, "{} is {}, of a second instance next to the first {}"),
+        checker.differ(&single, &one, "{} is {}, next to another instance {}"),
+        checker.differ(&single, &other, "{} is {}, of a second instance next to the first {}"),
     ];
     checker.check("results.instances", writer.sequence, any(criteria))
 }
@@ -122,13 +122,13 @@ fn first(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let outputs = outputs.filter(|index| variables[*index].causality == "output").take(checker.most(16));
     let mut writer = checker.writer(trajectory);
     let together = writer.write(0, &[Begin, Points(3), Part::Read, Part::Free]).reads;
-    let mut alone = Vec::new();
+    let mut single = Vec::new();
     for output in outputs {
         writer.write(0, &[Begin, Points(3)]);
-        alone.push((output, writer.read_these(0, &[output])));
+        single.push((output, writer.read_these(0, &[output])));
         writer.free(0);
     }
-    let criterion = unlike(checker, alone, together, |name, one, other| {
+    let criterion = unlike(checker, single, together, |name, one, other| {
         format!("{name} is {one} read first and {other} read after others")
     });
     checker.check("results.reading", writer.sequence, criterion)
@@ -167,7 +167,7 @@ fn repeated(checker: &Checker, trajectory: &Trajectory, all: &[usize]) -> anyhow
 /// Checks that simulations on four threads have the results of a single simulation.
 pub fn threads(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let alone = writer.write(0, WHOLE).reads;
+    let single = writer.write(0, WHOLE).reads;
     writer.free(0);
     let mut sequences: Vec<Vec<Numbered>> = Vec::new();
     let mut criteria = Vec::new();
@@ -176,7 +176,11 @@ pub fn threads(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
         // Twenty simulations for each thread, so that simulations overlap.
         for _ in 0..20 {
             let reads = thread.write(number, WHOLE).reads;
-            criteria.push(checker.differ(&alone, &reads, "{} is {}, on a thread next to others {}"));
+            criteria.push(checker.differ(
+                &single,
+                &reads,
+                "{} is {}, on a thread in parallel with others {}",
+            ));
             thread.free(number);
         }
         writer.next = thread.next;

@@ -156,7 +156,7 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let near: Vec<(usize, Values)> = floats.iter().filter_map(with_other).collect();
     // Floating-point variables get values near their start values, all in one group. A model may reject new values of
     // integers, Booleans and strings, so these variables are set one at a time.
-    let alone = others.iter().take(checker.most(40)).flat_map(|index| {
+    let separate = others.iter().take(checker.most(40)).flat_map(|index| {
         // 500 bytes, longer than usual buffers.
         let long = Values::texts(&b"long ".repeat(100), variable(index).start.len());
         let long = (variable(index).base == Some(BaseType::String)).then_some((*index, long));
@@ -165,7 +165,7 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     if !near.is_empty() {
         when(checker, trajectory, &near)?;
     }
-    for values in std::iter::once(near.clone()).filter(|near| !near.is_empty()).chain(alone) {
+    for values in std::iter::once(near.clone()).filter(|near| !near.is_empty()).chain(separate) {
         for (before, after) in [(&[Make, Enter][..], &[][..]), (&[Make][..], &[Enter][..])] {
             read_back(checker, trajectory, before, values.clone(), after)?;
         }
