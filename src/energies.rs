@@ -1,7 +1,6 @@
 //! Energies and power of the testbed, eqs. (1) and (3) to (7), from which the paper derives the model.
 //!
-//! The stepping does not use this module. Tests use it to check the energy balance: the energy that the
-//! motors supply is stored or dissipated.
+//! The stepping does not use this module. Tests derive the matrices of eq. (8) from these functions.
 
 use crate::parameters::Parameters;
 

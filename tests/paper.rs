@@ -3,7 +3,7 @@
 
 use nalgebra::{Complex, Matrix2, Matrix4, Matrix6, Vector4};
 use prw_testbed::Parameters;
-use prw_testbed::energies::{Angles, kinetic_energy, potential_energy, sect};
+use prw_testbed::energies::{Angles, dissipation, kinetic_energy, potential_energy, sect};
 use prw_testbed::state_space::{
     angle_transfer_matrix, damping_matrix, force, mass_matrix, state_space, stiffness_matrix, transfer_matrix,
 };
@@ -79,17 +79,23 @@ fn erratum_theta7_is_pitch_and_theta8_is_roll() {
     assert!((kinetic_energy(&TABLE_1, &rates) - (TABLE_1.J2 + 0.5 * TABLE_1.H3)).abs() < 1e-15);
 }
 
-/// Returns the Hessian of a quadratic form of theta3..theta6.
-fn hessian(form: impl Fn(&Angles) -> f64) -> Matrix4<f64> {
+/// Returns the Hessian of a quadratic form of theta1..theta6.
+fn hessian(form: impl Fn(&Angles) -> f64) -> Matrix6<f64> {
     let at = |i: usize, j: usize, si: f64, sj: f64| {
-        let mut q = [0.0; 4];
+        let mut q = [0.0; 6];
         q[i] += si;
         q[j] += sj;
-        form(&Angles { theta3: q[0], theta4: q[1], theta5: q[2], theta6: q[3], ..Angles::default() })
+        let [theta1, theta2, theta3, theta4, theta5, theta6] = q;
+        form(&Angles { theta1, theta2, theta3, theta4, theta5, theta6 })
     };
-    Matrix4::from_fn(|i, j| {
+    Matrix6::from_fn(|i, j| {
         0.25 * (at(i, j, 1., 1.) - at(i, j, 1., -1.) - at(i, j, -1., 1.) + at(i, j, -1., -1.))
     })
+}
+
+/// Returns the part of the Hessian for theta3..theta6, whose motion eq. (8) describes.
+fn free(hessian: &Matrix6<f64>) -> Matrix4<f64> {
+    hessian.fixed_view::<4, 4>(2, 2).into_owned()
 }
 
 #[test]
@@ -99,16 +105,28 @@ fn erratum_last_term_of_eq_6_has_k2() {
         potential_energy(&TABLE_1, q) - last(TABLE_1.k2) + last(TABLE_1.k1)
     };
     let k = stiffness_matrix(&TABLE_1);
-    assert!((hessian(|q| potential_energy(&TABLE_1, q)) - k).norm() < 1e-12 * k.norm());
-    assert!((hessian(printed) - k).norm() > 0.1 * k.norm());
+    assert!((free(&hessian(printed)) - k).norm() > 0.1 * k.norm());
 }
 
+/// Checks M, Delta, K and f of eq. (8). By Lagrange's equation (2), the motors act on the testbed with the
+/// negative mixed derivatives of the potential energy and of the dissipation.
 #[test]
-fn mass_and_damping_matrix_follow_from_the_energies() {
-    use prw_testbed::energies::dissipation;
-    let (m, d) = (mass_matrix(&TABLE_1), damping_matrix(&TABLE_1));
-    assert!((hessian(|rates| kinetic_energy(&TABLE_1, rates)) - m).norm() < 1e-14 * m.norm());
-    assert!((hessian(|rates| dissipation(&TABLE_1, rates)) - d).norm() < 1e-14 * d.norm());
+fn matrices_of_eq_8_follow_from_the_energies() {
+    let p = &TABLE_1;
+    let kinetic = hessian(|rates| kinetic_energy(p, rates));
+    let (damping, stiffness) = (hessian(|rates| dissipation(p, rates)), hessian(|q| potential_energy(p, q)));
+    for (found, expected) in
+        [(&kinetic, mass_matrix(p)), (&damping, damping_matrix(p)), (&stiffness, stiffness_matrix(p))]
+    {
+        assert!((free(found) - expected).norm() < 1e-12 * expected.norm());
+    }
+    for (motor, unit) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
+        for (hessian, found) in [(&stiffness, force(p, unit, [0.0; 2])), (&damping, force(p, [0.0; 2], unit))]
+        {
+            let expected = -hessian.fixed_view::<4, 1>(2, motor);
+            assert!((found - expected).norm() < 1e-12 * expected.norm());
+        }
+    }
 }
 
 #[test]

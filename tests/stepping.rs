@@ -1,10 +1,8 @@
-//! Comparison of the exact step with independent derivations: eq. (11) instead of the decoupled equations,
-//! nalgebra's matrix exponential instead of the propagator, and the conservation of energy.
+//! Comparison of the exact step with independent derivations: eq. (11) instead of the decoupled equations, and
+//! nalgebra's matrix exponential instead of the propagator.
 
 use nalgebra::SMatrix;
 use proptest::prelude::*;
-use prw_testbed::energies::{Angles, dissipation, kinetic_energy, potential_energy};
-use prw_testbed::motor::Motion;
 use prw_testbed::pair::PitchRoll;
 use prw_testbed::propagator::{Propagator, StepMatrices};
 use prw_testbed::state_space::state_space;
@@ -181,18 +179,6 @@ fn opposite_motors_leave_pitch_at_zero_and_equal_motors_roll() {
     }
 }
 
-#[test]
-fn a_testbed_at_rest_stays_at_rest() {
-    let mut testbed = Testbed::new(Parameters::BUILT_IN).unwrap();
-    let start = [0.7, -0.4, 0.7, -0.4, 0.0, 0.0];
-    testbed.state = start;
-    (testbed.motors.inputs[0].theta, testbed.motors.inputs[1].theta) = (0.7, -0.4);
-    for i in 0..1000 {
-        assert!(testbed.step(1e-3 * f64::from(1 + i % 7)));
-    }
-    assert_eq!(testbed.state, start);
-}
-
 /// Checks that stored step matrices are used only for their parameters and their step size.
 #[test]
 fn the_past_does_not_matter() {
@@ -271,74 +257,4 @@ fn what_is_left_of_a_velocity_has_all_digits() {
         let left = testbed.state[4] / (-fading).exp();
         assert!((left - 1.0).abs() < 1e-14 * (1.0 + fading), "{fading}: {left}");
     }
-}
-
-#[test]
-fn angle_jumps_pass_through_the_dampers() {
-    // omega = 0 makes a zero-order hold; the impulse of the jump is B2 d.
-    let mut testbed = Testbed::new(Parameters::BUILT_IN).unwrap();
-    testbed.motors.use_omega = true;
-    assert!(testbed.step(1e-3));
-    testbed.motors.inputs[0].theta = 0.1;
-    assert!(testbed.step(1e-12));
-    let b = state_space(&Parameters::BUILT_IN).B;
-    for (state, row) in testbed.state.iter().zip(0..) {
-        assert!((state - 0.1 * b[(row, 2)]).abs() < 1e-9, "{state} {}", 0.1 * b[(row, 2)]);
-    }
-}
-
-/// Nodes and weights of Gauss's quadrature of order 10 on 0..1.
-const GAUSS: [(f64, f64); 5] = [
-    (0.046910077030668, 0.118463442528095),
-    (0.230765344947158, 0.239314335249683),
-    (0.5, 0.284444444444444),
-    (0.769234655052842, 0.239314335249683),
-    (0.953089922969332, 0.118463442528095),
-];
-
-#[test]
-fn the_motors_work_is_stored_or_dissipated() {
-    let p = Parameters::BUILT_IN;
-    let mut testbed = Testbed::new(p).unwrap();
-    testbed.state = [0.1, -0.2, 0.15, 0.05, 1.0, -2.0];
-    let now = |testbed: &Testbed, theta: [f64; 2], omega: [f64; 2]| {
-        let [theta3, theta4, theta5, theta6, omega5, omega6] = testbed.state;
-        let side = testbed.system().side;
-        let motor = |i: usize| Motion { angle: theta[i], rate: omega[i], acceleration: 0.0 };
-        let angles = Angles { theta1: theta[0], theta2: theta[1], theta3, theta4, theta5, theta6 };
-        let rates = Angles {
-            theta1: omega[0],
-            theta2: omega[1],
-            theta3: side.shaft_rate(theta3, theta5, omega5, motor(0)),
-            theta4: side.shaft_rate(theta4, theta6, omega6, motor(1)),
-            theta5: omega5,
-            theta6: omega6,
-        };
-        // Eq. (9) as printed. The sensor torques act on the motors, so the motors supply the power -tau
-        // omega.
-        let tau1 = p.k1 * (theta3 - theta[0]) + p.c1 * (rates.theta3 - omega[0]);
-        let tau2 = p.k1 * (theta4 - theta[1]) + p.c1 * (rates.theta4 - omega[1]);
-        let energy = kinetic_energy(&p, &rates) + potential_energy(&p, &angles);
-        (energy, -(tau1 * omega[0] + tau2 * omega[1]), 2.0 * dissipation(&p, &rates))
-    };
-    let (mut theta, panel) = ([0.0, 0.0], 2e-3);
-    let mut work = 0.0;
-    let mut loss = 0.0;
-    let start = now(&testbed, theta, [0.0, 0.0]).0;
-    for i in 0..400 {
-        let omega = [(f64::from(i) * 0.03).sin() * 4.0, (f64::from(i) * 0.05).cos() * 3.0];
-        let mut at = 0.0;
-        for (node, weight) in GAUSS.into_iter().chain([(1.0, 0.0)]) {
-            sample(&mut testbed, [theta[0] + omega[0] * at, theta[1] + omega[1] * at], omega);
-            assert!(testbed.step((node - at / panel) * panel));
-            at = node * panel;
-            let (_, power, lost) = now(&testbed, [theta[0] + omega[0] * at, theta[1] + omega[1] * at], omega);
-            work += power * weight * panel;
-            loss += lost * weight * panel;
-        }
-        theta = [theta[0] + omega[0] * panel, theta[1] + omega[1] * panel];
-    }
-    let end = now(&testbed, theta, [0.0, 0.0]).0;
-    assert!(work.abs() > 1.0 && loss > 1.0, "the test must move something: {work} {loss}");
-    assert!((start + work - end - loss).abs() < 1e-9, "{} J missing", start + work - end - loss);
 }

@@ -188,7 +188,7 @@ fn output_derivatives_are_exact() {
             let given = [random.between(-2.0, 2.0), random.between(-2.0, 2.0)];
             fmu.set(&OMEGA, &given);
             if rates == Rates::Derivatives {
-                fmu.set_rates(THETA, given);
+                fmu.give_rates(&THETA, &given);
             }
             if rates == Rates::Samples && step == 2 {
                 // A change of the slope, so that later samples lie on a curve.

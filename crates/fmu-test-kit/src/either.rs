@@ -1,7 +1,12 @@
 //! Operations on an instance of either FMI version, and assertions for tests.
 
-use crate::{Arguments, Hook, Message};
+use crate::fmi3::{self, Stepped};
+use crate::importer::{Log, lock};
+use crate::{Arguments, Hook, Importer, Message};
+use fmi_abi::calls;
+use fmi_abi::fmi2::types::fmi2EventInfo;
 use fmu_export::Mode::{self, *};
+use fmu_export::fmi3::reference;
 use fmu_export::{Exported, Interface, Standard, Status};
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::ptr::{null, null_mut};
@@ -24,123 +29,80 @@ pub(crate) fn truth(flag: i32) -> bool {
     flag == 1
 }
 
-/// Declares the methods whose functions differ only in names and in types, or implements them for an FMI version.
+/// Importer of either FMI version.
+#[derive(Debug)]
+pub enum Version<'a> {
+    /// Importer of FMI 2.0.
+    Fmi2(&'a Importer),
+    /// Importer of FMI 3.0.
+    Fmi3(&'a fmi3::Importer),
+}
+
+/// Defines the methods whose functions differ only in names, and the methods for one value.
 macro_rules! methods {
-    ($version:ident) => {
-        $crate::either::methods! { @$version
-            calls {
-                exit_initialization_mode fmi2ExitInitializationMode fmi3ExitInitializationMode ();
-                terminate fmi2Terminate fmi3Terminate ();
-                reset fmi2Reset fmi3Reset ();
-                get_state fmi2GetFMUstate fmi3GetFMUState (state: *mut *mut c_void);
-                set_state fmi2SetFMUstate fmi3SetFMUState (state: *mut c_void);
-                free_state fmi2FreeFMUstate fmi3FreeFMUState (state: *mut *mut c_void);
-                state_size fmi2SerializedFMUstateSize fmi3SerializedFMUStateSize (state: *mut c_void, size: *mut usize);
-                enter_event_mode fmi2EnterEventMode fmi3EnterEventMode ();
-                enter_continuous_time_mode fmi2EnterContinuousTimeMode fmi3EnterContinuousTimeMode ();
-                set_time fmi2SetTime fmi3SetTime (time: f64);
-                set_states fmi2SetContinuousStates fmi3SetContinuousStates (x: *const f64, count: usize);
-                get_states fmi2GetContinuousStates fmi3GetContinuousStates (x: *mut f64, count: usize);
-                get_derivatives fmi2GetDerivatives fmi3GetContinuousStateDerivatives (rates: *mut f64, count: usize);
-                get_nominals fmi2GetNominalsOfContinuousStates fmi3GetNominalsOfContinuousStates
-                    (nominals: *mut f64, count: usize);
-                get_indicators fmi2GetEventIndicators fmi3GetEventIndicators (indicators: *mut f64, count: usize);
-            }
-            values {
-                set_integer fmi2SetInteger fmi3SetInt32, get_integer fmi2GetInteger fmi3GetInt32: i32;
-                set_boolean fmi2SetBoolean fmi3SetBoolean, get_boolean fmi2GetBoolean fmi3GetBoolean: u8;
-                set_text fmi2SetString fmi3SetString, get_text fmi2GetString fmi3GetString: *const c_char;
-                set_item fmi2SetInteger fmi3SetInt64, get_item fmi2GetInteger fmi3GetInt64: i32;
-            }
-        }
-    };
     (
-        @declare
         calls { $($name:ident $fmi2:ident $fmi3:ident ($($argument:ident: $type:ty),*);)+ }
         values { $($set:ident $set2:ident $set3:ident, $get:ident $get2:ident $get3:ident: $value:ty;)+ }
     ) => {
         $(
             #[doc = concat!("Calls `", stringify!($fmi2), "` or `", stringify!($fmi3), "`.")]
-            fn $name(&self $(, $argument: $type)*) -> Status;
+            fn $name(&self $(, $argument: $type)*) -> Status {
+                match self.version() {
+                    Version::Fmi2(fmu) => fmu.$fmi2($($argument),*),
+                    Version::Fmi3(fmu) => fmu.$fmi3($($argument),*),
+                }
+            }
         )+
         $(
             #[doc = concat!("Calls `", stringify!($set2), "` or `", stringify!($set3), "` for one variable.")]
-            fn $set(&self, index: u32, value: $value) -> Status;
+            #[allow(clippy::useless_conversion, reason = "some types are equal")]
+            fn $set(&self, index: u32, value: $value) -> Status {
+                match self.version() {
+                    Version::Fmi2(fmu) => fmu.$set2(&index, 1, &value.into()),
+                    Version::Fmi3(fmu) => fmu.$set3(&reference(index), 1, &value.into(), 1),
+                }
+            }
+
             #[doc = concat!("Calls `", stringify!($get2), "` or `", stringify!($get3), "` for one variable.")]
-            fn $get(&self, index: u32, value: &mut $value) -> Status;
+            #[allow(clippy::useless_conversion, reason = "some types are equal")]
+            fn $get(&self, index: u32, value: &mut $value) -> Status {
+                match self.version() {
+                    Version::Fmi2(fmu) => {
+                        let mut found = (*value).into();
+                        let status = fmu.$get2(&index, 1, &mut found);
+                        *value = found.try_into().expect("a small number");
+                        status
+                    }
+                    Version::Fmi3(fmu) => {
+                        let mut found = (*value).into();
+                        let status = fmu.$get3(&reference(index), 1, &mut found, 1);
+                        *value = found.try_into().expect("a small number");
+                        status
+                    }
+                }
+            }
         )+
     };
-    (
-        @fmi2
-        calls { $($name:ident $fmi2:ident $fmi3:ident ($($argument:ident: $type:ty),*);)+ }
-        values { $($set:ident $set2:ident $set3:ident, $get:ident $get2:ident $get3:ident: $value:ty;)+ }
-    ) => {
-        $crate::either::methods! { @implement
-            $($name $fmi2 ($($argument: $type),*);)+ | $($set $set2, $get $get2: $value;)+ | []
-        }
-    };
-    (
-        @fmi3
-        calls { $($name:ident $fmi2:ident $fmi3:ident ($($argument:ident: $type:ty),*);)+ }
-        values { $($set:ident $set2:ident $set3:ident, $get:ident $get2:ident $get3:ident: $value:ty;)+ }
-    ) => {
-        $crate::either::methods! { @implement
-            $($name $fmi3 ($($argument: $type),*);)+ | $($set $set3, $get $get3: $value;)+ | [1]
-        }
-    };
-    (
-        @implement
-        $($name:ident $call:ident ($($argument:ident: $type:ty),*);)+ |
-        $($set:ident $setter:ident, $get:ident $getter:ident: $value:ty;)+ | $count:tt
-    ) => {
-        $(fn $name(&self $(, $argument: $type)*) -> Status { self.$call($($argument),*) })+
-        $($crate::either::methods! { @value $set $setter, $get $getter: $value, $count })+
-
-        fn functions() -> &'static [&'static str] {
-            FUNCTIONS
-        }
-
-        fn make<M: Exported>(arguments: &Arguments) -> Result<Self, Vec<Message>> {
-            Self::instantiate(functions_of::<M>(), arguments)
-        }
-
-        fn nothing<M: Exported>() -> Self {
-            Self { functions: functions_of::<M>(), instance: null_mut(), log: Default::default() }
-        }
-
-        unsafe fn call(&self, name: &str, words: &[u64]) -> Status {
-            // SAFETY: the address belongs to the function of this name; the caller guarantees the arguments.
-            Status::from_c(unsafe { calls::call(self.address_of(name), name, self.instance.cast(), words) })
-        }
-
-        fn take_log(&self) -> Vec<Message> {
-            self.log.take()
-        }
-
-        fn on_message(&self, hook: Hook) {
-            *lock(&self.log.hook) = Some(hook);
-        }
-    };
-    (@value $set:ident $setter:ident, $get:ident $getter:ident: $value:ty, [$($count:literal)?]) => {
-        #[allow(clippy::useless_conversion, reason = "some types are equal")]
-        fn $set(&self, index: u32, value: $value) -> Status {
-            self.$setter(&Self::standard().reference(index), 1, &value.into() $(, $count)?)
-        }
-
-        #[allow(clippy::useless_conversion, reason = "some types are equal")]
-        fn $get(&self, index: u32, value: &mut $value) -> Status {
-            let mut found = (*value).into();
-            let status = self.$getter(&Self::standard().reference(index), 1, &mut found $(, $count)?);
-            *value = found.try_into().expect("a small number");
-            status
-        }
-    };
 }
-pub(crate) use methods;
+
+/// Returns the value references of up to 16 variables in FMI 3.0. Allocates nothing, because tests of control
+/// loops count allocations.
+fn references(indices: &[u32]) -> [u32; 16] {
+    let mut references = [0; 16];
+    references[..indices.len()].copy_from_slice(indices);
+    references.map(reference)
+}
+
+fn log_of<'a>(version: &Version<'a>) -> &'a Log {
+    match version {
+        Version::Fmi2(fmu) => fmu.log(),
+        Version::Fmi3(fmu) => fmu.log(),
+    }
+}
 
 /// An instance of FMI 2.0 or FMI 3.0, as an importer uses it. Variables are given by their indices in the
 /// table.
-#[allow(clippy::missing_panics_doc, reason = "that is what the asserting ones are for")]
+#[allow(clippy::missing_panics_doc, reason = "the functions that assert panic on purpose")]
 pub trait Either: Send {
     /// Returns the FMI version.
     fn standard() -> Standard
@@ -152,12 +114,10 @@ pub trait Either: Send {
     where
         Self: Sized;
 
-    methods!(declare);
-
-    /// Makes an instance of a model in this program.
+    /// Instantiates a model in this program.
     ///
     /// # Errors
-    /// Returns the log messages if there is no instance.
+    /// Returns the log messages if instantiation fails.
     fn make<M: Exported>(arguments: &Arguments) -> Result<Self, Vec<Message>>
     where
         Self: Sized;
@@ -167,10 +127,56 @@ pub trait Either: Send {
     where
         Self: Sized;
 
+    /// Returns the importer, for the functions of its FMI version.
+    fn version(&self) -> Version<'_>;
+
+    methods! {
+        calls {
+            exit_initialization_mode fmi2ExitInitializationMode fmi3ExitInitializationMode ();
+            terminate fmi2Terminate fmi3Terminate ();
+            reset fmi2Reset fmi3Reset ();
+            get_state fmi2GetFMUstate fmi3GetFMUState (state: *mut *mut c_void);
+            set_state fmi2SetFMUstate fmi3SetFMUState (state: *mut c_void);
+            free_state fmi2FreeFMUstate fmi3FreeFMUState (state: *mut *mut c_void);
+            state_size fmi2SerializedFMUstateSize fmi3SerializedFMUStateSize (state: *mut c_void, size: *mut usize);
+            enter_event_mode fmi2EnterEventMode fmi3EnterEventMode ();
+            enter_continuous_time_mode fmi2EnterContinuousTimeMode fmi3EnterContinuousTimeMode ();
+            set_time fmi2SetTime fmi3SetTime (time: f64);
+            set_states fmi2SetContinuousStates fmi3SetContinuousStates (x: *const f64, count: usize);
+            get_states fmi2GetContinuousStates fmi3GetContinuousStates (x: *mut f64, count: usize);
+            get_derivatives fmi2GetDerivatives fmi3GetContinuousStateDerivatives (rates: *mut f64, count: usize);
+            get_nominals fmi2GetNominalsOfContinuousStates fmi3GetNominalsOfContinuousStates
+                (nominals: *mut f64, count: usize);
+            get_indicators fmi2GetEventIndicators fmi3GetEventIndicators (indicators: *mut f64, count: usize);
+        }
+        values {
+            set_integer fmi2SetInteger fmi3SetInt32, get_integer fmi2GetInteger fmi3GetInt32: i32;
+            set_boolean fmi2SetBoolean fmi3SetBoolean, get_boolean fmi2GetBoolean fmi3GetBoolean: u8;
+            set_text fmi2SetString fmi3SetString, get_text fmi2GetString fmi3GetString: *const c_char;
+            set_item fmi2SetInteger fmi3SetInt64, get_item fmi2GetInteger fmi3GetInt64: i32;
+        }
+    }
+
     /// Returns the modes of an interface type, except fatal, which needs a model that panics.
     fn modes_of(interface: Interface) -> &'static [Mode]
     where
-        Self: Sized;
+        Self: Sized,
+    {
+        match (Self::standard(), interface) {
+            (Standard::Fmi2, Interface::CoSimulation) => {
+                &[Instantiated, Initialization, StepComplete, StepFailed, Terminated, Error]
+            }
+            (Standard::Fmi2, Interface::ModelExchange) => {
+                &[Instantiated, Initialization, Event, ContinuousTime, Terminated, Error]
+            }
+            (Standard::Fmi3, Interface::CoSimulation) => {
+                &[Instantiated, Initialization, Event, StepComplete, Terminated]
+            }
+            (Standard::Fmi3, Interface::ModelExchange) => {
+                &[Instantiated, Initialization, Event, ContinuousTime, Terminated]
+            }
+        }
+    }
 
     /// Calls the function of this name with arguments as words; missing ones are 0 or NULL.
     ///
@@ -178,67 +184,230 @@ pub trait Either: Send {
     /// The words are valid arguments of the function, as in C.
     ///
     /// # Panics
-    /// Panics if there is no such function.
-    unsafe fn call(&self, name: &str, words: &[u64]) -> Status;
+    /// Panics if the FMI version has no function of this name.
+    unsafe fn call(&self, name: &str, words: &[u64]) -> Status {
+        let (address, instance) = match self.version() {
+            Version::Fmi2(fmu) => (fmu.address_of(name), fmu.instance()),
+            Version::Fmi3(fmu) => (fmu.address_of(name), fmu.instance()),
+        };
+        // SAFETY: the address belongs to the function of this name; the caller guarantees the arguments.
+        Status::from_c(unsafe { calls::call(address, name, instance, words) })
+    }
 
     /// Calls the function of this name with all arguments 0 or NULL.
     ///
     /// # Panics
-    /// Panics if there is no such function.
+    /// Panics if the FMI version has no function of this name.
     fn call_with_zeros(&self, name: &str) -> Status {
         // SAFETY: NULL pointers are never dereferenced.
         unsafe { self.call(name, &[]) }
     }
 
     /// Returns the messages since the last call of this function.
-    fn take_log(&self) -> Vec<Message>;
+    fn take_log(&self) -> Vec<Message> {
+        log_of(&self.version()).take()
+    }
 
     /// Runs this code in the log callback, for every message.
-    fn on_message(&self, hook: Hook);
+    fn on_message(&self, hook: Hook) {
+        *lock(&log_of(&self.version()).hook) = Some(hook);
+    }
 
     /// Enters Initialization Mode.
-    fn enter_initialization_mode(&self, start_time: f64, stop_time: Option<f64>) -> Status;
+    fn enter_initialization_mode(&self, start_time: f64, stop_time: Option<f64>) -> Status {
+        let (defined, stop_time) = (stop_time.is_some(), stop_time.unwrap_or(f64::NAN));
+        match self.version() {
+            Version::Fmi2(fmu) => {
+                match fmu.fmi2SetupExperiment(0, f64::NAN, start_time, defined.into(), stop_time) {
+                    Status::Ok => fmu.fmi2EnterInitializationMode(),
+                    rejected => rejected,
+                }
+            }
+            Version::Fmi3(fmu) => {
+                fmu.fmi3EnterInitializationMode(0, f64::NAN, start_time, defined.into(), stop_time)
+            }
+        }
+    }
 
-    /// Reads Reals.
-    fn try_get(&self, indices: &[u32], values: &mut [f64]) -> Status;
+    /// Reads Reals. Allocates nothing for up to 16 variables.
+    fn try_get(&self, indices: &[u32], values: &mut [f64]) -> Status {
+        let (count, value) = (indices.len(), values.as_mut_ptr());
+        assert_eq!(count, values.len());
+        match self.version() {
+            Version::Fmi2(fmu) => fmu.fmi2GetReal(indices.as_ptr(), count, value),
+            Version::Fmi3(fmu) if count <= 16 => {
+                fmu.fmi3GetFloat64(references(indices).as_ptr(), count, value, count)
+            }
+            Version::Fmi3(fmu) => {
+                let vr: Vec<_> = indices.iter().map(|index| reference(*index)).collect();
+                fmu.fmi3GetFloat64(vr.as_ptr(), count, value, count)
+            }
+        }
+    }
 
     /// Sets up to 16 Reals.
-    fn try_set(&self, indices: &[u32], values: &[f64]) -> Status;
+    fn try_set(&self, indices: &[u32], values: &[f64]) -> Status {
+        let (count, value) = (indices.len(), values.as_ptr());
+        assert_eq!(count, values.len());
+        match self.version() {
+            Version::Fmi2(fmu) => fmu.fmi2SetReal(indices.as_ptr(), count, value),
+            Version::Fmi3(fmu) => fmu.fmi3SetFloat64(references(indices).as_ptr(), count, value, count),
+        }
+    }
 
     /// Performs a step.
-    fn try_step(&self, point: f64, step_size: f64) -> Status;
+    fn try_step(&self, point: f64, step_size: f64) -> Status {
+        match self.version() {
+            Version::Fmi2(fmu) => fmu.fmi2DoStep(point, step_size, 1),
+            Version::Fmi3(fmu) => fmu.do_step(point, step_size).err().unwrap_or(Status::Ok),
+        }
+    }
 
     /// Performs a step to its end, which must equal the time of the FMU exactly. Allocates nothing.
-    fn step(&self, point: f64, step_size: f64);
+    #[track_caller]
+    fn step(&self, point: f64, step_size: f64) {
+        const LAST_SUCCESSFUL_TIME: i32 = 2;
+        let last_successful_time = point + step_size;
+        match self.version() {
+            Version::Fmi2(fmu) => {
+                self.ok(self.try_step(point, step_size));
+                let mut time = f64::NAN;
+                self.ok(fmu.fmi2GetRealStatus(LAST_SUCCESSFUL_TIME, &mut time));
+                assert_eq!(time, last_successful_time);
+            }
+            Version::Fmi3(fmu) => {
+                let [event_handling_needed, terminate, early_return] = [false; 3];
+                let complete =
+                    Stepped { event_handling_needed, terminate, early_return, last_successful_time };
+                assert_eq!(fmu.do_step(point, step_size), Ok(complete), "log: {:#?}", self.take_log());
+            }
+        }
+    }
 
     /// Sets the time derivatives of up to 8 inputs; FMI 3.0 has no function for it.
-    fn give_rates(&self, _indices: &[u32], _values: &[f64]) {}
+    #[track_caller]
+    fn give_rates(&self, indices: &[u32], values: &[f64]) {
+        let (orders, count) = ([1; 8], indices.len());
+        assert!(count == values.len() && count <= orders.len());
+        if let Version::Fmi2(fmu) = self.version() {
+            let (vr, orders) = (indices.as_ptr(), orders.as_ptr());
+            self.ok(fmu.fmi2SetRealInputDerivatives(vr, count, orders, values.as_ptr()));
+        }
+    }
 
     /// Reads the time derivative of a variable.
-    fn try_rate(&self, index: u32, order: i32, rate: &mut f64) -> Status;
+    fn try_rate(&self, index: u32, order: i32, rate: &mut f64) -> Status {
+        match self.version() {
+            Version::Fmi2(fmu) => fmu.fmi2GetRealOutputDerivatives(&index, 1, &order, rate),
+            Version::Fmi3(fmu) => fmu.fmi3GetOutputDerivatives(&reference(index), 1, &order, rate, 1),
+        }
+    }
 
-    /// Reads the directional derivatives of up to 16 unknowns with respect to up to 16 knowns. FMI 3.0 reads
-    /// adjoint derivatives, too, and compares them.
-    fn try_directional(&self, unknowns: &[u32], knowns: &[u32], seed: &[f64], results: &mut [f64]) -> Status;
+    /// Reads the directional derivatives of up to 16 unknowns with respect to up to 16 knowns.
+    ///
+    /// FMI 3.0 also reads the adjoint derivatives of each unknown. By definition, their scalar product with the
+    /// seed is the directional derivative; for one known, both are bit-identical.
+    fn try_directional(&self, unknowns: &[u32], knowns: &[u32], seed: &[f64], results: &mut [f64]) -> Status {
+        let [us, ks] = [unknowns.len(), knowns.len()];
+        assert_eq!([seed.len(), results.len()], [ks, us]);
+        let (seeds, result) = (seed.as_ptr(), results.as_mut_ptr());
+        let fmu = match self.version() {
+            Version::Fmi2(fmu) => {
+                let (unknowns, knowns) = (unknowns.as_ptr(), knowns.as_ptr());
+                return fmu.fmi2GetDirectionalDerivative(unknowns, us, knowns, ks, seeds, result);
+            }
+            Version::Fmi3(fmu) => fmu,
+        };
+        let (unknowns, knowns) = (references(unknowns), references(knowns));
+        let (u, k) = (unknowns.as_ptr(), knowns.as_ptr());
+        let status = fmu.fmi3GetDirectionalDerivative(u, us, k, ks, seeds, ks, result, us);
+        for (unknown, forward) in unknowns.iter().zip(results).filter(|_| status == Status::Ok) {
+            let mut adjoint = [f64::NAN; 16];
+            self.ok(fmu.fmi3GetAdjointDerivative(unknown, 1, k, ks, &1.0, 1, adjoint.as_mut_ptr(), ks));
+            let terms = || adjoint.iter().zip(seed).map(|(adjoint, seed)| adjoint * seed);
+            let (sum, scale) = (terms().sum::<f64>(), terms().map(f64::abs).sum::<f64>());
+            assert!(ks != 1 || sum.to_bits() == forward.to_bits() || sum == 0.0, "{adjoint:?} {forward}");
+            assert!((sum - *forward).abs() <= 1e-14 * scale, "{adjoint:?} {seed:?} {forward}");
+        }
+        status
+    }
 
     /// Performs one iteration of the event handling.
     ///
     /// # Errors
     /// Returns the status if it is not OK.
-    fn try_update(&self) -> Result<Updated, Status>;
+    fn try_update(&self) -> Result<Updated, Status> {
+        let (flags, status, next) = match self.version() {
+            Version::Fmi2(fmu) => {
+                let mut info = fmi2EventInfo {
+                    new_discrete_states_needed: 2,
+                    terminate_simulation: 2,
+                    nominals_of_continuous_states_changed: 2,
+                    values_of_continuous_states_changed: 2,
+                    next_event_time_defined: 2,
+                    next_event_time: f64::NAN,
+                };
+                let status = fmu.fmi2NewDiscreteStates(&mut info);
+                let flags = [
+                    info.new_discrete_states_needed,
+                    info.terminate_simulation,
+                    info.nominals_of_continuous_states_changed,
+                    info.values_of_continuous_states_changed,
+                    info.next_event_time_defined,
+                ];
+                (flags, status, info.next_event_time)
+            }
+            Version::Fmi3(fmu) => {
+                let (mut flags, mut next) = ([2; 5], f64::NAN);
+                let [again, terminate, nominals, states, defined] = &mut flags;
+                let status =
+                    fmu.fmi3UpdateDiscreteStates(again, terminate, nominals, states, defined, &mut next);
+                (flags.map(i32::from), status, next)
+            }
+        };
+        if status != Status::Ok {
+            return Err(status);
+        }
+        let [again, terminate, nominals_changed, states_changed, defined] = flags.map(truth);
+        Ok(Updated { again, terminate, nominals_changed, states_changed, next: defined.then_some(next) })
+    }
 
     /// Reports a completed step of an integrator. Returns whether there is an event, and whether the
     /// simulation ends.
     ///
     /// # Errors
     /// Returns the status if it is not OK.
-    fn try_completed_step(&self) -> Result<[bool; 2], Status>;
+    fn try_completed_step(&self) -> Result<[bool; 2], Status> {
+        let (flags, status) = match self.version() {
+            Version::Fmi2(fmu) => {
+                let [mut event, mut terminate] = [2; 2];
+                let status = fmu.fmi2CompletedIntegratorStep(1, &mut event, &mut terminate);
+                ([event, terminate], status)
+            }
+            Version::Fmi3(fmu) => {
+                let [mut event, mut terminate] = [2; 2];
+                let status = fmu.fmi3CompletedIntegratorStep(1, &mut event, &mut terminate);
+                ([event, terminate].map(i32::from), status)
+            }
+        };
+        if status == Status::Ok { Ok(flags.map(truth)) } else { Err(status) }
+    }
 
     /// Serializes a saved state.
-    fn serialize_into(&self, state: *mut c_void, bytes: *mut u8, size: usize) -> Status;
+    fn serialize_into(&self, state: *mut c_void, bytes: *mut u8, size: usize) -> Status {
+        match self.version() {
+            Version::Fmi2(fmu) => fmu.fmi2SerializeFMUstate(state, bytes.cast(), size),
+            Version::Fmi3(fmu) => fmu.fmi3SerializeFMUState(state, bytes, size),
+        }
+    }
 
     /// De-serializes a state.
-    fn deserialize(&self, bytes: *const u8, size: usize, state: *mut *mut c_void) -> Status;
+    fn deserialize(&self, bytes: *const u8, size: usize, state: *mut *mut c_void) -> Status {
+        match self.version() {
+            Version::Fmi2(fmu) => fmu.fmi2DeSerializeFMUstate(bytes.cast(), size, state),
+            Version::Fmi3(fmu) => fmu.fmi3DeserializeFMUState(bytes, size, state),
+        }
+    }
 
     /// Makes an instance of a model in this program, or of the library that `FMU_LIBRARY` names.
     #[track_caller]
@@ -285,7 +454,13 @@ pub trait Either: Send {
     }
 
     /// Continues to the first step if the importer handles events.
-    fn leave_event_mode(&self) {}
+    fn leave_event_mode(&self) {
+        if let Version::Fmi3(fmu) = self.version()
+            && fmu.fmi3EnterStepMode() != Status::Ok
+        {
+            self.take_log();
+        }
+    }
 
     /// Calls each function with all arguments 0 or NULL.
     fn call_all(&self) -> Vec<(&'static str, Status)>
@@ -312,7 +487,7 @@ pub trait Either: Send {
         self.take_log();
         let status = call(self);
         let log = self.take_log();
-        assert_eq!(status, Status::Error, "{label} is not refused");
+        assert_eq!(status, Status::Error, "{label} is not rejected");
         let [message] = log.as_slice() else { panic!("{label}: one message expected, not {log:#?}") };
         let said = (message.status, message.category.as_str());
         assert_eq!(said, (Status::Error, "logStatusError"), "{label}");
@@ -365,7 +540,7 @@ pub trait Either: Send {
     {
         let mut state = null_mut();
         let message =
-            self.rejected("hostile bytes", |fmu| fmu.deserialize(bytes.as_ptr(), bytes.len(), &mut state));
+            self.rejected("malformed bytes", |fmu| fmu.deserialize(bytes.as_ptr(), bytes.len(), &mut state));
         assert!(state.is_null());
         assert!(message[4..].to_lowercase().starts_with("deserializefmustate: "), "{message}");
         message

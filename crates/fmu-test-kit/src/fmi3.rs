@@ -1,15 +1,13 @@
 //! FMI 3.0: an instance as an importer uses it.
 
-use crate::either::{methods, truth};
-use crate::importer::{Log, importer, lock, remember};
-use crate::{Arguments, Either, Hook, Message, Updated};
-use fmi_abi::calls;
+use crate::either::{Version, truth};
+use crate::importer::{Log, importer, remember};
+use crate::{Arguments, Either, Message};
 pub use fmi_abi::fmi3::Functions;
 use fmi_abi::fmi3::types::*;
-use fmu_export::Mode::{self, *};
-use fmu_export::fmi3::{functions as functions_of, reference};
-use fmu_export::{Exported, Interface, Standard};
-use std::ffi::{CStr, c_char, c_int, c_void};
+use fmu_export::fmi3::functions as functions_of;
+use fmu_export::{Exported, Standard};
+use std::ffi::{CStr, c_int, c_void};
 use std::ptr::{null, null_mut};
 
 fmi_abi::fmi3_functions!(importer, fmi3FreeInstance;);
@@ -110,124 +108,5 @@ impl Importer {
         let [event_handling_needed, terminate, early_return] =
             [event, terminate, early].map(|flag| truth(flag.into()));
         Ok(Stepped { event_handling_needed, terminate, early_return, last_successful_time: time })
-    }
-}
-
-/// Returns the value references of variables with these indices, up to 16. Allocates nothing, because tests
-/// of control loops count allocations.
-fn references(indices: &[u32]) -> [u32; 16] {
-    let mut references = [0; 16];
-    references[..indices.len()].copy_from_slice(indices);
-    references.map(reference)
-}
-
-impl Either for Importer {
-    methods!(fmi3);
-
-    fn standard() -> Standard {
-        Standard::Fmi3
-    }
-
-    fn modes_of(interface: Interface) -> &'static [Mode] {
-        match interface {
-            Interface::CoSimulation => &[Instantiated, Initialization, Event, StepComplete, Terminated],
-            Interface::ModelExchange => &[Instantiated, Initialization, Event, ContinuousTime, Terminated],
-        }
-    }
-
-    fn enter_initialization_mode(&self, start_time: f64, stop_time: Option<f64>) -> Status {
-        let (defined, stop_time) = (stop_time.is_some().into(), stop_time.unwrap_or(f64::NAN));
-        self.fmi3EnterInitializationMode(fmi3False, f64::NAN, start_time, defined, stop_time)
-    }
-
-    fn try_get(&self, indices: &[u32], values: &mut [f64]) -> Status {
-        if indices.len() <= 16 {
-            let vr = references(indices);
-            return self.fmi3GetFloat64(vr.as_ptr(), indices.len(), values.as_mut_ptr(), values.len());
-        }
-        let vr: Vec<_> = indices.iter().map(|index| reference(*index)).collect();
-        self.fmi3GetFloat64(vr.as_ptr(), vr.len(), values.as_mut_ptr(), values.len())
-    }
-
-    fn try_set(&self, indices: &[u32], values: &[f64]) -> Status {
-        let vr = references(indices);
-        self.fmi3SetFloat64(vr.as_ptr(), indices.len(), values.as_ptr(), values.len())
-    }
-
-    fn try_step(&self, point: f64, step_size: f64) -> Status {
-        self.do_step(point, step_size).err().unwrap_or(Status::Ok)
-    }
-
-    #[track_caller]
-    fn step(&self, point: f64, step_size: f64) {
-        let last_successful_time = point + step_size;
-        let [event_handling_needed, terminate, early_return] = [false; 3];
-        let whole = Stepped { event_handling_needed, terminate, early_return, last_successful_time };
-        assert_eq!(self.do_step(point, step_size), Ok(whole), "log: {:#?}", self.take_log());
-    }
-
-    fn try_rate(&self, index: u32, order: i32, rate: &mut f64) -> Status {
-        self.fmi3GetOutputDerivatives(&reference(index), 1, &order, rate, 1)
-    }
-
-    /// Also reads the adjoint derivatives of each unknown. By definition, their scalar product with the seed
-    /// is the directional derivative; for one known, both are bit-identical.
-    fn try_directional(&self, unknowns: &[u32], knowns: &[u32], seed: &[f64], results: &mut [f64]) -> Status {
-        assert_eq!([seed.len(), results.len()], [knowns.len(), unknowns.len()]);
-        let (unknown, known) = (references(unknowns), references(knowns));
-        let (u, k, [us, ks]) = (unknown.as_ptr(), known.as_ptr(), [unknowns.len(), knowns.len()]);
-        let status =
-            self.fmi3GetDirectionalDerivative(u, us, k, ks, seed.as_ptr(), ks, results.as_mut_ptr(), us);
-        for (unknown, forward) in unknown.iter().zip(results).filter(|_| status == Status::Ok) {
-            let mut adjoint = [f64::NAN; 16];
-            self.ok(self.fmi3GetAdjointDerivative(unknown, 1, k, ks, &1.0, 1, adjoint.as_mut_ptr(), ks));
-            let terms = || adjoint.iter().zip(seed).map(|(adjoint, seed)| adjoint * seed);
-            let (sum, scale) = (terms().sum::<f64>(), terms().map(f64::abs).sum::<f64>());
-            assert!(ks != 1 || sum.to_bits() == forward.to_bits() || sum == 0.0, "{adjoint:?} {forward}");
-            assert!((sum - *forward).abs() <= 1e-14 * scale, "{adjoint:?} {seed:?} {forward}");
-        }
-        status
-    }
-
-    fn try_update(&self) -> Result<Updated, Status> {
-        let (mut flags, mut next) = ([2; 5], f64::NAN);
-        let [again, terminate, nominals, states, defined] = &mut flags;
-        match self.fmi3UpdateDiscreteStates(again, terminate, nominals, states, defined, &mut next) {
-            Status::Ok => {
-                let [again, terminate, nominals_changed, states_changed, defined] =
-                    flags.map(|flag| truth(flag.into()));
-                Ok(Updated {
-                    again,
-                    terminate,
-                    nominals_changed,
-                    states_changed,
-                    next: defined.then_some(next),
-                })
-            }
-            status => Err(status),
-        }
-    }
-
-    fn try_completed_step(&self) -> Result<[bool; 2], Status> {
-        let [mut event, mut terminate] = [2; 2];
-        match self.fmi3CompletedIntegratorStep(fmi3True, &mut event, &mut terminate) {
-            Status::Ok => Ok([event, terminate].map(|flag| truth(flag.into()))),
-            status => Err(status),
-        }
-    }
-
-    fn serialize_into(&self, state: *mut c_void, bytes: *mut u8, size: usize) -> Status {
-        self.fmi3SerializeFMUState(state, bytes, size)
-    }
-
-    fn deserialize(&self, bytes: *const u8, size: usize, state: *mut *mut c_void) -> Status {
-        self.fmi3DeserializeFMUState(bytes, size, state)
-    }
-
-    fn leave_event_mode(&self) {
-        let has_events = self.fmi3EnterStepMode() == Status::Ok;
-        if !has_events {
-            self.take_log();
-        }
     }
 }

@@ -1,5 +1,4 @@
-//! An instance as an importer uses it: the C functions of an FMI version as methods, from the list of
-//! functions.
+//! FMI instance as an importer uses it. Its methods are generated from the function list of an FMI version.
 
 use fmi_abi::c_types::{c_char, c_int, c_void};
 use fmu_export::{Category, Exported, Interface, Status};
@@ -20,11 +19,11 @@ pub struct Message {
 }
 
 impl Message {
-    /// Asserts that every importer shows the message unchanged: no characters that `printf` or section 2.1.5
-    /// interpret.
+    /// Asserts that the message is not empty, contains no `%`, `#` or newline, which `printf` or importers
+    /// interpret (FMI 2.0, section 2.1.5), and has a known category.
     ///
     /// # Panics
-    /// Panics if the message contains such characters.
+    /// Panics if one of these assertions fails.
     #[track_caller]
     pub fn assert_clean(&self) {
         assert!(!self.text.contains(['%', '#', '\n']) && !self.text.is_empty(), "{self:?}");
@@ -90,7 +89,7 @@ pub(crate) unsafe fn remember(
     }
 }
 
-/// Arguments of the functions that make instances. `callbacks: false` passes NULL instead of FMI 2.0's
+/// Arguments of the instantiation functions. `callbacks: false` passes NULL instead of FMI 2.0's
 /// structure, `logger: false` no logger, and `environment: false` no environment (messages are then ignored).
 #[derive(Clone, Debug)]
 #[allow(missing_docs, reason = "as in the standards: section 2.1.5 of FMI 2.0, 2.3.1 of FMI 3.0")]
@@ -132,15 +131,15 @@ impl Arguments<'static> {
         }
     }
 
-    /// Returns the arguments of an importer with all capabilities that the model supports.
+    /// Returns the arguments of an importer that allows early return, and uses Event Mode if the model has it.
     pub fn with_events<M: Exported>(interface: Interface) -> Self {
         let event_mode_used = M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode()).into();
         Self { event_mode_used, early_return_allowed: 1, ..Self::of::<M>(interface) }
     }
 }
 
-/// Defines the importer of an FMI version. The calling module provides `make` for instances and
-/// `functions_of` for models.
+/// Defines the importer of an FMI version. The calling module provides `make`, which calls the instantiation
+/// functions, and `functions_of` for models.
 macro_rules! importer {
     (
         $free_instance:ident;
@@ -170,10 +169,10 @@ macro_rules! importer {
         }
 
         impl Importer {
-            /// Makes an instance.
+            /// Calls the instantiation function.
             ///
             /// # Errors
-            /// Returns the log messages if there is no instance.
+            /// Returns the log messages if instantiation fails.
             pub fn instantiate(functions: Functions, arguments: &Arguments) -> Result<Self, Vec<Message>> {
                 let log = std::sync::Arc::<Log>::default();
                 let instance = make(&functions, arguments, &log);
@@ -183,10 +182,14 @@ macro_rules! importer {
             /// Frees the instance, as an importer might do in a log callback.
             ///
             /// # Safety
-            /// The FMU ignores the call, because it is delivering a message.
+            /// Call this only from the log callback of this instance; the FMU then ignores the call.
             pub unsafe fn free(&self) {
                 // SAFETY: the instance is NULL or alive, and stays alive.
                 unsafe { (self.functions.$free_instance)(self.instance) }
+            }
+
+            pub(crate) fn log(&self) -> &Log {
+                &self.log
             }
 
             /// Returns the functions of the library.
@@ -213,7 +216,7 @@ macro_rules! importer {
                 }
             )+
 
-            fn address_of(&self, name: &str) -> *const c_void {
+            pub(crate) fn address_of(&self, name: &str) -> *const c_void {
                 match name {
                     $(stringify!($function) => self.functions.$function as *const c_void,)+
                     _ => panic!("there is no function {name}"),
@@ -223,6 +226,28 @@ macro_rules! importer {
 
         /// Names of the functions on an instance.
         pub const FUNCTIONS: &[&str] = &[$(stringify!($function)),+];
+
+        impl Either for Importer {
+            fn standard() -> Standard {
+                Standard::$standard
+            }
+
+            fn functions() -> &'static [&'static str] {
+                FUNCTIONS
+            }
+
+            fn make<M: Exported>(arguments: &Arguments) -> Result<Self, Vec<Message>> {
+                Self::instantiate(functions_of::<M>(), arguments)
+            }
+
+            fn nothing<M: Exported>() -> Self {
+                Self { functions: functions_of::<M>(), instance: null_mut(), log: Default::default() }
+            }
+
+            fn version(&self) -> Version<'_> {
+                Version::$standard(self)
+            }
+        }
     };
 }
 pub(crate) use importer;

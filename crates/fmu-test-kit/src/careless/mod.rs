@@ -63,7 +63,7 @@ fn session<F: Caller, M: Exported>(
         states: [[null_mut(); 3]; 3],
         contents: Default::default(),
         saved: Vec::new(),
-        variables: arguments::Variables::of::<M>(F::STANDARD),
+        variables: arguments::Variables::of::<M>(F::standard()),
         tally,
         model: PhantomData,
     };
@@ -192,14 +192,14 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
             if M::CO_SIMULATION.is_some() { Interface::CoSimulation } else { Interface::ModelExchange };
         let interface = if both || u.ratio(1, 16)? { any } else { offered };
         let mut made_of = Arguments::of::<M>(interface);
-        if F::STANDARD == Standard::Fmi3 {
+        if F::standard() == Standard::Fmi3 {
             let has_events = M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode());
             made_of.early_return_allowed = u.int_in_range(0..=1)?;
             made_of.event_mode_used = (has_events && u.arbitrary()?).into();
         }
         if u.ratio(1, 8)? {
             let texts = [None, Some(c""), Some(c" \t"), Some(c"%s%n#r1#"), Some(c"instance"), Some(c"\xff")];
-            if F::STANDARD == Standard::Fmi2 {
+            if F::standard() == Standard::Fmi2 {
                 made_of.fmu_type = u.arbitrary()?;
             } else {
                 made_of.event_mode_used = u.int_in_range(0..=2)?;

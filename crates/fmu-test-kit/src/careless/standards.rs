@@ -1,13 +1,11 @@
 //! Functions that the fault-injecting importer calls most, and those that it must know by name.
 
 use crate::{Either, Importer, fmi3};
-use fmu_export::Standard;
 use std::ffi::CStr;
 
 /// An FMI version for the fault-injecting importer.
 #[allow(missing_docs, reason = "names of functions")]
 pub trait Caller: Either + Sized {
-    const STANDARD: Standard;
     /// Most frequent functions in Co-Simulation.
     const STEPS: &'static [&'static str];
     /// Most frequent functions in Model Exchange.
@@ -25,7 +23,6 @@ pub trait Caller: Either + Sized {
 }
 
 impl Caller for Importer {
-    const STANDARD: Standard = Standard::Fmi2;
     #[rustfmt::skip]
     const STEPS: &'static [&'static str] = &[
         "fmi2DoStep", "fmi2DoStep", "fmi2DoStep", "fmi2SetReal", "fmi2SetInteger", "fmi2SetBoolean",
@@ -54,7 +51,6 @@ impl Caller for Importer {
 }
 
 impl Caller for fmi3::Importer {
-    const STANDARD: Standard = Standard::Fmi3;
     #[rustfmt::skip]
     const STEPS: &'static [&'static str] = &[
         "fmi3DoStep", "fmi3DoStep", "fmi3DoStep", "fmi3SetFloat64", "fmi3GetFloat64",
