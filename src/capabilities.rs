@@ -65,7 +65,7 @@ impl Model for TestbedFmu {
         let motors = &mut self.testbed.motors;
         if !motors.times.are_possible() {
             return Err(Error::new(
-                "the samples of a saved state must be 0 to 2, the steps between them > 0",
+                "a saved state must have 0 to 2 earlier samples, and positive times between them",
             ));
         }
         motors.times.update();
@@ -94,9 +94,7 @@ impl Model for TestbedFmu {
 impl CoSimulation for TestbedFmu {
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         if !self.testbed.step(step.size) {
-            return Err(Error::new(
-                "the state would leave the range of numbers; look for extreme inputs or states",
-            ));
+            return Err(Error::new("the state would overflow; look for extreme inputs or states"));
         }
         self.start.is_over = true;
         self.calculate_with(self.testbed.motors.path_end);
@@ -139,7 +137,8 @@ impl OutputDerivatives for TestbedFmu {
 
 /// Derivatives of the values that a getter returns, in Initialization Mode and later. In Co-Simulation, the
 /// rates that are estimated from the angles depend on the angles. Until the simulation has started, the
-/// states may depend on the angles too. All other derivatives are entries of A, B, C and D of eq. (11).
+/// states may depend on the angles too. Derivatives with respect to parameters are calculated separately. All
+/// others are entries of A, B, C and D of eq. (11).
 impl Partials for TestbedFmu {
     fn partial(&self, unknown: Name, known: Name) -> Option<f64> {
         self.partials(Some((known, 0)), false)((unknown, 0))
@@ -151,16 +150,16 @@ impl Partials for TestbedFmu {
         known: Option<(Name, usize)>,
         _initial: bool,
     ) -> impl Fn((Name, usize)) -> Option<f64> {
-        let reactions = self.reactions(known.map(|(known, _)| known));
-        move |(unknown, _)| reactions.get(unknown as usize).copied()
+        let sensitivities = self.sensitivities(known.map(|(known, _)| known));
+        move |(unknown, _)| sensitivities.get(unknown as usize).copied()
     }
 }
 
 impl TestbedFmu {
-    /// Returns the change of each variable per unit change of a known. No variable depends explicitly on
-    /// time.
+    /// Returns the partial derivatives of the variables with respect to a known. `None` stands for time, on
+    /// which no variable depends explicitly.
     #[inline(never)]
-    fn reactions(&self, known: Option<Name>) -> Cow<'_, Moving> {
+    fn sensitivities(&self, known: Option<Name>) -> Cow<'_, Moving> {
         let [_, _, _, _, of_states @ ..] = &self.jacobian;
         let has_start = !self.start.is_over && !self.start.at_rest;
         let start = |state: usize| if has_start { &of_states[state] } else { &[0.0; _] };
@@ -178,21 +177,21 @@ impl TestbedFmu {
             Some(Name::theta6_start) => start(3),
             Some(Name::omega5_start) => start(4),
             Some(Name::omega6_start) => start(5),
-            Some(Name::theta1) => return self.reactions_to_angle(0),
-            Some(Name::theta2) => return self.reactions_to_angle(1),
-            Some(Name::omega1) => self.reactions_to_rate(0),
-            Some(Name::omega2) => self.reactions_to_rate(1),
-            Some(parameter) => return self.reactions_to_parameter(parameter),
+            Some(Name::theta1) => return self.sensitivities_to_angle(0),
+            Some(Name::theta2) => return self.sensitivities_to_angle(1),
+            Some(Name::omega1) => self.sensitivities_to_rate(0),
+            Some(Name::omega2) => self.sensitivities_to_rate(1),
+            Some(parameter) => return self.sensitivities_to_parameter(parameter),
         })
     }
 
-    /// Includes the rate that is estimated from the angle, and the states that follow the motor until the
-    /// start.
+    /// Returns the partial derivatives with respect to a motor angle. They include the effect of the estimated
+    /// rate and, until the simulation has started, of the states.
     #[inline(never)]
-    fn reactions_to_angle(&self, motor: usize) -> Cow<'_, Moving> {
+    fn sensitivities_to_angle(&self, motor: usize) -> Cow<'_, Moving> {
         let mut inputs = [Inputs::default(); 2];
         inputs[motor].theta = 1.0;
-        let motors = self.motions(&self.testbed.motors.reaction(inputs));
+        let motors = self.motions(&self.testbed.motors.sensitivity(inputs));
         let follows = !self.start.is_over && self.start.at_rest;
         if motors.rate[motor] == 0.0 && !follows {
             return Cow::Borrowed(&self.jacobian[motor]);
@@ -201,7 +200,7 @@ impl TestbedFmu {
         Cow::Owned(self.moving(&Instant { x, motors }))
     }
 
-    fn reactions_to_rate(&self, motor: usize) -> &Moving {
+    fn sensitivities_to_rate(&self, motor: usize) -> &Moving {
         let takes_omega =
             self.interface == Interface::ModelExchange || self.testbed.motors.takes_omega(motor);
         if takes_omega { &self.jacobian[2 + motor] } else { &[0.0; _] }
@@ -220,7 +219,8 @@ impl TestbedFmu {
         })
     }
 
-    /// Returns the values of the variables at an instant. They are linear in the instant.
+    /// Returns the values of the variables at an instant. The values are linear functions of the states and of
+    /// the motor motion.
     #[inline]
     fn moving(&self, instant: &Instant) -> Moving {
         let system = self.system();
@@ -237,22 +237,23 @@ impl TestbedFmu {
         ]
     }
 
-    /// Returns the changes per unit change of a parameter. The variable table sets the unit change.
+    /// Returns the partial derivatives with respect to a parameter. The setter of the variable table writes 1
+    /// to this parameter; all others are 0.
     #[cold]
     #[inline(never)]
-    fn reactions_to_parameter(&self, parameter: Name) -> Cow<'_, Moving> {
+    fn sensitivities_to_parameter(&self, parameter: Name) -> Cow<'_, Moving> {
         let mut unit = self.clone();
         unit.testbed.parameters = Parameters::ZERO;
         Self::TABLE[Self::index(parameter)].set(&mut unit, &1.0.into());
         let (now, system, change) = (self.now(), self.system(), &unit.testbed.parameters);
-        let mut reactions: Moving = [0.0; _];
+        let mut sensitivities: Moving = [0.0; _];
         for (first, [one, two]) in [
             (Name::tau1, now.change_of_torques(system, change).array()),
             (Name::der_theta3, now.change_of_shaft_rates(system, change).array()),
             (Name::der_omega5, now.change_of_accelerations(system, change).array()),
         ] {
-            reactions[first as usize..][..2].copy_from_slice(&[one, two]);
+            sensitivities[first as usize..][..2].copy_from_slice(&[one, two]);
         }
-        Cow::Owned(reactions)
+        Cow::Owned(sensitivities)
     }
 }

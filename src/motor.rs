@@ -282,7 +282,7 @@ impl Motors {
 
     /// Returns the change of these motors per change `inputs` of their inputs. The motions are linear in
     /// inputs, earlier samples and given rates, so the latter two are 0 here.
-    pub fn reaction(&self, inputs: [Inputs; 2]) -> Self {
+    pub fn sensitivity(&self, inputs: [Inputs; 2]) -> Self {
         Self {
             inputs,
             is_sampled: [true; 2],

@@ -22,12 +22,12 @@ const DEG_PER_RAD: f64 = 180.0 / PI;
 /// The message names the file, the parameter and the fault.
 pub fn read(file: &Path) -> Result<Parameters, String> {
     let name = file.display();
-    let text = fs::read_to_string(file).map_err(|error| format!("{name}: cannot be read: {error}"))?;
-    parse(&text).map_err(|error| format!("{name}: {error}"))
+    let json = fs::read_to_string(file).map_err(|error| format!("{name}: cannot be read: {error}"))?;
+    parse(&json).map_err(|error| format!("{name}: {error}"))
 }
 
-fn parse(text: &str) -> Result<Parameters, String> {
-    let File(parameters) = serde_json::from_str(text).map_err(|error| error.to_string())?;
+fn parse(json: &str) -> Result<Parameters, String> {
+    let File(parameters) = serde_json::from_str(json).map_err(|error| error.to_string())?;
     parameters.check().map_err(|error| format!("in SI units: {error}"))?;
     Ok(parameters)
 }
@@ -170,10 +170,10 @@ mod tests {
 
     #[test]
     fn units_per_radian_and_entries_without_meaning_are_taken() {
-        let text = with_line("k1", r#""k1": {"value": 120, "unit": "N.m/rad"},"#);
-        assert_eq!(parse(&text).unwrap().k1, 120.0);
-        let text = with_line("c3", r#""c3": {"unit": "N.m.s/rad", "value": -0.0},"#);
-        assert!(parse(&text).unwrap().c3.is_sign_positive());
+        let json = with_line("k1", r#""k1": {"value": 120, "unit": "N.m/rad"},"#);
+        assert_eq!(parse(&json).unwrap().k1, 120.0);
+        let json = with_line("c3", r#""c3": {"unit": "N.m.s/rad", "value": -0.0},"#);
+        assert!(parse(&json).unwrap().c3.is_sign_positive());
     }
 
     #[test]
@@ -215,13 +215,13 @@ mod tests {
             ((String::new(), String::new()), "line 1"),
             ((TABLE_1.replace("7.83", "0").replace("8.35", "0"), "c1 and c2".into()), "must not both be 0"),
         ];
-        for ((text, key), message) in cases {
-            match parse(&text) {
-                Ok(_) => assert_eq!(message, "", "{text}"),
+        for ((json, key), message) in cases {
+            match parse(&json) {
+                Ok(_) => assert_eq!(message, "", "{json}"),
                 Err(error) => {
                     assert!(
                         !message.is_empty() && error.contains(&key) && error.contains(message),
-                        "{error}\n{text}"
+                        "{error}\n{json}"
                     );
                 }
             }

@@ -1,19 +1,19 @@
 //! Comparison of the FMU's compiled C sources with the library from the same Rust code. `make
 //! test-source-fmu` names the compiled sources in the environment variable `FMU_LIBRARY`.
 
-use fmu_test_kit::careless::{random_bytes, record};
+use fmu_test_kit::fault_injection::{random_bytes, record};
 use fmu_test_kit::functions_of;
 use prw_testbed::TestbedFmu;
 
 /// Checks that random sequences of calls give equal bits, statuses and messages.
 #[test]
 #[ignore = "needs compiled C sources"]
-fn random_sessions_are_answered_alike() {
+fn random_sessions_give_equal_results() {
     assert!(
         std::env::var_os("FMU_LIBRARY").is_some(),
         "FMU_LIBRARY must name the compiled sources; make test-source-fmu"
     );
-    let sessions = std::env::var("SESSIONS").map_or(300, |text| text.parse().expect("a number"));
+    let sessions = std::env::var("SESSIONS").map_or(300, |value| value.parse().expect("a number"));
     let (mut calls, mut rejected) = (0, 0);
     for seed in 0..sessions {
         let bytes = random_bytes(seed, 1 << 12);
@@ -24,7 +24,7 @@ fn random_sessions_are_answered_alike() {
         }
         assert_eq!(native.len(), compiled.len(), "seed {seed}");
         calls += native.len();
-        rejected += native.iter().filter(|answer| answer.contains("Error")).count();
+        rejected += native.iter().filter(|result| result.contains("Error")).count();
     }
-    println!("{calls} calls in {sessions} sessions, {rejected} refused: the same bits, statuses and texts");
+    println!("{calls} calls in {sessions} sessions, {rejected} rejected: equal bits, statuses and messages");
 }

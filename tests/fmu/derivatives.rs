@@ -58,8 +58,8 @@ fn fit_differences<F: Either>(fmu: &F, mode: Mode, started: bool, label: &str) {
         _ => (UNKNOWNS.to_vec(), vec![&structure.outputs, &structure.derivatives]),
     };
     let declares = |unknown: u32, known: u32| {
-        let mut listed = listed.iter().copied().flatten().filter(|of| of.index == unknown);
-        listed.any(|of| of.dependencies.iter().any(|(vr, _)| *vr == known))
+        let mut listed = listed.iter().copied().flatten().filter(|variable| variable.index == unknown);
+        listed.any(|variable| variable.dependencies.iter().any(|(vr, _)| *vr == known))
     };
     // No function sets states in Co-Simulation.
     let states = if matches!(mode, Event | ContinuousTime) { &STATES[..] } else { &[] };

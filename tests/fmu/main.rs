@@ -27,7 +27,7 @@ const fn vr(name: Name) -> u32 {
 
 /// Makes an instance.
 fn new(interface: Interface) -> Importer {
-    Importer::of::<TestbedFmu>(interface)
+    Importer::new::<TestbedFmu>(interface)
 }
 
 const INTERFACES: [Interface; 2] = [Interface::CoSimulation, Interface::ModelExchange];

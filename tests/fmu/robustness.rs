@@ -1,12 +1,12 @@
 //! Random sequences of calls; loading and unloading of the library together with another FMU.
 //! (crates/fmu-export tests the rest of docs/robustness.md, with test models.)
 
-use fmu_test_kit::careless::{run, run_seeds};
+use fmu_test_kit::fault_injection::{run, run_seeds};
 use fmu_test_kit::{Importer, fmi3};
 use prw_testbed::TestbedFmu;
 
 #[test]
-fn no_sequence_of_calls_breaks_a_promise() {
+fn every_guarantee_holds_for_any_calls() {
     let tally = run_seeds(4, &[("prw_testbed", run::<Importer, TestbedFmu>)]);
     assert_eq!(tally.len(), 44, "every function is called");
     run_seeds(4, &[("prw_testbed in FMI 3.0", run::<fmi3::Importer, TestbedFmu>)]);

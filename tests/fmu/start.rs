@@ -40,7 +40,7 @@ fn rests(fmu: &impl Either) {
 /// Checks that the testbed in Co-Simulation stays exactly at rest, because nothing is twisted.
 fn rest_in_co_simulation<F: Either>() {
     for (stage, use_omega) in STAGES.into_iter().flat_map(|stage| [(stage, 0), (stage, 1)]) {
-        let fmu = F::of::<TestbedFmu>(CoSimulation);
+        let fmu = F::new::<TestbedFmu>(CoSimulation);
         fmu.ok(fmu.set_boolean(vr(Name::use_omega), use_omega));
         initialize(&fmu, |now| {
             if now == stage {
@@ -93,7 +93,7 @@ fn a_rejected_step_starts_nothing() {
 
 fn rest_in_model_exchange<F: Either>() {
     for stage in STAGES {
-        let fmu = F::of::<TestbedFmu>(ModelExchange);
+        let fmu = F::new::<TestbedFmu>(ModelExchange);
         initialize(&fmu, |now| {
             if now == stage {
                 fmu.set(&THETA, &ANGLES);
@@ -198,14 +198,14 @@ fn saved_and_reset() {
 #[test]
 fn states_in_event_mode_of_fmi3() {
     // In Event Mode, FMI 3.0 allows setting one state; the other states keep their values.
-    let fmu = fmi3::Importer::of::<TestbedFmu>(ModelExchange);
+    let fmu = fmi3::Importer::new::<TestbedFmu>(ModelExchange);
     fmu.set(&THETA, &ANGLES);
     initialize(&fmu, |_| {});
     fmu.set(&[vr(Name::theta5)], &[9.0]);
     fmu.set(&THETA, &[0.0; 2]);
     assert_eq!(fmu.get(STATES), [0.7, -0.4, 9.0, -0.4, 0.0, 0.0]);
     // A given start state applies even if it is set late.
-    let fmu = fmi3::Importer::of::<TestbedFmu>(ModelExchange);
+    let fmu = fmi3::Importer::new::<TestbedFmu>(ModelExchange);
     initialize(&fmu, |_| {});
     start_at(&fmu, GIVEN);
     assert_eq!(fmu.get(STATES), GIVEN);

@@ -46,7 +46,7 @@ impl FromWord for f64 {
     }
 }
 
-macro_rules! whole {
+macro_rules! integers {
     ($($of:ty)*) => { $(impl FromWord for $of {
         #[allow(trivial_numeric_casts)]
         fn from_word(word: u64) -> Self {
@@ -54,7 +54,7 @@ macro_rules! whole {
         }
     })* };
 }
-whole!(u8 i32 u32 usize);
+integers!(u8 i32 u32 usize);
 
 impl<T> FromWord for *const T {
     fn from_word(word: u64) -> Self {

@@ -1,4 +1,5 @@
-//! Reads model descriptions as written. A description may have faults; the reader lists them.
+//! Reads model descriptions without rejecting faulty ones. Missing attributes get the defaults of the standard; faults
+//! are listed.
 
 use crate::{BaseType, Interface, Standard};
 use roxmltree::{Document, Node};
@@ -24,7 +25,8 @@ pub struct Variable {
     pub has_variability: bool,
     /// `exact`, `approx` or `calculated`, with the default of the standard; empty if there is no default.
     pub initial: String,
-    /// Start values as written: one for each element, or none.
+    /// Start values as strings. A single start value of an array is repeated for each element; any other number of
+    /// values is kept.
     pub start: Vec<String>,
     /// Sizes of the dimensions of an array; `None` if a size is unknown.
     pub dimensions: Option<Vec<usize>>,
@@ -44,7 +46,7 @@ pub struct Variable {
     pub declared_type: Option<String>,
     /// Index of the variable of which this variable is the time derivative.
     pub derivative_of: Option<usize>,
-    /// Whether clocks set the variable.
+    /// Whether the variable is clocked (attribute `clocks`).
     pub clocked: bool,
     /// Whether the variable may be set only once per time instant.
     pub once_per_instant: bool,
@@ -53,9 +55,9 @@ pub struct Variable {
 }
 
 impl Variable {
-    /// Returns the start values as numbers, up to the first that is no number.
+    /// Returns the start values as numbers, up to the first that is not a number.
     pub fn starts(&self) -> Vec<f64> {
-        let number = |text: &String| match text.as_str() {
+        let number = |value: &String| match value.as_str() {
             "true" => Some(1.0),
             "false" => Some(0.0),
             "INF" => Some(f64::INFINITY),
@@ -111,7 +113,7 @@ impl Offer {
     fn read(node: Node, standard: Standard) -> Self {
         let is_true = |name| matches!(node.attribute(name), Some("true" | "1"));
         Self {
-            identifier: text(node, "modelIdentifier"),
+            identifier: attribute_or_empty(node, "modelIdentifier"),
             once_per_process: is_true("canBeInstantiatedOnlyOncePerProcess"),
             needs_execution_tool: is_true("needsExecutionTool"),
             input_derivatives: standard == Standard::Fmi2 && is_true("canInterpolateInputs"),
@@ -135,7 +137,7 @@ impl Offer {
     }
 }
 
-/// Kinds of faults. The reader leaves out the faulty element.
+/// Kinds of faults.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// A required attribute is missing.
@@ -144,11 +146,11 @@ pub enum Fault {
     Reference,
     /// A variable has no type.
     Type,
-    /// The model structure refers to no variable.
+    /// The model structure refers to a variable that does not exist.
     Structure,
 }
 
-/// A model description as written.
+/// Content of a model description.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelDescription {
     /// FMI version.
@@ -195,12 +197,12 @@ impl ModelDescription {
     /// Reads a `modelDescription.xml`.
     ///
     /// # Errors
-    /// Fails if the text is no XML, or for other FMI versions. The message names the fault.
-    pub fn parse(text_of_file: &str) -> Result<Self, String> {
-        let document = Document::parse(text_of_file)
-            .map_err(|error| format!("modelDescription.xml is no XML: {error}"))?;
+    /// Fails if the string is not well-formed XML, or for other FMI versions. The message names the fault.
+    pub fn parse(xml: &str) -> Result<Self, String> {
+        let document = Document::parse(xml)
+            .map_err(|error| format!("modelDescription.xml is not well-formed XML: {error}"))?;
         let root = document.root_element();
-        let version = text(root, "fmiVersion");
+        let version = attribute_or_empty(root, "fmiVersion");
         let (standard, token) = match version.as_str() {
             "2.0" => (Standard::Fmi2, "guid"),
             version if version.starts_with("3.") => (Standard::Fmi3, "instantiationToken"),
@@ -227,8 +229,8 @@ impl ModelDescription {
         let mut description = Self {
             standard,
             version,
-            model_name: text(root, "modelName"),
-            token: text(root, token),
+            model_name: attribute_or_empty(root, "modelName"),
+            token: attribute_or_empty(root, token),
             co_simulation,
             model_exchange,
             scheduled_execution: child(root, "ScheduledExecution").is_some(),
@@ -263,14 +265,14 @@ impl ModelDescription {
             self.variables.iter().enumerate().rev().map(|(index, of)| (of.reference, index)).collect();
         let (count, standard) = (self.variables.len(), self.standard);
         let mut lost = Vec::new();
-        let mut find = |text: &str| {
-            let number: Option<u32> = text.parse().ok();
+        let mut find = |number: &str| {
+            let number: Option<u32> = number.parse().ok();
             let found = match standard {
                 Standard::Fmi2 => number.and_then(from_one).filter(|index| *index < count),
                 Standard::Fmi3 => number.and_then(|number| by_reference.get(&number).copied()),
             };
             if found.is_none() {
-                lost.push(format!("ModelStructure refers to {text:?}, which is no variable"));
+                lost.push(format!("ModelStructure refers to {number:?}, which does not exist"));
             }
             found
         };
@@ -313,7 +315,10 @@ fn variables(root: Node, standard: Standard, faults: &mut Vec<(Fault, String)>) 
     let mut found = Vec::new();
     for node in &nodes {
         let Some(reference) = number(*node, "valueReference") else {
-            faults.push((Fault::Reference, format!("{} has no value reference", text(*node, "name"))));
+            faults.push((
+                Fault::Reference,
+                format!("{} has no value reference", attribute_or_empty(*node, "name")),
+            ));
             continue;
         };
         let is_type = |child: &Node| base_of(standard, child.tag_name().name()).is_some();
@@ -322,7 +327,7 @@ fn variables(root: Node, standard: Standard, faults: &mut Vec<(Fault, String)>) 
             Standard::Fmi3 => Some(*node),
         };
         let Some(of_type) = of_type else {
-            faults.push((Fault::Type, format!("{} has no type", text(*node, "name"))));
+            faults.push((Fault::Type, format!("{} has no type", attribute_or_empty(*node, "name"))));
             continue;
         };
         let declared = of_type.attribute("declaredType").and_then(|name| types.get(name)).copied();
@@ -362,7 +367,7 @@ fn variable(
         };
         of_type.attribute(name).or_else(of_declared)
     };
-    let limit = |name| of_both(name).and_then(|text| text.trim().parse().ok());
+    let limit = |name| of_both(name).and_then(|value| value.trim().parse().ok());
     let causality = node.attribute("causality").unwrap_or("local");
     let variability = node.attribute("variability");
     let has_variability = variability.is_some();
@@ -371,7 +376,7 @@ fn variable(
     let product = |sizes: &Vec<usize>| sizes.iter().try_fold(1_usize, |all, size| all.checked_mul(*size));
     let size = dimensions.as_ref().and_then(product);
     Variable {
-        name: text(node, "name"),
+        name: attribute_or_empty(node, "name"),
         reference: 0,
         base,
         causality: causality.to_owned(),
@@ -390,7 +395,7 @@ fn variable(
         derivative_of: None,
         clocked: node.attribute("clocks").is_some(),
         once_per_instant: node.attribute("canHandleMultipleSetPerTimeInstant") == Some("false"),
-        description: text(node, "description"),
+        description: attribute_or_empty(node, "description"),
     }
 }
 
@@ -437,7 +442,7 @@ fn base_of(standard: Standard, element: &str) -> Option<BaseType> {
 
 /// Reads a unit (section 2.2.2 of FMI 2.0, 2.4.3 of FMI 3.0).
 fn unit(node: Node) -> (String, Vec<(String, String)>) {
-    (text(node, "name"), child(node, "BaseUnit").map(attributes).unwrap_or_default())
+    (attribute_or_empty(node, "name"), child(node, "BaseUnit").map(attributes).unwrap_or_default())
 }
 
 /// Reads display units: value in the display unit = factor * value in the unit + offset. Skips inverse units
@@ -447,10 +452,11 @@ fn display_units(node: Node) -> (String, Vec<(String, f64, f64)>) {
         of.has_tag_name("DisplayUnit") && !matches!(of.attribute("inverse"), Some("true" | "1"))
     });
     let others = others.filter_map(|of| {
-        let number = |name, default| of.attribute(name).and_then(|text| text.parse().ok()).unwrap_or(default);
+        let number =
+            |name, default| of.attribute(name).and_then(|value| value.parse().ok()).unwrap_or(default);
         Some((of.attribute("name")?.to_owned(), number("factor", 1.0), number("offset", 0.0)))
     });
-    (text(node, "name"), others.collect())
+    (attribute_or_empty(node, "name"), others.collect())
 }
 
 /// Reads an enumeration. In FMI 2.0 the type element contains an element for the base type (section 2.2.3);
@@ -467,7 +473,7 @@ fn from_one(number: u32) -> Option<usize> {
     (number as usize).checked_sub(1)
 }
 
-fn text(node: Node, name: &str) -> String {
+fn attribute_or_empty(node: Node, name: &str) -> String {
     node.attribute(name).unwrap_or_default().to_owned()
 }
 

@@ -40,12 +40,12 @@ impl Category {
     /// Returns a sentence for the model description.
     pub const fn description(self) -> &'static str {
         match self {
-            Self::Events => "The course of the simulation: instantiation, initialization, reset, termination",
-            Self::Warning => "Something is odd; the simulation goes on",
-            Self::Discard => "A question about the step has no answer; the simulation goes on",
-            Self::Error => "A call was refused; the message says why and what to do",
-            Self::Fatal => "The instance is broken and can only be freed",
-            Self::All => "All of the above",
+            Self::Events => "Progress of the simulation: instantiation, initialization, reset, termination",
+            Self::Warning => "A warning; the simulation continues",
+            Self::Discard => "A status query has no result, or a step ended early; the simulation continues",
+            Self::Error => "A call was rejected; the message gives the reason",
+            Self::Fatal => "The instance failed and can only be freed",
+            Self::All => "All categories",
         }
     }
 

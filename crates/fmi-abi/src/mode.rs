@@ -7,7 +7,7 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Mode {
-    /// After the instance was made or reset.
+    /// After instantiation or a reset.
     Instantiated = 1,
     /// Initialization Mode.
     Initialization = 2,

@@ -23,11 +23,11 @@ impl Standard {
     /// Returns the location of the resources as importers write it: a URI in FMI 2.0 (section 2.1.5), a path
     /// with a final separator in FMI 3.0 (section 2.3.1).
     pub fn resources(self, directory: &Path) -> CString {
-        let text = match self {
+        let resources = match self {
             Self::Fmi2 => uri(&directory.to_string_lossy()),
             Self::Fmi3 => format!("{}{}", directory.display(), std::path::MAIN_SEPARATOR),
         };
-        CString::new(text).unwrap_or_default()
+        CString::new(resources).unwrap_or_default()
     }
 }
 

@@ -26,26 +26,26 @@ impl Value {
 
     /// Parses a value in the format of [`Display`](fmt::Display); `None` if the string is no value of this
     /// base type.
-    pub fn read(base: BaseType, text: &str) -> Option<Self> {
+    pub fn read(base: BaseType, string: &str) -> Option<Self> {
         match base {
-            BaseType::Real => text.parse().ok().map(Self::Real),
-            BaseType::Float32 => text.parse().ok().map(|value: f32| Self::Real(value.into())),
-            BaseType::Enumeration => text.parse().ok().map(|value: i32| Self::Integer(value.into())),
-            BaseType::Boolean => text.parse().ok().map(Self::Boolean),
-            BaseType::Binary => bytes(text).map(Self::Binary),
-            BaseType::String => Some(Self::String(text.to_owned())),
+            BaseType::Real => string.parse().ok().map(Self::Real),
+            BaseType::Float32 => string.parse().ok().map(|value: f32| Self::Real(value.into())),
+            BaseType::Enumeration => string.parse().ok().map(|value: i32| Self::Integer(value.into())),
+            BaseType::Boolean => string.parse().ok().map(Self::Boolean),
+            BaseType::Binary => bytes(string).map(Self::Binary),
+            BaseType::String => Some(Self::String(string.to_owned())),
             _ => {
                 let (min, max) = base.range()?;
-                text.parse().ok().filter(|value| (min..=max).contains(value)).map(Self::Integer)
+                string.parse().ok().filter(|value| (min..=max).contains(value)).map(Self::Integer)
             }
         }
     }
 }
 
 /// Parses two hexadecimal digits for each byte.
-fn bytes(text: &str) -> Option<Vec<u8>> {
+fn bytes(string: &str) -> Option<Vec<u8>> {
     let digit = |byte: &u8| char::from(*byte).to_digit(16);
-    let digits: Vec<u32> = text.as_bytes().iter().map(digit).collect::<Option<_>>()?;
+    let digits: Vec<u32> = string.as_bytes().iter().map(digit).collect::<Option<_>>()?;
     let (pairs, rest) = digits.as_chunks();
     let byte = |[high, low]: &[u32; 2]| u8::try_from(16 * high + low).ok();
     if rest.is_empty() { pairs.iter().map(byte).collect() } else { None }
@@ -113,14 +113,14 @@ mod tests {
             assert_eq!(Value::read(base, &value.to_string()), Some(value));
         }
         assert!(matches!(Value::read(BaseType::Real, "NaN"), Some(Value::Real(value)) if value.is_nan()));
-        for (base, text) in [
+        for (base, string) in [
             (BaseType::Real, "fast"),
             (BaseType::UInt8, "256"),
             (BaseType::Boolean, "1"),
             (BaseType::Binary, "0"),
             (BaseType::Binary, "0g"),
         ] {
-            assert_eq!(Value::read(base, text), None, "{text}");
+            assert_eq!(Value::read(base, string), None, "{string}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The description of the model in a library, as JSON, for the program that makes FMUs (`fmu-package`).
+//! The description of the model in a library, as JSON, for `fmu-package`, which builds FMUs.
 //!
 //! Floating-point numbers and integers of types are strings, which keep all digits. The functions are not
 //! inlined and take trait objects: the description runs once, and its size counts in every library.
@@ -21,7 +21,7 @@ const VERSION: u32 = 1;
 
 /// Function that receives the description: a UTF-8 string and its length in bytes.
 #[doc(hidden)]
-pub type Receive = unsafe extern "C" fn(context: *mut c_void, text: *const u8, length: usize);
+pub type Receive = unsafe extern "C" fn(context: *mut c_void, json: *const u8, length: usize);
 
 /// Passes the description of a model to `receive`, or an empty description if the model panics. The model may
 /// read the files in the directory `resources`.
@@ -37,13 +37,13 @@ pub unsafe fn pass_description<M: Exported>(
 ) {
     // SAFETY: the caller guarantees a string or NULL.
     let resources = unsafe { string(resources) }.map(|path| path.to_string_lossy().into_owned());
-    let text = catch_unwind(|| describe_with::<M>(resources.as_ref())).unwrap_or_else(|panic| {
+    let json = catch_unwind(|| describe_with::<M>(resources.as_ref())).unwrap_or_else(|panic| {
         forget_panic(Err(panic));
         String::new()
     });
     // SAFETY: the caller guarantees that `receive` accepts `context`; pointer and length come from one
     // string.
-    unsafe { receive(context, text.as_ptr(), text.len()) }
+    unsafe { receive(context, json.as_ptr(), json.len()) }
 }
 
 /// Returns the description of a model in this program, which has no resources.
@@ -93,14 +93,14 @@ fn describe_with<M: Exported>(resources: Option<&String>) -> String {
 
 #[inline(never)]
 fn info(json: &mut Json, of: &Info) {
-    json.text("name", of.name);
-    json.text("identifier", of.identifier);
-    json.text("guid", of.guid);
-    json.text("description", of.description);
-    json.text("author", of.author);
-    json.text("modelVersion", of.version);
-    json.text("license", of.license);
-    json.text("copyright", of.copyright);
+    json.string("name", of.name);
+    json.string("identifier", of.identifier);
+    json.string("guid", of.guid);
+    json.string("description", of.description);
+    json.string("author", of.author);
+    json.string("modelVersion", of.version);
+    json.string("license", of.license);
+    json.string("copyright", of.copyright);
     json.number("startTime", &of.default_experiment.start_time);
     json.number("stopTime", &of.default_experiment.stop_time);
     json.number("stepSize", &of.default_experiment.step_size);
@@ -110,11 +110,11 @@ fn info(json: &mut Json, of: &Info) {
 
 fn variable<M: Exported>(json: &mut Json, of: &Variable<M>) {
     json.open("", '{');
-    json.text("name", of.name());
-    json.text("array", of.name_of_array());
+    json.string("name", of.name());
+    json.string("array", of.name_of_array());
     json.words("dimensions", of.dimensions());
     json.word("element", &of.element());
-    json.text("description", of.description());
+    json.string("description", of.description());
     json.number("causality", &format_args!("{}", of.causality()));
     json.number("variability", &format_args!("{}", of.variability()));
     if let Some(initial) = of.initial() {
@@ -136,11 +136,11 @@ fn variable<M: Exported>(json: &mut Json, of: &Variable<M>) {
 #[inline(never)]
 fn variable_type(json: &mut Json, of: &Type) {
     json.open("type", '{');
-    json.text("name", of.name);
+    json.string("name", of.name);
     json.number("base", &of.base());
     match of.attributes {
         Attributes::Real { quantity, unit: of, min, max, nominal } => {
-            json.text("quantity", quantity);
+            json.string("quantity", quantity);
             unit(json, of);
             for (name, value) in [("min", min), ("max", max), ("nominal", nominal)] {
                 if let Some(value) = value {
@@ -153,16 +153,16 @@ fn variable_type(json: &mut Json, of: &Type) {
             json.number("largest", &max);
         }
         Attributes::Binary { mime_type, max_size } => {
-            json.text("mimeType", mime_type);
+            json.string("mimeType", mime_type);
             json.word("maxSize", &max_size);
         }
         Attributes::Enumeration(items) => {
             json.open("items", '[');
             for item in items {
                 json.open("", '{');
-                json.text("name", item.name);
+                json.string("name", item.name);
                 json.word("value", &item.value);
-                json.text("description", item.description);
+                json.string("description", item.description);
                 json.close('}');
             }
             json.close(']');
@@ -176,13 +176,13 @@ fn variable_type(json: &mut Json, of: &Type) {
 fn unit(json: &mut Json, of: &Unit) {
     let BaseUnit { kg, m, s, A: ampere, K: kelvin, mol, cd, rad, factor, offset } = of.base;
     json.open("unit", '{');
-    json.text("name", of.name);
+    json.string("name", of.name);
     json.words("exponents", [kg, m, s, ampere, kelvin, mol, cd, rad]);
     json.number("factor", &factor);
     json.number("offset", &offset);
     if let Some(display) = of.display {
         json.open("display", '{');
-        json.text("name", display.name);
+        json.string("name", display.name);
         json.number("factor", &display.factor);
         json.number("offset", &display.offset);
         json.close('}');
@@ -194,14 +194,14 @@ fn unit(json: &mut Json, of: &Unit) {
 /// model has none. For Model Exchange, also writes the first event indicator that the model does not write.
 fn starts<M: Exported>(json: &mut Json, setup: &Setup) {
     json.open("", '{');
-    let made = catch_unwind(|| M::new(setup));
-    match made {
+    let instantiated = catch_unwind(|| M::new(setup));
+    match instantiated {
         Ok(Ok(model)) => {
             json.open("values", '[');
             for of in M::TABLE {
                 match catch_unwind(AssertUnwindSafe(|| of.value(&model))) {
                     Ok(value) => match value.filter(|_| of.has_start()) {
-                        Some(value) => json.text("", &value.to_string()),
+                        Some(value) => json.string("", &value.to_string()),
                         None => json.word("", &"null"),
                     },
                     Err(panic) => {
@@ -219,7 +219,7 @@ fn starts<M: Exported>(json: &mut Json, setup: &Setup) {
         }
         Ok(Err(error)) => json.number("error", &format_args!("{error}")),
         Err(panic) => {
-            json.text("error", panic_message(&*panic));
+            json.string("error", panic_message(&*panic));
             forget_panic(Err(panic));
         }
     }
@@ -265,9 +265,9 @@ impl Json {
     }
 
     #[inline(never)]
-    fn quoted(&mut self, text: &str) {
+    fn quoted(&mut self, value: &str) {
         self.0.push('"');
-        for letter in text.chars() {
+        for letter in value.chars() {
             match letter {
                 '"' | '\\' => self.0.extend(['\\', letter]),
                 '\0'..='\x1f' => self.formatted(format_args!("\\u{:04x}", u32::from(letter))),
@@ -278,15 +278,15 @@ impl Json {
     }
 
     #[inline(never)]
-    fn text(&mut self, name: &str, text: &str) {
+    fn string(&mut self, name: &str, value: &str) {
         self.begin(name);
-        self.quoted(text);
+        self.quoted(value);
     }
 
     /// Writes a number with all its digits, or a name, as a string.
     #[inline(never)]
     fn number(&mut self, name: &str, value: &dyn Debug) {
-        self.text(name, &format!("{value:?}"));
+        self.string(name, &format!("{value:?}"));
     }
 
     /// Writes a number, true, false or null.
@@ -303,9 +303,9 @@ impl Json {
     }
 
     #[inline(never)]
-    fn formatted(&mut self, text: std::fmt::Arguments<'_>) {
+    fn formatted(&mut self, value: std::fmt::Arguments<'_>) {
         // Writing to a string does not fail.
-        let _ = self.0.write_fmt(text);
+        let _ = self.0.write_fmt(value);
     }
 }
 
@@ -317,7 +317,7 @@ mod tests {
     fn strings_and_lists_are_json() {
         let mut json = Json::default();
         json.open("", '{');
-        json.text("a", "\"\\\n\u{e9}");
+        json.string("a", "\"\\\n\u{e9}");
         json.words("b", [1, 2]);
         json.number("c", &1e300);
         json.open("d", '[');

@@ -18,7 +18,7 @@ const fn bit(category: Category) -> u8 {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Message {
     pub status: Status,
-    pub text: String,
+    pub message: String,
 }
 
 impl Message {
@@ -30,7 +30,7 @@ impl Message {
     /// interpret.
     pub fn printable(&self) -> CString {
         let special = |c: char| matches!(c, '%' | '#') || c.is_control();
-        let safe: String = self.text.chars().map(|c| if special(c) { '_' } else { c }).collect();
+        let safe: String = self.message.chars().map(|c| if special(c) { '_' } else { c }).collect();
         CString::new(safe).unwrap_or_default()
     }
 }
@@ -48,13 +48,13 @@ pub struct Log(Vec<Message>);
 
 impl Log {
     /// Logs an event of the simulation (`logEvents`).
-    pub fn event(&mut self, text: impl Into<String>) {
-        self.0.push(Message { status: Status::Ok, text: text.into() });
+    pub fn event(&mut self, message: impl Into<String>) {
+        self.0.push(Message { status: Status::Ok, message: message.into() });
     }
 
     /// Logs a warning; the simulation continues (`logStatusWarning`).
-    pub fn warning(&mut self, text: impl Into<String>) {
-        self.0.push(Message { status: Status::Warning, text: text.into() });
+    pub fn warning(&mut self, message: impl Into<String>) {
+        self.0.push(Message { status: Status::Warning, message: message.into() });
     }
 
     /// Returns whether no message is waiting.
@@ -119,8 +119,8 @@ impl Logger {
     }
 
     #[cold]
-    pub fn log(&mut self, status: Status, text: impl Into<String>) {
-        self.add(Message { status, text: text.into() });
+    pub fn log(&mut self, status: Status, message: impl Into<String>) {
+        self.add(Message { status, message: message.into() });
     }
 
     #[cold]
@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn nothing_is_left_that_an_importer_would_expand() {
-        let message = Message { status: Status::Ok, text: "a%s#r1#\0b\nc".to_owned() };
+        let message = Message { status: Status::Ok, message: "a%s#r1#\0b\nc".to_owned() };
         assert_eq!(message.printable().to_str(), Ok("a_s_r1__b_c"));
     }
 }

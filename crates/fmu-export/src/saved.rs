@@ -11,14 +11,14 @@ pub trait StateVisitor {
     /// Visits a Boolean.
     fn boolean(&mut self, value: &mut bool);
     /// Visits a string.
-    fn text(&mut self, value: &mut String);
+    fn string(&mut self, value: &mut String);
     /// Visits the number of elements that follow; each element has at least one byte. A length beyond the
     /// remaining bytes makes the state invalid and becomes 0.
     fn length(&mut self, value: &mut usize);
     /// Marks the state as invalid; it is then rejected.
     fn invalid(&mut self);
     /// Returns whether more elements may follow: false once the state is invalid.
-    fn goes_on(&self) -> bool {
+    fn continues(&self) -> bool {
         true
     }
 }
@@ -46,7 +46,7 @@ impl Saved for bool {
 
 impl Saved for String {
     fn visit(&mut self, visitor: &mut dyn StateVisitor) {
-        visitor.text(self);
+        visitor.string(self);
     }
 }
 
@@ -142,7 +142,7 @@ impl<T: Saved + Default> Saved for Vec<T> {
         self.truncate(length);
         self.iter_mut().for_each(|value| value.visit(visitor));
         // Malformed bytes may claim any length, so an element is made only after the previous ones were read.
-        while self.len() < length && visitor.goes_on() {
+        while self.len() < length && visitor.continues() {
             let mut value = T::default();
             value.visit(visitor);
             self.push(value);

@@ -229,7 +229,7 @@ impl<M: Exported> Simulation<M> {
 
     /// Returns the messages since the last call, of the model and of the FMU.
     pub fn messages(&mut self) -> Vec<(Status, String)> {
-        self.instance.logger.take().into_iter().map(|message| (message.status, message.text)).collect()
+        self.instance.logger.take().into_iter().map(|message| (message.status, message.message)).collect()
     }
 }
 

@@ -4,7 +4,7 @@
 mod models;
 
 use fmu_export::Interface::ModelExchange;
-use fmu_test_kit::careless::{RunBytes, Tally, run, run_seeds};
+use fmu_test_kit::fault_injection::{RunBytes, Tally, run, run_seeds};
 use fmu_test_kit::{Either, FUNCTIONS, Importer, fmi3};
 use models::{oscillator::Name, *};
 use std::io::{Cursor, Read as _};
@@ -38,14 +38,14 @@ fn check_counts(tally: &Tally, functions: &[&str]) {
 }
 
 #[test]
-fn no_sequence_of_calls_breaks_a_promise() {
+fn every_guarantee_holds_for_any_calls() {
     let tally = run_seeds(3, MODELS);
     assert_eq!(tally.len(), 44, "every function is called");
     check_counts(&tally, FUNCTIONS);
 }
 
 #[test]
-fn no_sequence_of_calls_of_fmi3_breaks_a_promise() {
+fn every_guarantee_of_fmi3_holds_for_any_calls() {
     let tally = run_seeds(3, MODELS_OF_FMI3);
     check_counts(&tally, fmi3::FUNCTIONS);
     check_counts(&tally, &["fmi3InstantiateCoSimulation", "fmi3InstantiateModelExchange"]);
@@ -53,7 +53,7 @@ fn no_sequence_of_calls_of_fmi3_breaks_a_promise() {
 
 /// Runs the inputs that libFuzzer found worth keeping, for every test model in both FMI versions.
 #[test]
-fn the_corpus_breaks_no_promise() {
+fn every_guarantee_holds_for_the_corpus() {
     let archive = include_bytes!("../fuzz/corpus.zip");
     let mut archive = zip::ZipArchive::new(Cursor::new(archive)).expect("a zip archive");
     let mut tally = Tally::new();
@@ -118,8 +118,8 @@ fn threads_pass_instances_on() {
             // Some are freed and replaced.
             if turn % 37 == thread {
                 *job = Job::new(job.number);
-                drop(Importer::of::<Oscillator>(ModelExchange));
-                drop(fmi3::Importer::of::<Oscillator>(ModelExchange));
+                drop(Importer::new::<Oscillator>(ModelExchange));
+                drop(fmi3::Importer::new::<Oscillator>(ModelExchange));
             }
         }
     };

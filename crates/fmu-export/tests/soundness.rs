@@ -19,7 +19,7 @@ use valid_calls::ValidCall;
 /// A log callback that makes all calls for every message: of rejected calls, of discarded queries, of events,
 /// of the model. Each call returns an error, and the interrupted call continues.
 fn log_callback_calls_back<F: Either + 'static>(free: unsafe fn(&F)) {
-    let arguments = Arguments { logging_on: 1, ..Arguments::of::<Talker>(CoSimulation) };
+    let arguments = Arguments { logging_on: 1, ..Arguments::new::<Talker>(CoSimulation) };
     let fmu = Box::new(F::make::<Talker>(&arguments).unwrap());
     let other = F::make::<Talker>(&arguments).unwrap();
     let results = Arc::new(Mutex::new(Vec::new()));
@@ -38,7 +38,7 @@ fn log_callback_calls_back<F: Either + 'static>(free: unsafe fn(&F)) {
     }));
     fmu.take_log();
     fmu.initialize(0.0);
-    fmu.say(talker::Name::heard as u32, "Ping");
+    fmu.write_string(talker::Name::heard as u32, "Ping");
     fmu.step(0.0, 1.0);
     fmu.set(&[talker::Name::volume as u32], &[10.5]);
     assert_eq!(fmu.try_set(&[99], &[0.0]), Status::Error);

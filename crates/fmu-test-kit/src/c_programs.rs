@@ -12,14 +12,14 @@ use std::process::Command;
 ///
 /// # Panics
 /// Panics if there is no such directory.
-pub fn headers(folder: &Path) -> PathBuf {
+pub fn headers(directory: &Path) -> PathBuf {
     let named = std::env::var_os("FMI2_HEADERS").map(PathBuf::from);
-    let in_venvs = folder.ancestors().flat_map(|folder| {
-        let versions = std::fs::read_dir(folder.join(".venv/lib")).into_iter().flatten().flatten();
+    let in_venvs = directory.ancestors().flat_map(|directory| {
+        let versions = std::fs::read_dir(directory.join(".venv/lib")).into_iter().flatten().flatten();
         versions.map(|version| version.path().join("site-packages/fmpy/c-code"))
     });
-    named.into_iter().chain(in_venvs).find(|folder| folder.join("fmi2Functions.h").exists()).expect(
-        "the headers of FMI 2.0 and 3.0 are missing; run: make headers (or set FMI2_HEADERS to their folder)",
+    named.into_iter().chain(in_venvs).find(|directory| directory.join("fmi2Functions.h").exists()).expect(
+        "the headers of FMI 2.0 and 3.0 are missing; run: make headers (or set FMI2_HEADERS to their directory)",
     )
 }
 
@@ -31,11 +31,12 @@ pub fn headers(folder: &Path) -> PathBuf {
 pub fn library(name: &str) -> PathBuf {
     let test = std::env::current_exe().expect("a test");
     let file = format!("{DLL_PREFIX}{name}{DLL_SUFFIX}");
-    let folders = test.ancestors().skip(1).take(2);
-    let mut paths = folders.flat_map(|folder| [folder.join(&file), folder.join("examples").join(&file)]);
+    let directories = test.ancestors().skip(1).take(2);
+    let mut paths =
+        directories.flat_map(|directory| [directory.join(&file), directory.join("examples").join(&file)]);
     paths.find(|path| path.exists()).unwrap_or_else(|| {
         panic!(
-            "there is no {file} near {}; cargo build --examples makes it, and cargo test without --test",
+            "{file} is missing near {}; cargo build --examples builds it, and so does cargo test without --test",
             test.display()
         )
     })
@@ -56,8 +57,8 @@ pub fn output(command: &mut Command, missing: &str) -> String {
 ///
 /// # Panics
 /// Panics if the compiler reports an error or a warning.
-pub fn compile(source: &Path, folder: &Path) -> PathBuf {
-    let program = folder.join(source.file_stem().expect("a file"));
+pub fn compile(source: &Path, directory: &Path) -> PathBuf {
+    let program = directory.join(source.file_stem().expect("a file"));
     output(c_compiler(&headers(source)).arg("-o").args([&program, source]).arg("-ldl"), NO_COMPILER);
     program
 }

@@ -31,17 +31,19 @@ fn is_real<M>(variable: &Variable<M>) -> bool {
 
 /// Returns the Real inputs.
 pub fn inputs<M: Exported>() -> Vec<u32> {
-    indices::<M>(|of| is_real(of) && of.causality() == Causality::Input)
+    indices::<M>(|variable| is_real(variable) && variable.causality() == Causality::Input)
 }
 
 /// Returns the Real outputs.
 pub(crate) fn outputs<M: Exported>() -> Vec<u32> {
-    indices::<M>(|of| is_real(of) && of.causality() == Causality::Output)
+    indices::<M>(|variable| is_real(variable) && variable.causality() == Causality::Output)
 }
 
 /// Returns the Boolean parameters.
 pub(crate) fn boolean_parameters<M: Exported>() -> Vec<u32> {
-    indices::<M>(|of| of.base() == BaseType::Boolean && of.causality() == Causality::Parameter)
+    indices::<M>(|variable| {
+        variable.base() == BaseType::Boolean && variable.causality() == Causality::Parameter
+    })
 }
 
 /// Returns the start value of a Real parameter.
@@ -76,8 +78,9 @@ pub fn output_derivatives_fit_steps<M: Exported>(
     go_on: impl Fn(f64),
 ) {
     const H: f64 = 5e-5;
-    let moving =
-        indices::<M>(|of| is_real(of) && matches!(of.causality(), Causality::Output | Causality::Local));
+    let moving = indices::<M>(|variable| {
+        is_real(variable) && matches!(variable.causality(), Causality::Output | Causality::Local)
+    });
     let found: Vec<_> = moving.iter().map(|index| fmu.rate(*index)).collect();
     let state = fmu.save();
     let y = [0.0, 1.0, 2.0, 3.0, 4.0].map(|steps| {

@@ -24,7 +24,7 @@ pub struct Updated {
 
 /// Returns the value of a Boolean of C.
 #[track_caller]
-pub(crate) fn truth(flag: i32) -> bool {
+pub(crate) fn to_bool(flag: i32) -> bool {
     assert!([0, 1].contains(&flag), "{flag} is no Boolean");
     flag == 1
 }
@@ -152,7 +152,7 @@ pub trait Either: Send {
         values {
             set_integer fmi2SetInteger fmi3SetInt32, get_integer fmi2GetInteger fmi3GetInt32: i32;
             set_boolean fmi2SetBoolean fmi3SetBoolean, get_boolean fmi2GetBoolean fmi3GetBoolean: u8;
-            set_text fmi2SetString fmi3SetString, get_text fmi2GetString fmi3GetString: *const c_char;
+            set_string fmi2SetString fmi3SetString, get_string fmi2GetString fmi3GetString: *const c_char;
             set_item fmi2SetInteger fmi3SetInt64, get_item fmi2GetInteger fmi3GetInt64: i32;
         }
     }
@@ -368,7 +368,7 @@ pub trait Either: Send {
         if status != Status::Ok {
             return Err(status);
         }
-        let [again, terminate, nominals_changed, states_changed, defined] = flags.map(truth);
+        let [again, terminate, nominals_changed, states_changed, defined] = flags.map(to_bool);
         Ok(Updated { again, terminate, nominals_changed, states_changed, next: defined.then_some(next) })
     }
 
@@ -390,7 +390,7 @@ pub trait Either: Send {
                 ([event, terminate].map(i32::from), status)
             }
         };
-        if status == Status::Ok { Ok(flags.map(truth)) } else { Err(status) }
+        if status == Status::Ok { Ok(flags.map(to_bool)) } else { Err(status) }
     }
 
     /// Serializes a saved state.
@@ -411,11 +411,11 @@ pub trait Either: Send {
 
     /// Makes an instance of a model in this program, or of the library that `FMU_LIBRARY` names.
     #[track_caller]
-    fn of<M: Exported>(interface: Interface) -> Self
+    fn new<M: Exported>(interface: Interface) -> Self
     where
         Self: Sized,
     {
-        Self::make::<M>(&Arguments::of::<M>(interface)).expect("an instance")
+        Self::make::<M>(&Arguments::new::<M>(interface)).expect("an instance")
     }
 
     /// Makes an instance and initializes it at this time.
@@ -423,7 +423,7 @@ pub trait Either: Send {
     where
         Self: Sized,
     {
-        let fmu = Self::of::<M>(Interface::CoSimulation);
+        let fmu = Self::new::<M>(Interface::CoSimulation);
         fmu.initialize(start_time);
         fmu
     }
@@ -489,14 +489,14 @@ pub trait Either: Send {
         let log = self.take_log();
         assert_eq!(status, Status::Error, "{label} is not rejected");
         let [message] = log.as_slice() else { panic!("{label}: one message expected, not {log:#?}") };
-        let said = (message.status, message.category.as_str());
-        assert_eq!(said, (Status::Error, "logStatusError"), "{label}");
+        let found = (message.status, message.category.as_str());
+        assert_eq!(found, (Status::Error, "logStatusError"), "{label}");
         message.assert_clean();
         let prefix = &Self::functions()[0][..4];
-        assert!(message.text.starts_with(prefix), "{label}: which function? {}", message.text);
+        assert!(message.message.starts_with(prefix), "{label}: which function? {}", message.message);
         assert_eq!(before, self.serialized(), "{label} changed the instance");
         self.take_log();
-        message.text.clone()
+        message.message.clone()
     }
 
     /// Asserts that a call is rejected with a message that contains these words.
@@ -625,23 +625,23 @@ pub trait Either: Send {
     fn boolean(&self, index: u32) -> bool {
         let mut value = 7;
         self.ok(self.get_boolean(index, &mut value));
-        truth(value.into())
+        to_bool(value.into())
     }
 
     /// Returns the value of a String.
     #[track_caller]
-    fn text(&self, index: u32) -> String {
+    fn string(&self, index: u32) -> String {
         let mut value = null();
-        self.ok(self.get_text(index, &mut value));
+        self.ok(self.get_string(index, &mut value));
         // SAFETY: a string of the FMU, valid until the next call.
         unsafe { CStr::from_ptr(value) }.to_str().expect("UTF-8").to_owned()
     }
 
     /// Sets a String.
     #[track_caller]
-    fn say(&self, index: u32, text: &str) {
-        let text = CString::new(text).expect("no NUL");
-        self.ok(self.set_text(index, text.as_ptr()));
+    fn write_string(&self, index: u32, value: &str) {
+        let value = CString::new(value).expect("no NUL");
+        self.ok(self.set_string(index, value.as_ptr()));
     }
 
     /// Returns the time derivative of a variable.

@@ -29,7 +29,7 @@ unsafe extern "C" fn log_message(
 /// Calls `fmi2Instantiate`. Afterwards overwrites the callbacks structure and the instance name, because the
 /// FMU must have copied them.
 fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi2Component {
-    let pointer = |text: Option<&CStr>| text.map_or(null(), CStr::as_ptr);
+    let pointer = |string: Option<&CStr>| string.map_or(null(), CStr::as_ptr);
     let mut name = arguments.instance_name.map(|name| name.to_bytes_with_nul().to_vec());
     #[cfg(not(miri))]
     let logger: unsafe extern "C" fn(_, _, _, _, _) = log_message;
@@ -74,7 +74,7 @@ impl Importer {
     pub fn version_and_platform(&self) -> [&CStr; 2] {
         let Functions { fmi2GetVersion, fmi2GetTypesPlatform, .. } = self.functions;
         // SAFETY: both functions return strings that the library keeps.
-        [fmi2GetVersion, fmi2GetTypesPlatform].map(|text| unsafe { CStr::from_ptr(text()) })
+        [fmi2GetVersion, fmi2GetTypesPlatform].map(|function| unsafe { CStr::from_ptr(function()) })
     }
 
     /// Calls `fmi2SetDebugLogging` with these categories.

@@ -1,6 +1,6 @@
 //! FMI 3.0: an instance as an importer uses it.
 
-use crate::either::{Version, truth};
+use crate::either::{Version, to_bool};
 use crate::importer::{Log, importer, remember};
 use crate::{Arguments, Either, Message};
 pub use fmi_abi::fmi3::Functions;
@@ -24,7 +24,7 @@ unsafe extern "C" fn log_message(
 
 /// Calls the function that makes instances of the interface type.
 fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi3Instance {
-    let pointer = |text: Option<&CStr>| text.map_or(null(), CStr::as_ptr);
+    let pointer = |string: Option<&CStr>| string.map_or(null(), CStr::as_ptr);
     let name = pointer(arguments.instance_name);
     let token = pointer(arguments.guid.as_deref());
     // FMI 3.0 needs a path, not a URI.
@@ -106,7 +106,7 @@ impl Importer {
             return Err(status);
         }
         let [event_handling_needed, terminate, early_return] =
-            [event, terminate, early].map(|flag| truth(flag.into()));
+            [event, terminate, early].map(|flag| to_bool(flag.into()));
         Ok(Stepped { event_handling_needed, terminate, early_return, last_successful_time: time })
     }
 }

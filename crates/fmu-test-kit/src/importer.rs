@@ -14,8 +14,8 @@ pub struct Message {
     pub status: Status,
     /// Log category.
     pub category: String,
-    /// Text of the message.
-    pub text: String,
+    /// The message.
+    pub message: String,
 }
 
 impl Message {
@@ -26,7 +26,7 @@ impl Message {
     /// Panics if one of these assertions fails.
     #[track_caller]
     pub fn assert_clean(&self) {
-        assert!(!self.text.contains(['%', '#', '\n']) && !self.text.is_empty(), "{self:?}");
+        assert!(!self.message.contains(['%', '#', '\n']) && !self.message.is_empty(), "{self:?}");
         let known = Category::ALL.map(|category| category.name().to_str().expect("ASCII"));
         assert!(known.contains(&self.category.as_str()), "{self:?}");
     }
@@ -71,16 +71,16 @@ pub(crate) unsafe fn remember(
     message: *const c_char,
 ) {
     // SAFETY: the caller guarantees NULL or a string.
-    let text = |pointer: *const c_char| match unsafe { pointer.as_ref() } {
+    let string = |pointer: *const c_char| match unsafe { pointer.as_ref() } {
         // SAFETY: the pointer is not NULL, so it is a string.
         Some(_) => unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned(),
         None => String::new(),
     };
     let status = Status::from_c(status);
-    let [instance_name, category, text] = [instance_name, category, message].map(text);
+    let [instance_name, category, message] = [instance_name, category, message].map(string);
     // SAFETY: NULL, or the `Log` that was passed with the logger and lives as long as the instance.
     if let Some(log) = unsafe { environment.cast::<Log>().as_ref() } {
-        lock(&log.messages).push(Message { instance_name, status, category, text });
+        lock(&log.messages).push(Message { instance_name, status, category, message });
         let hook = lock(&log.hook).take();
         if let Some(mut hook) = hook {
             hook();
@@ -114,7 +114,7 @@ pub struct Arguments<'a> {
 
 impl Arguments<'static> {
     /// Returns the arguments of an importer without optional capabilities.
-    pub fn of<M: Exported>(interface: Interface) -> Self {
+    pub fn new<M: Exported>(interface: Interface) -> Self {
         Self {
             instance_name: Some(c"instance"),
             fmu_type: interface as i32,
@@ -134,7 +134,7 @@ impl Arguments<'static> {
     /// Returns the arguments of an importer that allows early return, and uses Event Mode if the model has it.
     pub fn with_events<M: Exported>(interface: Interface) -> Self {
         let event_mode_used = M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode()).into();
-        Self { event_mode_used, early_return_allowed: 1, ..Self::of::<M>(interface) }
+        Self { event_mode_used, early_return_allowed: 1, ..Self::new::<M>(interface) }
     }
 }
 

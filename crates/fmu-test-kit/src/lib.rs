@@ -3,16 +3,16 @@
 //! [`Importer`] is a plain importer of FMI 2.0: the C functions as methods of an instance that frees itself.
 //! [`fmi3`] contains the importer of FMI 3.0. [`Either`] contains the operations that both share, and
 //! assertions. [`serialized`] describes the bytes of saved states; [`c_programs`] supports tests with C
-//! programs. [`careless`] is a fault-injecting importer that makes any calls in any order. [`realtime`]
+//! programs. [`fault_injection`] is a fault-injecting importer that makes any calls in any order. [`realtime`]
 //! checks that code may run in a control loop. [`checks`] contains checks that hold for every FMU.
 
 // Under Miri, the logger is variadic as in C.
 #![cfg_attr(miri, feature(c_variadic))]
 
 pub mod c_programs;
-pub mod careless;
 pub mod checks;
 mod either;
+pub mod fault_injection;
 pub mod fmi2;
 pub mod fmi3;
 mod importer;

@@ -106,7 +106,7 @@ struct Loop<F: Either> {
     /// Values to set and values read.
     values: [Vec<f64>; 2],
     parameter: (u32, f64),
-    truths: Vec<u32>,
+    booleans: Vec<u32>,
 }
 
 impl<F: Either> Loop<F> {
@@ -121,7 +121,7 @@ impl<F: Either> Loop<F> {
             inputs,
             outputs,
             parameter: parameter.expect("a parameter"),
-            truths: boolean_parameters::<M>(),
+            booleans: boolean_parameters::<M>(),
         }
     }
 
@@ -141,7 +141,7 @@ impl<F: Either> Loop<F> {
     fn change(&self, factor: f64) {
         let Self { fmu, parameter: (parameter, start), .. } = self;
         fmu.set(&[*parameter], &[start * factor]);
-        self.truths.iter().for_each(|truth| fmu.ok(fmu.set_boolean(*truth, 1)));
+        self.booleans.iter().for_each(|boolean| fmu.ok(fmu.set_boolean(*boolean, 1)));
         fmu.ok(fmu.set_state(self.state));
         self.outputs.iter().for_each(|output| _ = fmu.rate(*output));
         fmu.partial(self.outputs[0], self.inputs[0]);
@@ -194,28 +194,28 @@ pub fn assert_no_system_call<M: Exported>() {
 ///
 /// # Panics
 /// Panics if it finds any.
-pub fn assert_nothing_to_lock(folder: &Path) -> usize {
+pub fn assert_nothing_to_lock(directory: &Path) -> usize {
     let shared = ["Mutex", "RwLock", "Condvar", "Once", "OnceLock", "LazyLock", "thread_local"];
-    let mut folders = vec![folder.to_owned()];
+    let mut directories = vec![directory.to_owned()];
     let mut files = 0;
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(&folder).expect("a readable folder") {
-            let path = entry.expect("a readable folder").path();
+    while let Some(directory) = directories.pop() {
+        for entry in std::fs::read_dir(&directory).expect("a readable directory") {
+            let path = entry.expect("a readable directory").path();
             if path.is_dir() {
-                folders.push(path);
+                directories.push(path);
                 continue;
             }
             files += 1;
-            let text = std::fs::read_to_string(&path).expect("a readable file");
+            let source = std::fs::read_to_string(&path).expect("a readable file");
             // Each instance has a separate WebAssembly module, so nothing in it is shared.
-            if text.contains("#![cfg(target_family = \"wasm\")]") {
+            if source.contains("#![cfg(target_family = \"wasm\")]") {
                 continue;
             }
-            for word in text.split(|c: char| !c.is_alphanumeric() && c != '_') {
+            for word in source.split(|c: char| !c.is_alphanumeric() && c != '_') {
                 let found = shared.contains(&word) || word.starts_with("Atomic");
                 assert!(!found, "{} has {word}", path.display());
             }
-            assert!(!text.contains("static mut"), "{} has static mut", path.display());
+            assert!(!source.contains("static mut"), "{} has static mut", path.display());
         }
     }
     files

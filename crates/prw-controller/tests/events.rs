@@ -59,7 +59,7 @@ fn bits(outputs: [f64; 6]) -> [u64; 6] {
 /// Returns the outputs at communication points one sample apart; the controller handles the samples within
 /// its steps.
 fn steps_of_fmi2() -> Vec<[f64; 6]> {
-    let fmu = fmu_test_kit::Importer::of::<Controller>(CoSimulation);
+    let fmu = fmu_test_kit::Importer::new::<Controller>(CoSimulation);
     fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
     fmu.initialize(START);
     let outputs = |sample| {
@@ -75,7 +75,7 @@ fn steps_of_fmi2() -> Vec<[f64; 6]> {
 
 fn with(event_mode_used: fmi3Boolean, early_return_allowed: fmi3Boolean) -> fmu_test_kit::fmi3::Importer {
     let arguments =
-        Arguments { event_mode_used, early_return_allowed, ..Arguments::of::<Controller>(CoSimulation) };
+        Arguments { event_mode_used, early_return_allowed, ..Arguments::new::<Controller>(CoSimulation) };
     let fmu = fmu_test_kit::fmi3::Importer::make::<Controller>(&arguments).unwrap();
     fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
     fmu.initialize(START);
@@ -144,7 +144,7 @@ fn too_many_samples_within_a_step() {
     let before = (fmu.bytes(), bits(fmu.get(OUTPUTS)));
     assert_eq!(fmu.do_step(START, 1000.0), Err(Status::Discard));
     let log = fmu.take_log();
-    assert!(log[0].text.contains("more than 10000 events; make shorter steps"), "{log:?}");
+    assert!(log[0].message.contains("more than 10000 events; make shorter steps"), "{log:?}");
     assert_eq!((fmu.bytes(), bits(fmu.get(OUTPUTS))), before);
     assert!(fmu.do_step(START, 70.0).unwrap().event_handling_needed);
 }
@@ -168,7 +168,7 @@ fn an_event_that_the_importer_does_not_handle() {
 #[test]
 fn in_model_exchange() {
     fn check<F: Either>() {
-        let fmu = F::make::<Controller>(&Arguments::of::<Controller>(ModelExchange)).unwrap();
+        let fmu = F::make::<Controller>(&Arguments::new::<Controller>(ModelExchange)).unwrap();
         fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
         fmu.initialize(START);
         for (sample, expected) in (0..).zip(steps_of_fmi2()) {
@@ -194,7 +194,7 @@ fn in_model_exchange() {
 /// Checks that an importer that ignores time events for hours gets an error.
 #[test]
 fn too_many_samples_at_once() {
-    let fmu = fmu_test_kit::Importer::of::<Controller>(ModelExchange);
+    let fmu = fmu_test_kit::Importer::new::<Controller>(ModelExchange);
     fmu.initialize(0.0);
     fmu.ok(fmu.fmi2SetTime(1e6));
     fmu.rejected_with(&["sample_time"], |fmu| fmu.fmi2NewDiscreteStates(&mut Default::default()));
@@ -205,7 +205,7 @@ fn too_many_samples_at_once() {
 #[test]
 fn partial_derivatives_with_respect_to_time() {
     const WIDTH: f64 = 1.0 / 65_536.0;
-    let fmu = fmu_test_kit::fmi3::Importer::of::<Controller>(ModelExchange);
+    let fmu = fmu_test_kit::fmi3::Importer::new::<Controller>(ModelExchange);
     fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
     fmu.initialize(START);
     let mut moves = [false; 6];

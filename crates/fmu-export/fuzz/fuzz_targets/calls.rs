@@ -1,11 +1,11 @@
-//! libFuzzer looks for bytes that, read as calls of the FMU's functions, break a promise of `fmu_test_kit::careless` or, under
+//! libFuzzer looks for bytes that, read as calls of the FMU's functions, violate a guarantee of `fmu_test_kit::fault_injection` or, under
 //! the AddressSanitizer, the memory.
 #![no_main]
 
 #[path = "../../tests/models/mod.rs"]
 mod models;
 
-use fmu_test_kit::careless::{RunBytes, Tally, run};
+use fmu_test_kit::fault_injection::{RunBytes, Tally, run};
 use fmu_test_kit::{Importer, fmi3};
 use libfuzzer_sys::fuzz_target;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -37,7 +37,7 @@ static CALLS: AtomicU64 = AtomicU64::new(0);
 const REPORT_EVERY: u64 = 1_000_000;
 
 fuzz_target!(|bytes: &[u8]| {
-    // The last byte says which model and standard; the calls are read from the front.
+    // The last byte selects the model and the FMI version; the calls are read from the front.
     let Some((which, calls)) = bytes.split_last() else { return };
     let mut tally = Tally::new();
     MODELS[usize::from(*which) % MODELS.len()](calls, &mut tally);

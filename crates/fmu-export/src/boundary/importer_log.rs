@@ -48,7 +48,7 @@ impl ImporterLog {
     #[cfg(not(target_family = "wasm"))]
     pub fn deliver(&self, message: &Message) {
         let Some(callback) = self.callback else { return };
-        let (category, text) = (message.category().as_ptr(), message.printable());
+        let (category, string) = (message.category().as_ptr(), message.printable());
         // SAFETY: the importer guarantees that the logger works until the instance is freed. All strings are
         // NUL-terminated. The message contains no format directive, so the variadic logger reads no further
         // arguments.
@@ -59,10 +59,10 @@ impl ImporterLog {
                     self.instance_name.as_ptr(),
                     message.status as _,
                     category,
-                    text.as_ptr(),
+                    string.as_ptr(),
                 ),
                 Callback::Fmi3(logger) => {
-                    logger(self.environment, message.status as _, category, text.as_ptr());
+                    logger(self.environment, message.status as _, category, string.as_ptr());
                 }
             }
         }

@@ -48,7 +48,7 @@ pub(crate) fn instantiate<M: Exported>(
             }
         };
         let mut logger = Logger::new(standard, false);
-        logger.add(Message { status: Status::Error, text: format!("{function}: {rejection}") });
+        logger.add(Message { status: Status::Error, message: format!("{function}: {rejection}") });
         logger.take().iter().for_each(|message| importer.deliver(message));
         None
     };
@@ -78,9 +78,12 @@ fn make_instance<M: Exported>(arguments: Arguments) -> Outcome<Instance<M>> {
             guid.map_or("NULL".into(), CStr::to_string_lossy),
         ));
     }
-    let text = |text: &CStr| text.to_string_lossy().into_owned();
-    let setup =
-        Setup { interface: interface?, instance_name: text(name), resource_location: resources.map(text) };
+    let string = |string: &CStr| string.to_string_lossy().into_owned();
+    let setup = Setup {
+        interface: interface?,
+        instance_name: string(name),
+        resource_location: resources.map(string),
+    };
     Instance::new(setup, importer, logging_on)
 }
 

@@ -13,15 +13,15 @@ use fmi_abi::Category;
 use fmi_abi::c_types::c_char;
 use std::ffi::CStr;
 
-/// Converts times and tolerance of the importer; `Truth` is the Boolean type of the FMI version.
-pub(crate) fn experiment<Truth: Default + PartialEq>(
-    tolerance_defined: Truth,
+/// Converts times and tolerance of the importer; `Boolean` is the Boolean type of the FMI version.
+pub(crate) fn experiment<Boolean: Default + PartialEq>(
+    tolerance_defined: Boolean,
     tolerance: f64,
     start_time: f64,
-    stop_time_defined: Truth,
+    stop_time_defined: Boolean,
     stop_time: f64,
 ) -> Experiment {
-    let is_false = Truth::default();
+    let is_false = Boolean::default();
     Experiment {
         start_time,
         stop_time: (stop_time_defined != is_false).then_some(stop_time),
@@ -46,13 +46,13 @@ pub unsafe fn reset<M: Exported>(instance: &mut Instance<M>) -> Outcome {
     instance.reset()
 }
 
-pub unsafe fn set_debug_logging<M: Exported, Truth: Default + PartialEq>(
+pub unsafe fn set_debug_logging<M: Exported, Boolean: Default + PartialEq>(
     instance: &mut Instance<M>,
-    on: Truth,
+    on: Boolean,
     count: usize,
     categories: *const *const c_char,
 ) -> Outcome {
-    let on = on != Truth::default();
+    let on = on != Boolean::default();
     // SAFETY: by contract, an array of this length.
     let names = unsafe { array(categories, count, "categories") }?;
     let mut found = 0;

@@ -12,11 +12,11 @@ pub unsafe fn enter_continuous_time_mode<M: Exported>(instance: &mut Instance<M>
     Ok(())
 }
 
-pub unsafe fn completed_integrator_step<M: Exported, Truth: From<bool>>(
+pub unsafe fn completed_integrator_step<M: Exported, Boolean: From<bool>>(
     instance: &mut Instance<M>,
-    _no_set_fmu_state_prior_to_current_point: Truth,
-    enter_event_mode: *mut Truth,
-    terminate_simulation: *mut Truth,
+    _no_set_fmu_state_prior_to_current_point: Boolean,
+    enter_event_mode: *mut Boolean,
+    terminate_simulation: *mut Boolean,
 ) -> Outcome {
     // SAFETY: by contract, each is NULL or points to a value.
     let (enter_event_mode, terminate_simulation) = unsafe {

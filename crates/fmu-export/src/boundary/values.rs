@@ -163,32 +163,32 @@ pub(crate) fn set_booleans<M: Exported, R: Reference, T: From<bool> + PartialEq 
     bases: &[BaseType],
 ) -> Outcome {
     let known = [false, true].map(T::from);
-    if let Some(place) = values.iter().position(|value| !known.contains(value)) {
-        return instance.reject_value(vr, bases, place, |name| {
-            format!("{name} must be 0 (false) or 1 (true), it is {}", values[place])
+    if let Some(index) = values.iter().position(|value| !known.contains(value)) {
+        return instance.reject_value(vr, bases, index, |name| {
+            format!("{name} must be 0 (false) or 1 (true), it is {}", values[index])
         });
     }
     instance.set(vr, bases, &|index| Value::Boolean(values[index] == known[1]))
 }
 
 /// Gets strings. The instance owns them until the next call on it.
-pub(crate) fn get_texts<M: Exported, R: Reference>(
+pub(crate) fn get_strings<M: Exported, R: Reference>(
     instance: &mut Instance<M>,
     vr: &[R],
     values: &mut [MaybeUninit<*const c_char>],
     bases: &[BaseType],
 ) -> Outcome {
-    let mut texts = Vec::with_capacity(vr.len());
+    let mut strings = Vec::with_capacity(vr.len());
     instance.get(vr, bases, &mut |_, value| {
-        if let Value::String(text) = value {
+        if let Value::String(value) = value {
             // C would read a NUL as the end of the string.
-            texts.push(CString::new(text.replace('\0', " ")).unwrap_or_default());
+            strings.push(CString::new(value.replace('\0', " ")).unwrap_or_default());
         }
     })?;
-    values.iter_mut().zip(&texts).for_each(|(value, text)| {
-        value.write(text.as_ptr());
+    values.iter_mut().zip(&strings).for_each(|(value, string)| {
+        value.write(string.as_ptr());
     });
-    instance.texts = texts;
+    instance.strings = strings;
     Ok(())
 }
 
@@ -196,24 +196,24 @@ pub(crate) fn get_texts<M: Exported, R: Reference>(
 ///
 /// # Safety
 /// Each value is NULL or a string.
-pub(crate) unsafe fn set_texts<M: Exported, R: Reference>(
+pub(crate) unsafe fn set_strings<M: Exported, R: Reference>(
     instance: &mut Instance<M>,
     vr: &[R],
     values: &[*const c_char],
     bases: &[BaseType],
 ) -> Outcome {
-    let mut texts = Vec::with_capacity(vr.len());
-    for (place, value) in values.iter().enumerate() {
+    let mut strings = Vec::with_capacity(vr.len());
+    for (index, value) in values.iter().enumerate() {
         // SAFETY: by contract, NULL or a string.
         let fault = match unsafe { string(*value) }.map(CStr::to_str) {
-            Some(Ok(text)) => {
-                texts.push(Value::String(text.to_owned()));
+            Some(Ok(value)) => {
+                strings.push(Value::String(value.to_owned()));
                 continue;
             }
             Some(Err(_)) => "not UTF-8",
             None => "NULL",
         };
-        return instance.reject_value(vr, bases, place, |name| format!("the text for {name} is {fault}"));
+        return instance.reject_value(vr, bases, index, |name| format!("the string for {name} is {fault}"));
     }
-    instance.set(vr, bases, &|index| texts[index].clone())
+    instance.set(vr, bases, &|index| strings[index].clone())
 }

@@ -70,7 +70,7 @@ pub fn room(size: usize) -> *mut c_void {
 pub unsafe fn broken<M: Exported>(c: *mut c_void, function: *const c_char, reason: *const c_char) -> Status {
     // SAFETY: the caller guarantees strings.
     let [function, reason] =
-        [function, reason].map(|text| unsafe { string(text) }.unwrap_or_default().to_string_lossy());
+        [function, reason].map(|pointer| unsafe { string(pointer) }.unwrap_or_default().to_string_lossy());
     let panic = PANIC.take().unwrap_or_else(|| reason.into_owned());
     // SAFETY: the caller guarantees that `c` is NULL or a live component.
     match unsafe { c.cast::<Component<M>>().as_ref() } {
@@ -79,8 +79,8 @@ pub unsafe fn broken<M: Exported>(c: *mut c_void, function: *const c_char, reaso
             finish(component, &function, Err(Box::new(panic) as Box<dyn Any + Send>))
         }
         None => {
-            let text = format!("{function}: internal failure ({panic})");
-            log(&Message { status: Status::Error, text });
+            let message = format!("{function}: internal failure ({panic})");
+            log(&Message { status: Status::Error, message });
             Status::Error
         }
     }

@@ -37,7 +37,7 @@ getters_and_setters! { fmi2ValueReference, [];
     fmi2GetReal get_reals, fmi2SetReal set_reals, fmi2Real: [Real];
     fmi2GetInteger get_integers, fmi2SetInteger set_integers, fmi2Integer: [Integer, Enumeration];
     fmi2GetBoolean get_booleans, fmi2SetBoolean set_booleans, fmi2Boolean: [Boolean];
-    fmi2GetString get_texts, fmi2SetString set_texts, fmi2String: [String];
+    fmi2GetString get_strings, fmi2SetString set_strings, fmi2String: [String];
 }
 
 pub unsafe fn fmi2GetDirectionalDerivative<M: Exported>(

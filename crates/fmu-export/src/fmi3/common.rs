@@ -42,7 +42,7 @@ getters_and_setters! { FromOne, [value_count];
     fmi3GetInt64 get_integers, fmi3SetInt64 set_integers, fmi3Int64: [Int64, Enumeration];
     fmi3GetUInt64 get_integers, fmi3SetUInt64 set_integers, fmi3UInt64: [UInt64];
     fmi3GetBoolean get_booleans, fmi3SetBoolean set_booleans, fmi3Boolean: [Boolean];
-    fmi3GetString get_texts, fmi3SetString set_texts, fmi3String: [String];
+    fmi3GetString get_strings, fmi3SetString set_strings, fmi3String: [String];
 }
 
 /// The instance owns the bytes until the next call on it.

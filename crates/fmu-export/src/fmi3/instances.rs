@@ -108,14 +108,14 @@ pub unsafe extern "C" fn fmi3InstantiateScheduledExecution<M: Exported>(
 /// The strings are NULL or valid; the callback works until the instance is freed.
 unsafe fn make<M: Exported>(
     function: &str,
-    texts: [fmi3String; 3],
+    strings: [fmi3String; 3],
     logging_on: fmi3Boolean,
     (environment, log_message): (fmi3InstanceEnvironment, Option<fmi3LogMessageCallback>),
     interface: Outcome<Interface>,
     importer: Importer,
 ) -> fmi3Instance {
     // SAFETY: the caller guarantees NULL or strings.
-    let [name, guid, resources] = texts.map(|text| unsafe { string(text) });
+    let [name, guid, resources] = strings.map(|pointer| unsafe { string(pointer) });
     let instance_name = name.unwrap_or(c"").to_owned();
     let log = || ImporterLog { callback: log_message.map(Callback::Fmi3), environment, instance_name };
     let logging_on = logging_on != fmi3False;

@@ -51,7 +51,7 @@ pub(crate) struct Instance<M> {
     /// that handles events and accepts early returns does not need it.
     before: Option<Box<State<M>>>,
     /// Strings that the importer reads until the next call.
-    pub texts: Vec<std::ffi::CString>,
+    pub strings: Vec<std::ffi::CString>,
     /// Bytes that the importer reads until the next call.
     pub bytes: Vec<Vec<u8>>,
     /// Reusable buffer for the indices of variables of a call, with each element of arrays; for models with
@@ -150,7 +150,7 @@ impl<M: Exported> Instance<M> {
             state,
             rejected: Sorted::new(),
             kept: Sorted::new(),
-            texts: Vec::new(),
+            strings: Vec::new(),
             bytes: Vec::new(),
             elements: Vec::with_capacity(if M::ARRAYS { M::TABLE.len() } else { 0 }),
         };

@@ -145,9 +145,9 @@ impl StateVisitor for Writer<'_> {
     fn boolean(&mut self, value: &mut bool) {
         self.put(&[u8::from(*value)]);
     }
-    fn text(&mut self, text: &mut String) {
-        self.length(&mut text.len());
-        self.put(text.as_bytes());
+    fn string(&mut self, value: &mut String) {
+        self.length(&mut value.len());
+        self.put(value.as_bytes());
     }
     fn length(&mut self, length: &mut usize) {
         self.put(&(*length as u64).to_le_bytes());
@@ -183,12 +183,12 @@ impl StateVisitor for Reader<'_> {
         self.valid &= byte <= 1;
         *value = byte == 1;
     }
-    fn text(&mut self, text: &mut String) {
+    fn string(&mut self, value: &mut String) {
         let length = u64::from_le_bytes(self.take());
         let bytes = usize::try_from(length).ok().and_then(|length| self.rest.split_at_checked(length));
         match bytes.and_then(|(bytes, rest)| Some((std::str::from_utf8(bytes).ok()?, rest))) {
             Some((read, rest)) => {
-                read.clone_into(text);
+                read.clone_into(value);
                 self.rest = rest;
             }
             None => self.invalid(),
@@ -207,7 +207,7 @@ impl StateVisitor for Reader<'_> {
     fn invalid(&mut self) {
         self.valid = false;
     }
-    fn goes_on(&self) -> bool {
+    fn continues(&self) -> bool {
         self.valid
     }
 }

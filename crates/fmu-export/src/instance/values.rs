@@ -244,7 +244,7 @@ impl<M: Exported> Instance<M> {
                     Some(blamed) => {
                         let [name, other] = [vr, blamed].map(|vr| M::TABLE[vr as usize].name());
                         format!(
-                            "{name} was not set, because {other} in the same call was refused: set it again"
+                            "{name} was not set, because {other} in the same call was rejected: set it again"
                         )
                     }
                 };

@@ -25,12 +25,15 @@ fn set(fmu: &Importer, name: Name, values: &[f64]) -> Status {
 
 #[test]
 fn names_and_indices() {
-    let names: Vec<_> = Rod::TABLE.iter().map(|of| of.name()).collect();
+    let names: Vec<_> = Rod::TABLE.iter().map(|variable| variable.name()).collect();
     assert_eq!(names[..4], ["wall", "T[1]", "T[2]", "T[3]"]);
     let of = |name: Name| &Rod::TABLE[Rod::index(name)];
     assert_eq!((of(Name::der_T).name(), of(Name::der_T).name_of_array()), ("der(T[1])", "der(T)"));
-    let limits: Vec<_> =
-        Rod::TABLE.iter().filter(|of| of.name_of_array() == "limits").map(|of| of.name()).collect();
+    let limits: Vec<_> = Rod::TABLE
+        .iter()
+        .filter(|variable| variable.name_of_array() == "limits")
+        .map(|variable| variable.name())
+        .collect();
     assert_eq!(limits, ["limits[1,1]", "limits[1,2]", "limits[2,1]", "limits[2,2]"]);
     assert_eq!((of(Name::limits).dimensions(), of(Name::limits).length()), (&[2, 2][..], 4));
     let second = &Rod::TABLE[Rod::index(Name::der_T) + 1];
@@ -247,7 +250,7 @@ fn bytes() {
 
 #[test]
 fn ranges() {
-    let fmu = Importer::of::<Palette>(Interface::CoSimulation);
+    let fmu = Importer::new::<Palette>(Interface::CoSimulation);
     let [port, shade, colour] = [palette::Name::uint16, palette::Name::shade, palette::Name::colour]
         .map(|name| reference(name as u32));
     let words = ["uint16 must be between 1024 and 65535, it is 80"];
@@ -260,6 +263,7 @@ fn ranges() {
     fmu.ok(fmu.fmi3GetInt64(&colour, 1, &mut item, 1));
     assert_eq!(item, i64::from(palette::Colour::Red.number()));
     // An item is a 32-bit integer.
-    let (fmu, mood) = (Importer::of::<Talker>(Interface::CoSimulation), reference(talker::Name::mood as u32));
+    let (fmu, mood) =
+        (Importer::new::<Talker>(Interface::CoSimulation), reference(talker::Name::mood as u32));
     fmu.rejected("beyond Int32", |fmu| fmu.fmi3SetInt64(&mood, 1, &(7 + (1 << 32)), 1));
 }

@@ -7,7 +7,7 @@ use fmu_test_kit::{Either, Importer};
 
 const SUM: u32 = Name::sum as u32;
 const REAL: u32 = Name::real as u32;
-const TRUTH: u32 = Name::truth as u32;
+const BOOLEAN: u32 = Name::boolean as u32;
 const STATE: u32 = Name::state as u32;
 
 /// Returns the sum after checking that it equals the sum of the other values read.
@@ -28,15 +28,15 @@ fn changes(fmu: &Importer, call: impl FnOnce(&Importer)) {
 
 #[test]
 fn after_every_change_in_co_simulation() {
-    let fmu = Importer::of::<Lazy>(CoSimulation);
+    let fmu = Importer::new::<Lazy>(CoSimulation);
     fmu.initialize(0.0);
     changes(&fmu, |fmu| fmu.set(&[REAL], &[7.0]));
-    changes(&fmu, |fmu| fmu.ok(fmu.fmi2SetInteger(&(Name::whole as u32), 1, &8)));
-    changes(&fmu, |fmu| fmu.ok(fmu.fmi2SetString(&(Name::text as u32), 1, &c"longer".as_ptr())));
+    changes(&fmu, |fmu| fmu.ok(fmu.fmi2SetInteger(&(Name::integer as u32), 1, &8)));
+    changes(&fmu, |fmu| fmu.ok(fmu.fmi2SetString(&(Name::string as u32), 1, &c"longer".as_ptr())));
     changes(&fmu, |fmu| fmu.set(&[Name::weight as u32], &[9.0]));
     changes(&fmu, |fmu| fmu.give_rates(&[REAL], &[0.5]));
     changes(&fmu, |fmu| fmu.step(0.0, 1.0));
-    changes(&fmu, |fmu| fmu.ok(fmu.fmi2SetBoolean(&TRUTH, 1, &1)));
+    changes(&fmu, |fmu| fmu.ok(fmu.fmi2SetBoolean(&BOOLEAN, 1, &1)));
     changes(&fmu, |fmu| assert_eq!(fmu.try_step(1.0, 1.0), Status::Discard));
     fmu.ok(fmu.fmi2Reset());
     fmu.enter_initialization(0.0, None);
@@ -45,7 +45,7 @@ fn after_every_change_in_co_simulation() {
 
 #[test]
 fn after_every_change_in_model_exchange() {
-    let fmu = Importer::of::<Lazy>(ModelExchange);
+    let fmu = Importer::new::<Lazy>(ModelExchange);
     let nominal = || {
         let mut nominal = 0.0;
         fmu.ok(fmu.fmi2GetNominalsOfContinuousStates(&mut nominal, 1));
@@ -66,7 +66,7 @@ fn after_every_change_in_model_exchange() {
 /// Checks all functions that read calculated values, and an event or a completed step after a change.
 #[test]
 fn before_everything_that_needs_it() {
-    let fmu = Importer::of::<Lazy>(ModelExchange);
+    let fmu = Importer::new::<Lazy>(ModelExchange);
     fmu.initialize(0.0);
     let mut value = 0.0;
     for (round, call) in (1..).zip([
@@ -95,7 +95,7 @@ fn before_everything_that_needs_it() {
         assert_eq!(fmu.get([STATE]), [before + 1.0]);
     }
 
-    let fmu = Importer::of::<Lazy>(CoSimulation);
+    let fmu = Importer::new::<Lazy>(CoSimulation);
     fmu.initialize(0.0);
     sum(&fmu);
     fmu.set(&[REAL], &[7.0]);
@@ -106,7 +106,7 @@ fn before_everything_that_needs_it() {
 /// serialized.
 #[test]
 fn after_a_state_is_restored() {
-    let fmu = Importer::of::<Lazy>(CoSimulation);
+    let fmu = Importer::new::<Lazy>(CoSimulation);
     fmu.initialize(0.0);
     sum(&fmu);
     let mut used = fmu.save();

@@ -202,7 +202,7 @@ const TYPES: [&str; 13] = [
 
 fn standard_of_fmi3(function: &str, interface: Interface, mode: Mode) -> bool {
     let name = &function[4..];
-    let is_of_type = |prefix: &str| name.strip_prefix(prefix).is_some_and(|of| TYPES.contains(&of));
+    let is_of_type = |prefix: &str| name.strip_prefix(prefix).is_some_and(|rest| TYPES.contains(&rest));
     let fits = |entry: &str| match entry {
         "Get*" => is_of_type("Get"),
         "Set*" => is_of_type("Set"),
@@ -248,7 +248,7 @@ pub fn lacking<M: Exported>(function: &str, interface: Interface) -> Option<&'st
         "EnterConfigurationMode" => Some("this FMU has no structural parameters"),
         "EvaluateDiscreteStates" => Some("providesEvaluateDiscreteStates is false"),
         name if name.ends_with("Dependencies") => Some("providesPerElementDependencies is false"),
-        name if ["Clock", "Interval", "Shift"].iter().any(|of| name[3..].starts_with(of)) => {
+        name if ["Clock", "Interval", "Shift"].iter().any(|kind| name[3..].starts_with(kind)) => {
             Some("this FMU has no clocks")
         }
         _ => None,
@@ -432,8 +432,8 @@ fn pointers<F: Either, M: Exported>() {
                     assert!(message.contains("not aligned"), "{label}: {message}");
                 }
             }
-            let is_array =
-                call.arguments.first().is_some_and(|of| of.name == "vr") && !function.ends_with("Binary");
+            let is_array = call.arguments.first().is_some_and(|first| first.name == "vr")
+                && !function.ends_with("Binary");
             if is_array || function.ends_with("InputDerivatives") {
                 let message = fmu.rejected(function, |fmu| {
                     call.make(fmu, |words| {
@@ -450,7 +450,7 @@ fn pointers<F: Either, M: Exported>() {
 }
 
 fn position(call: &ValidCall, argument: &Argument) -> usize {
-    call.arguments.iter().position(|of| std::ptr::eq(of, argument)).expect("an argument of the call")
+    call.arguments.iter().position(|other| std::ptr::eq(other, argument)).expect("an argument of the call")
 }
 
 #[test]

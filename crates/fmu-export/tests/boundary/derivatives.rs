@@ -132,7 +132,7 @@ fn in_both_versions() {
 /// parameter, which may be set at any time.
 #[test]
 fn only_in_fmi3() {
-    let fmu = fmi3::Importer::of::<Oscillator>(CoSimulation);
+    let fmu = fmi3::Importer::new::<Oscillator>(CoSimulation);
     fmu.set(&KNOWNS[1..], &[0.25, -3.0]);
     fmu.initialize(0.0);
     assert_eq!(fmu.rates([Name::position as u32, Oscillator::TABLE.len() as u32]), [-3.0, 1.0]);

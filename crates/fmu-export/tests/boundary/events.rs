@@ -23,7 +23,7 @@ fn of_fmi3<M: Exported>(
     early_return_allowed: fmi3Boolean,
     prepare: impl FnOnce(&fmi3::Importer),
 ) -> fmi3::Importer {
-    let arguments = Arguments { event_mode_used, early_return_allowed, ..Arguments::of::<M>(CoSimulation) };
+    let arguments = Arguments { event_mode_used, early_return_allowed, ..Arguments::new::<M>(CoSimulation) };
     let fmu = fmi3::Importer::make::<M>(&arguments).unwrap();
     prepare(&fmu);
     fmu.initialize(0.0);
@@ -31,7 +31,7 @@ fn of_fmi3<M: Exported>(
 }
 
 fn of_fmi2<M: Exported>(prepare: impl FnOnce(&Importer)) -> Importer {
-    let fmu = Importer::of::<M>(CoSimulation);
+    let fmu = Importer::new::<M>(CoSimulation);
     prepare(&fmu);
     fmu.initialize(0.0);
     fmu
@@ -52,7 +52,7 @@ fn undone(fmu: &fmi3::Importer, expected: Status, point: f64, step_size: f64) ->
     assert_eq!(fmu.do_step(point, step_size), Err(expected));
     let message = fmu.take_log().pop().unwrap();
     assert_eq!((message.status, fmu.bytes()), (expected, before), "{message:?}");
-    message.text
+    message.message
 }
 
 /// Returns the time that an instance of FMI 2.0 has reached, and whether the model requests the end of the
@@ -72,7 +72,7 @@ fn discarded(fmu: &Importer, point: f64, step_size: f64) -> String {
     assert_eq!(fmu.try_step(point, step_size), Status::Discard);
     let log = fmu.take_log();
     assert_eq!(log.iter().filter(|message| message.category == "logStatusDiscard").count(), 1, "{log:?}");
-    log.into_iter().map(|message| message.text).collect::<Vec<_>>().join("; ")
+    log.into_iter().map(|message| message.message).collect::<Vec<_>>().join("; ")
 }
 
 /// Checks a state event, its effects, and the information about completed steps.
@@ -205,9 +205,9 @@ fn the_importer_handles_them() {
     // An event at the end of a step is not early.
     assert_eq!(fmu.do_step(0.25, 0.25), at(0.5, false));
     // A model without events has no Event Mode.
-    let arguments = Arguments { event_mode_used: fmi3True, ..Arguments::of::<Fuse>(CoSimulation) };
+    let arguments = Arguments { event_mode_used: fmi3True, ..Arguments::new::<Fuse>(CoSimulation) };
     let log = fmi3::Importer::make::<Fuse>(&arguments).unwrap_err();
-    assert!(log[0].text.contains("hasEventMode is false"), "{log:?}");
+    assert!(log[0].message.contains("hasEventMode is false"), "{log:?}");
 }
 
 /// If the importer does not handle events, the library handles them within the step.
@@ -293,7 +293,7 @@ fn a_step_that_fails_half_way() {
 /// Checks that in FMI 2.0 the first iteration of a failed event is undone, and the step ends at the event.
 #[test]
 fn an_event_that_fails_in_its_second_round() {
-    let fmu = Importer::of::<Grumbler>(CoSimulation);
+    let fmu = Importer::new::<Grumbler>(CoSimulation);
     trouble(&fmu, Trouble::SecondRound);
     fmu.enter_initialization(0.0, None);
     let before = fmu.bytes();
@@ -327,13 +327,13 @@ fn more_events_than_a_step_may_have() {
     assert!(text.contains("at 5000.25: ") && text.contains(EXPECTED), "{text}");
     assert_eq!(progress(&fmu), (5000.25, false));
     // An endless event.
-    let fmu = Importer::of::<Grumbler>(CoSimulation);
+    let fmu = Importer::new::<Grumbler>(CoSimulation);
     trouble(&fmu, Trouble::Rounds);
     fmu.enter_initialization(0.0, None);
     assert_eq!(fmu.fmi2ExitInitializationMode(), Status::Error);
     let log = fmu.take_log();
     let words = "does not come to an end in 10000 rounds";
-    assert!(log.iter().any(|message| message.text.contains(words)), "{log:?}");
+    assert!(log.iter().any(|message| message.message.contains(words)), "{log:?}");
 }
 
 /// The fuse warms by 10 degrees per second from 20: hot after 8 s, melted after 18 s.
@@ -386,7 +386,7 @@ fn an_early_end_and_a_shorter_step() {
     fmu.ok(fmu.fmi2Terminate());
     assert_eq!(progress(&fmu), (18.0, true));
     // The state includes the end of the simulation.
-    let other = Importer::of::<Fuse>(CoSimulation);
+    let other = Importer::new::<Fuse>(CoSimulation);
     other.restore(&bytes);
     assert_eq!(progress(&other), (18.0, true));
     fmu.ok(fmu.fmi2SetFMUstate(state));
@@ -434,7 +434,7 @@ fn an_early_end_that_the_model_has_not_announced() {
         let fmu = F::initialized_at::<hasty::Hasty>(0.0);
         assert_eq!(fmu.try_step(0.0, 1.0), Status::Fatal);
         let log = fmu.take_log();
-        assert!(log.len() == 1 && log[0].text.contains("const ENDS_EARLY: bool = true"), "{log:?}");
+        assert!(log.len() == 1 && log[0].message.contains("const ENDS_EARLY: bool = true"), "{log:?}");
     }
     check::<Importer>();
     check::<fmi3::Importer>();

@@ -12,7 +12,7 @@ fn talker(instance_name: &'static CStr, resource_location: Option<&CStr>) -> Imp
     let arguments = Arguments {
         instance_name: Some(instance_name),
         resource_location,
-        ..Arguments::of::<Talker>(CoSimulation)
+        ..Arguments::new::<Talker>(CoSimulation)
     };
     Importer::make::<Talker>(&arguments).unwrap()
 }
@@ -84,8 +84,9 @@ fn files_in_the_resources() {
 #[test]
 fn bad_resources() {
     let location = CString::new(resources("mute", "\n").to_str().unwrap()).unwrap();
-    let arguments = Arguments { resource_location: Some(&location), ..Arguments::of::<Talker>(CoSimulation) };
+    let arguments =
+        Arguments { resource_location: Some(&location), ..Arguments::new::<Talker>(CoSimulation) };
     let log = Importer::make::<Talker>(&arguments).expect_err("there is nothing to say");
     assert_eq!(log.len(), 1);
-    assert_eq!(log[0].text, "fmi2Instantiate: resources/words.txt is empty");
+    assert_eq!(log[0].message, "fmi2Instantiate: resources/words.txt is empty");
 }

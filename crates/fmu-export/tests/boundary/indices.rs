@@ -14,7 +14,7 @@ const LEVEL: u32 = Name::level as u32;
 /// Sets and reads `count` inputs per call, with each as the first, before the first step and after it. All
 /// must keep their values.
 fn set_and_read<F: Either>(count: usize) {
-    let fmu = F::of::<Meter>(CoSimulation);
+    let fmu = F::new::<Meter>(CoSimulation);
     fmu.initialize(0.0);
     let (mut now, mut time, mut number) = ([0.0; 6], 0.0, 0.0);
     let mut seconds = 0;
@@ -57,7 +57,7 @@ fn alone_and_together() {
 
 /// Checks that a rejected variable at any index changes neither the model nor the importer's array.
 fn rejected<F: Either>() {
-    let fmu = F::of::<Meter>(CoSimulation);
+    let fmu = F::new::<Meter>(CoSimulation);
     fmu.initialize(0.0);
     for round in 0..3 {
         let before = fmu.bytes();

@@ -11,7 +11,7 @@ use std::ffi::CStr;
 use std::ptr::{null, null_mut};
 
 fn logging<M: Exported>(logging_on: bool) -> Importer {
-    let arguments = Arguments { logging_on: logging_on.into(), ..Arguments::of::<M>(CoSimulation) };
+    let arguments = Arguments { logging_on: logging_on.into(), ..Arguments::new::<M>(CoSimulation) };
     Importer::make::<M>(&arguments).unwrap()
 }
 
@@ -20,7 +20,7 @@ fn shown(fmu: &Importer) -> String {
     fmu.take_log();
     fmu.ok(fmu.fmi2Reset());
     fmu.initialize(0.0);
-    fmu.say(Name::heard as u32, "%s#r1#\n");
+    fmu.write_string(Name::heard as u32, "%s#r1#\n");
     fmu.step(0.0, 0.1);
     fmu.set(&[Name::volume as u32], &[10.5]);
     assert_eq!(fmu.fmi2GetStatus(0, &mut 0), Status::Discard);
@@ -93,7 +93,7 @@ fn categories_that_do_not_exist() {
 /// Section 2.3.1 of FMI 3.0: without logging there are only errors, which cannot be disabled.
 #[test]
 fn logging_of_fmi3() {
-    let fmu = fmi3::Importer::of::<Talker>(CoSimulation);
+    let fmu = fmi3::Importer::new::<Talker>(CoSimulation);
     let volume = Name::volume as u32;
     fmu.set(&[volume], &[10.5]);
     assert_eq!(fmu.take_log(), [], "a warning is no error");
@@ -102,7 +102,7 @@ fn logging_of_fmi3() {
     assert_eq!(fmu.take_log().len(), 1);
     fmu.ok(fmu.fmi3SetDebugLogging(1, 0, null()));
     fmu.initialize(0.0);
-    assert!(fmu.take_log().iter().any(|message| message.text == "initialized"));
+    assert!(fmu.take_log().iter().any(|message| message.message == "initialized"));
     fmu.ok(fmu.fmi3SetDebugLogging(0, 1, &c"logAll".as_ptr()));
     fmu.rejected("no category", |fmu| fmu.fmi3SetDebugLogging(1, 1, &c"logNothing".as_ptr()));
 }
@@ -117,7 +117,7 @@ fn events() {
     fmu.ok(fmu.fmi2Terminate());
     fmu.ok(fmu.fmi2Reset());
     let log = fmu.take_log();
-    let texts: Vec<_> = log.iter().map(|message| message.text.as_str()).collect();
+    let texts: Vec<_> = log.iter().map(|message| message.message.as_str()).collect();
     assert_eq!(texts, ["instantiated", "initialized", "terminated", "reset to the start values"]);
     assert!(log.iter().all(|Message { status, category, .. }| (*status, category.as_str()) == (Status::Ok, "logEvents")));
 }
@@ -128,15 +128,18 @@ fn events() {
 fn messages_of_the_model() {
     let fmu = logging::<Talker>(true);
     fmu.initialize(0.0);
-    fmu.say(Name::heard as u32, "Ping");
+    fmu.write_string(Name::heard as u32, "Ping");
     fmu.take_log();
     fmu.step(0.0, 1.0);
-    assert_eq!(fmu.take_log().iter().map(|message| message.text.as_str()).collect::<Vec<_>>(), ["says Ping"]);
+    assert_eq!(
+        fmu.take_log().iter().map(|message| message.message.as_str()).collect::<Vec<_>>(),
+        ["says Ping"]
+    );
     let volume = [Name::volume as u32];
     fmu.set(&volume, &[10.5]);
     let log = fmu.take_log();
     assert_eq!(
-        (log.len(), log[0].status, log[0].text.as_str()),
+        (log.len(), log[0].status, log[0].message.as_str()),
         (1, Status::Warning, "a volume of 10.5 hurts")
     );
     fmu.set(&volume, &[1.0]);
@@ -151,7 +154,7 @@ fn messages_of_the_model() {
 #[test]
 fn messages_of_a_model_that_fails() {
     let fmu = logging::<Grumbler>(false);
-    let said = |fmu: &Importer| fmu.take_log().into_iter().map(|message| message.text).collect::<Vec<_>>();
+    let said = |fmu: &Importer| fmu.take_log().into_iter().map(|message| message.message).collect::<Vec<_>>();
     let trouble =
         |trouble: Trouble| fmu.fmi2SetInteger(&(grumbler::Name::trouble as u32), 1, &(trouble as i32));
     assert_eq!(said(&fmu), ["made"]);
@@ -184,7 +187,7 @@ fn messages_of_a_model_that_fails() {
 #[test]
 fn instances_do_not_mix() {
     let fmus = [c"left", c"right"].map(|name| {
-        let arguments = Arguments { instance_name: Some(name), ..Arguments::of::<Talker>(CoSimulation) };
+        let arguments = Arguments { instance_name: Some(name), ..Arguments::new::<Talker>(CoSimulation) };
         Importer::make::<Talker>(&arguments).unwrap()
     });
     for (fmu, name) in fmus.iter().zip(["left", "right"]) {
@@ -198,7 +201,7 @@ fn instances_do_not_mix() {
 /// Checks that a NULL logger only suppresses the messages. (All tests pass NULL for the memory callbacks.)
 #[test]
 fn no_logger() {
-    let arguments = Arguments { logger: false, logging_on: 1, ..Arguments::of::<Talker>(ModelExchange) };
+    let arguments = Arguments { logger: false, logging_on: 1, ..Arguments::new::<Talker>(ModelExchange) };
     let fmu = Importer::make::<Talker>(&arguments).unwrap();
     fmu.initialize(0.0);
     assert_eq!(fmu.try_set(&[99], &[0.0]), Status::Error);

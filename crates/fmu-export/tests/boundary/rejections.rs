@@ -35,7 +35,7 @@ fn all_rejected(fmu: &Importer, cases: &[Case]) {
 /// Variables of other types, and values out of their range. `indices.rs` checks invalid value references.
 const VALUES: &[Case] = &[
     (|fmu| fmu.set_integer(MASS, 1), &["mass is of type Real, not Integer"]),
-    (|fmu| fmu.set_text(DAMPED, c"1".as_ptr()), &["damped is of type Boolean, not String"]),
+    (|fmu| fmu.set_string(DAMPED, c"1".as_ptr()), &["damped is of type Boolean, not String"]),
     (|fmu| fmu.try_set(&[SPRINGS], &[7.0]), &["springs is of type Integer, not Real"]),
     (|fmu| fmu.try_set(&[FORCE], &[INF]), &["force must be a finite number, it is inf"]),
     (|fmu| fmu.try_set(&[MASS, STIFFNESS], &[1.1, NAN]), &["stiffness must be a finite number"]),
@@ -85,8 +85,8 @@ fn texts() {
     all_rejected(
         &Importer::in_mode::<Talker>(CoSimulation, StepComplete),
         &[
-            (|fmu| fmu.set_text(talker::Name::answer as u32, null()), &["answer is of type Integer"]),
-            (|fmu| fmu.set_text(99, c"\xff".as_ptr()), &["value reference 99"]),
+            (|fmu| fmu.set_string(talker::Name::answer as u32, null()), &["answer is of type Integer"]),
+            (|fmu| fmu.set_string(99, c"\xff".as_ptr()), &["value reference 99"]),
             (
                 |fmu| fmu.fmi2SetString([GREETING, HEARD].as_ptr(), 2, [c"a".as_ptr(), null()].as_ptr()),
                 &["heard is NULL"],
@@ -118,7 +118,7 @@ fn experiments() {
 
 #[test]
 fn steps() {
-    let fmu = Importer::of::<Oscillator>(CoSimulation);
+    let fmu = Importer::new::<Oscillator>(CoSimulation);
     fmu.enter_initialization(1.0, Some(2.0));
     fmu.ok(fmu.fmi2ExitInitializationMode());
     fmu.step(1.0, 0.25);
@@ -253,7 +253,7 @@ fn status_kinds() {
     for (question, word) in questions {
         assert_eq!(question(&fmu), Status::Discard);
         let log = fmu.take_log();
-        assert!(log.len() == 1 && log[0].text.contains(word), "{log:?}");
+        assert!(log.len() == 1 && log[0].message.contains(word), "{log:?}");
     }
 
     fmu.step(0.0, 0.25);
@@ -265,14 +265,14 @@ fn status_kinds() {
 
 /// Checks that there is no instance of the model with changed arguments, and parts of the message.
 fn no_instance<F: Either, M: Exported>(change: impl Fn(&mut Arguments<'static>), words: &[&str]) {
-    let mut arguments = Arguments::of::<M>(CoSimulation);
+    let mut arguments = Arguments::new::<M>(CoSimulation);
     change(&mut arguments);
     let Err(log) = F::make::<M>(&arguments) else { panic!("{words:?} is accepted") };
     let [message] = log.as_slice() else { panic!("{words:?}: one message expected, not {log:?}") };
     message.assert_clean();
     assert_eq!((message.status, message.category.as_str()), (Status::Error, "logStatusError"), "{words:?}");
     for word in words.iter().chain(&[&format!("{}Instantiate", &F::functions()[0][..4])[..]]) {
-        assert!(message.text.contains(word), "'{word}' is not in: {}", message.text);
+        assert!(message.message.contains(word), "'{word}' is not in: {}", message.message);
     }
     // Without a logger the call is rejected as well.
     arguments.logger = false;
@@ -300,14 +300,14 @@ fn instantiation() {
         |a| a.required_intermediate_variables = &[0],
         &["requiredIntermediateVariables must be empty"],
     );
-    let arguments = Arguments { callbacks: false, ..Arguments::of::<Oscillator>(CoSimulation) };
+    let arguments = Arguments { callbacks: false, ..Arguments::new::<Oscillator>(CoSimulation) };
     assert!(Importer::make::<Oscillator>(&arguments).is_err());
     no_instance::<fmi3::Importer, Fuse>(|a| a.fmu_type = 2, &["this FMU has no Scheduled Execution"]);
 }
 
 #[test]
 fn instances_of_the_other_version() {
-    let old = Importer::of::<Fuse>(CoSimulation);
+    let old = Importer::new::<Fuse>(CoSimulation);
     let functions = fmu_export::fmi3::functions::<Fuse>();
     // SAFETY: a live instance of the same model.
     let status = unsafe { (functions.fmi3Reset)(old.instance()) };

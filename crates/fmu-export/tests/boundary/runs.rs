@@ -75,7 +75,7 @@ fn input_derivatives() {
     // The second step equals a step of an instance without slope.
     let state = once.get(STATES);
     once.step(0.1, 0.1);
-    let other = Importer::of::<Oscillator>(CoSimulation);
+    let other = Importer::new::<Oscillator>(CoSimulation);
     other.set(&STATES, &state);
     other.initialize(0.1);
     other.step(0.1, 0.1);

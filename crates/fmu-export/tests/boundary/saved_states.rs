@@ -65,10 +65,10 @@ fn handles_that_are_none() {
 /// back, so it is not written.
 #[test]
 fn infinite_numbers() {
-    let fmu = Importer::of::<Grumbler>(CoSimulation);
+    let fmu = Importer::new::<Grumbler>(CoSimulation);
     fmu.set(&[grumbler::Name::last as u32], &[0.5]);
     fmu.initialize(0.0);
-    let other = Importer::of::<Grumbler>(CoSimulation);
+    let other = Importer::new::<Grumbler>(CoSimulation);
     other.restore(&fmu.bytes());
     other.step(0.0, 1e6);
 
@@ -174,7 +174,7 @@ fn reset_is_a_new_beginning<F: Either, M: Exported>() {
         for (index, variable) in (0..).zip(M::TABLE) {
             match variable.base() {
                 BaseType::Real => _ = fmu.try_set(&[index], &[0.75]),
-                BaseType::String => _ = fmu.set_text(index, c"odd".as_ptr()),
+                BaseType::String => _ = fmu.set_string(index, c"odd".as_ptr()),
                 BaseType::Boolean => _ = fmu.set_boolean(index, 1),
                 _ => _ = fmu.set_integer(index, 7),
             }
@@ -278,8 +278,8 @@ fn impossible_contents() {
     for mode in [0, 3, -1, i64::MAX, 1 << 32 | 4] {
         fmu.rejected_bytes(&with(bytes.clone(), MODE, &i64::to_le_bytes(mode)));
     }
-    for truth in [2, u8::MAX] {
-        fmu.rejected_bytes(&with(bytes.clone(), ENDED..ENDED + 1, &[truth]));
+    for byte in [2, u8::MAX] {
+        fmu.rejected_bytes(&with(bytes.clone(), ENDED..ENDED + 1, &[byte]));
     }
     for number in [f64::NAN, f64::INFINITY] {
         fmu.rejected_bytes(&with(bytes.clone(), TIME, &number.to_le_bytes()));
@@ -293,7 +293,7 @@ fn impossible_contents() {
         fmu.rejected_bytes(&with(bytes.clone(), value(5), &springs.to_le_bytes()));
     }
     let message = fmu.rejected_bytes(&with(bytes.clone(), value(6), &20.0_f64.to_le_bytes()));
-    assert!(message.contains("nothing oscillates"), "what update refuses: {message}");
+    assert!(message.contains("nothing oscillates"), "update rejects it: {message}");
     // The force may have any finite value and is restored exactly.
     assert!(restores(&fmu, &with(bytes, value(0), &f64::MAX.to_le_bytes())));
     assert_eq!(fmu.get([FORCE]), [f64::MAX]);
@@ -303,7 +303,7 @@ fn impossible_contents() {
 #[test]
 fn invalid_strings_and_items() {
     let fmu = Importer::in_mode::<Talker>(CoSimulation, StepComplete);
-    fmu.say(talker::Name::heard as u32, "heard");
+    fmu.write_string(talker::Name::heard as u32, "heard");
     let bytes = fmu.bytes();
     // The heard string and the greeting have a length and 5 letters, the mood is an integer.
     let heard = VALUES + 8..VALUES + 10;
@@ -321,6 +321,6 @@ fn invalid_strings_and_items() {
 #[test]
 fn states_of_event_mode() {
     let (with, without) =
-        (fmi3::Importer::in_mode::<Ticker>(CoSimulation, Event), fmi3::Importer::of::<Ticker>(CoSimulation));
+        (fmi3::Importer::in_mode::<Ticker>(CoSimulation, Event), fmi3::Importer::new::<Ticker>(CoSimulation));
     assert!(without.rejected_bytes(&with.bytes()).contains("event mode"));
 }

@@ -45,7 +45,7 @@ fn set(fmu: &Importer, vr: u32, base: BaseType) -> Status {
         BaseType::Integer => fmu.set_integer(vr, 3),
         BaseType::Enumeration => fmu.set_item(vr, 2),
         BaseType::Boolean => fmu.set_boolean(vr, 1),
-        _ => fmu.set_text(vr, c"a text".as_ptr()),
+        _ => fmu.set_string(vr, c"a text".as_ptr()),
     }
 }
 
@@ -56,7 +56,7 @@ fn is_set(fmu: &Importer, vr: u32, base: BaseType) -> bool {
         BaseType::Integer => fmu.integer(vr) == 3,
         BaseType::Enumeration => fmu.item(vr) == 2,
         BaseType::Boolean => fmu.boolean(vr),
-        _ => fmu.text(vr) == "a text",
+        _ => fmu.string(vr) == "a text",
     }
 }
 

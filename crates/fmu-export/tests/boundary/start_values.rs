@@ -50,12 +50,12 @@ fn a_rejected_start_value_is_remembered() {
         is_remembered::<F>(|fmu| fmu.try_set(&[damping], &[1e6]), |fmu| fmu.try_set(&[damping], &[0.0]));
         for mode in [Instantiated, Initialization] {
             let fmu = F::in_mode::<Talker>(CoSimulation, mode);
-            let greet = |text| fmu.set_text(talker::Name::greeting as u32, text);
+            let greet = |text| fmu.set_string(talker::Name::greeting as u32, text);
             for text in [null(), c"\xff".as_ptr()] {
                 assert_eq!(greet(text), Status::Error);
             }
             fmu.take_log();
-            fmu.rejected_with(&["the text for greeting"], |fmu| go_on(fmu, mode));
+            fmu.rejected_with(&["the string for greeting"], |fmu| go_on(fmu, mode));
             fmu.ok(greet(c"Good morning".as_ptr()));
             fmu.ok(go_on(&fmu, mode));
         }
@@ -70,7 +70,7 @@ fn every_variable_of_a_rejected_call() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, Instantiated);
     let enter = |fmu: &Importer| fmu.rejected("the start", |fmu| fmu.fmi2EnterInitializationMode());
     let of_mass = "mass must not be below 0.001, it is -1";
-    let of_stiffness = "stiffness was not set, because mass in the same call was refused: set it again";
+    let of_stiffness = "stiffness was not set, because mass in the same call was rejected: set it again";
     assert_eq!(fmu.try_set(&[STIFFNESS, MASS], &[60.0, -1.0]), Status::Error);
     assert_eq!(enter(&fmu), format!("fmi2EnterInitializationMode: {of_mass}; {of_stiffness}"));
     fmu.set(&[MASS], &[1.0]);
@@ -137,7 +137,7 @@ fn calculated_start<F: Either>() {
     let [plain, stiffness, level] =
         [meter::Name::plain, meter::Name::stiffness, meter::Name::level].map(|name| name as u32);
     for interface in INTERFACES {
-        let fmu = F::of::<Meter>(interface);
+        let fmu = F::new::<Meter>(interface);
         fmu.set(&[plain, stiffness], &[6.0, 2.0]);
         let words = ["its start follows from plain, stiffness: set these"];
         fmu.rejected_with(&words, |fmu| fmu.try_set(&[level], &[1.0]));

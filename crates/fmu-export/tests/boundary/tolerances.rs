@@ -80,7 +80,7 @@ fn stop_time_passed_by_rounding() {
         ("thirds", 1.0 / 3.0, 9, 3.0),
     ];
     for (label, step_size, steps, stop_time) in cases {
-        let fmu = Importer::of::<Oscillator>(CoSimulation);
+        let fmu = Importer::new::<Oscillator>(CoSimulation);
         fmu.enter_initialization(0.0, Some(*stop_time));
         fmu.ok(fmu.fmi2ExitInitializationMode());
         let mut time = 0.0;

@@ -3,7 +3,7 @@
 use fmu_export::fmi2::types::fmi2EventInfo;
 use fmu_export::{Causality, Exported, Mode, Status, Variability, Variable};
 use fmu_test_kit::calls::{Argument, signature};
-use fmu_test_kit::careless::{bases_of, element_size};
+use fmu_test_kit::fault_injection::{bases_of, element_size};
 use fmu_test_kit::{Either, serialized};
 use std::ffi::c_void;
 use std::mem::MaybeUninit;
@@ -26,17 +26,23 @@ fn first<M: Exported>(wanted: impl Fn(&Variable<M>) -> bool) -> Option<u32> {
 /// Returns the value reference for the argument of this name; `None` if the model has no such variable.
 fn reference<F: Either, M: Exported>(name: &str, function: &str, mode: Mode) -> Option<u32> {
     let is_set = function[4..].starts_with("Set");
-    let is_settable = |of: &Variable<M>| match of.causality() {
+    let is_settable = |variable: &Variable<M>| match variable.causality() {
         Causality::Parameter => true,
-        Causality::Input => mode != Mode::ContinuousTime || of.variability() == Variability::Continuous,
+        Causality::Input => mode != Mode::ContinuousTime || variable.variability() == Variability::Continuous,
         _ => false,
     };
     let found = match name {
-        "unknown" => first::<M>(|of| of.causality() == Causality::Output),
-        "known" => first::<M>(|of| of.causality() == Causality::Input || of.is_state()),
-        _ if function.ends_with("InputDerivatives") => first::<M>(|of| of.causality() == Causality::Input),
-        _ if function.ends_with("OutputDerivatives") => first::<M>(|of| of.causality() == Causality::Output),
-        _ => first::<M>(|of| bases_of(function).contains(&of.base()) && (!is_set || is_settable(of))),
+        "unknown" => first::<M>(|variable| variable.causality() == Causality::Output),
+        "known" => first::<M>(|variable| variable.causality() == Causality::Input || variable.is_state()),
+        _ if function.ends_with("InputDerivatives") => {
+            first::<M>(|variable| variable.causality() == Causality::Input)
+        }
+        _ if function.ends_with("OutputDerivatives") => {
+            first::<M>(|variable| variable.causality() == Causality::Output)
+        }
+        _ => first::<M>(|variable| {
+            bases_of(function).contains(&variable.base()) && (!is_set || is_settable(variable))
+        }),
     };
     found.map(|index| F::standard().reference(index))
 }
@@ -46,7 +52,7 @@ impl ValidCall {
         let arguments = signature(function).expect("a function of the standard").arguments;
         let mut call = Self { function, arguments, words: Vec::new(), memory: Vec::new() };
         let bytes = fmu.bytes();
-        let has_variables = arguments.iter().any(|of| ["vr", "unknown"].contains(&of.name));
+        let has_variables = arguments.iter().any(|argument| ["vr", "unknown"].contains(&argument.name));
         let count = has_variables && reference::<F, M>(arguments[0].name, function, mode).is_some();
         for argument in arguments {
             let word = match (argument.pointee(), argument.of, argument.name) {

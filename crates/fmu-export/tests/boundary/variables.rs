@@ -14,7 +14,7 @@ use std::ffi::CStr;
 use std::ptr::null;
 
 pub fn texts<F: Either, const N: usize>(fmu: &F, names: [Name; N]) -> [String; N] {
-    names.map(|name| fmu.text(name as u32))
+    names.map(|name| fmu.string(name as u32))
 }
 
 /// Checks strings in both directions, several at once and repeated, of any length and script.
@@ -24,11 +24,13 @@ fn texts_in_and_out<F: Either>() {
         let fmu = F::in_mode::<Talker>(interface, Initialization);
         assert_eq!(texts(&fmu, [Name::heard, Name::greeting]), ["", "Hello"]);
         for text in ["", "Hi", "Gödel said: ∀x ∃y 🙂", "100%s #r1# \n\t", &long] {
-            fmu.say(Name::heard as u32, text);
+            fmu.write_string(Name::heard as u32, text);
             assert_eq!(texts(&fmu, [Name::reply, Name::heard, Name::reply]), [text; 3]);
         }
-        fmu.rejected_with(&["heard is NULL"], |fmu| fmu.set_text(Name::heard as u32, null()));
-        fmu.rejected_with(&["heard is not UTF-8"], |fmu| fmu.set_text(Name::heard as u32, c"G\xc3".as_ptr()));
+        fmu.rejected_with(&["heard is NULL"], |fmu| fmu.set_string(Name::heard as u32, null()));
+        fmu.rejected_with(&["heard is not UTF-8"], |fmu| {
+            fmu.set_string(Name::heard as u32, c"G\xc3".as_ptr())
+        });
     }
 }
 
@@ -36,10 +38,10 @@ fn texts_in_and_out<F: Either>() {
 /// instances.
 fn how_long_texts_live<F: Either>() {
     let [one, other] = [(); 2].map(|()| F::in_mode::<Talker>(CoSimulation, StepComplete));
-    one.say(Name::heard as u32, "the one");
+    one.write_string(Name::heard as u32, "the one");
     let mut text = null();
-    one.ok(one.get_text(Name::reply as u32, &mut text));
-    other.say(Name::heard as u32, "the other");
+    one.ok(one.get_string(Name::reply as u32, &mut text));
+    other.write_string(Name::heard as u32, "the other");
     texts(&other, [Name::reply]);
     // SAFETY: there was no call on this instance since.
     assert_eq!(unsafe { CStr::from_ptr(text) }, c"the one");
@@ -50,7 +52,7 @@ fn enumerations<F: Either>() {
     let fmu = F::in_mode::<Talker>(CoSimulation, StepComplete);
     assert_eq!(texts(&fmu, [Name::said]), ["Hello"]);
     for (point, mood, expected) in [(0.0, 1, "Ping"), (1.0, 2, "Ping!"), (2.0, 7, "Ping!")] {
-        fmu.say(Name::heard as u32, "Ping");
+        fmu.write_string(Name::heard as u32, "Ping");
         fmu.ok(fmu.set_item(Name::mood as u32, mood));
         assert_eq!([Name::mood, Name::own_mood].map(|name| fmu.item(name as u32)), [mood; 2]);
         fmu.step(point, 1.0);
@@ -210,7 +212,7 @@ fn value_references_count_from_1() {
 fn the_time_of_fmi3() {
     fn check<M: Exported>() {
         let (index, variable) = independent::<M>();
-        let in_table = M::TABLE.iter().position(|of| of.causality() == Causality::Independent);
+        let in_table = M::TABLE.iter().position(|variable| variable.causality() == Causality::Independent);
         assert_eq!(index as usize, in_table.unwrap_or(M::TABLE.len()));
         assert_eq!((variable.name(), variable.causality()), ("time", Causality::Independent));
         let fmu = fmi3::Importer::initialized_at::<M>(2.0);
@@ -231,7 +233,7 @@ fn the_time_of_fmi3() {
 /// Checks that a value that is not finite is not read.
 #[test]
 fn out_of_the_range_of_float32() {
-    let (fmu, mut value) = (fmi3::Importer::of::<Grumbler>(CoSimulation), f32::NAN);
+    let (fmu, mut value) = (fmi3::Importer::new::<Grumbler>(CoSimulation), f32::NAN);
     fmu.ok(fmu.set_item(grumbler::Name::trouble as u32, Trouble::Heat as i32));
     fmu.initialize(0.0);
     let warmer = reference(grumbler::Name::warmer as u32);
@@ -240,5 +242,5 @@ fn out_of_the_range_of_float32() {
     fmu.step(0.0, 0.5);
     fmu.take_log();
     assert_eq!(fmu.fmi3GetFloat32(&warmer, 1, &mut value, 1), Status::Error);
-    assert!(fmu.take_log()[0].text.contains("warmer is out of the range of numbers"));
+    assert!(fmu.take_log()[0].message.contains("warmer is out of the range of numbers"));
 }

@@ -10,7 +10,7 @@ pub enum Fault {
     None,
     Read,
     Then,
-    ReadText,
+    ReadString,
     Update,
     Initialize,
     Calculate,
@@ -53,8 +53,8 @@ pub struct Faulty {
     fault: i32,
     number: f64,
     state: f64,
-    truth: bool,
-    text: String,
+    boolean: bool,
+    string: String,
     memory: Memory,
 }
 
@@ -116,11 +116,11 @@ variables! { for Faulty, memory in memory;
     /// An integer
     n = output(&INTEGER) by |faulty| faulty.read(3);
     /// A Boolean
-    truth = input(&BOOLEAN) in truth then |faulty| { faulty.panic_if(Fault::Then); } by |faulty| faulty.read(faulty.truth);
+    boolean = input(&BOOLEAN) in boolean then |faulty| { faulty.panic_if(Fault::Then); } by |faulty| faulty.read(faulty.boolean);
     /// A string
-    text = input(&STRING) in text then |faulty| { faulty.panic_if(Fault::Then); } by |faulty| {
-        faulty.panic_if(Fault::ReadText);
-        faulty.text.clone()
+    string = input(&STRING) in string then |faulty| { faulty.panic_if(Fault::Then); } by |faulty| {
+        faulty.panic_if(Fault::ReadString);
+        faulty.string.clone()
     };
     /// A state
     x = local(&NUMBER).state() in state then |faulty| { faulty.panic_if(Fault::Then); };
@@ -131,7 +131,7 @@ variables! { for Faulty, memory in memory;
 impl Clone for Faulty {
     fn clone(&self) -> Self {
         check(EVERYWHERE.get() as i32, Fault::Clone);
-        Self { text: self.text.clone(), memory: self.memory.clone(), ..*self }
+        Self { string: self.string.clone(), memory: self.memory.clone(), ..*self }
     }
 }
 
@@ -149,7 +149,7 @@ impl Model for Faulty {
     fn new(_: &Setup) -> Result<Self, Error> {
         check(EVERYWHERE.get() as i32, Fault::New);
         let memory = Memory(0);
-        Ok(Self { fault: 0, number: 0.0, state: 0.0, truth: false, text: String::new(), memory })
+        Ok(Self { fault: 0, number: 0.0, state: 0.0, boolean: false, string: String::new(), memory })
     }
 
     fn update(&mut self) -> Result<(), Error> {

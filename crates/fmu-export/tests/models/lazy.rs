@@ -6,9 +6,9 @@ use fmu_export::*;
 #[derive(Clone)]
 pub struct Lazy {
     real: f64,
-    whole: i32,
-    truth: bool,
-    text: String,
+    integer: i32,
+    boolean: bool,
+    string: String,
     weight: f64,
     state: f64,
     slope: f64,
@@ -19,11 +19,11 @@ variables! { for Lazy, memory in slope;
     /// A summand
     real = input(&NUMBER) in real;
     /// Another
-    whole = input(&INTEGER) in whole;
+    integer = input(&INTEGER) in integer;
     /// 1 more, and steps end half-way
-    truth = input(&BOOLEAN) in truth;
+    boolean = input(&BOOLEAN) in boolean;
     /// Its length
-    text = input(&STRING) in text;
+    string = input(&STRING) in string;
     /// A parameter
     weight = parameter(&NUMBER) in weight;
     /// A state
@@ -40,8 +40,8 @@ variables! { for Lazy, memory in slope;
 
 impl Lazy {
     fn summands(&self) -> f64 {
-        let whole = f64::from(self.whole) + f64::from(u8::from(self.truth)) + self.text.len() as f64;
-        self.real + whole + self.weight + self.state + self.slope
+        let integer = f64::from(self.integer) + f64::from(u8::from(self.boolean)) + self.string.len() as f64;
+        self.real + integer + self.weight + self.state + self.slope
     }
 }
 
@@ -49,8 +49,8 @@ impl Model for Lazy {
     const INFO: Info = Info { guid: "{lazy}", ..info!("Lazy", "lazy") };
 
     fn new(_: &Setup) -> Result<Self, Error> {
-        let (real, whole, truth, text) = (1.0, 2, false, "abc".to_owned());
-        Ok(Self { real, whole, truth, text, weight: 4.0, state: 5.0, slope: 0.0, sum: f64::NAN })
+        let (real, integer, boolean, string) = (1.0, 2, false, "abc".to_owned());
+        Ok(Self { real, integer, boolean, string, weight: 4.0, state: 5.0, slope: 0.0, sum: f64::NAN })
     }
 
     fn calculate(&mut self, time: f64) {
@@ -63,7 +63,7 @@ impl CoSimulation for Lazy {
 
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         self.state += 1.0;
-        Ok(if self.truth { Stepped::Early(step.time + 0.5 * step.size) } else { Stepped::Done })
+        Ok(if self.boolean { Stepped::Early(step.time + 0.5 * step.size) } else { Stepped::Done })
     }
 }
 

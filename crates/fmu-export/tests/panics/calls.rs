@@ -2,7 +2,7 @@
 
 use crate::models::Faulty;
 use crate::models::faulty::{Fault, Name, while_all_break};
-use crate::{FAULT, TEXT, TRUTH, U, X, Y};
+use crate::{BOOLEAN, FAULT, STRING, U, X, Y};
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Status;
 use fmu_export::fmi3::{indicator, reference};
@@ -30,12 +30,12 @@ pub fn of_both<F: Either>() -> Vec<Case<F>> {
         }),
         (CoSimulation, INTEGERS, Fault::Drop, |fmu| set_fault(fmu, Fault::None)),
         (CoSimulation, INTEGERS, Fault::Log, |fmu| set_fault(fmu, Fault::Log)),
-        (CoSimulation, ["SetBoolean"; 2], Fault::Then, |fmu| fmu.set_boolean(TRUTH, 1)),
-        (CoSimulation, ["SetString"; 2], Fault::Then, |fmu| fmu.set_text(TEXT, c"a".as_ptr())),
+        (CoSimulation, ["SetBoolean"; 2], Fault::Then, |fmu| fmu.set_boolean(BOOLEAN, 1)),
+        (CoSimulation, ["SetString"; 2], Fault::Then, |fmu| fmu.set_string(STRING, c"a".as_ptr())),
         (CoSimulation, ["DoStep"; 2], Fault::Step, |fmu| fmu.try_step(0.0, 0.1)),
         (CoSimulation, ["GetInteger", "GetInt32"], Fault::Read, |fmu| fmu.get_integer(N, &mut 0)),
-        (CoSimulation, ["GetBoolean"; 2], Fault::Read, |fmu| fmu.get_boolean(TRUTH, &mut 0)),
-        (CoSimulation, ["GetString"; 2], Fault::ReadText, |fmu| fmu.get_text(TEXT, &mut null())),
+        (CoSimulation, ["GetBoolean"; 2], Fault::Read, |fmu| fmu.get_boolean(BOOLEAN, &mut 0)),
+        (CoSimulation, ["GetString"; 2], Fault::ReadString, |fmu| fmu.get_string(STRING, &mut null())),
         (
             CoSimulation,
             ["GetRealOutputDerivatives", "GetOutputDerivatives"],

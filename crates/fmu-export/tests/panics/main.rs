@@ -18,12 +18,12 @@ use std::ptr::null_mut;
 const U: u32 = Name::u as u32;
 const Y: u32 = Name::y as u32;
 const X: u32 = Name::x as u32;
-const TRUTH: u32 = Name::truth as u32;
-const TEXT: u32 = Name::text as u32;
+const BOOLEAN: u32 = Name::boolean as u32;
+const STRING: u32 = Name::string as u32;
 const FAULT: u32 = Name::fault as u32;
 
 fn initialized<F: Either>(interface: Interface) -> F {
-    let fmu = F::of::<Faulty>(interface);
+    let fmu = F::new::<Faulty>(interface);
     fmu.initialize(0.0);
     fmu
 }
@@ -38,11 +38,11 @@ fn fatal<F: Either>(fmu: &F, label: &str, call: impl FnOnce(&F) -> Status) -> St
     assert_eq!(log.len(), 1, "{label}: {log:?}");
     log[0].assert_clean();
     assert_eq!((log[0].status, log[0].category.as_str()), (Status::Fatal, "logStatusFatal"), "{label}");
-    log[0].text.clone()
+    log[0].message.clone()
 }
 
 /// Faults that show as soon as the parameter says so: it is set by the call itself.
-fn shows_at_once(fault: Fault) -> bool {
+fn appears_at_once(fault: Fault) -> bool {
     [Fault::Update, Fault::Log].contains(&fault)
 }
 
@@ -63,7 +63,7 @@ fn contained<F: Special>() {
     let all = of_both::<F>().into_iter().chain(F::CALLS.iter().copied());
     all.for_each(|case| is_contained(case, &bystanders));
 
-    let fmu = F::of::<Faulty>(CoSimulation);
+    let fmu = F::new::<Faulty>(CoSimulation);
     fmu.ok(set_fault(&fmu, Fault::Initialize));
     let message = fatal(&fmu, "initialization", |fmu| fmu.enter_initialization_mode(0.0, None));
     assert!(message.starts_with(&named::<F>("EnterInitializationMode")), "{message}");
@@ -76,22 +76,22 @@ fn contained<F: Special>() {
     check_that_all_is_over(&fmu);
 
     // A panic while an instance is freed ends with it; so do those of its states.
-    let fmu = F::of::<Faulty>(CoSimulation);
+    let fmu = F::new::<Faulty>(CoSimulation);
     fmu.ok(set_fault(&fmu, Fault::Drop));
     (0..3).for_each(|_| _ = fmu.save());
     without_output(|| drop(fmu));
 
     // A panic while one is made, for the first time and by a reset.
-    let fmu = F::of::<Faulty>(CoSimulation);
+    let fmu = F::new::<Faulty>(CoSimulation);
     fatal(&fmu, "reset", |fmu| while_all_break(Fault::New, || fmu.reset()));
     check_that_all_is_over(&fmu);
-    let none = || F::make::<Faulty>(&Arguments::of::<Faulty>(CoSimulation)).map(drop);
+    let none = || F::make::<Faulty>(&Arguments::new::<Faulty>(CoSimulation)).map(drop);
     let log = without_output(|| while_all_break(Fault::New, none)).expect_err("no instance comes of a panic");
     let [message] = log.as_slice() else {
         panic!("a message about a panic while an instance is made: {log:?}")
     };
-    assert!(message.text.starts_with(&named::<F>("Instantiate")), "{message:?}");
-    assert!(message.text.contains("fault _New at 100_s"), "{message:?}");
+    assert!(message.message.starts_with(&named::<F>("Instantiate")), "{message:?}");
+    assert!(message.message.contains("fault _New at 100_s"), "{message:?}");
 
     let [co_simulation, model_exchange] = &bystanders;
     co_simulation.step(0.0, 0.1);
@@ -103,7 +103,7 @@ fn contained<F: Special>() {
 fn is_contained<F: Either>((interface, names, fault, call): Case<F>, bystanders: &[F; 2]) {
     let name = named::<F>(names[usize::from(named::<F>("") == "fmi3")]);
     let fmu: F = initialized(interface);
-    if !shows_at_once(fault) {
+    if !appears_at_once(fault) {
         fmu.ok(set_fault(&fmu, fault));
     }
     if interface == ModelExchange {
@@ -160,7 +160,7 @@ fn check_that_all_is_over<F: Either>(fmu: &F) {
     assert_eq!(answers.len(), log.len());
     for ((name, status), message) in answers.iter().zip(&log) {
         assert_eq!((*status, message.status), (Status::Fatal, Status::Fatal), "{name}");
-        assert!(message.text.starts_with(name) && message.text.contains("fatal"), "{message:?}");
+        assert!(message.message.starts_with(name) && message.message.contains("fatal"), "{message:?}");
         assert_eq!(message.category, "logStatusFatal");
     }
 }

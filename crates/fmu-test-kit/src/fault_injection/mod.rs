@@ -19,7 +19,7 @@ use arbitrary::{Result, Unstructured};
 use arguments::CallArguments;
 pub use arguments::bases_of;
 pub use call::element_size;
-use call::{Answer, Call, has_handles};
+use call::{Call, CallResult, has_handles};
 use fmu_export::{Exported, Interface, Standard, Status};
 pub use standards::Caller;
 use std::collections::BTreeMap;
@@ -63,7 +63,7 @@ fn session<F: Caller, M: Exported>(
         states: [[null_mut(); 3]; 3],
         contents: Default::default(),
         saved: Vec::new(),
-        variables: arguments::Variables::of::<M>(F::standard()),
+        variables: arguments::Variables::new::<M>(F::standard()),
         tally,
         model: PhantomData,
     };
@@ -81,7 +81,7 @@ pub type RunBytes = fn(&[u8], &mut Tally);
 /// # Panics
 /// Panics if a sequence violates a guarantee, or if `ROBUSTNESS_SECONDS` is no number.
 pub fn run_seeds(at_least: u64, models: &[(&str, RunBytes)]) -> Tally {
-    let seconds = std::env::var("ROBUSTNESS_SECONDS").map_or(3, |text| text.parse().expect("a number"));
+    let seconds = std::env::var("ROBUSTNESS_SECONDS").map_or(3, |value| value.parse().expect("a number"));
     let end = Instant::now() + Duration::from_secs(seconds);
     let mut tally = Tally::new();
     let mut seed = 0;
@@ -93,7 +93,7 @@ pub fn run_seeds(at_least: u64, models: &[(&str, RunBytes)]) -> Tally {
         seed += 1;
     }
     let calls: u64 = tally.values().flatten().sum();
-    println!("{calls} calls in {seed} sequences of each model; OK, discarded, refused:");
+    println!("{calls} calls in {seed} sequences of each model; OK, discarded, rejected:");
     for (function, counts) in &tally {
         println!("{function:40}{counts:9?}");
     }
@@ -125,9 +125,9 @@ struct Session<'a, F, M> {
 /// An instance, its last saved state, and the calls since then.
 struct Slot<F> {
     fmu: F,
-    made_of: Arguments<'static>,
+    arguments: Arguments<'static>,
     saved: Vec<u8>,
-    since: Vec<(Call, Answer)>,
+    since: Vec<(Call, CallResult)>,
 }
 
 /// Number of calls that are stored for a replay.
@@ -168,7 +168,7 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
             6..=8 => self.replay(index, u.arbitrary()?),
             9..=14 => self.handle(index, u)?,
             15..=47 => {
-                let steps = self.instances[index].as_ref().is_some_and(|slot| slot.made_of.fmu_type == 1);
+                let steps = self.instances[index].as_ref().is_some_and(|slot| slot.arguments.fmu_type == 1);
                 self.call(index, u.choose(if steps { F::STEPS } else { F::INTEGRATION })?, u)?;
             }
             _ => {
@@ -182,7 +182,7 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         Ok(())
     }
 
-    /// Makes an instance in place of another one, which is freed first.
+    /// Frees the instance at this index and instantiates the model again.
     fn instantiate(&mut self, index: usize, u: &mut Unstructured) -> Result<()> {
         self.free(index);
         self.count(F::FREE, Status::Ok);
@@ -191,43 +191,44 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         let offered =
             if M::CO_SIMULATION.is_some() { Interface::CoSimulation } else { Interface::ModelExchange };
         let interface = if both || u.ratio(1, 16)? { any } else { offered };
-        let mut made_of = Arguments::of::<M>(interface);
+        let mut arguments = Arguments::new::<M>(interface);
         if F::standard() == Standard::Fmi3 {
             let has_events = M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode());
-            made_of.early_return_allowed = u.int_in_range(0..=1)?;
-            made_of.event_mode_used = (has_events && u.arbitrary()?).into();
+            arguments.early_return_allowed = u.int_in_range(0..=1)?;
+            arguments.event_mode_used = (has_events && u.arbitrary()?).into();
         }
         if u.ratio(1, 8)? {
-            let texts = [None, Some(c""), Some(c" \t"), Some(c"%s%n#r1#"), Some(c"instance"), Some(c"\xff")];
+            let strings =
+                [None, Some(c""), Some(c" \t"), Some(c"%s%n#r1#"), Some(c"instance"), Some(c"\xff")];
             if F::standard() == Standard::Fmi2 {
-                made_of.fmu_type = u.arbitrary()?;
+                arguments.fmu_type = u.arbitrary()?;
             } else {
-                made_of.event_mode_used = u.int_in_range(0..=2)?;
-                made_of.required_intermediate_variables = if u.ratio(1, 8)? { &[0] } else { &[] };
+                arguments.event_mode_used = u.int_in_range(0..=2)?;
+                arguments.required_intermediate_variables = if u.ratio(1, 8)? { &[0] } else { &[] };
             }
             if u.ratio(1, 2)? {
-                made_of.guid = u.choose(&texts)?.map(CString::from);
+                arguments.guid = u.choose(&strings)?.map(CString::from);
             }
-            made_of.resource_location = *u.choose(&texts)?;
-            made_of.callbacks = u.arbitrary()?;
+            arguments.resource_location = *u.choose(&strings)?;
+            arguments.callbacks = u.arbitrary()?;
             // Accepted names are all equal: a model may display its name, which is included in states of
             // other instances.
-            made_of.instance_name = match *u.choose(&texts)? {
+            arguments.instance_name = match *u.choose(&strings)? {
                 Some(name) if !name.to_bytes().trim_ascii().is_empty() => Some(c"instance"),
                 rejected => rejected,
             };
         }
-        (made_of.logging_on, made_of.visible) = (u.int_in_range(0..=2)?, u.arbitrary()?);
-        made_of.environment = u.ratio(7, 8)?;
-        let made = (self.make)(&made_of);
-        let function = F::INSTANTIATE[usize::from(made_of.fmu_type == 0)];
-        self.count(function, if made.is_ok() { Status::Ok } else { Status::Error });
-        let log = made.as_ref().map_or_else(Clone::clone, F::take_log);
+        (arguments.logging_on, arguments.visible) = (u.int_in_range(0..=2)?, u.arbitrary()?);
+        arguments.environment = u.ratio(7, 8)?;
+        let result = (self.make)(&arguments);
+        let function = F::INSTANTIATE[usize::from(arguments.fmu_type == 0)];
+        self.count(function, if result.is_ok() { Status::Ok } else { Status::Error });
+        let log = result.as_ref().map_or_else(Clone::clone, F::take_log);
         self.record(|| format!("{function} {log:?}"));
         check_messages(log);
-        if let Ok(fmu) = made {
+        if let Ok(fmu) = result {
             let saved = fmu.bytes();
-            self.instances[index] = Some(Slot { fmu, made_of, saved, since: Vec::new() });
+            self.instances[index] = Some(Slot { fmu, arguments, saved, since: Vec::new() });
             if u.ratio(7, 8)? {
                 self.initialize(index);
             }
@@ -267,20 +268,20 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         let arguments = CallArguments::decode(u, function, time(&before), &self.variables)?;
         let call = Call { function, arguments };
         slot.fmu.take_log();
-        let answer = call.run(&slot.fmu);
+        let result = call.run(&slot.fmu);
         let messages = slot.fmu.take_log();
         if let Some(record) = &mut self.record {
-            record.push(format!("{:x?} {function} {answer:?} {messages:?}", fnv1a(&before)));
+            record.push(format!("{:x?} {function} {result:?} {messages:?}", fnv1a(&before)));
         }
         check_messages(messages);
         let unasked = function.ends_with("CompletedIntegratorStep")
             && M::MODEL_EXCHANGE.is_none_or(|offer| !offer.step_completed);
-        assert!(!unasked || answer.values.iter().all(|flag| *flag == 0), "{answer:?}");
-        if unasked || call.must_not_change(answer.status) {
-            assert_eq!(before, slot.fmu.bytes(), "changed by a call that answered {answer:?}: {call:?}");
+        assert!(!unasked || result.values.iter().all(|flag| *flag == 0), "{result:?}");
+        if unasked || call.must_not_change(result.status) {
+            assert_eq!(before, slot.fmu.bytes(), "changed by a call that returned {result:?}: {call:?}");
         }
-        let status = answer.status;
-        slot.since.push((call, answer));
+        let status = result.status;
+        slot.since.push((call, result));
         if slot.since.len() == MEMORY {
             self.replay(index, false);
         }
@@ -292,16 +293,16 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
     fn replay(&mut self, index: usize, elsewhere: bool) {
         let Some(slot) = &mut self.instances[index] else { return };
         let end = slot.fmu.bytes();
-        let other = elsewhere.then(|| (self.make)(&slot.made_of).expect("it was made before"));
+        let other = elsewhere.then(|| (self.make)(&slot.arguments).expect("an equal instance exists"));
         let fmu = other.as_ref().unwrap_or(&slot.fmu);
         fmu.restore(&slot.saved);
-        for (call, answer) in &slot.since {
-            assert_eq!(call.run(fmu), *answer, "another answer from the same state: {call:?}");
+        for (call, result) in &slot.since {
+            assert_eq!(call.run(fmu), *result, "a different result from the same state: {call:?}");
         }
-        assert_eq!(fmu.bytes(), end, "another end from the same state");
-        let made: Vec<_> = slot.since.iter().map(|(call, answer)| (call.function, answer.status)).collect();
+        assert_eq!(fmu.bytes(), end, "a different final state from the same state");
+        let calls: Vec<_> = slot.since.iter().map(|(call, result)| (call.function, result.status)).collect();
         slot.start_over();
-        for (function, status) in made {
+        for (function, status) in calls {
             self.count(function, status);
         }
     }
@@ -345,7 +346,7 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
                 let pointer = if u.ratio(1, 16)? { null() } else { self.saved.as_ptr() };
                 let old = *state;
                 let status = fmu.deserialize(pointer, self.saved.len(), pointer_to(state, u)?);
-                assert!(status == Status::Ok || *state == old, "a handle changed by a refused call");
+                assert!(status == Status::Ok || *state == old, "a handle changed by a rejected call");
                 (deserialize, status)
             }
         };
@@ -354,10 +355,10 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
             record.push(format!("{:x?} {function} {status:?} {messages:?}", fnv1a(&self.saved)));
         }
         check_messages(messages);
-        assert!([Status::Ok, Status::Error].contains(&status), "{function} answers {status:?}");
+        assert!([Status::Ok, Status::Error].contains(&status), "{function} returns {status:?}");
         // Freeing through a NULL pointer is no error.
         let rejected = status == Status::Error || function == free;
-        assert!(!foreign || rejected && !state.is_null(), "{function} takes another instance's state");
+        assert!(!foreign || rejected && !state.is_null(), "{function} accepts a state of another instance");
         let content = &mut self.contents[index][which];
         if function == set && status == Status::Ok {
             assert!(content.is_empty() || *content == fmu.bytes(), "another state is restored");

@@ -16,7 +16,7 @@ pub struct Call {
 
 /// Result of a call, with values as bits, so that NaN compares as well.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Answer {
+pub struct CallResult {
     pub status: Status,
     pub values: Vec<u64>,
 }
@@ -47,7 +47,7 @@ impl Call {
 
     /// Calls the function. Panics on an invalid result: an unexpected status, a value that is not finite, or
     /// more values than requested.
-    pub fn run<F: Caller>(&self, fmu: &F) -> Answer {
+    pub fn run<F: Caller>(&self, fmu: &F) -> CallResult {
         let (name, a) = (self.function, &self.arguments);
         let list = signature(name).expect("a function of the standard").arguments;
         let mut arrays: Vec<Array> = Vec::new();
@@ -79,7 +79,7 @@ impl Call {
         // without access.
         let status = unsafe { fmu.call(name, &words) };
         let discards = (name.ends_with("Status") || name.ends_with("DoStep")) && status == Status::Discard;
-        assert!(discards || [Status::Ok, Status::Error].contains(&status), "{name} answers {status:?}");
+        assert!(discards || [Status::Ok, Status::Error].contains(&status), "{name} returns {status:?}");
         let mut values = Vec::new();
         for index in 0..arrays.len() {
             let array = &arrays[index];
@@ -99,7 +99,7 @@ impl Call {
                 assert!(early == 0 || end < point + size, "not early: {self:?}");
             }
         }
-        Answer { status, values }
+        CallResult { status, values }
     }
 
     /// Returns the number to pass for the size argument of this name.
@@ -179,7 +179,7 @@ impl Array {
         let size = element_size(of, function);
         let mut bytes = Vec::new();
         if !to_read {
-            let count = match list.iter().rfind(|other| other.of == "usize").map(|of| of.name) {
+            let count = match list.iter().rfind(|other| other.of == "usize").map(|variable| variable.name) {
                 _ if of == "EventInfo" => EVENT_INFO / size,
                 Some("n_value") => a.values,
                 Some("n_sensitivity") if function.contains("Adjoint") => a.known_values,
@@ -190,14 +190,14 @@ impl Array {
             let elements = Elements::new(size, count, std::iter::empty());
             return Self { of, elements, written: Some(count), _bytes: bytes };
         }
-        let address = |text: *const c_char| text.expose_provenance() as u64;
+        let address = |string: *const c_char| string.expose_provenance() as u64;
         // Room for as many elements as any count may give.
         let room = a.values.max(a.known_values).max(a.vr.len()) + 2;
         let bits: Vec<u64> = match (of, name) {
             ("ValueReference", "known") => a.known.iter().map(|vr| u64::from(*vr)).collect(),
             ("ValueReference", _) => a.vr.iter().map(|vr| u64::from(*vr)).collect(),
-            ("String", "categories") => a.categories.iter().map(|text| address(*text)).collect(),
-            ("String", _) => a.texts.iter().map(|text| address(*text)).collect(),
+            ("String", "categories") => a.categories.iter().map(|string| address(*string)).collect(),
+            ("String", _) => a.strings.iter().map(|string| address(*string)).collect(),
             // Some sizes are larger than any variable here permits.
             ("usize", _) => a.integers.iter().map(|n| *n as u64 % (LONGEST + 1)).collect(),
             ("Binary", _) => {
@@ -223,7 +223,7 @@ impl Array {
     fn values(&self, count: usize, sizes: Option<&Elements>, values: &mut Vec<u64>) {
         if self.of == "EventInfo" {
             let bits = |index| self.elements.bits(index);
-            values.extend((0..5).map(|index| truth(bits(index))));
+            values.extend((0..5).map(|index| checked_boolean(bits(index))));
             values.push(finite(f64::from_bits(bits(6) | bits(7) << 32)));
             return;
         }
@@ -236,14 +236,14 @@ impl Array {
                     finite(f32::from_bits(bits as u32).into());
                     bits
                 }
-                "Boolean" | "Clock" => truth(bits),
+                "Boolean" | "Clock" => checked_boolean(bits),
                 "String" => {
-                    assert!(bits != 0, "no text");
+                    assert!(bits != 0, "no string");
                     // SAFETY: a string of the FMU, valid until the next call.
-                    let text = unsafe { CStr::from_ptr(std::ptr::with_exposed_provenance(bits as usize)) }
+                    let string = unsafe { CStr::from_ptr(std::ptr::with_exposed_provenance(bits as usize)) }
                         .to_bytes();
-                    assert!(std::str::from_utf8(text).is_ok(), "no UTF-8: {text:?}");
-                    u64::from_le_bytes(fnv1a(text))
+                    assert!(std::str::from_utf8(string).is_ok(), "not UTF-8: {string:?}");
+                    u64::from_le_bytes(fnv1a(string))
                 }
                 "Binary" => {
                     let size = sizes.expect("their sizes come before").bits(index) as usize;
@@ -267,12 +267,12 @@ const EVENT_INFO: usize = size_of::<fmu_export::fmi2::types::fmi2EventInfo>();
 
 /// Checks that a number is finite and returns its bits.
 fn finite(value: f64) -> u64 {
-    assert!(value.is_finite(), "{value} is no number to answer");
+    assert!(value.is_finite(), "{value} is no number to result");
     value.to_bits()
 }
 
 /// Checks that a Boolean is 0 or 1 and returns its bits.
-fn truth(flag: u64) -> u64 {
-    assert!(flag <= 1, "{flag} is no truth value");
+fn checked_boolean(flag: u64) -> u64 {
+    assert!(flag <= 1, "{flag} is neither 0 nor 1");
     flag
 }

@@ -51,7 +51,7 @@ pub struct Variables {
 
 impl Variables {
     /// Collects the value references of a model in an FMI version.
-    pub fn of<M: Exported>(standard: Standard) -> Self {
+    pub fn new<M: Exported>(standard: Standard) -> Self {
         let reference = |index| standard.reference(index);
         // In FMI 3.0, elements of arrays are not variables.
         let is_one = |variable: &Variable<M>| standard == Standard::Fmi2 || variable.element() == 0;
@@ -59,13 +59,17 @@ impl Variables {
             let indices = (0..).zip(M::TABLE).filter(|(_, variable)| is_one(variable) && wanted(variable));
             indices.map(|(index, _)| reference(index)).collect::<Vec<u32>>()
         };
-        let reals = |wanted: fn(&Variable<M>) -> bool| those(&|of| of.base() == BaseType::Real && wanted(of));
+        let reals = |wanted: fn(&Variable<M>) -> bool| {
+            those(&|variable| variable.base() == BaseType::Real && wanted(variable))
+        };
         Self {
             all: reference(M::TABLE.len() as u32),
-            real_inputs: reals(|of| of.causality() == Causality::Input),
+            real_inputs: reals(|variable| variable.causality() == Causality::Input),
             real_starts: reals(Variable::has_start),
-            unknowns: reals(|of| of.causality() == Causality::Output || of.differentiates().is_some()),
-            by_end: BY_END.map(|(end, bases)| (end, those(&|of| bases.contains(&of.base())))),
+            unknowns: reals(|variable| {
+                variable.causality() == Causality::Output || variable.differentiates().is_some()
+            }),
+            by_end: BY_END.map(|(end, bases)| (end, those(&|variable| bases.contains(&variable.base())))),
             states: M::STATES.len(),
             indicators: M::MODEL_EXCHANGE.map_or(0, |offer| offer.indicators),
             arrays: (0..)
@@ -122,7 +126,7 @@ pub struct CallArguments {
     pub orders: Vec<i32>,
     pub reals: Vec<f64>,
     pub integers: Vec<i32>,
-    pub texts: Vec<fmi2String>,
+    pub strings: Vec<fmi2String>,
     pub categories: Vec<fmi2String>,
     pub flags: [i32; 2],
     pub kind: i32,
@@ -139,7 +143,7 @@ const SPECIAL: [f64; 20] = [
     f64::MIN_POSITIVE, 5e-324, -5e-324, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-300,
 ];
 
-const TEXTS: [Option<&CStr>; 8] = [
+const STRINGS: [Option<&CStr>; 8] = [
     Some(c"hello"),
     Some(c""),
     Some(c"G\xc3\xb6del"),
@@ -179,7 +183,7 @@ fn reals(u: &mut Unstructured, count: usize) -> Result<Vec<f64>> {
     array(count, || if is_tame { tame(u) } else { wild(u) })
 }
 
-fn texts(u: &mut Unstructured, count: usize, known: &[Option<&CStr>]) -> Result<Vec<fmi2String>> {
+fn strings(u: &mut Unstructured, count: usize, known: &[Option<&CStr>]) -> Result<Vec<fmi2String>> {
     array(count, || Ok(u.choose(known)?.map_or(null(), CStr::as_ptr)))
 }
 
@@ -242,7 +246,7 @@ impl CallArguments {
             known.push(u.arbitrary()?);
         }
         // Only a quarter of the calls may contain invalid strings.
-        let good = if u.ratio(3, 4)? { &TEXTS[..5] } else { &TEXTS };
+        let good = if u.ratio(3, 4)? { &STRINGS[..5] } else { &STRINGS };
         let vr = variables.references(u, count, function)?;
         let (values, known_values) = (variables.values(&vr), variables.values(&known));
         Ok(Self {
@@ -252,8 +256,8 @@ impl CallArguments {
             orders: array(count, || if u.ratio(15, 16)? { Ok(1) } else { small(u) })?,
             reals: reals(u, count.max(values).max(known_values))?,
             integers: array(count, || small(u))?,
-            texts: texts(u, count, good)?,
-            categories: texts(u, count, &CATEGORIES)?,
+            strings: strings(u, count, good)?,
+            categories: strings(u, count, &CATEGORIES)?,
             flags: [small(u)?, small(u)?],
             kind: small(u)?,
             numbers,
