@@ -14,7 +14,7 @@ import pytest
 from built import ROOT
 
 from prw.checking.agreement import compare
-from prw.checking.experiments import FOLDER, read_experiments
+from prw.checking.experiments import DIRECTORY, read_experiments
 from tools.validation.importers import IMPORTERS
 
 #: Largest error of the FMU, and smallest effect of a change of k1 by 1 %, as fractions of the tolerance.
@@ -30,9 +30,9 @@ def known(testbed):
 def test_the_fmu_contains_them(testbed, known):
     assert list(known) == NAMES
     with zipfile.ZipFile(testbed) as archive:
-        inside = {name.removeprefix(f"{FOLDER}/") for name in archive.namelist() if name.startswith(FOLDER)}
-        zipped = sum(i.compress_size for i in archive.infolist() if i.filename.startswith(FOLDER))
-    assert inside == {path.name for path in (ROOT / "modelDescription" / FOLDER).iterdir()}
+        inside = {name.removeprefix(f"{DIRECTORY}/") for name in archive.namelist() if name.startswith(DIRECTORY)}
+        zipped = sum(i.compress_size for i in archive.infolist() if i.filename.startswith(DIRECTORY))
+    assert inside == {path.name for path in (ROOT / "modelDescription" / DIRECTORY).iterdir()}
     assert zipped < 100_000
 
 

@@ -118,7 +118,7 @@ def about(found: list[Experiment]) -> str:
     kinds = ", ".join(" ".join(names) for names in KINDS)
     return f"""Reference experiments
 
-The folder extra/{LAYER} has experiments to test an importer. A program that shares no code with
+The folder extra/{LAYER} contains experiments to test an importer. A program that shares no code with
 the FMU calculated the outputs from the energies of the testbed's parts.
 
 {listed}

@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> None:
         if master.version() is None:
             absent.append(master)
         else:
-            runs[f"{master.name} {master.version()}"] = masters.run_apart(master, system)
+            runs[f"{master.name} {master.version()}"] = masters.run_separately(master, system)
     if not runs:
         raise UserError("no co-simulation master is installed; `make closed-loop` installs them")
     name, first = next(iter(runs.items()))

@@ -105,7 +105,7 @@ MASTERS = (
 )
 
 
-def run_apart(master: Tool, system: System) -> dict[str, np.ndarray]:
+def run_separately(master: Tool, system: System) -> dict[str, np.ndarray]:
     """Run the system under the master in a separate process.
 
     Returns `time` and RECORDED by name, each (steps,): the values at the end of every step. Raises UserError with the

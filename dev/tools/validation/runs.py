@@ -90,7 +90,7 @@ def validate(fmus: Path, results: Mapping[str, Path] = {}) -> Validation:
                 rows.append(row(importer.name, str(importer.version()), fmi, agreement))
     loop = system.read(fmus / "prw_closed_loop.ssp", fmus / "prw_closed_loop")
     for master in filter(Tool.version, masters.MASTERS):
-        found = of_testbed(masters.run_apart(master, loop))
+        found = of_testbed(masters.run_separately(master, loop))
         agreement = compare(found, find(known, "closed_loop"), master.interface)
         rows.append(row(f"{master.name}, with the controller's FMU", str(master.version()), "2.0", agreement))
     for tool, file in results.items():
