@@ -281,7 +281,7 @@ impl Motors {
     }
 
     /// Returns the change of these motors per change `inputs` of their inputs. The motions are linear in
-    /// inputs, earlier samples and given rates, so the latter two are 0 here.
+    /// inputs, earlier samples and given rates, so earlier samples and given rates are 0 here.
     pub fn sensitivity(&self, inputs: [Inputs; 2]) -> Self {
         Self {
             inputs,
@@ -302,7 +302,7 @@ impl Motors {
     /// Makes the samples the earlier ones after a step from the angles `theta` to `end`. The caller updates
     /// `times`.
     #[inline(always)]
-    pub fn go_on(&mut self, theta: Sides, end: &Motions) {
+    pub fn finish_step(&mut self, theta: Sides, end: &Motions) {
         self.earlier = [theta, self.earlier[0]];
         self.path_end = *end;
         self.is_sampled = [false; 2];

@@ -123,7 +123,7 @@ impl Testbed {
         }
         let ([theta3, theta4], [theta5, theta6], [omega5, omega6]) = (q_i.array(), q_ii.array(), v.array());
         *state = [theta3, theta4, theta5, theta6, omega5, omega6];
-        motors.go_on(u, &end);
+        motors.finish_step(u, &end);
         true
     }
 }

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-const FOLDER: &str = env!("CARGO_MANIFEST_DIR");
+const DIRECTORY: &str = env!("CARGO_MANIFEST_DIR");
 
 /// Connects the FMUs of controller and testbed to a closed loop: prw_closed_loop.ssp, and the folder
 /// prw_closed_loop with OspSystemStructure.xml.
@@ -49,7 +49,7 @@ fn run(options: &Options) -> Result<()> {
         ensure!(angle.is_finite(), "--go-to must have finite numbers, not {angle}");
     }
     let workspace =
-        Path::new(FOLDER).ancestors().nth(2).context("this program was moved out of its workspace")?;
+        Path::new(DIRECTORY).ancestors().nth(2).context("this program was moved out of its workspace")?;
     let folder = workspace.join("target/fmu");
     let fmu = |option: &Option<PathBuf>, name: &str| option.clone().unwrap_or_else(|| folder.join(name));
     let [pitch, roll] = [0, 1].map(|axis| options.go_to[axis] * PI / 180.0);

@@ -128,8 +128,8 @@ def bill(product: Product) -> str:
     (main,) = (key for key in components if key[0] == product.package)
     metadata = {"component": components.pop(main)}
     every = list(components.values())
-    for name, licence, holder, where in NO_CRATES:
-        component = {"type": "library", "bom-ref": name, "name": name, "description": where}
+    for name, licence, holder, location in NO_CRATES:
+        component = {"type": "library", "bom-ref": name, "name": name, "description": location}
         every.append(component | {"licenses": [{"expression": licence}], "copyright": holder})
     content = {"metadata": metadata, "components": every}
     # The serial number is a hash of the content, so equal content has an equal serial number.

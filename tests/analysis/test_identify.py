@@ -172,8 +172,8 @@ def test_wrong_options(prw, tmp_path, experiment, arguments, message):
 
 
 def test_encoder_steps_are_not_taken_for_motion(prw, tmp_path):
-    """Equal motors: the difference of their encoders' steps rolls no wrist, however well J3 fits it. The others are
-    found all the same."""
+    """With equal motor angles the wrist does not roll. The encoders' steps differ, but must not determine J3. The other
+    parameters are identified."""
     simulated = rig.experiment(seed=3, duration=5, pattern="equal")
     rig.write(tmp_path / "run.csv", rig.measure(simulated, 1, ("tau1", "tau2", "theta3", "theta4")))
     result = prw("identify", "run.csv", "--estimate", "k1,k2,c1,c2,c3,J3", "--starts", 1)

@@ -30,7 +30,7 @@ def needs_new_system(fmu: Path) -> bool:
 
 
 @pytest.mark.parametrize("model", ["prw_testbed", "prw_controller"])
-def test_nothing_is_found_but_what_is_listed(version: str, model: str) -> None:
+def test_only_listed_notes_are_found(version: str, model: str) -> None:
     fmu = built(f"{version}{model}.fmu")
     command = [CHECK, "fmu", "check", "--fmu", fmu, "--json", "--no-shrink", "--repeat", "0.3"]
     run = subprocess.run(command, capture_output=True, text=True, timeout=300)

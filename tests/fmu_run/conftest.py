@@ -11,7 +11,7 @@ from unruly import build
 
 @pytest.fixture(scope="session")
 def unruly(tmp_path_factory) -> Path:
-    """An FMU in C, compiled here, whose parameter `mood` selects how it misbehaves (unruly.c)."""
+    """An FMU in C, compiled here, whose parameter `behaviour` selects how it misbehaves (unruly.c)."""
     return build(tmp_path_factory.mktemp("unruly"))
 
 

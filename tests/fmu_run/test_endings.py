@@ -11,8 +11,8 @@ from unruly import repacked
 
 TIME = np.arange(11) / 10
 
-# By the value of `mood`: the number of rows (of 11), the error, and the note.
-MOODS = {
+# By the value of `behaviour`: the number of rows (of 11), the error, and the note.
+BEHAVIOURS = {
     "good": (11, None, None),
     "silent error": (6, "at 0.5 s: fmi2DoStep returned Error without a message", None),
     "pending": (6, "at 0.5 s: fmi2DoStep returned Error without a message", None),
@@ -25,30 +25,30 @@ MOODS = {
     "ends at point": (7, "ended by the FMU at t = 0.6 s", None),
     "no terminate": (11, None, "finished; then fmi2Terminate returned Error without a message"),
     "no start": (0, "fmi2ExitInitializationMode returned Error without a message", None),
-    "error if asked": (6, "at 0.5 s: fmi2DoStep: the pump ran dry", None),
-    "fatal if asked": (6, "at 0.5 s: fmi2DoStep: the pump ran dry", None),
+    "error if logging": (6, "at 0.5 s: fmi2DoStep: the pump ran dry", None),
+    "fatal if logging": (6, "at 0.5 s: fmi2DoStep: the pump ran dry", None),
 }
-MOODS3 = {
+BEHAVIOURS3 = {
     "good": (11, None, None),
     "ends between": (6, "ended by the FMU at t = 0.525 s", None),
     "ends at point": (7, "ended by the FMU at t = 0.6 s", None),
     "returns early": (6, "at 0.5 s: fmi3DoStep: the step ended early, at 0.525 s", None),
     "no terminate": (11, None, "finished; then fmi3Terminate returned Fatal without a message"),
-    "error if asked": (6, "at 0.5 s: fmi3DoStep: the pump ran dry", None),
+    "error if logging": (6, "at 0.5 s: fmi3DoStep: the pump ran dry", None),
 }
 
 
 @pytest.mark.parametrize(
-    "moods, fixture, first", [(MOODS, "unruly", 4.0), (MOODS3, "unruly3", 0.0)], ids=["fmi2", "fmi3"]
+    "behaviours, fixture, first", [(BEHAVIOURS, "unruly", 4.0), (BEHAVIOURS3, "unruly3", 0.0)], ids=["fmi2", "fmi3"]
 )
 @pytest.mark.parametrize("read_before_set", [False, True])
-def test_moods(request, moods, fixture, first, read_before_set):
-    number = np.repeat(np.arange(len(moods)), 3)
+def test_behaviours(request, behaviours, fixture, first, read_before_set):
+    number = np.repeat(np.arange(len(behaviours)), 3)
     with fmu_run.Fmu(request.getfixturevalue(fixture)) as fmu:
-        ask = {"start": {"mood": number}, "outputs": ["y"], "threads": 4, "read_before_set": read_before_set}
+        ask = {"start": {"behaviour": number}, "outputs": ["y"], "threads": 4, "read_before_set": read_before_set}
         runs = fmu.run(TIME, every=1, measures=["end", "mean"], **ask)
         thinned = fmu.run(TIME, every=2, **ask)
-    rows, errors, notes = (dict(enumerate(np.repeat(column, 3))) for column in zip(*moods.values()))
+    rows, errors, notes = (dict(enumerate(np.repeat(column, 3))) for column in zip(*behaviours.values()))
     assert runs.errors == thinned.errors == {run: why for run, why in errors.items() if why}
     assert runs.notes == thinned.notes == {run: why for run, why in notes.items() if why}
     for run, count in rows.items():
@@ -63,17 +63,17 @@ def test_moods(request, moods, fixture, first, read_before_set):
 
 def test_an_end_at_the_last_time(unruly):
     with fmu_run.Fmu(unruly) as fmu:
-        runs = fmu.run(TIME[:7], start={"mood": list(MOODS).index("ends at point")}, outputs=["y"])
+        runs = fmu.run(TIME[:7], start={"behaviour": list(BEHAVIOURS).index("ends at point")}, outputs=["y"])
     assert runs.ok.all() and runs.notes == {0: "ended by the FMU at t = 0.6 s"}
     np.testing.assert_allclose(runs["y"][0], 4.0 + TIME[:7], atol=1e-15)
 
 
 def test_silent_runs_are_repeated_once_with_logging(unruly):
-    moods = [
-        list(MOODS).index(name) for name in ("error if asked", "good", "silent error", "discard", "error if asked")
+    behaviours = [
+        list(BEHAVIOURS).index(name) for name in ("error if logging", "good", "silent error", "discard", "error if logging")
     ]
     with fmu_run.Fmu(unruly) as fmu:
-        runs = fmu.run(TIME, start={"mood": moods}, outputs=["y", "logged", "instances"])
+        runs = fmu.run(TIME, start={"behaviour": behaviours}, outputs=["y", "logged", "instances"])
         after = fmu.run(TIME, outputs=["logged", "instances"])
     assert runs.errors.keys() == {0, 2, 3, 4} and np.nanmax(runs["logged"]) == 0
     # Three runs failed without a message. They were repeated with logging, one at a time, six steps each.
@@ -83,7 +83,7 @@ def test_silent_runs_are_repeated_once_with_logging(unruly):
 def test_an_fmu_that_is_slow_with_logging(unruly):
     with fmu_run.Fmu(unruly) as fmu:
         begin = clock.monotonic()
-        runs = fmu.run(np.linspace(0, 0.6, 101), start={"mood": len(MOODS)}, outputs=["y"])
+        runs = fmu.run(np.linspace(0, 0.6, 101), start={"behaviour": len(BEHAVIOURS)}, outputs=["y"])
     # If all 76 steps were repeated, at 0.3 s each, this would take 23 s.
     assert clock.monotonic() - begin < 10
     assert runs.errors[0].endswith("fmi2DoStep returned Error without a message")

@@ -99,7 +99,7 @@ def test_rejected_runs_do_not_affect_the_others(fmu):
     [
         (None, "cannot be opened"),
         ({}, "no readable modelDescription.xml"),
-        ({"modelDescription.xml": "<a"}, "is no XML"),
+        ({"modelDescription.xml": "<a"}, "is not well-formed XML"),
         ({"modelDescription.xml": '<fmiModelDescription fmiVersion="1.0"/>'}, 'its fmiVersion is "1.0"'),
         (
             {"modelDescription.xml": '<fmiModelDescription fmiVersion="2.0"/>'},
@@ -247,16 +247,16 @@ def test_other_types(unruly):
             start={"label": "seven77", "slope": 2},
             outputs=["y", "count", "flag"],
         ).check()
-        labels = fmu.run(TIME, start={"label": ["one", "three"], "mood": ["Good", "SilentError"]}, outputs=["y"])
+        labels = fmu.run(TIME, start={"label": ["one", "three"], "behaviour": ["Good", "SilentError"]}, outputs=["y"])
         assert list(labels["y"][:, 0]) == [3.0, 5.0] and list(labels.errors) == [1]
-        one = fmu.instances(start={"label": "held", "mood": "Good", "flag": "true"})
-        assert one.texts("label") == ["held"] and list(one.get(("mood", "flag"))[0]) == [0.0, 1.0]
+        one = fmu.instances(start={"label": "held", "behaviour": "Good", "flag": "true"})
+        assert one.texts("label") == ["held"] and list(one.get(("behaviour", "flag"))[0]) == [0.0, 1.0]
         for call, message in [
             (lambda: fmu.run(TIME, outputs=["label"]), "label is no number"),
             (lambda: one.texts("y"), "y is a number, not a string"),
             (
-                lambda: fmu.run(TIME, outputs=["y"], start={"mood": "Glad"}),
-                "mood is one of Good, SilentError, its start",
+                lambda: fmu.run(TIME, outputs=["y"], start={"behaviour": "Glad"}),
+                "behaviour is one of Good, SilentError, its start",
             ),
             (
                 lambda: fmu.run(TIME, outputs=["y"], start={"flag": "on"}),

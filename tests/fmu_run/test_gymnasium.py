@@ -170,14 +170,14 @@ def test_a_failure_ends_one_episode(task, mode, count) -> None:
 
 
 @pytest.mark.parametrize(
-    ("mood", "slope", "message"),
+    ("behaviour", "slope", "message"),
     [
         (1, 1.0, "fmi2DoStep"),
         (8, 1.0, "ended by the FMU at t = 0.525 s"),
         (0, np.inf, "an observation is no finite number"),
     ],
 )
-def test_termination_and_infinite_observations_end_the_episode(unruly, mood, slope, message) -> None:
+def test_termination_and_infinite_observations_end_the_episode(unruly, behaviour, slope, message) -> None:
     """The FMU allows one instance in a process, so each environment is closed before the next one is created."""
     task = Task(
         fmu=unruly,
@@ -187,7 +187,7 @@ def test_termination_and_infinite_observations_end_the_episode(unruly, mood, slo
         step=0.1,
         length=100,
         failed_reward=0.0,
-        start={"mood": mood},
+        start={"behaviour": behaviour},
     )
     with Env(task) as env:
         for _ in range(2):

@@ -1,5 +1,5 @@
-/* An FMU for Co-Simulation alone that does what its parameter says, and lacks all that it need not have: compiled with
- * COMPLETE it has what FMPy asks for before it loads an FMU. Where logging is on it gives more reasons. */
+/* An FMU for Co-Simulation whose parameter selects its behaviour. It has no optional functions, unless it is compiled with
+ * COMPLETE, because FMPy loads only FMUs with all functions. With logging on, it logs more reasons. */
 #define _POSIX_C_SOURCE 199309L
 #include <stdlib.h>
 #include <string.h>
@@ -7,13 +7,13 @@
 
 #include "fmi2Functions.h"
 
-enum { MOOD, COUNT, FLAG, SLOPE, Y, INSTANCES, LABEL, LOGGED };
+enum { BEHAVIOUR, COUNT, FLAG, SLOPE, Y, INSTANCES, LABEL, LOGGED };
 enum { GOOD, SILENT_ERROR, PENDING, FATAL, DISCARD, NO_STATUS, NO_RESET, WARNING,
-       ENDS_BETWEEN, ENDS_AT_POINT, NO_TERMINATE, NO_START, ERROR_IF_ASKED, FATAL_IF_ASKED, SLOW_IF_ASKED };
+       ENDS_BETWEEN, ENDS_AT_POINT, NO_TERMINATE, NO_START, ERROR_IF_LOGGING, FATAL_IF_LOGGING, SLOW_IF_LOGGING };
 
 typedef struct {
     fmi2CallbackFunctions callbacks;
-    int mood, count, flag, logging;
+    int behaviour, count, flag, logging;
     double slope, y, time;
     char label[64];
 } Instance;
@@ -23,12 +23,12 @@ static int alive, most, logged_steps;
 const char *fmi2GetTypesPlatform(void) { return "default"; }
 const char *fmi2GetVersion(void) { return "2.0"; }
 
-static void as_new(Instance *i) {
-    i->mood = GOOD, i->count = 3, i->flag = 0, i->slope = 1.0, i->y = 0.0;
+static void set_defaults(Instance *i) {
+    i->behaviour = GOOD, i->count = 3, i->flag = 0, i->slope = 1.0, i->y = 0.0;
     strcpy(i->label, "none");
 }
 
-static void say(const Instance *i, fmi2Status status, const char *text) {
+static void log_message(const Instance *i, fmi2Status status, const char *text) {
 #ifdef COMPLETE
     if (status == fmi2OK) return; /* FMPy prints it. */
 #endif
@@ -46,8 +46,8 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     Instance *i = calloc(1, sizeof *i);
     if (i == NULL) return NULL;
     i->callbacks = *callbacks, i->logging = logging;
-    as_new(i);
-    say(i, fmi2OK, "here I am");
+    set_defaults(i);
+    log_message(i, fmi2OK, "here I am");
     if (++alive > most) most = alive;
     return i;
 }
@@ -66,22 +66,22 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2R
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return c != NULL ? fmi2OK : fmi2Error; }
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     Instance *i = c;
-    if (i->mood == NO_START) return fmi2Error;
-    say(i, fmi2OK, "ready");
+    if (i->behaviour == NO_START) return fmi2Error;
+    log_message(i, fmi2OK, "ready");
     return fmi2OK;
 }
-fmi2Status fmi2Terminate(fmi2Component c) { return ((Instance *)c)->mood != NO_TERMINATE ? fmi2OK : fmi2Error; }
+fmi2Status fmi2Terminate(fmi2Component c) { return ((Instance *)c)->behaviour != NO_TERMINATE ? fmi2OK : fmi2Error; }
 
 fmi2Status fmi2Reset(fmi2Component c) {
     Instance *i = c;
-    if (i->mood == NO_RESET) return fmi2Error;
-    as_new(i);
+    if (i->behaviour == NO_RESET) return fmi2Error;
+    set_defaults(i);
     return fmi2OK;
 }
 
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer value[]) {
     Instance *i = c;
-    for (size_t k = 0; k < n; k++) *(vr[k] == MOOD ? &i->mood : &i->count) = value[k];
+    for (size_t k = 0; k < n; k++) *(vr[k] == BEHAVIOUR ? &i->behaviour : &i->count) = value[k];
     return fmi2OK;
 }
 
@@ -118,7 +118,7 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer value[]) {
     Instance *i = c;
     for (size_t k = 0; k < n; k++)
-        value[k] = vr[k] == INSTANCES ? most : vr[k] == LOGGED ? logged_steps : vr[k] == MOOD ? i->mood : i->count;
+        value[k] = vr[k] == INSTANCES ? most : vr[k] == LOGGED ? logged_steps : vr[k] == BEHAVIOUR ? i->behaviour : i->count;
     return fmi2OK;
 }
 
@@ -132,38 +132,38 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean
     (void)no_set_state;
     Instance *i = c;
     logged_steps += i->logging;
-    if (i->logging && i->mood >= ERROR_IF_ASKED) {
-        if (time < 0.45) say(i, fmi2Error, "not the reason");
-        else say(i, fmi2OK, "the pump ran dry");
+    if (i->logging && i->behaviour >= ERROR_IF_LOGGING) {
+        if (time < 0.45) log_message(i, fmi2Error, "not the reason");
+        else log_message(i, fmi2OK, "the pump ran dry");
     }
-    if (i->mood == SLOW_IF_ASKED && i->logging) nanosleep(&(struct timespec){.tv_nsec = 300000000}, NULL);
-    double reached = time + (i->mood == ENDS_BETWEEN && time > 0.45 ? 0.25 * size : size);
+    if (i->behaviour == SLOW_IF_LOGGING && i->logging) nanosleep(&(struct timespec){.tv_nsec = 300000000}, NULL);
+    double reached = time + (i->behaviour == ENDS_BETWEEN && time > 0.45 ? 0.25 * size : size);
     i->y += i->slope * (reached - time);
     i->time = reached;
-    if (time < 0.45 && i->mood == PENDING) {
-        say(i, fmi2Warning, "not the reason");
+    if (time < 0.45 && i->behaviour == PENDING) {
+        log_message(i, fmi2Warning, "not the reason");
         return fmi2Warning;
     }
     if (time < 0.45) return fmi2OK;
-    switch (i->mood) {
+    switch (i->behaviour) {
     case SILENT_ERROR: return fmi2Error;
     case PENDING: return fmi2Pending;
     case FATAL: return fmi2Fatal;
     case NO_STATUS: return (fmi2Status)77;
-    case WARNING: say(i, fmi2Warning, "a warning"); return fmi2Warning;
-    case DISCARD: say(i, fmi2Discard, "no more of this after %s"); return fmi2Discard;
-    case ENDS_BETWEEN: say(i, fmi2Discard, "the tank is empty"); return fmi2Discard;
+    case WARNING: log_message(i, fmi2Warning, "a warning"); return fmi2Warning;
+    case DISCARD: log_message(i, fmi2Discard, "no more of this after %s"); return fmi2Discard;
+    case ENDS_BETWEEN: log_message(i, fmi2Discard, "the tank is empty"); return fmi2Discard;
     case ENDS_AT_POINT: return fmi2Discard;
-    case ERROR_IF_ASKED:
-    case SLOW_IF_ASKED: return fmi2Error;
-    case FATAL_IF_ASKED: return fmi2Fatal;
+    case ERROR_IF_LOGGING:
+    case SLOW_IF_LOGGING: return fmi2Error;
+    case FATAL_IF_LOGGING: return fmi2Fatal;
     }
     return fmi2OK;
 }
 
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
-    int mood = ((Instance *)c)->mood;
-    *value = mood == ENDS_BETWEEN || mood == ENDS_AT_POINT;
+    int behaviour = ((Instance *)c)->behaviour;
+    *value = behaviour == ENDS_BETWEEN || behaviour == ENDS_AT_POINT;
     return kind == fmi2Terminated ? fmi2OK : fmi2Discard;
 }
 
@@ -173,24 +173,24 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Rea
 }
 
 #ifdef COMPLETE
-#define REFUSED(function, ...) \
+#define REJECTED(function, ...) \
     fmi2Status function(__VA_ARGS__) { return fmi2Error; }
 #pragma GCC diagnostic ignored "-Wunused-parameter"
-REFUSED(fmi2SetDebugLogging, fmi2Component c, fmi2Boolean on, size_t n, const fmi2String categories[])
-REFUSED(fmi2GetFMUstate, fmi2Component c, fmi2FMUstate *state)
-REFUSED(fmi2SetFMUstate, fmi2Component c, fmi2FMUstate state)
-REFUSED(fmi2FreeFMUstate, fmi2Component c, fmi2FMUstate *state)
-REFUSED(fmi2SerializedFMUstateSize, fmi2Component c, fmi2FMUstate state, size_t *size)
-REFUSED(fmi2SerializeFMUstate, fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
-REFUSED(fmi2DeSerializeFMUstate, fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
-REFUSED(fmi2GetDirectionalDerivative, fmi2Component c, const fmi2ValueReference unknown[], size_t n_unknown,
+REJECTED(fmi2SetDebugLogging, fmi2Component c, fmi2Boolean on, size_t n, const fmi2String categories[])
+REJECTED(fmi2GetFMUstate, fmi2Component c, fmi2FMUstate *state)
+REJECTED(fmi2SetFMUstate, fmi2Component c, fmi2FMUstate state)
+REJECTED(fmi2FreeFMUstate, fmi2Component c, fmi2FMUstate *state)
+REJECTED(fmi2SerializedFMUstateSize, fmi2Component c, fmi2FMUstate state, size_t *size)
+REJECTED(fmi2SerializeFMUstate, fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
+REJECTED(fmi2DeSerializeFMUstate, fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
+REJECTED(fmi2GetDirectionalDerivative, fmi2Component c, const fmi2ValueReference unknown[], size_t n_unknown,
         const fmi2ValueReference known[], size_t n_known, const fmi2Real seed[], fmi2Real value[])
-REFUSED(fmi2SetRealInputDerivatives, fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
+REJECTED(fmi2SetRealInputDerivatives, fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
         const fmi2Real value[])
-REFUSED(fmi2GetRealOutputDerivatives, fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
+REJECTED(fmi2GetRealOutputDerivatives, fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
         fmi2Real value[])
-REFUSED(fmi2CancelStep, fmi2Component c)
-REFUSED(fmi2GetStatus, fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)
-REFUSED(fmi2GetIntegerStatus, fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
-REFUSED(fmi2GetStringStatus, fmi2Component c, const fmi2StatusKind kind, fmi2String *value)
+REJECTED(fmi2CancelStep, fmi2Component c)
+REJECTED(fmi2GetStatus, fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)
+REJECTED(fmi2GetIntegerStatus, fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
+REJECTED(fmi2GetStringStatus, fmi2Component c, const fmi2StatusKind kind, fmi2String *value)
 #endif

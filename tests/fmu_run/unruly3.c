@@ -1,16 +1,16 @@
-/* An FMU for FMI 3.0 whose parameter says how its steps end after 0.5 s. */
+/* An FMU for FMI 3.0 whose parameter selects how its steps end after 0.5 s. */
 #include <stdlib.h>
 #include <string.h>
 
 #include "fmi3Functions.h"
 
-enum { GOOD, ENDS_BETWEEN, ENDS_AT_POINT, RETURNS_EARLY, NO_TERMINATE, ERROR_IF_ASKED };
+enum { GOOD, ENDS_BETWEEN, ENDS_AT_POINT, RETURNS_EARLY, NO_TERMINATE, ERROR_IF_LOGGING };
 
 typedef struct {
     fmi3InstanceEnvironment environment;
     fmi3LogMessageCallback log;
     fmi3Boolean logging;
-    int mood;
+    int behaviour;
     double y;
 } Instance;
 
@@ -35,11 +35,11 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean has_tolerance
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance c) { return c != NULL ? fmi3OK : fmi3Error; }
-fmi3Status fmi3Terminate(fmi3Instance c) { return ((Instance *)c)->mood != NO_TERMINATE ? fmi3OK : fmi3Fatal; }
+fmi3Status fmi3Terminate(fmi3Instance c) { return ((Instance *)c)->behaviour != NO_TERMINATE ? fmi3OK : fmi3Fatal; }
 
 fmi3Status fmi3SetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Int32 value[], size_t nv) {
     (void)vr, (void)n, (void)nv;
-    ((Instance *)c)->mood = value[0];
+    ((Instance *)c)->behaviour = value[0];
     return fmi3OK;
 }
 
@@ -53,13 +53,13 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Bo
                       fmi3Boolean *terminate, fmi3Boolean *early, fmi3Float64 *reached) {
     (void)no_set_state;
     Instance *i = c;
-    int late = time > 0.45, mood = late ? i->mood : GOOD;
+    int late = time > 0.45, behaviour = late ? i->behaviour : GOOD;
     *event = fmi3False;
-    *terminate = mood == ENDS_BETWEEN || mood == ENDS_AT_POINT;
-    *early = mood == ENDS_BETWEEN || mood == RETURNS_EARLY;
+    *terminate = behaviour == ENDS_BETWEEN || behaviour == ENDS_AT_POINT;
+    *early = behaviour == ENDS_BETWEEN || behaviour == RETURNS_EARLY;
     *reached = time + (*early ? 0.25 * size : size);
     i->y = *reached;
-    if (mood != ERROR_IF_ASKED) return fmi3OK;
+    if (behaviour != ERROR_IF_LOGGING) return fmi3OK;
     if (i->logging) i->log(i->environment, fmi3Error, "logStatusError", "the pump ran dry");
     return fmi3Error;
 }

@@ -111,7 +111,7 @@ class LinearModel:
     parameters: dict
 
     def impulse(self, jump):
-        """Change of x when the motor angles jump by `jump` (2,) rad at once.
+        """Change of x when the motor angles jump by `jump` (2,) rad.
 
         Lagrange's equation is integrated over the instant of the jump. Terms with angles vanish. theta5 and theta6 do
         not jump, because they have inertia. The result is Delta [q] + M [q'] = -(dissipative coupling) jump.

@@ -57,7 +57,7 @@ def test_the_published_crates() -> None:
 
 
 @pytest.mark.parametrize("home", published(), ids=lambda directory: directory.name)
-def test_a_crate_has_all_that_its_page_needs(home: Path) -> None:
+def test_the_page_of_a_crate_is_complete(home: Path) -> None:
     readme = home / "README.md"
     package = tomllib.loads((home / "Cargo.toml").read_text(encoding="utf-8"))["package"]
     assert package["documentation"] == f"https://docs.rs/{home.name}" and package["readme"] == readme.name
@@ -85,7 +85,7 @@ def anchors(page: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_relative_links_lead_somewhere(name: str) -> None:
+def test_relative_links_have_targets(name: str) -> None:
     page = ROOT / name
     for link in links(page.read_text(encoding="utf-8")):
         if not re.match(r"[a-z]+:", link):

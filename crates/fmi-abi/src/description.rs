@@ -6,7 +6,7 @@ use roxmltree::{Document, Node};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Largest array whose single start value is repeated for all elements.
-pub const MOST_ELEMENTS: usize = 1 << 20;
+pub const MAX_ELEMENTS: usize = 1 << 20;
 
 /// A variable; an array of FMI 3.0 is one variable.
 #[derive(Clone, Debug, PartialEq)]
@@ -413,7 +413,7 @@ fn start_values(node: Node, of_type: Node, base: Option<BaseType>, size: Option<
     }
     let is_array = node.children().any(|child| child.has_tag_name("Dimension"));
     match (size, &start[..]) {
-        (Some(size), [one]) if is_array && size <= MOST_ELEMENTS => vec![one.clone(); size],
+        (Some(size), [one]) if is_array && size <= MAX_ELEMENTS => vec![one.clone(); size],
         _ => start,
     }
 }

@@ -86,7 +86,7 @@ fn call(numbered: &Numbered) -> Vec<Broken> {
     }));
     if function.ends_with("GetString") && !numbered.forbidden {
         broken.push(rule("start_values.utf8", move |run| {
-            let Values::Texts(texts) = run.written(id)? else { return None };
+            let Values::Strings(texts) = run.written(id)? else { return None };
             let bad = texts.iter().flatten().find(|text| std::str::from_utf8(text).is_err())?;
             Some(format!("the string {:?} is not UTF-8", String::from_utf8_lossy(bad)))
         }));
@@ -118,7 +118,7 @@ const MESSAGE_TESTS: [(&str, MessageTest); 4] = [
         };
         Some(format!("its category is {}{why}", show(category)))
     }),
-    ("logs.text", |message, _, _| match &message.text {
+    ("logs.utf8", |message, _, _| match &message.text {
         None => Some("the message is NULL".to_owned()),
         Some(text) if std::str::from_utf8(text).is_err() => Some(format!("{} is not UTF-8", show(text))),
         Some(_) => None,

@@ -72,13 +72,13 @@ pub enum Arg {
     /// Bits of a floating-point number.
     Real(u64),
     /// An integer, a size or a Boolean.
-    Whole(i64),
+    Integer(i64),
     /// NULL.
     Null,
     /// Array of numbers for the FMU to read, as their bits.
     In(Kind, Vec<u64>),
     /// Array of strings; `None` is NULL.
-    Texts(Vec<Option<Vec<u8>>>),
+    Strings(Vec<Option<Vec<u8>>>),
     /// Array of pointers to bytes.
     Blobs(Vec<Vec<u8>>),
     /// Array for this many results.
@@ -195,7 +195,7 @@ pub enum Values {
     /// Bits of numbers.
     Numbers(Kind, Vec<u64>),
     /// Strings or binary values; `None` is NULL.
-    Texts(Vec<Option<Vec<u8>>>),
+    Strings(Vec<Option<Vec<u8>>>),
 }
 
 impl Values {
@@ -205,14 +205,14 @@ impl Values {
     }
 
     /// Returns `size` copies of a string or binary value.
-    pub fn texts(text: &[u8], size: usize) -> Self {
-        Self::Texts(vec![Some(text.to_owned()); size])
+    pub fn strings(text: &[u8], size: usize) -> Self {
+        Self::Strings(vec![Some(text.to_owned()); size])
     }
 
     pub fn numbers(&self) -> Vec<f64> {
         match self {
             Self::Numbers(kind, bits) => bits.iter().map(|bits| kind.number(*bits)).collect(),
-            Self::Texts(_) => Vec::new(),
+            Self::Strings(_) => Vec::new(),
         }
     }
 
@@ -220,7 +220,7 @@ impl Values {
     pub fn part(&self, begin: usize, size: usize) -> Option<Self> {
         Some(match self {
             Self::Numbers(kind, bits) => Self::Numbers(*kind, bits.get(begin..begin + size)?.to_vec()),
-            Self::Texts(texts) => Self::Texts(texts.get(begin..begin + size)?.to_vec()),
+            Self::Strings(texts) => Self::Strings(texts.get(begin..begin + size)?.to_vec()),
         })
     }
 
@@ -232,7 +232,7 @@ impl Values {
                 Some(number) => number.to_string(),
                 None => "nothing".to_owned(),
             },
-            Self::Texts(texts) => match texts.get(index) {
+            Self::Strings(texts) => match texts.get(index) {
                 Some(Some(text)) => format!("{:?}", String::from_utf8_lossy(text)),
                 _ => "NULL".to_owned(),
             },
@@ -250,7 +250,7 @@ impl Values {
                     .zip(two)
                     .position(|(one, two)| one != two && !equal(kind.number(*one), kind.number(*two)))
             }
-            (Self::Texts(one), Self::Texts(two)) => one.iter().zip(two).position(|(one, two)| one != two),
+            (Self::Strings(one), Self::Strings(two)) => one.iter().zip(two).position(|(one, two)| one != two),
             _ => Some(0),
         }
     }

@@ -13,7 +13,7 @@ fn units(sequence: &[Numbered]) -> Vec<Vec<u32>> {
             Step::Call { function, .. } => function.get(4..).unwrap_or_default(),
             _ => "",
         };
-        let goes_on = match name {
+        let belongs = match name {
             "NewDiscreteStates" | "UpdateDiscreteStates" => open,
             "EnterContinuousTimeMode" | "EnterStepMode" => std::mem::take(&mut open),
             "EnterInitializationMode" => before == "SetupExperiment",
@@ -23,14 +23,14 @@ fn units(sequence: &[Numbered]) -> Vec<Vec<u32>> {
         open |= ["EnterEventMode", "ExitInitializationMode"].contains(&name);
         before = name;
         match units.last_mut() {
-            Some(unit) if goes_on => unit.push(numbered.id),
+            Some(unit) if belongs => unit.push(numbered.id),
             _ => units.push(vec![numbered.id]),
         }
     }
     units
 }
 
-/// Returns a key of a call, which does not contain the instance; `None` for calls that only read and other steps.
+/// Returns the function and the arguments of a call without its instance, or `None` for calls that only read and for other steps.
 fn content(step: &Step) -> Option<String> {
     match step {
         Step::Call { function, args, .. } => {
@@ -42,7 +42,7 @@ fn content(step: &Step) -> Option<String> {
     }
 }
 
-/// Returns the sequence without the steps that have these numbers, also in its threads.
+/// Returns the sequence without the steps with these numbers. The steps of its threads are removed, too.
 fn without(sequence: &[Numbered], ids: &[u32]) -> CallSequence {
     let kept = sequence.iter().filter(|numbered| !ids.contains(&numbered.id)).cloned();
     kept.map(|mut numbered| {
@@ -54,7 +54,7 @@ fn without(sequence: &[Numbered], ids: &[u32]) -> CallSequence {
     .collect()
 }
 
-/// Joins corresponding units of compared simulations. If one simulation lacked a call, its results would differ for that reason.
+/// Joins corresponding units of compared simulations. A simulation without one of these calls would have other results.
 fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
     let contents: HashMap<u32, String> = all_steps(sequence)
         .into_iter()
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_is_needed_and_legal() {
+    fn the_remaining_calls_are_needed_and_legal() {
         let (description, trajectory) = (description(), trajectory());
         let mut writer = Writer::new(&description, &trajectory, &[0]);
         writer.write(0, WHOLE);
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_left_out_that_is_pinned() {
+    fn pinned_calls_are_kept() {
         let (description, trajectory) = (description(), trajectory());
         let mut writer = Writer::new(&description, &trajectory, &[0]);
         writer.write(0, WHOLE);
@@ -181,7 +181,7 @@ mod tests {
 
     /// Checks that a call is removed from all compared simulations or from none.
     #[test]
-    fn compared_simulations_stay_alike() {
+    fn compared_simulations_keep_the_same_calls() {
         let (description, trajectory) = (description(), trajectory());
         let mut writer = Writer::new(&description, &trajectory, &[0]);
         writer.write(0, WHOLE);
@@ -197,10 +197,10 @@ mod tests {
         let Some(Step::Parallel(threads)) = short.last().map(|numbered| &numbered.step) else {
             panic!("{short:?}")
         };
-        let alone = short[..short.len() - 1].to_vec();
+        let single = short[..short.len() - 1].to_vec();
         for name in ["fmi2DoStep", "fmi2SetReal"] {
-            assert_eq!(count(&alone, name), count(&threads[0], name), "{name}");
+            assert_eq!(count(&single, name), count(&threads[0], name), "{name}");
         }
-        assert_eq!(count(&alone, "fmi2DoStep"), 2);
+        assert_eq!(count(&single, "fmi2DoStep"), 2);
     }
 }

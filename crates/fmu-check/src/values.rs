@@ -14,8 +14,8 @@ pub fn other_values(description: &Description, index: usize) -> Option<Values> {
         BaseType::Real | BaseType::Float32 => {
             Values::new(kind, starts.iter().map(|start| near(variable, *start, 1.0 / 64.0)))
         }
-        BaseType::String => Values::texts("Gödel, Escher, Bach".as_bytes(), size),
-        BaseType::Binary => Values::texts(&Vec::from_iter((0..300).map(|byte| (byte % 256) as u8)), size),
+        BaseType::String => Values::strings("Gödel, Escher, Bach".as_bytes(), size),
+        BaseType::Binary => Values::strings(&Vec::from_iter((0..300).map(|byte| (byte % 256) as u8)), size),
         BaseType::Boolean => Values::new(kind, starts.iter().map(|start| 1.0 - start)),
         BaseType::Enumeration if variable.max.is_none() => return None,
         _ => {

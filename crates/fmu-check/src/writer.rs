@@ -230,7 +230,7 @@ impl<'a> Writer<'a> {
         stop: Option<f64>,
     ) -> u32 {
         let defined = |number: Option<f64>| {
-            [Arg::Whole(number.is_some().into()), Arg::real(number.unwrap_or_default())]
+            [Arg::Integer(number.is_some().into()), Arg::real(number.unwrap_or_default())]
         };
         let mut experiment = defined(tolerance).to_vec();
         experiment.push(Arg::real(start));
@@ -318,7 +318,7 @@ impl<'a> Writer<'a> {
             for position in positions {
                 match &values[position].1 {
                     Values::Numbers(_, bits) => numbers.extend(bits),
-                    Values::Texts(all) => texts.extend(all.iter().cloned()),
+                    Values::Strings(all) => texts.extend(all.iter().cloned()),
                 }
             }
             let total = numbers.len() + texts.len();
@@ -328,7 +328,7 @@ impl<'a> Writer<'a> {
                     let sizes = blobs.iter().map(|blob| blob.len() as u64).collect();
                     vec![Arg::In(Kind::Size, sizes), Arg::Blobs(blobs)]
                 }
-                "String" => vec![Arg::Texts(texts)],
+                "String" => vec![Arg::Strings(texts)],
                 _ => vec![Arg::In(kind, numbers)],
             };
             let args = access(self.description.standard, references, values, total);
@@ -376,7 +376,11 @@ impl<'a> Writer<'a> {
             }
             ids.extend(self.set(instance, &point.inputs));
             let flag = Arg::Out(if self.fmi3() { Kind::U8 } else { Kind::I32 }, 1);
-            ids.push(self.call(instance, "CompletedIntegratorStep", vec![Arg::Whole(0), flag.clone(), flag]));
+            ids.push(self.call(
+                instance,
+                "CompletedIntegratorStep",
+                vec![Arg::Integer(0), flag.clone(), flag],
+            ));
         }
         if point.updates > 0 {
             ids.extend(self.event(instance, point.updates));
@@ -393,13 +397,13 @@ impl<'a> Writer<'a> {
         self.call(
             instance,
             "SetContinuousStates",
-            vec![Arg::In(Kind::F64, bits), Arg::Whole(states.len() as i64)],
+            vec![Arg::In(Kind::F64, bits), Arg::Integer(states.len() as i64)],
         )
     }
 
     /// Reads a vector of `count` numbers.
     pub fn vector(&mut self, instance: usize, function: &str, count: usize) -> u32 {
-        self.call(instance, function, vec![Arg::Out(Kind::F64, count), Arg::Whole(count as i64)])
+        self.call(instance, function, vec![Arg::Out(Kind::F64, count), Arg::Integer(count as i64)])
     }
 
     pub fn derivatives_name(&self) -> &'static str {
@@ -446,13 +450,13 @@ pub fn access(
     values: impl IntoIterator<Item = Arg>,
     total: usize,
 ) -> Vec<Arg> {
-    let count = Arg::Whole(references.len() as i64);
-    let sizes = (standard == Standard::Fmi3).then_some(Arg::Whole(total as i64));
+    let count = Arg::Integer(references.len() as i64);
+    let sizes = (standard == Standard::Fmi3).then_some(Arg::Integer(total as i64));
     [Arg::In(Kind::U32, references), count].into_iter().chain(values).chain(sizes).collect()
 }
 
 pub fn step_args(standard: Standard, time: f64, size: f64) -> Vec<Arg> {
-    let mut args = vec![Arg::real(time), Arg::real(size), Arg::Whole(0)];
+    let mut args = vec![Arg::real(time), Arg::real(size), Arg::Integer(0)];
     if standard == Standard::Fmi3 {
         args.extend([Kind::U8, Kind::U8, Kind::U8, Kind::F64].map(|kind| Arg::Out(kind, 1)));
     }

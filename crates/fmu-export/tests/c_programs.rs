@@ -87,7 +87,7 @@ fn model_exchange() -> [f64; 4] {
     fmu.get(OUTPUTS)
 }
 
-/// A variadic logger that formats and one that does not show the same texts.
+/// Checks that a logger that formats its arguments and a logger that does not show the same messages.
 #[test]
 fn loggers() {
     let printed = run("loggers");
@@ -96,7 +96,7 @@ fn loggers() {
     assert!(printed.contains("there is no log category '_s_s_n'"), "{printed}");
 }
 
-/// Alone and side by side.
+/// Loads one library, and two libraries at the same time.
 #[cfg(target_os = "linux")]
 #[test]
 fn loading_and_unloading_leaves_nothing_behind() {
@@ -105,7 +105,7 @@ fn loading_and_unloading_leaves_nothing_behind() {
     reload(&program, &["oscillator", "talker"]);
 }
 
-/// The library exports the 44 functions of FMI 2.0, the 75 of FMI 3.0, the one that describes the model, and nothing else.
+/// Checks that the library exports only the 44 functions of FMI 2.0, the 75 of FMI 3.0, and the function that describes the model.
 #[test]
 fn exported_symbols() {
     let flags: &[&str] = if cfg!(target_os = "macos") { &["-gU"] } else { &["-D", "--defined-only"] };

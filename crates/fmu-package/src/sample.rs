@@ -24,7 +24,7 @@ pub(crate) struct FactorSample<'a> {
     pub instance: Instance<'a>,
 }
 
-/// The point that a draw begins at, whether it has a new time, and the variables that it moves.
+/// A random draw: the point that it changes, whether it changes the time, and the variables that it changes.
 struct Draw<'d> {
     before: Option<&'d Point>,
     time: bool,
@@ -43,19 +43,19 @@ pub(crate) struct Sampler<'a> {
     pub stuck: BTreeMap<u32, String>,
 }
 
-/// Attempts with the same reach.
+/// The number of attempts with one reach.
 const ATTEMPTS: usize = 10;
 /// The number of reaches.
 const REACHES: usize = 10;
 
-/// How far variables are moved, as parts of the usual distance.
+/// The largest change of a variable, as a fraction of the usual change.
 #[derive(Clone, Copy)]
 struct Reach {
-    /// The first reach moves each element around its start value. All others move it around its value at the point before.
+    /// Whether elements change around their start values. With the other reaches they change around their values at the previous point.
     first: bool,
-    /// The part by which each element is moved separately.
+    /// The fraction for each element separately.
     single: f64,
-    /// The part by which all elements of an array are moved in proportion, which keeps their order.
+    /// The fraction for a common factor of all elements of an array, which keeps their order.
     common: f64,
 }
 
@@ -68,14 +68,14 @@ impl Reach {
 }
 
 impl<'a> Sampler<'a> {
-    /// A sampler of points near these start values.
+    /// Creates a sampler of points near these start values.
     pub fn new(model: &'a LoadedModel, starts: Starts, tunable_parameters: bool) -> Self {
         // The seed is fixed: the same model always gets the same description.
         let random = fastrand::Rng::with_seed(2);
         Self { running: false, model, random, starts, tunable_parameters, stuck: BTreeMap::new() }
     }
 
-    /// Instances that differ in fixed parameters, in tunable ones, and in inputs, states and time.
+    /// Returns instances that differ in fixed parameters, in tunable parameters, and in inputs, states and time.
     pub fn factor_samples(&mut self) -> Result<Vec<FactorSample<'a>>> {
         let is_parameter = |variable: &Variable| variable.causality == Causality::Parameter;
         let tunable_parameters = self.tunable_parameters;
@@ -90,7 +90,7 @@ impl<'a> Sampler<'a> {
                 for steps in 0..3 {
                     let (point, instance) =
                         self.draw(Some(&point), true, |variable| !is_parameter(variable))?;
-                    let instance = self.go_on(instance, &point, steps);
+                    let instance = self.make_steps(instance, &point, steps);
                     samples.push(FactorSample { fixed, tunable, instance });
                 }
             }
@@ -98,8 +98,8 @@ impl<'a> Sampler<'a> {
         Ok(samples)
     }
 
-    /// Draws new values for some variables, and a new time or not, until the model accepts them; all others are as before. If the
-    /// model accepts no new value of a variable, the variable keeps its value and is [`stuck`](Self::stuck).
+    /// Draws new values for some variables, and with `time` a new time, until the model accepts them. The other variables keep their
+    /// values. If the model accepts no new value of a variable, the variable keeps its value and is [`stuck`](Self::stuck).
     pub fn draw(
         &mut self,
         before: Option<&Point>,
@@ -126,7 +126,7 @@ impl<'a> Sampler<'a> {
         self.draw_one_by_one(point, &draw)
     }
 
-    /// Moves one variable or array after the other, each as far as the model accepts it.
+    /// Changes one variable or array after the other. Each change is the largest that the model accepts.
     fn draw_one_by_one(&mut self, at: Point, draw: &Draw) -> Result<(Point, Instance<'a>)> {
         let table = &self.model.table;
         let values = match draw.before {
@@ -236,7 +236,7 @@ impl<'a> Sampler<'a> {
     }
 
     /// Makes steps in Co-Simulation, and sets derivatives of the inputs after the first step: factors may depend on both.
-    fn go_on(&self, mut instance: Instance<'a>, point: &Point, steps: usize) -> Instance<'a> {
+    fn make_steps(&self, mut instance: Instance<'a>, point: &Point, steps: usize) -> Instance<'a> {
         if point.interface != Interface::CoSimulation {
             return instance;
         }
@@ -246,7 +246,7 @@ impl<'a> Sampler<'a> {
             instance = of_fmi2;
         }
         for _ in 0..steps {
-            // If the model rejects the step, it is as before.
+            // A model that rejects the step is unchanged.
             if instance.step(table.info.step_size).is_err() {
                 break;
             }
@@ -282,7 +282,7 @@ pub(crate) fn model_at<'a>(
     instance.initialized()?;
     instance.run()?;
     if point.interface == Interface::CoSimulation {
-        // Before the first step, states may depend on inputs and parameters. If the model rejects the step, it is as before.
+        // Before the first step, states may depend on inputs and parameters. A model that rejects the step is unchanged.
         let _ = instance.step(model.table.info.step_size);
     } else {
         let mut states = instance.states()?;
@@ -296,12 +296,12 @@ pub(crate) fn model_at<'a>(
     Ok(instance)
 }
 
-/// Whether a value is anything but a Real that is infinite or NaN.
+/// Returns whether a value is finite. Values that are not Real are finite.
 pub(crate) fn is_finite(value: &Value) -> bool {
     !matches!(value, Value::Real(value) if !value.is_finite())
 }
 
-/// The value of an array's element when all elements change by a common factor, or integers by a common number.
+/// Returns the value of an array's element after a change of all elements: by a factor, or by a summand for integers.
 fn moved_in_common(variable_type: &Type, value: &Value, share: f64) -> Value {
     match (&variable_type.attributes, value) {
         (Attributes::Real { .. }, &Value::Real(value)) => Value::Real(value * (1.0 + 0.5 * share)),
@@ -312,8 +312,8 @@ fn moved_in_common(variable_type: &Type, value: &Value, share: f64) -> Value {
     }
 }
 
-/// A value in the range of the type, which differs from the start value by at most a `part` of the usual distance, and from the
-/// value before if possible. `None` for strings and bytes, whose other possible values are unknown.
+/// Returns a random value in the range of the type. It differs from the start value by at most the fraction `part` of the usual
+/// change, and from the previous value if possible. Returns `None` for strings and binary values.
 pub(crate) fn draw_value(
     random: &mut fastrand::Rng,
     variable_type: &Type,

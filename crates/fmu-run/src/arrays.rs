@@ -2,7 +2,7 @@
 //! reference. A call of the FMU gets or sets all values of an array (section 2.2.7.2).
 
 use fmi_abi::BaseType;
-use fmi_abi::description::{MOST_ELEMENTS, Variable};
+use fmi_abi::description::{MAX_ELEMENTS, Variable};
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -36,7 +36,7 @@ impl Array {
 
     fn length(&self) -> Option<usize> {
         let length = self.sizes.iter().try_fold(1_usize, |length, size| length.checked_mul(*size));
-        length.filter(|length| *length <= MOST_ELEMENTS)
+        length.filter(|length| *length <= MAX_ELEMENTS)
     }
 
     /// Returns the start value of an element.
@@ -101,7 +101,7 @@ impl Arrays {
         let length = array.length()?;
         let begin = u32::try_from(self.elements.len()).ok()?.checked_add(self.first)?;
         let end = begin.checked_add(u32::try_from(length).ok()?)?;
-        if self.elements.len() + length > MOST_ELEMENTS {
+        if self.elements.len() + length > MAX_ELEMENTS {
             return None;
         }
         let index = self.all.len();

@@ -8,11 +8,11 @@ use fmi_abi::BaseType;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Found<'a> {
     /// Index of the component.
-    pub part: usize,
+    pub component: usize,
     pub variable: &'a Variable,
     pub description: &'a Description,
     /// Name of the output that feeds the variable.
-    pub fed_by: Option<&'a str>,
+    pub source: Option<&'a str>,
 }
 
 impl Found<'_> {
@@ -25,7 +25,7 @@ impl Found<'_> {
 
     /// Fails if an output feeds the variable.
     pub fn check_own(self, name: &str) -> Result<(), Error> {
-        match self.fed_by {
+        match self.source {
             Some(output) => request(format!("{name} is fed by {output}, it cannot be set")),
             None => Ok(()),
         }

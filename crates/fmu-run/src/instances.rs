@@ -115,7 +115,7 @@ impl System {
             ));
         }
         let start = StartValues::of(self, &[])?;
-        let all = empty(setup.count, self.parts().len())?;
+        let all = empty(setup.count, self.components().len())?;
         let threads = self.threads(setup.interface, setup.threads)?.min(setup.count);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads - 1);
         let pool = (threads > 1).then(|| pool.build()).transpose();
@@ -612,13 +612,13 @@ impl One {
 }
 
 /// Allocates entries for the instances of a system, if there is enough memory for them and for their data.
-fn empty(count: usize, parts: usize) -> Result<Vec<One>, Error> {
+fn empty(count: usize, components: usize) -> Result<Vec<One>, Error> {
     /// Minimum of further memory per component: allocations of its FMU and of its log.
     const COMPONENT: usize = 256;
     let too_many = || Error::Memory(format!("{count} instances need more memory than there is"));
     let mut all = Vec::new();
     all.try_reserve_exact(count).map_err(|_| too_many())?;
-    let each = size_of::<Running>() + parts * (size_of::<Instance>() + COMPONENT);
+    let each = size_of::<Running>() + components * (size_of::<Instance>() + COMPONENT);
     let needed = count.checked_mul(each).ok_or_else(too_many)?;
     // Freed immediately; it only tests whether so much memory is available.
     Vec::<u8>::new().try_reserve_exact(needed).map_err(|_| too_many())?;

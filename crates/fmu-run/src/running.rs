@@ -11,7 +11,7 @@ use fmi_abi::Interface;
 /// component and no connections.
 #[derive(Debug)]
 pub(crate) struct Running {
-    parts: Vec<Instance>,
+    components: Vec<Instance>,
     system: System,
     /// Whether inputs must be updated before the next get or step ([`Order::Dependencies`]).
     is_due: bool,
@@ -32,7 +32,7 @@ impl Running {
         logging_on: bool,
     ) -> Result<Self, (String, bool)> {
         let used = used.filter(Self::is_alive).and_then(|mut used| {
-            used.parts.iter_mut().try_for_each(Instance::reset).ok()?;
+            used.components.iter_mut().try_for_each(Instance::reset).ok()?;
             Some(used)
         });
         // Some FMUs cannot be reset. The old instances are freed before new ones are made, because some FMUs
@@ -40,11 +40,13 @@ impl Running {
         if let Some(used) = used {
             return Ok(used);
         }
-        let parts =
-            system.parts().iter().map(|part| Instance::new(&part.fmu, &part.name, interface, logging_on));
-        let parts = parts.collect::<Result<Vec<_>, _>>()?;
+        let components = system
+            .components()
+            .iter()
+            .map(|component| Instance::new(&component.fmu, &component.name, interface, logging_on));
+        let components = components.collect::<Result<Vec<_>, _>>()?;
         let (system, [passed, row, buffer]) = (system.clone(), [const { Vec::new() }; 3]);
-        Ok(Self { parts, system, is_due: false, passed, saved: Vec::new(), row, buffer })
+        Ok(Self { components, system, is_due: false, passed, saved: Vec::new(), row, buffer })
     }
 
     /// Sets start values and enters Initialization Mode, in an order that both FMI versions allow.
@@ -57,18 +59,18 @@ impl Running {
     ) -> Result<(), Rejection> {
         self.each(|_, instance| instance.set_up(start_time, stop_time))?;
         for (target, text) in start.texts(number) {
-            self.parts[target.part].set_text(target.reference, text)?;
+            self.components[target.component].set_text(target.reference, text)?;
         }
         let numbers: Vec<_> = start.numbers(number).collect();
         // One call sets values that must be consistent, such as the elements of an array that must increase.
         let together = |(one, _): &(Target, f64), (next, _): &(Target, f64)| {
-            (one.part, one.base) == (next.part, next.base)
+            (one.component, one.base) == (next.component, next.base)
         };
         for group in numbers.chunk_by(together) {
-            let Target { part, base, .. } = group[0].0;
+            let Target { component, base, .. } = group[0].0;
             let (references, values): (Vec<_>, Vec<_>) =
                 group.iter().map(|(target, value)| (target.reference, *value)).unzip();
-            self.parts[part].set_numbers(base, &references, &values)?;
+            self.components[component].set_numbers(base, &references, &values)?;
         }
         self.each(|_, instance| instance.enter_initialization_mode(start_time, stop_time))
     }
@@ -87,7 +89,7 @@ impl Running {
         let order = *order;
         let most = match order {
             _ if stages.is_empty() => return Ok(()),
-            Order::Jacobi => self.parts.len(),
+            Order::Jacobi => self.components.len(),
             Order::Dependencies => 1 + stages.iter().map(|stage| stage.outputs.len()).sum::<usize>(),
         };
         let mut before: Vec<u64> = Vec::new();
@@ -115,12 +117,12 @@ impl Running {
     }
 
     fn pass_all_on(&mut self, mut observe: impl FnMut(&[f64])) -> Result<(), Rejection> {
-        let Self { parts, system, row, buffer, .. } = self;
+        let Self { components, system, row, buffer, .. } = self;
         for stage in &system.exchange().stages {
             row.resize(stage.outputs.len(), 0.0);
-            stage.outputs.get(parts, buffer, row)?;
+            stage.outputs.get(components, buffer, row)?;
             observe(row);
-            stage.inputs.set(parts, buffer, row)?;
+            stage.inputs.set(components, buffer, row)?;
         }
         self.is_due = false;
         Ok(())
@@ -129,14 +131,14 @@ impl Running {
     /// Updates the records after a step or the initialization.
     #[inline]
     fn stepped(&mut self) -> Result<(), Rejection> {
-        let Self { parts, system, passed, buffer, .. } = self;
+        let Self { components, system, passed, buffer, .. } = self;
         let Exchange { order, stages } = system.exchange();
         match (order, stages.first()) {
             (_, None) => {}
             (Order::Dependencies, _) => self.is_due = true,
             (Order::Jacobi, Some(stage)) => {
                 passed.resize(stage.outputs.len(), 0.0);
-                stage.outputs.get(parts, buffer, passed)?;
+                stage.outputs.get(components, buffer, passed)?;
             }
         }
         Ok(())
@@ -146,7 +148,7 @@ impl Running {
     /// the step.
     #[inline]
     pub fn step(&mut self, time: f64, size: f64) -> Result<(), Rejection> {
-        if let [instance] = &mut *self.parts
+        if let [instance] = &mut *self.components
             && self.system.exchange().stages.is_empty()
         {
             return instance.step(time, size);
@@ -154,7 +156,7 @@ impl Running {
         self.pass_on()?;
         if !self.passed.is_empty() {
             let stage = &self.system.exchange().stages[0];
-            stage.inputs.set(&mut self.parts, &mut self.buffer, &self.passed)?;
+            stage.inputs.set(&mut self.components, &mut self.buffer, &self.passed)?;
         }
         let mut ended = None;
         self.each(|_, instance| match instance.step(time, size) {
@@ -171,12 +173,12 @@ impl Running {
     #[inline]
     pub fn get(&mut self, variables: &Selection, row: &mut [f64]) -> Result<(), Rejection> {
         self.pass_on()?;
-        variables.get(&mut self.parts, &mut self.buffer, row)
+        variables.get(&mut self.components, &mut self.buffer, row)
     }
 
     #[inline]
     pub fn set(&mut self, variables: &Selection, row: &[f64]) -> Result<(), Rejection> {
-        variables.set(&mut self.parts, &mut self.buffer, row)?;
+        variables.set(&mut self.components, &mut self.buffer, row)?;
         let Exchange { order, stages } = self.system.exchange();
         self.is_due |= *order == Order::Dependencies && !stages.is_empty();
         Ok(())
@@ -184,26 +186,26 @@ impl Running {
 
     pub fn get_text(&mut self, index: Target) -> Result<String, Rejection> {
         self.pass_on()?;
-        self.parts[index.part].get_text(index.reference)
+        self.components[index.component].get_text(index.reference)
     }
 
     /// Returns the instance of a single FMU.
     #[inline]
     pub fn sole(&mut self) -> &mut Instance {
-        &mut self.parts[0]
+        &mut self.components[0]
     }
 
     pub fn is_alive(&self) -> bool {
-        self.parts.iter().all(Instance::is_alive)
+        self.components.iter().all(Instance::is_alive)
     }
 
     pub fn forget_log(&self) {
-        self.parts.iter().for_each(Instance::forget_log);
+        self.components.iter().for_each(Instance::forget_log);
     }
 
     /// Returns the messages since the last call, of instances with logging enabled.
     pub fn take_messages(&self) -> Vec<Message> {
-        self.parts.iter().flat_map(Instance::take_messages).collect()
+        self.components.iter().flat_map(Instance::take_messages).collect()
     }
 
     pub fn terminate(&mut self) -> Result<(), Rejection> {
@@ -252,20 +254,20 @@ impl Running {
         }
         let mut rest = bytes;
         let short = || Rejection::without_fmu("deserialize", "the bytes are no state of this system");
-        let parts = self.parts.iter().map(|_| {
+        let components = self.components.iter().map(|_| {
             let (length, after) = rest.split_first_chunk()?;
             let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
             let (own, after) = after.split_at_checked(length)?;
             rest = after;
             Some(own)
         });
-        let parts: Vec<_> = parts.collect::<Option<_>>().ok_or_else(short)?;
+        let components: Vec<_> = components.collect::<Option<_>>().ok_or_else(short)?;
         if rest.len() != size_of::<f64>() * self.passed.len() {
             return Err(short());
         }
         let now = rest.chunks_exact(8).filter_map(|bytes| Some(f64::from_le_bytes(bytes.try_into().ok()?)));
         let before = std::mem::replace(&mut self.passed, now.collect());
-        let saved = self.keep(|part, instance| instance.deserialize(parts[part]));
+        let saved = self.keep(|component, instance| instance.deserialize(components[component]));
         self.passed = before;
         saved
     }
@@ -276,19 +278,19 @@ impl Running {
         mut state: impl FnMut(usize, &mut Instance) -> Result<Saved, Rejection>,
     ) -> Result<Saved, Rejection> {
         let mut done = None;
-        let kept = self.each(|part, instance| {
-            done = Some((part, state(part, instance)?));
+        let kept = self.each(|component, instance| {
+            done = Some((component, state(component, instance)?));
             Ok(())
         });
         let (last, saved) = match (kept, done) {
             (Ok(()), Some(done)) => done,
             (Err(rejection), Some((last, saved))) => {
-                self.parts[..=last].iter_mut().for_each(|instance| _ = instance.forget(saved));
+                self.components[..=last].iter_mut().for_each(|instance| _ = instance.forget(saved));
                 return Err(rejection);
             }
             (kept, None) => return kept.and(Err(Rejection::without_fmu("save", "there is no instance"))),
         };
-        debug_assert_eq!(last + 1, self.parts.len(), "all have kept one");
+        debug_assert_eq!(last + 1, self.components.len(), "all have kept one");
         if !self.passed.is_empty() {
             self.saved.resize(self.saved.len().max(saved.index() + 1), Vec::new());
             self.saved[saved.index()].clone_from(&self.passed);
@@ -300,6 +302,6 @@ impl Running {
         &mut self,
         mut body: impl FnMut(usize, &mut Instance) -> Result<(), Rejection>,
     ) -> Result<(), Rejection> {
-        self.parts.iter_mut().enumerate().try_for_each(|(part, instance)| body(part, instance))
+        self.components.iter_mut().enumerate().try_for_each(|(component, instance)| body(component, instance))
     }
 }

@@ -21,7 +21,7 @@ pub struct Selection {
 /// Variables of one component and one type, which one call sets or reads.
 #[derive(Clone, Debug, PartialEq)]
 struct Group {
-    part: usize,
+    component: usize,
     base: BaseType,
     references: Vec<u32>,
     /// Indices of the values in a row.
@@ -31,14 +31,14 @@ struct Group {
 /// Target of a value: component, type and value reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Target {
-    pub part: usize,
+    pub component: usize,
     pub base: BaseType,
     pub reference: u32,
 }
 
 impl Target {
     pub fn of(found: Found) -> Self {
-        Self { part: found.part, base: found.variable.base, reference: found.variable.reference }
+        Self { component: found.component, base: found.variable.base, reference: found.variable.reference }
     }
 }
 
@@ -64,10 +64,11 @@ impl Selection {
         self.names.push(name.to_owned());
         let read_only = found.iter().find_map(|found| found.check_settable(name).err());
         self.read_only = self.read_only.take().or(read_only.map(|error| error.to_string()));
-        for Target { part, base, reference } in found.iter().copied().map(Target::of) {
-            let index = self.groups.iter().position(|group| group.part == part && group.base == base);
+        for Target { component, base, reference } in found.iter().copied().map(Target::of) {
+            let index =
+                self.groups.iter().position(|group| group.component == component && group.base == base);
             let index = index.unwrap_or_else(|| {
-                self.groups.push(Group { part, base, references: Vec::new(), indices: Vec::new() });
+                self.groups.push(Group { component, base, references: Vec::new(), indices: Vec::new() });
                 self.groups.len() - 1
             });
             self.groups[index].references.push(reference);
@@ -109,17 +110,17 @@ impl Selection {
     #[inline]
     pub(crate) fn get(
         &self,
-        parts: &mut [Instance],
+        components: &mut [Instance],
         buffer: &mut Vec<f64>,
         row: &mut [f64],
     ) -> Result<(), Rejection> {
         if self.is_direct {
-            let Group { part, references, .. } = &self.groups[0];
-            return parts[*part].get_numbers(BaseType::Real, references, row);
+            let Group { component, references, .. } = &self.groups[0];
+            return components[*component].get_numbers(BaseType::Real, references, row);
         }
-        for Group { part, base, references, indices } in &self.groups {
+        for Group { component, base, references, indices } in &self.groups {
             buffer.resize(references.len(), 0.0);
-            parts[*part].get_numbers(*base, references, buffer)?;
+            components[*component].get_numbers(*base, references, buffer)?;
             indices.iter().zip(&*buffer).for_each(|(index, value)| row[*index] = *value);
         }
         Ok(())
@@ -129,18 +130,18 @@ impl Selection {
     #[inline]
     pub(crate) fn set(
         &self,
-        parts: &mut [Instance],
+        components: &mut [Instance],
         buffer: &mut Vec<f64>,
         row: &[f64],
     ) -> Result<(), Rejection> {
         if self.is_direct {
-            let Group { part, references, .. } = &self.groups[0];
-            return parts[*part].set_numbers(BaseType::Real, references, row);
+            let Group { component, references, .. } = &self.groups[0];
+            return components[*component].set_numbers(BaseType::Real, references, row);
         }
-        for Group { part, base, references, indices } in &self.groups {
+        for Group { component, base, references, indices } in &self.groups {
             buffer.clear();
             buffer.extend(indices.iter().map(|index| row[*index]));
-            parts[*part].set_numbers(*base, references, buffer)?;
+            components[*component].set_numbers(*base, references, buffer)?;
         }
         Ok(())
     }

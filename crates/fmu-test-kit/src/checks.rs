@@ -69,13 +69,13 @@ pub fn modes_of_model<F: Either, M: Exported>() -> Vec<(Interface, Mode)> {
 }
 
 /// Compares time derivatives of order 1 with finite differences over short steps, each from the same saved
-/// state. `go_on` sets the inputs as a function of time.
+/// state. `set_inputs` sets the inputs as a function of time.
 #[track_caller]
 pub fn output_derivatives_fit_steps<M: Exported>(
     fmu: &dyn Either,
     time: f64,
     label: &str,
-    go_on: impl Fn(f64),
+    set_inputs: impl Fn(f64),
 ) {
     const H: f64 = 5e-5;
     let moving = indices::<M>(|variable| {
@@ -87,7 +87,7 @@ pub fn output_derivatives_fit_steps<M: Exported>(
         fmu.ok(fmu.set_state(state));
         if steps > 0.0 {
             fmu.step(time, H * steps);
-            go_on(H * steps);
+            set_inputs(H * steps);
         }
         fmu.read(&moving)
     });

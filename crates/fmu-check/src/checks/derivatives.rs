@@ -57,11 +57,11 @@ pub fn derivative(
     results: usize,
 ) -> u32 {
     let sizes = writer.fmi3();
-    let size = |size: usize| sizes.then_some(Arg::Whole(size as i64));
+    let size = |size: usize| sizes.then_some(Arg::Integer(size as i64));
     let mut args = Vec::new();
     for references in [unknowns, knowns] {
         args.push(Arg::In(Kind::U32, references.iter().map(|reference| u64::from(*reference)).collect()));
-        args.push(Arg::Whole(references.len() as i64));
+        args.push(Arg::Integer(references.len() as i64));
     }
     args.push(Arg::In(Kind::F64, seed.iter().map(|number| number.to_bits()).collect()));
     args.extend(size(seed.len()));

@@ -35,7 +35,7 @@ pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
                 })
             })
         })?;
-        checker.record("results.early-unsaid", &run, &writer.sequence, move |run| {
+        checker.record("results.early-unreported", &run, &writer.sequence, move |run| {
             steps.iter().find_map(|step| {
                 let (event, early, reached) = ended(&steps, run, step.id)?;
                 let end = step.end;

@@ -73,11 +73,11 @@ fn logging(writer: &mut Writer, _: &Trajectory) {
         writer.description.log_categories.iter().map(|name| Some(name.clone().into_bytes())).collect();
     for part in [Make, Enter, Leave, Points(2)] {
         writer.write(0, &[part]);
-        writer.call(0, "SetDebugLogging", vec![Arg::Whole(1), Arg::Whole(0), Arg::Null]);
+        writer.call(0, "SetDebugLogging", vec![Arg::Integer(1), Arg::Integer(0), Arg::Null]);
         let all = std::iter::once(categories.clone()).filter(|all| !all.is_empty());
         for some in all.chain(categories.iter().map(|category| vec![category.clone()])) {
-            let count = Arg::Whole(some.len() as i64);
-            writer.call(0, "SetDebugLogging", vec![Arg::Whole(1), count, Arg::Texts(some)]);
+            let count = Arg::Integer(some.len() as i64);
+            writer.call(0, "SetDebugLogging", vec![Arg::Integer(1), count, Arg::Strings(some)]);
         }
     }
     writer.free(0);

@@ -12,7 +12,7 @@ pub fn switches(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()
         let mut writer = checker.writer(trajectory);
         let mut ids = vec![writer.make_with(0, |how| how.logging = by_call)];
         if by_call {
-            writer.call(0, "SetDebugLogging", vec![Arg::Whole(0), Arg::Whole(0), Arg::Null]);
+            writer.call(0, "SetDebugLogging", vec![Arg::Integer(0), Arg::Integer(0), Arg::Null]);
             ids.clear();
         }
         let calls = writer.write(0, &[Enter, Leave, Points(usize::MAX), ReadAll, Call("Terminate"), Free]);

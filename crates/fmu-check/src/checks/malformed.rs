@@ -100,7 +100,7 @@ fn harmless(name: &str) -> Arg {
         name if name.starts_with('*') || name.to_lowercase().contains("state") || name == "String" => {
             Arg::Null
         }
-        _ => Arg::Whole(0),
+        _ => Arg::Integer(0),
     }
 }
 
@@ -111,7 +111,7 @@ fn with_null(checker: &Checker, signature: &Signature, null: usize) -> Vec<Arg> 
     let mut at = 0;
     let args = signature.arguments.iter().map(|argument| {
         if argument.of == "usize" {
-            return Arg::Whole(1);
+            return Arg::Integer(1);
         }
         if !argument.of.starts_with('*') {
             return if argument.of.contains("FMU") { Arg::Null } else { harmless(argument.of) };
@@ -152,7 +152,7 @@ pub fn references(checker: &Checker, trajectory: &Trajectory) -> Sequences {
             for get in [true, false] {
                 let values = match (get, kind) {
                     (true, _) => Arg::Out(*kind, 1),
-                    (false, Kind::Pointer) => Arg::Texts(vec![Some(b"text".to_vec())]),
+                    (false, Kind::Pointer) => Arg::Strings(vec![Some(b"text".to_vec())]),
                     (false, _) => Arg::In(*kind, vec![0]),
                 };
                 wrong.push(after(checker, trajectory, &[Part::Begin], |writer| {
@@ -201,7 +201,8 @@ pub fn sizes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     ];
     for (function, right) in vectors.into_iter().filter(|_| !trajectory.is_stepped()) {
         for count in [right.checked_sub(1), Some(right + 1)].into_iter().flatten() {
-            let args = vec![values(function.starts_with("Get"), Kind::F64, count), Arg::Whole(count as i64)];
+            let args =
+                vec![values(function.starts_with("Get"), Kind::F64, count), Arg::Integer(count as i64)];
             sizes.push(after(checker, trajectory, &[Part::Begin], |writer| {
                 writer.call(0, function, args);
             }));
@@ -220,7 +221,7 @@ fn extreme_values(name: &str, kind: Kind, size: usize) -> Vec<Values> {
                 "String" => &[b"", b"%s%n%s%n%s%n", b"\xff\xfe no UTF-8", &long],
                 _ => &[b"", &long],
             };
-            return texts.iter().map(|text| Values::texts(text, size)).collect();
+            return texts.iter().map(|text| Values::strings(text, size)).collect();
         }
         kind if kind.is_float() => &[],
         Kind::I8 | Kind::U8 => &[0.0, 127.0],
@@ -335,7 +336,7 @@ pub fn bytes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     }
     let sequence = |bytes: Vec<u64>| {
         after(checker, trajectory, &[Part::Begin], |writer| {
-            let count = Arg::Whole(bytes.len() as i64);
+            let count = Arg::Integer(bytes.len() as i64);
             let args = vec![Arg::In(Kind::U8, bytes), count, Arg::StateOut(1)];
             writer.call(0, "DeserializeFMUState", args);
             writer.write(0, &[Part::Restore(1), Part::ReadAll]);

@@ -129,7 +129,7 @@ fn call_attacks(checker: &Checker, interface: Interface, time: f64) -> Vec<Attac
     let get = access(checker.description.standard, vec![unknown], [Arg::Out(Kind::F64, 1)], 1);
     let set = set(checker, vec![unknown], Kind::F64, vec![0]);
     let experiment =
-        vec![Arg::Whole(0), Arg::real(0.0), Arg::real(time + 7.0), Arg::Whole(0), Arg::real(0.0)];
+        vec![Arg::Integer(0), Arg::real(0.0), Arg::real(time + 7.0), Arg::Integer(0), Arg::real(0.0)];
     let (experiment, nothing) = if fmi3 { (vec![], experiment) } else { (experiment, vec![]) };
     let (exit, enter) = ("ExitInitializationMode", "EnterInitializationMode");
     let mut attacks = vec![
@@ -144,7 +144,7 @@ fn call_attacks(checker: &Checker, interface: Interface, time: f64) -> Vec<Attac
     }
     if checker.serializes(interface) {
         let bytes = Arg::In(Kind::U8, (0..64).map(|byte| byte * 37 % 256).collect());
-        let bytes = vec![bytes, Arg::Whole(64), Arg::StateOut(90)];
+        let bytes = vec![bytes, Arg::Integer(64), Arg::StateOut(90)];
         attacks.push(attack("DeserializeFMUState", bytes, "bytes that are no state", TOLERATED));
     }
     attacks
@@ -176,7 +176,7 @@ fn step_attacks(checker: &Checker, time: f64, size: f64) -> Vec<Attack> {
         .map(|(second, order, what)| {
             let args = vec![
                 Arg::In(Kind::U32, vec![input, second]),
-                Arg::Whole(2),
+                Arg::Integer(2),
                 Arg::In(Kind::I32, vec![1, order]),
                 Arg::In(Kind::F64, vec![3_f64.to_bits(); 2]),
             ];
@@ -200,7 +200,7 @@ fn integration_attacks(states: &[f64]) -> Vec<Attack> {
         for (states, what, rule) in
             [(more, "one state too many", TOLERATED), (bad, "states one of which is NaN", None)]
         {
-            let count = Arg::Whole(states.len() as i64);
+            let count = Arg::Integer(states.len() as i64);
             attacks.push(attack("SetContinuousStates", vec![Arg::In(Kind::F64, states), count], what, rule));
         }
     }

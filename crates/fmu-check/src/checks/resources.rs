@@ -25,7 +25,7 @@ pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
         .filter(|(_, variable)| {
             variable.causality == "input" || variable.causality == "parameter" && variable.initial == "exact"
         })
-        .filter_map(|(index, variable)| Some((index, Values::texts(variable.start.first()?.as_bytes(), 1))))
+        .filter_map(|(index, variable)| Some((index, Values::strings(variable.start.first()?.as_bytes(), 1))))
         .collect();
     if !texts.is_empty() {
         measured("strings set", &[Make], &|writer| {

@@ -41,7 +41,7 @@ fn is_start(variable: &Variable, value: &Values) -> bool {
         return true;
     }
     match value {
-        Values::Texts(texts) => {
+        Values::Strings(texts) => {
             let mut pairs = texts.iter().zip(&variable.start);
             variable.base != Some(BaseType::String)
                 || pairs.all(|(text, start)| text.as_deref() == Some(start.as_bytes()))
@@ -80,9 +80,9 @@ const VALUE_TESTS: [(&str, ValueTest); 5] = [
         let wrong = ranged && value.numbers().iter().any(|number| *number < min || *number > max);
         wrong.then(|| format!("is {}, outside of {min} to {max}", value.show(0)))
     }),
-    ("start_values.text", |variable, value| {
+    ("start_values.string", |variable, value| {
         let wrong = variable.base == Some(BaseType::String)
-            && matches!(value, Values::Texts(texts) if texts.contains(&None));
+            && matches!(value, Values::Strings(texts) if texts.contains(&None));
         wrong.then(|| "is NULL".to_owned())
     }),
     ("results.not-finite", |variable, value| {
@@ -158,7 +158,7 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     // integers, Booleans and strings, so these variables are set one at a time.
     let separate = others.iter().take(checker.most(40)).flat_map(|index| {
         // 500 bytes, longer than usual buffers.
-        let long = Values::texts(&b"long ".repeat(100), variable(index).start.len());
+        let long = Values::strings(&b"long ".repeat(100), variable(index).start.len());
         let long = (variable(index).base == Some(BaseType::String)).then_some((*index, long));
         with_other(index).into_iter().chain(long).map(|value| vec![value])
     });

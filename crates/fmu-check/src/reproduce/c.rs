@@ -251,12 +251,12 @@ impl Writer<'_> {
         }
         match arg {
             Arg::Real(bits) => number_of(Kind::F64, *bits),
-            Arg::Whole(number) => number.to_string(),
+            Arg::Integer(number) => number.to_string(),
             Arg::Null => "NULL".to_owned(),
             Arg::In(kind, bits) => {
                 parts.array(number, kind.c_name(), bits.iter().map(|bits| number_of(*kind, *bits)))
             }
-            Arg::Texts(texts) => {
+            Arg::Strings(texts) => {
                 let pointer =
                     |text: &Option<Vec<u8>>| text.as_ref().map_or("NULL".to_owned(), |text| string(text, 1));
                 parts.array(number, "void *", texts.iter().map(pointer))
@@ -327,7 +327,7 @@ impl Parts {
         }
         if name != "fmi3GetBinary" {
             self.results.push(match letter {
-                's' => format!("if (status < 2) put_texts(file, a{number}, {count});"),
+                's' => format!("if (status < 2) put_strings(file, a{number}, {count});"),
                 _ => format!("put_numbers(file, a{number}, {count}, {width});"),
             });
         }

@@ -171,7 +171,7 @@ fn shown(outcome: &Outcome, [written, log]: [bool; 2]) -> String {
                     let _ = write!(text, "{:x},", bits & mask);
                 }
             }
-            Values::Texts(texts) => texts.iter().for_each(|string| {
+            Values::Strings(texts) => texts.iter().for_each(|string| {
                 let _ = write!(text, "{},", or_null(string));
             }),
         }

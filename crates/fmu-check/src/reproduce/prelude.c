@@ -89,7 +89,7 @@ static char *hexes(char *to, const char *text) {
     return to;
 }
 
-static __attribute__((unused)) void put_texts(FILE *file, const char *const *array, size_t count) {
+static __attribute__((unused)) void put_strings(FILE *file, const char *const *array, size_t count) {
     size_t i;
     for (i = 0; i < count; i++) {
         static const char untouched[9] = "ZZZZZZZZ";
@@ -221,7 +221,7 @@ static __attribute__((unused)) void version(int number, const char *name) {
     const char *text = ((const char *(*)(void))function(name))();
     FILE *file = results("r", number, "w");
     print("%s: %s\n", name, text);
-    put_texts(file, &text, 1);
+    put_strings(file, &text, 1);
     fclose(file);
 }
 

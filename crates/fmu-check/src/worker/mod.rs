@@ -571,14 +571,14 @@ impl Executor {
         };
         match arg {
             Arg::Real(bits) => *bits,
-            Arg::Whole(number) => *number as u64,
+            Arg::Integer(number) => *number as u64,
             Arg::Null => 0,
             Arg::In(kind, bits) => {
                 let bytes: Vec<u8> =
                     bits.iter().flat_map(|bits| bits.to_ne_bytes().into_iter().take(kind.size())).collect();
                 input(&bytes)
             }
-            Arg::Texts(texts) => {
+            Arg::Strings(texts) => {
                 let mut with_end = |text: &Vec<u8>| input(&[text.as_slice(), &[0]].concat());
                 let pointers = texts.iter().map(|text| text.as_ref().map_or(0, &mut with_end)).collect();
                 input(&words(pointers))
@@ -630,7 +630,7 @@ fn read(array: &Guarded, kind: Kind, count: usize, succeeded: bool) -> Values {
             // SAFETY: if the call succeeded, the pointers that it wrote point to strings.
             if written { unsafe { text_at(word as usize as *const c_char) } } else { None }
         });
-        return Values::Texts(texts.collect());
+        return Values::Strings(texts.collect());
     }
     Values::Numbers(kind, words.collect())
 }
@@ -640,7 +640,7 @@ fn blobs(pointers: &Guarded, sizes: &Values) -> Values {
     let (Values::Numbers(_, pointers), Values::Numbers(_, sizes)) =
         (read(pointers, Kind::Size, usize::MAX, true), sizes)
     else {
-        return Values::Texts(Vec::new());
+        return Values::Strings(Vec::new());
     };
     let blob = |(pointer, size): (u64, &u64)| {
         // SAFETY: the FMU has returned the address and the size of the bytes.
@@ -648,7 +648,7 @@ fn blobs(pointers: &Guarded, sizes: &Values) -> Values {
             std::slice::from_raw_parts(pointer as usize as *const u8, *size as usize).to_vec()
         })
     };
-    Values::Texts(pointers.into_iter().zip(sizes).map(blob).collect())
+    Values::Strings(pointers.into_iter().zip(sizes).map(blob).collect())
 }
 
 /// Removes and returns the messages that were logged with this environment pointer.

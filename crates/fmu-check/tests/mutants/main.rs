@@ -192,9 +192,9 @@ mutants! {
     3 set_ignored "start_values" "start_values.set";
     2 boolean_two "start_values" "start_values.boolean";
     3 output_unwritten "start_values" "start_values.unwritten";
-    2 whole_out_of_range "start_values" "start_values.range";
+    2 integer_out_of_range "start_values" "start_values.range";
     3 parameter_drifts "start_values" "start_values.fixed";
-    2 text_latin1 "start_values" "start_values.utf8";
+    2 string_latin1 "start_values" "start_values.utf8";
     2 version_wrong "functions" "functions.version";
     3 state_not_supported "functions" "functions.capability";
     2 status_unknown "results" "functions.status";
@@ -205,7 +205,7 @@ mutants! {
     3 crash_amid "results" "results.crash";
     3 token_ignored "life_cycle" "life_cycle.token";
     2 category_unknown "rejections" "logs.category";
-    3 log_latin1 "rejections" "logs.text";
+    3 log_latin1 "rejections" "logs.utf8";
     3 silent "rejections" "logs.silent";
     3 log_when_off "logs" "logs.off";
     2 endless_step "malformed" "malformed.times.hang";
@@ -213,19 +213,19 @@ mutants! {
     2 bytes_crash "malformed" "malformed.bytes.crash";
     3 reference_crashes "malformed" "malformed.references.crash";
     2 reference_exits "malformed" "malformed.references.exit";
-    2 text_cut "start_values" "start_values.set";
+    2 string_cut "start_values" "start_values.set";
     2 event_loses_input "start_values" "start_values.inputs";
     3 start_in_mode_ignored "start_values" "start_values.when";
-    2 text_leaks "resources" "resources.memory";
+    2 string_leaks "resources" "resources.memory";
     2 step_prints "resources" "logs.printed";
-    3 reset_keeps_text "reset" "reset.values";
+    3 reset_keeps_string "reset" "reset.values";
     2 directional_imprecise "derivatives" "derivatives.precision";
     3 directional_added "derivatives" "derivatives.directional";
     3 event_again_now "life_cycle" "life_cycle.next-event-time";
     2 event_moves_silently "life_cycle" "life_cycle.states-changed";
     2 last_step_rejected "life_cycle" "life_cycle.rejected";
     3 early_time_wrong "results" "results.early-return";
-    3 early_unsaid "results" "results.early-unsaid";
+    3 early_unreported "results" "results.early-unreported";
     2 name_in_result "results" "results.name";
     3 reference_once "results" "results.repeated";
     3 start_time_ignored "results" "results.time";
@@ -250,7 +250,7 @@ fn function_missing() {
     caught((2, "none", "WITHOUT_NOMINALS"), "functions", "functions.missing", |text| text);
 }
 
-/// Elsewhere it is not linked in the first index.
+/// The linkers of other platforms reject the library.
 #[cfg(target_os = "linux")]
 #[test]
 fn symbol_missing() {

@@ -82,7 +82,7 @@ static void start(State *s) {
     s->next = 0.05;
     s->mode = INSTANTIATED;
     strcpy(s->label, "wagon");
-    if (IS(reset_keeps_text) && mass > 0) memcpy(s->label, label, sizeof label);
+    if (IS(reset_keeps_string) && mass > 0) memcpy(s->label, label, sizeof label);
     s->stop = INFINITY;
     if (IS(reset_without_count)) s->count = count;
 }
@@ -237,7 +237,7 @@ static int get_count(void *c, const uint32_t *vr, size_t n, int32_t *value) {
     size_t i;
     if (n && (!vr || !value)) return no(m, "an array is NULL");
     for (i = 0; i < n; i++) if (vr[i] != COUNT) return no(m, "an unknown reference");
-    for (i = 0; i < n; i++) if (!IS(output_unwritten)) value[i] = m->s.count + (IS(whole_out_of_range) ? 999 : 0);
+    for (i = 0; i < n; i++) if (!IS(output_unwritten)) value[i] = m->s.count + (IS(integer_out_of_range) ? 999 : 0);
     return 0;
 }
 
@@ -259,7 +259,7 @@ static int get_label(void *c, const uint32_t *vr, size_t n, const char **value) 
     size_t i;
     if (n && (!vr || !value)) return no(m, "an array is NULL");
     for (i = 0; i < n; i++) if (vr[i] != LABEL) return no(m, "an unknown reference");
-    for (i = 0; i < n; i++) value[i] = IS(text_latin1) ? "wag\xf6n" : m->s.label;
+    for (i = 0; i < n; i++) value[i] = IS(string_latin1) ? "wag\xf6n" : m->s.label;
     return 0;
 }
 
@@ -270,8 +270,8 @@ static int set_label(void *c, const uint32_t *vr, size_t n, const char *const *v
     for (i = 0; i < n; i++)
         if (vr[i] != LABEL || !value[i] || strlen(value[i]) >= sizeof m->s.label) return no(m, "no such text");
     for (i = 0; i < n; i++) strcpy(m->s.label, value[i]);
-    if (IS(text_cut)) m->s.label[8] = 0;
-    if (IS(text_leaks) && !malloc(40)) return 3;
+    if (IS(string_cut)) m->s.label[8] = 0;
+    if (IS(string_leaks) && !malloc(40)) return 3;
     return 0;
 }
 
@@ -647,7 +647,7 @@ EXPORT(DoStep)(void *c, double point, double size, bool no_set, bool *event, boo
     if (status) return status;
     *event = m->events && m->early && m->s.time >= m->s.next - 1e-12;
     *terminate = false;
-    *early = stops && !IS(early_unsaid);
+    *early = stops && !IS(early_unreported);
     *last = IS(last_time_wrong) ? point : stops && !IS(early_time_wrong) ? m->s.next : point + size;
     return 0;
 }

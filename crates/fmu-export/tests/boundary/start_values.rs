@@ -13,7 +13,7 @@ const MASS: u32 = Name::mass as u32;
 const STIFFNESS: u32 = Name::stiffness as u32;
 
 /// Ends the mode of an instance.
-fn go_on<F: Either>(fmu: &F, mode: Mode) -> Status {
+fn leave_mode<F: Either>(fmu: &F, mode: Mode) -> Status {
     if mode == Instantiated {
         fmu.enter_initialization_mode(0.0, None)
     } else {
@@ -29,11 +29,11 @@ fn is_remembered<F: Either>(wrong: impl Fn(&F) -> Status, right: impl Fn(&F) -> 
         let fmu = F::in_mode::<Oscillator>(interface, mode);
         let first = fmu.rejected("a start value", &wrong);
         for _ in 0..2 {
-            let again = fmu.rejected("the end of the mode", |fmu| go_on(fmu, mode));
+            let again = fmu.rejected("the end of the mode", |fmu| leave_mode(fmu, mode));
             assert_eq!(again.split_once(": ").unwrap().1, first.split_once(": ").unwrap().1);
         }
         fmu.ok(right(&fmu));
-        fmu.ok(go_on(&fmu, mode));
+        fmu.ok(leave_mode(&fmu, mode));
     }
 }
 
@@ -55,9 +55,9 @@ fn a_rejected_start_value_is_remembered() {
                 assert_eq!(greet(text), Status::Error);
             }
             fmu.take_log();
-            fmu.rejected_with(&["the string for greeting"], |fmu| go_on(fmu, mode));
+            fmu.rejected_with(&["the string for greeting"], |fmu| leave_mode(fmu, mode));
             fmu.ok(greet(c"Good morning".as_ptr()));
-            fmu.ok(go_on(&fmu, mode));
+            fmu.ok(leave_mode(&fmu, mode));
         }
     }
     check::<Importer>();
@@ -89,7 +89,7 @@ fn values_that_do_not_fit_together() {
 }
 
 #[test]
-fn reset_and_restored_states_begin_anew() {
+fn reset_and_restored_states_start_again() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, Initialization);
     let (state, bytes) = (fmu.save(), fmu.bytes());
     let ways: [&dyn Fn(); 3] = [&|| fmu.ok(fmu.fmi2SetFMUstate(state)), &|| fmu.restore(&bytes), &|| {

@@ -1,4 +1,4 @@
-/* Drives the FMU as a C importer does: drive LIBRARY GUID.
+/* Simulates the FMU like an importer in C: drive LIBRARY GUID.
    Prints "name value" for what the tests compare. With TESTBED defined the FMU is the testbed, else the oscillator. */
 #include "fmu.h"
 
@@ -53,22 +53,22 @@ static void layout(void) {
     CHECK(strcmp(fmi2GetVersion(), "2.0") == 0);
 }
 
-/* A Boolean is a whole int, and no more than that is written. */
-static void booleans(unsigned truth) {
+/* A Boolean is an int, and only that int is written. */
+static void booleans(unsigned reference) {
     fmi2Component c = instantiate(fmi2CoSimulation);
     fmi2Boolean values[] = {-1, -1}, yes = 1, two = 256;
-    CHECK(fmi2SetBoolean(c, &truth, 1, &two) == fmi2Error && messages == 1);
+    CHECK(fmi2SetBoolean(c, &reference, 1, &two) == fmi2Error && messages == 1);
     CHECK(fmi2SetupExperiment(c, 0, 0, 0, 0, 0) == fmi2OK);
-    /* A refused start value is not forgotten. */
+    /* Initialization Mode is rejected until the value is set. */
     CHECK(fmi2EnterInitializationMode(c) == fmi2Error && messages == 2);
-    CHECK(fmi2SetBoolean(c, &truth, 1, &yes) == fmi2OK);
+    CHECK(fmi2SetBoolean(c, &reference, 1, &yes) == fmi2OK);
     CHECK(fmi2EnterInitializationMode(c) == fmi2OK);
-    CHECK(fmi2GetBoolean(c, &truth, 1, values) == fmi2OK);
+    CHECK(fmi2GetBoolean(c, &reference, 1, values) == fmi2OK);
     CHECK(values[0] == 1 && values[1] == -1);
     fmi2FreeInstance(c);
 }
 
-/* One input grows with the time, at the rate 1, which is another input of the testbed. */
+/* One input increases at the rate 1; another input is this rate. */
 static void set_inputs(fmi2Component c, double t) {
     const fmi2Real values[] = {t, 1};
     CHECK(fmi2SetReal(c, inputs, sizeof inputs / sizeof *inputs, values) == fmi2OK);
@@ -98,7 +98,7 @@ static void co_simulation(void) {
     for (i = 0; i < 4; ++i) printf("cs%d %.17g\n", i, values[i]);
 }
 
-/* Forward Euler is enough to see that everything arrives. */
+/* Forward Euler is accurate enough to detect missing values. */
 static void model_exchange(void) {
     fmi2Real x[STATES + 1] = {0}, der[STATES + 1] = {0}, nominals[STATES], values[4];
     struct { char before[8]; fmi2EventInfo info; char after[8]; } event;
@@ -136,7 +136,7 @@ static void model_exchange(void) {
     for (i = 0; i < 4; ++i) printf("me%d %.17g\n", i, values[i]);
 }
 
-/* FMPy unloads after every run: nothing of the library may stay behind. */
+/* FMPy unloads the library after each simulation, so the library must be removed from the process. */
 static void load_and_unload(const char *path) {
     int i;
     for (i = 0; i < 100; ++i) {
@@ -145,7 +145,7 @@ static void load_and_unload(const char *path) {
         CHECK(c && fmi2Terminate(c) == fmi2Error); /* with a message */
         fmi2FreeInstance(c);
         CHECK(dlclose(library) == 0);
-        CHECK(!dlopen(path, RTLD_NOW | RTLD_NOLOAD)); /* it is really gone */
+        CHECK(!dlopen(path, RTLD_NOW | RTLD_NOLOAD)); /* the library is unloaded */
     }
 }
 

@@ -22,7 +22,7 @@ static void take(fmi2ComponentEnvironment environment, fmi2String instance_name,
     snprintf(plain[plain_count++], 1000, "[%s] %s", instance_name, message);
 }
 
-/* All that can bring text of the importer's into a message. */
+/* Calls whose messages quote strings of the importer. */
 static void provoke(const char *guid, fmi2CallbackFunctions callbacks) {
     const fmi2String wishes[] = {"%s%s%n", "#r1#"};
     const unsigned vr = 99;

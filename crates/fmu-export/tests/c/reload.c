@@ -1,4 +1,4 @@
-/* Loads FMUs, uses them all at once and in both standards, frees everything in ever new order and unloads:
+/* Loads FMUs, uses instances of all of them in both FMI versions, frees the instances in varying order, and unloads:
    reload ROUNDS LIBRARY...
    Prints the resident memory in KiB after a tenth of the rounds and at the end. */
 #include "fmu.h"
@@ -6,7 +6,7 @@
 
 enum { LIBRARIES = 4, INSTANCES = 3, STEPS = 8, VARIABLES = 16, GUID_LENGTH = 64 };
 
-/* The functions of one library, and as many instances of FMI 3.0 as of FMI 2.0. */
+/* The functions of one library, and its instances for FMI 2.0 and FMI 3.0. */
 struct fmu {
 #define MEMBER(name) fmi2##name##TYPE *fmi2##name;
     FMI2_FUNCTIONS(MEMBER)
@@ -32,7 +32,7 @@ static struct fmu open_fmu(const char *path) {
     return fmu;
 }
 
-/* Every FMU of this project refuses a wrong guid and says its own. */
+/* Each FMU rejects a wrong guid and reports its own. */
 static void learn_guid(fmi2ComponentEnvironment guid, fmi2String instance, fmi2Status status, fmi2String category,
                        fmi2String message, ...) {
     const char *own = strstr(message, "library's {");
@@ -40,7 +40,7 @@ static void learn_guid(fmi2ComponentEnvironment guid, fmi2String instance, fmi2S
     if (own && guid) sscanf(own, "library's %63[^:]", (char *)guid);
 }
 
-/* An instance of FMI 3.0, without a logger. */
+/* Uses an instance of FMI 3.0 without a logger. */
 static void use3(struct fmu *fmu, const char *token, int i) {
     fmi3Boolean event, terminate, early;
     fmi3Float64 last;
@@ -75,7 +75,7 @@ static void use(struct fmu *fmu) {
         CHECK(fmu->fmi2EnterInitializationMode(c) == fmi2OK && fmu->fmi2ExitInitializationMode(c) == fmi2OK);
         for (k = 0; k < STEPS; ++k) CHECK(fmu->fmi2DoStep(c, k / 512.0, 1 / 512.0, 1) == fmi2OK);
         CHECK(fmu->fmi2DoStep(c, -1, 1, 1) == fmi2Error);
-        /* Variables that are no texts are refused. */
+        /* Variables of other types are rejected. */
         for (vr = 0; vr < VARIABLES; ++vr) fmu->fmi2GetString(c, &vr, 1, &text);
         CHECK(fmu->fmi2GetFMUstate(c, &fmu->states[i]) == fmi2OK);
         fmu->instances[i] = c;
@@ -83,7 +83,7 @@ static void use(struct fmu *fmu) {
     }
 }
 
-/* Instances from any one on; some free their states first, the others leave that to their end. */
+/* Frees the instances, beginning with `first`. Some saved states are freed before their instances, some with them. */
 static void free_all(struct fmu *fmu, int first) {
     int i;
     for (i = 0; i < INSTANCES; ++i) {

@@ -1,4 +1,4 @@
-//! A model whose numbers are in every kind of field, with a state that starts at rest, and with steps at once.
+//! A model with numbers in every kind of field, a state that starts at rest, and `step_at_once`.
 
 use fmu_export::*;
 use std::ops::{Index, IndexMut};
@@ -77,7 +77,7 @@ variables! { for Meter, memory in has_started, ring.begin, ring.values, counted,
     der_level as "der(level)" = local(&NUMBER).derivative_of(level) by |meter| meter.plain - meter.stiffness * meter.level;
     /// Stiffness of the spring that carries the level
     stiffness = parameter(&STIFFNESS) in stiffness;
-    /// Steps that were made at once
+    /// Steps that `step_at_once` made
     steps_at_once = local(&INTEGER) by |meter| meter.steps_at_once;
 }
 
@@ -119,7 +119,7 @@ impl CoSimulation for Meter {
         Ok(Stepped::Done)
     }
 
-    /// One of size 1 can be made at once.
+    /// Only steps of size 1 use this path.
     fn step_at_once(&mut self, size: f64) -> bool {
         if size != 1.0 {
             return false;

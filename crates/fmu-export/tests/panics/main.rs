@@ -123,9 +123,8 @@ fn is_contained<F: Either>((interface, names, fault, call): Case<F>, bystanders:
     }
 }
 
-/// The model made into C sources, whose compiled library `FMU_LIBRARY` names: `make test-source-fmu`. What breaks every
-/// instance at once does so in this program only, a saved state belongs to its instance, and it is asked for its size when it
-/// is saved.
+/// Tests the compiled C sources of the model, which `FMU_LIBRARY` names (`make test-source-fmu`). A fault that breaks all
+/// instances needs a process for it, as in this program.
 #[test]
 #[ignore = "needs compiled C sources"]
 fn every_panic_of_c_sources_is_contained() {

@@ -29,7 +29,7 @@ pub struct System(Arc<Definition>);
 #[derive(Debug)]
 struct Definition {
     name: String,
-    parts: Vec<Part>,
+    components: Vec<Component>,
     /// Names of the system's inputs and outputs, and the variables that they denote.
     connectors: BTreeMap<String, Vec<String>>,
     connections: Vec<(String, String)>,
@@ -40,7 +40,7 @@ struct Definition {
 
 /// A component.
 #[derive(Debug)]
-pub(crate) struct Part {
+pub(crate) struct Component {
     /// Name; empty for a single component.
     pub name: String,
     pub fmu: Arc<Loaded>,
@@ -77,12 +77,12 @@ impl System {
     /// [`Error::Fmu`] if an FMU does not support Co-Simulation, or a process may have only one instance of
     /// it.
     pub fn connect(composition: &Composition) -> Result<Self, Error> {
-        let parts =
+        let components =
             composition.components.iter().map(|(name, fmu)| ((*name).to_owned(), Arc::clone(fmu.loaded())));
         let connections =
             composition.connections.iter().map(|(from, to)| ((*from).to_owned(), (*to).to_owned()));
         let mut definition =
-            Definition::of(composition.name, parts.map(|(name, fmu)| Part { name, fmu }).collect());
+            Definition::of(composition.name, components.map(|(name, fmu)| Component { name, fmu }).collect());
         definition.connections = connections.collect();
         definition.finish(composition.order)
     }
@@ -90,7 +90,7 @@ impl System {
     /// Creates a system with a single FMU.
     pub(crate) fn of_one(fmu: Loaded) -> Self {
         let name = fmu.description.model_name.clone();
-        Self(Arc::new(Definition::of(&name, vec![Part { name: String::new(), fmu: Arc::new(fmu) }])))
+        Self(Arc::new(Definition::of(&name, vec![Component { name: String::new(), fmu: Arc::new(fmu) }])))
     }
 
     /// Returns the name of the system; for an FMU, the name of its model.
@@ -104,8 +104,8 @@ impl System {
         let own = self.0.connectors.iter();
         let own =
             own.filter_map(|(name, ends)| Some((name.clone(), self.0.look_up(ends.first()?)?.variable)));
-        own.chain(self.parts().iter().flat_map(|part| {
-            part.fmu.description.variables.iter().map(|of| (joined(&part.name, &of.name), of))
+        own.chain(self.components().iter().flat_map(|component| {
+            component.fmu.description.variables.iter().map(|of| (joined(&component.name, &of.name), of))
         }))
     }
 
@@ -148,8 +148,8 @@ impl System {
         self.find_first(name)?.display_unit(name, unit)
     }
 
-    pub(crate) fn parts(&self) -> &[Part] {
-        &self.0.parts
+    pub(crate) fn components(&self) -> &[Component] {
+        &self.0.components
     }
 
     pub(crate) fn exchange(&self) -> &Exchange {
@@ -158,7 +158,10 @@ impl System {
 
     /// Returns the FMU of a system with a single FMU.
     pub(crate) fn sole(&self) -> Option<&Loaded> {
-        self.parts().first().filter(|part| part.name.is_empty()).map(|part| &*part.fmu)
+        self.components()
+            .first()
+            .filter(|component| component.name.is_empty())
+            .map(|component| &*component.fmu)
     }
 
     /// Fails if a component does not support this interface type.
@@ -166,12 +169,12 @@ impl System {
         if interface == Interface::ModelExchange && self.sole().is_none() {
             return Err(Error::Fmu(format!("{} is a system, which has Co-Simulation only", self.name())));
         }
-        self.parts().iter().try_for_each(|part| part.fmu.library(interface).map(drop))
+        self.components().iter().try_for_each(|component| component.fmu.library(interface).map(drop))
     }
 
     /// Returns whether a process may have only one instance.
     pub(crate) fn once_per_process(&self, interface: Interface) -> bool {
-        self.parts().iter().any(|part| part.fmu.once_per_process(interface))
+        self.components().iter().any(|component| component.fmu.once_per_process(interface))
     }
 
     /// Returns the number of threads for instances: the requested number, or one for each processor.
@@ -235,7 +238,7 @@ impl System {
         offers: fn(&Offer) -> bool,
         what: &str,
     ) -> Result<(), Error> {
-        let descriptions = self.parts().iter().map(|part| &part.fmu.description);
+        let descriptions = self.components().iter().map(|component| &component.fmu.description);
         let mut lacking = descriptions.filter(|of| !of.offer(interface).is_some_and(offers));
         lacking.next().map_or(Ok(()), |of| request(format!("{} {what}", of.model_name)))
     }
@@ -285,7 +288,7 @@ impl Fmu {
     }
 
     pub(crate) fn loaded(&self) -> &Arc<Loaded> {
-        &self.0.parts()[0].fmu
+        &self.0.components()[0].fmu
     }
 }
 
@@ -299,10 +302,10 @@ impl Deref for Fmu {
 }
 
 impl Definition {
-    fn of(name: &str, parts: Vec<Part>) -> Self {
+    fn of(name: &str, components: Vec<Component>) -> Self {
         Self {
             name: name.to_owned(),
-            parts,
+            components,
             connectors: BTreeMap::new(),
             connections: Vec::new(),
             exchange: Exchange::default(),
@@ -313,14 +316,14 @@ impl Definition {
 
     /// Checks the connections and sorts them into stages.
     fn finish(mut self, order: Order) -> Result<System, Error> {
-        if self.parts.is_empty() {
+        if self.components.is_empty() {
             return request("a system needs at least one component".to_owned());
         }
-        for (index, Part { name, fmu }) in self.parts.iter().enumerate() {
+        for (index, Component { name, fmu }) in self.components.iter().enumerate() {
             if name.is_empty() {
                 return request("a component has no name".to_owned());
             }
-            let before = &self.parts[..index];
+            let before = &self.components[..index];
             if before.iter().any(|other| other.name == *name) {
                 return request(format!("two components are named {name}"));
             }
@@ -362,16 +365,16 @@ impl Definition {
     }
 
     fn look_up(&self, name: &str) -> Option<Found<'_>> {
-        let with = |part: usize, own: &str| {
-            let description = &self.parts[part].fmu.description;
+        let with = |component: usize, own: &str| {
+            let description = &self.components[component].fmu.description;
             let fed = self.connections.iter().find(|(_, to)| to == name);
-            let fed_by = fed.map(|(from, _)| from.as_str());
-            Some(Found { part, variable: description.variable(own)?, description, fed_by })
+            let source = fed.map(|(from, _)| from.as_str());
+            Some(Found { component, variable: description.variable(own)?, description, source })
         };
-        match &*self.parts {
-            [part] if part.name.is_empty() => with(0, name),
-            parts => parts.iter().enumerate().find_map(|(index, part)| {
-                with(index, name.strip_prefix(part.name.as_str())?.strip_prefix('.')?)
+        match &*self.components {
+            [component] if component.name.is_empty() => with(0, name),
+            components => components.iter().enumerate().find_map(|(index, component)| {
+                with(index, name.strip_prefix(component.name.as_str())?.strip_prefix('.')?)
             }),
         }
     }
@@ -384,10 +387,9 @@ impl Definition {
         if !found.is_empty() {
             return Ok(found);
         }
-        let names = self
-            .parts
-            .iter()
-            .flat_map(|part| part.fmu.description.variables.iter().map(|of| joined(&part.name, &of.name)));
+        let names = self.components.iter().flat_map(|component| {
+            component.fmu.description.variables.iter().map(|of| joined(&component.name, &of.name))
+        });
         let hint = nearest(name, names.chain(self.connectors.keys().cloned()));
         let hint = hint.map_or(String::new(), |near| format!("; did you mean {near:?}?"));
         request(format!("{} has no variable {name:?}{hint}", self.name))

@@ -38,7 +38,7 @@ type Ends<'a> = (Found<'a>, Found<'a>);
 /// Returns whether the output of a connection depends directly on the input of another one.
 fn follows((from, _): &Ends, (_, to): &Ends) -> bool {
     let depends_on = from.variable.depends_on.as_ref();
-    to.part == from.part && depends_on.is_none_or(|inputs| inputs.contains(&to.variable.reference))
+    to.component == from.component && depends_on.is_none_or(|inputs| inputs.contains(&to.variable.reference))
 }
 
 /// Returns the stages, each after the stages that it depends on.

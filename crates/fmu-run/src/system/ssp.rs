@@ -1,6 +1,6 @@
 //! Reads systems from SSP files (System Structure and Parameterization 1.0).
 
-use super::{Definition, Order, Part, StartValue, System};
+use super::{Component, Definition, Order, StartValue, System};
 use crate::error::Error;
 use crate::fmu::{Loaded, unpacked};
 use crate::start::StartValues;
@@ -53,7 +53,7 @@ impl System {
         read.system(directory.path(), system, "").map_err(fail)?;
 
         let mut loaded: BTreeMap<&str, Arc<Loaded>> = BTreeMap::new();
-        let mut parts = Vec::new();
+        let mut components = Vec::new();
         for (name, source) in &read.components {
             let fmu = match loaded.get(source.as_str()) {
                 Some(fmu) => Arc::clone(fmu),
@@ -67,9 +67,9 @@ impl System {
                     Arc::clone(loaded.entry(source).or_insert_with(|| Arc::new(opened)))
                 }
             };
-            parts.push(Part { name: name.clone(), fmu });
+            components.push(Component { name: name.clone(), fmu });
         }
-        let mut definition = Definition::of(root.attribute("name").unwrap_or("system"), parts);
+        let mut definition = Definition::of(root.attribute("name").unwrap_or("system"), components);
         read.connect(&mut definition);
         definition.start = read.start_values(&definition)?;
         let experiment = child(root, "DefaultExperiment");
@@ -205,7 +205,7 @@ impl Read {
                 continue;
             }
             let found = definition.find(name)?[0];
-            if found.fed_by.is_some() {
+            if found.source.is_some() {
                 continue;
             }
             let value = match (kind.as_str(), text.parse::<f64>()) {

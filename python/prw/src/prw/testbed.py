@@ -31,9 +31,10 @@ BUILT = CLONE / "target" / "fmu" / "prw_testbed.fmu"
 
 
 def default_fmu() -> Path:
-    """The testbed FMU that is used if none is named: the one that the environment variable PRW_FMU names, else the one inside
-    the installed package, else the one that `make fmu` builds in the clone that the package comes from. It serves any importer:
-    `fmu_run.Fmu(prw.default_fmu())`. Raises UserError if there is none.
+    """The path of the default testbed FMU, for any importer: `fmu_run.Fmu(prw.default_fmu())`.
+
+    The environment variable PRW_FMU has precedence, then the FMU in the installed package, then the FMU that `make fmu`
+    builds in the clone from which the package is installed. Raises UserError if there is none.
     """
     if named := os.environ.get(VARIABLE):
         if not Path(named).is_file():

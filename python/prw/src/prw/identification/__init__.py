@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 #: The parameters that are estimated by default.
 DEFAULT_ESTIMATE = ("k1", "k2", "c1", "c2", "c3")
 #: Default bounds: the start value divided and multiplied by this factor.
-REACH = 100.0
+BOUNDS_FACTOR = 100.0
 
 
 def identify(
@@ -178,9 +178,9 @@ def task_of(
     from prw.identification.fit import Prior, Task
 
     estimate = names_of("estimate", estimate)
-    whole = f"; {', '.join(known.counts)} are counted, not estimated" if known.counts else ""
+    counts = f"; {', '.join(known.counts)} are counted, not estimated" if known.counts else ""
     for argument, names in (("estimate", estimate), ("priors", priors), ("parameters", parameters), ("bounds", bounds)):
-        check_names(argument, names, known.real, whole)
+        check_names(argument, names, known.real, counts)
     check_names("noise", noise, MEASURED)
     start = {**known.starts, **parameters}
     if not estimate and not priors:
@@ -193,7 +193,7 @@ def task_of(
     for name in chosen:
         if start[name] <= 0:
             raise UserError(f"{name} starts at {start[name]:g} and cannot be estimated from there; fix another value")
-    spans = {**{name: (value / REACH, value * REACH) for name, value in start.items()}, **bounds}
+    spans = {**{name: (value / BOUNDS_FACTOR, value * BOUNDS_FACTOR) for name, value in start.items()}, **bounds}
     for name, span in bounds.items():
         if not isinstance(span, Sequence) or len(span) != 2:
             raise UserError(f"{name} {span!r}; write (least, greatest)", argument="bounds")

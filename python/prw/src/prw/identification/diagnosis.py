@@ -168,7 +168,7 @@ def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
             progress(done)
             new = tuple(Distortion(kind, name) for name in group)
             found = refitted(solution, new)
-            gain = solution.unlikeliness - found.unlikeliness - 12 * len(group)
+            gain = solution.deviance - found.deviance - 12 * len(group)
             if kind not in best or gain > best[kind][0]:
                 best[kind] = gain, new, found
     greatest = max((gain for gain, *_ in best.values()), default=0.0)

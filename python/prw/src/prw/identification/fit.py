@@ -246,7 +246,7 @@ class Solution:
         return self.task.values(self.logarithms)
 
     @property
-    def unlikeliness(self) -> float:
+    def deviance(self) -> float:
         """Minus twice the logarithm of the likelihood, up to a constant."""
         return self.misfit + sum(comparison.spread for comparison in self.comparisons)
 
@@ -460,7 +460,7 @@ def refitted(
         found.append(_solution(fitter, point, misfit, [], 1))
         if np.abs(point[: len(task.names)] - task.first()[: len(task.names)]).max() < 1:
             break
-    return min(found, key=lambda each: each.unlikeliness)
+    return min(found, key=lambda each: each.deviance)
 
 
 def _other_starts(task: Task, point: Array, count: int, seed: int) -> list[Array]:

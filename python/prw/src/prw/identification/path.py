@@ -26,21 +26,21 @@ DEGREE = 5
 ORDER = 3
 #: Range of log10 of the penalty: below, the path interpolates; above, the normal equations lose their digits.
 STIFFNESS = (-6.0, 10.0)
-#: Range of log10 of the weight of logged rates, s^2, and where the search for it begins, for one block and for two.
+#: Range of log10 of the weight of logged rates, s^2, and the start values of the search by the number of blocks.
 RATIO = (-14.0, 4.0)
 GUESSES: dict[int, list[list[float]]] = {1: [[]], 2: [[-2.0], [-4.0], [-6.0]]}
 #: Divisor of the most probable penalty. Too little smoothing adds some noise, too much biases the parameters. The highest
 #: frequency that the path follows rises by the sixth root of the divisor, 1.6.
 UNDERSMOOTHING = 16.0
-#: Errors of encoders are drawn along a path whose penalty is the most probable one times the first number, and whose
-#: angles are rescaled by up to the second. If the motor is slow, a path that follows the encoder's steps would be rounded
-#: to these steps again, and the drawn errors would be up to three times too large.
+#: Errors of encoders are drawn along a smoother path: OVERSMOOTHING multiplies the penalty, and RESCALED is the largest
+#: relative change of the angles. If the motor is slow, a path that follows the encoder's steps is rounded to these steps
+#: again, and the drawn errors are up to three times too large.
 OVERSMOOTHING, RESCALED = 64.0, 0.05
 #: A column is a multiple of a quantum if all its values are, to this fraction of the quantum.
 ON_GRID = 0.05
 #: Maximum number of quanta between neighbouring values of a typical column.
 MAX_STEPS = 50
-#: Ratio of variance to the variance of the steps from which samples have other noise.
+#: If the variance exceeds the variance of the encoder's steps by this factor, the samples contain other noise.
 NOISIER = 1.2
 #: Number of values from which the quantum is found.
 QUANTUM_VALUES = 20000
@@ -58,7 +58,7 @@ class Path(NamedTuple):
     quiet: Array
 
     def errors(self, random: np.random.Generator) -> Array:
-        """A draw (n,) of the samples' errors, rad."""
+        """Draw errors (n,) of the samples, rad."""
         if self.noise >= self.quantum:
             return random.normal(0, self.noise, len(self.quiet))
         return rounding(self.quiet, self.quantum, random)
@@ -98,9 +98,9 @@ def rough_noise(values: Array) -> float:
 
 
 def rounding(values: Array, quantum: float, random: np.random.Generator) -> Array:
-    """A draw of an encoder's errors at the values (n,). An encoder has the same error at the same angle, and so in every
+    """Draw an encoder's errors at the values (n,). An encoder has the same error at the same angle, and so in every
     period of a motion."""
-    # `values` contain remainders of the samples' errors. Another zero and scale avoid that they are rounded to the same grid.
+    # `values` contain remainders of the samples' errors. A random zero and scale avoid rounding to the same grid.
     level = values * (1 + random.uniform(-RESCALED, RESCALED)) / quantum + random.uniform()
     return (np.rint(level) - level) * quantum
 
@@ -113,7 +113,7 @@ class _Spline:
         pieces = max(1, int(np.ceil((time[-1] - time[0]) / self.spacing - 1e-6)))
         self.spacing = (time[-1] - time[0]) / pieces
         self._knots = time[0] + self.spacing * np.arange(-DEGREE, pieces + DEGREE + 1)
-        # The outer knots, because the first and last time may be outside of them by rounding errors.
+        # Times may be outside of these knots by rounding errors, so `rows` clips them.
         self._ends = self._knots[DEGREE], self._knots[-DEGREE - 1]
         self.size = pieces + DEGREE
         self.penalties = self.size - ORDER
@@ -135,7 +135,7 @@ class _Spline:
 
 
 class _Fit(NamedTuple):
-    """Coefficients of the path and of a quieter one; noise of the first block, rad; weights of the blocks relative to
+    """Coefficients of the path and of a smoother path; noise of the first block, rad; weights of the blocks relative to
     the first (ratios of their variances)."""
 
     coefficients: Array
@@ -162,10 +162,9 @@ def _fit(spline: _Spline, blocks: list[Block], least: float) -> _Fit:
         return coefficients, float(misfit + penalty * (bend @ bend)), float(spread)
 
     def most_probable(variance: float | None) -> tuple[float, list[float]]:
-        """Minus twice the logarithm of the likelihood at its minimum over penalty and weights, as (penalty,
-        weights)."""
+        """Penalty and weights with the maximum likelihood. `deviance` is minus twice the log-likelihood."""
 
-        def unlikeliness(x: Sequence[float]) -> float:
+        def deviance(x: Sequence[float]) -> float:
             weights = _weights(x)
             _, misfit, spread = solve(10.0 ** np.clip(x[0], *STIFFNESS), weights)
             spread -= float(sum(len(values) * np.log(w) for w, (_, values) in zip(weights, blocks)))
@@ -175,8 +174,8 @@ def _fit(spline: _Spline, blocks: list[Block], least: float) -> _Fit:
 
         guesses = GUESSES[len(blocks)]
         grid = [[float(x), *guess] for x in np.linspace(*STIFFNESS, 10) for guess in guesses]
-        best = min(grid, key=unlikeliness)
-        found = minimize(unlikeliness, best, method="Nelder-Mead", options={"xatol": 0.05, "fatol": 0.5}).x
+        best = min(grid, key=deviance)
+        found = minimize(deviance, best, method="Nelder-Mead", options={"xatol": 0.05, "fatol": 0.5}).x
         return float(10.0 ** np.clip(found[0], *STIFFNESS)), _weights(found)
 
     variance = least
