@@ -70,7 +70,8 @@ def test_an_end_at_the_last_time(unruly):
 
 def test_silent_runs_are_repeated_once_with_logging(unruly):
     behaviours = [
-        list(BEHAVIOURS).index(name) for name in ("error if logging", "good", "silent error", "discard", "error if logging")
+        list(BEHAVIOURS).index(name)
+        for name in ("error if logging", "good", "silent error", "discard", "error if logging")
     ]
     with fmu_run.Fmu(unruly) as fmu:
         runs = fmu.run(TIME, start={"behaviour": behaviours}, outputs=["y", "logged", "instances"])
