@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_file_is_said() {
+    fn invalid_files_have_an_error() {
         let entry = |key: &str, value: &str, unit: &str| {
             let comma = if key == "N" { "" } else { "," };
             (

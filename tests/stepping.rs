@@ -245,7 +245,7 @@ fn a_testbed_that_turns_goes_on_turning() {
 /// Checks that with almost no stiffness a velocity decays exponentially, and that a small remainder has all
 /// digits.
 #[test]
-fn what_is_left_of_a_velocity_has_all_digits() {
+fn decayed_velocities_have_all_digits() {
     let built_in = Parameters::BUILT_IN;
     let p = Parameters { k1: 1e-20, k2: 1e-20, c3: 1.0, ..built_in };
     let mut testbed = Testbed::new(p).unwrap();

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import cross_check
-from libraries import environment, run, say, target_directory
+from libraries import environment, run, log, target_directory
 from targets import ARM_DIRECTORIES, CONTROLLER, DIRECTORIES, FMI3_DIRECTORIES, MODEL, PACKERS, Target
 
 SYSTEM = "prw_closed_loop"
@@ -22,10 +22,10 @@ def make(libraries: Mapping[str, Mapping[Target, Path]], out: Path, scratch: Pat
     packages = [argument for _, package in PACKERS.values() for argument in ("--package", package)]
     run("cargo", "build", "--locked", "--release", "--bins", *packages)
     for model, found in libraries.items():
-        say(f"packing {model}")
+        log(f"packing {model}")
         _pack(model, 2, DIRECTORIES, found, scratch).rename(out / f"{model}.fmu")
         _pack(model, 3, FMI3_DIRECTORIES, found, scratch).rename(out / f"{model}-fmi3.fmu")
-    say(f"packing the variants of {MODEL}, and {SYSTEM}")
+    log(f"packing the variants of {MODEL}, and {SYSTEM}")
     arm = _pack(MODEL, 2, ARM_DIRECTORIES, libraries[MODEL], scratch, "--any-processor")
     arm.rename(out / f"{MODEL}-linux-arm64.fmu")
     _run(PACKERS[MODEL][0], "--c-sources", f"--out={scratch}")

@@ -27,7 +27,7 @@ EPOCH = "315532800"
 PACKAGE = ROOT / "crates" / "fmu-run"
 
 
-def say(text: str) -> None:
+def log(text: str) -> None:
     """Prints progress, in order with the messages of the started programs."""
     print(text, file=sys.stderr, flush=True)
 
@@ -163,9 +163,9 @@ def compile_all(out: Path) -> dict[str, dict[Target, Path]]:
     """Compiles the libraries of all models for all targets, and the wheels in `out`."""
     found: dict[str, dict[Target, Path]] = {model: {} for model in MODELS}
     for number, target in enumerate(TARGETS, start=1):
-        say(f"[{number}/{len(TARGETS)}] {target.triple}")
+        log(f"[{number}/{len(TARGETS)}] {target.triple}")
         start = time.monotonic()
         paths = [found[model].setdefault(target, library(model, target)) for model in MODELS] + [wheel(target, out)]
         sizes = ", ".join(f"{path.name}: {path.stat().st_size / 1000:.0f} kB" for path in paths)
-        say(f"      {sizes}; {time.monotonic() - start:.0f} s")
+        log(f"      {sizes}; {time.monotonic() - start:.0f} s")
     return found

@@ -39,9 +39,9 @@ def test_only_listed_notes_are_found(version: str, model: str) -> None:
     assert report["unreached"] == []
     # An observation begins with the function, whose name depends on the FMI version.
     found = [
-        (finding["severity"], finding["name"], seen.split(" with ", 1)[-1])
+        (finding["severity"], finding["name"], observed.split(" with ", 1)[-1])
         for finding in report["findings"]
-        for seen in [finding["observed"], *finding["more"]]
+        for observed in [finding["observed"], *finding["more"]]
         if finding["name"] != "package.glibc"
     ]
     assert sorted(found) == sorted(listed(model))

@@ -45,7 +45,7 @@ def test_fmpy_finds_no_problem(testbed):
     assert validate_fmu(str(testbed)) == []
 
 
-def test_what_importers_need(description):
+def test_attributes_that_importers_need(description):
     """OMSimulator counts the variables with the attribute `derivative` to know how many states there are. OpenModelica 1.27.0
     passes all Booleans in one array and garbles all but the first: the second arrives as false, and with `start_at_rest`
     false a testbed with turned motors would not start at rest."""

@@ -79,9 +79,9 @@ fn call(numbered: &Numbered) -> Vec<Broken> {
     });
     let mut broken = Vec::from(arrays);
     let Step::Call { function, .. } = &numbered.step else { return broken };
-    let most = if function == "fmi2DoStep" { 5 } else { 4 };
+    let max_status = if function == "fmi2DoStep" { 5 } else { 4 };
     broken.push(rule("functions.status", move |run| {
-        let status = run.status(id).filter(|status| !(0..=most).contains(status))?;
+        let status = run.status(id).filter(|status| !(0..=max_status).contains(status))?;
         Some(format!("{name} returns {status}"))
     }));
     if function.ends_with("GetString") && !numbered.forbidden {

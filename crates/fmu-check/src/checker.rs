@@ -167,7 +167,7 @@ impl Checker {
     }
 
     /// Returns `many`, or an eighth of it in a quick check.
-    pub fn most(&self, many: usize) -> usize {
+    pub fn at_most(&self, count: usize) -> usize {
         if self.quick { many.div_ceil(8) } else { many }
     }
 

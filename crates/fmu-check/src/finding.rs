@@ -182,12 +182,12 @@ pub fn failure_of(sequence: &CallSequence, run: &Run, id: u32) -> Option<String>
 }
 
 /// Describes the first failed instantiation, otherwise the first call that returned a status above `most`.
-pub fn first_failure(sequence: &CallSequence, run: &Run, most: i32) -> Option<String> {
+pub fn first_failure(sequence: &CallSequence, run: &Run, max_status: i32) -> Option<String> {
     let made = |numbered: &&Numbered| matches!(numbered.step, Step::Make(..));
     let failed = |numbered: &&Numbered| {
         matches!(numbered.step, Step::Call { .. })
             && run.outcome(numbered.id).is_some_and(|outcome| {
-                outcome.status.map_or(outcome.missing && most < 2, |status| status > most)
+                outcome.status.map_or(outcome.missing && max_status < 2, |status| status > max_status)
             })
     };
     let one = |numbered: &Numbered| failure_of(sequence, run, numbered.id);

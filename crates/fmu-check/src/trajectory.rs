@@ -231,12 +231,12 @@ fn integrated(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<T
         0 => range / 10.0,
         _ => (range / 500.0).min(description.step_size.unwrap_or(f64::INFINITY)),
     };
-    let (near, far, most) = if count > 0 { (6, range / 160.0, 166) } else { (14, small, 14) };
+    let (near, far, count_max) = if count > 0 { (6, range / 160.0, 166) } else { (14, small, 14) };
     let mut next_event = initialized(checker, &mut trajectory)?.and_then(|event| event.next);
     let (mut states, mut slopes, mut before) = (Vec::new(), Vec::<f64>::new(), Vec::<f64>::new());
     let (mut time, mut event_now) = (description.start_time, false);
     let begin = Instant::now();
-    for number in 0..most {
+    for number in 0..count_max {
         if trajectory.points.len() > 20 || number >= near && begin.elapsed() > 16 * LONG {
             break;
         }

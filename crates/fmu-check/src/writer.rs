@@ -152,8 +152,8 @@ impl<'a> Writer<'a> {
                 Part::Enter => calls.ids.push(self.enter(instance)),
                 Part::Leave => calls.ids.extend(self.leave(instance)),
                 Part::Begin => calls.ids.extend(self.begin(instance)),
-                Part::Points(most) => {
-                    calls.ids.extend(points.iter().take(most).flat_map(|point| self.point(instance, point)));
+                Part::Points(count) => {
+                    calls.ids.extend(points.iter().take(count).flat_map(|point| self.point(instance, point)));
                 }
                 Part::Run(from) => {
                     for point in &points[from..] {
@@ -466,15 +466,15 @@ pub fn step_args(standard: Standard, time: f64, size: f64) -> Vec<Arg> {
 /// Maximum number of variables that most checks read.
 pub const READ: usize = 1000;
 
-/// Returns the indices of at most `most` variables that can be read: no clocks, none of unknown size. If there are more, at most
+/// Returns the indices of at most `max_count` variables that can be read: no clocks, none of unknown size. If there are more, at most
 /// half are inputs, outputs, derivatives and the independent variable. All are taken at equal distances.
-pub fn sample(description: &Description, most: usize) -> Vec<usize> {
+pub fn sample(description: &Description, max_count: usize) -> Vec<usize> {
     let known = |index: &usize| {
         let variable = &description.variables[*index];
         variable.base.is_some() && variable.size.is_some()
     };
     let all: Vec<usize> = (0..description.variables.len()).filter(known).collect();
-    if all.len() <= most {
+    if all.len() <= max_count {
         return all;
     }
     let first = |index: &usize| {
@@ -483,12 +483,12 @@ pub fn sample(description: &Description, most: usize) -> Vec<usize> {
             || variable.derivative_of.is_some()
     };
     let (first, others): (Vec<usize>, Vec<usize>) = all.into_iter().partition(first);
-    let evenly = |from: Vec<usize>, most: usize| -> Vec<usize> {
-        let step = from.len().div_ceil(most.max(1)).max(1);
+    let evenly = |indices: Vec<usize>, count: usize| -> Vec<usize> {
+        let step = indices.len().div_ceil(count.max(1)).max(1);
         from.into_iter().step_by(step).collect()
     };
-    let mut found = evenly(first, most / 2);
-    found.extend(evenly(others, most - found.len()));
+    let mut found = evenly(first, max_count / 2);
+    found.extend(evenly(others, max_count - found.len()));
     found.sort_unstable();
     found
 }

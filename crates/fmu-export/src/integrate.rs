@@ -189,7 +189,7 @@ mod tests {
             (|x| (0.3 - x).powi(9), 33),
             (|x| 1e-300 - x, 6),
         ];
-        for (number, (indicator, most)) in indicators.into_iter().enumerate() {
+        for (number, (indicator, limit)) in indicators.into_iter().enumerate() {
             let mut count = 0;
             let found = find_event(Step::new(0.0, 1.0), Crossing::Any, 1e-9, |part| {
                 count += 1;
@@ -197,7 +197,7 @@ mod tests {
             });
             let end = found.unwrap().size;
             assert!(indicator(end) <= 0.0 && indicator(end - 1e-9) > 0.0, "indicator {number}: {end}");
-            assert!(count <= most, "indicator {number}: {count} evaluations");
+            assert!(count <= limit, "indicator {number}: {count} evaluations");
         }
     }
 

@@ -173,7 +173,7 @@ impl Builder {
         let content = self.sources.content_files()?;
         let workspace = Neighbourhood::of(&self.sources.directory)?.workspace;
         // Another build would overwrite the library of this one.
-        let _alone = lock(&workspace.join("target"));
+        let _lock = lock(&workspace.join("target"));
         let mut libraries = self.libraries(options, &guid)?;
         let model = self.model(&libraries, &guid)?;
         let sources = match options.c_sources {

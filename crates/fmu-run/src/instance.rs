@@ -485,12 +485,12 @@ impl Instance {
                 )
             )?;
             if self.is_of_fmi2() {
-                let truth = |value: fmi2Boolean| fmi3Boolean::from(value != fmi2False);
-                again = truth(of_fmi2.new_discrete_states_needed);
-                terminate = truth(of_fmi2.terminate_simulation);
-                nominals = truth(of_fmi2.nominals_of_continuous_states_changed);
-                states = truth(of_fmi2.values_of_continuous_states_changed);
-                is_next = truth(of_fmi2.next_event_time_defined);
+                let boolean = |value: fmi2Boolean| fmi3Boolean::from(value != fmi2False);
+                again = boolean(of_fmi2.new_discrete_states_needed);
+                terminate = boolean(of_fmi2.terminate_simulation);
+                nominals = boolean(of_fmi2.nominals_of_continuous_states_changed);
+                states = boolean(of_fmi2.values_of_continuous_states_changed);
+                is_next = boolean(of_fmi2.next_event_time_defined);
                 next = of_fmi2.next_event_time;
             }
             all.terminate |= terminate != fmi3False;

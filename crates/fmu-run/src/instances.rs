@@ -84,7 +84,7 @@ struct Own {
 /// consumes the value, so freed states cannot be used.
 ///
 /// ```compile_fail,E0382
-/// fn restore_what_is_freed(instances: &mut fmu_run::Instances) {
+/// fn restore_a_freed_state(instances: &mut fmu_run::Instances) {
 ///     let states = instances.save().unwrap();
 ///     instances.forget(states);
 ///     instances.restore(&states, None);

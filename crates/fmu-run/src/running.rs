@@ -87,13 +87,13 @@ impl Running {
     fn agree(&mut self) -> Result<(), Rejection> {
         let Exchange { order, stages } = self.system.exchange();
         let order = *order;
-        let most = match order {
+        let rounds = match order {
             _ if stages.is_empty() => return Ok(()),
             Order::Jacobi => self.components.len(),
             Order::Dependencies => 1 + stages.iter().map(|stage| stage.outputs.len()).sum::<usize>(),
         };
         let mut before: Vec<u64> = Vec::new();
-        for _ in 0..most {
+        for _ in 0..rounds {
             let mut now = Vec::new();
             self.pass_all_on(|values| now.extend(values.iter().map(|value| value.to_bits())))?;
             if now == before {

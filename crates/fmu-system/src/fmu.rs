@@ -76,14 +76,14 @@ impl<'a> Own<'a> {
         if let Some(value) = number {
             let Variable { min, max, base, .. } = self.variable;
             ensure!(value.is_finite(), "the start value of {name} must be a finite number, it is {value}");
-            let [least, most] = match base.range() {
-                Some((least, most)) => [Some(least as f64), Some(most as f64)],
+            let [lowest, highest] = match base.range() {
+                Some((lowest, highest)) => [Some(lowest as f64), Some(highest as f64)],
                 None => [None, None],
             };
-            if let Some(min) = min.or(least).filter(|min| value < *min) {
+            if let Some(min) = min.or(lowest).filter(|min| value < *min) {
                 bail!("the start value of {name} must not be below {min}, it is {value}");
             }
-            if let Some(max) = max.or(most).filter(|max| value > *max) {
+            if let Some(max) = max.or(highest).filter(|max| value > *max) {
                 bail!("the start value of {name} must not be above {max}, it is {value}");
             }
         }

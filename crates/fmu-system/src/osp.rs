@@ -12,15 +12,14 @@ impl CheckedSystem<'_> {
     ///
     /// # Errors
     /// Fails if a file cannot be written.
-    pub fn write_osp(&self, folder: &Path) -> Result<()> {
+    pub fn write_osp(&self, directory: &Path) -> Result<()> {
         for (name, bytes) in self.files()? {
-            write_atomically(&folder.join(name), |file| Ok(file.write_all(bytes)?))?;
+            write_atomically(&directory.join(name), |file| Ok(file.write_all(bytes)?))?;
         }
         let text = self.osp()?.document()?;
-        write_atomically(
-            &folder.join("OspSystemStructure.xml"),
-            |file| Ok(file.write_all(text.as_bytes())?),
-        )?;
+        write_atomically(&directory.join("OspSystemStructure.xml"), |file| {
+            Ok(file.write_all(text.as_bytes())?)
+        })?;
         Ok(())
     }
 

@@ -32,12 +32,12 @@ fn entry(path: &Path, name: &str) -> String {
     text
 }
 
-fn fmu(folder: &Path, name: &str, variables: &str) -> PathBuf {
+fn fmu(directory: &Path, name: &str, variables: &str) -> PathBuf {
     let text = format!(
         "<fmiModelDescription fmiVersion=\"2.0\" modelName=\"m\" guid=\"g\"><CoSimulation modelIdentifier=\"m\"/>{UNITS}\
          <ModelVariables>{variables}</ModelVariables></fmiModelDescription>"
     );
-    packed(folder.join(name), &text)
+    packed(directory.join(name), &text)
 }
 
 fn variable(name: &str, causality: &str, kind: &str) -> String {
@@ -48,7 +48,7 @@ fn variable(name: &str, causality: &str, kind: &str) -> String {
 }
 
 /// Returns two FMUs. One angle has its unit at the variable, one at the declared type.
-fn fmus(folder: &Path) -> Vec<(&'static str, PathBuf)> {
+fn fmus(directory: &Path) -> Vec<(&'static str, PathBuf)> {
     let plant = [
         variable("u", "input", r#"Real unit="rad""#),
         variable("y", "output", r#"Real declaredType="Angle""#),
@@ -69,14 +69,17 @@ fn fmus(folder: &Path) -> Vec<(&'static str, PathBuf)> {
         variable("other_gear", "input", r#"Enumeration declaredType="Other""#),
         variable("u", "output", r#"Real unit="rad""#),
     ];
-    vec![("law", fmu(folder, "law.fmu", &law.concat())), ("plant", fmu(folder, "plant.fmu", &plant.concat()))]
+    vec![
+        ("law", fmu(directory, "law.fmu", &law.concat())),
+        ("plant", fmu(directory, "plant.fmu", &plant.concat())),
+    ]
 }
 
-fn system<'a>(folder: &Path) -> System<'a> {
+fn system<'a>(directory: &Path) -> System<'a> {
     System {
         name: "loop",
         description: "A loop",
-        components: fmus(folder),
+        components: fmus(directory),
         inputs: vec![("reference", "law.r", "0.5".into())],
         outputs: vec![("angle", "plant.y")],
         connections: vec![("law.u", "plant.u"), ("plant.y", "law.y")],
@@ -88,9 +91,9 @@ fn system<'a>(folder: &Path) -> System<'a> {
 
 #[test]
 fn wrong_systems_are_rejected() {
-    let folder = tempfile::tempdir().unwrap();
+    let directory = tempfile::tempdir().unwrap();
     let rejection = |change: fn(&mut System)| {
-        let mut system = system(folder.path());
+        let mut system = system(directory.path());
         change(&mut system);
         format!("{:#}", system.check().err().expect("it is wrong"))
     };
@@ -143,21 +146,21 @@ fn wrong_systems_are_rejected() {
         assert_eq!(rejection(change).split(": No such file").next(), Some(message));
     }
     // An output with a start value accepts another one.
-    let mut other_start = system(folder.path());
+    let mut other_start = system(directory.path());
     other_start.start.push(("plant.angle", "0.5".into()));
     other_start.check().unwrap();
     // An undeclared unit fits any unit.
-    let mut without_unit = system(folder.path());
+    let mut without_unit = system(directory.path());
     without_unit.connections[1].0 = "plant.bare";
     without_unit.check().unwrap();
 }
 
 #[test]
 fn the_ssp_is_complete_and_reproducible() {
-    let folder = tempfile::tempdir().unwrap();
-    let system = system(folder.path());
+    let directory = tempfile::tempdir().unwrap();
+    let system = system(directory.path());
     let checked = system.check().unwrap();
-    let (one, other) = (folder.path().join("one.ssp"), folder.path().join("other.ssp"));
+    let (one, other) = (directory.path().join("one.ssp"), directory.path().join("other.ssp"));
     checked.write_ssp(&one).unwrap();
     system.check().unwrap().write_ssp(&other).unwrap();
     assert!(fs::read(&one).unwrap() == fs::read(&other).unwrap());
@@ -195,10 +198,10 @@ fn the_ssp_is_complete_and_reproducible() {
 /// The schema permits no empty list of connectors.
 #[test]
 fn a_component_that_is_not_connected_has_no_connectors() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut unconnected = system(folder.path());
+    let directory = tempfile::tempdir().unwrap();
+    let mut unconnected = system(directory.path());
     (unconnected.inputs, unconnected.outputs, unconnected.connections) = (Vec::new(), Vec::new(), Vec::new());
-    let ssp = folder.path().join("unconnected.ssp");
+    let ssp = directory.path().join("unconnected.ssp");
     unconnected.check().unwrap().write_ssp(&ssp).unwrap();
     let ssd = entry(&ssp, "SystemStructure.ssd");
     assert!(!ssd.contains("ssd:Connectors") && !ssd.contains("ssd:Connections"), "{ssd}");
@@ -207,18 +210,18 @@ fn a_component_that_is_not_connected_has_no_connectors() {
 /// SSP 1.0 has only Real and Integer for the number types of FMI 3.0.
 #[test]
 fn fmus_for_fmi_3_are_connected_too() {
-    let folder = tempfile::tempdir().unwrap();
+    let directory = tempfile::tempdir().unwrap();
     let text = r#"<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="t">
         <CoSimulation modelIdentifier="m"/><UnitDefinitions><Unit name="rad"><BaseUnit rad="1"/></Unit></UnitDefinitions>
         <TypeDefinitions><Float64Type name="Angle" unit="rad" max="3"/></TypeDefinitions><ModelVariables>
         <Float64 name="u" valueReference="1" causality="input" declaredType="Angle" start="0"/>
         <Int16 name="n" valueReference="2" causality="parameter" start="0"/>
         <Float64 name="y" valueReference="3" causality="output" declaredType="Angle"/></ModelVariables></fmiModelDescription>"#;
-    let mut new = system(folder.path());
-    new.components.push(("new", packed(folder.path().join("new.fmu"), text)));
+    let mut new = system(directory.path());
+    new.components.push(("new", packed(directory.path().join("new.fmu"), text)));
     new.connections.push(("law.u", "new.u"));
     new.start.push(("new.n", "7".into()));
-    let ssp = folder.path().join("new.ssp");
+    let ssp = directory.path().join("new.ssp");
     new.check().unwrap().write_ssp(&ssp).unwrap();
     let ssv = entry(&ssp, "resources/new.ssv");
     assert!(ssv.contains(r#"<ssv:Integer value="7"/>"#), "{ssv}");
@@ -233,9 +236,9 @@ fn fmus_for_fmi_3_are_connected_too() {
 
 #[test]
 fn the_directory_for_libcosim_has_the_fmus_and_the_start_values() {
-    let folder = tempfile::tempdir().unwrap();
-    let system = system(folder.path());
-    let out = folder.path().join("osp");
+    let directory = tempfile::tempdir().unwrap();
+    let system = system(directory.path());
+    let out = directory.path().join("osp");
     system.check().unwrap().write_osp(&out).unwrap();
     let text = fs::read_to_string(out.join("OspSystemStructure.xml")).unwrap();
     for part in [
@@ -247,7 +250,7 @@ fn the_directory_for_libcosim_has_the_fmus_and_the_start_values() {
         assert_eq!(text.matches(part).count(), 1, "{part}\n{text}");
     }
     for name in ["law.fmu", "plant.fmu"] {
-        assert_eq!(fs::read(out.join(name)).unwrap(), fs::read(folder.path().join(name)).unwrap());
+        assert_eq!(fs::read(out.join(name)).unwrap(), fs::read(directory.path().join(name)).unwrap());
     }
 }
 
@@ -268,11 +271,11 @@ fn twins<'a>(components: Vec<(&'a str, PathBuf)>) -> System<'a> {
 
 #[test]
 fn two_instances_of_one_fmu_share_its_file() {
-    let folder = tempfile::tempdir().unwrap();
-    let plant = fmus(folder.path()).remove(1).1;
+    let directory = tempfile::tempdir().unwrap();
+    let plant = fmus(directory.path()).remove(1).1;
     let system = twins(vec![("one", plant.clone()), ("other", plant)]);
     let checked = system.check().unwrap();
-    let ssp = folder.path().join("twins.ssp");
+    let ssp = directory.path().join("twins.ssp");
     checked.write_ssp(&ssp).unwrap();
     let expected =
         ["experiment.ssv", "one.ssv", "other.ssv", "plant.fmu"].map(|name| format!("resources/{name}"));
@@ -280,7 +283,7 @@ fn two_instances_of_one_fmu_share_its_file() {
     let ssd = entry(&ssp, "SystemStructure.ssd");
     assert_eq!(ssd.matches(r#"source="resources/plant.fmu""#).count(), 2, "{ssd}");
 
-    let osp = folder.path().join("osp");
+    let osp = directory.path().join("osp");
     checked.write_osp(&osp).unwrap();
     assert_eq!(fs::read_dir(&osp).unwrap().count(), 2);
     let text = fs::read_to_string(osp.join("OspSystemStructure.xml")).unwrap();
@@ -289,9 +292,9 @@ fn two_instances_of_one_fmu_share_its_file() {
 
 #[test]
 fn different_fmus_with_the_same_file_name_are_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let plant = fmus(folder.path()).remove(1).1;
-    let elsewhere = folder.path().join("elsewhere");
+    let directory = tempfile::tempdir().unwrap();
+    let plant = fmus(directory.path()).remove(1).1;
+    let elsewhere = directory.path().join("elsewhere");
     fs::create_dir(&elsewhere).unwrap();
     let signals = [
         variable("u", "input", "Real"),
@@ -310,12 +313,12 @@ fn different_fmus_with_the_same_file_name_are_named() {
 
 #[test]
 fn enumerations_and_strings_are_written() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut system = system(folder.path());
+    let directory = tempfile::tempdir().unwrap();
+    let mut system = system(directory.path());
     system.connections.push(("plant.gear_now", "law.gear"));
     system.start = vec![("plant.gear", "Drive".into()), ("plant.note", "a < b".into())];
     let checked = system.check().unwrap();
-    let (ssp, osp) = (folder.path().join("loop.ssp"), folder.path().join("osp"));
+    let (ssp, osp) = (directory.path().join("loop.ssp"), directory.path().join("osp"));
     checked.write_ssp(&ssp).unwrap();
     let (ssd, ssv) = (entry(&ssp, "SystemStructure.ssd"), entry(&ssp, "resources/plant.ssv"));
     assert_eq!(ssd.matches(r#"<ssc:Enumeration name="Gear"/>"#).count(), 2, "{ssd}");

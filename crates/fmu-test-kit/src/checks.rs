@@ -139,15 +139,15 @@ pub fn random_contents_break_nothing<F: Either, M: Exported>() {
 /// Checks that a step of any size returns quickly, because importers may take very long steps.
 pub fn steps_of_any_size<F: Either, M: Exported>() {
     for step_size in [1e-300, 1e-9, 1.0, 1e9, 1e100, 1e300, 0.5 * f64::MAX] {
-        let (answer, answers) = std::sync::mpsc::channel();
+        let (sender, receiver) = std::sync::mpsc::channel();
         std::thread::spawn(move || {
             let fmu = F::in_mode::<M>(CoSimulation, StepComplete);
             let inputs = inputs::<M>();
             fmu.set(&inputs, &vec![0.5; inputs.len()]);
-            let _ = answer.send((fmu.try_step(0.0, step_size), fmu.read(&indices::<M>(is_real))));
+            let _ = sender.send((fmu.try_step(0.0, step_size), fmu.read(&indices::<M>(is_real))));
         });
-        let answer = answers.recv_timeout(std::time::Duration::from_secs(10));
-        let (status, _) = answer.unwrap_or_else(|_| panic!("a step of {step_size:e} s takes for ever"));
+        let received = receiver.recv_timeout(std::time::Duration::from_secs(10));
+        let (status, _) = received.unwrap_or_else(|_| panic!("a step of {step_size:e} s takes for ever"));
         assert!(matches!(status, Status::Ok | Status::Error), "{step_size:e}: {status:?}");
     }
 }

@@ -86,7 +86,7 @@ def for_page(svg: bytes, name: str) -> bytes:
         root.attrib.pop(attribute, None)
     used = set(re.findall(r'(?:url\(#|href="#)([^)"]+)', etree.tostring(root, encoding="unicode")))
     for element in root.iter():
-        _name_apart(element, name, used)
+        _make_unique(element, name, used)
         for attribute in ("d", "points", "x", "y", "width", "height", "transform"):
             if attribute in element.attrib:
                 element.attrib[attribute] = _shorter(element.attrib[attribute])
@@ -110,7 +110,7 @@ def for_page(svg: bytes, name: str) -> bytes:
     return re.sub(rb"\n +", b"\n", bytes(etree.tostring(root, encoding="utf-8", pretty_print=True)))
 
 
-def _name_apart(element: Any, name: str, used: set[str]) -> None:
+def _make_unique(element: Any, name: str, used: set[str]) -> None:
     """Prefix the ids that are referred to, and drop the others."""
     identifier = element.attrib.pop("id", None)
     if identifier in used:

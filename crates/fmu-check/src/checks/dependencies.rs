@@ -70,7 +70,7 @@ pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
             && !variable.once_per_instant
             && !variable.clocked
     });
-    let knowns: Vec<usize> = inputs.chain(states.iter().copied()).take(checker.most(60)).collect();
+    let knowns: Vec<usize> = inputs.chain(states.iter().copied()).take(checker.at_most(60)).collect();
     let (values, vector) = middle_values(checker, trajectory, &knowns, &states)?;
     for (known, value) in knowns.into_iter().zip(values) {
         let unknowns = undeclared(checker, description.outputs.iter().chain(derivatives), known);
@@ -99,7 +99,7 @@ pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
             && !variable.starts().is_empty()
             && !variable.clocked
     });
-    for known in knowns.take(checker.most(60)) {
+    for known in knowns.take(checker.at_most(60)) {
         let unknowns = undeclared(checker, &description.initial_unknowns, known);
         if unknowns.is_empty() {
             continue;

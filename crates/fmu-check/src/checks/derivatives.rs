@@ -87,7 +87,7 @@ pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
     let [has_directional, has_adjoint] = offers(checker, trajectory.interface);
     let unknowns = unknowns(&checker.description, trajectory.interface);
     let mut knowns = knowns(&checker.description, trajectory.interface);
-    knowns.truncate(checker.most(40));
+    knowns.truncate(checker.at_most(40));
     if !has_directional && !has_adjoint || unknowns.is_empty() || knowns.is_empty() {
         return Ok(());
     }
@@ -200,7 +200,7 @@ fn order(checker: &Checker, trajectory: &Trajectory, unknowns: &[u32], knowns: &
     let other = derivative(&mut writer, name, &reversed(unknowns), &reversed(knowns), &back, unknowns.len());
     checker.check("derivatives.order", writer.sequence, move |run| {
         let (one, other) = (numbers(run, one)?, numbers(run, other)?);
-        let scale = one.iter().fold(0.0_f64, |most, number| most.max(number.abs()));
+        let scale = one.iter().fold(0.0_f64, |greatest, number| greatest.max(number.abs()));
         let off = |(one, other): (&f64, &f64)| (one - other).abs() > 1e-6 * scale;
         let at = one.iter().zip(other.iter().rev()).position(off)?;
         let (is, reversed, number) = (one[at], other[other.len() - 1 - at], at + 1);

@@ -171,7 +171,7 @@ fn token(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
 /// Checks random sequences of allowed calls.
 pub fn random(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut random = Random::new(checker.seed);
-    for _ in 0..checker.most(20) {
+    for _ in 0..checker.at_most(20) {
         let mut writer = checker.writer(trajectory);
         // Mode: 0 instantiated, 1 initialization, 2 at a point of the trajectory, 3 terminated.
         let (mut mode, mut at) = (0, 0);

@@ -15,14 +15,14 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// Fails if the FMU cannot be unpacked or has more than `most` bytes when it is unpacked.
-pub fn unpack(path: &Path, directory: &Path, most: u64) -> anyhow::Result<Vec<Observation>> {
+pub fn unpack(path: &Path, directory: &Path, max_bytes: u64) -> anyhow::Result<Vec<Observation>> {
     let at = path.display();
     let file = File::open(path).map_err(|error| anyhow::anyhow!("{at}: cannot be opened ({error})"))?;
     let mut archive = zip::ZipArchive::new(file)
         .map_err(|error| anyhow::anyhow!("{at}: is no FMU, which is a ZIP file ({error})"))?;
     let mut found = Vec::new();
     let mut names = BTreeSet::new();
-    let mut remaining = most;
+    let mut remaining = max_bytes;
     for index in 0..archive.len() {
         let name = entry(&mut archive, index, &mut names, &mut found)?;
         if crate::worker::interrupted() {
@@ -41,9 +41,9 @@ pub fn unpack(path: &Path, directory: &Path, most: u64) -> anyhow::Result<Vec<Ob
         let written = std::io::copy(&mut (&mut entry).take(remaining + 1), &mut File::create(&target)?)
             .map_err(|error| anyhow::anyhow!("{at}: cannot be unpacked ({error})"))?;
         remaining = remaining.checked_sub(written).with_context(|| {
-            let most = most >> 20;
+            let max_megabytes = max_bytes >> 20;
             format!(
-                "{at}: it has more than {most} MB when it is unpacked; if that is right, give --unpacked MB"
+                "{at}: it has more than {max_megabytes} MB when it is unpacked; if that is right, give --unpacked MB"
             )
         })?;
         #[cfg(unix)]

@@ -22,8 +22,10 @@ fn attack(function: &str, args: Vec<Arg>, what: &str, rule: Option<&'static str>
 /// Returns a value reference that no variable has.
 pub fn unknown_reference(checker: &Checker) -> u64 {
     let used: Vec<u32> = checker.description.variables.iter().map(|variable| variable.reference).collect();
-    let most = used.iter().copied().max().unwrap_or(0);
-    u64::from(most.checked_add(1000).unwrap_or_else(|| (0..).find(|free| !used.contains(free)).unwrap_or(0)))
+    let greatest = used.iter().copied().max().unwrap_or(0);
+    u64::from(
+        greatest.checked_add(1000).unwrap_or_else(|| (0..).find(|free| !used.contains(free)).unwrap_or(0)),
+    )
 }
 
 /// Returns the arguments of a setter.

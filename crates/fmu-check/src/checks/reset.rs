@@ -37,7 +37,7 @@ fn changed(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     }
     // A model may reject any of these, so they are set one at a time, at most 40.
     after_values(checker, trajectory, &values, true)?;
-    let mut others = others.chunks(1).take(checker.most(40));
+    let mut others = others.chunks(1).take(checker.at_most(40));
     others.try_for_each(|other| after_values(checker, trajectory, other, false))
 }
 

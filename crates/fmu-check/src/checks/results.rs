@@ -119,7 +119,7 @@ pub fn reading(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
 fn first(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let variables = &checker.description.variables;
     let outputs = checker.readable.iter().copied();
-    let outputs = outputs.filter(|index| variables[*index].causality == "output").take(checker.most(16));
+    let outputs = outputs.filter(|index| variables[*index].causality == "output").take(checker.at_most(16));
     let mut writer = checker.writer(trajectory);
     let together = writer.write(0, &[Begin, Points(3), Part::Read, Part::Free]).reads;
     let mut single = Vec::new();

@@ -156,7 +156,7 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let near: Vec<(usize, Values)> = floats.iter().filter_map(with_other).collect();
     // Floating-point variables get values near their start values, all in one group. A model may reject new values of
     // integers, Booleans and strings, so these variables are set one at a time.
-    let separate = others.iter().take(checker.most(40)).flat_map(|index| {
+    let separate = others.iter().take(checker.at_most(40)).flat_map(|index| {
         // 500 bytes, longer than usual buffers.
         let long = Values::strings(&b"long ".repeat(100), variable(index).start.len());
         let long = (variable(index).base == Some(BaseType::String)).then_some((*index, long));
@@ -171,7 +171,7 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         }
     }
     // Only variables that can be set without Event Mode are set at a communication point.
-    for index in indices.iter().take(checker.most(400)) {
+    for index in indices.iter().take(checker.at_most(400)) {
         let of = variable(index);
         let late = of.causality == "input" || of.variability == "tunable" && trajectory.is_stepped();
         let late = late && (of.is_float() || of.variability != "discrete" && trajectory.is_stepped());

@@ -226,8 +226,8 @@ impl Report {
     }
 }
 
-fn short(text: &str, most: usize) -> String {
-    match text.char_indices().nth(most) {
+fn short(text: &str, max_length: usize) -> String {
+    match text.char_indices().nth(max_length) {
         Some((index, _)) => format!("{}...", &text[..index]),
         None => text.to_owned(),
     }

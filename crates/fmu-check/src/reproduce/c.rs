@@ -106,9 +106,9 @@ fn shows(evidence: &Evidence) -> String {
             let [first, last] = [first, last].map(|id| format!("strchr(result(\"r\", {id}), ';')"));
             Some(format!("strcmp({first}, {last}) != 0"))
         }
-        Evidence::Grown(measure, first, last, most) => {
+        Evidence::Grown(measure, first, last, limit) => {
             let index = *measure as usize;
-            Some(format!("measured({last}, {index}) - measured({first}, {index}) > {most}"))
+            Some(format!("measured({last}, {index}) - measured({first}, {index}) > {limit}"))
         }
     };
     let kind = match evidence {

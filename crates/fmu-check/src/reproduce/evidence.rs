@@ -98,14 +98,14 @@ fn pairs(sequence: &CallSequence) -> Vec<[u32; 2]> {
         let query = |numbered: &&Numbered| matches!(&numbered.step, Step::Call { function, .. } if function[4..].starts_with("Get"));
         sequence.iter().filter(query).map(|numbered| numbered.id).collect()
     };
-    let alone = queries(sequence);
+    let single = queries(sequence);
     let threads = sequence.iter().flat_map(|numbered| match &numbered.step {
         Step::Parallel(sequences) => sequences.iter().map(|sequence| queries(sequence)).collect(),
         _ => Vec::new(),
     });
     threads
         .flat_map(|ids| {
-            ids.into_iter().zip(alone.iter().cycle()).map(|(id, one)| [*one, id]).collect::<Vec<_>>()
+            ids.into_iter().zip(single.iter().cycle()).map(|(id, one)| [*one, id]).collect::<Vec<_>>()
         })
         .collect()
 }
@@ -217,7 +217,7 @@ fn grown(finding: &Finding, needed: &Run) -> Evidence {
         ("resources.settings", Measure::Settings, 0),
     ];
     match (&measures[..], known.into_iter().find(|(name, ..)| *name == finding.name)) {
-        (&[first, last], Some((_, measure, most))) => Evidence::Grown(measure, first, last, most),
+        (&[first, last], Some((_, measure, limit))) => Evidence::Grown(measure, first, last, limit),
         _ => Evidence::None,
     }
 }

@@ -108,10 +108,10 @@ fn wait(child: libc::pid_t, limit: f64) -> (Option<ExitStatus>, Option<usize>) {
 /// Writes the results of a process to the standard output, as a line of JSON, and clears its files for the next one.
 fn pass_on(mut ended: Ended, files: &mut [File; 2]) -> std::io::Result<()> {
     let results = [(&mut ended.output, MOST_OUTPUT), (&mut ended.outcomes, u64::MAX)];
-    for (file, (text, most)) in files.iter_mut().zip(results) {
+    for (file, (text, max_bytes)) in files.iter_mut().zip(results) {
         let mut bytes = Vec::new();
         file.rewind()?;
-        file.take(most).read_to_end(&mut bytes)?;
+        file.take(max_bytes).read_to_end(&mut bytes)?;
         *text = String::from_utf8_lossy(&bytes).into_owned();
         file.set_len(0)?;
         file.rewind()?;

@@ -235,38 +235,38 @@ mod tests {
     }
 
     #[track_caller]
-    fn comes_back<T: Saved + Default + Clone + PartialEq + std::fmt::Debug>(value: T) {
+    fn round_trip<T: Saved + Default + Clone + PartialEq + std::fmt::Debug>(value: T) {
         let bytes = written(value.clone());
         assert_eq!(read(&bytes), Some(value));
         assert!((0..bytes.len()).all(|length| read::<T>(&bytes[..length]).is_none()), "a cut is seen");
     }
 
     #[test]
-    fn every_type_comes_back() {
-        comes_back(-0.25);
-        comes_back([f64::MIN_POSITIVE, f64::INFINITY]);
-        comes_back([f32::MAX, f32::NEG_INFINITY]);
+    fn every_type_round_trip() {
+        round_trip(-0.25);
+        round_trip([f64::MIN_POSITIVE, f64::INFINITY]);
+        round_trip([f32::MAX, f32::NEG_INFINITY]);
         assert!(
             read::<(f64, f32)>(&written((f64::NAN, f32::NAN))).is_some_and(|(a, b)| a.is_nan() && b.is_nan())
         );
         assert_eq!(read::<f32>(&written(f64::MAX)), None);
-        comes_back(true);
-        comes_back("Gödel".to_owned());
-        comes_back([i8::MIN, -1, i8::MAX]);
-        comes_back([u32::MAX, 0]);
-        comes_back(i64::MIN);
-        comes_back((7_u8, Some(-3_i16)));
-        comes_back([usize::MAX, 0]);
-        comes_back((isize::MIN, Box::new(2.5), "c".to_owned()));
-        comes_back((1_u8, (2_u8, 3_u8), false, 4.0));
-        comes_back(VecDeque::from([1.5, -2.0, 0.25]));
-        comes_back(BTreeMap::from([(-3, vec![true]), (7, vec![])]));
-        comes_back([None, Some(2.5)]);
-        comes_back(vec![vec![String::new(), "a".to_owned()], vec![], vec!["bc".to_owned()]]);
+        round_trip(true);
+        round_trip("Gödel".to_owned());
+        round_trip([i8::MIN, -1, i8::MAX]);
+        round_trip([u32::MAX, 0]);
+        round_trip(i64::MIN);
+        round_trip((7_u8, Some(-3_i16)));
+        round_trip([usize::MAX, 0]);
+        round_trip((isize::MIN, Box::new(2.5), "c".to_owned()));
+        round_trip((1_u8, (2_u8, 3_u8), false, 4.0));
+        round_trip(VecDeque::from([1.5, -2.0, 0.25]));
+        round_trip(BTreeMap::from([(-3, vec![true]), (7, vec![])]));
+        round_trip([None, Some(2.5)]);
+        round_trip(vec![vec![String::new(), "a".to_owned()], vec![], vec!["bc".to_owned()]]);
     }
 
     #[test]
-    fn what_cannot_be_is_invalid() {
+    fn impossible_bytes_are_invalid() {
         assert_eq!(read::<bool>(&[2]), None);
         assert_eq!(read::<u8>(&written(256_i32)), None);
         assert_eq!(read::<u32>(&written(-1_i64)), None);

@@ -71,9 +71,9 @@ impl<M: Exported> Instance<M> {
         while done < values.len() {
             let first = index(done);
             let variable = &M::TABLE[first as usize];
-            let most = (variable.length() - variable.element()).min(values.len() - done);
+            let rest = (variable.length() - variable.element()).min(values.len() - done);
             let follows = |number: &usize| index(done + number) as usize == first as usize + number;
-            let run = 1 + (1..most).take_while(follows).count();
+            let run = 1 + (1..rest).take_while(follows).count();
             if variable.reals(model, time, &mut values[done..done + run]) != 0.0 {
                 for variable in &M::TABLE[first as usize..][..run] {
                     finite(variable, variable.real(model).unwrap_or(time))?;

@@ -62,10 +62,10 @@ fn no_experiment() {
 
 /// Creates a directory for resources, with a space in its name.
 fn resources(name: &str, words: &str) -> PathBuf {
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("resources of").join(name);
-    std::fs::create_dir_all(&folder).unwrap();
-    std::fs::write(folder.join("words.txt"), words).unwrap();
-    folder
+    let directory = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("resources of").join(name);
+    std::fs::create_dir_all(&directory).unwrap();
+    std::fs::write(directory.join("words.txt"), words).unwrap();
+    directory
 }
 
 /// Checks that a resource file is read. Unit tests of `Setup` check the forms of the location.

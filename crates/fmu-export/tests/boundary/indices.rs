@@ -48,7 +48,7 @@ fn set_and_read<F: Either>(count: usize) {
 }
 
 #[test]
-fn alone_and_together() {
+fn single_and_several() {
     for count in 1..=6 {
         set_and_read::<Importer>(count);
         set_and_read::<fmi3::Importer>(count);

@@ -154,33 +154,34 @@ fn messages_of_the_model() {
 #[test]
 fn messages_of_a_model_that_fails() {
     let fmu = logging::<Grumbler>(false);
-    let said = |fmu: &Importer| fmu.take_log().into_iter().map(|message| message.message).collect::<Vec<_>>();
+    let messages =
+        |fmu: &Importer| fmu.take_log().into_iter().map(|message| message.message).collect::<Vec<_>>();
     let trouble =
         |trouble: Trouble| fmu.fmi2SetInteger(&(grumbler::Name::trouble as u32), 1, &(trouble as i32));
-    assert_eq!(said(&fmu), ["made"]);
+    assert_eq!(messages(&fmu), ["made"]);
     let failed =
         |function: &str, at: &str| [format!("{at} will fail"), format!("{function}: {at} has failed")];
     assert_eq!(trouble(Trouble::Update), Status::Error);
-    assert_eq!(said(&fmu), failed("fmi2SetInteger", "Update"));
+    assert_eq!(messages(&fmu), failed("fmi2SetInteger", "Update"));
     fmu.ok(trouble(Trouble::Initialize));
     assert_eq!(fmu.fmi2EnterInitializationMode(), Status::Error);
-    assert_eq!(said(&fmu), failed("fmi2EnterInitializationMode", "Initialize"));
+    assert_eq!(messages(&fmu), failed("fmi2EnterInitializationMode", "Initialize"));
     fmu.ok(trouble(Trouble::SecondRound));
     fmu.ok(fmu.fmi2EnterInitializationMode());
     assert_eq!(fmu.fmi2ExitInitializationMode(), Status::Error);
-    assert_eq!(said(&fmu), failed("fmi2ExitInitializationMode", "SecondRound"));
+    assert_eq!(messages(&fmu), failed("fmi2ExitInitializationMode", "SecondRound"));
     // Bytes that the model rejects.
     let bytes = with(fmu.bytes(), VALUES..VALUES + 8, &(Trouble::Update as i64).to_le_bytes());
     let status = fmu.fmi2DeSerializeFMUstate(bytes.as_ptr().cast(), bytes.len(), &mut null_mut());
     assert_eq!(status, Status::Error);
-    assert_eq!(said(&fmu), failed("fmi2DeSerializeFMUstate", "Update"));
+    assert_eq!(messages(&fmu), failed("fmi2DeSerializeFMUstate", "Update"));
     fmu.ok(fmu.fmi2Reset());
-    assert_eq!(said(&fmu), ["made"]);
+    assert_eq!(messages(&fmu), ["made"]);
     // Messages of a step before an event.
     fmu.initialize(0.0);
     fmu.ok(fmu.set_debug_logging(true, &[c"logEvents"]));
     fmu.step(0.0, 2.0);
-    assert_eq!(said(&fmu), ["stops at 1", "stops at 2"]);
+    assert_eq!(messages(&fmu), ["stops at 1", "stops at 2"]);
 }
 
 /// Checks that every instance logs with its name and its environment.

@@ -189,7 +189,7 @@ fn reset_is_a_new_beginning<F: Either, M: Exported>() {
 }
 
 /// Checks that every state restores its mode, time and stop time, even an earlier mode.
-fn every_mode_comes_back<F: Either, M: Exported>() {
+fn every_mode_is_restored<F: Either, M: Exported>() {
     for (interface, mode) in modes_of_model::<F, M>() {
         let bytes = F::in_mode::<M>(interface, mode).bytes();
         for other in [Instantiated, Terminated] {
@@ -235,7 +235,7 @@ fn in_both_versions() {
         no_cut_and_no_extension_goes_unseen::<F, Palette>();
         reset_is_a_new_beginning::<F, Oscillator>();
         reset_is_a_new_beginning::<F, Talker>();
-        every_mode_comes_back::<F, Oscillator>();
+        every_mode_is_restored::<F, Oscillator>();
         random_contents_break_nothing::<F, Counter>();
         random_contents_break_nothing::<F, Talker>();
     }

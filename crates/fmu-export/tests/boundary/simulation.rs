@@ -20,7 +20,7 @@ fn variables_have_the_names_of_the_description() {
 }
 
 #[test]
-fn what_does_not_fit_is_named() {
+fn errors_name_the_mistake() {
     let mut rod = Simulation::<Rod>::new().unwrap();
     let rejected =
         |result: Result<&mut Simulation<Rod>, fmu_export::Error>| result.err().unwrap().to_string();

@@ -90,7 +90,7 @@ impl Model for Talker {
         Info { description: "Says what it hears", guid: "{talker}", ..info!("Talker", "talker") };
 
     fn new(setup: &Setup) -> Result<Self, Error> {
-        let path = setup.resources().map(|folder| folder.join("words.txt"));
+        let path = setup.resources().map(|directory| directory.join("words.txt"));
         let words = match path.map(std::fs::read_to_string) {
             Some(Ok(words)) if words.trim().is_empty() => {
                 return Err(Error::new("resources/words.txt is empty"));

@@ -99,11 +99,11 @@ impl Output {
     }
 
     /// Fails if it shares memory with numbers that are read at the same time.
-    pub fn apart_from(&self, read: &Numbers) -> PyResult<()> {
+    pub fn check_disjoint(&self, read: &Numbers) -> PyResult<()> {
         let (own, other) = (self.0.buf_ptr().addr(), read.values().as_ptr_range());
-        let apart = own + 8 * self.0.item_count() <= other.start.addr() || other.end.addr() <= own;
+        let is_disjoint = own + 8 * self.0.item_count() <= other.start.addr() || other.end.addr() <= own;
         let message = "out shares memory with the values that are set";
-        if apart { Ok(()) } else { Err(PyValueError::new_err(message)) }
+        if is_disjoint { Ok(()) } else { Err(PyValueError::new_err(message)) }
     }
 
     pub fn values(&mut self) -> &mut [f64] {

@@ -203,7 +203,7 @@ impl Instances {
         let (set, get) = (self.named(set)?, self.named(get)?);
         let values = self.fitting(set.columns(), Numbers::of(values)?)?;
         let (array, mut output) = Output::of(py, out, &self.shape(get.columns()))?;
-        output.apart_from(&values)?;
+        output.check_disjoint(&values)?;
         self.attempt(py, |all| {
             all.advance((&set.selection, values.values()), size, (&get.selection, output.values()))
         })?;
@@ -282,7 +282,7 @@ impl Instances {
         let (unknowns, knowns) = (self.named(unknowns)?, self.named(knowns)?);
         let seed = self.fitting(knowns.columns(), Numbers::of(seed)?)?;
         let (array, mut output) = Output::of(py, out, &self.shape(unknowns.columns()))?;
-        output.apart_from(&seed)?;
+        output.check_disjoint(&seed)?;
         self.attempt(py, |all| {
             let seed = (&knowns.selection, seed.values());
             all.directional_derivative(&unknowns.selection, seed, output.values())

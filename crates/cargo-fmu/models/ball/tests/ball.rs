@@ -19,7 +19,7 @@ fn it_bounces_when_it_should() {
 }
 
 #[test]
-fn its_energy_is_that_of_the_fall() {
+fn the_energy_equals_the_energy_of_the_fall() {
     let mut ball = Simulation::<Ball>::new().unwrap();
     ball.step_size(0.4).run(0.4).unwrap();
     let [height, velocity] = ["height", "velocity"].map(|name| ball.get(name).unwrap());

@@ -11,7 +11,7 @@ fn house(weather: &str) -> Result<Simulation<House>, Error> {
 }
 
 #[test]
-fn the_weather_is_that_of_the_table() {
+fn the_weather_follows_the_table() {
     let mut house = house("winter.csv").unwrap();
     for (hour, outside) in [(0.0, -4.0), (4.5, -5.75), (24.0 + 13.0, 1.5)] {
         let found = house.run(hour * 3600.0).unwrap().get("outside").unwrap();
@@ -23,7 +23,7 @@ fn the_weather_is_that_of_the_table() {
 }
 
 #[test]
-fn what_is_no_table_is_rejected() {
+fn invalid_tables_are_rejected() {
     for weather in ["summer.csv", "../../Cargo.toml"] {
         let error = house(weather).err().expect("there is no such table").to_string();
         assert!(error.contains(weather), "{error}");
