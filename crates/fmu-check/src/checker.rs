@@ -166,9 +166,9 @@ impl Checker {
         Step::Version(if self.fmi3() { "fmi3GetVersion" } else { "fmi2GetVersion" }.to_owned())
     }
 
-    /// Returns `many`, or an eighth of it in a quick check.
+    /// Returns `count`, or an eighth of it in a quick check.
     pub fn at_most(&self, count: usize) -> usize {
-        if self.quick { many.div_ceil(8) } else { many }
+        if self.quick { count.div_ceil(8) } else { count }
     }
 
     pub fn fmi3(&self) -> bool {

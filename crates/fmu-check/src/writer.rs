@@ -485,7 +485,7 @@ pub fn sample(description: &Description, max_count: usize) -> Vec<usize> {
     let (first, others): (Vec<usize>, Vec<usize>) = all.into_iter().partition(first);
     let evenly = |indices: Vec<usize>, count: usize| -> Vec<usize> {
         let step = indices.len().div_ceil(count.max(1)).max(1);
-        from.into_iter().step_by(step).collect()
+        indices.into_iter().step_by(step).collect()
     };
     let mut found = evenly(first, max_count / 2);
     found.extend(evenly(others, max_count - found.len()));
