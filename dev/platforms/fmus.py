@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import cross_check
-from libraries import environment, run, log, target_directory
+from libraries import environment, log, run, target_directory
 from targets import ARM_DIRECTORIES, CONTROLLER, DIRECTORIES, FMI3_DIRECTORIES, MODEL, PACKERS, Target
 
 SYSTEM = "prw_closed_loop"
