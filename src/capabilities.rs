@@ -185,8 +185,8 @@ impl TestbedFmu {
         })
     }
 
-    /// Returns the partial derivatives with respect to a motor angle. They include the effect of the estimated
-    /// rate and, until the simulation has started, of the states.
+    /// Returns the partial derivatives with respect to a motor angle. A change of the angle also changes the
+    /// estimated rate and, before the simulation has started, the states.
     #[inline(never)]
     fn sensitivities_to_angle(&self, motor: usize) -> Cow<'_, Moving> {
         let mut inputs = [Inputs::default(); 2];

@@ -280,8 +280,9 @@ impl Motors {
         Motions::new(now(0), now(1))
     }
 
-    /// Returns the change of these motors per change `inputs` of their inputs. The motions are linear in
-    /// inputs, earlier samples and given rates, so earlier samples and given rates are 0 here.
+    /// Returns the change of these motors per change `inputs` of their inputs. The motions are
+    /// linear in inputs, earlier samples and given rates. Only the inputs change, so the changes of the others
+    /// are 0.
     pub fn sensitivity(&self, inputs: [Inputs; 2]) -> Self {
         Self {
             inputs,

@@ -1,4 +1,4 @@
-//! Times the calculations of a step without the C interface.
+//! Benchmarks of the calculations in a step, without the C interface.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use prw_testbed::propagator::{Propagator, StepMatrices};

@@ -146,7 +146,7 @@ pub enum Fault {
     Reference,
     /// A variable has no type.
     Type,
-    /// The model structure refers to a variable that does not exist.
+    /// `ModelStructure` refers to an unknown variable.
     Structure,
 }
 

@@ -257,7 +257,7 @@ mod tests {
         );
     }
 
-    /// Cargo stands for a wasm2c of another version.
+    /// Uses cargo as a program that is not the required version of wasm2c.
     #[test]
     fn another_version_is_named() {
         let text = error(check_version(OsStr::new(env!("CARGO"))));

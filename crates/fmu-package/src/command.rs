@@ -94,7 +94,7 @@ pub struct Builder {
     pub command: &'static str,
     /// The files that the FMU is made from.
     pub sources: Sources,
-    /// FMI versions of the FMUs that are built by default. The description for the first version is committed.
+    /// FMI versions of the FMUs that are built by default. The committed model description is for the first of them.
     pub fmi: Vec<Standard>,
     /// The terminals of the FMU for FMI 3.0.
     pub terminals: Vec<Terminal>,

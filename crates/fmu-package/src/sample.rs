@@ -51,7 +51,7 @@ const REACHES: usize = 10;
 /// The largest change of a variable, as a fraction of the usual change.
 #[derive(Clone, Copy)]
 struct Reach {
-    /// Whether elements change around their start values. With the other reaches they change around their values at the previous point.
+    /// Whether values are drawn around the start values (the first reach) or around the values at the previous point (all others).
     first: bool,
     /// The fraction for each element separately.
     single: f64,
@@ -301,7 +301,7 @@ pub(crate) fn is_finite(value: &Value) -> bool {
     !matches!(value, Value::Real(value) if !value.is_finite())
 }
 
-/// Returns the value of an array's element after a change of all elements: by a factor, or by a summand for integers.
+/// Returns an element of an array that is scaled by a common factor, or, for integers, shifted by a common number.
 fn moved_in_common(variable_type: &Type, value: &Value, share: f64) -> Value {
     match (&variable_type.attributes, value) {
         (Attributes::Real { .. }, &Value::Real(value)) => Value::Real(value * (1.0 + 0.5 * share)),
@@ -312,8 +312,8 @@ fn moved_in_common(variable_type: &Type, value: &Value, share: f64) -> Value {
     }
 }
 
-/// Returns a random value in the range of the type. It differs from the start value by at most the fraction `part` of the usual
-/// change, and from the previous value if possible. Returns `None` for strings and binary values.
+/// Draws a value from the range of the type. A number is near the start value: `part` scales the largest distance. An enumeration
+/// or Boolean differs from the previous value if possible. Returns `None` for strings and binary values.
 pub(crate) fn draw_value(
     random: &mut fastrand::Rng,
     variable_type: &Type,

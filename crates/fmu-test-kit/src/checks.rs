@@ -68,8 +68,8 @@ pub fn modes_of_model<F: Either, M: Exported>() -> Vec<(Interface, Mode)> {
     all.filter(|pair| has_events || *pair != (CoSimulation, Event)).collect()
 }
 
-/// Compares time derivatives of order 1 with finite differences over short steps, each from the same saved
-/// state. `set_inputs` sets the inputs as a function of time.
+/// Compares first time derivatives with finite differences over short steps. Every step begins at the same saved
+/// state. After each step, `set_inputs` receives the step size and sets the inputs for the end of the step.
 #[track_caller]
 pub fn output_derivatives_fit_steps<M: Exported>(
     fmu: &dyn Either,

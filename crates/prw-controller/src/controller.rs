@@ -4,7 +4,7 @@
 //! correction:
 //!
 //! ```text
-//! twist     = rigid - measured          rigid: eq. (1) of the motors' angles as they are
+//! twist      = rigid - measured          rigid: eq. (1) of the motors' angles as they are
 //! correction = b twist + (1 - b) I - D               b = Kp / (1 + Kp)
 //! I'         = Ki (1 - b) (twist - I)
 //! D          = Kd rate, filtered with the time constant 2 Kd
@@ -14,7 +14,7 @@
 //! This is PI control. If the motors are at their goal, rigid = reference + correction. Then, with Kd = 0,
 //! twist - correction is the error e = reference - measured, correction = Kp e + I, and I' = Ki e. In this
 //! form, only the twist of the couplings counts as error, not the remaining distance to the goal. The
-//! integral pauses while a motor moves or is limited by its torque (anti-twist), so a move leaves no error
+//! integral pauses while a motor moves or is limited by its torque (anti-windup), so a move leaves no error
 //! to correct afterwards.
 //!
 //! D damps the vibration of the couplings, because of which the wrist lags behind its motors. A stiff wrist

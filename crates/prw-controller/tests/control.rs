@@ -91,7 +91,7 @@ fn motors_back_off_from_a_blocked_wrist() {
     }
     let [one, _] = motions.last().unwrap();
     assert!((p.stiffness * one.angle - p.max_torque).abs() < 1e-6, "{one:?}");
-    // Anti-twist: the integral has paused while the motors backed off.
+    // Anti-windup: the integral has paused while the motors backed off.
     assert_eq!(c.integral, [0.0; 2]);
     let motions = run(&mut c, 2.0, rigid(reference));
     for motor in motions.iter().flatten() {

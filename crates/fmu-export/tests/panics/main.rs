@@ -123,8 +123,8 @@ fn is_contained<F: Either>((interface, names, fault, call): Case<F>, bystanders:
     }
 }
 
-/// Tests the compiled C sources of the model, which `FMU_LIBRARY` names (`make test-source-fmu`). A fault that breaks all
-/// instances needs a process for it, as in this program.
+/// Tests the compiled C sources of the model, which `FMU_LIBRARY` names (`make test-source-fmu`). Some faults
+/// break all instances of a process, so they are tested only in this program.
 #[test]
 #[ignore = "needs compiled C sources"]
 fn every_panic_of_c_sources_is_contained() {
