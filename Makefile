@@ -42,9 +42,9 @@ ADD_WEBASSEMBLY = $(HAS_WEBASSEMBLY) || rustup target add $(WEBASSEMBLY)
 
 # Directory of the compiled programs that build FMUs. If empty, cargo compiles them.
 PROGRAMS ?=
-BUILD_FMU = $(NO_JOBS) $(if $(PROGRAMS),$(PROGRAMS)/build_fmu,$(CARGO) run $(LOCKED) --release --bin build_fmu --)
-BUILD_CONTROLLER = $(NO_JOBS) $(if $(PROGRAMS),$(PROGRAMS)/build_controller,$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller --)
-BUILD_CLOSED_LOOP = $(NO_JOBS) $(if $(PROGRAMS),$(PROGRAMS)/build_closed_loop,$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_closed_loop --)
+BUILD_FMU = $(NO_JOBS) $(if $(PROGRAMS),$(PROGRAMS)/build_fmu,$(CARGO) run $(LOCKED) --bin build_fmu --)
+BUILD_CONTROLLER = $(NO_JOBS) $(if $(PROGRAMS),$(PROGRAMS)/build_controller,$(CARGO) run $(LOCKED) -p prw_controller --bin build_controller --)
+BUILD_CLOSED_LOOP = $(NO_JOBS) $(if $(PROGRAMS),$(PROGRAMS)/build_closed_loop,$(CARGO) run $(LOCKED) -p prw_controller --bin build_closed_loop --)
 # Succeeds if the existing FMU contains the page that runs it.
 HAS_PAGE = $(PYTHON) -c 'import sys, zipfile; sys.exit(b".catch(showFailure)" not in zipfile.ZipFile("$(FMU)").read("documentation/index.html"))' 2>/dev/null
 
@@ -53,7 +53,7 @@ TWO_JOBS = $(if $(findstring jobserver,$(MAKEFLAGS)),,-j2)
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-fmu check check-release test compile-tests test-rust test-crates test-docs test-python test-fmu test-newest-fmpy test-page fmu bench profile figures docs reference experiments validation closed-loop closed-loop-fmus test-closed-loop importer-fmus test-importers examples test-examples test-faults release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo demo-fmu check check-release test compile-tests test-rust test-crates test-docs test-python test-fmu test-newest-fmpy test-page fmu bench instructions figures docs reference experiments validation closed-loop closed-loop-fmus test-closed-loop importer-fmus test-importers examples test-examples test-faults release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -75,8 +75,8 @@ help:
 	@echo 'make test-faults             put faults into the sources and count those that the tests find'
 	@echo 'make test-newest-fmpy        run the tests with FMPy again, with the newest FMPy'
 	@echo 'make test-page               test the page in the FMU in Chromium, Firefox and WebKit, which it installs'
-	@echo 'make bench                   compare the speed of the FMU with C    -> out/bench.md'
-	@echo 'make profile                 count the instructions of a step, with callgrind'
+	@echo 'make bench                   compare the speed of the FMU with C    -> dev/benches/ratios.json'
+	@echo 'make instructions            count the instructions of about 25 uses, with callgrind, into the table that make test compares'
 	@echo 'make figures                 draw the figures of the paper          -> out/*.svg, out/*.png'
 	@echo 'make docs                    update the documentation in the FMUs and docs/examples.md'
 	@echo 'make reference               write the reference of the Python packages -> target/reference/index.html'
@@ -173,9 +173,10 @@ test-page: $(VENV)/test.stamp closed-loop-fmus
 bench: $(VENV)/test.stamp closed-loop-fmus source-fmu
 	@$(PY) dev/benches/bench.py $(FMU) --sources $(SOURCE_FMU)
 
-# Instructions of a step, counted by callgrind.
-profile: $(VENV)/test.stamp fmu
-	@$(PY) dev/benches/bench.py $(FMU) --profile
+# The commit that changes the table gives the reason for each change of more than 2 %.
+instructions: $(VENV)/test.stamp fmu
+	@command -v valgrind >/dev/null || $(call stop,valgrind is missing; on Debian: apt install valgrind)
+	@$(PY) dev/benches/instructions.py $(FMU) --write
 
 # The figures and their copies for documentation and README.
 figures: need-rust $(VENV)/test.stamp closed-loop-fmus

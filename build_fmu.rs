@@ -19,8 +19,8 @@ const PARAMETERS: &str = "modelDescription/parameters.json";
 /// target/fmu/fmi3/prw_testbed.fmu for FMI 3.0.
 #[derive(Parser)]
 #[command(
-    override_usage = "cargo run --release --bin build_fmu [-- OPTIONS]",
-    after_help = "Examples (after `cargo run --release --bin build_fmu --`):
+    override_usage = "cargo run --bin build_fmu [-- OPTIONS]",
+    after_help = "Examples (after `cargo run --bin build_fmu --`):
   --parameters mine.json --out mine    an FMU with other start values, in mine/
   --tunable --out tunable              parameters can be changed while Simulink runs
   --describe                           after a change of the variables, before a commit
@@ -50,7 +50,6 @@ fn run(options: &Options) -> Result<()> {
     let file = other.clone().unwrap_or_else(|| project.join(PARAMETERS));
     let builder = Builder {
         sources: sources(project),
-        profile: "library",
         terminals: terminals(),
         start: parameter_file::read(&file).map_err(Error::msg)?.start_values(),
         is_default: other.is_none(),

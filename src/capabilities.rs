@@ -2,11 +2,11 @@
 
 use crate::fmu::{Moving, TestbedFmu};
 use crate::instant::Instant;
-use crate::motor::{Inputs, Motions};
+use crate::motor::Motions;
 use crate::pair::Pair;
 use crate::parameters::{InvalidParameter, Parameters};
 use crate::start::Start;
-use crate::testbed::{State, Testbed};
+use crate::testbed::{State, Testbed, by_sides};
 use crate::variables::Name;
 use fmu_export::{
     CoSimulation, DefaultExperiment, Error, Experiment, Info, InputDerivatives, Interface, Model,
@@ -87,27 +87,34 @@ impl Model for TestbedFmu {
     }
 
     fn calculate(&mut self, _time: f64) {
-        self.calculate_with(self.motions(&self.testbed.motors));
+        self.calculate_with(by_sides(&self.testbed.state), self.motions(&self.testbed.motors));
     }
 }
 
 impl CoSimulation for TestbedFmu {
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
-        if !self.testbed.step(step.size) {
+        if !self.step_any_size(step.size) {
             return Err(Error::new("the state would overflow; look for extreme inputs or states"));
         }
         self.start.is_over = true;
-        self.calculate_with(self.testbed.motors.path_end);
         Ok(Stepped::Calculated)
     }
 
     #[inline(always)]
-    fn step_at_once(&mut self, size: f64) -> bool {
-        if !self.testbed.step_at_once(size) {
-            return false;
+    fn step_fast(&mut self, size: f64) -> bool {
+        let state = self.testbed.step_fast(size);
+        if let Some(state) = state {
+            self.calculate_with(state, self.testbed.motors.path_end);
         }
-        self.calculate_with(self.testbed.motors.path_end);
-        true
+        state.is_some()
+    }
+
+    fn step_any_size(&mut self, size: f64) -> bool {
+        let state = self.testbed.step_to(size);
+        if let Some(state) = state {
+            self.calculate_with(state, self.testbed.motors.path_end);
+        }
+        state.is_some()
     }
 }
 
@@ -189,9 +196,9 @@ impl TestbedFmu {
     /// estimated rate and, before the simulation has started, the states.
     #[inline(never)]
     fn sensitivities_to_angle(&self, motor: usize) -> Cow<'_, Moving> {
-        let mut inputs = [Inputs::default(); 2];
-        inputs[motor].theta = 1.0;
-        let motors = self.motions(&self.testbed.motors.sensitivity(inputs));
+        let mut theta = [0.0; 2];
+        theta[motor] = 1.0;
+        let motors = self.motions(&self.testbed.motors.sensitivity(theta));
         let follows = !self.start.is_over && self.start.at_rest;
         if motors.rate[motor] == 0.0 && !follows {
             return Cow::Borrowed(&self.jacobian[motor]);

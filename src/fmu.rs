@@ -5,7 +5,7 @@ use crate::instant::{Instant, output_shaft, torques};
 use crate::motor::{Motion, Motions, Motors};
 use crate::pair::Sides;
 use crate::start::Start;
-use crate::testbed::Testbed;
+use crate::testbed::{BySides, Testbed};
 use fmu_export::Interface;
 
 /// The testbed in an FMU. The [table of variables](crate::variables) maps its fields to variables.
@@ -61,10 +61,10 @@ impl TestbedFmu {
         }
     }
 
-    /// Calculates the outputs for this motion of the motors.
+    /// Calculates the outputs for this state and motion of the motors.
     #[inline(always)]
-    pub(crate) fn calculate_with(&mut self, motors: Motions) {
-        let (state, system) = (&self.testbed.state, self.testbed.system());
+    pub(crate) fn calculate_with(&mut self, state: BySides, motors: Motions) {
+        let system = self.testbed.system();
         self.torques = torques(state, &motors, system).array();
         [self.angles, self.rates] = output_shaft(state, system).map(Sides::array);
     }

@@ -9,7 +9,7 @@ use crate::decoupled::Decoupled;
 use crate::motor::{Motion, Motions};
 use crate::pair::{PitchRoll, Sides, sides, sum_difference};
 use crate::parameters::Parameters;
-use crate::testbed::{State, by_sides};
+use crate::testbed::{BySides, State, by_sides};
 
 /// State x and motion of the motors at one instant. All functions are linear in the instant, so they return
 /// values, partial derivatives (at unit points) or time derivatives (at the rates of a point).
@@ -23,22 +23,20 @@ pub struct Instant {
 
 /// Returns the sensor torques, eq. (9), N.m.
 #[inline]
-pub fn torques(x: &State, motors: &Motions, system: &Decoupled) -> Sides {
-    let [q_i, q_ii, v] = by_sides(x);
+pub fn torques([q_i, q_ii, v]: BySides, motors: &Motions, system: &Decoupled) -> Sides {
     system.both_sides.torque(q_i, q_ii, v, *motors)
 }
 
 /// Returns pitch and roll of the output shaft and their rates, eq. (1), rad and rad/s.
 #[inline]
-pub fn output_shaft(x: &State, system: &Decoupled) -> [PitchRoll; 2] {
-    let [_, q_ii, v] = by_sides(x);
+pub fn output_shaft([_, q_ii, v]: BySides, system: &Decoupled) -> [PitchRoll; 2] {
     [q_ii, v].map(|sides| sum_difference(sides) * system.output_shaft)
 }
 
 impl Instant {
     /// Returns the sensor torques, eq. (9), N.m.
     pub fn torques(&self, system: &Decoupled) -> Sides {
-        torques(&self.x, &self.motors, system)
+        torques(by_sides(&self.x), &self.motors, system)
     }
 
     /// Returns the rates of the massless shafts, eq. (11a), rad/s.

@@ -20,20 +20,16 @@ pub struct SampleTimes {
 }
 
 impl SampleTimes {
-    /// Makes the current sample the previous one after a step of size `h`.
-    #[inline]
-    pub fn shift(&mut self, h: f64) {
-        if h != self.steady_step {
-            self.shift_by(h);
+    /// Makes the current sample the previous one after a step of size `h`, whose `inverse` is 1 / h.
+    /// It divides once, because the inverses of both steps are known.
+    pub fn shift(&mut self, h: f64, inverse: f64) {
+        if h == self.steady_step {
+            return;
         }
-    }
-
-    #[cold]
-    fn shift_by(&mut self, h: f64) {
         self.count = (self.count + 1).min(2);
-        self.step_before = self.last_step;
-        self.last_step = h;
-        self.update();
+        (self.step_before, self.last_step) = (self.last_step, h);
+        (self.inverses[1], self.inverses[0]) = (self.inverses[0], Sides::splat(inverse));
+        self.update_both();
     }
 
     /// Returns whether the number of samples is in range and the time between them is positive.
@@ -45,12 +41,19 @@ impl SampleTimes {
 
     /// Updates the fields that are derived from the steps.
     pub fn update(&mut self) {
+        let inverse = |step: f64| Sides::splat(1.0 / step);
+        (self.inverses[0], self.inverses[1]) = (inverse(self.last_step), inverse(self.step_before));
+        self.update_both();
+    }
+
+    /// Updates the fields that are derived from both steps.
+    #[inline]
+    fn update_both(&mut self) {
         let Self { count, last_step, step_before, .. } = *self;
         let is_steady = count == 2 && last_step == step_before;
         self.steady_step = if is_steady { last_step } else { 0.0 };
-        self.inverses =
-            [last_step, step_before, 0.5 * (last_step + step_before)].map(|step| Sides::both(1.0 / step));
-        self.half_last_step = Sides::both(0.5 * last_step);
+        self.inverses[2] = Sides::splat(1.0 / (0.5 * (last_step + step_before)));
+        self.half_last_step = Sides::splat(0.5 * last_step);
     }
 }
 
@@ -97,16 +100,18 @@ impl Motions {
     }
 }
 
-/// Inputs of one motor.
+/// The angle of one motor as the importer sets it.
 ///
-/// Stored per motor, not in pairs: an importer sets one number at a time. Reading a pair right after its
-/// halves were written stalls the processor.
+/// An importer sets one number at a time, and reading 16 bytes right after 8 of them were written stalls the
+/// processor. The compiler reads two numbers at once if they are neighbours, or if the first of them is aligned to
+/// 16 bytes. So the flag stands before each angle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Inputs {
+#[repr(C)]
+pub struct Sample {
+    /// Whether theta has been set since the last step. If not, the end of the path replaces the sample.
+    pub is_new: bool,
     /// Angle, rad; see [`Motors::theta_changed`].
     pub theta: f64,
-    /// Rate, rad/s; see [`Motors::omega_changed`].
-    pub omega: f64,
 }
 
 /// The motors of the FMU: their inputs and the values stored from earlier steps.
@@ -115,13 +120,13 @@ pub struct Inputs {
 /// [`omega_changed`](Self::omega_changed) or [`use_omega_changed`](Self::use_omega_changed).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motors {
-    /// Values that the importer sets.
-    pub inputs: [Inputs; 2],
+    /// Angles that the importer sets.
+    pub samples: [Sample; 2],
+    /// Rates that the importer sets, rad/s; see [`omega_changed`](Self::omega_changed).
+    pub omega: [f64; 2],
     /// Whether the rates come from omega if no derivative is set. Otherwise they come from a backward
     /// difference of the sampled angles. See [`use_omega_changed`](Self::use_omega_changed).
     pub use_omega: bool,
-    /// Whether theta has been set since the last step. If not, the end of the path replaces the sample.
-    pub is_sampled: [bool; 2],
     /// Derivatives of theta that the importer has set since the last step, rad/s.
     pub given_rate: [Option<f64>; 2],
     /// theta of the previous two samples, rad; the newer sample first.
@@ -139,33 +144,33 @@ impl Motors {
     /// Returns the motor angles that the importer set, rad.
     #[inline(always)]
     pub fn theta(&self) -> Sides {
-        Sides::new(self.inputs[0].theta, self.inputs[1].theta)
+        Sides::new(self.samples[0].theta, self.samples[1].theta)
     }
 
     /// Returns the rates that the importer set, rad/s.
     #[inline]
     pub fn omega(&self) -> Sides {
-        Sides::new(self.inputs[0].omega, self.inputs[1].omega)
+        Sides::new(self.omega[0], self.omega[1])
     }
 
     /// Sets the angle of motor 0 or 1.
     #[inline]
     pub fn set_theta(&mut self, motor: usize, theta: f64) {
-        self.inputs[motor].theta = theta;
+        self.samples[motor].theta = theta;
         self.theta_changed(motor);
     }
 
     /// Sets the input omega of motor 0 or 1.
     #[inline]
     pub fn set_omega(&mut self, motor: usize, omega: f64) {
-        self.inputs[motor].omega = omega;
+        self.omega[motor] = omega;
         self.omega_changed(motor);
     }
 
     /// Records a new sample. Call this after theta of motor 0 or 1 has been set.
     #[inline]
     pub fn theta_changed(&mut self, motor: usize) {
-        self.is_sampled[motor] = true;
+        self.samples[motor].is_new = true;
     }
 
     /// Makes a new omega effective at once, if the rate of motor 0 or 1 comes from omega. Call this after
@@ -173,7 +178,7 @@ impl Motors {
     #[inline]
     pub fn omega_changed(&mut self, motor: usize) {
         if self.takes_omega(motor) {
-            self.path_end.rate[motor] = self.inputs[motor].omega;
+            self.path_end.rate[motor] = self.omega[motor];
         }
     }
 
@@ -206,8 +211,9 @@ impl Motors {
 
     /// Forgets the samples: the next sample is the first.
     pub fn forget_samples(&mut self) {
-        let Self { inputs, use_omega, given_rate, has_rates, .. } = *self;
-        *self = Self { inputs, use_omega, given_rate, has_rates, ..Self::default() };
+        let Self { omega, use_omega, given_rate, has_rates, .. } = *self;
+        let samples = self.samples.map(|sample| Sample { is_new: false, ..sample });
+        *self = Self { samples, omega, use_omega, given_rate, has_rates, ..Self::default() };
     }
 
     /// Returns whether each of the last two steps had the size `h`.
@@ -220,8 +226,7 @@ impl Motors {
     /// [`sampled`](Self::sampled).
     #[inline(always)]
     pub fn steady(&self) -> Motions {
-        let motions = self.parabolas();
-        if self.has_rates { self.with_rates(motions) } else { motions }
+        self.with_rates(self.parabolas())
     }
 
     /// Returns the motions at the current communication point that the parabolas through the last three
@@ -241,18 +246,21 @@ impl Motors {
     pub fn sampled(&self) -> Motions {
         let steady = |rate| Motion { angle: self.theta(), rate, acceleration: Sides::default() };
         self.with_rates(match self.times.count {
-            0 => steady(Sides::default()),
+            2 => self.parabolas(),
             1 => steady((self.theta() - self.earlier[0]) * self.times.inverses[0]),
-            _ => self.parabolas(),
+            _ => steady(Sides::default()),
         })
     }
 
     /// Replaces the rates that are given or come from omega; their accelerations are 0.
-    #[inline]
+    #[inline(always)]
     fn with_rates(&self, motions: Motions) -> Motions {
+        if !self.has_rates {
+            return motions;
+        }
         let [rate, acceleration] = [motions.rate, motions.acceleration].map(Sides::array);
         let [motor1, motor2] = [0, 1].map(|motor| {
-            let given = self.given_rate[motor].or(self.use_omega.then_some(self.inputs[motor].omega));
+            let given = self.given_rate[motor].or(self.use_omega.then_some(self.omega[motor]));
             given.map_or((rate[motor], acceleration[motor]), |rate| (rate, 0.0))
         });
         Motions {
@@ -265,7 +273,7 @@ impl Motors {
     /// Returns whether motor 0 or 1 is at the end of the last path because no new sample has been set.
     #[inline]
     pub fn is_at_path_end(&self, motor: usize) -> bool {
-        !self.is_sampled[motor] && self.times.count > 0
+        !self.samples[motor].is_new && self.times.count > 0
     }
 
     /// Returns the current motions: the motion at the sample, or at the end of the path if there is no new
@@ -280,13 +288,13 @@ impl Motors {
         Motions::new(now(0), now(1))
     }
 
-    /// Returns the change of these motors per change `inputs` of their inputs. The motions are
-    /// linear in inputs, earlier samples and given rates. Only the inputs change, so the changes of the others
+    /// Returns the change of these motors per change `theta` of their angles. The motions are
+    /// linear in angles, earlier samples and rates. Only the angles change, so the changes of the others
     /// are 0.
-    pub fn sensitivity(&self, inputs: [Inputs; 2]) -> Self {
+    pub fn sensitivity(&self, theta: [f64; 2]) -> Self {
         Self {
-            inputs,
-            is_sampled: [true; 2],
+            samples: theta.map(|theta| Sample { is_new: true, theta }),
+            omega: [0.0; 2],
             given_rate: self.given_rate.map(|rate| rate.and(Some(0.0))),
             earlier: Default::default(),
             ..*self
@@ -304,9 +312,11 @@ impl Motors {
     /// `times`.
     #[inline(always)]
     pub fn finish_step(&mut self, theta: Sides, end: &Motions) {
-        self.earlier = [theta, self.earlier[0]];
+        self.earlier[1] = self.earlier[0];
+        self.earlier[0] = theta;
         self.path_end = *end;
-        self.is_sampled = [false; 2];
+        self.samples[0].is_new = false;
+        self.samples[1].is_new = false;
         if self.has_rates {
             self.given_rate = [None; 2];
             self.has_rates = self.use_omega;

@@ -2,7 +2,10 @@
 
 use num_traits::{One, Zero};
 #[cfg(target_arch = "x86_64")]
-use safe_arch::{bitxor_m128d, m128d, unpack_high_m128d, unpack_low_m128d};
+use safe_arch::{
+    bitxor_m128d, cast_to_m128d_from_m128i, cast_to_m128i_from_m128d, m128d, set_splat_m128d,
+    shuffle_ai_f32_all_m128i,
+};
 use std::ops::{Add, AddAssign, Div, DivAssign, Index, IndexMut, Mul, MulAssign, Neg, Sub, SubAssign};
 
 /// A quantity of side 1 and the same quantity of side 2 (or pitch and roll). The alignment is that of a
@@ -27,6 +30,16 @@ impl Pair {
         Self([value; 2])
     }
 
+    /// Creates a pair of two equal numbers with one vector instruction. If it is stored, both halves are stored at once,
+    /// so that reading it soon after does not stall the processor.
+    #[inline]
+    pub fn splat(value: f64) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        return Self(set_splat_m128d(value).into());
+        #[cfg(not(target_arch = "x86_64"))]
+        Self::both(value)
+    }
+
     /// Returns the two numbers as an array.
     #[inline]
     pub const fn array(self) -> [f64; 2] {
@@ -46,10 +59,10 @@ pub type PitchRoll = Pair;
 pub fn sum_difference(sides: Sides) -> PitchRoll {
     #[cfg(target_arch = "x86_64")]
     {
+        // [a, b] -> [a, -b] + [b, a]. This shuffle copies, so it takes one instruction.
         let sides = m128d::from(sides.0);
-        // A difference is the sum with the negated number.
-        let other = bitxor_m128d(unpack_high_m128d(sides, sides), [0.0, -0.0].into());
-        Pair((unpack_low_m128d(sides, sides) + other).into())
+        let swapped = shuffle_ai_f32_all_m128i::<0b01_00_11_10>(cast_to_m128i_from_m128d(sides));
+        Pair((bitxor_m128d(sides, [0.0, -0.0].into()) + cast_to_m128d_from_m128i(swapped)).into())
     }
     #[cfg(not(target_arch = "x86_64"))]
     {

@@ -169,8 +169,8 @@ pub struct StepMatrices {
     /// Half of [`Rounded::keeps_velocity`] of both subsystems. `keeps_velocities` is true if both are 1.
     half_kept: PitchRoll,
     keeps_velocities: bool,
-    /// Step size, s; 0 marks an unused entry.
-    h: f64,
+    /// 1 / step size, 1/s.
+    inverse_h: f64,
 }
 
 impl StepMatrices {
@@ -180,7 +180,7 @@ impl StepMatrices {
         half_jump: [ZERO; 3],
         half_kept: ZERO,
         keeps_velocities: true,
-        h: 0.0,
+        inverse_h: 0.0,
     };
 
     /// Computes the matrices for step size `h` in s.
@@ -197,7 +197,7 @@ impl StepMatrices {
             half_jump: beside(pitch.after_jump(&system.pitch), roll.after_jump(&system.roll)),
             half_kept,
             keeps_velocities: half_kept == PitchRoll::both(0.5),
-            h,
+            inverse_h: 1.0 / h,
         }
     }
 
@@ -230,67 +230,91 @@ impl StepMatrices {
 
 const ZERO: PitchRoll = PitchRoll::both(0.0);
 
-/// The step matrices of the most recent step sizes. Importers use one step size or alternate among a few.
-#[derive(Debug)]
+/// The step matrices of the most recent step sizes. Importers use one step size or alternate among a few, also
+/// where they mean one: the differences of `np.arange(n) * 1e-3` vary in their last digits.
+///
+/// An entry belongs to exactly one step size. Sizes that differ by rounding are not merged, because results
+/// would then depend on the sizes that were used before, and a restored state would not repeat them.
+#[derive(Debug, Default)]
 pub struct StepCache {
-    /// Copy of the current entry, so that a step needs no lookup.
-    current: StepMatrices,
-    /// Never grows beyond its first capacity, so that a step does not allocate.
-    entries: Vec<StepMatrices>,
+    /// Step sizes of the entries, s; 0 marks an unused entry.
+    sizes: [f64; Self::SIZE],
+    /// Entry of the last step, and its step size, s.
+    current: usize,
+    current_size: f64,
+    /// Entry that the next unknown size replaces.
     oldest: usize,
+    /// Number of times that matrices were computed.
+    computed: u64,
+    /// All entries, or none before the first step of a cache without [capacity](Self::with_capacity).
+    entries: Vec<StepMatrices>,
 }
 
 impl StepCache {
     const SIZE: usize = 8;
 
-    /// Creates a cache with room for `SIZE` step sizes. A cache from [`default`](Self::default)
-    /// has room only for the current one.
-    pub fn new() -> Self {
-        Self { entries: Vec::with_capacity(Self::SIZE), ..Self::default() }
+    /// Creates an empty cache that has allocated its memory, so that a step does not allocate. An empty cache
+    /// from [`default`](Self::default) allocates it at the first step.
+    pub fn with_capacity() -> Self {
+        Self { entries: vec![StepMatrices::UNUSED; Self::SIZE], ..Self::default() }
     }
 
-    /// Forgets all matrices.
+    /// Forgets all matrices and keeps the memory.
     pub fn clear(&mut self) {
-        self.current.h = 0.0;
-        self.entries.clear();
-        self.oldest = 0;
+        (self.sizes, self.current_size) = ([0.0; _], 0.0);
     }
 
-    /// Returns the matrices of the last step size.
-    #[inline]
-    pub fn current(&self) -> &StepMatrices {
-        &self.current
+    /// Returns the matrices of the last step size, if there are any.
+    #[inline(always)]
+    pub fn current(&self) -> Option<&StepMatrices> {
+        self.entries.get(self.current)
+    }
+
+    /// Returns 1 / step size of the last step, 1/s.
+    pub fn inverse_of_current(&self) -> f64 {
+        self.current().map_or(0.0, |matrices| matrices.inverse_h)
     }
 
     /// Returns whether the [current](Self::current) matrices are for step size `h > 0`.
-    #[inline]
+    #[inline(always)]
     pub fn has(&self, h: f64) -> bool {
-        self.current.h == h
+        self.current_size == h
     }
 
-    /// Makes the matrices for step size `h > 0` the current ones; computes them if the cache does not contain
+    /// Makes the matrices for step size `h > 0` the current ones. Returns false if the cache does not contain
     /// them.
+    #[inline]
+    fn find(&mut self, h: f64) -> bool {
+        let Some(found) = self.sizes.iter().position(|&size| size == h) else { return false };
+        (self.current, self.current_size) = (found, h);
+        true
+    }
+
+    /// Makes the matrices for step size `h > 0` the current ones, and computes them if the cache does not
+    /// contain them.
+    #[inline]
     pub fn prepare(&mut self, system: &Decoupled, h: f64) {
-        if self.has(h) {
-            return;
-        }
-        if let Some(found) = self.entries.iter().find(|entry| entry.h == h) {
-            self.current = *found;
-            return;
-        }
-        self.current = StepMatrices::new(system, h);
-        if self.entries.len() < self.entries.capacity() {
-            self.entries.push(self.current);
-        } else if let Some(oldest) = self.entries.get_mut(self.oldest) {
-            *oldest = self.current;
-            self.oldest = (self.oldest + 1) % self.entries.len();
+        if !(self.has(h) || self.find(h)) {
+            self.compute(system, h);
         }
     }
-}
 
-impl Default for StepCache {
-    /// Creates a cache without entries.
-    fn default() -> Self {
-        Self { current: StepMatrices::UNUSED, entries: Vec::new(), oldest: 0 }
+    /// Computes the matrices for step size `h`. They replace the oldest.
+    #[cold]
+    #[inline(never)]
+    fn compute(&mut self, system: &Decoupled, h: f64) {
+        // Allocates for a copy, whose cache is empty.
+        self.entries.resize(Self::SIZE, StepMatrices::UNUSED);
+        self.current = self.oldest;
+        self.oldest = (self.oldest + 1) % Self::SIZE;
+        self.computed += 1;
+        self.entries[self.current] = StepMatrices::new(system, h);
+        (self.sizes[self.current], self.current_size) = (h, h);
+    }
+
+    /// Returns the number of times that matrices were computed. A use that should find them in the cache
+    /// leaves it unchanged.
+    pub fn computed(&self) -> u64 {
+        self.computed
     }
 }

@@ -9,6 +9,9 @@ use crate::propagator::StepCache;
 /// The state x of eq. (11): `[theta3, theta4, theta5, theta6, omega5, omega6]`, rad and rad/s.
 pub type State = [f64; 6];
 
+/// A state x in pairs of both sides: `[q_I, q_II, v]` of eq. (8), rad and rad/s.
+pub type BySides = [Sides; 3];
+
 /// The testbed between two communication points.
 #[derive(Debug)]
 pub struct Testbed {
@@ -23,22 +26,23 @@ pub struct Testbed {
 }
 
 impl Clone for Testbed {
-    /// Copies neither the step matrices nor the capacity of the cache, because most copies are saved states.
+    /// The copy starts with an empty cache of step matrices, because most copies are saved states and should stay
+    /// small. It allocates the cache at its first step.
     fn clone(&self) -> Self {
         Self { cache: StepCache::default(), ..*self }
     }
 }
 
 impl Testbed {
-    /// Copies all fields except the step matrices, which stay valid if the parameters are equal. Returns
-    /// whether the parameters differ.
+    /// Copies all fields except the step matrices, and what follows from the parameters only if they differ. Returns
+    /// whether they differ.
     pub fn copy_from(&mut self, source: &Self) -> bool {
         let differs = self.parameters != source.parameters;
         if differs {
+            (self.parameters, self.system) = (source.parameters, source.system);
             self.cache.clear();
         }
-        let Self { parameters, state, motors, system, cache: _ } = *source;
-        (self.parameters, self.state, self.motors, self.system) = (parameters, state, motors, system);
+        (self.state, self.motors) = (source.state, source.motors);
         differs
     }
 
@@ -52,8 +56,13 @@ impl Testbed {
             state: [0.0; 6],
             motors: Motors::default(),
             system: Decoupled::new(&parameters)?,
-            cache: StepCache::new(),
+            cache: StepCache::with_capacity(),
         })
+    }
+
+    /// Returns the number of times that step matrices were computed.
+    pub fn computed_matrices(&self) -> u64 {
+        self.cache.computed()
     }
 
     /// Returns the equations for the current parameters.
@@ -79,28 +88,32 @@ impl Testbed {
     /// Returns false and changes nothing if the state would overflow.
     #[must_use]
     pub fn step(&mut self, h: f64) -> bool {
+        self.step_to(h).is_some()
+    }
+
+    /// Does the same as [`step`](Self::step) and returns the state, or nothing if it would overflow.
+    #[inline]
+    pub fn step_to(&mut self, h: f64) -> Option<BySides> {
         self.cache.prepare(&self.system, h);
-        let is_possible = self.step_from(&self.motors.sampled(), self.motors.jumps(), h);
-        if is_possible {
-            self.motors.times.shift(h);
+        let state = self.step_from(&self.motors.sampled(), self.motors.jumps(), h)?;
+        self.motors.times.shift(h, self.cache.inverse_of_current());
+        Some(state)
+    }
+
+    /// Does the same [step](Self::step) with fewer checks, if the size is that of the last two steps. Returns the
+    /// state after it, or nothing if the size differs or the state would overflow.
+    #[inline(always)]
+    pub fn step_fast(&mut self, h: f64) -> Option<BySides> {
+        if !(self.motors.are_steady(h) && self.cache.has(h)) {
+            return None;
         }
-        is_possible
-    }
-
-    /// Does the same [step](Self::step) with fewer checks, if the size is that of the last two steps. Returns
-    /// false if the size differs or the state would overflow.
-    #[inline(always)]
-    #[must_use]
-    pub fn step_at_once(&mut self, h: f64) -> bool {
-        self.motors.are_steady(h)
-            && self.cache.has(h)
-            && self.step_from(&self.motors.steady(), self.motors.theta() - self.motors.path_end.angle, h)
+        self.step_from(&self.motors.steady(), self.motors.theta() - self.motors.path_end.angle, h)
     }
 
     #[inline(always)]
-    fn step_from(&mut self, motions: &Motions, jumps: Sides, h: f64) -> bool {
+    fn step_from(&mut self, motions: &Motions, jumps: Sides, h: f64) -> Option<BySides> {
         let Self { state, motors, cache, .. } = self;
-        let matrices = cache.current();
+        let matrices = cache.current()?;
         let [q_i, q_ii, v] = by_sides(state);
         let u = motions.angle;
         let deviation = [sum_difference(q_i - u), sum_difference(q_ii - u), sum_difference(v)];
@@ -119,17 +132,17 @@ impl Testbed {
         let sum = sum1 + sum2;
         // `f64::is_finite` takes twice as many instructions.
         if (sum * 0.0).is_nan() {
-            return false;
+            return None;
         }
         let ([theta3, theta4], [theta5, theta6], [omega5, omega6]) = (q_i.array(), q_ii.array(), v.array());
         *state = [theta3, theta4, theta5, theta6, omega5, omega6];
         motors.finish_step(u, &end);
-        true
+        Some([q_i, q_ii, v])
     }
 }
 
 /// Returns the pairs `[q_I, q_II, v]` of a state.
 #[inline]
-pub fn by_sides(x: &State) -> [Sides; 3] {
+pub fn by_sides(x: &State) -> BySides {
     [0, 2, 4].map(|i| Sides::new(x[i], x[i + 1]))
 }

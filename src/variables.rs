@@ -19,17 +19,18 @@ const COUNT: Type = Type::integer("Integer_from_1").min_integer(1);
 variables! {
     for TestbedFmu, memory in
         testbed.motors.times.count, testbed.motors.times.last_step, testbed.motors.times.step_before,
-        testbed.motors.is_sampled, testbed.motors.given_rate, testbed.motors.earlier, testbed.motors.path_end,
+        testbed.motors.samples[0].is_new, testbed.motors.samples[1].is_new,
+        testbed.motors.given_rate, testbed.motors.earlier, testbed.motors.path_end,
         start.is_over;
 
     /// Angle of motor 1
-    theta1 = input(&ANGLE) in testbed.motors.inputs[0].theta then testbed.motors.is_sampled[0];
+    theta1 = input(&ANGLE) in testbed.motors.samples[0].theta then testbed.motors.samples[0].is_new;
     /// Angle of motor 2
-    theta2 = input(&ANGLE) in testbed.motors.inputs[1].theta then testbed.motors.is_sampled[1];
+    theta2 = input(&ANGLE) in testbed.motors.samples[1].theta then testbed.motors.samples[1].is_new;
     /// Angular velocity of motor 1; used in Co-Simulation only if use_omega is true
-    omega1 = input(&ANGULAR_VELOCITY) in testbed.motors.inputs[0].omega then |fmu| { fmu.testbed.motors.omega_changed(0) };
+    omega1 = input(&ANGULAR_VELOCITY) in testbed.motors.omega[0] then |fmu| { fmu.testbed.motors.omega_changed(0) };
     /// Angular velocity of motor 2; used in Co-Simulation only if use_omega is true
-    omega2 = input(&ANGULAR_VELOCITY) in testbed.motors.inputs[1].omega then |fmu| { fmu.testbed.motors.omega_changed(1) };
+    omega2 = input(&ANGULAR_VELOCITY) in testbed.motors.omega[1] then |fmu| { fmu.testbed.motors.omega_changed(1) };
 
     /// Torque measured by sensor 1 between motor 1 and the SECT, eq. (9a)
     tau1 = output(&TORQUE) from torques[0];

@@ -101,7 +101,7 @@ proptest! {
     /// Checks that fast steps and general steps are bit-identical, also with rates that are given or come
     /// from omega.
     #[test]
-    fn steps_at_once_are_steps(
+    fn fast_steps_are_steps(
         p in parameters(),
         uses_omega in any::<bool>(),
         steps in prop::collection::vec(
@@ -113,7 +113,7 @@ proptest! {
         testbed.motors.use_omega = uses_omega;
         testbed.motors.use_omega_changed();
         let mut other = testbed.clone();
-        let mut at_once = 0;
+        let mut fast = 0;
         for (theta, rates, size) in steps {
             for testbed in [&mut testbed, &mut other] {
                 for motor in 0..2 {
@@ -129,8 +129,8 @@ proptest! {
                 // A copy has no matrices.
                 testbed = testbed.clone();
             }
-            if testbed.step_at_once(h) {
-                at_once += 1;
+            if testbed.step_fast(h).is_some() {
+                fast += 1;
             } else {
                 prop_assert!(testbed.step(h));
             }
@@ -138,7 +138,42 @@ proptest! {
             prop_assert_eq!(testbed.state.map(f64::to_bits), other.state.map(f64::to_bits));
             prop_assert_eq!(testbed.motors, other.motors);
         }
-        prop_assume!(at_once > 0);
+        prop_assume!(fast > 0);
+    }
+
+    /// Checks on grids like `np.arange(n) * 1e-3`, whose differences vary in their last digits, that matrices are
+    /// computed once for each difference, whatever happens in between, and that each step uses those of its own size.
+    #[test]
+    fn matrices_are_computed_once_for_each_size(p in parameters(), dt in 1e-5..1e-2f64, first in 1..5000_i32) {
+        let size = |k: i32| f64::from(k + 1) * dt - f64::from(k) * dt;
+        let mut testbed = Testbed::new(p).unwrap();
+        prop_assert!(testbed.step(dt));
+        // A changed parameter forgets the matrices, but not the memory for the next ones.
+        testbed.parameters.k1 *= 1.5;
+        testbed.parameters_changed().unwrap();
+        for mut testbed in [testbed.clone(), testbed] {
+            let mut sizes: Vec<f64> = Vec::new();
+            let before = testbed.computed_matrices();
+            for k in first..first + 40 {
+                // Computing matrices takes long, so a fresh copy follows rarely.
+                let mut fresh = (k % 8 == 0).then(|| testbed.clone());
+                testbed.motors.set_theta(0, 0.01 * f64::from(k % 7));
+                prop_assert!(testbed.step(size(k)));
+                if let Some(fresh) = &mut fresh {
+                    fresh.motors.set_theta(0, 0.01 * f64::from(k % 7));
+                    prop_assert!(fresh.step(size(k)));
+                    prop_assert_eq!(testbed.state.map(f64::to_bits), fresh.state.map(f64::to_bits));
+                }
+                if !sizes.contains(&size(k)) {
+                    sizes.push(size(k));
+                }
+                // A saved state that is restored.
+                let saved = testbed.clone();
+                testbed.copy_from(&saved);
+            }
+            prop_assume!(sizes.len() <= 8);
+            prop_assert_eq!(testbed.computed_matrices() - before, sizes.len() as u64);
+        }
     }
 
     /// Checks that the pairs of propagators equal the separate propagators.

@@ -13,7 +13,7 @@ const DIRECTORY: &str = env!("CARGO_MANIFEST_DIR");
 /// Connects the FMUs of controller and testbed to a closed loop: prw_closed_loop.ssp, and the folder
 /// prw_closed_loop with OspSystemStructure.xml.
 #[derive(Parser)]
-#[command(override_usage = "cargo run --release -p prw_controller --bin build_closed_loop [-- OPTIONS]")]
+#[command(override_usage = "cargo run -p prw_controller --bin build_closed_loop [-- OPTIONS]")]
 struct Options {
     /// The testbed [default: target/fmu/prw_testbed.fmu]
     #[arg(long, value_name = "FMU")]

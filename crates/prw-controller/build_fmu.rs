@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 /// Builds the FMU of the wrist's controller, target/fmu/prw_controller.fmu.
 #[derive(Parser)]
-#[command(override_usage = "cargo run --release -p prw_controller --bin build_controller [-- OPTIONS]")]
+#[command(override_usage = "cargo run -p prw_controller --bin build_controller [-- OPTIONS]")]
 struct Options {
     #[command(flatten)]
     build: BuildOptions,
@@ -15,12 +15,11 @@ struct Options {
 
 fn main() -> ExitCode {
     let builder = Builder {
-        command: "cargo run --release -p prw_controller --bin build_controller --",
+        command: "cargo run -p prw_controller --bin build_controller --",
         sources: Sources {
             licenses: vec!["../../LICENSE-APACHE", "../../LICENSE-MIT"],
             ..Sources::of_package(env!("CARGO_MANIFEST_DIR"))
         },
-        profile: "library",
         terminals: terminals(),
         ..Builder::new(env!("CARGO_PKG_NAME"), env!("CARGO_MANIFEST_DIR"))
     };

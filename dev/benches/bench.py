@@ -1,15 +1,15 @@
-"""Times the FMUs against programs in C and other tools, and writes Markdown tables to out/bench.md; `make bench`.
+"""Times the FMUs against programs in C and other tools; `make bench`.
 
-With --profile it counts the instructions of a step with callgrind, which repeat exactly on a busy machine.
+It prints Markdown tables and writes the figures to dev/benches/ratios.json, from which `make docs` writes docs/performance.md.
 The programs of a table are measured alternately. Each time is the minimum of several rounds. If the environment variable
-BENCH_QUICK is set, counts are small, and the tables go to target/bench/quick.md: they only show that the benchmarks run.
+BENCH_QUICK is set, counts are small, and the file is target/bench/quick.json: they only show that the benchmarks run.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -34,8 +34,10 @@ from tools.validation import masters  # noqa: E402
 from tools.validation.system import read  # noqa: E402
 
 FMUS, WORK = ROOT / "target" / "fmu", ROOT / "target" / "bench"
+RATIOS = Path(__file__).with_name("ratios.json")
 QUICK = "BENCH_QUICK" in os.environ
-STEP = 1e-3
+#: Communication step size, s. The sums of EXACT have no rounding errors.
+STEP, EXACT = 1e-3, 2.0**-10
 SAMPLES, RUNS, ROUNDS, LOOPS = (21, 4, 1, 2) if QUICK else (2001, 2000, 7, 1000)
 #: Numbers of instances, each with the number of steps.
 SIZES = ((1, 50), (8, 5)) if QUICK else ((1, 50_000), (1024, 300), (16384, 40))
@@ -47,21 +49,31 @@ WAYS = {
     "with input derivatives": 100_000,
     "with use_omega and rates set": 100_000,
     "step size alternating among 4": 100_000,
+    "steps of the grid np.arange(n) * 1e-3": 100_000,
     "a new step size every step": 4_000,
     "fmi2GetFMUstate and Set every step": 100_000,
     "8 x 10 directional derivatives": 20_000,
 }
-VECTORS, RATES, OMEGA, ALTERNATING, NEW_SIZES = 0, 2, 3, 4, 5
+VECTORS, RATES, OMEGA, ALTERNATING, GRID, NEW_SIZES = 0, 2, 3, 4, 5, 6
 
 
-def table(*rows: Iterable[object]) -> None:
-    """Prints a table and appends it to out/bench.md."""
+#: The figures of all tables, by the name of the table and the label of the row.
+FIGURES: dict[str, dict[str, list[float]]] = {}
+
+
+def table(name: str, *rows: Iterable[object]) -> None:
+    """Prints a table and keeps its figures, under its name."""
     lines = [f"| {' | '.join(f'{x:,.3g}' if isinstance(x, float) else str(x) for x in row)} |\n" for row in rows]
     lines.insert(1, "|---" * lines[0].count(" |") + "|\n")
     print("", *lines, sep="", flush=True)
-    target = WORK / "quick.md" if QUICK else ROOT / "out" / "bench.md"
-    with target.open("a", encoding="utf-8") as file:
-        file.writelines(["\n", *lines])
+    found = [list(row) for row in rows[1:]]
+    FIGURES[name] = {str(label): [float(f"{x:.3g}") for x in figures] for label, *figures in found}
+
+
+def write_figures() -> None:
+    """Writes the figures of all tables."""
+    path = WORK / "quick.json" if QUICK else RATIOS
+    path.write_text(json.dumps(FIGURES, indent=2) + "\n", encoding="utf-8")
 
 
 def compile_c(output: str, *arguments: object) -> None:
@@ -72,11 +84,8 @@ def compile_c(output: str, *arguments: object) -> None:
 
 def prepare(fmu: Path) -> str:
     """Writes the libraries and programs of the benchmarks into target/bench. Returns the guid of the FMU."""
-    (ROOT / "out").mkdir(exist_ok=True)
     shutil.rmtree(WORK, ignore_errors=True)
     WORK.mkdir(parents=True)
-    if not QUICK:
-        (ROOT / "out" / "bench.md").unlink(missing_ok=True)
     with zipfile.ZipFile(fmu) as archive:
         (WORK / "fmu.so").write_bytes(archive.read("binaries/linux64/prw_testbed.so"))
     strict, directory = ("-Wall", "-Wextra", "-Werror"), ROOT / "dev" / "benches" / "c"
@@ -112,7 +121,7 @@ def steps(guid: str, sources: Path | None) -> None:
         compile_c("sources.so", "-O3", "-shared", "-fPIC", *files)
         np.testing.assert_array_equal(outputs("sources", VECTORS), outputs("fmu", VECTORS))
         others.append(("sources", VECTORS, 100_000))
-    for way in (VECTORS, RATES, OMEGA, ALTERNATING):
+    for way in (VECTORS, RATES, OMEGA, ALTERNATING, GRID):
         np.testing.assert_allclose(outputs("bare_exact", way), outputs("fmu", way), rtol=0, atol=1e-10)
     measured: dict[object, list[float]] = {}
     for _ in range(1 if QUICK else 25):
@@ -125,11 +134,13 @@ def steps(guid: str, sources: Path | None) -> None:
             measured.setdefault(threads, []).append(seconds("fmu", VECTORS, 400_000, threads))
     least = {name: min(found) for name, found in measured.items()}
     ratios = [(name, least["fmu", way] / least["bare_exact", way]) for way, name in enumerate(WAYS)]
-    table(("time of the FMU / time of bare_exact.c", "ratio"), *ratios)
+    table("steps", ("time of the FMU / time of bare_exact.c", "ratio"), *ratios)
     one, exact, euler = least["fmu", VECTORS], outputs("fmu", RATES), outputs("euler", OMEGA)
     torque, roll = (100 * np.abs(euler - exact)[:, k].max() / np.abs(exact[:, k]).max() for k in (0, 3))
     rows = {
         "step of the FMU, ns": 1e9 * one,
+        "steps of np.arange(n) * 1e-3 / steps of one size": least["fmu", GRID] / one,
+        "four alternating sizes / steps of one size": least["fmu", ALTERNATING] / one,
         "new step size / known step size": least["fmu", NEW_SIZES] / one,
         "two threads / one, throughput": least[1] / least[2],
         "forward Euler in C / FMU": least["euler"] / one,
@@ -139,32 +150,7 @@ def steps(guid: str, sources: Path | None) -> None:
     }
     if sources:
         rows["step of the C sources / step of the library"] = least["sources"] / one
-    table(("other ratios", "ratio"), *rows.items())
-
-
-def profile(guid: str) -> None:
-    """Counts the instructions of a step."""
-    ways = ("angles as vectors", "one scalar per call", "with input derivatives", "with use_omega")[: 1 if QUICK else 4]
-
-    def count(library: str, way: int, steps: int) -> dict[str, int]:
-        file = str(WORK / f"callgrind.{steps}")
-        program = (str(WORK / "bench"), str(WORK / f"{library}.so"), guid, str(way), str(steps), "1")
-        command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={file}", *program]
-        subprocess.run(command, check=True, capture_output=True)
-        command = ["callgrind_annotate", "--threshold=100", file]
-        report = subprocess.run(command, check=True, capture_output=True, text=True).stdout.replace(",", "")
-        lines = re.findall(r"^ *(\d+) .*?(PROGRAM TOTALS|fmi2\w+)", report, re.MULTILINE)
-        return {name: int(number) for number, name in reversed(lines)}
-
-    names = {"PROGRAM TOTALS": "all"} | {name: name for name in ("fmi2SetReal", "fmi2DoStep", "fmi2GetReal")}
-    rows = []
-    for library in ("fmu",) if QUICK else ("fmu", "bare_exact"):
-        for way, label in enumerate(ways):
-            # The difference between a long run and a short run does not contain the start of the program.
-            short, long = (count(library, way, number) for number in (1000, 11000))
-            found = [f"{(long.get(name, 0) - short.get(name, 0)) / 10000:.0f}" for name in names]
-            rows.append((f"{library}, {label}", *found))
-    table(("instructions per step", *names.values()), *rows)
+    table("others", ("other ratios", "ratio"), *rows.items())
 
 
 class Case:
@@ -187,18 +173,18 @@ class Case:
         self.loaded.close()
         shutil.rmtree(self.directory)
 
-    def in_c(self) -> tuple[float, np.ndarray]:
-        """Seconds per run in C, and the outputs (samples, n) of the last run."""
+    def in_c(self, step: float) -> tuple[float, np.ndarray]:
+        """Seconds per run in C with steps of `step` s, and the outputs (samples, n) of the last run."""
         library = Path(self.directory, "binaries", "linux64", f"{self.description.coSimulation.modelIdentifier}.so")
         lists = (",".join(map(str, references)) for references in self.references)
-        arguments = (self.runs, SAMPLES, STEP, *lists, 1)
+        arguments = (self.runs, SAMPLES, step, *lists, 1)
         seconds, rows = bench(library, self.description.guid, *arguments, stdin=self.table.tobytes())
         return seconds / self.runs, rows.reshape(SAMPLES, -1)
 
-    def by_fmu_run(self, threads: int, **kept: Any) -> tuple[float, fmu_run.Runs]:
+    def by_fmu_run(self, step: float, threads: int, **kept: Any) -> tuple[float, fmu_run.Runs]:
         begin = time.perf_counter()
         given: dict[str, Any] = {"inputs": self.inputs, "start": self.start, "outputs": self.outputs, **kept}
-        runs = self.loaded.run(np.arange(SAMPLES) * STEP, threads=threads, **given)
+        runs = self.loaded.run(np.arange(SAMPLES) * step, threads=threads, **given)
         return (time.perf_counter() - begin) / self.runs, runs.check()
 
     def by_fmpy(self) -> tuple[float, np.ndarray]:
@@ -223,14 +209,16 @@ class Case:
     def row(self) -> tuple[object, ...]:
         rounds = []
         for _ in range(ROUNDS):
-            (c, expected), (one, runs), (two, _) = self.in_c(), self.by_fmu_run(1), self.by_fmu_run(2)
-            (measures, _), (fmpy_, found) = self.by_fmu_run(1, measures=["peak", "rms", "end"]), self.by_fmpy()
+            (c, expected), (one, runs), (two, _) = self.in_c(STEP), self.by_fmu_run(STEP, 1), self.by_fmu_run(STEP, 2)
+            measured = self.by_fmu_run(STEP, 1, measures=["peak", "rms", "end"])[0]
+            exact_c, exact = self.in_c(EXACT)[0], self.by_fmu_run(EXACT, 1)[0]
+            fmpy_, found = self.by_fmpy()
             for number, name in enumerate(self.outputs):
                 for values in (runs[name][-1], found[:, number]):
                     np.testing.assert_allclose(values, expected[:, number], rtol=0, atol=1e-12)
-            rounds.append((c, one, two, measures, fmpy_))
-        c, one, two, measures, fmpy_ = map(min, zip(*rounds))
-        return self.name, one / c, measures / c, one / two, fmpy_ / one
+            rounds.append((c, exact_c, exact, one, two, measured, fmpy_))
+        c, exact_c, exact, one, two, measured, fmpy_ = map(min, zip(*rounds))
+        return self.name, exact / exact_c, one / c, measured / c, one / two, fmpy_ / one
 
 
 def many_runs() -> None:
@@ -245,8 +233,13 @@ def many_runs() -> None:
             Case("controller", FMUS / "prw_controller.fmu", wrist, ["theta1", "theta2", "omega1", "omega2"], RUNS),
             Case("a ramp in C", ramp, {"slope": 1 + wave}, ["y"], 2 * RUNS),
         )
-        heads = ("one thread / C, outputs stored", "one thread / C, statistics", "two threads, throughput")
-        table(("FMU", *heads, "FMPy / one thread"), *(case.row() for case in cases))
+        heads = (
+            "one thread / C, equal steps",
+            "np.arange(n) * 1e-3",
+            "the same, statistics",
+            "two threads, throughput",
+        )
+        table("runs", ("FMU", *heads, "FMPy / one thread"), *(case.row() for case in cases))
         for case in cases:
             case.close()
 
@@ -287,7 +280,7 @@ def instances(guid: str) -> None:
             c, three = least(in_c, count, moves), least(by_fmu_run, count, 1, moves, False)
             one, two = (least(by_fmu_run, count, threads, moves, True) for threads in (1, 2))
             rows.append((f"{count:,}", three / c, one / c, one / two))
-        table(("testbeds", "three calls / C", "one call / C", "two threads, throughput"), *rows)
+        table("instances", ("testbeds", "three calls / C", "one call / C", "two threads, throughput"), *rows)
 
 
 def loops() -> None:
@@ -318,22 +311,20 @@ def loops() -> None:
         if master.name == "libcosim":
             expected = np.column_stack([series[name][0, 1:] for name in masters.RECORDED])
             np.testing.assert_array_equal(found, expected)
-    table((f"closed loop, {system.steps} steps", "runs per second"), *rows)
+    table("loops", (f"closed loop, {system.steps} steps", "runs per second"), *rows)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("fmu", type=Path)
     parser.add_argument("--sources", type=Path, help="the FMU as C sources")
-    parser.add_argument("--profile", action="store_true")
     options = parser.parse_args()
     guid = prepare(options.fmu)
-    if options.profile:
-        return profile(guid)
     steps(guid, options.sources)
     many_runs()
     instances(guid)
     loops()
+    write_figures()
     if not QUICK:
         subprocess.run(["cargo", "bench", "--locked", "--bench", "parts"], cwd=ROOT, check=True)
 

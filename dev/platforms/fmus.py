@@ -20,7 +20,7 @@ Directories = Mapping[str, tuple[Target, ...]]
 def make(libraries: Mapping[str, Mapping[Target, Path]], out: Path, scratch: Path) -> None:
     """Builds the files of a release that contain the libraries of the models."""
     packages = [argument for _, package in PACKERS.values() for argument in ("--package", package)]
-    run("cargo", "build", "--locked", "--release", "--bins", *packages)
+    run("cargo", "build", "--locked", "--bins", *packages)
     for model, found in libraries.items():
         log(f"packing {model}")
         _pack(model, 2, DIRECTORIES, found, scratch).rename(out / f"{model}.fmu")
@@ -51,4 +51,4 @@ def _pack(
 
 def _run(program: str, *arguments: str) -> None:
     # These programs compile the model to WebAssembly, for the page and for the C sources.
-    run(str(target_directory() / "release" / program), *arguments, environment=environment())
+    run(str(target_directory() / "debug" / program), *arguments, environment=environment())

@@ -71,7 +71,7 @@ def environment(target: Target | None = None) -> dict[str, str]:
         (lld,) = sysroot.glob("lib/rustlib/*/bin/rust-lld")
         found[f"CARGO_TARGET_{target.triple.replace('-', '_').upper()}_LINKER"] = macos_linker.__file__
         found |= {"RUST_LLD": str(lld), "SDKROOT": str(macos_sdk()), "MACOSX_DEPLOYMENT_TARGET": target.macos}
-        found["CARGO_PROFILE_LIBRARY_STRIP"] = "false"
+        found["CARGO_PROFILE_RELEASE_STRIP"] = "false"
     # Cargo splits the flags at this character, which paths do not contain.
     return found | {"CARGO_ENCODED_RUSTFLAGS": "\x1f".join(flags)}
 
@@ -110,7 +110,7 @@ def macos_sdk() -> Path:
 def guid(model: str) -> str:
     """The guid of a model's FMU, which is compiled into its libraries."""
     program, package = PACKERS[model]
-    cargo = ("cargo", "run", "--quiet", "--locked", "--release", "--package", package, "--bin", program)
+    cargo = ("cargo", "run", "--quiet", "--locked", "--package", package, "--bin", program)
     return run(*cargo, "--", "--guid")
 
 
@@ -123,10 +123,10 @@ def library(model: str, target: Target) -> Path:
         exports = [line.split()[-1] for line in listed.splitlines()]
     program, glibc = ("cargo", "") if target.macos else ("cargo-zigbuild", f".{GLIBC}" * ("linux" in target.triple))
     command = [program, "rustc", *STD, "--target", target.triple + glibc, "--package", model, "--no-default-features"]
-    command += ["--lib", "--crate-type=cdylib", "--profile=library", "--locked"]
+    command += ["--lib", "--crate-type=cdylib", "--release", "--locked"]
     command += link(target, f"{model}{target.suffix}", exports)
     run(*command, environment=environment(target) | {"FMU_GUID": guid(model)})
-    return target_directory() / target.triple / "library" / target.library(model)
+    return target_directory() / target.triple / "release" / target.library(model)
 
 
 def export_from_object() -> list[str]:
@@ -148,7 +148,7 @@ def export_from_object() -> list[str]:
 
 def wheel(target: Target, out: Path) -> Path:
     """Builds the wheel of fmu-run for a target and all Python versions from 3.11 on, in `out`."""
-    command = ["maturin", "build", "--profile", "library", *STD, "--target", target.triple, "--out", str(out)]
+    command = ["maturin", "build", "--release", *STD, "--target", target.triple, "--out", str(out)]
     if not target.macos:
         command += ["--zig"]
     if "linux" in target.triple:

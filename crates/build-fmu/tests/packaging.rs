@@ -45,7 +45,7 @@ fn the_committed_description_is_up_to_date() {
     assert!(
         fs::read_to_string(COMMITTED).unwrap_or_default() == description(&[]),
         "modelDescription/modelDescription.xml is out of date; update it with\n    \
-         cargo run --release --bin build_fmu -- --describe"
+         cargo run --bin build_fmu -- --describe"
     );
 }
 

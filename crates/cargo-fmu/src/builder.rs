@@ -31,7 +31,7 @@ pub fn build(
 ) -> Result<bool> {
     if let Some(name) = &project.own_builder {
         let mut command = Command::new(cargo());
-        command.args(["run", "--quiet", "--release", "--package", &project.name, "--bin", name]);
+        command.args(["run", "--quiet", "--package", &project.name, "--bin", name]);
         command.arg("--manifest-path").arg(project.directory.join("Cargo.toml")).arg("--").args(arguments);
         let status = command.status().context("cannot start cargo")?;
         return Ok(status.success());

@@ -25,11 +25,20 @@ pub trait CoSimulation: Model {
 
     /// Carries out a step and calculates like [`calculate`](Model::calculate), if the model can do both
     /// quickly, without events and messages. The result must equal the result of [`step`](Self::step).
-    /// Otherwise the function returns false and changes nothing; then this crate calls `step`.
+    /// Otherwise the function returns false and changes nothing; then this crate calls
+    /// [`step_any_size`](Self::step_any_size).
     ///
-    /// This crate calls it only after the first `step`, and only if steps cannot end early.
+    /// This crate calls it only after the first `step`, and only if steps cannot end early. It is inlined into the
+    /// C function, so it should do only the most frequent step, and call no function that is not inlined.
     #[inline]
-    fn step_at_once(&mut self, _size: f64) -> bool {
+    fn step_fast(&mut self, _size: f64) -> bool {
+        false
+    }
+
+    /// Does the same as [`step_fast`](Self::step_fast) for steps that it leaves out, such as steps of another size
+    /// than the last. If this returns false as well, this crate calls [`step`](Self::step).
+    #[inline]
+    fn step_any_size(&mut self, _size: f64) -> bool {
         false
     }
 }

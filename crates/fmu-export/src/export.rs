@@ -23,7 +23,12 @@ pub trait Exported: Model {
     }
     #[doc(hidden)]
     #[inline]
-    fn exported_step_at_once(&mut self, _size: f64) -> bool {
+    fn exported_step_fast(&mut self, _size: f64) -> bool {
+        false
+    }
+    #[doc(hidden)]
+    #[inline]
+    fn exported_step_any_size(&mut self, _size: f64) -> bool {
         false
     }
     #[doc(hidden)]
@@ -150,8 +155,13 @@ macro_rules! offer {
         }
 
         #[inline(always)]
-        fn exported_step_at_once(&mut self, size: f64) -> bool {
-            $crate::CoSimulation::step_at_once(self, size)
+        fn exported_step_fast(&mut self, size: f64) -> bool {
+            $crate::CoSimulation::step_fast(self, size)
+        }
+
+        #[inline(always)]
+        fn exported_step_any_size(&mut self, size: f64) -> bool {
+            $crate::CoSimulation::step_any_size(self, size)
         }
     };
     (@capability ModelExchange) => {

@@ -27,10 +27,10 @@ use std::path::{Path, PathBuf};
 /// |---|---|
 /// | instantiate, reset | [`new`](Self::new) |
 /// | set inputs, states, start values of outputs | sets the field and runs the `then` of the table; then [`calculate_start`](Self::calculate_start), until the first step |
-/// | set parameters | as above on a copy, then [`update`](Self::update) once; the copy replaces the model if `update` succeeds |
-/// | enter initialization | [`initialize`](Self::initialize) on a copy, which replaces the model if it succeeds; an error while the last value set for some start value was rejected |
+/// | set parameters | as above, then [`update`](Self::update) once; an error undoes the change |
+/// | enter initialization | [`initialize`](Self::initialize), undone after an error; an error while the last value set for some start value was rejected |
 /// | get | [`calculate`](Self::calculate), if a value was set or a step was done since the last time; then the `by` of the table |
-/// | step | [`CoSimulation::step_at_once`](crate::CoSimulation::step_at_once); [`step`](crate::CoSimulation::step) if that returns false |
+/// | step | [`CoSimulation::step_fast`](crate::CoSimulation::step_fast), then [`step_any_size`](crate::CoSimulation::step_any_size) and [`step`](crate::CoSimulation::step), until one of them does it |
 /// | event | [`ModelExchange::event`](crate::ModelExchange::event) |
 /// | enter Continuous-Time Mode | [`ModelExchange::continuous_time_entered`](crate::ModelExchange::continuous_time_entered) |
 /// | save, restore | `clone_from` |

@@ -9,6 +9,9 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+/// The cargo profile of every library: what users run is optimized.
+pub const PROFILE: &str = "release";
+
 /// A run of cargo that makes a package's shared library.
 #[derive(Clone, Debug)]
 pub struct LibraryBuild<'a> {
@@ -16,8 +19,6 @@ pub struct LibraryBuild<'a> {
     pub directory: PathBuf,
     /// The package.
     pub package: &'a str,
-    /// The profile.
-    pub profile: &'a str,
     /// The target; `None` for this machine.
     pub target: Option<&'a str>,
     /// Settings of cargo, such as `profile.release.lto=false`.
@@ -42,7 +43,7 @@ impl LibraryBuild<'_> {
             // Cargo skips link-time optimization for a package that also has the crate type rlib.
             .args(["rustc", "--lib", "--crate-type", "cdylib", "--locked", "--no-default-features"])
             .args(["--message-format", "json-render-diagnostics"])
-            .args(["--profile", self.profile, "--package", self.package])
+            .args(["--profile", PROFILE, "--package", self.package])
             .current_dir(&self.directory)
             .stdin(Stdio::null())
             .stdout(Stdio::piped());
@@ -55,7 +56,7 @@ impl LibraryBuild<'_> {
         // The library needs no debug information. cargo-zigbuild cannot strip libraries for macOS.
         if cargo == ZIGBUILD {
             let strip = !target.is_some_and(|target| target.contains("-apple-"));
-            command.env(format!("CARGO_PROFILE_{}_STRIP", self.profile.to_uppercase()), strip.to_string());
+            command.env(format!("CARGO_PROFILE_{}_STRIP", PROFILE.to_uppercase()), strip.to_string());
         }
         for setting in &self.settings {
             command.args(["--config", setting]);

@@ -1,7 +1,7 @@
 //! The command `build_fmu`, which is the same for every model.
 
 use crate::c_sources::{COMPILED, CSources, LINKING, WEBASSEMBLY, c_sources, check_tools};
-use crate::cargo::LibraryBuild;
+use crate::cargo::{LibraryBuild, PROFILE};
 use crate::connectors::{Terminal, terminals};
 use crate::content::ContentFile;
 use crate::cross::{GLIBC, TARGETS, ZIGBUILD, check_targets, has_std};
@@ -98,8 +98,6 @@ pub struct Builder {
     pub fmi: Vec<Standard>,
     /// The terminals of the FMU for FMI 3.0.
     pub terminals: Vec<Terminal>,
-    /// The cargo profile of the library.
-    pub profile: &'static str,
     /// Settings of cargo for this build, such as `profile.release.lto=false`.
     pub settings: Vec<String>,
     /// Start values that the library reads from another file when it is compiled, see [`Variant::start`].
@@ -117,9 +115,6 @@ pub struct Builder {
     pub environment: Vec<(&'static str, Option<OsString>)>,
 }
 
-/// The profile of a library that is only described, and the default profile of a library that is packed.
-const DESCRIBED_IN: &str = "release";
-
 /// The description of the default FMU, which is kept with the sources.
 const DESCRIPTION: &str = "modelDescription/modelDescription.xml";
 
@@ -127,17 +122,16 @@ const DESCRIPTION: &str = "modelDescription/modelDescription.xml";
 const RESOURCES: &str = "modelDescription/resources";
 
 impl Builder {
-    /// The settings for a package in the usual layout, whose program is started with `cargo run --release --bin build_fmu`.
+    /// The settings for a package in the usual layout, whose program is started with `cargo run --bin build_fmu`.
     ///
     /// The arguments are `env!("CARGO_PKG_NAME")` and `env!("CARGO_MANIFEST_DIR")`.
     pub fn new(package: impl Into<String>, directory: impl Into<PathBuf>) -> Self {
         Self {
             package: package.into(),
-            command: "cargo run --release --bin build_fmu --",
+            command: "cargo run --bin build_fmu --",
             sources: Sources::of_package(directory),
             fmi: vec![Standard::Fmi2, Standard::Fmi3],
             terminals: Vec::new(),
-            profile: DESCRIBED_IN,
             settings: Vec::new(),
             start: Vec::new(),
             start_from: None,
@@ -334,7 +328,7 @@ impl Builder {
         };
         let path = match libraries.iter().find(is_for_here) {
             Some(library) => library.path.clone(),
-            None => LibraryBuild { profile: DESCRIBED_IN, ..self.build(guid) }.run()?,
+            None => self.build(guid).run()?,
         };
         // SAFETY: cargo has just compiled it from the author's model, or it has the guid of these sources.
         #[allow(unsafe_code)]
@@ -381,7 +375,7 @@ impl Builder {
             return Ok(None);
         }
         let mut settings = self.settings.clone();
-        settings.push(format!("profile.{}.opt-level=\"z\"", self.profile));
+        settings.push(format!("profile.{PROFILE}.opt-level=\"z\""));
         let build =
             LibraryBuild { target: Some(WEBASSEMBLY), settings, arguments: &LINKING, ..self.build(guid) };
         let runnable = |description, path: PathBuf, guid: &str| {
@@ -421,7 +415,6 @@ impl Builder {
         LibraryBuild {
             directory: self.sources.directory.clone(),
             package: &self.package,
-            profile: self.profile,
             target: None,
             settings: self.settings.clone(),
             arguments: &[],

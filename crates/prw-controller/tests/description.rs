@@ -17,6 +17,6 @@ fn the_committed_description_is_up_to_date() {
         fs::read_to_string(COMMITTED).unwrap_or_default()
             == fs::read_to_string(folder.join("modelDescription.xml")).unwrap(),
         "modelDescription/modelDescription.xml of the controller is out of date; write it again with\n    \
-         cargo run --release -p prw_controller --bin build_controller -- --describe"
+         cargo run -p prw_controller --bin build_controller -- --describe"
     );
 }

@@ -1,5 +1,5 @@
 """Writes the documentation of both FMUs from the text in docs/fmu-page, the tables of the model descriptions,
-docs/compatibility.md and the figures that `make figures` has made."""
+docs/compatibility.md and the figures that `make figures` has made, and docs/performance.md from the figures of `make bench`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from prw.files import write_text
 
 PROJECT = Path(".")
 
-HELP = "write the FMUs' documentation"
+HELP = "write the FMUs' documentation and docs/performance.md"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -23,10 +23,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `tools docs`. Raises UserError with a message of one line, and then writes no file."""
     # Loaded when they are needed: FMPy takes a while.
+    from tools.documentation import performance
     from tools.documentation.pages import PAGES, render
 
     project = arguments.project
     contents = {page.path: render(project, page) for page in PAGES}
+    contents[performance.PAGE] = performance.render(project)
     for name, content in contents.items():
         path = project / name
         if path.is_file() and path.read_bytes() == content.encode():

@@ -67,7 +67,7 @@ pub(crate) unsafe fn call<M: Exported>(
 /// # Safety
 /// `c` meets the requirement of [`call`].
 #[inline(always)]
-pub(crate) unsafe fn call_at_once<M: Exported>(
+pub(crate) unsafe fn call_fast<M: Exported>(
     c: *mut c_void,
     rule: &'static Rule,
     way: impl FnOnce(*mut Instance<M>) -> bool,

@@ -14,7 +14,7 @@ pub(crate) mod values;
 pub(crate) mod webassembly;
 
 pub(crate) use arrays::{array, of_elements, output, same, string, target};
-pub(crate) use call::{Component, call, call_at_once, forget_panic, panic_message};
+pub(crate) use call::{Component, call, call_fast, forget_panic, panic_message};
 pub(crate) use derivatives::{output_derivatives, partial_derivatives};
 pub(crate) use importer_log::{Callback, ImporterLog};
 pub(crate) use instances::{Arguments, free, instantiate};

@@ -14,6 +14,9 @@ use crate::instance::{FromOne, Instance, Reference};
 use fmi_abi::fmi3::types::fmi3Boolean;
 use std::mem::MaybeUninit;
 
+/// The fast paths of the most frequent arguments are in this module itself.
+pub(crate) use super::short as usual;
+
 /// Returns whether these can be arrays of `count` elements: not empty, not larger than memory, not NULL, and
 /// aligned.
 #[inline(always)]
@@ -37,9 +40,9 @@ unsafe fn get<M: Exported, R: Reference>(
     unsafe {
         match count {
             _ if !are_arrays(vr, values, count) => false,
-            4 => instance.get_reals_at_once::<R, 4>(&*references.cast(), &mut *indices.cast()),
-            1 => instance.get_reals_at_once::<R, 1>(&*references.cast(), &mut *indices.cast()),
-            2 => instance.get_reals_at_once::<R, 2>(&*references.cast(), &mut *indices.cast()),
+            4 => instance.get_reals_fast::<R, 4>(&*references.cast(), &mut *indices.cast()),
+            1 => instance.get_reals_fast::<R, 1>(&*references.cast(), &mut *indices.cast()),
+            2 => instance.get_reals_fast::<R, 2>(&*references.cast(), &mut *indices.cast()),
             _ => false,
         }
     }
@@ -57,8 +60,8 @@ unsafe fn set<M: Exported, R: Reference>(
     unsafe {
         match count {
             _ if !are_arrays(vr, values, count) => false,
-            2 => instance.set_reals_at_once::<R, 2>(&*references.cast(), &*values.cast()),
-            1 => instance.set_reals_at_once::<R, 1>(&*references.cast(), &*values.cast()),
+            2 => instance.set_reals_fast::<R, 2>(&*references.cast(), &*values.cast()),
+            1 => instance.set_reals_fast::<R, 1>(&*references.cast(), &*values.cast()),
             _ => false,
         }
     }
@@ -93,7 +96,41 @@ pub(crate) unsafe fn fmi2DoStep<M: Exported>(
     size: f64,
     _no_set_fmu_state_prior_to_current_point: i32,
 ) -> bool {
-    instance.step_at_once(point, size)
+    instance.step_fast(point, size)
+}
+
+/// Steps of other sizes than the last. They have a function of their own, because the fast path would have to save
+/// registers for the call of a function that is not inlined.
+pub(crate) mod any_size {
+    use super::{Exported, Instance, fmi3_step, fmi3Boolean};
+
+    #[inline(always)]
+    pub(crate) unsafe fn fmi2DoStep<M: Exported>(
+        instance: &mut Instance<M>,
+        point: f64,
+        size: f64,
+        _no_set_fmu_state_prior_to_current_point: i32,
+    ) -> bool {
+        instance.step_any_size(point, size)
+    }
+
+    #[inline(always)]
+    pub(crate) unsafe fn fmi3DoStep<M: Exported>(
+        instance: &mut Instance<M>,
+        point: f64,
+        size: f64,
+        _no_set_fmu_state_prior_to_current_point: fmi3Boolean,
+        event_handling_needed: *mut fmi3Boolean,
+        terminate_simulation: *mut fmi3Boolean,
+        early_return: *mut fmi3Boolean,
+        last_successful_time: *mut f64,
+    ) -> bool {
+        let flags = [event_handling_needed, terminate_simulation, early_return];
+        // SAFETY: the caller guarantees the contract.
+        unsafe {
+            fmi3_step(flags, last_successful_time, point + size, || instance.step_any_size(point, size))
+        }
+    }
 }
 
 #[inline(always)]
@@ -131,58 +168,71 @@ pub(crate) unsafe fn fmi3DoStep<M: Exported>(
     early_return: *mut fmi3Boolean,
     last_successful_time: *mut f64,
 ) -> bool {
+    let flags = [event_handling_needed, terminate_simulation, early_return];
+    // SAFETY: the caller guarantees the contract.
+    unsafe { fmi3_step(flags, last_successful_time, point + size, || instance.step_fast(point, size)) }
+}
+
+/// Steps, if the pointers can be written, and reports a step that reached its end without an event.
+#[inline(always)]
+unsafe fn fmi3_step(
+    flags: [*mut fmi3Boolean; 3],
+    last_successful_time: *mut f64,
+    end: f64,
+    step: impl FnOnce() -> bool,
+) -> bool {
     // Same tests as in `are_arrays`.
-    let highest = event_handling_needed.addr().wrapping_sub(1)
-        | terminate_simulation.addr().wrapping_sub(1)
-        | early_return.addr().wrapping_sub(1)
-        | last_successful_time.addr().wrapping_sub(1);
+    let [highest1, highest2, highest3] = flags.map(|flag| flag.addr().wrapping_sub(1));
+    let highest = highest1 | highest2 | highest3 | last_successful_time.addr().wrapping_sub(1);
     let lowest = last_successful_time.addr() & (align_of::<f64>() - 1);
-    if highest >> (usize::BITS - 5) | lowest != 0 || !instance.step_at_once(point, size) {
+    if highest >> (usize::BITS - 5) | lowest != 0 || !step() {
         return false;
     }
     // SAFETY: the pointers are not NULL and are aligned; by contract, they point to values.
     unsafe {
-        event_handling_needed.write(false.into());
-        terminate_simulation.write(false.into());
-        early_return.write(false.into());
-        last_successful_time.write(point + size);
+        for flag in flags {
+            flag.write(false.into());
+        }
+        last_successful_time.write(end);
     }
     true
 }
 
-/// Calls a function's body for model `M`, after its fast path if it has one.
+/// Calls a function's body for model `M`, after its fast paths if it has any. The names in brackets are the modules of
+/// the fast paths, in the order in which they are tried.
 macro_rules! call {
-    (fmi2GetReal $arguments:tt) => { $crate::boundary::short::call!(@at_once fmi2GetReal $arguments) };
-    (fmi2SetReal $arguments:tt) => { $crate::boundary::short::call!(@at_once fmi2SetReal $arguments) };
-    (fmi2DoStep $arguments:tt) => { $crate::boundary::short::call!(@at_once fmi2DoStep $arguments) };
-    (fmi3GetFloat64 $arguments:tt) => { $crate::boundary::short::call!(@at_once fmi3GetFloat64 $arguments) };
-    (fmi3SetFloat64 $arguments:tt) => { $crate::boundary::short::call!(@at_once fmi3SetFloat64 $arguments) };
-    (fmi3DoStep $arguments:tt) => { $crate::boundary::short::call!(@at_once fmi3DoStep $arguments) };
-    (@at_once $function:ident ($c:ident $(, $argument:ident: $type:ty)*)) => {{
-        // A separate function, so that the fast path needs no stack space for it.
-        #[cold]
-        #[inline(never)]
-        unsafe fn at_length<M: $crate::Exported>(
-            $c: *mut fmi_abi::c_types::c_void
-            $(, $argument: $type)*
-        ) -> fmi_abi::Status {
-            // SAFETY: the caller guarantees the contract.
-            unsafe { $crate::boundary::short::call!(@body $function($c $(, $argument: $type)*)) }
-        }
-        let way = move |instance: *mut $crate::instance::Instance<M>| {
-            $crate::boundary::short::$function(&mut *instance $(, $argument)*)
-        };
-        match $crate::boundary::call_at_once::<M>($c, Function::$function.rule(), way) {
-            Some(status) => status,
-            None => at_length::<M>($c $(, $argument)*),
-        }
-    }};
-    (@body $function:ident ($c:ident $(, $argument:ident: $type:ty)*)) => {
+    (fmi2GetReal $arguments:tt) => { $crate::boundary::short::call!(@fast [usual] fmi2GetReal $arguments) };
+    (fmi2SetReal $arguments:tt) => { $crate::boundary::short::call!(@fast [usual] fmi2SetReal $arguments) };
+    (fmi2DoStep $arguments:tt) => { $crate::boundary::short::call!(@fast [usual any_size] fmi2DoStep $arguments) };
+    (fmi3GetFloat64 $arguments:tt) => { $crate::boundary::short::call!(@fast [usual] fmi3GetFloat64 $arguments) };
+    (fmi3SetFloat64 $arguments:tt) => { $crate::boundary::short::call!(@fast [usual] fmi3SetFloat64 $arguments) };
+    (fmi3DoStep $arguments:tt) => { $crate::boundary::short::call!(@fast [usual any_size] fmi3DoStep $arguments) };
+    (@fast [] $function:ident ($c:ident $(, $argument:ident: $type:ty)*)) => {
         $crate::boundary::call::<M>($c, Function::$function.rule(), |instance| {
             bodies::$function(instance $(, $argument)*)
         })
     };
-    ($function:ident $arguments:tt) => { $crate::boundary::short::call!(@body $function $arguments) };
+    (@fast [$path:ident $($rest:ident)*] $function:ident ($c:ident $(, $argument:ident: $type:ty)*)) => {{
+        // A separate function, so that the fast path needs no stack space for it.
+        #[inline(never)]
+        unsafe fn otherwise<M: $crate::Exported>(
+            $c: *mut fmi_abi::c_types::c_void
+            $(, $argument: $type)*
+        ) -> fmi_abi::Status {
+            // SAFETY: the caller guarantees the contract.
+            unsafe {
+                $crate::boundary::short::call!(@fast [$($rest)*] $function($c $(, $argument: $type)*))
+            }
+        }
+        let way = move |instance: *mut $crate::instance::Instance<M>| {
+            $crate::boundary::short::$path::$function(&mut *instance $(, $argument)*)
+        };
+        match $crate::boundary::call_fast::<M>($c, Function::$function.rule(), way) {
+            Some(status) => status,
+            None => otherwise::<M>($c $(, $argument)*),
+        }
+    }};
+    ($function:ident $arguments:tt) => { $crate::boundary::short::call!(@fast [] $function $arguments) };
 }
 pub(crate) use call;
 

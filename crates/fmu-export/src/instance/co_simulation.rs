@@ -75,18 +75,36 @@ impl<M: Exported> Instance<M> {
         why
     }
 
-    /// Performs a step that begins where the last one ended and needs no further checks. Otherwise returns
-    /// false and changes nothing.
+    /// Performs a step that begins where the last one ended, has its size and needs no further checks. Otherwise
+    /// returns false and changes nothing.
     #[inline(always)]
-    pub fn step_at_once(&mut self, point: f64, step_size: f64) -> bool {
+    pub fn step_fast(&mut self, point: f64, step_size: f64) -> bool {
         let end = point + step_size;
-        let is_usual = !Self::ENDS_EARLY && point == self.state.time && end > point && end <= self.latest_end;
-        if !is_usual || !self.state.model.exported_step_at_once(step_size) {
-            return false;
+        let done = self.is_usual(point, end) && self.state.model.exported_step_fast(step_size);
+        self.finish_usual(done, end)
+    }
+
+    /// Does the same as [`step_fast`](Self::step_fast) for steps of any size.
+    #[inline(always)]
+    pub fn step_any_size(&mut self, point: f64, step_size: f64) -> bool {
+        let end = point + step_size;
+        let done = self.is_usual(point, end) && self.state.model.exported_step_any_size(step_size);
+        self.finish_usual(done, end)
+    }
+
+    /// Returns whether a step begins where the last one ended and needs no further checks.
+    #[inline(always)]
+    fn is_usual(&self, point: f64, end: f64) -> bool {
+        !Self::ENDS_EARLY && point == self.state.time && end > point && end <= self.latest_end
+    }
+
+    #[inline(always)]
+    fn finish_usual(&mut self, done: bool, end: f64) -> bool {
+        if done {
+            self.state.stale = false;
+            self.state.time = end;
         }
-        self.state.stale = false;
-        self.state.time = end;
-        true
+        done
     }
 
     pub(super) fn step(&mut self, point: f64, step_size: f64) -> Outcome<Stepped> {
@@ -195,7 +213,7 @@ impl<M: Exported> Instance<M> {
     /// Performs the event iteration in Co-Simulation, for importers that do not handle events.
     pub(super) fn handle_event(&mut self) -> Outcome {
         let time = self.state.time;
-        let ended = self.try_on_copy(|model| {
+        let ended = self.try_change(|model| {
             let mut ended = false;
             for _ in 0..MOST_EVENTS {
                 model.calculate(time);

@@ -239,7 +239,7 @@ impl<M: Exported> Instance<M> {
     pub fn enter_initialization_mode(&mut self) -> Outcome {
         self.check_start_values()?;
         let experiment = self.state.experiment;
-        self.try_on_copy(|model| model.initialize(&experiment))?;
+        self.try_change(|model| model.initialize(&experiment))?;
         self.enter(Mode::Initialization);
         Ok(())
     }
@@ -281,22 +281,32 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    /// Applies a change that may fail to a copy first, so that an error changes nothing.
+    /// Applies a change that may fail to the model, and undoes it after an error.
+    ///
+    /// The copy is the backup and not the draft, because a model may keep memory and computed values that its
+    /// copies lack. So a change that is accepted leaves the instance as fast as it was.
     #[cold]
     #[inline(never)]
-    fn try_on_copy<T, E: Into<Box<Rejection>>>(
+    fn try_change<T, E: Into<Box<Rejection>>>(
         &mut self,
         change: impl FnOnce(&mut M) -> Result<T, E>,
     ) -> Outcome<T> {
-        // Takes the messages now, because the copy has an empty log and may replace the model.
+        // Takes the messages before and after the change, because a change or the backup may replace the model with
+        // its log.
         self.listen();
-        let mut draft = M::clone(&self.state.model);
-        let changed = change(&mut draft);
-        self.logger.listen(draft.log());
-        let changed = changed.map_err(Into::into)?;
-        *self.state.model = draft;
-        self.state.stale = true;
-        Ok(changed)
+        let before = M::clone(&self.state.model);
+        let changed = change(&mut self.state.model);
+        self.listen();
+        match changed {
+            Ok(changed) => {
+                self.state.stale = true;
+                Ok(changed)
+            }
+            Err(rejection) => {
+                (*self.state.model).clone_from(&before);
+                Err(rejection.into())
+            }
+        }
     }
 
     /// Returns the model after all calculations that reading needs.

@@ -25,7 +25,7 @@ impl<M: Exported> Instance<M> {
     /// Performs one iteration of the event handling.
     pub fn event(&mut self) -> Outcome<Event> {
         let time = self.state.time;
-        let event = self.try_on_copy(|model| {
+        let event = self.try_change(|model| {
             model.calculate(time);
             model.exported_event(time)
         })?;

@@ -38,7 +38,7 @@ impl<M: Exported> Instance<M> {
     /// Gets Reals if no calculation is needed, all are fields of the model, and all are finite. Otherwise
     /// returns false and writes nothing.
     #[inline(always)]
-    pub fn get_reals_at_once<R: Reference, const N: usize>(
+    pub fn get_reals_fast<R: Reference, const N: usize>(
         &mut self,
         vr: &[R; N],
         values: &mut [MaybeUninit<f64>; N],
@@ -127,11 +127,7 @@ impl<M: Exported> Instance<M> {
     /// Sets Reals if all are plain fields of the model and may be set. Otherwise returns false; then
     /// [`set_reals`](Self::set_reals) sets all.
     #[inline(always)]
-    pub fn set_reals_at_once<R: Reference, const N: usize>(
-        &mut self,
-        vr: &[R; N],
-        values: &[f64; N],
-    ) -> bool {
+    pub fn set_reals_fast<R: Reference, const N: usize>(&mut self, vr: &[R; N], values: &[f64; N]) -> bool {
         // Copies the arrays, because the compiler cannot assume that they do not overlap the model.
         let lines: [usize; N] = std::array::from_fn(|number| vr[number].index() as usize);
         let values: [f64; N] = std::array::from_fn(|number| values[number]);
@@ -281,7 +277,7 @@ impl<M: Exported> Instance<M> {
             set(&mut self.state.model);
             return Ok(());
         }
-        self.try_on_copy(|model| {
+        self.try_change(|model| {
             set(model);
             model.update()
         })

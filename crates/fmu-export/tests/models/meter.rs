@@ -1,4 +1,4 @@
-//! A model with numbers in every kind of field, a state that starts at rest, and `step_at_once`.
+//! A model with numbers in every kind of field, a state that starts at rest, and `step_fast`.
 
 use fmu_export::*;
 use std::ops::{Index, IndexMut};
@@ -77,7 +77,7 @@ variables! { for Meter, memory in has_started, ring.begin, ring.values, counted,
     der_level as "der(level)" = local(&NUMBER).derivative_of(level) by |meter| meter.plain - meter.stiffness * meter.level;
     /// Stiffness of the spring that carries the level
     stiffness = parameter(&STIFFNESS) in stiffness;
-    /// Steps that `step_at_once` made
+    /// Steps that `step_fast` made
     steps_at_once = local(&INTEGER) by |meter| meter.steps_at_once;
 }
 
@@ -120,7 +120,7 @@ impl CoSimulation for Meter {
     }
 
     /// Only steps of size 1 use this path.
-    fn step_at_once(&mut self, size: f64) -> bool {
+    fn step_fast(&mut self, size: f64) -> bool {
         if size != 1.0 {
             return false;
         }

@@ -1,0 +1,1 @@
+"""Benchmarks: ratios of times, and counts of instructions."""

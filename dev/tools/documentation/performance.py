@@ -1,0 +1,36 @@
+"""Writes docs/performance.md from the figures of `make bench` and `make instructions`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+PAGE = Path("docs/performance.md")
+RATIOS, INSTRUCTIONS = Path("dev/benches/ratios.json"), Path("dev/benches/instructions.json")
+TEMPLATE = "performance.md.j2"
+
+
+def render(project: Path) -> str:
+    """The page in Markdown. Depends on the project's files only. Raises FileNotFoundError if figures are missing."""
+    import jinja2
+
+    ratios, counted = (json.loads((project / path).read_text(encoding="utf-8")) for path in (RATIOS, INSTRUCTIONS))
+    loader = jinja2.FileSystemLoader(Path(__file__).parent)
+    environment = jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
+    return environment.get_template(TEMPLATE).render(
+        compiler=counted["compiler"],
+        table=lambda name, *heads: _table(heads, ratios[name].items()),
+        instructions=lambda: _table(("use", "instructions"), ((k, [v]) for k, v in counted["instructions"].items())),
+    )
+
+
+def _table(heads: tuple[str, ...], rows: Iterable[tuple[str, list[Any]]]) -> str:
+    lines = [f"| {' | '.join(heads)} |", "|" + "---|" * len(heads)]
+    lines += [f"| {label} | {' | '.join(map(_number, figures))} |" for label, figures in rows]
+    return "\n".join(lines)
+
+
+def _number(value: float) -> str:
+    return f"{value:,}" if isinstance(value, int) else f"{value:,.3g}" if value < 1000 else f"{value:,.0f}"
