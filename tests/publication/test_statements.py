@@ -35,6 +35,12 @@ def test_named_targets_exist() -> None:
         assert name == "CHANGELOG.md" or named <= RULES.keys(), name
 
 
+def test_the_readme_names_the_command_of_the_continuous_integration() -> None:
+    called = re.findall(r"^make .*$", (ROOT / ".ci" / "run").read_text(encoding="utf-8"), re.MULTILINE)
+    named = re.findall(r"^\| `(make \w+)` \|", (ROOT / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert called == ["make test"] and named == ["make demo", "make test"]
+
+
 def test_help_lists_every_target_that_no_other_needs() -> None:
     (phony,) = re.findall(r"^\.PHONY: (.*)$", MAKEFILE, re.MULTILINE)
     internal = {name for needed in RULES.values() for name in needed.split()}

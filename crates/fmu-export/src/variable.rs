@@ -48,7 +48,7 @@ pub struct Variable<M> {
     /// Modes in which setting a Real stores the value without further checks; none for other variables.
     pub(crate) takes_reals: Situations,
     /// Modes in which setting only writes the field and the `bool` after `then`, once the model has started.
-    pub(crate) takes_at_once: Situations,
+    pub(crate) takes_fast: Situations,
     /// Whether setting it has no side effect except the `bool` after `then`.
     plain: bool,
     pub(crate) read: Option<Read<M>>,
@@ -132,7 +132,7 @@ impl<M> Variable<M> {
             reinit: false,
             settable: Situations::NONE,
             takes_reals: Situations::NONE,
-            takes_at_once: Situations::NONE,
+            takes_fast: Situations::NONE,
             plain: false,
             read: None,
             store: None,
@@ -339,7 +339,7 @@ impl<M> Variable<M> {
             // A rejected start value must be recorded, so setting start values needs further checks.
             self.takes_reals = self.settable.without(crate::settable::STARTING);
             if self.plain {
-                self.takes_at_once = self.takes_reals;
+                self.takes_fast = self.takes_reals;
             }
         }
         self

@@ -59,10 +59,10 @@ static void step(long k, double h) {
     t += h;
 }
 
-/* The grid np.arange(n) * 1e-3, whose differences vary in their last digits. */
+/* The grid np.arange(n) * 1e-3, whose differences vary in their last digits, from 5 s on. */
 static void step_on_grid(long k) {
-    t = (double)k * 1e-3;
-    step(k, (double)(k + 1) * 1e-3 - t);
+    const double begin = (double)(5000 + k) * 1e-3;
+    step(k, (double)(5001 + k) * 1e-3 - begin);
 }
 
 static void step_of_four_sizes(long k) {

@@ -95,7 +95,11 @@ impl<M: Exported> Instance<M> {
     /// Returns whether a step begins where the last one ended and needs no further checks.
     #[inline(always)]
     fn is_usual(&self, point: f64, end: f64) -> bool {
-        !Self::ENDS_EARLY && point == self.state.time && end > point && end <= self.latest_end
+        !Self::ENDS_EARLY
+            && self.state.started
+            && point == self.state.time
+            && end > point
+            && end <= self.state.experiment.stop_time.unwrap_or(f64::MAX)
     }
 
     #[inline(always)]

@@ -35,11 +35,6 @@ pub(crate) struct Instance<M> {
     pub logger: Logger,
     /// State of the FMI state machine, FMI version and interface type, as one bit; derived from these.
     situation: Situation,
-    /// Equal to `situation` once the model has started, before that no situation. Then the fast path may set
-    /// Reals.
-    started_in: Situation,
-    /// Latest end of a step for the fast path; derived from the state.
-    latest_end: f64,
     importer: Importer,
     setup: Setup,
     state: State<M>,
@@ -142,8 +137,6 @@ impl<M: Exported> Instance<M> {
         let mut instance = Self {
             logger: Logger::new(importer.standard, logging_on),
             situation: Situation::new(importer.standard, setup.interface, state.mode),
-            started_in: Situation::NOWHERE,
-            latest_end: f64::NEG_INFINITY,
             importer,
             setup,
             before: may_fail_half_way.then(|| Box::new(state.clone())),
@@ -179,10 +172,6 @@ impl<M: Exported> Instance<M> {
     fn enter(&mut self, mode: Mode) {
         self.state.mode = mode;
         self.situation = Situation::new(self.importer.standard, self.setup.interface, mode);
-        (self.started_in, self.latest_end) = match self.state.started {
-            true => (self.situation, self.state.experiment.stop_time.unwrap_or(f64::MAX)),
-            false => (Situation::NOWHERE, f64::NEG_INFINITY),
-        };
     }
 
     /// Forbids all calls while messages are delivered.

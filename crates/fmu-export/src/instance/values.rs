@@ -128,14 +128,16 @@ impl<M: Exported> Instance<M> {
     /// [`set_reals`](Self::set_reals) sets all.
     #[inline(always)]
     pub fn set_reals_fast<R: Reference, const N: usize>(&mut self, vr: &[R; N], values: &[f64; N]) -> bool {
+        let situation = self.situation();
         // Copies the arrays, because the compiler cannot assume that they do not overlap the model.
         let lines: [usize; N] = std::array::from_fn(|number| vr[number].index() as usize);
         let values: [f64; N] = std::array::from_fn(|number| values[number]);
         let is_taken = |line: &usize| {
             let variable = M::TABLE.get(*line);
-            variable.is_some_and(|variable| self.started_in.is_in(variable.takes_at_once))
+            variable.is_some_and(|variable| situation.is_in(variable.takes_fast))
         };
-        if M::ARRAYS || !lines.iter().all(is_taken) || !is_finite(values.iter().sum()) {
+        if M::ARRAYS || !self.state.started || !lines.iter().all(is_taken) || !is_finite(values.iter().sum())
+        {
             return false;
         }
         self.state.stale = true;
