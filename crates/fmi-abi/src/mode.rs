@@ -105,6 +105,11 @@ impl Situations {
         self.0 & bit(standard, interface, mode) != 0
     }
 
+    /// Returns whether the set contains nothing.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
     /// Returns the union of both sets.
     #[must_use]
     pub const fn union(self, other: Self) -> Self {

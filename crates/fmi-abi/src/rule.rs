@@ -16,7 +16,7 @@ pub struct Rule {
 
 impl Rule {
     /// Creates a row from the letters of [`Situations::new`] for each interface type. Tolerated modes apply
-    /// only to interface types that have the function.
+    /// only to interface types that have the function, or to both if the standard allows it in no mode here.
     pub const fn new(
         of: Standard,
         name: &'static str,
@@ -25,7 +25,8 @@ impl Rule {
         tolerated: &str,
     ) -> Self {
         let standard = Situations::new(of, co_simulation, model_exchange);
-        let tolerated = Situations::new(of, tolerated, tolerated).where_any(standard);
+        let tolerated = Situations::new(of, tolerated, tolerated);
+        let tolerated = if standard.is_empty() { tolerated } else { tolerated.where_any(standard) };
         Self { name, standard, tolerated }
     }
 

@@ -22,8 +22,7 @@ const MODELS_OF_FMI3: &[(&str, RunBytes)] =
 
 /// Functions that never succeed: steps are synchronous, and no model has clocks or structural parameters.
 const NEVER: &str = "fmi2CancelStep fmi2GetStatus fmi2GetIntegerStatus fmi2GetStringStatus fmi3GetClock \
-    fmi3SetClock fmi3EnterConfigurationMode fmi3ExitConfigurationMode \
-    fmi3GetNumberOfVariableDependencies fmi3GetVariableDependencies fmi3GetIntervalDecimal \
+    fmi3SetClock fmi3GetNumberOfVariableDependencies fmi3GetVariableDependencies fmi3GetIntervalDecimal \
     fmi3GetIntervalFraction fmi3GetShiftDecimal fmi3GetShiftFraction fmi3SetIntervalDecimal \
     fmi3SetIntervalFraction fmi3SetShiftDecimal fmi3SetShiftFraction fmi3EvaluateDiscreteStates \
     fmi3ActivateModelPartition";

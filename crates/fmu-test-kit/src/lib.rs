@@ -21,7 +21,7 @@ mod random;
 pub mod realtime;
 pub mod serialized;
 
-pub use either::{Either, Updated};
+pub use either::{Either, Updated, Version};
 pub use fmi_abi::calls;
 pub use fmi2::{FUNCTIONS, Functions, Importer};
 pub use importer::{Arguments, Hook, Message};

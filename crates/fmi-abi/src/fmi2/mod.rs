@@ -16,6 +16,7 @@ use types::*;
 /// Tolerated calls, for interface types that have the function:
 /// * fmi2Terminate after an error (FMI Library calls it in a destructor);
 /// * fmi2EnterInitializationMode without fmi2SetupExperiment before it: the start time is then 0;
+/// * fmi2SetInteger, fmi2SetBoolean and fmi2SetString in Continuous-Time Mode, for inputs that have the value already (FMPy);
 /// * fmi2SetTime in Initialization Mode and Event Mode, fmi2SetContinuousStates in Event Mode (OpenModelica,
 ///   on every run).
 #[doc(hidden)]
@@ -51,11 +52,11 @@ macro_rules! fmi2_functions {
             (vr: *const fmi2ValueReference, n: usize, value: *mut fmi2String);
         fmi2SetReal                         "INC"     "INMK"    ""
             (vr: *const fmi2ValueReference, n: usize, value: *const fmi2Real);
-        fmi2SetInteger                      "INC"     "INM"     ""
+        fmi2SetInteger                      "INC"     "INM"     "K"
             (vr: *const fmi2ValueReference, n: usize, value: *const fmi2Integer);
-        fmi2SetBoolean                      "INC"     "INM"     ""
+        fmi2SetBoolean                      "INC"     "INM"     "K"
             (vr: *const fmi2ValueReference, n: usize, value: *const fmi2Boolean);
-        fmi2SetString                       "INC"     "INM"     ""
+        fmi2SetString                       "INC"     "INM"     "K"
             (vr: *const fmi2ValueReference, n: usize, value: *const fmi2String);
         fmi2GetFMUstate                     "INCFTE"  "INMKTE"  "" (state: *mut fmi2FMUstate);
         fmi2SetFMUstate                     "INCFTE"  "INMKTE"  "" (state: fmi2FMUstate);

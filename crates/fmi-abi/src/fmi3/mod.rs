@@ -15,15 +15,18 @@ use types::*;
 /// In fmu-export an error changes nothing. So the importer may continue although section 2.3.1 moves the
 /// instance to terminated.
 ///
-/// No state allows fmi3ExitConfigurationMode and fmi3ActivateModelPartition, because their states cannot be
-/// entered. Some functions are allowed but return an error with the reason: functions of clocks,
-/// fmi3EnterConfigurationMode (no structural parameters), fmi3EvaluateDiscreteStates.
+/// No state allows fmi3ActivateModelPartition, because its state cannot be entered. Some functions are allowed but
+/// return an error with the reason: functions of clocks, fmi3EvaluateDiscreteStates, and
+/// fmi3EnterConfigurationMode after the initialization, because there are no structural parameters.
 ///
 /// Tolerated calls, for interface types that have the function:
 /// * fmi3SetTime in Initialization Mode and Event Mode, fmi3SetContinuousStates in Event Mode, as in FMI 2.0;
 /// * the two functions for the numbers of states and event indicators, and the function for nominal values,
 ///   in every state: the numbers never change;
-/// * fmi3EnterEventMode in Event Mode, as in FMI 2.0 (OpenModelica).
+/// * functions that set discrete inputs in Continuous-Time Mode, for inputs that have the value already (FMPy);
+/// * fmi3EnterEventMode in Event Mode, as in FMI 2.0 (OpenModelica);
+/// * fmi3EnterConfigurationMode and fmi3ExitConfigurationMode in instantiated, although there are no structural
+///   parameters (FMIKit). Nothing changes, so the instance stays in instantiated.
 #[doc(hidden)]
 #[macro_export]
 #[rustfmt::skip]
@@ -87,27 +90,27 @@ macro_rules! fmi3_functions {
             (vr: *const fmi3ValueReference, n: usize, value: *const fmi3Float32, n_value: usize);
         fmi3SetFloat64                         "INCM"   "INMK"   ""
             (vr: *const fmi3ValueReference, n: usize, value: *const fmi3Float64, n_value: usize);
-        fmi3SetInt8                            "INCM"   "INM"    ""
+        fmi3SetInt8                            "INCM"   "INM"    "K"
             (vr: *const fmi3ValueReference, n: usize, value: *const fmi3Int8, n_value: usize);
-        fmi3SetUInt8                           "INCM"   "INM"    ""
+        fmi3SetUInt8                           "INCM"   "INM"    "K"
             (vr: *const fmi3ValueReference, n: usize, value: *const fmi3UInt8, n_value: usize);
-        fmi3SetInt16                           "INCM"   "INM"    ""
+        fmi3SetInt16                           "INCM"   "INM"    "K"
             (vr: *const fmi3ValueReference, n: usize, value: *const fmi3Int16, n_value: usize);
-        fmi3SetUInt16                          "INCM"   "INM"    ""
+        fmi3SetUInt16                          "INCM"   "INM"    "K"
             (vr: *const fmi3ValueReference, n: usize, value: *const fmi3UInt16, n_value: usize);
-        fmi3SetInt32                           "INCM"   "INM"    ""
+        fmi3SetInt32                           "INCM"   "INM"    "K"
             (vr: *const fmi3ValueReference, n: usize, value: *const fmi3Int32, n_value: usize);
-        fmi3SetUInt32                          "INCM"   "INM"    ""
+        fmi3SetUInt32                          "INCM"   "INM"    "K"
             (vr: *const fmi3ValueReference, n: usize, value: *const fmi3UInt32, n_value: usize);
-        fmi3SetInt64                           "INCM"   "INM"    ""
+        fmi3SetInt64                           "INCM"   "INM"    "K"
             (vr: *const fmi3ValueReference, n: usize, value: *const fmi3Int64, n_value: usize);
-        fmi3SetUInt64                          "INCM"   "INM"    ""
+        fmi3SetUInt64                          "INCM"   "INM"    "K"
             (vr: *const fmi3ValueReference, n: usize, value: *const fmi3UInt64, n_value: usize);
-        fmi3SetBoolean                         "INCM"   "INM"    ""
+        fmi3SetBoolean                         "INCM"   "INM"    "K"
             (vr: *const fmi3ValueReference, n: usize, value: *const fmi3Boolean, n_value: usize);
-        fmi3SetString                          "INCM"   "INM"    ""
+        fmi3SetString                          "INCM"   "INM"    "K"
             (vr: *const fmi3ValueReference, n: usize, value: *const fmi3String, n_value: usize);
-        fmi3SetBinary                          "INCM"   "INM"    ""
+        fmi3SetBinary                          "INCM"   "INM"    "K"
             (vr: *const fmi3ValueReference, n: usize, size: *const usize, value: *const fmi3Binary, n_value: usize);
         fmi3SetClock                           "M"      "M"      ""
             (vr: *const fmi3ValueReference, n: usize, value: *const fmi3Clock);
@@ -130,7 +133,7 @@ macro_rules! fmi3_functions {
             (unknown: *const fmi3ValueReference, n_unknown: usize, known: *const fmi3ValueReference, n_known: usize,
              seed: *const fmi3Float64, n_seed: usize, sensitivity: *mut fmi3Float64, n_sensitivity: usize);
         fmi3EnterConfigurationMode             "IC"     "IM"     "" ();
-        fmi3ExitConfigurationMode              ""       ""       "" ();
+        fmi3ExitConfigurationMode              ""       ""       "I" ();
         fmi3GetIntervalDecimal                 "NM"     "NM"     ""
             (vr: *const fmi3ValueReference, n: usize, interval: *mut fmi3Float64,
              qualifier: *mut fmi3IntervalQualifier);

@@ -30,11 +30,6 @@ absent! { "this FMU has no clocks":
     fmi3SetShiftFraction(*const fmi3ValueReference, usize, *const fmi3UInt64, *const fmi3UInt64);
 }
 
-absent! { "this FMU has no structural parameters":
-    fmi3EnterConfigurationMode();
-    fmi3ExitConfigurationMode();
-}
-
 absent! { "this FMU has no Scheduled Execution":
     fmi3ActivateModelPartition(fmi3ValueReference, fmi3Float64);
 }

@@ -10,7 +10,7 @@ use crate::boundary::{array, of_elements, output, partial_derivatives, target};
 use crate::export::Exported;
 use crate::instance::{FromOne, Instance, Outcome, reject};
 use fmi_abi::BaseType::{self, *};
-use fmi_abi::Value;
+use fmi_abi::{Mode, Status, Value};
 
 pub unsafe fn fmi3EnterInitializationMode<M: Exported>(
     instance: &mut Instance<M>,
@@ -27,6 +27,21 @@ pub unsafe fn fmi3EnterInitializationMode<M: Exported>(
         stop_time_defined,
         stop_time,
     ))
+}
+
+/// Accepts the call before the initialization, where FMIKit makes it for every FMU with inputs. Section 2.3.2 of FMI 3.0
+/// requires structural parameters, which models of this crate do not have.
+pub unsafe fn fmi3EnterConfigurationMode<M: Exported>(instance: &mut Instance<M>) -> Outcome {
+    if instance.mode() != Mode::Instantiated {
+        return reject("this FMU has no structural parameters");
+    }
+    instance.logger.log(Status::Ok, "there are no structural parameters to configure, so nothing changes");
+    Ok(())
+}
+
+/// Accepts the call after [`fmi3EnterConfigurationMode`], which does not change the state.
+pub unsafe fn fmi3ExitConfigurationMode<M: Exported>(_: &mut Instance<M>) -> Outcome {
+    Ok(())
 }
 
 // Enumerations use the functions of Int64 (section 2.2.7.2).

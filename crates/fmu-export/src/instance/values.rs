@@ -7,7 +7,7 @@ use crate::types::Attributes;
 use crate::variable::Variable;
 use fmi_abi::BaseType;
 use fmi_abi::Value;
-use fmi_abi::{Causality, Initial};
+use fmi_abi::{Causality, Initial, Mode, Variability};
 use std::mem::MaybeUninit;
 
 impl<M: Exported> Instance<M> {
@@ -193,7 +193,12 @@ impl<M: Exported> Instance<M> {
         bases: &[BaseType],
         value: &dyn Fn(usize) -> Value,
     ) -> Outcome {
-        self.check_all_settable(vr, bases)?;
+        for (index, vr) in vr.iter().enumerate() {
+            let variable = self.variable_of(vr.index(), bases)?;
+            if !self.changes_nothing(variable, || value(index)) {
+                self.check_settable(variable)?;
+            }
+        }
         let to_blame = vr.iter().enumerate().find_map(|(index, vr)| {
             let rejection = check_value(&M::TABLE[vr.index() as usize], &value(index)).err()?;
             Some((*vr, rejection))
@@ -265,10 +270,14 @@ impl<M: Exported> Instance<M> {
     fn set_settable<R: Reference>(&mut self, vr: &[R], value: &dyn Fn(usize) -> Value) -> Outcome {
         let parameters =
             vr.iter().any(|vr| M::TABLE[vr.index() as usize].causality() == Causality::Parameter);
-        let started = self.state.started;
+        let (started, situation) = (self.state.started, self.situation());
         let set = |model: &mut M| {
             for (index, vr) in vr.iter().enumerate() {
-                M::TABLE[vr.index() as usize].set(model, &value(index));
+                let variable = &M::TABLE[vr.index() as usize];
+                if !situation.is_in(variable.settable) {
+                    continue;
+                }
+                variable.set(model, &value(index));
                 if !started {
                     model.calculate_start();
                 }
@@ -288,6 +297,15 @@ impl<M: Exported> Instance<M> {
     /// Returns the name of a variable that has the type.
     pub fn name(&self, vr: impl Reference, base: BaseType) -> Outcome<&'static str> {
         Ok(self.variable(vr.index(), base)?.name())
+    }
+
+    /// Returns whether setting a variable is a call that the standard forbids, but has no effect: FMPy sets discrete inputs
+    /// in Continuous-Time Mode to the values that they have.
+    fn changes_nothing(&self, variable: &Variable<M>, value: impl FnOnce() -> Value) -> bool {
+        self.mode() == Mode::ContinuousTime
+            && variable.causality() == Causality::Input
+            && variable.variability() == Variability::Discrete
+            && variable.value(&self.state.model) == Some(value())
     }
 
     fn check_settable(&self, variable: &Variable<M>) -> Outcome {

@@ -1,6 +1,6 @@
 //! Unusual calls of real importers, outside the standard or at its limits, that must work.
 
-use crate::models::{Oscillator, Palette, oscillator::Name};
+use crate::models::{Counter, Oscillator, Palette, counter, oscillator::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::Status;
@@ -25,6 +25,44 @@ fn parameters_after_the_initialization() {
         early.ok(early.fmi2ExitInitializationMode());
         assert_eq!(early.get([ACCELERATION]), late.get([ACCELERATION]));
         assert_eq!(early.bytes(), late.bytes());
+    }
+}
+
+/// FMPy sets discrete inputs in Continuous-Time Mode whenever an FMU has an event indicator. A value that the input has
+/// already is accepted; any other value belongs to an event, and the whole call is rejected.
+fn unchanged_discrete_inputs<F: Either>() {
+    use counter::Name::{increment, on, weight};
+    let fmu = F::in_mode::<Counter>(ModelExchange, ContinuousTime);
+    let before = fmu.bytes();
+    fmu.ok(fmu.set_integer(increment as u32, 1));
+    fmu.ok(fmu.set_boolean(on as u32, 0));
+    fmu.ok(fmu.try_set(&[weight as u32], &[1.0]));
+    assert_eq!(fmu.bytes(), before);
+    fmu.rejected("another Integer", |fmu| fmu.set_integer(increment as u32, 2));
+    fmu.rejected("another Boolean", |fmu| fmu.set_boolean(on as u32, 1));
+    fmu.rejected("another Real", |fmu| fmu.try_set(&[weight as u32], &[1.5]));
+    let output = counter::Name::count as u32;
+    fmu.rejected("an output", |fmu| fmu.set_integer(output, 0));
+}
+
+#[test]
+fn discrete_inputs_that_do_not_change() {
+    unchanged_discrete_inputs::<Importer>();
+    unchanged_discrete_inputs::<fmi3::Importer>();
+}
+
+/// FMIKit configures every FMU for FMI 3.0 that has inputs, with or without structural parameters.
+#[test]
+fn configuration_without_structural_parameters() {
+    for interface in [CoSimulation, ModelExchange] {
+        let fmu = fmi3::Importer::new::<Oscillator>(interface);
+        let before = fmu.bytes();
+        fmu.ok(fmu.fmi3EnterConfigurationMode());
+        fmu.set(&[Name::mass as u32], &[2.0]);
+        fmu.ok(fmu.fmi3ExitConfigurationMode());
+        assert_eq!(fmu.bytes(), before);
+        fmu.initialize(0.0);
+        fmu.rejected("too late", |fmu| fmu.fmi3ExitConfigurationMode());
     }
 }
 
