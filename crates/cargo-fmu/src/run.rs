@@ -7,7 +7,8 @@ use anyhow::{Context, Result, bail, ensure};
 use fmu_package::terminal::{fmi_version, short};
 use fmu_package::{BuildOptions, Standard};
 use fmu_run::{
-    BaseType, Batch, Description, Fmu, Interface, Runs, Start, Status, Trajectory, Variable, Watch, nearest,
+    BaseType, Batch, Description, Fmu, Interface, Logged, Runs, Start, Status, Trajectory, Variable, Watch,
+    nearest,
 };
 use std::collections::BTreeMap;
 use std::fs;
@@ -261,10 +262,11 @@ fn follow(
 
 /// Prints the warnings of the FMU, or all its messages.
 fn print_messages(watch: &Watch, all: bool) {
-    for (_, time, message) in watch.messages() {
+    for Logged { time, message, .. } in watch.take_messages() {
         // Errors are not warnings: `simulate` prints the reason of a failure.
         if all || message.status == Status::Warning {
-            println!("t = {time} s, {}: {}", message.category, message.text.trim());
+            let time = time.map_or_else(String::new, |time| format!("t = {time} s, "));
+            println!("{time}{}: {}", message.category, message.text.trim());
         }
     }
 }

@@ -169,6 +169,8 @@ pub struct ModelDescription {
     pub scheduled_execution: bool,
     /// Start time, stop time and step size of the default experiment, s, if given.
     pub default_experiment: [Option<f64>; 3],
+    /// Relative tolerance of the default experiment, if given.
+    pub default_tolerance: Option<f64>,
     /// Variables, in the order of the file.
     pub variables: Vec<Variable>,
     /// Outputs of the model structure.
@@ -223,7 +225,7 @@ impl ModelDescription {
         };
         let (co_simulation, model_exchange) = (offer("CoSimulation"), offer("ModelExchange"));
         let experiment = child(root, "DefaultExperiment");
-        let time = |name: &str| experiment?.attribute(name)?.trim().parse().ok();
+        let time = |name: &str| -> Option<f64> { experiment?.attribute(name)?.trim().parse().ok() };
         let named = |list| elements(root, list).filter_map(|node| Some(node.attribute("name")?.to_owned()));
         let variables = variables(root, standard, &mut faults);
         let mut description = Self {
@@ -235,6 +237,8 @@ impl ModelDescription {
             model_exchange,
             scheduled_execution: child(root, "ScheduledExecution").is_some(),
             default_experiment: ["startTime", "stopTime", "stepSize"].map(time),
+            default_tolerance: time("tolerance")
+                .filter(|tolerance| tolerance.is_finite() && *tolerance > 0.0),
             variables,
             outputs: Vec::new(),
             derivatives: Vec::new(),

@@ -2,13 +2,15 @@
 
 use crate::description::Description;
 use crate::error::{Error, request};
-use crate::instance::{Continuous, Event, Instance, Saved};
-use crate::rejection::Rejection;
-use crate::running::Running;
+use crate::instance::{Experiment, Instance, Tolerance};
+use crate::messages::{Feed, Logged, Logging};
+use crate::running::{Running, Saved};
 use crate::selection::{Selection, Target};
-use crate::start::{Start, StartValues};
+use crate::start::{Start, StartValues, exact, is_exact};
 use crate::system::System;
-use fmi_abi::{BaseType, Interface};
+use fmi_abi::{BaseType, Interface, Value};
+use fmi_client::{Continuous, Event, Rejection};
+use std::sync::Arc;
 
 /// Settings for new instances.
 #[derive(Clone, Debug)]
@@ -23,6 +25,10 @@ pub struct Setup<'a> {
     pub start_time: f64,
     /// Stop time, s, if known; the FMU may reject steps beyond it.
     pub stop_time: Option<f64>,
+    /// Relative tolerance for solvers inside the FMU.
+    pub tolerance: Tolerance,
+    /// Whether all messages of the FMU are collected, with its logging switched on; see [`Instances::take_messages`].
+    pub listening: bool,
     /// Number of threads; `None` uses one thread for each processor.
     pub threads: Option<usize>,
 }
@@ -36,6 +42,8 @@ impl Default for Setup<'_> {
             start: Vec::new(),
             start_time: 0.0,
             stop_time: None,
+            tolerance: Tolerance::Default,
+            listening: false,
             threads: Some(1),
         }
     }
@@ -53,14 +61,15 @@ pub struct Instances {
     interface: Interface,
     all: Vec<One>,
     begin: Begin,
+    /// Collects all messages, if the caller wants them.
+    feed: Option<Arc<Feed>>,
     pool: Option<rayon::ThreadPool>,
 }
 
 #[derive(Debug)]
 struct Begin {
     start: StartValues<'static>,
-    time: f64,
-    stop_time: Option<f64>,
+    experiment: Experiment,
 }
 
 #[derive(Debug)]
@@ -114,7 +123,9 @@ impl System {
                 self.name()
             ));
         }
+        setup.tolerance.check()?;
         let start = StartValues::of(self, &[])?;
+        let Setup { start_time, stop_time, tolerance, .. } = *setup;
         let all = empty(setup.count, self.components().len())?;
         let threads = self.threads(setup.interface, setup.threads)?.min(setup.count);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads - 1);
@@ -123,7 +134,8 @@ impl System {
             system: self.clone(),
             interface: setup.interface,
             all,
-            begin: Begin { start, time: setup.start_time, stop_time: setup.stop_time },
+            begin: Begin { start, experiment: Experiment { start_time, stop_time, tolerance } },
+            feed: setup.listening.then(|| self.feed()),
             pool: pool.map_err(|error| Error::Fmu(format!("no threads can be made: {error}")))?,
         };
         instances.start_from(&setup.start)?;
@@ -197,11 +209,13 @@ impl Instances {
 
     /// Resets the instances to their start values and initializes them.
     pub fn reset(&mut self, mask: Mask) {
-        let (system, interface, begin) = (&self.system, self.interface, &self.begin);
+        let (system, interface, begin, feed) = (&self.system, self.interface, &self.begin, &self.feed);
         let reset = |index: usize, one: &mut One| {
             one.error = None;
-            (one.own.time, one.own.event) = (begin.time, Event::default());
-            match Running::renewed(one.instance.take(), system, interface, false) {
+            (one.own.time, one.own.event) = (begin.experiment.start_time, Event::default());
+            let feed = feed.as_ref().map(|feed| (Arc::clone(feed), index));
+            let logging = Logging { on: feed.is_some(), feed };
+            match Running::renewed(one.instance.take(), system, interface, &logging) {
                 Ok(instance) => {
                     let instance = one.instance.insert(instance);
                     match initialize(instance, begin, index, interface) {
@@ -318,10 +332,23 @@ impl Instances {
 
     /// Restores states that these instances have saved.
     ///
+    /// # Errors
+    /// Returns [`Error::Request`] and restores none if an instance was made again since, by a reset of an FMU that cannot be reset
+    /// or of an instance that had failed.
+    ///
     /// # Panics
     /// Panics if the number of states differs from the number of instances.
-    pub fn restore(&mut self, states: &States, mask: Mask) {
+    pub fn restore(&mut self, states: &States, mask: Mask) -> Result<(), Error> {
         assert_eq!(states.0.len(), self.len(), "states of other instances");
+        for (index, one) in
+            self.all.iter().enumerate().filter(|(index, _)| mask.is_none_or(|mask| mask[*index]))
+        {
+            if let (Some((saved, _)), Some(instance)) = (states.0[index], &one.instance) {
+                instance
+                    .check_own(saved)
+                    .map_err(|why| Error::Request(format!("instance {index}: {why}")))?;
+            }
+        }
         let back = |index: usize, one: &mut One| {
             let (Some((saved, time)), Some(instance)) = (states.0[index], &mut one.instance) else { return };
             match instance.restore(saved) {
@@ -330,6 +357,7 @@ impl Instances {
             }
         };
         each(self.pool.as_ref(), &mut self.all, mask, back);
+        Ok(())
     }
 
     /// Frees saved states.
@@ -349,6 +377,13 @@ impl Instances {
     pub fn serialize(&mut self, states: &States) -> Result<Vec<Option<Vec<u8>>>, Error> {
         let why = "cannot serialize its state (canSerializeFMUstate is not true)";
         self.system.check_offer(self.interface, |offer| offer.serializes_states, why)?;
+        for (index, (one, saved)) in self.all.iter().zip(&states.0).enumerate() {
+            if let (Some((saved, _)), Some(instance)) = (saved, &one.instance) {
+                instance
+                    .check_own(*saved)
+                    .map_err(|why| Error::Request(format!("instance {index}: {why}")))?;
+            }
+        }
         let bytes = self.all.iter_mut().zip(&states.0).map(|(one, saved)| {
             let ((saved, time), instance) = (saved.as_ref()?, one.instance.as_mut()?);
             match instance.serialize(*saved) {
@@ -553,21 +588,60 @@ impl Instances {
         references.ok_or_else(|| Error::Request(why.to_owned()))
     }
 
+    /// Returns the exact value of a variable of any type in each instance; `None` for a failed instance.
+    ///
+    /// # Errors
+    /// Returns [`Error::Request`] if the variable is unknown.
+    pub fn values(&mut self, name: &str) -> Result<Vec<Option<Value>>, Error> {
+        let of = Target::of(self.system.find_first(name)?);
+        let mut values = vec![None; self.len()];
+        for (one, value) in self.all.iter_mut().zip(&mut values) {
+            one.with(|_, instance| instance.get_value(of).map(|found| *value = Some(found)));
+        }
+        Ok(values)
+    }
+
+    /// Sets a string, bytes or an integer of 64 bits, to a value for each instance or to one for all.
+    ///
+    /// # Errors
+    /// Returns [`Error::Request`] if the variable is read-only, or a value does not fit its type.
+    ///
+    /// # Panics
+    /// Panics if the number of values is wrong.
+    pub fn set_values(&mut self, name: &str, values: &[Value], mask: Mask) -> Result<(), Error> {
+        assert!(values.len() == 1 || values.len() == self.len(), "a value for each instance or one");
+        let mut targets = Vec::new();
+        for found in self.system.find(name)? {
+            found.check_settable(name)?;
+            if !is_exact(found.variable.base) {
+                return request(format!("{name} is {}; set it with set", found.variable.kind_in_words()));
+            }
+            let own = values.iter().map(|value| exact(found, name, value.clone()));
+            targets.push((Target::of(found), own.collect::<Result<Vec<_>, _>>()?));
+        }
+        self.alive(mask, |index, _, instance| {
+            let value = |values: &[Value]| values[if values.len() == 1 { 0 } else { index }].clone();
+            targets.iter().try_for_each(|(target, values)| instance.set_value(*target, &value(values)))
+        });
+        Ok(())
+    }
+
     /// Returns the value of a string variable in each instance; `None` for a failed instance.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if the variable is unknown or no string.
+    /// Returns [`Error::Request`] if the variable is unknown or not a string.
     pub fn texts(&mut self, name: &str) -> Result<Vec<Option<String>>, Error> {
         let found = self.system.find_first(name)?;
         if found.variable.base != BaseType::String {
             return request(format!("{name} is {}, not a string", found.variable.kind_in_words()));
         }
-        let index = Target::of(found);
-        let mut texts = vec![None; self.len()];
-        for (one, text) in self.all.iter_mut().zip(&mut texts) {
-            one.with(|_, instance| instance.get_text(index).map(|found| *text = Some(found)));
-        }
-        Ok(texts)
+        let text = |value: Option<Value>| value.map(|value| value.to_string());
+        Ok(self.values(name)?.into_iter().map(text).collect())
+    }
+
+    /// Removes and returns the messages of the FMU since the last call, if the instances [listen](Setup::listening).
+    pub fn take_messages(&self) -> Vec<Logged> {
+        self.feed.as_ref().map(|feed| feed.take()).unwrap_or_default()
     }
 
     /// Calls `body` for each instance that has not failed. An error makes the instance fail.
@@ -640,7 +714,7 @@ fn initialize(
     index: usize,
     interface: Interface,
 ) -> Result<Event, Rejection> {
-    instance.begin(begin.time, begin.stop_time, &begin.start, index)?;
+    instance.begin(begin.experiment, &begin.start, index)?;
     instance.exit_initialization_mode()?;
     let mut event = Event::default();
     if interface == Interface::ModelExchange {

@@ -1,16 +1,27 @@
 //! Instances of the components of a system, which run together.
 
-use crate::instance::{Instance, Saved};
-use crate::rejection::{Message, Rejection};
+use crate::instance::{Experiment, Instance};
+use crate::messages::Logging;
 use crate::selection::{Selection, Target};
 use crate::start::StartValues;
 use crate::system::{Exchange, Order, System};
-use fmi_abi::Interface;
+use fmi_abi::{Interface, Value};
+use fmi_client::Rejection;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A state that instances of all components have saved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Saved {
+    generation: u64,
+    state: fmi_client::Saved,
+}
 
 /// One instance of each component; each function acts on all of them. A single FMU is a system with one
 /// component and no connections.
 #[derive(Debug)]
 pub(crate) struct Running {
+    /// Differs from the numbers of all other values: states belong to the instances that saved them.
+    generation: u64,
     components: Vec<Instance>,
     system: System,
     /// Whether inputs must be updated before the next get or step ([`Order::Dependencies`]).
@@ -29,10 +40,11 @@ impl Running {
         used: Option<Self>,
         system: &System,
         interface: Interface,
-        logging_on: bool,
+        logging: &Logging,
     ) -> Result<Self, (String, bool)> {
+        static GENERATION: AtomicU64 = AtomicU64::new(0);
         let used = used.filter(Self::is_alive).and_then(|mut used| {
-            used.components.iter_mut().try_for_each(Instance::reset).ok()?;
+            used.components.iter_mut().try_for_each(|instance| instance.reset()).ok()?;
             Some(used)
         });
         // Some FMUs cannot be reset. The old instances are freed before new ones are made, because some FMUs
@@ -40,26 +52,34 @@ impl Running {
         if let Some(used) = used {
             return Ok(used);
         }
-        let components = system
-            .components()
-            .iter()
-            .map(|component| Instance::new(&component.fmu, &component.name, interface, logging_on));
+        let components = system.components().iter().enumerate();
+        let components = components.map(|(index, component)| {
+            Instance::new(&component.fmu, (index, &component.name), interface, logging)
+        });
         let components = components.collect::<Result<Vec<_>, _>>()?;
         let (system, [passed, row, buffer]) = (system.clone(), [const { Vec::new() }; 3]);
-        Ok(Self { components, system, is_due: false, passed, saved: Vec::new(), row, buffer })
+        let generation = GENERATION.fetch_add(1, Ordering::Relaxed);
+        Ok(Self { generation, components, system, is_due: false, passed, saved: Vec::new(), row, buffer })
     }
 
     /// Sets start values and enters Initialization Mode, in an order that both FMI versions allow.
     pub fn begin(
         &mut self,
-        start_time: f64,
-        stop_time: Option<f64>,
+        experiment: Experiment,
         start: &StartValues,
         number: usize,
     ) -> Result<(), Rejection> {
-        self.each(|_, instance| instance.set_up(start_time, stop_time))?;
-        for (target, text) in start.texts(number) {
-            self.components[target.component].set_text(target.reference, text)?;
+        let Experiment { start_time, stop_time, tolerance } = experiment;
+        let tolerances: Vec<_> = self
+            .system
+            .components()
+            .iter()
+            .map(|component| tolerance.of(&component.fmu.description))
+            .collect();
+        self.each(|index, instance| instance.set_up(start_time, stop_time, tolerances[index]))?;
+        for (target, value) in start.values(number) {
+            let value = std::slice::from_ref(value);
+            self.components[target.component].set_values(target.base, &[target.reference], value)?;
         }
         let numbers: Vec<_> = start.numbers(number).collect();
         // One call sets values that must be consistent, such as the elements of an array that must increase.
@@ -72,7 +92,9 @@ impl Running {
                 group.iter().map(|(target, value)| (target.reference, *value)).unzip();
             self.components[component].set_numbers(base, &references, &values)?;
         }
-        self.each(|_, instance| instance.enter_initialization_mode(start_time, stop_time))
+        self.each(|index, instance| {
+            instance.enter_initialization_mode(start_time, stop_time, tolerances[index])
+        })
     }
 
     pub fn exit_initialization_mode(&mut self) -> Result<(), Rejection> {
@@ -184,9 +206,20 @@ impl Running {
         Ok(())
     }
 
-    pub fn get_text(&mut self, index: Target) -> Result<String, Rejection> {
+    /// Returns the exact value of a variable.
+    pub fn get_value(&mut self, of: Target) -> Result<Value, Rejection> {
         self.pass_on()?;
-        self.components[index.component].get_text(index.reference)
+        let mut values = self.components[of.component].get_values(of.base, &[of.reference])?;
+        values.pop().ok_or_else(|| Rejection::without_fmu("get", "there is no value"))
+    }
+
+    /// Sets a variable to an exact value.
+    pub fn set_value(&mut self, of: Target, value: &Value) -> Result<(), Rejection> {
+        let value = std::slice::from_ref(value);
+        self.components[of.component].set_values(of.base, &[of.reference], value)?;
+        let Exchange { order, stages } = self.system.exchange();
+        self.is_due |= *order == Order::Dependencies && !stages.is_empty();
+        Ok(())
     }
 
     /// Returns the instance of a single FMU.
@@ -196,16 +229,11 @@ impl Running {
     }
 
     pub fn is_alive(&self) -> bool {
-        self.components.iter().all(Instance::is_alive)
+        self.components.iter().all(|instance| instance.is_alive())
     }
 
     pub fn forget_log(&self) {
-        self.components.iter().for_each(Instance::forget_log);
-    }
-
-    /// Returns the messages since the last call, of instances with logging enabled.
-    pub fn take_messages(&self) -> Vec<Message> {
-        self.components.iter().flat_map(Instance::take_messages).collect()
+        self.components.iter().for_each(|instance| instance.forget_log());
     }
 
     pub fn terminate(&mut self) -> Result<(), Rejection> {
@@ -217,7 +245,25 @@ impl Running {
         self.keep(|_, instance| instance.save())
     }
 
+    /// Returns the index of a state, if these instances have saved it.
+    fn own(&self, saved: Saved) -> Result<fmi_client::Saved, Rejection> {
+        if saved.generation == self.generation {
+            return Ok(saved.state);
+        }
+        Err(Rejection::without_fmu(
+            "restore",
+            "the state was saved before a reset that made a new instance, because the FMU cannot be reset or had failed; save it \
+            again, or serialize states that must outlive a reset",
+        ))
+    }
+
+    /// Fails if other instances, which are freed, have saved a state.
+    pub fn check_own(&self, saved: Saved) -> Result<(), Rejection> {
+        self.own(saved).map(drop)
+    }
+
     pub fn restore(&mut self, saved: Saved) -> Result<(), Rejection> {
+        let saved = self.own(saved)?;
         self.each(|_, instance| instance.restore(saved))?;
         match self.saved.get(saved.index()) {
             Some(passed) => self.passed.clone_from(passed),
@@ -227,12 +273,15 @@ impl Running {
     }
 
     pub fn forget(&mut self, saved: Saved) -> Result<(), Rejection> {
+        // The instances that saved another state are freed, and their states with them.
+        let Ok(saved) = self.own(saved) else { return Ok(()) };
         self.each(|_, instance| instance.forget(saved))
     }
 
     /// Serializes a saved state. For a single FMU, returns its bytes. For a system, returns the bytes of all
     /// components, each after its length, and the outputs of the last step.
     pub fn serialize(&mut self, saved: Saved) -> Result<Vec<u8>, Rejection> {
+        let saved = self.own(saved)?;
         if self.system.sole().is_some() {
             return self.sole().serialize(saved);
         }
@@ -250,7 +299,7 @@ impl Running {
 
     pub fn deserialize(&mut self, bytes: &[u8]) -> Result<Saved, Rejection> {
         if self.system.sole().is_some() {
-            return self.sole().deserialize(bytes);
+            return self.keep(|_, instance| instance.deserialize(bytes));
         }
         let mut rest = bytes;
         let short = || Rejection::without_fmu("deserialize", "the bytes are no state of this system");
@@ -275,7 +324,7 @@ impl Running {
     /// Stores a state of each instance, with the outputs of the last step. On an error, stores none.
     fn keep(
         &mut self,
-        mut state: impl FnMut(usize, &mut Instance) -> Result<Saved, Rejection>,
+        mut state: impl FnMut(usize, &mut Instance) -> Result<fmi_client::Saved, Rejection>,
     ) -> Result<Saved, Rejection> {
         let mut done = None;
         let kept = self.each(|component, instance| {
@@ -295,7 +344,7 @@ impl Running {
             self.saved.resize(self.saved.len().max(saved.index() + 1), Vec::new());
             self.saved[saved.index()].clone_from(&self.passed);
         }
-        Ok(saved)
+        Ok(Saved { generation: self.generation, state: saved })
     }
 
     fn each(

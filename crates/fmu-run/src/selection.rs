@@ -3,8 +3,8 @@
 use crate::error::{Error, request};
 use crate::found::Found;
 use crate::instance::Instance;
-use crate::rejection::Rejection;
 use fmi_abi::BaseType;
+use fmi_client::Rejection;
 
 /// Numeric variables, looked up once by name. A row of values has one value for each, in this order; 0 and 1
 /// represent Booleans.

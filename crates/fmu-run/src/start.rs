@@ -4,9 +4,8 @@ use crate::error::{Error, request};
 use crate::found::Found;
 use crate::selection::{Target, fits};
 use crate::system::{StartValue, System};
-use fmi_abi::BaseType;
+use fmi_abi::{BaseType, Value};
 use std::borrow::Cow;
-use std::ffi::{CStr, CString};
 
 /// Start value of a variable. A string is a value of a string variable, an item of an enumeration, or `true`
 /// or `false` for a Boolean.
@@ -20,15 +19,20 @@ pub enum Start<'a> {
     Text(&'a str),
     /// A string for each run or instance.
     EachText(&'a [String]),
+    /// An exact value, for all types: integers of 64 bits, bytes.
+    Value(&'a Value),
+    /// An exact value for each run or instance.
+    EachValue(&'a [Value]),
 }
 
 impl Start<'_> {
     /// Returns the number of runs or instances, if the value is given for each.
     pub(crate) fn count(&self) -> Option<usize> {
         match self {
-            Self::Same(_) | Self::Text(_) => None,
+            Self::Same(_) | Self::Text(_) | Self::Value(_) => None,
             Self::Each(values) => Some(values.len()),
             Self::EachText(texts) => Some(texts.len()),
+            Self::EachValue(values) => Some(values.len()),
         }
     }
 }
@@ -37,7 +41,8 @@ impl Start<'_> {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct StartValues<'a> {
     numbers: Vec<(Target, Cow<'a, [f64]>)>,
-    texts: Vec<(Target, Vec<CString>)>,
+    /// Values of types that numbers do not have: strings, bytes, integers of 64 bits.
+    values: Vec<(Target, Vec<Value>)>,
 }
 
 impl<'a> StartValues<'a> {
@@ -70,12 +75,12 @@ impl<'a> StartValues<'a> {
     /// Adds start values and removes earlier values of the same variables.
     pub fn put(&mut self, new: Self) {
         let is_new = |index: &Target| {
-            new.numbers.iter().any(|(of, _)| of == index) || new.texts.iter().any(|(of, _)| of == index)
+            new.numbers.iter().any(|(of, _)| of == index) || new.values.iter().any(|(of, _)| of == index)
         };
         self.numbers.retain(|(index, _)| !is_new(index));
-        self.texts.retain(|(index, _)| !is_new(index));
+        self.values.retain(|(index, _)| !is_new(index));
         self.numbers.extend(new.numbers);
-        self.texts.extend(new.texts);
+        self.values.extend(new.values);
     }
 
     /// Returns the numbers of a run or an instance.
@@ -83,56 +88,119 @@ impl<'a> StartValues<'a> {
         self.numbers.iter().filter_map(move |(index, values)| Some((*index, *one(values, of)?)))
     }
 
-    /// Returns the strings of a run or an instance.
-    pub fn texts(&self, of: usize) -> impl Iterator<Item = (Target, &CStr)> {
-        self.texts.iter().filter_map(move |(index, texts)| Some((*index, one(texts, of)?.as_c_str())))
+    /// Returns the strings, bytes and integers of 64 bits of a run or an instance.
+    pub fn values(&self, of: usize) -> impl Iterator<Item = (Target, &Value)> {
+        self.values.iter().filter_map(move |(index, values)| Some((*index, one(values, of)?)))
     }
 
     /// Copies borrowed values.
     pub fn into_owned(self) -> StartValues<'static> {
         let own = |(index, numbers): (_, Cow<[f64]>)| (index, Cow::Owned(numbers.into_owned()));
-        StartValues { numbers: self.numbers.into_iter().map(own).collect(), texts: self.texts }
+        StartValues { numbers: self.numbers.into_iter().map(own).collect(), values: self.values }
     }
 
     fn found(system: &System, name: &str, start: Start<'a>) -> Result<Self, Error> {
         let mut all = Self::default();
         for found in system.find_startable(name)? {
-            let index = Target::of(found);
-            let texts: Vec<&str> = match start {
-                Start::Same(number) => {
-                    all.numbers.push((index, checked(found, name, Cow::Owned(vec![number]))?));
-                    continue;
-                }
-                Start::Each(numbers) => {
-                    all.numbers.push((index, checked(found, name, Cow::Borrowed(numbers))?));
-                    continue;
-                }
-                Start::Text(text) => vec![text],
-                Start::EachText(texts) => texts.iter().map(String::as_str).collect(),
-            };
-            if index.base == BaseType::String {
-                let texts = texts.iter().map(|text| CString::new(*text)).collect::<Result<_, _>>();
-                let Ok(texts) = texts else {
-                    return request(format!("the start value of {name} must not contain a character NUL"));
+            let target = Target::of(found);
+            if is_exact(target.base) {
+                let values = match start {
+                    Start::Same(number) => vec![Value::Real(number)],
+                    Start::Each(numbers) => numbers.iter().copied().map(Value::Real).collect(),
+                    Start::Text(text) => vec![Value::from(text)],
+                    Start::EachText(texts) => texts.iter().map(|text| Value::from(text.as_str())).collect(),
+                    Start::Value(value) => vec![value.clone()],
+                    Start::EachValue(values) => values.to_vec(),
                 };
-                all.texts.push((index, texts));
-            } else {
-                let numbers = texts.iter().map(|text| number_of(found, name, text));
-                all.numbers.push((index, numbers.collect::<Result<_, _>>()?));
+                let values = values.into_iter().map(|value| exact(found, name, value));
+                all.values.push((target, values.collect::<Result<_, _>>()?));
+                continue;
             }
+            let number = |value: &Value| match value {
+                Value::String(text) => number_of(found, name, text),
+                value => number_in(found, name, value),
+            };
+            let numbers = match start {
+                Start::Same(number) => Cow::Owned(vec![number]),
+                Start::Each(numbers) => Cow::Borrowed(numbers),
+                Start::Text(text) => Cow::Owned(vec![number_of(found, name, text)?]),
+                Start::EachText(texts) => Cow::Owned(
+                    texts.iter().map(|text| number_of(found, name, text)).collect::<Result<_, _>>()?,
+                ),
+                Start::Value(value) => Cow::Owned(vec![number(value)?]),
+                Start::EachValue(values) => Cow::Owned(values.iter().map(number).collect::<Result<_, _>>()?),
+            };
+            fits(name, target.base, &numbers)?;
+            all.numbers.push((target, numbers));
         }
         Ok(all)
     }
 }
 
-fn one<T>(values: &[T], of: usize) -> Option<&T> {
-    if values.len() == 1 { values.first() } else { values.get(of) }
+/// Returns whether a type has values that `f64` has not.
+pub(crate) fn is_exact(base: BaseType) -> bool {
+    matches!(base, BaseType::String | BaseType::Binary | BaseType::Int64 | BaseType::UInt64)
 }
 
-fn checked<'a>(found: Found, name: &str, numbers: Cow<'a, [f64]>) -> Result<Cow<'a, [f64]>, Error> {
+/// Converts a value to the type of a variable for which [`is_exact`] holds.
+pub(crate) fn exact(found: Found, name: &str, value: Value) -> Result<Value, Error> {
+    /// Integers up to this magnitude are exact in `f64`.
+    const EXACT: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;
+    let base = found.variable.base;
+    let value = match (base, value) {
+        (BaseType::String, Value::String(text)) if text.contains('\0') => {
+            return request(format!("the value of {name} must not contain a character NUL"));
+        }
+        (BaseType::String, value @ Value::String(_)) | (BaseType::Binary, value @ Value::Binary(_)) => value,
+        (BaseType::Int64 | BaseType::UInt64, Value::Real(number))
+            if number.fract() == 0.0 && number.abs() > EXACT =>
+        {
+            return request(format!(
+                "{name} is an integer of 64 bits, and the floating-point number {number} may not be the one that is meant; give an \
+                integer"
+            ));
+        }
+        (BaseType::Int64 | BaseType::UInt64, Value::Real(number)) if number.fract() == 0.0 => {
+            Value::Integer(number as i128)
+        }
+        (BaseType::Int64 | BaseType::UInt64, Value::Boolean(boolean)) => Value::Integer(boolean.into()),
+        (BaseType::Int64 | BaseType::UInt64, value @ Value::Integer(_)) => value,
+        (_, value) => {
+            let value = match value {
+                Value::String(text) => format!("{text:?}"),
+                Value::Binary(bytes) => format!("{} bytes", bytes.len()),
+                other => other.to_string(),
+            };
+            return request(format!(
+                "{name} is {}, its value cannot be {value}",
+                found.variable.kind_in_words()
+            ));
+        }
+    };
+    if let (Value::Integer(number), Some((low, high))) = (&value, base.range())
+        && !(low..=high).contains(number)
+    {
+        return request(format!("{name} is an integer from {low} to {high} and cannot be {number}"));
+    }
+    Ok(value)
+}
+
+/// Returns the number of an exact value, for a variable of numbers.
+fn number_in(found: Found, name: &str, value: &Value) -> Result<f64, Error> {
     found.check_number(name)?;
-    fits(name, found.variable.base, &numbers)?;
-    Ok(numbers)
+    match value {
+        Value::Real(number) => Ok(*number),
+        // Types of fewer bits reject the numbers that are rounded here.
+        Value::Integer(number) => Ok(*number as f64),
+        Value::Boolean(boolean) => Ok(f64::from(u8::from(*boolean))),
+        Value::String(_) | Value::Binary(_) => {
+            request(format!("{name} is {}, its value cannot be bytes", found.variable.kind_in_words()))
+        }
+    }
+}
+
+fn one<T>(values: &[T], of: usize) -> Option<&T> {
+    if values.len() == 1 { values.first() } else { values.get(of) }
 }
 
 /// Returns the number for a string, for a variable that is no string.

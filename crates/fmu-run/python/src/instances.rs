@@ -82,7 +82,15 @@ impl Instances {
         };
         let system = System::clone(&*loaded.model()?);
         let start = Start::of(&system, start.as_ref())?;
-        let setup = Setup { interface, count, start: start.values(), start_time, stop_time, threads };
+        let setup = Setup {
+            interface,
+            count,
+            start: start.values(),
+            start_time,
+            stop_time,
+            threads,
+            ..Setup::default()
+        };
         let made = py.detach(|| system.instances(&setup)).map_err(python)?;
         Ok(Self { system, count, instances: Arc::new(Mutex::new(made)), known: Mutex::default() })
     }
@@ -238,10 +246,7 @@ impl Instances {
     #[pyo3(signature = (states, mask=None))]
     fn restore(&self, py: Python, states: &States, mask: Optional) -> PyResult<()> {
         let (mask, states) = (self.mask(mask)?, self.own(states)?);
-        self.revive(py, |all| {
-            all.restore(&states, mask.as_deref());
-            Ok(())
-        })
+        self.revive(py, |all| all.restore(&states, mask.as_deref()))
     }
 
     /// Return saved states as bytes, for use in another process: one for each instance, None for an instance

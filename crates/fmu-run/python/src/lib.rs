@@ -206,6 +206,7 @@ impl Loaded {
             measures: measures.map_err(PyValueError::new_err)?,
             threads,
             read_before_set,
+            ..Batch::default()
         };
         let planned = model.plan(&batch).map_err(python)?;
         let size = planned.size();

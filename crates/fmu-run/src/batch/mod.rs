@@ -8,6 +8,7 @@ pub use measure::Measure;
 pub use run::Watch;
 
 use crate::error::Error;
+use crate::instance::Tolerance;
 use crate::start::Start;
 use crate::system::System;
 
@@ -38,6 +39,8 @@ pub struct Batch<'a> {
     /// 2.0 describes this order, and FMPy uses it. Outputs that depend directly on inputs then lag by one
     /// step.
     pub read_before_set: bool,
+    /// Relative tolerance for solvers inside the FMU.
+    pub tolerance: Tolerance,
 }
 
 /// Values of an input.

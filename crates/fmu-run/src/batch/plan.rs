@@ -3,6 +3,7 @@
 use super::{Batch, Measure, Trajectory};
 use crate::error::{Error, request};
 use crate::found::article;
+use crate::instance::Tolerance;
 use crate::selection::{Selection, fits};
 use crate::start::StartValues;
 use crate::system::System;
@@ -20,6 +21,7 @@ pub(super) struct Plan<'a> {
     pub measures: &'a [Measure],
     pub threads: usize,
     pub read_before_set: bool,
+    pub tolerance: Tolerance,
 }
 
 /// Inputs and their values.
@@ -32,6 +34,7 @@ pub(super) struct Inputs<'a> {
 impl<'a> Plan<'a> {
     pub fn of(system: &System, batch: &'a Batch) -> Result<Self, Error> {
         system.check_interface(Interface::CoSimulation)?;
+        batch.tolerance.check()?;
         let time = checked_time(batch.time)?;
         let runs = runs(batch)?;
         let mut plan = Self {
@@ -45,6 +48,7 @@ impl<'a> Plan<'a> {
             measures: &batch.measures,
             threads: system.threads(Interface::CoSimulation, batch.threads)?.min(runs.max(1)),
             read_before_set: batch.read_before_set,
+            tolerance: batch.tolerance,
         };
         if batch.every == Some(0) {
             return request("every must be at least 1".to_owned());

@@ -4,12 +4,14 @@ use super::Trajectory;
 use super::measure::Measured;
 use super::plan::{Inputs, Plan};
 use crate::error::Error;
-use crate::rejection::{Message, Rejection};
+use crate::instance::Experiment;
+use crate::messages::{Feed, Logged, Logging};
 use crate::running::Running;
 use crate::system::System;
 use fmi_abi::Interface;
+use fmi_client::Rejection;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{self, Duration};
 
 /// Messages with the number of their run.
@@ -24,19 +26,20 @@ pub struct Watch {
     done: AtomicUsize,
     cancelled: AtomicBool,
     ended: Mutex<Vec<(usize, f64, Vec<f64>)>>,
-    /// Messages of runs, each with its time, if the caller wants them.
-    messages: Option<Mutex<Vec<(usize, f64, Message)>>>,
+    listening: bool,
+    /// Collects all messages during the runs.
+    feed: OnceLock<Arc<Feed>>,
 }
 
 impl Watch {
     /// Creates a watch that receives all messages of the FMU. Logging is switched on.
     pub fn listening() -> Self {
-        Self { messages: Some(Mutex::default()), ..Self::default() }
+        Self { listening: true, ..Self::default() }
     }
 
-    /// Returns the messages so far, each with the number of the run and the time of the communication point.
-    pub fn messages(&self) -> Vec<(usize, f64, Message)> {
-        self.messages.as_ref().map(|messages| lock(messages).clone()).unwrap_or_default()
+    /// Removes and returns the messages so far.
+    pub fn take_messages(&self) -> Vec<Logged> {
+        self.feed.get().map(|feed| feed.take()).unwrap_or_default()
     }
 
     /// Returns the runs that the FMU has ended, each with its end time in s and the outputs at this time, which
@@ -91,8 +94,10 @@ pub(super) fn run(
     let rows = Mutex::new(rows.map(|(run, (trajectories, measures))| Row { run, trajectories, measures }));
     let next = || rows.lock().unwrap_or_else(PoisonError::into_inner).next();
     // Each thread has one instance and takes the next run.
-    let found = pool.broadcast(|_| {
+    let feed = watch.listening.then(|| watch.feed.get_or_init(|| system.feed()));
+    let found = pool.broadcast(|context| {
         let mut worker = Worker::new(system, plan, watch, None);
+        worker.feed = feed.map(|feed| (Arc::clone(feed), context.index()));
         let (mut failures, mut notes) = (Vec::new(), Vec::new());
         while !watch.is_cancelled()
             && let Some(row) = next()
@@ -183,6 +188,8 @@ struct Worker<'a> {
     watch: &'a Watch,
     /// Deadline of a run with logging on; `None` without logging.
     deadline: Option<time::Instant>,
+    /// Collects all messages, and the number of the instance.
+    feed: Option<(Arc<Feed>, usize)>,
     instance: Option<Running>,
     inputs: Signals<'a>,
     derivatives: Signals<'a>,
@@ -236,6 +243,7 @@ impl<'a> Worker<'a> {
             plan,
             watch,
             deadline,
+            feed: None,
             instance: None,
             inputs: Signals::new(&plan.inputs),
             derivatives: Signals::new(&plan.derivatives),
@@ -255,6 +263,7 @@ impl<'a> Worker<'a> {
         measures: &mut [f64],
     ) -> Result<Option<String>, Failure> {
         let plan = self.plan;
+        self.report_time(run, times[0]);
         let mut instance = match self.instance() {
             Ok(instance) => instance,
             Err((text, is_silent)) => {
@@ -270,7 +279,7 @@ impl<'a> Worker<'a> {
         let stopped = self.follow(times, &mut instance, run, trajectories).err();
         if self.deadline.is_none() {
             let at = stopped.as_ref().and_then(|(at, _)| *at).map_or(0, |at| at.min(times.len() - 1));
-            self.report_messages(run, times[at], &instance);
+            self.report_time(run, times[at]);
             let ended = stopped.as_ref().and_then(|(_, rejection)| rejection.ended());
             lock(&self.watch.ended).extend(ended.map(|time| (run, time, self.row.clone())));
         }
@@ -302,19 +311,17 @@ impl<'a> Worker<'a> {
     /// Returns a new or reset instance. The error contains the reason, and whether there is no message.
     fn instance(&mut self) -> Result<Running, (String, bool)> {
         let used = self.instance.take();
-        let logging_on = self.deadline.is_some() || self.watch.messages.is_some();
-        let instance = Running::renewed(used, self.system, Interface::CoSimulation, logging_on)?;
+        let logging = Logging { on: self.deadline.is_some() || self.feed.is_some(), feed: self.feed.clone() };
+        let instance = Running::renewed(used, self.system, Interface::CoSimulation, &logging)?;
         instance.forget_log();
         Ok(instance)
     }
 
-    /// Passes the messages of the FMU to the caller, unless the run is repeated.
-    fn report_messages(&self, run: usize, time: f64, instance: &Running) {
-        if let Some(messages) = &self.watch.messages
-            && self.deadline.is_none()
-        {
-            let new = instance.take_messages().into_iter().map(|message| (run, time, message));
-            lock(messages).extend(new);
+    /// Tells the collector of messages where the run is.
+    #[inline]
+    fn report_time(&self, run: usize, time: f64) {
+        if let Some((feed, instance)) = &self.feed {
+            feed.at(*instance, run, time);
         }
     }
 
@@ -330,9 +337,6 @@ impl<'a> Worker<'a> {
         let plan = self.plan;
         self.start(instance, run).map_err(|rejection| (None, rejection))?;
         instance.forget_log();
-        if let Some(first) = times.first() {
-            self.report_messages(run, *first, instance);
-        }
         let measures = !plan.measures.is_empty();
         // Index of the next kept value in a trajectory, and number of times until then.
         let (kept, mut index, mut wait) = (plan.kept(), 0, 0);
@@ -342,10 +346,10 @@ impl<'a> Worker<'a> {
             if self.watch.is_cancelled() {
                 return Ok(());
             }
+            self.report_time(run, time);
             if let Some(deadline) = self.deadline {
                 // Messages about earlier steps are not the reason of a later error.
                 instance.forget_log();
-                drop(instance.take_messages());
                 if time::Instant::now() > deadline {
                     return Ok(());
                 }
@@ -390,8 +394,6 @@ impl<'a> Worker<'a> {
                         return Err(at(rejection));
                     }
                     ended = Some(rejection);
-                } else {
-                    self.report_messages(run, time, instance);
                 }
             }
         }
@@ -401,7 +403,9 @@ impl<'a> Worker<'a> {
     /// Sets start values before Initialization Mode and inputs in it.
     fn start(&mut self, instance: &mut Running, run: usize) -> Result<(), Rejection> {
         let plan = self.plan;
-        instance.begin(plan.time[0], plan.time.last().copied(), &plan.start, run)?;
+        let (start_time, stop_time) = (plan.time[0], plan.time.last().copied());
+        let experiment = Experiment { start_time, stop_time, tolerance: plan.tolerance };
+        instance.begin(experiment, &plan.start, run)?;
         self.set_values(instance, 0)?;
         instance.exit_initialization_mode()
     }

@@ -7,6 +7,7 @@ use crate::description::{Description, Variable};
 use crate::error::{Error, request};
 use crate::fmu::Loaded;
 use crate::found::Found;
+use crate::messages::Feed;
 use crate::selection::Selection;
 use fmi_abi::description::Offer;
 use fmi_abi::{BaseType, Interface};
@@ -150,6 +151,11 @@ impl System {
 
     pub(crate) fn components(&self) -> &[Component] {
         &self.0.components
+    }
+
+    /// Returns a feed for the messages of instances of this system.
+    pub(crate) fn feed(&self) -> Arc<Feed> {
+        Feed::of(self.components().iter().map(|component| component.name.clone()).collect())
     }
 
     pub(crate) fn exchange(&self) -> &Exchange {

@@ -7,7 +7,7 @@ use fmi_abi::Status;
 pub struct Message {
     /// Status of the message.
     pub status: Status,
-    /// Log category.
+    /// Log category; empty if the FMU gives none.
     pub category: String,
     /// Text of the message.
     pub text: String,
@@ -20,8 +20,8 @@ pub struct Rejection(Box<Rejected>);
 
 #[derive(Debug)]
 struct Rejected {
-    /// Name of the component; empty if there is only one.
-    component: String,
+    /// Label of the instance, for messages; may be empty.
+    label: String,
     function: &'static str,
     status: Status,
     log: Vec<Message>,
@@ -29,45 +29,52 @@ struct Rejected {
 }
 
 impl Rejection {
+    /// Creates an error of a function, with the messages of the FMU.
     #[cold]
-    pub(crate) fn new(component: &str, function: &'static str, status: Status, log: Vec<Message>) -> Self {
-        Self(Box::new(Rejected { component: component.to_owned(), function, status, log, ended: None }))
+    pub fn new(label: &str, function: &'static str, status: Status, log: Vec<Message>) -> Self {
+        Self(Box::new(Rejected { label: label.to_owned(), function, status, log, ended: None }))
     }
 
     /// Creates an error that does not come from an FMU.
     #[cold]
-    pub(crate) fn without_fmu(function: &'static str, why: &str) -> Self {
+    pub fn without_fmu(function: &'static str, why: &str) -> Self {
         let message = Message { status: Status::Error, category: String::new(), text: why.to_owned() };
         Self::new("", function, Status::Error, vec![message])
     }
 
-    pub(crate) fn status(&self) -> Status {
+    /// Returns the status of the call.
+    pub fn status(&self) -> Status {
         self.0.status
     }
 
-    /// Records that the FMU requests the end of the simulation, at this time.
+    /// Records that the FMU requests the end of the simulation, at this time, s.
     pub(crate) fn at_end(mut self, time: f64) -> Self {
         self.0.ended = Some(time);
         self
     }
 
-    /// Returns the time at which the FMU ended the simulation, if it did.
-    pub(crate) fn ended(&self) -> Option<f64> {
+    /// Returns the time at which the FMU ended the simulation, s, if it did.
+    pub fn ended(&self) -> Option<f64> {
         self.0.ended
     }
 
     /// Returns whether the FMU gave no reason.
-    pub(crate) fn is_silent(&self) -> bool {
+    pub fn is_silent(&self) -> bool {
         self.0.log.is_empty() && self.0.ended.is_none()
+    }
+
+    /// Returns the message that explains the error, if the FMU logged one.
+    pub fn reason(&self) -> Option<&Message> {
+        reason(&self.0.log)
     }
 }
 
 impl std::fmt::Display for Rejection {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Rejected { component, function, status, log, ended } = &*self.0;
-        let message = reason(log);
-        if !component.is_empty() {
-            write!(f, "{component}: ")?;
+        let Rejected { label, function, status, ended, .. } = &*self.0;
+        let message = self.reason();
+        if !label.is_empty() {
+            write!(f, "{label}: ")?;
         }
         if let Some(time) = ended {
             write!(f, "ended by the FMU at t = {time} s")?;
@@ -86,7 +93,7 @@ impl std::error::Error for Rejection {}
 
 /// Returns the message that explains an error: the last one with status Discard or worse, otherwise the last
 /// one.
-pub(crate) fn reason(log: &[Message]) -> Option<&Message> {
+pub fn reason(log: &[Message]) -> Option<&Message> {
     let severe = log.iter().rev().find(|message| message.status as i32 >= Status::Discard as i32);
     severe.or(log.last())
 }

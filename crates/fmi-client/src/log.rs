@@ -1,0 +1,225 @@
+//! Log callbacks for FMUs, and the list of living instances.
+//!
+//! FMUs do not always hand the environment of the instance to the logger: some hand their own pointer, NULL, or the environment of
+//! another instance, and some log from their own threads. So the environment is a number that is looked up, never a pointer that is
+//! followed.
+
+use crate::format::Arguments;
+use crate::rejection::Message;
+use fmi_abi::Status;
+use fmi_abi::c_types::{c_char, c_int, c_void};
+use fmi_abi::fmi2::types::*;
+use fmi_abi::fmi3::types::*;
+use std::collections::{BTreeMap, VecDeque};
+use std::ffi::CStr;
+use std::fmt;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+use std::thread::ThreadId;
+
+/// Receiver of log messages, called while the FMU logs, also from threads of the FMU. It must not call the FMU and must not panic.
+pub trait Listen: Send + Sync {
+    /// Receives a message of the instance with this [`number`](crate::Settings::listener); `None` if the FMU does not name one of
+    /// the living instances.
+    fn hear(&self, number: Option<usize>, message: &Message);
+}
+
+/// Maximum number of messages that are kept for the reason of a later error.
+const KEPT: usize = 64;
+
+/// The log of an instance.
+pub(crate) struct Log {
+    /// Environment of the instance: a number that is used once in a process.
+    environment: usize,
+    /// Messages since the last failed call.
+    new: Mutex<VecDeque<Message>>,
+    listener: Option<(Arc<dyn Listen>, usize)>,
+}
+
+impl fmt::Debug for Log {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Log").field("new", &self.new).finish_non_exhaustive()
+    }
+}
+
+/// Logs of the living instances by environment.
+static LIVING: RwLock<BTreeMap<usize, Arc<Log>>> = RwLock::new(BTreeMap::new());
+
+/// Messages with an unknown environment, each with the thread that logged it. Most FMUs log during a call, so that the thread leads
+/// to the instance.
+static STRAY: Mutex<VecDeque<(ThreadId, Message)>> = Mutex::new(VecDeque::new());
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Log {
+    /// Creates a log and enters it in the list of living instances.
+    pub fn living(listener: Option<(Arc<dyn Listen>, usize)>) -> Arc<Self> {
+        /// Distance of environments, as of pointers that `malloc` returns.
+        const APART: usize = 16;
+        static NEXT: AtomicUsize = AtomicUsize::new(0x1000);
+        let environment = NEXT.fetch_add(APART, Ordering::Relaxed);
+        let log = Arc::new(Self { environment, new: Mutex::default(), listener });
+        LIVING.write().unwrap_or_else(PoisonError::into_inner).insert(environment, Arc::clone(&log));
+        log
+    }
+
+    /// Removes the log from the list, when its instance is freed.
+    pub fn end(&self) {
+        LIVING.write().unwrap_or_else(PoisonError::into_inner).remove(&self.environment);
+    }
+
+    pub fn environment(&self) -> *mut c_void {
+        std::ptr::without_provenance_mut(self.environment)
+    }
+
+    /// Removes and returns the messages since the last failed call, with those of this thread that name no instance.
+    pub fn take(&self) -> Vec<Message> {
+        let mut messages = Vec::from(std::mem::take(&mut *lock(&self.new)));
+        let mut stray = lock(&STRAY);
+        if !stray.is_empty() {
+            let this = std::thread::current().id();
+            messages.extend(
+                stray.iter().filter(|(thread, _)| *thread == this).map(|(_, message)| message.clone()),
+            );
+            stray.retain(|(thread, _)| *thread != this);
+        }
+        messages
+    }
+
+    fn add(&self, message: Message) {
+        if let Some((listener, number)) = &self.listener {
+            listener.hear(Some(*number), &message);
+        }
+        keep(&mut lock(&self.new), message);
+    }
+}
+
+/// Adds an item; removes the oldest one if there are many.
+fn keep<T>(items: &mut VecDeque<T>, item: T) {
+    if items.len() >= KEPT {
+        items.pop_front();
+    }
+    items.push_back(item);
+}
+
+/// Stores a message with the instance whose environment it has; if there is only one, with that one.
+fn remember(environment: usize, message: Message) {
+    let living = LIVING.read().unwrap_or_else(PoisonError::into_inner);
+    let only = || living.values().next().filter(|_| living.len() == 1);
+    if let Some(log) = living.get(&environment).or_else(only) {
+        let log = Arc::clone(log);
+        drop(living);
+        return log.add(message);
+    }
+    let mut told: Vec<Arc<dyn Listen>> = Vec::new();
+    for (listener, _) in living.values().filter_map(|log| log.listener.as_ref()) {
+        if !told.iter().any(|other| Arc::ptr_eq(other, listener)) {
+            told.push(Arc::clone(listener));
+        }
+    }
+    drop(living);
+    told.iter().for_each(|listener| listener.hear(None, &message));
+    keep(&mut lock(&STRAY), (std::thread::current().id(), message));
+}
+
+/// Returns a string; empty for NULL.
+///
+/// # Safety
+/// NULL, or a string that ends with NUL.
+unsafe fn string(pointer: *const c_char) -> String {
+    if pointer.is_null() {
+        return String::new();
+    }
+    // SAFETY: the caller's requirement.
+    unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned()
+}
+
+/// Returns the callbacks of FMI 2.0 (section 2.1.5 of FMI 2.0.5). They must live as long as the instance. The memory functions are
+/// those of C; an FMU may do without them only if `canNotUseMemoryManagementFunctions` is true.
+pub fn callbacks(environment: *mut c_void) -> fmi2CallbackFunctions {
+    let logger = log_of_fmi2 as *const ();
+    fmi2CallbackFunctions {
+        // SAFETY: the documentation of `log_of_fmi2` explains why both types have compatible calls.
+        logger: Some(unsafe { std::mem::transmute::<*const (), fmi2CallbackLogger>(logger) }),
+        allocate_memory: Some(allocate),
+        free_memory: Some(free),
+        step_finished: None,
+        component_environment: environment,
+    }
+}
+
+unsafe extern "C" fn allocate(count: usize, size: usize) -> *mut c_void {
+    // SAFETY: any arguments are allowed; the FMU frees the memory with `free`.
+    unsafe { libc::calloc(count, size) }
+}
+
+unsafe extern "C" fn free(memory: *mut c_void) {
+    // SAFETY: section 2.1.5 requires NULL, or memory of `allocate` that is freed once.
+    unsafe { libc::free(memory) }
+}
+
+/// Logger of FMI 2.0. Stable Rust cannot define variadic functions, so it has named arguments: integers and pointers, then
+/// floating-point numbers, which have separate registers. On Linux, and on macOS with Intel processors, variadic functions receive
+/// their arguments in these registers and then on the stack; more are read than there may be, which is harmless there.
+#[cfg(any(all(unix, target_arch = "x86_64"), all(target_os = "linux", target_arch = "aarch64")))]
+#[allow(clippy::too_many_arguments, reason = "the values of the message")]
+unsafe extern "C" fn log_of_fmi2(
+    environment: fmi2ComponentEnvironment,
+    _instance_name: fmi2String,
+    status: fmi2Status,
+    category: fmi2String,
+    message: fmi2String,
+    a: usize,
+    b: usize,
+    c: usize,
+    d: usize,
+    e: usize,
+    f: usize,
+    g: usize,
+    h: usize,
+    r: f64,
+    s: f64,
+    t: f64,
+    u: f64,
+    v: f64,
+    w: f64,
+    x: f64,
+    y: f64,
+) {
+    // SAFETY: section 2.1.5 requires NULL or NUL-terminated strings.
+    let [category, format] = [category, message].map(|text| unsafe { string(text) });
+    let arguments = Arguments::new([a, b, c, d, e, f, g, h], [r, s, t, u, v, w, x, y]);
+    let message = Message { status: Status::from_c(status), category, text: arguments.expand(&format) };
+    remember(environment.addr(), message);
+}
+
+/// Logger of FMI 2.0 without its `...`. Named arguments are passed as in plain calls on every platform of this project; the values
+/// of formats are not read here.
+#[cfg(not(any(all(unix, target_arch = "x86_64"), all(target_os = "linux", target_arch = "aarch64"))))]
+unsafe extern "C" fn log_of_fmi2(
+    environment: fmi2ComponentEnvironment,
+    _instance_name: fmi2String,
+    status: fmi2Status,
+    category: fmi2String,
+    message: fmi2String,
+) {
+    // SAFETY: the requirements are those of FMI 3.0.
+    unsafe { log_of_fmi3(environment, status, category, message) }
+}
+
+/// Logger of FMI 3.0 for instances of this crate.
+///
+/// # Safety
+/// Category and message are NULL or NUL-terminated strings (section 2.3.1 of FMI 3.0).
+pub unsafe extern "C" fn log_of_fmi3(
+    environment: fmi3InstanceEnvironment,
+    status: c_int,
+    category: fmi3String,
+    message: fmi3String,
+) {
+    // SAFETY: the caller's requirement.
+    let [category, text] = [category, message].map(|text| unsafe { string(text) });
+    remember(environment.addr(), Message { status: Status::from_c(status), category, text });
+}

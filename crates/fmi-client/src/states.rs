@@ -1,0 +1,141 @@
+//! Saved states of an instance. They are indices, so that no caller can pass a pointer that the FMU did not make.
+
+use crate::instance::{Instance, call};
+use crate::library::Functions;
+use crate::rejection::Rejection;
+use fmi_abi::c_types::{c_int, c_void};
+use std::alloc::{Layout, alloc_zeroed};
+use std::ptr::null_mut;
+
+/// Index of a state that an instance has saved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Saved(usize);
+
+impl Saved {
+    /// Returns the index, which is free again after [`Instance::forget`].
+    pub fn index(self) -> usize {
+        self.0
+    }
+}
+
+/// States that an instance has saved.
+#[derive(Debug, Default)]
+pub(crate) struct States {
+    /// Handles; NULL marks a free entry.
+    all: Vec<*mut c_void>,
+    /// Indices of the free entries.
+    free: Vec<usize>,
+}
+
+impl States {
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.all.len() == self.free.len()
+    }
+
+    fn keep(&mut self, state: *mut c_void) -> Saved {
+        let index = self.free.pop().unwrap_or(self.all.len());
+        self.all.resize(self.all.len().max(index + 1), null_mut());
+        self.all[index] = state;
+        Saved(index)
+    }
+}
+
+impl Instance {
+    /// Saves the state.
+    ///
+    /// # Errors
+    /// The FMU rejects the call.
+    pub fn save(&mut self) -> Result<Saved, Rejection> {
+        let mut state = null_mut();
+        call!(self, fmi2GetFMUstate(&mut state), fmi3GetFMUState(&mut state))?;
+        self.kept(state, "save")
+    }
+
+    fn kept(&mut self, state: *mut c_void, function: &'static str) -> Result<Saved, Rejection> {
+        if state.is_null() {
+            return Err(self.own_rejection(function, "the FMU returned no state".to_owned()));
+        }
+        Ok(self.states.keep(state))
+    }
+
+    /// Returns the saved state of an index.
+    fn state(&self, saved: Saved, function: &'static str) -> Result<*mut c_void, Rejection> {
+        let state = self.states.all.get(saved.0).copied().filter(|state| !state.is_null());
+        state.ok_or_else(|| self.own_rejection(function, "there is no such saved state".to_owned()))
+    }
+
+    /// Restores a saved state.
+    ///
+    /// # Errors
+    /// The FMU rejects the call.
+    pub fn restore(&mut self, saved: Saved) -> Result<(), Rejection> {
+        let state = self.state(saved, "restore")?;
+        call!(self, fmi2SetFMUstate(state), fmi3SetFMUState(state))
+    }
+
+    /// Frees a saved state.
+    ///
+    /// # Errors
+    /// The FMU rejects the call.
+    pub fn forget(&mut self, saved: Saved) -> Result<(), Rejection> {
+        let Ok(mut state) = self.state(saved, "forget") else { return Ok(()) };
+        self.states.all[saved.0] = null_mut();
+        self.states.free.push(saved.0);
+        call!(self, fmi2FreeFMUstate(&mut state), fmi3FreeFMUState(&mut state))
+    }
+
+    /// Frees all saved states.
+    pub(crate) fn forget_all(&mut self) {
+        for index in 0..self.states.all.len() {
+            _ = self.forget(Saved(index));
+        }
+    }
+
+    /// Returns a saved state as bytes.
+    ///
+    /// # Errors
+    /// The FMU rejects a call, or reports a size for which there is not enough memory.
+    pub fn serialize(&mut self, saved: Saved) -> Result<Vec<u8>, Rejection> {
+        let (state, mut size) = (self.state(saved, "serialize")?, 0);
+        call!(
+            self,
+            fmi2SerializedFMUstateSize(state, &mut size),
+            fmi3SerializedFMUStateSize(state, &mut size)
+        )?;
+        let Some(mut bytes) = zeros(size) else {
+            let text =
+                format!("the FMU reports a state of {size} bytes, for which there is not enough memory");
+            return Err(self.own_rejection("serialize", text));
+        };
+        let to = bytes.as_mut_ptr();
+        call!(self, fmi2SerializeFMUstate(state, to.cast(), size), fmi3SerializeFMUState(state, to, size))?;
+        Ok(bytes)
+    }
+
+    /// Reads a state from bytes.
+    ///
+    /// # Errors
+    /// The FMU rejects the bytes.
+    pub fn deserialize(&mut self, bytes: &[u8]) -> Result<Saved, Rejection> {
+        let (from, size, mut state) = (bytes.as_ptr(), bytes.len(), null_mut());
+        call!(
+            self,
+            fmi2DeSerializeFMUstate(from.cast(), size, &mut state),
+            fmi3DeserializeFMUState(from, size, &mut state)
+        )?;
+        self.kept(state, "deserialize")
+    }
+}
+
+/// Returns bytes that are 0, if there is enough memory. The system provides their pages when the FMU writes to them.
+fn zeros(size: usize) -> Option<Vec<u8>> {
+    if size == 0 {
+        return Some(Vec::new());
+    }
+    let layout = Layout::array::<u8>(size).ok()?;
+    // SAFETY: the layout has a size above 0.
+    let memory = unsafe { alloc_zeroed(layout) };
+    // SAFETY: memory of the global allocator with this layout, which is initialized.
+    (!memory.is_null()).then(|| unsafe { Vec::from_raw_parts(memory, size, size) })
+}

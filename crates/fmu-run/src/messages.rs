@@ -1,0 +1,83 @@
+//! Messages of FMUs for callers that want them all.
+
+use fmi_client::{Listen, Message};
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// A message of an FMU.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Logged {
+    /// Index of the run or the instance; `None` if the FMU does not tell, because it logs from its own thread and hands an unknown
+    /// environment to the logger.
+    pub index: Option<usize>,
+    /// Name of the component in a system; empty for a single FMU.
+    pub component: String,
+    /// Communication point at or after which the message came, s, in runs.
+    pub time: Option<f64>,
+    /// The message.
+    pub message: Message,
+}
+
+/// Collects the messages of instances. An instance has a number: that of its first component, plus the index of the component.
+#[derive(Debug)]
+pub(crate) struct Feed {
+    components: Vec<String>,
+    /// Index and time of the run that an instance performs, by the number of the instance.
+    runs: Mutex<HashMap<usize, (usize, f64)>>,
+    logged: Mutex<Vec<Logged>>,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Feed {
+    /// Creates a feed for the instances of these components.
+    pub fn of(components: Vec<String>) -> Arc<Self> {
+        Arc::new(Self { components, runs: Mutex::default(), logged: Mutex::default() })
+    }
+
+    /// Records which run an instance performs.
+    pub fn at(&self, instance: usize, run: usize, time: f64) {
+        lock(&self.runs).insert(instance, (run, time));
+    }
+
+    /// Removes and returns the messages so far.
+    pub fn take(&self) -> Vec<Logged> {
+        std::mem::take(&mut *lock(&self.logged))
+    }
+}
+
+impl Listen for Feed {
+    fn hear(&self, number: Option<usize>, message: &Message) {
+        let count = self.components.len().max(1);
+        let instance = number.map(|number| number / count);
+        let run = instance.and_then(|instance| lock(&self.runs).get(&instance).copied());
+        let component = number.and_then(|number| self.components.get(number % count));
+        let logged = Logged {
+            index: run.map(|(run, _)| run).or(instance),
+            component: component.cloned().unwrap_or_default(),
+            time: run.map(|(_, time)| time),
+            message: message.clone(),
+        };
+        lock(&self.logged).push(logged);
+    }
+}
+
+/// How the messages of an instance are treated.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Logging {
+    /// Whether the FMU logs more.
+    pub on: bool,
+    /// Receiver of all messages, and the number of the instance.
+    pub feed: Option<(Arc<Feed>, usize)>,
+}
+
+impl Logging {
+    /// Returns the listener for a component of the instance.
+    pub fn listener(&self, component: usize) -> Option<(Arc<dyn Listen>, usize)> {
+        let (feed, instance) = self.feed.as_ref()?;
+        let count = feed.components.len().max(1);
+        Some((Arc::clone(feed) as Arc<dyn Listen>, instance * count + component))
+    }
+}

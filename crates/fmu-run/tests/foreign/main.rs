@@ -1,0 +1,273 @@
+//! FMUs with the manners of other producers: `foreign.c` names each, and tools in which it was observed.
+#![allow(unsafe_code, reason = "FMUs are opened")]
+#![cfg(all(target_os = "linux", target_arch = "x86_64"))]
+
+mod built;
+
+use built::{built, opened};
+use fmu_run::{Batch, Error, Fmu, Setup, Standard, Start, Status, Tolerance, Trajectory, Watch};
+
+const VERSIONS: [Standard; 2] = [Standard::Fmi2, Standard::Fmi3];
+
+fn times() -> Vec<f64> {
+    (0..11).map(|k| f64::from(k) / 10.0).collect()
+}
+
+/// Runs an FMU with u = 1; returns y at the end.
+fn end(fmu: &Fmu) -> Result<f64, String> {
+    let time = times();
+    let batch = Batch {
+        time: &time,
+        inputs: vec![("u", Trajectory::Constant(1.0))],
+        outputs: vec!["y"],
+        every: Some(1),
+        ..Batch::default()
+    };
+    let runs = fmu.run(&batch, &Watch::default()).map_err(|error| error.to_string())?;
+    match runs.errors.first() {
+        Some((_, why)) => Err(why.clone()),
+        None => Ok(runs.trajectories[10]),
+    }
+}
+
+#[test]
+fn foreign_manners_do_not_change_results() {
+    let same = [
+        "plain",
+        "memory",
+        "unchecked_memory",
+        "null_environment",
+        "freed_environment",
+        "thread",
+        "other_thread",
+        "free",
+        "format",
+        "percent",
+        "chatty",
+        "null_texts",
+        "stop_time",
+        "pending",
+        "warning",
+        "once",
+        "directory",
+        "locale",
+        "output",
+        "libm",
+        "exceptions",
+        "no_reset",
+    ];
+    for standard in VERSIONS {
+        for manner in same {
+            let result = end(&opened(manner, standard));
+            assert!(
+                result.as_ref().is_ok_and(|y| (y - 1.0).abs() < 1e-12),
+                "{manner}, {standard}: {result:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn errors_have_the_messages_of_fmus_with_another_environment() {
+    for (standard, function) in VERSIONS.into_iter().zip(["fmi2DoStep", "fmi3DoStep"]) {
+        let expected = format!("at 0.5 s: {function}: the stranger gives up");
+        assert_eq!(end(&opened("other_environment", standard)), Err(expected));
+        // With several instances, the thread tells to which one a message belongs.
+        let fmu = opened("other_environment", standard);
+        let mut others = fmu.instances(&Setup { count: 3, ..Setup::default() }).unwrap();
+        others.step(0.6, None).unwrap();
+        others.step(0.1, None).unwrap();
+        let errors: Vec<_> = others.errors().map(|(index, why)| (index, why.to_owned())).collect();
+        assert_eq!(errors.len(), 3);
+        assert!(errors.iter().all(|(_, why)| why.ends_with("the stranger gives up")), "{errors:?}");
+    }
+}
+
+#[test]
+fn the_tolerance_of_the_default_experiment_is_passed() {
+    for standard in VERSIONS {
+        let fmu = opened("tolerance", standard);
+        for (tolerance, expected, passed) in [
+            (Tolerance::Default, 1.0 + 1e-5, 1e-5),
+            (Tolerance::Value(1e-3), 1.001, 1e-3),
+            (Tolerance::None, 1.01, -1.0),
+        ] {
+            let time = times();
+            let batch = Batch {
+                time: &time,
+                inputs: vec![("u", Trajectory::Constant(1.0))],
+                outputs: vec!["y"],
+                every: Some(10),
+                tolerance,
+                ..Batch::default()
+            };
+            let runs = fmu.run(&batch, &Watch::default()).unwrap();
+            assert!((runs.trajectories[1] - expected).abs() < 1e-12, "{standard} {tolerance:?}");
+            let setup = Setup { tolerance, stop_time: Some(3.0), ..Setup::default() };
+            let mut one = fmu.instances(&setup).unwrap();
+            let mut values = [0.0; 2];
+            one.get(&fmu.select(&["tolerance", "stop"]).unwrap(), &mut values);
+            assert_eq!(values, [passed, 3.0]);
+        }
+        let setup = Setup { tolerance: Tolerance::Value(0.0), ..Setup::default() };
+        assert!(matches!(fmu.instances(&setup), Err(Error::Request(why)) if why.contains("above 0")));
+    }
+}
+
+#[test]
+fn messages_reach_a_listener() {
+    let of = |manner, standard| {
+        let fmu = opened(manner, standard);
+        let setup =
+            Setup { listening: true, count: if manner == "once" { 1 } else { 2 }, ..Setup::default() };
+        let mut instances = fmu.instances(&setup).unwrap();
+        instances.step(0.1, None).unwrap();
+        let messages = instances.take_messages();
+        assert!(instances.take_messages().is_empty() || manner.contains("thread"));
+        messages.into_iter().map(|of| (of.index, of.message.status, of.message.text)).collect::<Vec<_>>()
+    };
+    for standard in VERSIONS {
+        let step = "a step".to_owned();
+        assert_eq!(
+            of("chatty", standard),
+            [(Some(0), Status::Ok, step.clone()), (Some(1), Status::Ok, step)]
+        );
+        let percent = of("percent", standard);
+        assert_eq!(percent[0], (Some(0), Status::Warning, "100% of %20s is %n, 50%".to_owned()));
+        assert_eq!(of("null_texts", standard)[0], (Some(0), Status::Warning, String::new()));
+        let strange = of("null_environment", standard);
+        let greeting = (None, Status::Warning, "my environment is not yours".to_owned());
+        assert_eq!(strange.last(), Some(&greeting), "{strange:?}");
+    }
+    let expanded = "tank has 7 of 8, 0.500 and 1.0e-09, ab  |%|z";
+    assert_eq!(of("format", Standard::Fmi2)[0].2, expanded);
+}
+
+#[test]
+fn runs_pass_messages_with_their_time() {
+    for standard in VERSIONS {
+        let (fmu, watch, time) = (opened("chatty", standard), Watch::listening(), times());
+        let gains = [0.0, 1.0, 2.0];
+        let batch = Batch {
+            time: &time,
+            start: vec![("gain", Start::Each(&gains))],
+            outputs: vec!["y"],
+            threads: Some(2),
+            ..Batch::default()
+        };
+        fmu.run(&batch, &watch).unwrap();
+        let messages = watch.take_messages();
+        for run in 0..3 {
+            let of_run: Vec<_> = messages.iter().filter(|of| of.index == Some(run)).collect();
+            let at: Vec<_> = of_run.iter().filter_map(|of| of.time).collect();
+            assert_eq!(at, time[..10], "{standard}, run {run}");
+        }
+        assert_eq!(messages.len(), 30);
+        assert!(watch.take_messages().is_empty());
+    }
+}
+
+#[test]
+fn discard_and_missing_stop_time_are_errors_with_their_messages() {
+    for standard in VERSIONS {
+        let discarded = end(&opened("discard", standard)).unwrap_err();
+        assert!(
+            discarded.starts_with("at 0.5 s: ") && discarded.ends_with("the step is too large"),
+            "{discarded}"
+        );
+        let missing = opened("stop_time", standard).instances(&Setup::default()).unwrap_err().to_string();
+        assert!(missing.ends_with("the stop time is missing"), "{missing}");
+    }
+}
+
+#[test]
+fn a_state_does_not_outlive_its_instance() {
+    for (standard, manner) in
+        [(Standard::Fmi2, "no_reset"), (Standard::Fmi3, "no_reset"), (Standard::Fmi2, "plain")]
+    {
+        let fmu = opened(manner, standard);
+        let (u, y) = (fmu.select(&["u"]).unwrap(), fmu.select(&["y"]).unwrap());
+        let mut one = fmu.instances(&Setup::default()).unwrap();
+        let mut save_at = |u_value: f64| {
+            one.set(&u, &[u_value], None).unwrap();
+            one.step(1.0, None).unwrap();
+            let saved = one.save().unwrap();
+            one.reset(None);
+            saved
+        };
+        let [first, second] = [1.0, 5.0].map(&mut save_at);
+        let mut value = [0.0];
+        for (states, expected) in [(first, 1.0), (second, 5.0)] {
+            let (restored, serialized) = (one.restore(&states, None), one.serialize(&states));
+            one.get(&y, &mut value);
+            if manner == "plain" {
+                restored.unwrap();
+                serialized.unwrap();
+                assert_eq!(value[0], expected);
+            } else {
+                let why = restored.unwrap_err().to_string();
+                assert!(why.contains("before a reset that made a new instance"), "{why}");
+                assert_eq!(serialized.unwrap_err().to_string(), why);
+                assert_eq!(value[0], 0.0, "the instance is as it was");
+            }
+            one.forget(states);
+        }
+        assert_eq!(one.errors().count(), 0);
+    }
+}
+
+#[test]
+fn absurd_sizes_of_states_are_errors() {
+    for standard in VERSIONS {
+        for manner in ["huge_state", "endless_state"] {
+            let fmu = opened(manner, standard);
+            let mut one = fmu.instances(&Setup::default()).unwrap();
+            let states = one.save().unwrap();
+            assert_eq!(one.serialize(&states).unwrap(), [None]);
+            let why = one.none_left().unwrap().to_owned();
+            assert!(why.contains("for which there is not enough memory"), "{why}");
+        }
+        let fmu = opened("growing_state", standard);
+        let mut one = fmu.instances(&Setup::default()).unwrap();
+        let states = one.save().unwrap();
+        let bytes = one.serialize(&states).unwrap();
+        assert!(one.deserialize(&bytes).is_ok());
+    }
+}
+
+#[test]
+fn resources_are_found_under_any_path() {
+    for standard in VERSIONS {
+        let directory = tempfile::Builder::new().prefix("a b%20 \u{e4}#").tempdir().unwrap();
+        let path = built("resources", standard, directory.path(), &[]);
+        // SAFETY: the FMU of this test.
+        let fmu = unsafe { Fmu::open(&path) }.unwrap();
+        assert_eq!(end(&fmu), Ok(3.5), "{standard}");
+    }
+}
+
+#[test]
+fn the_rounding_of_an_fmu_does_not_reach_the_caller() {
+    for standard in VERSIONS {
+        let fmu = opened("rounding", standard);
+        let mut one = fmu.instances(&Setup::default()).unwrap();
+        let mut value = [0.0];
+        one.get(&fmu.select(&["y"]).unwrap(), &mut value);
+        let third = std::hint::black_box(1.0_f64) / std::hint::black_box(3.0);
+        assert_eq!(third.to_bits(), 0x3fd5_5555_5555_5555, "{standard}");
+        // An unmasked exception would end the process.
+        assert!((std::hint::black_box(1.0_f64) / std::hint::black_box(value[0])).is_infinite());
+    }
+}
+
+#[test]
+fn a_second_instance_of_an_fmu_that_exists_once_is_an_error() {
+    for standard in VERSIONS {
+        let fmu = opened("once", standard);
+        let first = fmu.instances(&Setup::default()).unwrap();
+        let second = fmu.instances(&Setup::default()).unwrap_err().to_string();
+        assert_eq!(second, "there is an instance already");
+        drop(first);
+        fmu.instances(&Setup::default()).unwrap();
+    }
+}
