@@ -8,7 +8,7 @@ macro_rules! base_types {
     ($($base:ident $description:literal [$($fmi2:literal)?] $fmi3:literal;)+) => {
         /// Base types of variables. FMI 2.0 has only Real, Integer, Boolean, String and Enumeration. FMI 3.0 has all
         /// of them; it calls Real Float64 and Integer Int32.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum BaseType { $(#[doc = $description] $base,)+ }
 
         impl BaseType {

@@ -8,6 +8,7 @@ use crate::running::{Running, Saved};
 use crate::selection::{Selection, Target};
 use crate::start::{Start, StartValues, exact, is_exact};
 use crate::system::System;
+use crate::threads::Threads;
 use fmi_abi::{BaseType, Interface, Value};
 use fmi_client::{Continuous, Event, Rejection};
 use std::sync::Arc;
@@ -63,7 +64,8 @@ pub struct Instances {
     begin: Begin,
     /// Collects all messages, if the caller wants them.
     feed: Option<Arc<Feed>>,
-    pool: Option<rayon::ThreadPool>,
+    /// Threads in addition to the caller's.
+    threads: Option<Threads>,
 }
 
 #[derive(Debug)]
@@ -127,16 +129,14 @@ impl System {
         let start = StartValues::of(self, &[])?;
         let Setup { start_time, stop_time, tolerance, .. } = *setup;
         let all = empty(setup.count, self.components().len())?;
-        let threads = self.threads(setup.interface, setup.threads)?.min(setup.count);
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads - 1);
-        let pool = (threads > 1).then(|| pool.build()).transpose();
+        let threads = self.threads(setup.interface, setup.threads, setup.count)?;
         let mut instances = Instances {
             system: self.clone(),
             interface: setup.interface,
             all,
             begin: Begin { start, experiment: Experiment { start_time, stop_time, tolerance } },
             feed: setup.listening.then(|| self.feed()),
-            pool: pool.map_err(|error| Error::Fmu(format!("no threads can be made: {error}")))?,
+            threads: (threads > 1).then(|| Threads::new(threads - 1)).transpose()?,
         };
         instances.start_from(&setup.start)?;
         instances.reset(None);
@@ -226,7 +226,7 @@ impl Instances {
                 Err((text, _)) => one.error = Some(text),
             }
         };
-        each(self.pool.as_ref(), &mut self.all, mask, reset);
+        each(&mut self.threads, &mut self.all, mask, reset);
     }
 
     /// Sets variables, from a row for each instance or from one row for all.
@@ -356,7 +356,7 @@ impl Instances {
                 Err(rejection) => one.error = Some(rejection.to_string()),
             }
         };
-        each(self.pool.as_ref(), &mut self.all, mask, back);
+        each(&mut self.threads, &mut self.all, mask, back);
         Ok(())
     }
 
@@ -650,7 +650,7 @@ impl Instances {
         mask: Mask,
         body: impl Fn(usize, &mut Own, &mut Running) -> Result<(), Rejection> + Sync,
     ) {
-        each(self.pool.as_ref(), &mut self.all, mask, |index, one| {
+        each(&mut self.threads, &mut self.all, mask, |index, one| {
             one.with(|own, instance| body(index, own, instance));
         });
     }
@@ -668,7 +668,7 @@ impl Instances {
                 row.fill(f64::NAN);
             }
         };
-        in_parts(self.pool.as_ref(), &mut self.all, length, values, body);
+        in_parts(&mut self.threads, &mut self.all, length, values, body);
     }
 }
 
@@ -725,16 +725,11 @@ fn initialize(
 }
 
 /// Calls `body` for each instance in the mask.
-fn each(
-    pool: Option<&rayon::ThreadPool>,
-    all: &mut [One],
-    mask: Mask,
-    body: impl Fn(usize, &mut One) + Sync,
-) {
+fn each(threads: &mut Option<Threads>, all: &mut [One], mask: Mask, body: impl Fn(usize, &mut One) + Sync) {
     if let Some(mask) = mask {
         assert_eq!(mask.len(), all.len(), "a Boolean for each instance");
     }
-    in_parts(pool, all, 0, &mut [], |index, one, _| {
+    in_parts(threads, all, 0, &mut [], |index, one, _| {
         if mask.is_none_or(|mask| mask[index]) {
             body(index, one);
         }
@@ -744,7 +739,7 @@ fn each(
 /// Calls `body` for each instance and its row of `length` values. This thread and each thread of the pool get
 /// a part of the instances.
 fn in_parts(
-    pool: Option<&rayon::ThreadPool>,
+    threads: &mut Option<Threads>,
     all: &mut [One],
     length: usize,
     values: &mut [f64],
@@ -756,10 +751,14 @@ fn in_parts(
             body(first + k, one, rows.next().unwrap_or_default());
         }
     };
-    let Some(pool) = pool else { return work(0, all, values) };
-    let part = all.len().div_ceil(pool.current_num_threads() + 1);
+    if let Some(of_parent) = threads.take_if(|threads| !threads.are_here()) {
+        // Without threads, this one does all the work.
+        *threads = Threads::new(of_parent.count()).ok();
+    }
+    let Some(threads) = threads else { return work(0, all, values) };
+    let part = all.len().div_ceil(threads.count() + 1);
     // This thread works too, because a waiting thread takes time to wake up.
-    pool.in_place_scope(|scope| {
+    threads.pool().in_place_scope(|scope| {
         let (own, others) = all.split_at_mut(part);
         let (own_values, other_values) = values.split_at_mut(part * length);
         let mut rest = other_values;

@@ -14,6 +14,7 @@ mod fmu;
 mod found;
 mod instance;
 mod instances;
+mod kept;
 mod library;
 mod machine;
 mod messages;
@@ -21,6 +22,7 @@ mod running;
 mod selection;
 mod start;
 mod system;
+mod threads;
 mod values;
 
 pub use batch::{Batch, Measure, Planned, Runs, Size, Trajectory, Watch};
@@ -36,3 +38,5 @@ pub use messages::Logged;
 pub use selection::Selection;
 pub use start::Start;
 pub use system::{Composition, Fmu, Order, StartValue, System, nearest};
+#[doc(hidden)]
+pub use threads::process;

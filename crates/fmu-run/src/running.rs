@@ -5,7 +5,7 @@ use crate::messages::Logging;
 use crate::selection::{Selection, Target};
 use crate::start::StartValues;
 use crate::system::{Exchange, Order, System};
-use fmi_abi::{Interface, Value};
+use fmi_abi::{BaseType, Interface, Value};
 use fmi_client::Rejection;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -42,24 +42,65 @@ impl Running {
         interface: Interface,
         logging: &Logging,
     ) -> Result<Self, (String, bool)> {
-        static GENERATION: AtomicU64 = AtomicU64::new(0);
-        let used = used.filter(Self::is_alive).and_then(|mut used| {
-            used.components.iter_mut().try_for_each(|instance| instance.reset()).ok()?;
-            Some(used)
-        });
         // Some FMUs cannot be reset. The old instances are freed before new ones are made, because some FMUs
         // permit only one.
-        if let Some(used) = used {
-            return Ok(used);
+        match used.and_then(Self::reset) {
+            Some(used) => Ok(used),
+            None => Self::new(system, interface, logging),
         }
+    }
+
+    /// Creates new instances. The error contains the reason, and whether the FMU gave it.
+    pub fn new(system: &System, interface: Interface, logging: &Logging) -> Result<Self, (String, bool)> {
         let components = system.components().iter().enumerate();
         let components = components.map(|(index, component)| {
             Instance::new(&component.fmu, (index, &component.name), interface, logging)
         });
-        let components = components.collect::<Result<Vec<_>, _>>()?;
-        let (system, [passed, row, buffer]) = (system.clone(), [const { Vec::new() }; 3]);
+        Ok(Self::of(system, components.collect::<Result<_, _>>()?))
+    }
+
+    /// Returns these instances of the components of the system.
+    pub fn of(system: &System, components: Vec<Instance>) -> Self {
+        static GENERATION: AtomicU64 = AtomicU64::new(0);
         let generation = GENERATION.fetch_add(1, Ordering::Relaxed);
-        Ok(Self { generation, components, system, is_due: false, passed, saved: Vec::new(), row, buffer })
+        let (system, [passed, row, buffer]) = (system.clone(), [const { Vec::new() }; 3]);
+        Self { generation, components, system, is_due: false, passed, saved: Vec::new(), row, buffer }
+    }
+
+    pub fn into_components(self) -> Vec<Instance> {
+        self.components
+    }
+
+    /// Resets the instances, if their FMUs can.
+    pub fn reset(mut self) -> Option<Self> {
+        if !self.is_alive() {
+            return None;
+        }
+        self.components.iter_mut().try_for_each(|instance| instance.reset()).ok()?;
+        self.is_due = false;
+        Some(self)
+    }
+
+    /// Reads all numbers, by their bits; `None` for numbers that an FMU does not return.
+    pub fn observe(&mut self) -> Vec<Option<u64>> {
+        let mut seen = Vec::new();
+        for (instance, component) in self.components.iter_mut().zip(self.system.components()) {
+            for base in BaseType::ALL {
+                if matches!(base, BaseType::String | BaseType::Binary) {
+                    continue;
+                }
+                let variables = &component.fmu.description.variables;
+                let references: Vec<_> =
+                    variables.iter().filter(|of| of.base == base).map(|of| of.reference).collect();
+                if references.is_empty() {
+                    continue;
+                }
+                let mut values = vec![0.0; references.len()];
+                let is_read = instance.get_numbers(base, &references, &mut values).is_ok();
+                seen.extend(values.iter().map(|value| is_read.then_some(value.to_bits())));
+            }
+        }
+        seen
     }
 
     /// Sets start values and enters Initialization Mode, in an order that both FMI versions allow.

@@ -29,7 +29,7 @@ struct Group {
 }
 
 /// Target of a value: component, type and value reference.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Target {
     pub component: usize,
     pub base: BaseType,
@@ -84,6 +84,16 @@ impl Selection {
             None => Some(&[]),
             Some(group) => self.is_direct.then_some(&group.references),
         }
+    }
+
+    pub(crate) fn targets(&self) -> impl Iterator<Item = Target> {
+        self.groups.iter().flat_map(|Group { component, base, references, .. }| {
+            references.iter().map(|reference| Target {
+                component: *component,
+                base: *base,
+                reference: *reference,
+            })
+        })
     }
 
     /// Fails if a caller may not set the variables to the values of these rows.

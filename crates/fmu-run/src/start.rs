@@ -88,6 +88,12 @@ impl<'a> StartValues<'a> {
         self.numbers.iter().filter_map(move |(index, values)| Some((*index, *one(values, of)?)))
     }
 
+    /// Returns the variables.
+    pub fn targets(&self) -> impl Iterator<Item = Target> {
+        let values = self.values.iter().map(|(index, _)| *index);
+        self.numbers.iter().map(|(index, _)| *index).chain(values)
+    }
+
     /// Returns the strings, bytes and integers of 64 bits of a run or an instance.
     pub fn values(&self, of: usize) -> impl Iterator<Item = (Target, &Value)> {
         self.values.iter().filter_map(move |(index, values)| Some((*index, one(values, of)?)))

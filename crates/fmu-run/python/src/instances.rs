@@ -3,12 +3,14 @@
 use crate::buffers::{Numbers, Output};
 use crate::start::Start;
 use crate::{FmuError, python};
-use fmu_run::{Continuous, Error, Interface, Selection, Setup, System};
+use fmu_run::{Continuous, Error, Interface, Selection, Setup, System, process};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::{PyBytes, PyDict, PyString, PyTuple};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::time::{Duration, Instant};
 
 /// Instances of one FMU, run in parallel; made by `Fmu.instances`.
 ///
@@ -24,7 +26,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub struct Instances {
     system: System,
     count: usize,
-    instances: Arc<Mutex<fmu_run::Instances>>,
+    instances: Arc<Shared>,
     /// Cache of looked-up names, by the objects that named them.
     known: Mutex<Vec<(Py<PyAny>, Arc<Named>)>>,
 }
@@ -39,15 +41,55 @@ struct Named {
 /// Saved states of instances; freed with this object.
 #[pyclass(frozen, module = "fmu_run")]
 pub struct States {
-    instances: Arc<Mutex<fmu_run::Instances>>,
+    instances: Arc<Shared>,
     states: Option<Arc<fmu_run::States>>,
 }
 
 impl Drop for States {
     fn drop(&mut self) {
         if let Some(states) = self.states.take().and_then(Arc::into_inner) {
-            lock(&self.instances).forget(states);
+            // In a forked process they may be out of reach.
+            if let Ok(mut instances) = self.instances.lock() {
+                instances.forget(states);
+            }
         }
+    }
+}
+
+/// Instances that Python threads share.
+struct Shared {
+    instances: Mutex<fmu_run::Instances>,
+    /// Process that locked them last.
+    process: AtomicU32,
+}
+
+impl Shared {
+    fn of(instances: fmu_run::Instances) -> Arc<Self> {
+        Arc::new(Self { instances: Mutex::new(instances), process: AtomicU32::new(process()) })
+    }
+
+    /// Waits until no other thread uses the instances. Fails if this is for ever, because a thread used them when
+    /// this process was forked.
+    fn lock(&self) -> PyResult<MutexGuard<'_, fmu_run::Instances>> {
+        const BETWEEN_LOCK_AND_STORE: Duration = Duration::from_secs(1);
+        let found = match self.instances.try_lock() {
+            Ok(found) => found,
+            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+            Err(TryLockError::WouldBlock) => {
+                let begin = Instant::now();
+                while self.process.load(Ordering::Acquire) != process() {
+                    if begin.elapsed() > BETWEEN_LOCK_AND_STORE {
+                        return Err(FmuError::new_err(
+                            "another thread used these instances when this process was forked; make new instances after the fork",
+                        ));
+                    }
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+                lock(&self.instances)
+            }
+        };
+        self.process.store(process(), Ordering::Release);
+        Ok(found)
     }
 }
 
@@ -92,17 +134,17 @@ impl Instances {
             ..Setup::default()
         };
         let made = py.detach(|| system.instances(&setup)).map_err(python)?;
-        Ok(Self { system, count, instances: Arc::new(Mutex::new(made)), known: Mutex::default() })
+        Ok(Self { system, count, instances: Shared::of(made), known: Mutex::default() })
     }
 
     fn __len__(&self) -> usize {
         self.count
     }
 
-    fn __repr__(&self) -> String {
-        let failed = lock(&self.instances).errors().count();
+    fn __repr__(&self) -> PyResult<String> {
+        let failed = self.instances.lock()?.errors().count();
         let failed = if failed == 0 { String::new() } else { format!(", {failed} dropped out") };
-        format!("<Instances: {} of {}{failed}>", self.count, self.system.name())
+        Ok(format!("<Instances: {} of {}{failed}>", self.count, self.system.name()))
     }
 
     /// dict[int, str]: the instances that have dropped out, each with the reason from the FMU.
@@ -111,7 +153,7 @@ impl Instances {
         let errors = PyDict::new(py);
         // Calls no Python code while the lock is held: dropping a States object takes the lock, too.
         let found: Vec<_> =
-            lock(&self.instances).errors().map(|(index, why)| (index, why.to_owned())).collect();
+            self.instances.lock()?.errors().map(|(index, why)| (index, why.to_owned())).collect();
         for (index, why) in found {
             errors.set_item(index, why)?;
         }
@@ -122,7 +164,7 @@ impl Instances {
     #[getter]
     fn time<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (array, mut output) = Output::of(py, None, &[self.count])?;
-        output.values().iter_mut().zip(lock(&self.instances).times()).for_each(|(to, time)| *to = time);
+        output.values().iter_mut().zip(self.instances.lock()?.times()).for_each(|(to, time)| *to = time);
         Ok(array)
     }
 
@@ -260,7 +302,7 @@ impl Instances {
     /// Read states from the bytes that `serialize` returned, here or in another process: one or None for each
     /// instance.
     fn deserialize(&self, py: Python, states: Vec<Option<PyBackedBytes>>) -> PyResult<States> {
-        let read = py.detach(|| lock(&self.instances).deserialize(&states)).map_err(python)?;
+        let read = py.detach(|| self.instances.lock()?.deserialize(&states).map_err(python))?;
         Ok(States { instances: Arc::clone(&self.instances), states: Some(Arc::new(read)) })
     }
 
@@ -335,7 +377,7 @@ impl Instances {
     #[pyo3(signature = (states, mask=None))]
     fn set_continuous_states(&self, py: Python, states: &Bound<'_, PyAny>, mask: Optional) -> PyResult<()> {
         self.only(Interface::ModelExchange)?;
-        let columns = Some(lock(&self.instances).continuous(Continuous::States));
+        let columns = Some(self.instances.lock()?.continuous(Continuous::States));
         let (mask, states) = (self.mask(mask)?, self.fitting(columns, Numbers::of(states)?)?);
         self.attempt(py, |all| {
             all.set_continuous_states(states.values(), mask.as_deref());
@@ -477,7 +519,7 @@ impl Instances {
 
     /// Fails if the instances are for another interface type, before the FMU would reject the call.
     fn only(&self, wanted: Interface) -> PyResult<()> {
-        let why = match (wanted, lock(&self.instances).interface()) {
+        let why = match (wanted, self.instances.lock()?.interface()) {
             (wanted, interface) if wanted == interface => return Ok(()),
             (Interface::ModelExchange, _) => {
                 "these instances are for Co-Simulation; this is for Model Exchange: instances(interface=\"model-exchange\")"
@@ -505,7 +547,7 @@ impl Instances {
         py: Python,
         body: impl FnOnce(&mut fmu_run::Instances) -> Result<T, Error> + Send,
     ) -> PyResult<T> {
-        if let Some(why) = lock(&self.instances).none_left() {
+        if let Some(why) = self.instances.lock()?.none_left() {
             let all = if self.count == 1 { "the instance has" } else { "all instances have" };
             let why = format!(
                 "{all} dropped out before; reset() or restore() brings them back (instance 0: {why})"
@@ -521,12 +563,11 @@ impl Instances {
         py: Python,
         body: impl FnOnce(&mut fmu_run::Instances) -> Result<T, Error> + Send,
     ) -> PyResult<T> {
-        let called = py.detach(|| {
-            let mut all = lock(&self.instances);
-            let result = body(&mut all)?;
-            Ok((result, all.none_left().map(str::to_owned)))
-        });
-        let (result, none_left) = called.map_err(python)?;
+        let (result, none_left) = py.detach(|| {
+            let mut all = self.instances.lock()?;
+            let result = body(&mut all).map_err(python)?;
+            PyResult::Ok((result, all.none_left().map(str::to_owned)))
+        })?;
         none_left.map_or(Ok(result), |why| Err(FmuError::new_err(why)))
     }
 
@@ -563,7 +604,7 @@ impl Instances {
         out: Optional<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
         self.only(Interface::ModelExchange)?;
-        let columns = lock(&self.instances).continuous(what);
+        let columns = self.instances.lock()?.continuous(what);
         self.read(py, Some(columns), out, |all, values| {
             all.get_continuous(what, values);
             Ok(())
@@ -579,7 +620,7 @@ impl Instances {
         output
             .values()
             .iter_mut()
-            .zip(lock(&self.instances).events())
+            .zip(self.instances.lock()?.events())
             .for_each(|(to, event)| *to = what(event));
         Ok(array)
     }

@@ -15,14 +15,9 @@ use start::Start;
 use std::collections::BTreeMap;
 use std::ops::Deref;
 use std::path::PathBuf;
-use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, PoisonError};
 
 create_exception!(fmu_run, FmuError, PyException, "An FMU that cannot be loaded or run, or rejects a run.");
-
-/// Interval for checks of Ctrl-C and reports of progress.
-const INTERVAL: Duration = Duration::from_millis(100);
 
 /// An unpacked and loaded FMU or system, until it is closed.
 #[pyclass(frozen, module = "fmu_run._native")]
@@ -118,7 +113,12 @@ impl Loaded {
 
     fn close(&self, py: Python) {
         let model = self.0.lock().unwrap_or_else(PoisonError::into_inner).take();
-        py.detach(|| drop(model));
+        py.detach(|| {
+            if let Some(model) = &model {
+                model.release();
+            }
+            drop(model);
+        });
     }
 
     fn is_closed(&self) -> bool {
@@ -216,7 +216,7 @@ impl Loaded {
         let array = |each: usize| Output::of(py, None, &[size.runs, size.outputs, each]);
         let ((trajectories, mut kept), (measures, mut measured)) = (array(size.kept)?, array(size.measures)?);
         let results = [kept.values(), measured.values()];
-        let [errors, notes] = carry_out(py, &planned, results, progress.as_ref())?;
+        let [errors, notes] = carry_out(py, &planned, results, progress)?;
         Ok((trajectories, measures, errors, notes, start.dict(py)?))
     }
 }
@@ -252,43 +252,28 @@ fn trajectories(given: &[(String, Numbers)]) -> Vec<(&str, Trajectory<'_>)> {
     trajectory.collect()
 }
 
-/// Performs the runs in other threads; this thread handles Python signals.
+/// Performs the runs without the GIL. Between steps, this thread handles Python signals and calls progress.
 fn carry_out(
     py: Python,
     planned: &Planned,
     [trajectories, measures]: [&mut [f64]; 2],
-    progress: Option<&Py<PyAny>>,
+    progress: Option<Py<PyAny>>,
 ) -> PyResult<[Messages; 2]> {
-    let watch = Watch::default();
-    let (sender, receiver) = channel();
-    // `Receiver` is not `Sync`, so `detach` needs a mutex around it.
-    let receiver = Mutex::new(receiver);
-    std::thread::scope(|scope| {
-        let watch = &watch;
-        // A panic drops the sender, which ends the loop.
-        scope.spawn(move || sender.send(planned.run(watch, trajectories, measures)));
-        let mut raised = None;
-        loop {
-            let waited =
-                py.detach(|| receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(INTERVAL));
-            match waited {
-                Ok(result) => return raised.map_or_else(|| result.map_err(python), Err),
-                Err(RecvTimeoutError::Disconnected) => {
-                    return Err(FmuError::new_err("the thread of the runs has panicked"));
-                }
-                Err(RecvTimeoutError::Timeout) => {}
-            }
-            if raised.is_none() {
-                let reported = progress.map_or(Ok(()), |progress| {
-                    progress.call1(py, (watch.done(), planned.size().runs)).map(drop)
-                });
-                if let Err(error) = py.check_signals().and(reported) {
-                    watch.cancel();
-                    raised = Some(error);
-                }
-            }
+    let (raised, runs) = (Arc::new(Mutex::new(None)), planned.size().runs);
+    let error = Arc::clone(&raised);
+    let watch = Watch::pulsing(move |watch| {
+        let reported = Python::attach(|py| {
+            py.check_signals()?;
+            progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (watch.done(), runs)).map(drop))
+        });
+        if let Err(reason) = reported {
+            watch.cancel();
+            error.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(reason);
         }
-    })
+    });
+    let result = py.detach(|| planned.run(&watch, trajectories, measures));
+    let raised = raised.lock().unwrap_or_else(PoisonError::into_inner).take();
+    raised.map_or_else(|| result.map_err(python), Err)
 }
 
 /// The module `fmu_run._native`.

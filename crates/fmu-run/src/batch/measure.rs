@@ -2,7 +2,8 @@
 
 use std::str::FromStr;
 
-/// A statistic of a trajectory over all times, including times that are not kept.
+/// A statistic of a trajectory over all times, including times that are not kept. If a value is NaN, all
+/// statistics except the last value are NaN.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
     /// The smallest value.
@@ -83,12 +84,16 @@ impl Measured {
 
     /// Clears the data of the previous run.
     pub fn begin(&mut self) {
-        self.count = 0.0;
-        self.min.fill(f64::INFINITY);
-        self.max.fill(f64::NEG_INFINITY);
-        self.peak.fill(-1.0);
-        self.sum.fill(0.0);
-        self.squares.fill(0.0);
+        let Self { extremes: _, peaks: _, sums: _, count, min, max, peak, time_of_peak, sum, squares, end } =
+            self;
+        *count = 0.0;
+        min.fill(f64::INFINITY);
+        max.fill(f64::NEG_INFINITY);
+        peak.fill(f64::NEG_INFINITY);
+        time_of_peak.fill(f64::NAN);
+        sum.fill(0.0);
+        squares.fill(0.0);
+        end.fill(f64::NAN);
     }
 
     /// Adds the outputs at a time.
@@ -97,14 +102,17 @@ impl Measured {
         self.count += 1.0;
         if self.extremes {
             for ((min, max), value) in self.min.iter_mut().zip(&mut self.max).zip(row) {
-                *min = if *value < *min { *value } else { *min };
-                *max = if *value > *max { *value } else { *max };
+                // No later value is below or above NaN, so that NaN stays.
+                *min = if *value < *min || value.is_nan() { *value } else { *min };
+                *max = if *value > *max || value.is_nan() { *value } else { *max };
             }
         }
         if self.peaks {
             for ((peak, when), value) in self.peak.iter_mut().zip(&mut self.time_of_peak).zip(row) {
                 if value.abs() > *peak {
                     (*peak, *when) = (value.abs(), time);
+                } else if value.is_nan() {
+                    (*peak, *when) = (f64::NAN, f64::NAN);
                 }
             }
         }
@@ -117,8 +125,10 @@ impl Measured {
         self.end.copy_from_slice(row);
     }
 
+    /// Returns a statistic; NaN without outputs.
     pub fn measure(&self, measure: Measure, output: usize) -> f64 {
         match measure {
+            _ if self.count == 0.0 => f64::NAN,
             Measure::Min => self.min[output],
             Measure::Max => self.max[output],
             Measure::Peak => self.peak[output],
@@ -127,5 +137,67 @@ impl Measured {
             Measure::Rms => (self.squares[output] / self.count).sqrt(),
             Measure::End => self.end[output],
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Measure, Measured};
+
+    /// Calculates the statistics of a series as their definitions say.
+    fn expected(measure: Measure, times: &[f64], values: &[f64]) -> f64 {
+        let (count, end) = (values.len() as f64, values[values.len() - 1]);
+        if measure == Measure::End {
+            return end;
+        }
+        if values.iter().any(|value| value.is_nan()) {
+            return f64::NAN;
+        }
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let (min, max) = (sorted[0], sorted[values.len() - 1]);
+        let peak = if -min > max { -min } else { max.abs() };
+        match measure {
+            Measure::Min => min,
+            Measure::Max => max,
+            Measure::Peak => peak,
+            Measure::TimeOfPeak => times[values.iter().position(|value| value.abs() == peak).unwrap()],
+            Measure::Mean => values.iter().sum::<f64>() / count,
+            Measure::Rms => (values.iter().map(|value| value * value).sum::<f64>() / count).sqrt(),
+            Measure::End => end,
+        }
+    }
+
+    /// Compares the statistics of successive runs, each with NaN at other times.
+    #[test]
+    fn not_a_number_stays_and_no_run_affects_the_next() {
+        let measures = Measure::ALL.map(|(_, measure)| measure);
+        let (times, nan) = ([0.0, 0.5, 1.0, 1.5], f64::NAN);
+        let runs = [
+            [1.0, -3.0, 2.0, 0.5],
+            [nan, nan, nan, nan],
+            [nan, 4.0, 5.0, -6.0],
+            [1.0, nan, 7.0, 8.0],
+            [-1.0, 2.0, 3.0, nan],
+            [-0.25, -0.5, -0.125, -0.5],
+            [f64::INFINITY, 1.0, 0.0, f64::NEG_INFINITY],
+        ];
+        let mut measured = Measured::new(&measures, 2);
+        for run in runs {
+            measured.begin();
+            // Its second output is never NaN.
+            times.iter().zip(run).for_each(|(time, value)| measured.add(*time, &[value, *time]));
+            for measure in measures {
+                let found = [0, 1].map(|output| measured.measure(measure, output));
+                let wanted = [expected(measure, &times, &run), expected(measure, &times, &times)];
+                assert_eq!(
+                    found.map(|value| value.to_string()),
+                    wanted.map(|value| value.to_string()),
+                    "{measure:?} of {run:?}"
+                );
+            }
+        }
+        measured.begin();
+        assert!(measures.iter().all(|measure| measured.measure(*measure, 0).is_nan()), "no outputs");
     }
 }

@@ -2,6 +2,8 @@
 
 mod measure;
 mod plan;
+mod pulse;
+mod reuse;
 mod run;
 
 pub use measure::Measure;

@@ -4,10 +4,11 @@ use super::{Batch, Measure, Trajectory};
 use crate::error::{Error, request};
 use crate::found::article;
 use crate::instance::Tolerance;
-use crate::selection::{Selection, fits};
+use crate::selection::{Selection, Target, fits};
 use crate::start::StartValues;
 use crate::system::System;
 use fmi_abi::{BaseType, Interface};
+use std::sync::Arc;
 
 /// A checked batch.
 pub(super) struct Plan<'a> {
@@ -15,6 +16,8 @@ pub(super) struct Plan<'a> {
     pub runs: usize,
     pub inputs: Inputs<'a>,
     pub derivatives: Inputs<'a>,
+    /// Variables of both.
+    pub set_in_steps: Arc<[Target]>,
     pub start: StartValues<'a>,
     pub outputs: Selection,
     pub every: Option<usize>,
@@ -42,11 +45,12 @@ impl<'a> Plan<'a> {
             runs,
             inputs: Inputs::default(),
             derivatives: Inputs::default(),
+            set_in_steps: Arc::default(),
             start: StartValues::of(system, &batch.start)?,
             outputs: system.select(&batch.outputs)?,
             every: batch.every,
             measures: &batch.measures,
-            threads: system.threads(Interface::CoSimulation, batch.threads)?.min(runs.max(1)),
+            threads: system.threads(Interface::CoSimulation, batch.threads, runs)?,
             read_before_set: batch.read_before_set,
             tolerance: batch.tolerance,
         };
@@ -86,6 +90,8 @@ impl<'a> Plan<'a> {
             self.derivatives.values.push(self.checked(name, BaseType::Real, *trajectory)?);
             self.derivatives.variables.push(name, &variables);
         }
+        let derivatives = self.derivatives.variables.targets();
+        self.set_in_steps = self.inputs.variables.targets().chain(derivatives).collect();
         Ok(())
     }
 

@@ -1,17 +1,19 @@
-//! Performs a plan: each thread has an instance, which it resets from run to run.
+//! Performs a plan: each thread takes the next run, until none is left.
 
 use super::Trajectory;
 use super::measure::Measured;
 use super::plan::{Inputs, Plan};
+use super::pulse::Pulse;
+use super::reuse::{Choice, Reuse};
 use crate::error::Error;
 use crate::instance::Experiment;
 use crate::messages::{Feed, Logged, Logging};
 use crate::running::Running;
 use crate::system::System;
-use fmi_abi::Interface;
 use fmi_client::Rejection;
+use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError};
 use std::time::{self, Duration};
 
 /// Messages with the number of their run.
@@ -20,9 +22,10 @@ pub(super) type Messages = Vec<(usize, String)>;
 /// Maximum time for [`repeat_with_logging`], in addition to the time of the runs.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// Access for another thread to the progress of [`System::run`].
-#[derive(Debug, Default)]
+/// Access to the progress of [`System::run`] for another thread, or for the thread that calls it.
+#[derive(Default)]
 pub struct Watch {
+    pulse: Option<Box<dyn Fn(&Self) + Send + Sync>>,
     done: AtomicUsize,
     cancelled: AtomicBool,
     ended: Mutex<Vec<(usize, f64, Vec<f64>)>>,
@@ -31,7 +34,27 @@ pub struct Watch {
     feed: OnceLock<Arc<Feed>>,
 }
 
+impl fmt::Debug for Watch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Watch")
+            .field("done", &self.done)
+            .field("cancelled", &self.cancelled)
+            .finish_non_exhaustive()
+    }
+}
+
 impl Watch {
+    /// Creates a watch whose function is called ten times per second, between steps, by the thread that called
+    /// [`System::run`]. It may [cancel](Self::cancel) the runs.
+    ///
+    /// ```
+    /// let watch = fmu_run::Watch::pulsing(|watch| eprintln!("{} runs are finished", watch.done()));
+    /// # assert_eq!(watch.done(), 0);
+    /// ```
+    pub fn pulsing(pulse: impl Fn(&Self) + Send + Sync + 'static) -> Self {
+        Self { pulse: Some(Box::new(pulse)), ..Self::default() }
+    }
+
     /// Creates a watch that receives all messages of the FMU. Logging is switched on.
     pub fn listening() -> Self {
         Self { listening: true, ..Self::default() }
@@ -58,8 +81,14 @@ impl Watch {
         self.cancelled.store(true, Ordering::Relaxed);
     }
 
-    fn is_cancelled(&self) -> bool {
+    pub(super) fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)
+    }
+
+    fn pulse(&self) {
+        if let Some(pulse) = &self.pulse {
+            pulse(self);
+        }
     }
 }
 
@@ -85,19 +114,15 @@ pub(super) fn run(
     let (trajectory, measured) = (plan.outputs.len() * plan.kept(), plan.outputs.len() * plan.measures.len());
     let fits = trajectories.len() >= plan.runs * trajectory && measures.len() >= plan.runs * measured;
     assert!(fits, "there is too little memory for {} runs", plan.runs);
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(plan.threads)
-        .build()
-        .map_err(|error| Error::Fmu(format!("no threads can be made: {error}")))?;
     let rows = split(trajectories, trajectory).zip(split(measures, measured));
     let rows = rows.take(plan.runs).enumerate();
     let rows = Mutex::new(rows.map(|(run, (trajectories, measures))| Row { run, trajectories, measures }));
     let next = || rows.lock().unwrap_or_else(PoisonError::into_inner).next();
-    // Each thread has one instance and takes the next run.
     let feed = watch.listening.then(|| watch.feed.get_or_init(|| system.feed()));
-    let found = pool.broadcast(|context| {
-        let mut worker = Worker::new(system, plan, watch, None);
-        worker.feed = feed.map(|feed| (Arc::clone(feed), context.index()));
+    let found = on_threads(system, plan.threads, watch, |number| {
+        let mut worker = Worker::new(system, plan, watch, number, None);
+        worker.feed = feed.map(|feed| (Arc::clone(feed), number));
+        worker.begin();
         let (mut failures, mut notes) = (Vec::new(), Vec::new());
         while !watch.is_cancelled()
             && let Some(row) = next()
@@ -114,8 +139,9 @@ pub(super) fn run(
             }
             watch.done.fetch_add(1, Ordering::Relaxed);
         }
+        worker.finish();
         (failures, notes)
-    });
+    })?;
     drop(rows);
     if watch.is_cancelled() && watch.done() < plan.runs {
         return Err(Error::Cancelled);
@@ -127,7 +153,7 @@ pub(super) fn run(
     notes.sort_unstable_by_key(|(run, _)| *run);
     let until = time::Instant::now() + begin.elapsed() + PATIENCE;
     if failures.iter().any(|(_, failure)| failure.is_silent) {
-        pool.install(|| repeat_with_logging(system, plan, watch, until, &mut failures));
+        repeat_with_logging(system, plan, watch, until, &mut failures)?;
     }
     Ok([failures.into_iter().map(|(run, failure)| (run, failure.text)).collect(), notes])
 }
@@ -140,11 +166,11 @@ fn repeat_with_logging(
     watch: &Watch,
     until: time::Instant,
     failures: &mut [(usize, Failure)],
-) {
+) -> Result<(), Error> {
     let silent = Mutex::new(failures.iter_mut().filter(|(_, failure)| failure.is_silent));
     let next = || silent.lock().unwrap_or_else(PoisonError::into_inner).next();
-    rayon::broadcast(|_| {
-        let mut worker = Worker::new(system, plan, watch, Some(until));
+    let repeated = on_threads(system, plan.threads, watch, |number| {
+        let mut worker = Worker::new(system, plan, watch, number, Some(until));
         let mut trajectories = vec![0.0; plan.outputs.len() * plan.kept()];
         let mut measures = vec![0.0; plan.outputs.len() * plan.measures.len()];
         while !watch.is_cancelled()
@@ -160,6 +186,47 @@ fn repeat_with_logging(
             }
         }
     });
+    repeated.map(drop)
+}
+
+/// Calls `work` in as many threads with the number of the thread and returns the results. This thread is
+/// number 0; it calls the pulse while it waits for the others.
+fn on_threads<T: Send>(
+    system: &System,
+    threads: usize,
+    watch: &Watch,
+    work: impl Fn(usize) -> T + Sync,
+) -> Result<Vec<T>, Error> {
+    if threads <= 1 {
+        return Ok(vec![work(0)]);
+    }
+    let others = system.kept().take_threads(threads - 1)?;
+    let (found, arrived) = (Mutex::new(Vec::new()), Condvar::new());
+    others.pool().in_place_scope(|scope| {
+        for number in 1..threads {
+            let (found, arrived, work) = (&found, &arrived, &work);
+            scope.spawn(move |_| {
+                let result = work(number);
+                lock(found).push(result);
+                arrived.notify_one();
+            });
+        }
+        let own = work(0);
+        let mut all = lock(&found);
+        all.push(own);
+        while all.len() < threads {
+            let (waited, timeout) =
+                arrived.wait_timeout(all, Pulse::INTERVAL).unwrap_or_else(PoisonError::into_inner);
+            all = waited;
+            if timeout.timed_out() {
+                drop(all);
+                watch.pulse();
+                all = lock(&found);
+            }
+        }
+    });
+    system.kept().put_threads(others);
+    Ok(found.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
 /// Returns the requested number of parts of equal length; parts after the end of the values are empty.
@@ -173,7 +240,8 @@ fn split(values: &mut [f64], length: usize) -> impl Iterator<Item = &mut [f64]> 
 }
 
 /// Failure of a run before its last time.
-struct Failure {
+#[derive(PartialEq)]
+pub(super) struct Failure {
     /// Index of the time of the failure; `None` before the end of the initialization.
     at: Option<usize>,
     text: String,
@@ -182,15 +250,18 @@ struct Failure {
 }
 
 /// Instance and buffers of a thread.
-struct Worker<'a> {
-    system: &'a System,
-    plan: &'a Plan<'a>,
-    watch: &'a Watch,
-    /// Deadline of a run with logging on; `None` without logging.
+pub(super) struct Worker<'a> {
+    pub system: &'a System,
+    pub plan: &'a Plan<'a>,
+    pub watch: &'a Watch,
+    /// Deadline of a run that is repeated with logging on.
     deadline: Option<time::Instant>,
     /// Collects all messages, and the number of the instance.
-    feed: Option<(Arc<Feed>, usize)>,
-    instance: Option<Running>,
+    pub feed: Option<(Arc<Feed>, usize)>,
+    /// Whether this thread called the runs; then it calls the pulse.
+    is_caller: bool,
+    pulse: Pulse,
+    pub reuse: Reuse,
     inputs: Signals<'a>,
     derivatives: Signals<'a>,
     /// Orders of the input derivatives.
@@ -236,6 +307,7 @@ impl<'a> Worker<'a> {
         system: &'a System,
         plan: &'a Plan<'a>,
         watch: &'a Watch,
+        number: usize,
         deadline: Option<time::Instant>,
     ) -> Self {
         Self {
@@ -244,7 +316,9 @@ impl<'a> Worker<'a> {
             watch,
             deadline,
             feed: None,
-            instance: None,
+            is_caller: number == 0,
+            pulse: Pulse::default(),
+            reuse: Reuse::default(),
             inputs: Signals::new(&plan.inputs),
             derivatives: Signals::new(&plan.derivatives),
             orders: vec![1; plan.derivatives.values.len()],
@@ -252,6 +326,15 @@ impl<'a> Worker<'a> {
             reached: 0,
             measured: Measured::new(plan.measures, plan.outputs.len()),
         }
+    }
+
+    /// Returns whether the FMU logs its messages, and instances are new for each run, so that the messages are complete.
+    pub fn is_logging(&self) -> bool {
+        self.deadline.is_some() || self.feed.is_some()
+    }
+
+    pub fn logging(&self) -> Logging {
+        Logging { on: self.is_logging(), feed: self.feed.clone() }
     }
 
     /// Performs a run over these times. May return a note if the run reaches the last time.
@@ -262,22 +345,49 @@ impl<'a> Worker<'a> {
         trajectories: &mut [f64],
         measures: &mut [f64],
     ) -> Result<Option<String>, Failure> {
-        let plan = self.plan;
         self.report_time(run, times[0]);
-        let mut instance = match self.instance() {
-            Ok(instance) => instance,
+        match self.choose(run) {
+            Choice::Reset(instance) => self.perform(instance, run, times, trajectories, measures),
+            Choice::New => self.run_new(run, times, trajectories, measures),
+            Choice::Check(used, changes) => self.check((used, changes), run, times, trajectories, measures),
+        }
+    }
+
+    /// Performs a run in a new instance.
+    pub fn run_new(
+        &mut self,
+        run: usize,
+        times: &[f64],
+        trajectories: &mut [f64],
+        measures: &mut [f64],
+    ) -> Result<Option<String>, Failure> {
+        match self.create() {
+            Ok(instance) => self.perform(instance, run, times, trajectories, measures),
             Err((text, is_silent)) => {
                 trajectories.fill(f64::NAN);
                 measures.fill(f64::NAN);
-                return Err(Failure { at: None, text, is_silent });
+                Err(Failure { at: None, text, is_silent })
             }
-        };
+        }
+    }
+
+    /// Performs a run in this instance, which can be used again if the run is complete.
+    pub fn perform(
+        &mut self,
+        mut instance: Running,
+        run: usize,
+        times: &[f64],
+        trajectories: &mut [f64],
+        measures: &mut [f64],
+    ) -> Result<Option<String>, Failure> {
+        let (plan, begin) = (self.plan, time::Instant::now());
+        instance.forget_log();
         self.inputs.begin(&plan.inputs, run, plan.time.len());
         self.derivatives.begin(&plan.derivatives, run, plan.time.len());
         self.reached = 0;
         self.measured.begin();
         let stopped = self.follow(times, &mut instance, run, trajectories).err();
-        if self.deadline.is_none() {
+        if !self.is_repeated() {
             let at = stopped.as_ref().and_then(|(at, _)| *at).map_or(0, |at| at.min(times.len() - 1));
             self.report_time(run, times[at]);
             let ended = stopped.as_ref().and_then(|(_, rejection)| rejection.ended());
@@ -293,8 +403,14 @@ impl<'a> Worker<'a> {
                 *value = if rejected { f64::NAN } else { self.measured.measure(*measure, output) };
             }
         }
+        let is_complete = stopped.is_none() && self.reached == plan.time.len();
+        if is_complete {
+            self.reuse.observe(&mut instance);
+        }
         let terminated = if rejected { Ok(()) } else { instance.terminate() };
-        self.instance = Some(instance).filter(Running::is_alive);
+        if is_complete && terminated.is_ok() {
+            self.keep(instance, run, begin.elapsed());
+        }
         let Some((at, rejection)) = stopped else {
             return Ok(terminated.err().map(|rejection| format!("finished; then {rejection}")));
         };
@@ -308,13 +424,9 @@ impl<'a> Worker<'a> {
         Err(Failure { at, text, is_silent: rejection.is_silent() })
     }
 
-    /// Returns a new or reset instance. The error contains the reason, and whether there is no message.
-    fn instance(&mut self) -> Result<Running, (String, bool)> {
-        let used = self.instance.take();
-        let logging = Logging { on: self.deadline.is_some() || self.feed.is_some(), feed: self.feed.clone() };
-        let instance = Running::renewed(used, self.system, Interface::CoSimulation, &logging)?;
-        instance.forget_log();
-        Ok(instance)
+    /// Returns whether the caller does not observe the run.
+    fn is_repeated(&self) -> bool {
+        self.deadline.is_some() || self.reuse.is_check()
     }
 
     /// Tells the collector of messages where the run is.
@@ -343,6 +455,9 @@ impl<'a> Worker<'a> {
         let mut ended: Option<Rejection> = None;
         for (k, &time) in times.iter().enumerate() {
             let at = |rejection| (Some(k), rejection);
+            if self.is_caller && self.pulse.is_due() {
+                self.watch.pulse();
+            }
             if self.watch.is_cancelled() {
                 return Ok(());
             }

@@ -7,6 +7,7 @@ use crate::description::{Description, Variable};
 use crate::error::{Error, request};
 use crate::fmu::Loaded;
 use crate::found::Found;
+use crate::kept::Kept;
 use crate::messages::Feed;
 use crate::selection::Selection;
 use fmi_abi::description::Offer;
@@ -37,6 +38,7 @@ struct Definition {
     exchange: Exchange,
     start: Vec<(String, StartValue)>,
     stop_time: Option<f64>,
+    kept: Kept,
 }
 
 /// A component.
@@ -149,6 +151,23 @@ impl System {
         self.find_first(name)?.display_unit(name, unit)
     }
 
+    /// Frees the instances and the threads that earlier [runs](Self::run) have left for later ones. They are also freed with the
+    /// last clone of the system.
+    pub fn release(&self) {
+        self.0.kept.clear();
+    }
+
+    pub(crate) fn kept(&self) -> &Kept {
+        &self.0.kept
+    }
+
+    /// Returns whether instances may exist while no run needs them.
+    pub(crate) fn may_be_idle(&self, interface: Interface) -> bool {
+        let offers =
+            self.components().iter().filter_map(|component| component.fmu.description.offer(interface));
+        offers.fold(true, |all, offer| all && !offer.once_per_process && !offer.needs_execution_tool)
+    }
+
     pub(crate) fn components(&self) -> &[Component] {
         &self.0.components
     }
@@ -183,15 +202,23 @@ impl System {
         self.components().iter().any(|component| component.fmu.once_per_process(interface))
     }
 
-    /// Returns the number of threads for instances: the requested number, or one for each processor.
-    pub(crate) fn threads(&self, interface: Interface, asked: Option<usize>) -> Result<usize, Error> {
+    /// Returns the number of threads for this number of runs or instances: the requested number, or one for each processor, but at
+    /// most one for each run or instance.
+    pub(crate) fn threads(
+        &self,
+        interface: Interface,
+        asked: Option<usize>,
+        count: usize,
+    ) -> Result<usize, Error> {
         if asked == Some(0) {
             return request("threads must be at least 1".to_owned());
         }
-        if self.once_per_process(interface) {
+        // Counting the processors takes longer than a short run.
+        if count <= 1 || self.once_per_process(interface) {
             return Ok(1);
         }
-        Ok(asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)))
+        let threads = asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+        Ok(threads.min(count))
     }
 
     /// Returns the variables of this name: several if an input of the system feeds several.
@@ -317,6 +344,7 @@ impl Definition {
             exchange: Exchange::default(),
             start: Vec::new(),
             stop_time: None,
+            kept: Kept::default(),
         }
     }
 

@@ -1,0 +1,179 @@
+//! Choice of the instance for a run: a new one, or the instance of an earlier run after a reset.
+
+use super::run::{Failure, Worker};
+use crate::kept::{Change, Given, Idle};
+use crate::running::Running;
+use fmi_abi::Interface;
+use std::time::{Duration, Instant};
+
+/// Instance for a run.
+pub(super) enum Choice {
+    /// A new instance.
+    New,
+    /// A reset instance.
+    Reset(Running),
+    /// A new instance, and the used one to check whether it can be reset.
+    Check(Running, Vec<Change>),
+}
+
+/// An instance after a complete run.
+struct Used {
+    instance: Running,
+    origin: Origin,
+    took: Duration,
+}
+
+/// The run after which an instance is used again.
+enum Origin {
+    /// A run of an earlier batch.
+    Earlier(Given),
+    /// A run of this batch, by its number.
+    Run(usize),
+}
+
+/// Instance of the previous run of a thread, and experience with resets.
+#[derive(Default)]
+pub(super) struct Reuse {
+    used: Option<Used>,
+    /// Whether the FMU can be reset between all runs of this batch.
+    is_trusted: bool,
+    /// Whether a run is only a check of the reset, which the caller does not observe.
+    is_check: bool,
+    /// All numbers at the end of a run, if they are compared.
+    seen: Option<Vec<Option<u64>>>,
+}
+
+impl Reuse {
+    pub fn is_check(&self) -> bool {
+        self.is_check
+    }
+
+    /// Records all numbers of an instance, if they are compared.
+    pub fn observe(&mut self, instance: &mut Running) {
+        if let Some(seen) = &mut self.seen {
+            *seen = instance.observe();
+        }
+    }
+}
+
+impl Worker<'_> {
+    /// Takes an instance of an earlier batch.
+    pub fn begin(&mut self) {
+        if self.is_logging() {
+            return;
+        }
+        if let Some(Idle { components, given, took }) = self.system.kept().take() {
+            let instance = Running::of(self.system, components);
+            self.reuse.used = Some(Used { instance, origin: Origin::Earlier(given), took });
+        }
+    }
+
+    /// Keeps the instance for a later batch.
+    pub fn finish(mut self) {
+        let Some(Used { instance, origin, took }) = self.reuse.used.take() else { return };
+        if self.is_logging() || !self.system.may_be_idle(Interface::CoSimulation) {
+            return;
+        }
+        let given = self.given_in(origin);
+        self.system.kept().put(Idle { components: instance.into_components(), given, took });
+    }
+
+    /// Keeps the instance of a complete run for the next run.
+    pub fn keep(&mut self, instance: Running, run: usize, took: Duration) {
+        // With logging on, each run has a new instance, so that its messages are complete.
+        if !self.is_logging() {
+            self.reuse.used = Some(Used { instance, origin: Origin::Run(run), took });
+        }
+    }
+
+    /// Chooses the instance for a run.
+    pub fn choose(&mut self, run: usize) -> Choice {
+        let Some(Used { instance, origin, took }) = self.reuse.used.take() else { return Choice::New };
+        let is_of_this_batch = matches!(origin, Origin::Run(_));
+        if !(self.reuse.is_trusted && is_of_this_batch) {
+            let changes = self.given_in(origin).changes(&self.given(run));
+            let trust = self.system.kept().trust();
+            let all = self.plan.start.targets().map(Change::Value).chain([Change::Steps]);
+            self.reuse.is_trusted = trust.proves(all);
+            if !trust.proves(changes.iter().copied()) {
+                let is_due = trust.is_check_due(took);
+                return if is_due { Choice::Check(instance, changes) } else { Choice::New };
+            }
+        }
+        if let Some(instance) = instance.reset() {
+            return Choice::Reset(instance);
+        }
+        self.system.kept().trust().distrust();
+        Choice::New
+    }
+
+    /// Performs a run in a new instance, after the same run in a reset instance. If both give the same bits, the
+    /// FMU can be reset after these changes.
+    pub fn check(
+        &mut self,
+        (instance, changes): (Running, Vec<Change>),
+        run: usize,
+        times: &[f64],
+        trajectories: &mut [f64],
+        measures: &mut [f64],
+    ) -> Result<Option<String>, Failure> {
+        let begin = Instant::now();
+        let [mut kept, mut measured] = [&trajectories, &measures].map(|values| vec![0.0; values.len()]);
+        (self.reuse.is_check, self.reuse.seen) = (true, Some(Vec::new()));
+        let reset = instance.reset();
+        let again = reset.map(|instance| self.perform(instance, run, times, &mut kept, &mut measured));
+        let seen = self.reuse.seen.replace(Vec::new());
+        self.reuse.is_check = false;
+        // Some FMUs permit only one instance.
+        self.reuse.used = None;
+        let took = begin.elapsed();
+        let result = self.run_new(run, times, trajectories, measures);
+        let seen_in_new = self.reuse.seen.take();
+        if self.watch.is_cancelled() {
+            return result;
+        }
+        let same = |one: &[f64], other: &[f64]| {
+            one.iter().map(|x| x.to_bits()).eq(other.iter().map(|x| x.to_bits()))
+        };
+        let is_same = again.as_ref() == Some(&result)
+            && seen == seen_in_new
+            && same(&kept, trajectories)
+            && same(&measured, measures);
+        let mut trust = self.system.kept().trust();
+        trust.checked(took);
+        match (is_same, &self.reuse.used) {
+            (false, _) => trust.distrust(),
+            (true, Some(_)) => trust.prove(changes),
+            // An incomplete run proves nothing.
+            (true, None) => {}
+        }
+        result
+    }
+
+    /// Creates an instance. The error contains the reason, and whether there is no message.
+    pub fn create(&mut self) -> Result<Running, (String, bool)> {
+        let begin = Instant::now();
+        let instance = Running::new(self.system, Interface::CoSimulation, &self.logging())?;
+        self.system.kept().trust().created(begin.elapsed());
+        Ok(instance)
+    }
+
+    fn given_in(&self, origin: Origin) -> Given {
+        match origin {
+            Origin::Earlier(given) => given,
+            Origin::Run(run) => self.given(run),
+        }
+    }
+
+    /// Returns the values that a run sets.
+    fn given(&self, run: usize) -> Given {
+        let plan = self.plan;
+        let times = [plan.time.first(), plan.time.last()].map(|time| time.map_or(0, |time| time.to_bits()));
+        Given {
+            experiment: (times, plan.tolerance),
+            numbers: plan.start.numbers(run).map(|(target, value)| (target, value.to_bits())).collect(),
+            values: plan.start.values(run).map(|(target, value)| (target, value.clone())).collect(),
+            inputs: plan.set_in_steps.clone(),
+        }
+    }
+}
