@@ -37,6 +37,6 @@ pub use instances::{Instances, Mask, Setup, States};
 pub use messages::Logged;
 pub use selection::Selection;
 pub use start::Start;
-pub use system::{Composition, Fmu, Order, StartValue, System, nearest};
+pub use system::{Composition, Elements, Fmu, Order, StartValue, System, nearest};
 #[doc(hidden)]
 pub use threads::process;

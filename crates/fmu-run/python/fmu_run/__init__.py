@@ -17,9 +17,7 @@ Values are in the FMU's units, see `Fmu.variables`. FMI 2.0 and 3.0.
 
 from __future__ import annotations
 
-import operator
 import os
-import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
@@ -30,6 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fmu_run._native import FmuError, Instances, States
 from fmu_run._native import Loaded as _Loaded
+from fmu_run._native import numbers as _numbers
 from fmu_run.runs import Runs
 
 __all__ = ["Fmu", "FmuError", "Instances", "Measure", "Runs", "Start", "States", "System", "Variable"]
@@ -159,26 +158,11 @@ class _Model:
         >>> runs["y"].shape
         (2, 1000)
         """
-        times = _array("time", time)
-        if times.ndim != 1:
-            raise ValueError(f"time must have one dimension, it has {times.ndim}")
-        names = [outputs] if isinstance(outputs, str) else list(outputs)
-        wanted = [measures] if isinstance(measures, str) else list(measures)
-        kept = 1 if every is None and not wanted else _count("every", every)
-        trajectories, measured, errors, notes, starts = self._loaded.run(
-            times,
-            [(name, self._trajectory(name, values, len(times))) for name, values in (inputs or {}).items()],
-            [(name, _trajectory(name, values, len(times))) for name, values in (input_derivatives or {}).items()],
-            dict(start or {}),
-            names,
-            kept,
-            wanted,
-            _count("threads", threads),
-            read_before_set,
-            progress,
+        return Runs(
+            *self._loaded.run(
+                time, outputs, inputs, input_derivatives, start, every, measures, threads, read_before_set, progress
+            )
         )
-        kept_times = times[:: kept or len(times)][: trajectories.shape[2]]
-        return Runs(kept_times, names, trajectories, wanted, measured, dict(errors), dict(notes), starts)
 
     def converted(self, name: str, values: ArrayLike, unit: str) -> float | _Array:
         """Convert values to the unit of a variable.
@@ -203,14 +187,9 @@ class _Model:
             If the FMU has no such variable, or the variable no such unit.
         """
         factor, offset = self._loaded.display_unit(name, unit)
-        found = (_array(name, values) - offset) / factor
+        array: _Array = _numbers(name, values)
+        found = (array - offset) / factor
         return float(found) if found.ndim == 0 else found
-
-    def _trajectory(self, name: str, values: Trajectory, times: int) -> float | _Array:
-        """Values in the variable's unit."""
-        if isinstance(values, tuple) and len(values) == 2 and isinstance(values[1], str):
-            return _trajectory(name, self.converted(name, values[0], values[1]), times)
-        return _trajectory(name, values, times)
 
     def instances(
         self,
@@ -252,8 +231,7 @@ class _Model:
         FmuError
             If the FMU has no such interface type, or rejects all instances.
         """
-        instances, threads = _count("count", count) or 1, _count("threads", threads)
-        return Instances(self._loaded, instances, interface, dict(start or {}), start_time, stop_time, threads)
+        return Instances(self._loaded, count, interface, start, start_time, stop_time, threads)
 
 
 class Fmu(_Model):
@@ -275,7 +253,7 @@ class Fmu(_Model):
     """
 
     def __init__(self, path: str | os.PathLike[str], *, execution_tool: bool = False):
-        super().__init__(_Loaded(os.fspath(path), execution_tool))
+        super().__init__(_Loaded(path, execution_tool))
         #: "2.0" or "3.0"; the name of the model; guid or instantiation token.
         self.fmi_version, self.model_name, self.token, derivatives, outputs, directional, units = self._loaded.about()
         #: Name of each continuous state's derivative by state; names of the continuous outputs; both in the order of the
@@ -327,14 +305,12 @@ class System(_Model):
         order: Literal["dependencies", "jacobi"] = "dependencies",
     ):
         if isinstance(source, Mapping):
-            given = connections.items() if isinstance(connections, Mapping) else connections or ()
-            pairs = [(output, to) for output, ends in given for to in ([ends] if isinstance(ends, str) else ends)]
             fmus = [(name, (fmu if isinstance(fmu, Fmu) else Fmu(fmu))._loaded) for name, fmu in source.items()]
-            super().__init__(_Loaded.connected("system", fmus, pairs, order))
+            super().__init__(_Loaded.connected("system", fmus, _pairs(connections), order))
         elif connections is not None:
             raise ValueError("an SSP has its own connections; give connections with FMUs only")
         else:
-            super().__init__(_Loaded.ssp(os.fspath(source), order))
+            super().__init__(_Loaded.ssp(source, order))
         #: Name of the system; order of data exchange, in stages of (output, input); stop time of the SSP's experiment, s, or None.
         self.name, self.stages, self.stop_time = self._loaded.about_system()
 
@@ -343,35 +319,18 @@ class System(_Model):
         return f"<System {self.name}, {connections} connections, {len(self.variables)} variables>"
 
 
-def _count(name: str, value: int | None) -> int | None:
-    if value is None:
-        return None
+def _pairs(
+    connections: Mapping[str, str | Sequence[str]] | Iterable[tuple[str, str | Sequence[str]]] | None,
+) -> list[tuple[str, str]]:
+    """Connections from an output to an input, (output, input) each."""
+    given = connections.items() if isinstance(connections, Mapping) else connections or ()
     try:
-        count = operator.index(value)
-    except TypeError:
-        raise ValueError(f"{name} must be an integer, it is {value!r}") from None
-    if count < 1:
-        raise ValueError(f"{name} must be at least 1, it is {count}")
-    return min(count, sys.maxsize)
-
-
-def _array(name: str, values: ArrayLike) -> _Array:
-    try:
-        array = np.asarray(values)
-    except ValueError as error:
-        raise ValueError(f"{name}: the values are no numbers ({error})") from None
-    # numpy converts None to NaN, and strings to numbers.
-    if array.dtype.kind not in "biuf":
-        raise ValueError(
-            f"{name}: {values!r} is no number" if array.ndim == 0 else f"{name}: the values are no numbers"
-        )
-    return np.ascontiguousarray(array, dtype=np.float64).reshape(array.shape)
-
-
-def _trajectory(name: str, values: Trajectory, times: int) -> float | _Array:
-    array = _array(name, values)  # type: ignore[arg-type]
-    if array.ndim == 0:
-        return float(array)
-    if array.ndim > 2 or array.shape[-1] != times:
-        raise ValueError(f"{name} has the shape {array.shape}; it must be ({times},), (runs, {times}) or a number")
-    return array
+        found = [(output, to) for output, ends in given for to in ([ends] if isinstance(ends, str) else ends)]
+    except (TypeError, ValueError):
+        found = [("", None)]
+    for output, to in found:
+        if not isinstance(output, str) or not isinstance(to, str):
+            raise ValueError(
+                f"connections must be a dict of outputs and their inputs, both str, or pairs of them, they are {connections!r}"
+            )
+    return found

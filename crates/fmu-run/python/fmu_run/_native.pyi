@@ -1,4 +1,5 @@
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,9 @@ class FmuError(Exception):
     """An FMU cannot be loaded or run, or rejects a run."""
 
 class Loaded:
-    def __init__(self, path: str, execution_tool: bool) -> None: ...
+    def __init__(self, path: str | PathLike[str], execution_tool: bool) -> None: ...
     @staticmethod
-    def ssp(path: str, order: str) -> Loaded: ...
+    def ssp(path: str | PathLike[str], order: str) -> Loaded: ...
     @staticmethod
     def connected(
         name: str, components: list[tuple[str, Loaded]], connections: list[tuple[str, str]], order: str
@@ -29,17 +30,29 @@ class Loaded:
     def variables(self) -> list[tuple[str, str, str, _Text, _Text, _Text, str, _Number, _Number, _Text]]: ...
     def run(
         self,
-        time: _Array,
-        inputs: list[tuple[str, float | _Array]],
-        input_derivatives: list[tuple[str, float | _Array]],
-        start: dict[str, Any],
-        outputs: list[str],
+        time: ArrayLike,
+        outputs: _Names,
+        inputs: Mapping[str, Any] | None,
+        input_derivatives: Mapping[str, Any] | None,
+        start: Mapping[str, Any] | None,
         every: int | None,
-        measures: list[Any],
+        measures: Sequence[Any],
         threads: int | None,
         read_before_set: bool,
         progress: Callable[[int, int], Any] | None,
-    ) -> tuple[_Array, _Array, list[tuple[int, str]], list[tuple[int, str]], dict[str, Any]]: ...
+    ) -> tuple[
+        _Array,
+        list[str],
+        _Array,
+        list[str],
+        _Array | None,
+        list[tuple[int, str]],
+        list[tuple[int, str]],
+        dict[str, Any],
+        dict[str, tuple[tuple[int, ...], list[str]]] | None,
+    ]: ...
+
+def numbers(name: str, values: ArrayLike) -> _Array: ...
 
 class States: ...
 
@@ -49,7 +62,7 @@ class Instances:
         loaded: Loaded,
         count: int,
         interface: str,
-        start: dict[str, Any],
+        start: Mapping[str, Any] | None,
         start_time: float,
         stop_time: float | None,
         threads: int | None,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import importlib
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,14 +18,17 @@ if TYPE_CHECKING:
     import xarray
 
 _Array = NDArray[np.float64]
+#: Ending of the name of a start value whose variable is an output, too.
+AT_START = " at start"
 
 
 class Runs(Mapping[str, _Array]):
     """Results of `Fmu.run`: time series by output, statistics by output and measure.
 
-    runs["roll"]: (runs, times), at the kept times. runs["roll", "peak"]: (runs,). Times that a run has not reached are NaN.
-    Measures are NaN for a rejected run; for a run that the FMU ended they cover the times until then. As a mapping, the
-    object contains time series by output, none if only measures were requested; its truth value is always true.
+    runs["roll"]: (runs, times), at the kept times. runs["roll", "peak"]: (runs,). A whole array is (runs, times, *shape), its
+    measures are (runs, *shape). Times that a run has not reached are NaN. Measures are NaN for a rejected run, and if a value is
+    NaN; for a run that the FMU ended they cover the times until then. As a mapping, the object contains time series by
+    output, none if only measures were requested; its truth value is always true.
 
     A RuntimeWarning reports NaN at the first use of a result. It reports failed runs only if neither `errors` nor `ok` was
     read before.
@@ -34,8 +38,6 @@ class Runs(Mapping[str, _Array]):
     time: _Array
     #: Notes on finished runs: the FMU ended by itself at the last time, or rejected the termination.
     notes: dict[int, str]
-    #: (runs,): the given start values by name; strings unchanged.
-    start: dict[str, _Array | str]
 
     def __init__(
         self,
@@ -43,20 +45,44 @@ class Runs(Mapping[str, _Array]):
         outputs: Sequence[str],
         trajectories: _Array,
         measures: Sequence[str],
-        measured: _Array,
-        errors: dict[int, str],
-        notes: dict[int, str],
-        start: Mapping[str, float | str | _Array],
+        measured: _Array | None,
+        errors: Iterable[tuple[int, str]],
+        notes: Iterable[tuple[int, str]],
+        start: Mapping[str, Any],
+        arrays: Mapping[str, tuple[tuple[int, ...], list[str]]] | None = None,
     ):
-        self.time, self._errors, self.notes = time, errors, notes
-        self._reported, self._checked = not errors, set[str | tuple[str, str]]()
-        runs = trajectories.shape[0]
-        self.start = {
-            name: value if isinstance(value, str) else np.broadcast_to(value, runs) for name, value in start.items()
-        }
-        self._outputs = {name: index for index, name in enumerate(outputs)}
-        self._measures = {name: index for index, name in enumerate(measures)}
+        self.time, self._errors, self.notes = time, dict(errors), dict(notes)
+        self._reported, self._checked = not self._errors, set[str | tuple[str, str]]()
         self._trajectories, self._measured = trajectories, measured
+        self._outputs, self._measures, self._start = outputs, measures, start
+        #: Shape and names of the elements of the arrays among outputs and start values.
+        self._arrays = arrays or {}
+
+    @cached_property
+    def start(self) -> dict[str, _Array | str]:
+        """(runs,) or (runs, *shape): the given start values by name; strings unchanged."""
+        return {
+            name: value if isinstance(value, str) else np.broadcast_to(value, (self.count, *self._shape(name)))
+            for name, value in self._start.items()
+        }
+
+    @cached_property
+    def _columns(self) -> dict[str, int]:
+        """The first column of each output in the results, and the columns of the elements of arrays."""
+        columns: dict[str, int] = {}
+        elements: dict[str, int] = {}
+        first = 0
+        for name in self._outputs:
+            columns[name] = first
+            elements |= {element: first + k for k, element in enumerate(self._elements(name))}
+            first += len(self._elements(name))
+        return elements | columns
+
+    def _shape(self, name: str) -> tuple[int, ...]:
+        return self._arrays[name][0] if name in self._arrays else ()
+
+    def _elements(self, name: str) -> list[str]:
+        return self._arrays[name][1] if name in self._arrays else [name]
 
     @property
     def count(self) -> int:
@@ -86,16 +112,26 @@ class Runs(Mapping[str, _Array]):
         return self
 
     def __getitem__(self, key: str | tuple[str, str]) -> _Array:
-        output, *measure = [key] if isinstance(key, str) else key
-        if output not in self._outputs:
-            raise KeyError(f"no output {output!r} was requested; there are {', '.join(self._outputs)}")
+        output, *measure = (key,) if isinstance(key, str) else key if isinstance(key, tuple) else (None,)
+        if output not in self._columns or len(measure) > 1:
+            raise KeyError(
+                f"no output {output if isinstance(output, str) else key!r} was requested; there are {', '.join(self._outputs)}"
+            )
         if not measure and not self._trajectories.shape[2]:
             raise KeyError(f"{key}: no trajectories were kept; request them with every=1, or read [output, measure]")
         if measure and measure[0] not in self._measures:
             known = ", ".join(self._measures) or "none"
             raise KeyError(f"no measure {measure[0]!r} was requested; there are {known}")
-        values = (self._measured if measure else self._trajectories)[:, self._outputs[output]]
-        found: _Array = values[:, self._measures[measure[0]]] if measure else values
+        results, shape = self._trajectories, self._shape(output)
+        first = self._columns[output]
+        if measure and self._measured is not None:
+            results = self._measured[:, :, self._measures.index(measure[0]), None]
+        found: _Array = results[:, first]
+        if shape:
+            columns = results[:, first : first + len(self._elements(output))].swapaxes(1, 2)
+            found = columns.reshape(*columns.shape[:2], *shape)
+        if measure:
+            found = found[:, 0]
         self._announce(key, found)
         return found
 
@@ -117,10 +153,10 @@ class Runs(Mapping[str, _Array]):
             warnings.warn(line, RuntimeWarning, stacklevel=3)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._outputs if self._trajectories.shape[2] else ())
+        return iter(dict.fromkeys(self._outputs) if self._trajectories.shape[2] else ())
 
     def __len__(self) -> int:
-        return len(self._outputs) if self._trajectories.shape[2] else 0
+        return len(set(self._outputs)) if self._trajectories.shape[2] else 0
 
     def __bool__(self) -> bool:
         return True
@@ -138,29 +174,58 @@ class Runs(Mapping[str, _Array]):
             index, repeat = pandas.MultiIndex.from_product([runs, self.time], names=["run", "time"]), len(self.time)
         by_run = {**self._starts(), **self._by_name()}
         columns = {
-            name: value if isinstance(value, str) else np.repeat(value, repeat) for name, value in by_run.items()
+            element: values if isinstance(values, str) else np.repeat(values, repeat)
+            for name, value in by_run.items()
+            for element, values in self._split(name, value, 1)
         }
-        return pandas.DataFrame({**columns, **{name: series.ravel() for name, series in self.items()}}, index=index)
+        for name, series in self.items():
+            columns |= {element: values.ravel() for element, values in self._split(name, series, 2)}
+        return pandas.DataFrame(columns, index=index)
 
     def to_xarray(self) -> xarray.Dataset:
         """Return outputs over the dimensions run and time, measures as `roll_peak` over run, start values as coordinates of run. A
-        start value of an output is called `roll at start`. Raises ImportError without xarray."""
+        start value of an output is called `roll at start`. The dimensions of an array are called `T_0`, `T_1` and so on. Raises
+        ImportError without xarray."""
         needed = _needed("xarray")
-        starts = {name: value if isinstance(value, str) else ("run", value) for name, value in self._starts().items()}
-        measures = {name: ("run", values) for name, values in self._by_name().items()}
+
+        def dims(name: str, *first: str) -> tuple[str, ...]:
+            return (*first, *(f"{name}_{number}" for number in range(len(self._shape(name)))))
+
+        starts = {
+            name: value if isinstance(value, str) else (dims(name.removesuffix(AT_START), "run"), value)
+            for name, value in self._starts().items()
+        }
+        measures = {
+            f"{output}_{measure}": (dims(output, "run"), self[output, measure])
+            for output in self._outputs
+            for measure in self._measures
+        }
         times = {"time": self.time} if len(self) else {}
+        series = {name: (dims(name, "run", "time"), series) for name, series in self.items()}
         dataset: xarray.Dataset = needed.Dataset(
-            {**{name: (("run", "time"), series) for name, series in self.items()}, **measures},
-            {"run": np.arange(self.count), **times, **starts},
+            {**series, **measures}, {"run": np.arange(self.count), **times, **starts}
         )
         return dataset
 
     def _starts(self) -> dict[str, _Array | str]:
-        return {f"{name} at start" if name in self else name: value for name, value in self.start.items()}
+        return {f"{name}{AT_START}" if name in self else name: value for name, value in self.start.items()}
 
     def _by_name(self) -> dict[str, _Array]:
-        names = [(output, measure) for output in self._outputs for measure in self._measures]
-        return {f"{output}_{measure}": self[output, measure] for output, measure in names}
+        found: dict[str, _Array] = {}
+        for output in self._outputs:
+            for measure in self._measures:
+                of_elements = self._split(output, self[output, measure], 1)
+                found |= {f"{element}_{measure}": values for element, values in of_elements}
+        return found
+
+    def _split(self, name: str, values: _Array | str, ahead: int) -> list[tuple[str, Any]]:
+        """The elements of an array by name, and their values over the first dimensions; other values unchanged."""
+        array = name.removesuffix(AT_START)
+        if array not in self._arrays or isinstance(values, str):
+            return [(name, values)]
+        columns = values.reshape(*values.shape[:ahead], -1)
+        ending = name[len(array) :]
+        return [(f"{element}{ending}", columns[..., k]) for k, element in enumerate(self._elements(array))]
 
     def __repr__(self) -> str:
         measures = f", measures {', '.join(self._measures)}" if self._measures else ""

@@ -14,8 +14,8 @@ pub enum Numbers {
 }
 
 impl Numbers {
-    /// Converts a number, an array, or an object that NumPy converts to an array.
-    pub fn of(values: &Bound<'_, PyAny>) -> PyResult<Self> {
+    /// Converts a number, an array, or an object that NumPy converts to an array. Errors name the argument.
+    pub fn of(name: &str, values: &Bound<'_, PyAny>) -> PyResult<Self> {
         if let Ok(number) = values.cast::<PyFloat>() {
             return Ok(Self::One(number.value()));
         }
@@ -24,20 +24,13 @@ impl Numbers {
         {
             return Ok(Self::Array(buffer));
         }
-        let numpy = values.py().import("numpy")?;
-        let array = numpy.call_method1("asarray", (values,))?;
-        // NumPy would convert None to NaN and strings to numbers.
-        if !"biuf".contains(&array.getattr("dtype")?.getattr("kind")?.extract::<String>()?) {
-            return Err(PyValueError::new_err(format!(
-                "{} is no number and no array of numbers",
-                values.repr()?
-            )));
-        }
-        let array = array.call_method1("astype", ("float64",))?;
+        let array = array_of(name, values)?;
         if array.getattr("ndim")?.extract::<usize>()? == 0 {
             return Ok(Self::One(array.extract()?));
         }
-        Ok(Self::Array(PyBuffer::get(&numpy.call_method1("ascontiguousarray", (array,))?)?))
+        static CONTIGUOUS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+        let contiguous = CONTIGUOUS.import(values.py(), "numpy", "ascontiguousarray")?;
+        Ok(Self::Array(PyBuffer::get(&contiguous.call1((array,))?)?))
     }
 
     pub fn shape(&self) -> &[usize] {
@@ -54,6 +47,26 @@ impl Numbers {
             Self::Array(buffer) => read(buffer),
         }
     }
+}
+
+/// Converts to a NumPy array of float64.
+pub fn array_of<'py>(name: &str, values: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    static ARRAY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    let py = values.py();
+    let no_numbers = |why: &str| PyValueError::new_err(format!("{name}: the values are not numbers{why}"));
+    let array = ARRAY.import(py, "numpy", "asarray")?.call1((values,));
+    let array = array.map_err(|error| match error.is_instance_of::<PyValueError>(py) {
+        true => no_numbers(&format!(" ({})", error.value(py))),
+        false => error,
+    })?;
+    // NumPy would convert None to NaN and strings to numbers.
+    if !"biuf".contains(&array.getattr("dtype")?.getattr("kind")?.extract::<String>()?) {
+        return Err(match array.getattr("ndim")?.extract::<usize>()? {
+            0 => PyValueError::new_err(format!("{name}: {} is not a number", values.repr()?)),
+            _ => no_numbers(""),
+        });
+    }
+    array.call_method1("astype", ("float64",))
 }
 
 /// Returns the numbers of an array. The caller must not write to it from another thread meanwhile, as for
@@ -88,7 +101,8 @@ impl Output {
         };
         let wrong = || {
             PyValueError::new_err(format!(
-                "out must be a writable, contiguous array of float64 of the shape {shape:?}"
+                "out must be a writable, contiguous array of float64 of the shape {}",
+                crate::arguments::shape(shape)
             ))
         };
         let buffer = PyBuffer::<f64>::get(&array).map_err(|_| wrong())?;

@@ -1,5 +1,6 @@
 //! The class `fmu_run.Instances`.
 
+use crate::arguments::{self, shape, wrong};
 use crate::buffers::{Numbers, Output};
 use crate::start::Start;
 use crate::{FmuError, python};
@@ -31,11 +32,12 @@ pub struct Instances {
     known: Mutex<Vec<(Py<PyAny>, Arc<Named>)>>,
 }
 
-/// Variables of a call, and whether a single str named them.
+/// Variables of a call.
 #[derive(Default)]
 struct Named {
     selection: Selection,
-    one: bool,
+    /// Shape of the values of an instance.
+    row: Vec<usize>,
 }
 
 /// Saved states of instances; freed with this object.
@@ -107,21 +109,22 @@ impl Instances {
     fn new(
         py: Python,
         loaded: &crate::Loaded,
-        count: usize,
-        interface: &str,
-        start: Option<Bound<'_, PyDict>>,
-        start_time: f64,
-        stop_time: Option<f64>,
-        threads: Option<usize>,
+        count: &Bound<'_, PyAny>,
+        interface: &Bound<'_, PyAny>,
+        start: Optional,
+        start_time: &Bound<'_, PyAny>,
+        stop_time: Optional,
+        threads: Optional,
     ) -> PyResult<Self> {
-        let interface = match interface {
-            "co-simulation" => Interface::CoSimulation,
-            "model-exchange" => Interface::ModelExchange,
-            other => {
-                let why = format!("interface must be 'co-simulation' or 'model-exchange', not {other:?}");
-                return Err(PyValueError::new_err(why));
-            }
+        let interface = match interface.extract::<String>().as_deref() {
+            Ok("co-simulation") => Interface::CoSimulation,
+            Ok("model-exchange") => Interface::ModelExchange,
+            _ => return Err(wrong("interface", "'co-simulation' or 'model-exchange'", interface)),
         };
+        let count = arguments::count("count", Some(count))?.unwrap_or(1);
+        let threads = arguments::count("threads", threads.as_ref())?;
+        let start_time = finite("start_time", start_time)?;
+        let stop_time = stop_time.map(|time| finite("stop_time", &time)).transpose()?;
         let system = System::clone(&*loaded.model()?);
         let start = Start::of(&system, start.as_ref())?;
         let setup = Setup {
@@ -213,8 +216,8 @@ impl Instances {
         variables: &Bound<'py, PyAny>,
         out: Optional<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let named = self.named(variables)?;
-        self.read(py, named.columns(), out, |all, values| {
+        let named = self.named("variables", variables)?;
+        self.read(py, &named.row, out, |all, values| {
             all.get(&named.selection, values);
             Ok(())
         })
@@ -222,14 +225,17 @@ impl Instances {
 
     /// list[str | None]: the value of a string variable in each instance; None for an instance that has
     /// dropped out.
-    fn texts(&self, py: Python, variable: &str) -> PyResult<Vec<Option<String>>> {
-        self.attempt(py, |all| all.texts(variable))
+    fn texts(&self, py: Python, variable: &Bound<'_, PyAny>) -> PyResult<Vec<Option<String>>> {
+        let variable = arguments::text("variable", variable)?;
+        self.attempt(py, |all| all.texts(&variable))
     }
 
     /// Perform a step of Co-Simulation: by `size`, or to the time `to`, s.
     #[pyo3(signature = (size=None, *, to=None, mask=None))]
-    fn step(&self, py: Python, size: Option<f64>, to: Option<f64>, mask: Optional) -> PyResult<()> {
+    fn step(&self, py: Python, size: Optional, to: Optional, mask: Optional) -> PyResult<()> {
         self.only(Interface::CoSimulation)?;
+        let number = |name, value: Optional| value.map(|value| arguments::number(name, &value)).transpose();
+        let (size, to) = (number("size", size)?, number("to", to)?);
         let mask = self.mask(mask)?;
         match (size, to) {
             (Some(size), None) => self.attempt(py, |all| all.step(size, mask.as_deref())),
@@ -245,14 +251,15 @@ impl Instances {
         py: Python<'py>,
         set: &Bound<'py, PyAny>,
         values: &Bound<'py, PyAny>,
-        size: f64,
+        size: &Bound<'py, PyAny>,
         get: &Bound<'py, PyAny>,
         out: Optional<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
         self.only(Interface::CoSimulation)?;
-        let (set, get) = (self.named(set)?, self.named(get)?);
-        let values = self.fitting(set.columns(), Numbers::of(values)?)?;
-        let (array, mut output) = Output::of(py, out, &self.shape(get.columns()))?;
+        let size = arguments::number("size", size)?;
+        let (set, get) = (self.named("set", set)?, self.named("get", get)?);
+        let values = self.fitting(&set.row, "values", values)?;
+        let (array, mut output) = Output::of(py, out, &self.shape(&get.row))?;
         output.check_disjoint(&values)?;
         self.attempt(py, |all| {
             all.advance((&set.selection, values.values()), size, (&get.selection, output.values()))
@@ -269,7 +276,7 @@ impl Instances {
     /// start : dict, optional
     ///     Start values by name that replace earlier ones: numbers, (n,), or strings.
     #[pyo3(signature = (mask=None, *, start=None))]
-    fn reset(&self, py: Python, mask: Optional, start: Option<Bound<'_, PyDict>>) -> PyResult<()> {
+    fn reset(&self, py: Python, mask: Optional, start: Optional) -> PyResult<()> {
         let (mask, start) = (self.mask(mask)?, Start::of(&self.system, start.as_ref())?);
         self.revive(py, |all| {
             all.start_from(&start.values())?;
@@ -326,9 +333,9 @@ impl Instances {
         seed: &Bound<'py, PyAny>,
         out: Optional<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (unknowns, knowns) = (self.named(unknowns)?, self.named(knowns)?);
-        let seed = self.fitting(knowns.columns(), Numbers::of(seed)?)?;
-        let (array, mut output) = Output::of(py, out, &self.shape(unknowns.columns()))?;
+        let (unknowns, knowns) = (self.named("unknowns", unknowns)?, self.named("knowns", knowns)?);
+        let seed = self.fitting(&knowns.row, "seed", seed)?;
+        let (array, mut output) = Output::of(py, out, &self.shape(&unknowns.row))?;
         output.check_disjoint(&seed)?;
         self.attempt(py, |all| {
             let seed = (&knowns.selection, seed.values());
@@ -359,17 +366,15 @@ impl Instances {
         out: Optional<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
         self.only(Interface::CoSimulation)?;
-        let named = self.named(variables)?;
-        self.read(py, named.columns(), out, |all, values| {
-            all.get_output_derivatives(&named.selection, values)
-        })
+        let named = self.named("variables", variables)?;
+        self.read(py, &named.row, out, |all, values| all.get_output_derivatives(&named.selection, values))
     }
 
     /// Model Exchange: set the time, s: a number for all instances or (n,).
     #[pyo3(signature = (time, mask=None))]
     fn set_time(&self, py: Python, time: &Bound<'_, PyAny>, mask: Optional) -> PyResult<()> {
         self.only(Interface::ModelExchange)?;
-        let (mask, time) = (self.mask(mask)?, self.fitting(None, Numbers::of(time)?)?);
+        let (mask, time) = (self.mask(mask)?, self.fitting(&[], "time", time)?);
         self.attempt(py, |all| all.set_time(time.values(), mask.as_deref()))
     }
 
@@ -377,8 +382,8 @@ impl Instances {
     #[pyo3(signature = (states, mask=None))]
     fn set_continuous_states(&self, py: Python, states: &Bound<'_, PyAny>, mask: Optional) -> PyResult<()> {
         self.only(Interface::ModelExchange)?;
-        let columns = Some(self.instances.lock()?.continuous(Continuous::States));
-        let (mask, states) = (self.mask(mask)?, self.fitting(columns, Numbers::of(states)?)?);
+        let row = [self.instances.lock()?.continuous(Continuous::States)];
+        let (mask, states) = (self.mask(mask)?, self.fitting(&row, "states", states)?);
         self.attempt(py, |all| {
             all.set_continuous_states(states.values(), mask.as_deref());
             Ok(())
@@ -431,8 +436,8 @@ impl Instances {
         let mask = self.mask(mask)?;
         let (named, values) = match (&variables, &values) {
             (Some(variables), Some(values)) => {
-                let named = self.named(variables)?;
-                let values = self.fitting(named.columns(), Numbers::of(values)?)?;
+                let named = self.named("variables", variables)?;
+                let values = self.fitting(&named.row, "values", values)?;
                 (named, Some(values))
             }
             (None, None) => (Arc::default(), None),
@@ -449,7 +454,7 @@ impl Instances {
     /// (n, 2): 1 if an instance requests an event, and 1 if it requests the end of the simulation, else 0
     fn completed_integrator_step<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.only(Interface::ModelExchange)?;
-        self.read(py, Some(2), None, |all, values| {
+        self.read(py, &[2], None, |all, values| {
             all.completed_integrator_step(values);
             Ok(())
         })
@@ -457,23 +462,29 @@ impl Instances {
 }
 
 impl Instances {
-    /// Looks up variables by name; results are cached by the identity of the Python object.
-    fn named(&self, variables: &Bound<'_, PyAny>) -> PyResult<Arc<Named>> {
+    /// Looks up the variables of an argument by name; results are cached by the identity of the Python object.
+    fn named(&self, argument: &str, variables: &Bound<'_, PyAny>) -> PyResult<Arc<Named>> {
         /// Size of the cache.
         const MOST: usize = 64;
-        let mut known = lock(&self.known);
-        if let Some((_, named)) = known.iter().find(|(object, _)| object.is(variables)) {
+        if let Some((_, named)) = lock(&self.known).iter().find(|(object, _)| object.is(variables)) {
             return Ok(Arc::clone(named));
         }
-        let text = variables.cast::<PyString>();
-        let names = match text {
-            Ok(name) => vec![name.extract()?],
-            Err(_) => variables.extract::<Vec<String>>()?,
+        let given = arguments::names(argument, variables)?;
+        let elements = given.iter().flat_map(|name| match self.system.array(name) {
+            None => std::slice::from_ref(name),
+            Some(array) => &array.names,
+        });
+        let selection = self.system.select(&elements.collect::<Vec<_>>()).map_err(python)?;
+        let is_one = variables.is_instance_of::<PyString>();
+        let row = match self.system.array(&given.concat()).filter(|_| is_one) {
+            Some(array) => array.sizes.clone(),
+            None if is_one => Vec::new(),
+            None => vec![selection.len()],
         };
-        let selection = self.system.select(&names).map_err(python)?;
-        let named = Arc::new(Named { selection, one: text.is_ok() });
+        let named = Arc::new(Named { selection, row });
         // A list is mutable, so it is not cached.
-        if text.is_ok() || variables.is_instance_of::<PyTuple>() {
+        if is_one || variables.is_instance_of::<PyTuple>() {
+            let mut known = lock(&self.known);
             known.truncate(MOST - 1);
             known.insert(0, (variables.clone().unbind(), Arc::clone(&named)));
         }
@@ -482,37 +493,37 @@ impl Instances {
 
     fn mask(&self, given: Optional) -> PyResult<Option<Vec<bool>>> {
         let Some(given) = given else { return Ok(None) };
-        let mask: Vec<bool> = match given.call_method0("tolist") {
-            Ok(list) => list.extract()?,
-            Err(_) => given.extract()?,
-        };
+        let list = given.call_method0("tolist").unwrap_or_else(|_| given.clone());
+        let must = "a sequence of Booleans, one for each instance";
+        let mask: Vec<bool> = list.extract().map_err(|_| wrong("mask", must, &given))?;
         if mask.len() == self.count {
             return Ok(Some(mask));
         }
-        let why = format!("the mask has {} Booleans for {} instances", mask.len(), self.count);
+        let why = format!("mask has {} Booleans for {} instances", mask.len(), self.count);
         Err(PyValueError::new_err(why))
     }
 
-    /// Returns the shape of an array with a row of `columns` values, or a single value, for each instance.
-    fn shape(&self, columns: Option<usize>) -> Vec<usize> {
-        std::iter::once(self.count).chain(columns).collect()
+    /// Returns the shape of an array with values for each instance.
+    fn shape(&self, row: &[usize]) -> Vec<usize> {
+        [&[self.count], row].concat()
     }
 
-    /// Checks the shape of values: one for all, a row for all, or a row for each instance.
-    fn fitting(&self, columns: Option<usize>, values: Numbers) -> PyResult<Numbers> {
-        let (rows, length) = (self.shape(columns), columns.unwrap_or(1));
+    /// Checks the shape of the values of an argument: one for all, a row for all, or a row for each instance.
+    fn fitting(&self, row: &[usize], argument: &str, values: &Bound<'_, PyAny>) -> PyResult<Numbers> {
+        let (values, length) = (Numbers::of(argument, values)?, row.iter().product());
+        let given = values.shape();
         match &values {
             Numbers::One(value) if length != 1 => Ok(Numbers::Row(vec![*value; length])),
             Numbers::One(_) => Ok(values),
-            _ if values.shape() == rows => Ok(values),
-            _ if columns.is_some() && values.shape() == [length] => Ok(values),
+            _ if given.first() == Some(&self.count) && given[1..] == *row => Ok(values),
+            _ if !row.is_empty() && given == row => Ok(values),
             _ => {
-                let row = columns.map_or(String::new(), |columns| format!(", [{columns}]"));
-                let why = format!(
-                    "the values have the shape {:?}; it must be {rows:?}{row} or a number",
-                    values.shape()
-                );
-                Err(PyValueError::new_err(why))
+                let of_one = if row.is_empty() { String::new() } else { format!(", {}", shape(row)) };
+                Err(PyValueError::new_err(format!(
+                    "{argument} has the shape {}; it must be {}{of_one} or a number",
+                    shape(given),
+                    shape(&self.shape(row))
+                )))
             }
         }
     }
@@ -580,19 +591,19 @@ impl Instances {
         mask: Optional,
         body: fn(&mut fmu_run::Instances, &Selection, &[f64], fmu_run::Mask) -> Result<(), Error>,
     ) -> PyResult<()> {
-        let (named, mask) = (self.named(variables)?, self.mask(mask)?);
-        let values = self.fitting(named.columns(), Numbers::of(values)?)?;
+        let (named, mask) = (self.named("variables", variables)?, self.mask(mask)?);
+        let values = self.fitting(&named.row, "values", values)?;
         self.attempt(py, |all| body(all, &named.selection, values.values(), mask.as_deref()))
     }
 
     fn read<'py>(
         &self,
         py: Python<'py>,
-        columns: Option<usize>,
+        row: &[usize],
         out: Optional<'py>,
         body: impl FnOnce(&mut fmu_run::Instances, &mut [f64]) -> Result<(), Error> + Send,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (array, mut output) = Output::of(py, out, &self.shape(columns))?;
+        let (array, mut output) = Output::of(py, out, &self.shape(row))?;
         self.attempt(py, |all| body(all, output.values()))?;
         Ok(array)
     }
@@ -604,8 +615,8 @@ impl Instances {
         out: Optional<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
         self.only(Interface::ModelExchange)?;
-        let columns = self.instances.lock()?.continuous(what);
-        self.read(py, Some(columns), out, |all, values| {
+        let row = [self.instances.lock()?.continuous(what)];
+        self.read(py, &row, out, |all, values| {
             all.get_continuous(what, values);
             Ok(())
         })
@@ -626,9 +637,7 @@ impl Instances {
     }
 }
 
-impl Named {
-    /// Returns the number of columns of an array; None for a single str.
-    fn columns(&self) -> Option<usize> {
-        (!self.one).then(|| self.selection.len())
-    }
+fn finite(name: &str, time: &Bound<'_, PyAny>) -> PyResult<f64> {
+    let found = arguments::number(name, time)?;
+    if found.is_finite() { Ok(found) } else { Err(wrong(name, "a finite time", time)) }
 }

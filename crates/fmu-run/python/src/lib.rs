@@ -1,20 +1,22 @@
 //! The Rust part of the Python package `fmu_run`: the module `fmu_run._native`. `fmu_run/__init__.py`
 //! contains the public interface.
 
+mod arguments;
 mod buffers;
 mod instances;
+mod signals;
 mod start;
 
 use buffers::{Numbers, Output};
-use fmu_run::{Batch, Composition, Error, Fmu, Order, Planned, System, Trajectory, Watch};
+use fmu_run::{Batch, Composition, Elements, Error, Fmu, Order, Planned, System, Watch};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
+use signals::Signals;
 use start::Start;
 use std::collections::BTreeMap;
 use std::ops::Deref;
-use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 create_exception!(fmu_run, FmuError, PyException, "An FMU that cannot be loaded or run, or rejects a run.");
@@ -52,8 +54,19 @@ type Pairs = Vec<(String, String)>;
 type Stages = Vec<Pairs>;
 /// Messages by run.
 type Messages = Vec<(usize, String)>;
-/// Trajectories and statistics, (runs, outputs, times or statistics) each, errors, notes and start values.
-type Result5<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Messages, Messages, Bound<'py, PyDict>);
+/// Kept times; outputs; trajectories, (runs, outputs, times); names and values of statistics, (runs, outputs, statistics); errors;
+/// notes; start values; shapes and elements of whole arrays.
+type Results<'py> = (
+    Bound<'py, PyAny>,
+    Vec<String>,
+    Bound<'py, PyAny>,
+    Vec<String>,
+    Option<Bound<'py, PyAny>>,
+    Messages,
+    Messages,
+    Bound<'py, PyDict>,
+    Option<Bound<'py, PyDict>>,
+);
 
 fn python(error: Error) -> PyErr {
     match error {
@@ -68,7 +81,9 @@ fn python(error: Error) -> PyErr {
 impl Loaded {
     /// Loads an FMU.
     #[new]
-    fn new(py: Python, path: PathBuf, execution_tool: bool) -> PyResult<Self> {
+    fn new(py: Python, path: &Bound<'_, PyAny>, execution_tool: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let path = arguments::path("path", path)?;
+        let execution_tool = arguments::flag("execution_tool", execution_tool)?;
         let open = if execution_tool { Fmu::open_with_execution_tool } else { Fmu::open };
         // SAFETY: the user passes a file that is an FMU and trusts its library like any extension module.
         #[allow(unsafe_code)]
@@ -78,8 +93,8 @@ impl Loaded {
 
     /// Loads a system from an SSP file.
     #[staticmethod]
-    fn ssp(py: Python, path: PathBuf, order: &str) -> PyResult<Self> {
-        let order = order_of(order)?;
+    fn ssp(py: Python, path: &Bound<'_, PyAny>, order: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let (path, order) = (arguments::path("source", path)?, order_of(order)?);
         // SAFETY: the user trusts the libraries, as in `new`.
         #[allow(unsafe_code)]
         let system = py.detach(|| unsafe { System::open(&path, order) }).map_err(python)?;
@@ -92,7 +107,7 @@ impl Loaded {
         name: &str,
         components: Vec<(String, PyRef<'_, Self>)>,
         connections: Vec<(String, String)>,
-        order: &str,
+        order: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
         let fmus = components.iter().map(|(name, loaded)| match loaded.model()? {
             Model::Fmu(fmu) => Ok((name.as_str(), fmu)),
@@ -126,8 +141,9 @@ impl Loaded {
     }
 
     /// Returns factor and offset: value in the other unit = factor * value + offset.
-    fn display_unit(&self, name: &str, unit: &str) -> PyResult<(f64, f64)> {
-        self.model()?.display_unit(name, unit).map_err(python)
+    fn display_unit(&self, name: &Bound<'_, PyAny>, unit: &Bound<'_, PyAny>) -> PyResult<(f64, f64)> {
+        let (name, unit) = (arguments::text("name", name)?, arguments::text("unit", unit)?);
+        arguments::display_unit(&*self.model()?, &name, &unit)
     }
 
     fn about(&self) -> PyResult<About> {
@@ -181,31 +197,40 @@ impl Loaded {
         &self,
         py: Python<'py>,
         time: Bound<'py, PyAny>,
-        inputs: Vec<(String, Bound<'py, PyAny>)>,
-        input_derivatives: Vec<(String, Bound<'py, PyAny>)>,
-        start: Option<Bound<'py, PyDict>>,
-        outputs: Vec<String>,
-        every: Option<usize>,
-        measures: Vec<String>,
-        threads: Option<usize>,
-        read_before_set: bool,
-        progress: Option<Py<PyAny>>,
-    ) -> PyResult<Result5<'py>> {
+        outputs: Bound<'py, PyAny>,
+        inputs: Option<Bound<'py, PyAny>>,
+        input_derivatives: Option<Bound<'py, PyAny>>,
+        start: Option<Bound<'py, PyAny>>,
+        every: Option<Bound<'py, PyAny>>,
+        measures: Bound<'py, PyAny>,
+        threads: Option<Bound<'py, PyAny>>,
+        read_before_set: Bound<'py, PyAny>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Results<'py>> {
         let model = self.model()?;
-        let measures = measures.iter().map(|name| name.parse()).collect::<Result<Vec<_>, String>>();
-        let time = Numbers::of(&time)?;
-        let [inputs, input_derivatives] = [numbers(&inputs)?, numbers(&input_derivatives)?];
+        let time = times(&time)?;
+        let measures = arguments::names("measures", &measures)?;
+        let outputs = arguments::names("outputs", &outputs)?;
+        let given = |name, values: Option<&Bound<'py, PyAny>>| {
+            Signals::of(&model, &arguments::items(name, values)?, time.values().len())
+        };
+        let inputs = given("inputs", inputs.as_ref())?;
+        let input_derivatives = given("input_derivatives", input_derivatives.as_ref())?;
         let start = Start::of(&model, start.as_ref())?;
+        let every = arguments::count("every", every.as_ref())?;
+        arguments::callable("progress", progress.as_ref())?;
+        let arrays = Arrays::of(&model, outputs.iter().map(String::as_str).chain(start.names()));
+        let parsed = measures.iter().map(|name| name.parse()).collect::<Result<Vec<_>, String>>();
         let batch = Batch {
             time: time.values(),
-            inputs: trajectories(&inputs),
-            input_derivatives: trajectories(&input_derivatives),
+            inputs: inputs.trajectories(),
+            input_derivatives: input_derivatives.trajectories(),
             start: start.values(),
-            outputs: outputs.iter().map(String::as_str).collect(),
-            every,
-            measures: measures.map_err(PyValueError::new_err)?,
-            threads,
-            read_before_set,
+            outputs: arrays.elements(&outputs),
+            every: every.or(measures.is_empty().then_some(1)),
+            measures: parsed.map_err(PyValueError::new_err)?,
+            threads: arguments::count("threads", threads.as_ref())?,
+            read_before_set: arguments::flag("read_before_set", &read_before_set)?,
             ..Batch::default()
         };
         let planned = model.plan(&batch).map_err(python)?;
@@ -213,11 +238,63 @@ impl Loaded {
         if size.trajectories().is_none() || size.measures().is_none() {
             return Err(python(Error::too_much()));
         }
+        let (times, mut kept_times) = Output::of(py, None, &[size.kept])?;
+        let every = batch.every.unwrap_or(1);
+        kept_times
+            .values()
+            .iter_mut()
+            .zip(batch.time.iter().step_by(every))
+            .for_each(|(to, time)| *to = *time);
         let array = |each: usize| Output::of(py, None, &[size.runs, size.outputs, each]);
-        let ((trajectories, mut kept), (measures, mut measured)) = (array(size.kept)?, array(size.measures)?);
-        let results = [kept.values(), measured.values()];
-        let [errors, notes] = carry_out(py, &planned, results, progress)?;
-        Ok((trajectories, measures, errors, notes, start.dict(py)?))
+        let (trajectories, mut kept) = array(size.kept)?;
+        let mut measured = (!measures.is_empty()).then(|| array(size.measures)).transpose()?;
+        let measured_values = measured.as_mut().map_or(&mut [][..], |(_, output)| output.values());
+        let results = [kept.values(), measured_values];
+        let [errors, notes] = carry_out(py, &planned, results, progress.map(Bound::unbind))?;
+        let measured = measured.map(|(array, _)| array);
+        let (start, arrays) = (start.dict(py)?, arrays.dict(py)?);
+        Ok((times, outputs, trajectories, measures, measured, errors, notes, start, arrays))
+    }
+}
+
+/// Whole arrays among names.
+#[derive(Default)]
+struct Arrays<'a>(BTreeMap<&'a str, &'a Elements>);
+
+impl<'a> Arrays<'a> {
+    fn of(system: &'a System, names: impl Iterator<Item = &'a str>) -> Self {
+        Self(names.filter_map(|name| Some((name, system.array(name)?))).collect())
+    }
+
+    /// Returns the names with each array replaced by its elements.
+    fn elements(&self, names: &'a [String]) -> Vec<&'a str> {
+        let elements = |name: &'a String| match self.0.get(name.as_str()) {
+            None => std::slice::from_ref(name),
+            Some(array) => &array.names,
+        };
+        names.iter().flat_map(elements).map(String::as_str).collect()
+    }
+
+    /// Returns the shape and the names of the elements by array.
+    fn dict<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        if self.0.is_empty() {
+            return Ok(None);
+        }
+        let dict = PyDict::new(py);
+        for (name, array) in &self.0 {
+            dict.set_item(*name, (PyTuple::new(py, &array.sizes)?, &array.names))?;
+        }
+        Ok(Some(dict))
+    }
+}
+
+fn times(given: &Bound<'_, PyAny>) -> PyResult<Numbers> {
+    let time = Numbers::of("time", given)?;
+    match time.shape().len() {
+        1 => Ok(time),
+        dimensions => {
+            Err(PyValueError::new_err(format!("time must have one dimension, it has {dimensions}")))
+        }
     }
 }
 
@@ -228,28 +305,12 @@ impl Loaded {
     }
 }
 
-fn order_of(name: &str) -> PyResult<Order> {
-    match name {
-        "dependencies" => Ok(Order::Dependencies),
-        "jacobi" => Ok(Order::Jacobi),
-        other => {
-            Err(PyValueError::new_err(format!("order must be 'dependencies' or 'jacobi', not {other:?}")))
-        }
+fn order_of(name: &Bound<'_, PyAny>) -> PyResult<Order> {
+    match name.extract::<String>().as_deref() {
+        Ok("dependencies") => Ok(Order::Dependencies),
+        Ok("jacobi") => Ok(Order::Jacobi),
+        _ => Err(arguments::wrong("order", "'dependencies' or 'jacobi'", name)),
     }
-}
-
-fn numbers(given: &[(String, Bound<'_, PyAny>)]) -> PyResult<Vec<(String, Numbers)>> {
-    given.iter().map(|(name, values)| Ok((name.clone(), Numbers::of(values)?))).collect()
-}
-
-/// Converts numbers to constants, time series for all runs, or time series for each run.
-fn trajectories(given: &[(String, Numbers)]) -> Vec<(&str, Trajectory<'_>)> {
-    let trajectory = given.iter().map(|(name, values)| match values.shape() {
-        [] => (name.as_str(), Trajectory::Constant(values.values()[0])),
-        [_] => (name.as_str(), Trajectory::Shared(values.values())),
-        _ => (name.as_str(), Trajectory::EachRun(values.values())),
-    });
-    trajectory.collect()
 }
 
 /// Performs the runs without the GIL. Between steps, this thread handles Python signals and calls progress.
@@ -276,11 +337,17 @@ fn carry_out(
     raised.map_or_else(|| result.map_err(python), Err)
 }
 
+/// Converts an argument to a NumPy array of float64.
+#[pyfunction]
+fn numbers<'py>(name: &str, values: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    buffers::array_of(name, values)
+}
+
 /// The module `fmu_run._native`.
 #[pymodule]
 mod _native {
     #[pymodule_export]
     use super::instances::{Instances, States};
     #[pymodule_export]
-    use super::{FmuError, Loaded};
+    use super::{FmuError, Loaded, numbers};
 }

@@ -1,58 +1,102 @@
 //! Start values that are given as a dict.
 
+use crate::arguments::{in_own_unit, items, shape};
 use crate::buffers::Numbers;
-use fmu_run::System;
+use fmu_run::{Elements, System};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 
-/// Start values by name: a number or an array with one for each run or instance, a string or a sequence of
-/// strings.
+/// Start values by name: a number, an array with one for each run or instance, a string, a sequence of
+/// strings, or whole arrays.
 #[derive(Default)]
-pub struct Start(Vec<(String, Value, Py<PyAny>)>);
+pub struct Start {
+    values: Vec<(String, Value)>,
+    /// Values as Python objects, in the units of the variables.
+    given: Vec<(String, Py<PyAny>)>,
+}
 
 enum Value {
     Numbers(Numbers),
+    /// A number for each run or instance.
+    Each(Vec<f64>),
     Text(String),
     Texts(Vec<String>),
 }
 
 impl Start {
     /// Reads start values. Converts values given as (value, unit) to the unit of their variable.
-    pub fn of(system: &System, given: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    pub fn of(system: &System, given: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let mut start = Self::default();
-        for (name, value) in given.into_iter().flatten() {
-            let name: String = name.extract()?;
-            let value = in_own_unit(system, &name, value)?;
-            start.0.push((name.clone(), Value::of(&name, &value)?, value.unbind()));
+        for (name, value) in items("start", given)? {
+            let value = in_own_unit(system, &name, &value)?;
+            match system.array(&name) {
+                None => start.values.push((name.clone(), Value::of(&name, &value)?)),
+                Some(array) => start.add_array(&name, array, &value)?,
+            }
+            start.given.push((name, value.unbind()));
         }
         Ok(start)
     }
 
     /// Returns the values for the Rust interface.
     pub fn values(&self) -> Vec<(&str, fmu_run::Start<'_>)> {
-        self.0.iter().map(|(name, of, _)| (name.as_str(), of.value())).collect()
+        self.values.iter().map(|(name, of)| (name.as_str(), of.value())).collect()
+    }
+
+    /// Returns the names of the values.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.given.iter().map(|(name, _)| name.as_str())
     }
 
     /// Returns the values as Python objects, in the units of the variables.
     pub fn dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
-        for (name, _, value) in &self.0 {
+        for (name, value) in &self.given {
             dict.set_item(name, value)?;
         }
         Ok(dict)
     }
+
+    /// Adds the elements of an array, which all have the given number, or their own numbers or strings.
+    fn add_array(&mut self, name: &str, array: &Elements, value: &Bound<'_, PyAny>) -> PyResult<()> {
+        let given = value.py().import("numpy")?.call_method1("asarray", (value,))?;
+        let is_text = matches!(given.getattr("dtype")?.getattr("kind")?.extract()?, 'U' | 'T');
+        let sizes: Vec<usize> = given.getattr("shape")?.extract()?;
+        let (count, by_run) = (array.names.len(), sizes.len() == array.sizes.len() + 1);
+        if !sizes.is_empty() && (!sizes.ends_with(&array.sizes) || sizes.len() > array.sizes.len() + 1) {
+            let own = array.sizes.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
+            return Err(PyValueError::new_err(format!(
+                "the start value of {name} has the shape {}; it must be {}, (n, {own}) with one array for each, or one number for all \
+                 elements",
+                shape(&sizes),
+                shape(&array.sizes)
+            )));
+        }
+        let is_same = sizes.is_empty();
+        if is_text {
+            let all: Vec<String> = given.call_method0("ravel")?.call_method0("tolist")?.extract()?;
+            for (number, element) in array.names.iter().enumerate() {
+                let own = if is_same { all.clone() } else { every(&all, number, count) };
+                let own = if by_run { Value::Texts(own) } else { Value::Text(own.concat()) };
+                self.values.push((element.clone(), own));
+            }
+            return Ok(());
+        }
+        let numbers = Numbers::of(name, value)?;
+        for (number, element) in array.names.iter().enumerate() {
+            let own =
+                if is_same { numbers.values().to_vec() } else { every(numbers.values(), number, count) };
+            let own = if by_run { Value::Each(own) } else { Value::Numbers(Numbers::One(own[0])) };
+            self.values.push((element.clone(), own));
+        }
+        Ok(())
+    }
 }
 
-/// Converts (value, unit) to the unit of the variable; returns a value without unit unchanged.
-fn in_own_unit<'py>(system: &System, name: &str, value: Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-    let Ok((number, unit)) = value.extract::<(Bound<'py, PyAny>, String)>() else { return Ok(value) };
-    if number.is_instance_of::<PyString>() {
-        return Ok(value);
-    }
-    let (factor, offset) = system.display_unit(name, &unit).map_err(crate::python)?;
-    let numbers = value.py().import("numpy")?.call_method1("asarray", (number, "float64"))?;
-    numbers.sub(offset)?.div(factor)
+/// Returns every `step`-th value from `first` on.
+fn every<T: Clone>(values: &[T], first: usize, step: usize) -> Vec<T> {
+    values.iter().skip(first).step_by(step).cloned().collect()
 }
 
 impl Value {
@@ -60,6 +104,7 @@ impl Value {
         match self {
             Self::Numbers(numbers) if numbers.shape().is_empty() => fmu_run::Start::Same(numbers.values()[0]),
             Self::Numbers(numbers) => fmu_run::Start::Each(numbers.values()),
+            Self::Each(numbers) => fmu_run::Start::Each(numbers),
             Self::Text(text) => fmu_run::Start::Text(text),
             Self::Texts(texts) => fmu_run::Start::EachText(texts),
         }
@@ -72,12 +117,12 @@ impl Value {
         if let Ok(texts) = value.extract::<Vec<String>>() {
             return Ok(Self::Texts(texts));
         }
-        let numbers = Numbers::of(value)
-            .map_err(|error| PyValueError::new_err(format!("{name}: {}", error.value(value.py()))))?;
+        let numbers = Numbers::of(name, value)?;
         match numbers.shape() {
             [] | [_] => Ok(Self::Numbers(numbers)),
-            shape => Err(PyValueError::new_err(format!(
-                "the start value of {name} has the shape {shape:?}; it must be a number, or an array with one for each"
+            given => Err(PyValueError::new_err(format!(
+                "the start value of {name} has the shape {}; it must be one number for all, or (n,) with one value for each",
+                shape(given)
             ))),
         }
     }

@@ -1,5 +1,6 @@
 //! Systems of connected FMUs.
 
+mod elements;
 mod order;
 mod ssp;
 
@@ -10,14 +11,15 @@ use crate::found::Found;
 use crate::kept::Kept;
 use crate::messages::Feed;
 use crate::selection::Selection;
+pub use elements::Elements;
 use fmi_abi::description::Offer;
 use fmi_abi::{BaseType, Interface};
 pub(crate) use order::Exchange;
 pub use order::Order;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Deref;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Connected FMUs in Co-Simulation. A system runs like one FMU, also in parallel in [batches](System::run)
 /// and as [instances](System::instances). An [`Fmu`](crate::Fmu) is a system with one component.
@@ -39,6 +41,8 @@ struct Definition {
     start: Vec<(String, StartValue)>,
     stop_time: Option<f64>,
     kept: Kept,
+    /// Arrays by name.
+    arrays: OnceLock<HashMap<String, Elements>>,
 }
 
 /// A component.
@@ -140,6 +144,30 @@ impl System {
             selection.push(name, &self.find_numbers(name)?);
         }
         Ok(selection)
+    }
+
+    /// Returns the elements of a whole array by its name: of an array of FMI 3.0, or of variables `y[1]`, `y[2]`, ... whose indices are
+    /// complete. `None` for other names, also for a variable.
+    ///
+    /// ```no_run
+    /// # fn main() -> Result<(), fmu_run::Error> {
+    /// # // SAFETY: the library of a trusted FMU.
+    /// let fmu = unsafe { fmu_run::Fmu::open("rod.fmu".as_ref()) }?;
+    /// if let Some(temperatures) = fmu.array("T") {
+    ///     println!("{:?} {:?}", temperatures.sizes, fmu.select(&temperatures.names)?);
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn array(&self, name: &str) -> Option<&Elements> {
+        if self.0.look_up(name).is_some() || self.0.connectors.contains_key(name) {
+            return None;
+        }
+        let all = self.0.arrays.get_or_init(|| {
+            let names: Vec<_> = self.variables().map(|(name, _)| name).collect();
+            elements::arrays(names.iter().map(String::as_str))
+        });
+        all.get(name)
     }
 
     /// Returns the conversion between the unit of a variable and another unit, as factor and offset: value in
@@ -345,6 +373,7 @@ impl Definition {
             start: Vec::new(),
             stop_time: None,
             kept: Kept::default(),
+            arrays: OnceLock::new(),
         }
     }
 
@@ -424,7 +453,10 @@ impl Definition {
         let names = self.components.iter().flat_map(|component| {
             component.fmu.description.variables.iter().map(|of| joined(&component.name, &of.name))
         });
-        let hint = nearest(name, names.chain(self.connectors.keys().cloned()));
+        let element = format!("{name}[");
+        let names: Vec<_> = names.chain(self.connectors.keys().cloned()).collect();
+        let of_array = names.iter().find(|known| known.starts_with(&element)).cloned();
+        let hint = of_array.or_else(|| nearest(name, names.into_iter()));
         let hint = hint.map_or(String::new(), |near| format!("; did you mean {near:?}?"));
         request(format!("{} has no variable {name:?}{hint}", self.name))
     }

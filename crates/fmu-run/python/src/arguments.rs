@@ -1,0 +1,135 @@
+//! Arguments of Python functions. An error names the argument.
+
+use crate::buffers::array_of;
+use fmu_run::System;
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString, PyTuple};
+use std::path::PathBuf;
+
+/// Returns the error for an argument, with the beginning of its value.
+pub fn wrong(name: &str, must: &str, value: &Bound<'_, PyAny>) -> PyErr {
+    const MOST: usize = 60;
+    let written = value.repr().map_or_else(|_| value.get_type().to_string(), |repr| repr.to_string());
+    let written = written.split_whitespace().collect::<Vec<_>>().join(" ");
+    let short: String = written.chars().take(MOST).collect();
+    let dots = if short.len() < written.len() { "..." } else { "" };
+    PyValueError::new_err(format!("{name} must be {must}, it is {short}{dots}"))
+}
+
+/// Returns an optional count, at least 1.
+pub fn count(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<usize>> {
+    let Some(value) = value else { return Ok(None) };
+    let integer = value.py().import("operator")?.call_method1("index", (value,));
+    let integer = integer.ok().filter(|_| !value.is_instance_of::<PyBool>());
+    let integer = integer.ok_or_else(|| wrong(name, "an integer", value))?;
+    if integer.lt(1)? {
+        return Err(PyValueError::new_err(format!("{name} must be at least 1, it is {}", integer.str()?)));
+    }
+    // A number that no machine has means: as many as possible.
+    Ok(Some(integer.extract().unwrap_or(usize::MAX >> 1)))
+}
+
+/// Returns a time or another number.
+pub fn number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
+    if let Ok(number) = value.cast::<PyFloat>() {
+        return Ok(number.value());
+    }
+    let is_number = !value.is_instance_of::<PyBool>() && !value.is_instance_of::<PyString>();
+    value.extract().ok().filter(|_| is_number).ok_or_else(|| wrong(name, "a number", value))
+}
+
+/// Returns a Boolean of Python or NumPy, or one of the numbers 0 and 1.
+pub fn flag(name: &str, value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    let integer = || value.cast::<PyInt>().ok()?.extract().ok().filter(|number: &u8| *number < 2);
+    let found = value.extract().ok().or_else(|| integer().map(|number| number == 1));
+    found.ok_or_else(|| wrong(name, "True or False", value))
+}
+
+/// Returns names: one str or a sequence of str.
+pub fn names(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
+    if let Ok(text) = value.cast::<PyString>() {
+        return Ok(vec![text.extract()?]);
+    }
+    let of = |value: &Bound<'_, PyAny>| -> PyResult<Vec<String>> {
+        value.try_iter()?.map(|one| Ok(one?.cast::<PyString>().map_err(PyErr::from)?.extract()?)).collect()
+    };
+    of(value).map_err(|error| match error.is_instance_of::<PyTypeError>(value.py()) {
+        true => wrong(name, "a str or a sequence of str", value),
+        false => error,
+    })
+}
+
+/// Returns the items of an optional dict with names as keys, or of another mapping.
+pub fn items<'py>(
+    name: &str,
+    value: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
+    let Some(value) = value else { return Ok(Vec::new()) };
+    let must = "a dict of values by name";
+    let pair = |(key, of): (Bound<'py, PyAny>, Bound<'py, PyAny>)| match key.cast::<PyString>() {
+        Ok(key) => Ok((key.extract()?, of)),
+        Err(_) => Err(wrong(&format!("a name in {name}"), "a str", &key)),
+    };
+    match value.cast::<PyDict>() {
+        Ok(dict) => dict.iter().map(pair).collect(),
+        Err(_) => {
+            let items = value.call_method0("items").map_err(|_| wrong(name, must, value))?;
+            let items = items.try_iter().map_err(|_| wrong(name, must, value))?;
+            items.map(|item| pair(item?.extract().map_err(|_| wrong(name, must, value))?)).collect()
+        }
+    }
+}
+
+/// Fails unless the optional argument can be called.
+pub fn callable(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+    match value {
+        Some(value) if !value.is_callable() => Err(wrong(name, "a function", value)),
+        _ => Ok(()),
+    }
+}
+
+/// Returns (value, unit) of a value with a unit.
+pub fn with_unit<'py>(value: &Bound<'py, PyAny>) -> Option<(Bound<'py, PyAny>, String)> {
+    let pair = value.cast::<PyTuple>().ok().filter(|pair| pair.len() == 2)?;
+    let (of, unit) = (pair.get_item(0).ok()?, pair.get_item(1).ok()?);
+    let unit = unit.cast::<PyString>().ok()?.extract().ok()?;
+    (!of.is_instance_of::<PyString>()).then_some((of, unit))
+}
+
+/// Converts (value, unit) to the unit of the variable or of the elements of an array.
+pub fn in_own_unit<'py>(
+    system: &System,
+    name: &str,
+    value: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let Some((of, unit)) = with_unit(value) else { return Ok(value.clone()) };
+    let (factor, offset) = display_unit(system, name, &unit)?;
+    let numbers = array_of(name, &of)?;
+    numbers.sub(offset)?.div(factor)
+}
+
+/// Returns factor and offset of a unit of a variable or of the elements of an array.
+pub fn display_unit(system: &System, name: &str, unit: &str) -> PyResult<(f64, f64)> {
+    let variable = system.array(name).and_then(|array| array.names.first()).map_or(name, String::as_str);
+    system.display_unit(variable, unit).map_err(crate::python)
+}
+
+/// Returns the path of a file.
+pub fn path(name: &str, value: &Bound<'_, PyAny>) -> PyResult<PathBuf> {
+    let decoded = value.py().import("os")?.call_method1("fsdecode", (value,));
+    decoded.and_then(|path| path.extract()).map_err(|_| wrong(name, "a path", value))
+}
+
+/// Returns a string.
+pub fn text(name: &str, value: &Bound<'_, PyAny>) -> PyResult<String> {
+    value.cast::<PyString>().map_err(|_| wrong(name, "a str", value))?.extract()
+}
+
+/// Writes a shape like NumPy.
+pub fn shape(sizes: &[usize]) -> String {
+    match sizes {
+        [one] => format!("({one},)"),
+        _ => format!("({})", sizes.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")),
+    }
+}
