@@ -17,7 +17,7 @@ BEHAVIOURS = {
     "silent error": (6, "at 0.5 s: fmi2DoStep returned Error without a message", None),
     "pending": (6, "at 0.5 s: fmi2DoStep returned Error without a message", None),
     "fatal": (6, "at 0.5 s: fmi2DoStep returned Fatal without a message", None),
-    "discard": (6, "at 0.5 s: fmi2DoStep: no more of this after %s", None),
+    "discard": (6, "at 0.5 s: fmi2DoStep: no more of this after half", None),
     "no status": (6, "at 0.5 s: fmi2DoStep returned Error without a message", None),
     "no reset": (11, None, None),
     "warning": (11, None, None),

@@ -65,6 +65,8 @@ pub struct Instance {
     pub(crate) library: Arc<Library>,
     pub(crate) states: crate::states::States,
     label: Box<str>,
+    /// Whether a step may end early.
+    early_return: bool,
 }
 
 impl fmt::Debug for Instance {
@@ -222,7 +224,15 @@ impl Instance {
             return Err(Rejection::new(settings.label, function, Status::Error, messages));
         }
         let (library, label) = (Arc::clone(library), settings.label.into());
-        Ok(Self { handle, log, _callbacks: callbacks, library, states: Default::default(), label })
+        Ok(Self {
+            handle,
+            log,
+            _callbacks: callbacks,
+            library,
+            states: Default::default(),
+            label,
+            early_return,
+        })
     }
 
     /// Returns the FMI version.
@@ -409,15 +419,17 @@ impl Instance {
         )
     }
 
-    /// Performs a step of Co-Simulation; if the FMU performs it asynchronously, waits for its end.
+    /// Performs a step of Co-Simulation and returns the time that the FMU has reached, s; if the FMU performs the step
+    /// asynchronously, waits for its end.
     ///
     /// # Errors
     /// The FMU rejects the step, or ends the simulation (see [`Rejection::ended`]).
     #[inline]
-    pub fn step(&mut self, time: f64, size: f64) -> Result<(), Rejection> {
+    pub fn step(&mut self, time: f64, size: f64) -> Result<f64, Rejection> {
         // A state that is kept may be restored (section 4.2.2 of FMI 2.0, noSetFMUStatePriorToCurrentPoint).
         let no_return = self.states.is_empty();
-        let (mut event, mut terminate, mut early, mut reached) = (fmi3False, fmi3False, fmi3False, time);
+        let (mut event, mut terminate, mut early, mut reached) =
+            (fmi3False, fmi3False, fmi3False, time + size);
         let handle = self.handle("fmi2DoStep")?;
         // SAFETY: the instance is alive; the pointers are live references.
         let (function, code) = unsafe {
@@ -444,7 +456,7 @@ impl Instance {
             }
         };
         match self.check(function, code) {
-            Ok(()) if terminate == fmi3False && early == fmi3False => Ok(()),
+            Ok(()) if terminate == fmi3False && (early == fmi3False || self.early_return) => Ok(reached),
             Ok(()) => Err(self.stopped(terminate != fmi3False, reached)),
             Err(rejection) => Err(self.ended(rejection, time)),
         }

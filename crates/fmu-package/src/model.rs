@@ -4,11 +4,12 @@
 use crate::table::Table;
 use anyhow::{Context, Result, ensure};
 use fmi_abi::c_types::{c_char, c_void};
-use fmi_abi::{BaseType, Value, fmi2, fmi3};
-use std::ffi::CString;
+use fmi_abi::{BaseType, Standard, Value, fmi2, fmi3};
+use fmi_client::{Functions, Library};
+use std::ffi::{CStr, CString};
 use std::path::Path;
 use std::ptr::null;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// The function of a library that describes its model; `fmu-export` declares it.
 const DESCRIPTION: &str = "fmu_export_describe";
@@ -19,8 +20,8 @@ type Receive = unsafe extern "C" fn(context: *mut c_void, text: *const u8, lengt
 #[derive(Debug)]
 pub struct LoadedModel {
     pub(crate) table: Table,
-    pub(crate) fmi2: fmi2::Functions,
-    pub(crate) fmi3: fmi3::Functions,
+    /// The functions of FMI 2.0 and FMI 3.0.
+    functions: [Arc<Library>; 2],
     /// The variables by their types.
     pub(crate) groups: Vec<Group>,
     /// The start values by variable, once the model has been checked.
@@ -46,7 +47,8 @@ impl LoadedModel {
     /// # Errors
     /// When the description cannot be read.
     pub unsafe fn new(description: &str, fmi2: fmi2::Functions, fmi3: fmi3::Functions) -> Result<Self> {
-        Self::with(description, fmi2, fmi3, None, None)
+        // SAFETY: the caller guarantees it.
+        unsafe { Self::with(description, fmi2, fmi3, None, None) }
     }
 
     /// Loads the model of a shared library for this machine. The model may read the files in the directory `resources`,
@@ -90,11 +92,14 @@ impl LoadedModel {
             describe(directory, keep, (&raw mut description).cast());
             (fmi2, fmi3)
         };
-        Self::with(std::str::from_utf8(&description)?, fmi2, fmi3, resources, Some(library))
-            .with_context(path_of)
+        let description = std::str::from_utf8(&description)?;
+        // SAFETY: the functions are those of the library, which describes itself.
+        unsafe { Self::with(description, fmi2, fmi3, resources, Some(library)) }.with_context(path_of)
     }
 
-    fn with(
+    /// # Safety
+    /// The functions belong to the model that is described, and the library contains them if there is one.
+    unsafe fn with(
         description: &str,
         fmi2: fmi2::Functions,
         fmi3: fmi3::Functions,
@@ -102,14 +107,23 @@ impl LoadedModel {
         library: Option<libloading::Library>,
     ) -> Result<Self> {
         let table = Table::read(description)?;
+        let functions = [Functions::Fmi2(Box::new(fmi2)), Functions::Fmi3(Box::new(fmi3))];
+        // SAFETY: the caller guarantees that the functions belong to a model of fmu-export; this value keeps them loaded, and
+        // instances borrow it.
+        let functions = functions.map(|functions| Arc::new(unsafe { Library::of(functions) }));
         let group = |base| Group { base, indices: table.find(|variable| variable.base() == base) };
         let groups = BaseType::ALL.into_iter().map(group).filter(|group| !group.indices.is_empty()).collect();
-        Ok(Self { table, fmi2, fmi3, groups, starts: OnceLock::new(), resources, _library: library })
+        Ok(Self { table, functions, groups, starts: OnceLock::new(), resources, _library: library })
     }
 
-    /// Returns the directory of resources, or NULL.
-    pub(crate) fn resources(&self) -> *const c_char {
-        self.resources.as_ref().map_or(null(), |path| path.as_ptr())
+    /// Returns the directory of resources, if there is one.
+    pub(crate) fn resources(&self) -> Option<&CStr> {
+        self.resources.as_deref()
+    }
+
+    /// Returns the functions of an FMI version.
+    pub(crate) fn functions(&self, standard: Standard) -> &Arc<Library> {
+        &self.functions[standard as usize]
     }
 
     /// The `modelIdentifier`.

@@ -214,7 +214,7 @@ impl Running {
         if let [instance] = &mut *self.components
             && self.system.exchange().stages.is_empty()
         {
-            return instance.step(time, size);
+            return instance.step(time, size).map(drop);
         }
         self.pass_on()?;
         if !self.passed.is_empty() {
@@ -227,7 +227,7 @@ impl Running {
                 ended.get_or_insert(rejection);
                 Ok(())
             }
-            stepped => stepped,
+            stepped => stepped.map(drop),
         })?;
         // An FMU that has ended accepts no more inputs.
         ended.map_or_else(|| self.stepped(), Err)

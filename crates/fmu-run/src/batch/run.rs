@@ -345,7 +345,7 @@ impl<'a> Worker<'a> {
         trajectories: &mut [f64],
         measures: &mut [f64],
     ) -> Result<Option<String>, Failure> {
-        self.report_time(run, times[0]);
+        self.report_time(run, self.plan.time[0]);
         match self.choose(run) {
             Choice::Reset(instance) => self.perform(instance, run, times, trajectories, measures),
             Choice::New => self.run_new(run, times, trajectories, measures),
@@ -389,7 +389,7 @@ impl<'a> Worker<'a> {
         let stopped = self.follow(times, &mut instance, run, trajectories).err();
         if !self.is_repeated() {
             let at = stopped.as_ref().and_then(|(at, _)| *at).map_or(0, |at| at.min(times.len() - 1));
-            self.report_time(run, times[at]);
+            self.report_time(run, plan.time[at]);
             let ended = stopped.as_ref().and_then(|(_, rejection)| rejection.ended());
             lock(&self.watch.ended).extend(ended.map(|time| (run, time, self.row.clone())));
         }
