@@ -201,6 +201,15 @@ impl ModelDescription {
     /// # Errors
     /// Fails if the string is not well-formed XML, or for other FMI versions. The message names the fault.
     pub fn parse(xml: &str) -> Result<Self, String> {
+        Self::parse_configured(xml, &HashMap::new())
+    }
+
+    /// Reads a `modelDescription.xml` whose structural parameters, by value reference, have other values than their start values, so
+    /// that arrays have other sizes (section 2.4.7.5.1 of FMI 3.0).
+    ///
+    /// # Errors
+    /// Fails as [`parse`](Self::parse) does.
+    pub fn parse_configured(xml: &str, structure: &HashMap<u32, usize>) -> Result<Self, String> {
         let document = Document::parse(xml)
             .map_err(|error| format!("modelDescription.xml is not well-formed XML: {error}"))?;
         let root = document.root_element();
@@ -227,7 +236,7 @@ impl ModelDescription {
         let experiment = child(root, "DefaultExperiment");
         let time = |name: &str| -> Option<f64> { experiment?.attribute(name)?.trim().parse().ok() };
         let named = |list| elements(root, list).filter_map(|node| Some(node.attribute("name")?.to_owned()));
-        let variables = variables(root, standard, &mut faults);
+        let variables = variables(root, standard, structure, &mut faults);
         let mut description = Self {
             standard,
             version,
@@ -309,7 +318,12 @@ impl ModelDescription {
     }
 }
 
-fn variables(root: Node, standard: Standard, faults: &mut Vec<(Fault, String)>) -> Vec<Variable> {
+fn variables(
+    root: Node,
+    standard: Standard,
+    structure: &HashMap<u32, usize>,
+    faults: &mut Vec<(Fault, String)>,
+) -> Vec<Variable> {
     let types: HashMap<&str, Node> =
         elements(root, "TypeDefinitions").filter_map(|node| Some((node.attribute("name")?, node))).collect();
     let nodes: Vec<Node> = elements(root, "ModelVariables").collect();
@@ -339,7 +353,8 @@ fn variables(root: Node, standard: Standard, faults: &mut Vec<(Fault, String)>) 
         // A size is a number, or the start value of a structural parameter (section 2.4.7.5.1 of FMI 3.0).
         let size = |dimension: Node| {
             let parameter = || nodes.get(*by_reference.get(&number(dimension, "valueReference")?)?).copied();
-            number(dimension, "start").or_else(|| number(parameter()?, "start"))
+            let configured = || structure.get(&number(dimension, "valueReference")?).copied();
+            number(dimension, "start").or_else(configured).or_else(|| number(parameter()?, "start"))
         };
         let dimensions = node.children().filter(|child| child.has_tag_name("Dimension")).map(size);
         let derivative_of = number(of_type, "derivative").and_then(|of| match standard {

@@ -2,7 +2,7 @@
 
 use crate::arrays::{Array, Arrays};
 use fmi_abi::description::{Fault, ModelDescription, Unknown, Variable as Declared};
-use fmi_abi::{BaseType, Standard};
+use fmi_abi::{BaseType, Standard, Value};
 use std::collections::HashMap;
 use std::ops::{Deref, Range};
 use std::sync::Arc;
@@ -57,6 +57,16 @@ pub struct Description {
     indices: HashMap<String, usize>,
     /// Variables of each variable of the file: one, or the elements of an array.
     spans: Vec<Range<usize>>,
+    /// Structural parameters that are set in Configuration Mode.
+    pub(crate) structure: Vec<Structural>,
+}
+
+/// Value of a structural parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Structural {
+    pub base: BaseType,
+    pub reference: u32,
+    pub value: Value,
 }
 
 /// A description has the fields of the model description as written.
@@ -74,7 +84,16 @@ impl Description {
     /// # Errors
     /// The message names the fault.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let written = ModelDescription::parse(text)?;
+        Self::parse_configured(text, Vec::new())
+    }
+
+    /// Reads a `modelDescription.xml` with other values of structural parameters.
+    pub(crate) fn parse_configured(text: &str, structure: Vec<Structural>) -> Result<Self, String> {
+        let size = |of: &Structural| match of.value {
+            Value::Integer(size) => Some((of.reference, usize::try_from(size).ok()?)),
+            _ => None,
+        };
+        let written = ModelDescription::parse_configured(text, &structure.iter().filter_map(size).collect())?;
         if written.co_simulation.is_none() && written.model_exchange.is_none() {
             return Err("it has neither Co-Simulation nor Model Exchange".to_owned());
         }
@@ -105,6 +124,7 @@ impl Description {
             variables,
             spans,
             written,
+            structure,
         })
     }
 
@@ -156,6 +176,11 @@ impl Variable {
     /// Returns whether a caller may set the variable after the initialization, according to its causality.
     pub(crate) fn is_settable(&self) -> bool {
         matches!(self.causality.as_str(), "input" | "parameter" | "structuralParameter")
+    }
+
+    /// Returns whether the variable determines the sizes of arrays; it is set in Configuration Mode.
+    pub(crate) fn is_structural(&self) -> bool {
+        self.causality == "structuralParameter"
     }
 
     /// Returns the kind of its values, for use in a message.

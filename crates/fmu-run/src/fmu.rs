@@ -1,6 +1,6 @@
 //! An unpacked and loaded FMU.
 
-use crate::description::Description;
+use crate::description::{Description, Structural};
 use crate::error::Error;
 use crate::library::Library;
 use crate::machine;
@@ -16,7 +16,8 @@ use tempfile::TempDir;
 /// An unpacked and loaded FMU.
 #[derive(Debug)]
 pub(crate) struct Loaded {
-    pub description: Description,
+    pub description: Arc<Description>,
+    directory: Arc<TempDir>,
     co_simulation: Option<Arc<Library>>,
     /// Library for Model Exchange, or the reason why it cannot be loaded although the library for
     /// Co-Simulation can.
@@ -31,10 +32,8 @@ impl Loaded {
     pub unsafe fn open(path: &Path, execution_tool: bool) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
         let directory = unpacked(path).map_err(fail)?;
-        let file = directory.path().join("modelDescription.xml");
-        let content = std::fs::read_to_string(&file)
-            .map_err(|_| fail("there is no readable modelDescription.xml in it; it is no FMU".to_owned()))?;
-        let description = Description::parse(&content).map_err(fail)?;
+        let description =
+            content(directory.path()).and_then(|text| Description::parse(&text)).map_err(fail)?;
         let directory = Arc::new(directory);
         // SAFETY: the caller guarantees that the library is sound.
         let load = |offer: &Offer| unsafe { load(&directory, description.standard, offer, execution_tool) };
@@ -50,7 +49,20 @@ impl Loaded {
         if co_simulation.is_none() {
             model_exchange = Ok(model_exchange.map_err(fail)?);
         }
-        Ok(Self { description, co_simulation, model_exchange })
+        Ok(Self { description: Arc::new(description), directory, co_simulation, model_exchange })
+    }
+
+    /// Returns the FMU with other values of structural parameters.
+    pub fn configured(&self, structure: Vec<Structural>) -> Result<Self, Error> {
+        let fail = |why: String| Error::Fmu(format!("{}: {why}", self.description.model_name));
+        let description =
+            content(self.directory.path()).and_then(|text| Description::parse_configured(&text, structure));
+        Ok(Self {
+            description: Arc::new(description.map_err(fail)?),
+            directory: Arc::clone(&self.directory),
+            co_simulation: self.co_simulation.clone(),
+            model_exchange: self.model_exchange.clone(),
+        })
     }
 
     /// Returns whether a process may have only one instance.
@@ -73,6 +85,12 @@ impl Loaded {
             },
         }
     }
+}
+
+/// Returns the model description of an unpacked FMU.
+fn content(directory: &Path) -> Result<String, String> {
+    std::fs::read_to_string(directory.join("modelDescription.xml"))
+        .map_err(|_| "there is no readable modelDescription.xml in it; it is no FMU".to_owned())
 }
 
 /// Loads the library for an interface type.

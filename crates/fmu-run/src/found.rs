@@ -34,6 +34,9 @@ impl Found<'_> {
     /// Fails if the variable cannot be set after the initialization.
     pub fn check_settable(self, name: &str) -> Result<(), Error> {
         self.check_own(name)?;
+        if self.variable.is_structural() {
+            return request(format!("{name} is a structural parameter; give it among the start values"));
+        }
         if self.variable.is_settable() {
             return Ok(());
         }

@@ -1,6 +1,7 @@
 //! An instance of a component, where the elements of arrays are variables.
 
 use crate::arrays::{Arrays, Expanded};
+use crate::description::{Description, Structural};
 use crate::error::{Error, request};
 use crate::fmu::Loaded;
 use crate::library::Library;
@@ -18,6 +19,7 @@ pub struct Instance {
     // Freed before the library is unloaded.
     pub(crate) client: fmi_client::Instance,
     _library: Arc<Library>,
+    description: Arc<Description>,
     pub(crate) arrays: Arc<Arrays>,
     /// Values of arrays set before the initialization, when they cannot be read; `None` after its start.
     pub(crate) early: Option<EarlyValues>,
@@ -90,8 +92,23 @@ impl Instance {
             let prefix = if component.is_empty() { String::new() } else { format!("{component}: ") };
             (prefix + &why, rejection.is_silent())
         })?;
-        let (arrays, early) = (Arc::clone(&fmu.description.arrays), Some(EarlyValues::default()));
-        Ok(Self { client, _library: Arc::clone(library), arrays, early })
+        let (description, early) = (Arc::clone(&fmu.description), Some(EarlyValues::default()));
+        let arrays = Arc::clone(&description.arrays);
+        let mut instance = Self { client, _library: Arc::clone(library), description, arrays, early };
+        instance.configure().map_err(|rejection| (rejection.to_string(), rejection.is_silent()))?;
+        Ok(instance)
+    }
+
+    /// Sets structural parameters (section 2.3.2 of FMI 3.0).
+    fn configure(&mut self) -> Result<(), Rejection> {
+        if self.description.structure.is_empty() {
+            return Ok(());
+        }
+        self.client.enter_configuration_mode()?;
+        for Structural { base, reference, value } in &self.description.structure {
+            self.client.set_values(*base, &[*reference], std::slice::from_ref(value))?;
+        }
+        self.client.exit_configuration_mode()
     }
 
     pub(crate) fn enter_initialization_mode(
@@ -140,7 +157,7 @@ impl Instance {
     pub(crate) fn reset(&mut self) -> Result<(), Rejection> {
         self.client.reset()?;
         self.early = Some(EarlyValues::default());
-        Ok(())
+        self.configure()
     }
 }
 

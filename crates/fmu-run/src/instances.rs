@@ -115,6 +115,12 @@ impl System {
     /// Returns [`Error::Request`] if the settings do not fit the FMU. Returns [`Error::Fmu`] if the FMU does
     /// not support the interface type or makes no instances.
     pub fn instances(&self, setup: &Setup) -> Result<Instances, Error> {
+        let (system, start) = self.configured(&setup.start)?;
+        system.instances_of(setup, &start)
+    }
+
+    /// Makes instances, whose structural parameters have their values.
+    fn instances_of(&self, setup: &Setup, given: &[(&str, Start)]) -> Result<Instances, Error> {
         self.check_interface(setup.interface)?;
         if setup.count == 0 {
             return request("count must be at least 1".to_owned());
@@ -138,7 +144,7 @@ impl System {
             feed: setup.listening.then(|| self.feed()),
             threads: (threads > 1).then(|| Threads::new(threads - 1)).transpose()?,
         };
-        instances.start_from(&setup.start)?;
+        instances.start_from(given)?;
         instances.reset(None);
         match instances.none_left() {
             Some(why) => Err(Error::Fmu(why.to_owned())),
@@ -196,6 +202,11 @@ impl Instances {
     /// instances.
     pub fn start_from(&mut self, start: &[(&str, Start)]) -> Result<(), Error> {
         for (name, values) in start {
+            if self.system.find(name)?.iter().any(|found| found.variable.is_structural()) {
+                return request(format!(
+                    "{name} is a structural parameter; give its value when the instances are made"
+                ));
+            }
             if let Some(count) = values.count()
                 && count != 1
                 && count != self.len()
@@ -578,7 +589,7 @@ impl Instances {
 
     /// Returns the model description of a single FMU.
     fn description(&self) -> Option<&Description> {
-        self.system.sole().map(|fmu| &fmu.description)
+        self.system.sole().map(|fmu| &*fmu.description)
     }
 
     /// Returns the value references of Real variables of a single FMU.

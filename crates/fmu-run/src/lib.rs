@@ -25,11 +25,11 @@ mod system;
 mod threads;
 mod values;
 
-pub use batch::{Batch, Measure, Planned, Runs, Size, Trajectory, Watch};
+pub use batch::{Batch, Finished, Measure, Planned, Runs, Size, Trajectory, Watch};
 pub use description::{Description, Variable};
 pub use error::Error;
 pub use fmi_abi::description::{ModelDescription, Offer, Unknown};
-pub use fmi_abi::{BaseType, Interface, Standard, Status};
+pub use fmi_abi::{BaseType, Interface, Standard, Status, Value};
 pub use fmi_client::Message;
 pub use fmi_client::{Continuous, Event};
 pub use instance::Tolerance;

@@ -131,9 +131,28 @@ impl Selection {
         for Group { component, base, references, indices } in &self.groups {
             buffer.resize(references.len(), 0.0);
             components[*component].get_numbers(*base, references, buffer)?;
+            if matches!(base, BaseType::Int64 | BaseType::UInt64) {
+                self.check_rounding(indices, buffer)?;
+            }
             indices.iter().zip(&*buffer).for_each(|(index, value)| row[*index] = *value);
         }
         Ok(())
+    }
+
+    /// Fails if an integer of 64 bits may have been rounded.
+    fn check_rounding(&self, indices: &[usize], values: &[f64]) -> Result<(), Rejection> {
+        /// Integers up to this magnitude are exact.
+        const EXACT: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;
+        match indices.iter().zip(values).find(|(_, value)| value.abs() >= EXACT) {
+            None => Ok(()),
+            Some((index, value)) => Err(Rejection::without_fmu(
+                "get",
+                &format!(
+                    "{} is about {value}, an integer that floating-point numbers do not have; read it by itself, which returns integers",
+                    self.names[*index]
+                ),
+            )),
+        }
     }
 
     /// Sets the values of a row, using a buffer.
@@ -167,7 +186,9 @@ pub(crate) fn fits(name: &str, base: BaseType, values: &[f64]) -> Result<(), Err
             None => return Ok(()),
         },
     };
-    match values.iter().find(|value| value.fract() != 0.0 || !(low..=high).contains(*value)) {
+    // Limits of 64 bits are rounded up.
+    let is_above = |value: f64| if high > 1e15 { value >= high } else { value > high };
+    match values.iter().find(|value| value.fract() != 0.0 || !(**value >= low) || is_above(**value)) {
         None => Ok(()),
         Some(value) if base == BaseType::Boolean => {
             request(format!("{name} is a Boolean and cannot be {value}"))

@@ -99,6 +99,12 @@ impl<'a> StartValues<'a> {
         self.values.iter().filter_map(move |(index, values)| Some((*index, one(values, of)?)))
     }
 
+    /// Returns whether each variable has one value for all runs or instances.
+    pub fn is_for_all(&self) -> bool {
+        self.numbers.iter().all(|(_, numbers)| numbers.len() == 1)
+            && self.values.iter().all(|(_, values)| values.len() == 1)
+    }
+
     /// Copies borrowed values.
     pub fn into_owned(self) -> StartValues<'static> {
         let own = |(index, numbers): (_, Cow<[f64]>)| (index, Cow::Owned(numbers.into_owned()));

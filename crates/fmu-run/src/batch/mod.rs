@@ -1,5 +1,7 @@
 //! Many runs of an FMU or a system.
 
+mod exact;
+mod grid;
 mod measure;
 mod plan;
 mod pulse;
@@ -13,6 +15,7 @@ use crate::error::Error;
 use crate::instance::Tolerance;
 use crate::start::Start;
 use crate::system::System;
+use fmi_abi::Value;
 
 /// Specification of runs. If an input or a start value is given for each run, there are many runs; otherwise
 /// there is one.
@@ -29,7 +32,8 @@ pub struct Batch<'a> {
     pub input_derivatives: Vec<(&'a str, Trajectory<'a>)>,
     /// Start values of parameters, states, inputs and so on.
     pub start: Vec<(&'a str, Start<'a>)>,
-    /// Outputs to read: any numeric variables.
+    /// Outputs to read: any variables. Strings, bytes and integers of 64 bits are in [`Runs::exact`], all others in
+    /// [`Runs::trajectories`], each in this order.
     pub outputs: Vec<&'a str>,
     /// Outputs are kept at the first time and then at each `every`-th time; `None` keeps no trajectories.
     pub every: Option<usize>,
@@ -54,23 +58,37 @@ pub enum Trajectory<'a> {
     Shared(&'a [f64]),
     /// A time series for each run, concatenated: runs times x times.
     EachRun(&'a [f64]),
+    /// Values at the input's own times, s, which do not decrease: a time series for all runs, or one for each run, concatenated.
+    /// Between times, a continuous variable follows the line and any other is held; equal times are a step; before the first and
+    /// after the last time, the value is constant.
+    Sampled {
+        /// Times, s.
+        times: &'a [f64],
+        /// Values.
+        values: &'a [f64],
+    },
+    /// One constant value of any type.
+    Value(&'a Value),
+    /// Values of any type: one for each time, or times for each run, concatenated. They are held between times.
+    Values(&'a [Value]),
+    /// Values of any type at the input's own times, s.
+    SampledValues {
+        /// Times, s.
+        times: &'a [f64],
+        /// Values.
+        values: &'a [Value],
+    },
 }
 
 impl Trajectory<'_> {
-    /// Returns the values of a run.
-    fn of_run(self, run: usize, times: usize) -> Self {
+    /// Returns the number of values, and of times that they are for; `None` if one value is for all times.
+    fn counts(&self, times: usize) -> Option<(usize, usize)> {
         match self {
-            Self::EachRun(values) => Self::Shared(&values[run * times..][..times]),
-            other => other,
-        }
-    }
-
-    /// Returns the value at the time with this index, in the values of a run.
-    #[inline]
-    fn at(&self, time: usize) -> f64 {
-        match self {
-            Self::Constant(value) => *value,
-            Self::Shared(values) | Self::EachRun(values) => values[time],
+            Self::Constant(_) | Self::Value(_) => None,
+            Self::Shared(values) | Self::EachRun(values) => Some((values.len(), times)),
+            Self::Values(values) => Some((values.len(), times)),
+            Self::Sampled { times, values } => Some((values.len(), times.len())),
+            Self::SampledValues { times, values } => Some((values.len(), times.len())),
         }
     }
 }
@@ -86,6 +104,8 @@ pub struct Size {
     pub kept: usize,
     /// Number of statistics.
     pub measures: usize,
+    /// Number of outputs in [`Runs::exact`], which are not among `outputs`.
+    pub exact: usize,
 }
 
 impl Size {
@@ -116,6 +136,9 @@ pub struct Runs {
     /// Statistics: runs, outputs, statistics; the last index varies fastest. They are NaN for a failed run.
     /// If the FMU ended a run, they cover the times until then.
     pub measures: Vec<f64>,
+    /// Values of outputs that are strings, bytes or integers of 64 bits: runs, outputs, times; the last index varies fastest. `None`
+    /// at times that a run has not reached.
+    pub exact: Vec<Option<Value>>,
     /// Runs that did not reach the last time, in ascending order, each with the time reached and the message
     /// of the FMU. Either a call failed or the FMU ended the simulation. If a run failed without a message,
     /// it is repeated with logging on after all other runs, unless this takes much longer.
@@ -136,31 +159,35 @@ impl System {
         let planned = self.plan(batch)?;
         let size = planned.size();
         let [mut trajectories, mut measures] = [zeros(size.trajectories())?, zeros(size.measures())?];
-        let [errors, notes] = planned.run(watch, &mut trajectories, &mut measures)?;
-        Ok(Runs { size, trajectories, measures, errors, notes })
+        let Finished { errors, notes, exact } = planned.run(watch, &mut trajectories, &mut measures)?;
+        Ok(Runs { size, trajectories, measures, exact, errors, notes })
     }
 
     /// Checks a batch, for callers that provide the memory for its results.
     ///
     /// # Errors
     /// Returns [`Error::Request`] as [`run`](Self::run) does.
-    pub fn plan<'a>(&'a self, batch: &'a Batch) -> Result<Planned<'a>, Error> {
-        Ok(Planned { system: self, plan: plan::Plan::of(self, batch)? })
+    pub fn plan<'a>(&self, batch: &'a Batch) -> Result<Planned<'a>, Error> {
+        let (system, start) = self.configured(&batch.start)?;
+        Ok(Planned { plan: plan::Plan::of(&system, batch, &start)?, system })
     }
 }
 
 /// A checked [`Batch`]; it keeps its system loaded.
-///
-/// ```compile_fail,E0505
-/// fn close_too_early(fmu: fmu_run::Fmu, batch: fmu_run::Batch) {
-///     let planned = fmu.plan(&batch).unwrap();
-///     drop(fmu);
-///     planned.size();
-/// }
-/// ```
 pub struct Planned<'a> {
-    system: &'a System,
     plan: plan::Plan<'a>,
+    system: System,
+}
+
+/// Results of [`Planned::run`] that are not in memory of the caller.
+#[derive(Clone, Debug, Default)]
+pub struct Finished {
+    /// As [`Runs::errors`].
+    pub errors: Vec<(usize, String)>,
+    /// As [`Runs::notes`].
+    pub notes: Vec<(usize, String)>,
+    /// As [`Runs::exact`].
+    pub exact: Vec<Option<Value>>,
 }
 
 impl Planned<'_> {
@@ -172,11 +199,17 @@ impl Planned<'_> {
             outputs: plan.outputs.len(),
             kept: plan.kept(),
             measures: plan.measures.len(),
+            exact: plan.exact_outputs.len(),
         }
     }
 
-    /// Performs the runs and writes the results to memory of the caller, in the layout of [`Runs`]. Returns
-    /// [`Runs::errors`] and [`Runs::notes`].
+    /// Returns the names of the outputs whose values are in [`Runs::exact`], in their order.
+    pub fn exact_outputs(&self) -> impl Iterator<Item = &str> {
+        self.plan.exact_outputs.iter().map(|(name, _)| name.as_str())
+    }
+
+    /// Performs the runs and writes the results to memory of the caller, in the layout of [`Runs`]. Returns the
+    /// other results.
     ///
     /// # Errors
     /// Same errors as [`System::run`].
@@ -188,8 +221,8 @@ impl Planned<'_> {
         watch: &Watch,
         trajectories: &mut [f64],
         measures: &mut [f64],
-    ) -> Result<[Vec<(usize, String)>; 2], Error> {
-        run::run(self.system, &self.plan, watch, [trajectories, measures])
+    ) -> Result<Finished, Error> {
+        run::run(&self.system, &self.plan, watch, [trajectories, measures])
     }
 }
 

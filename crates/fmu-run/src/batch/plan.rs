@@ -1,11 +1,13 @@
 //! Checks a batch and looks up its names.
 
+use super::exact::Input;
+use super::grid::Grid;
 use super::{Batch, Measure, Trajectory};
 use crate::error::{Error, request};
 use crate::found::article;
 use crate::instance::Tolerance;
 use crate::selection::{Selection, Target, fits};
-use crate::start::StartValues;
+use crate::start::{Start, StartValues, is_exact};
 use crate::system::System;
 use fmi_abi::{BaseType, Interface};
 use std::sync::Arc;
@@ -19,7 +21,11 @@ pub(super) struct Plan<'a> {
     /// Variables of both.
     pub set_in_steps: Arc<[Target]>,
     pub start: StartValues<'a>,
+    /// Inputs whose values numbers do not have.
+    pub exact_inputs: Vec<Input>,
     pub outputs: Selection,
+    /// Outputs whose values numbers do not have.
+    pub exact_outputs: Vec<(String, Target)>,
     pub every: Option<usize>,
     pub measures: &'a [Measure],
     pub threads: usize,
@@ -31,11 +37,25 @@ pub(super) struct Plan<'a> {
 #[derive(Default)]
 pub(super) struct Inputs<'a> {
     pub variables: Selection,
-    pub values: Vec<Trajectory<'a>>,
+    pub values: Vec<Numbers<'a>>,
+}
+
+/// Numbers of an input.
+pub(super) enum Numbers<'a> {
+    Constant(f64),
+    Shared(&'a [f64]),
+    EachRun(&'a [f64]),
+    /// At times of the input; whether they are held, and whether each run has its own.
+    Sampled {
+        grid: Grid,
+        values: &'a [f64],
+        is_held: bool,
+        is_each: bool,
+    },
 }
 
 impl<'a> Plan<'a> {
-    pub fn of(system: &System, batch: &'a Batch) -> Result<Self, Error> {
+    pub fn of(system: &System, batch: &'a Batch, start: &[(&str, Start<'a>)]) -> Result<Self, Error> {
         system.check_interface(Interface::CoSimulation)?;
         batch.tolerance.check()?;
         let time = checked_time(batch.time)?;
@@ -46,8 +66,10 @@ impl<'a> Plan<'a> {
             inputs: Inputs::default(),
             derivatives: Inputs::default(),
             set_in_steps: Arc::default(),
-            start: StartValues::of(system, &batch.start)?,
-            outputs: system.select(&batch.outputs)?,
+            start: StartValues::of(system, start)?,
+            exact_inputs: Vec::new(),
+            outputs: Selection::default(),
+            exact_outputs: Vec::new(),
             every: batch.every,
             measures: &batch.measures,
             threads: system.threads(Interface::CoSimulation, batch.threads, runs)?,
@@ -56,6 +78,14 @@ impl<'a> Plan<'a> {
         };
         if batch.every == Some(0) {
             return request("every must be at least 1".to_owned());
+        }
+        for name in &batch.outputs {
+            let found = system.find(name)?;
+            if is_exact(found[0].variable.base) {
+                plan.exact_outputs.push(((*name).to_owned(), Target::of(found[0])));
+            } else {
+                plan.outputs.push(name, &found);
+            }
         }
         plan.find_inputs(system, batch)?;
         Ok(plan)
@@ -69,10 +99,10 @@ impl<'a> Plan<'a> {
     fn find_inputs(&mut self, system: &System, batch: &'a Batch) -> Result<(), Error> {
         let mut names = Vec::new();
         for (name, trajectory) in &batch.inputs {
-            let variables = system.find_numbers(name)?;
+            let variables = system.find(name)?;
             variables.iter().try_for_each(|found| found.check_own(name))?;
             let of = variables[0].variable;
-            if !of.is_settable() || of.variability.as_deref() == Some("fixed") {
+            if !of.is_settable() || of.is_structural() || of.variability.as_deref() == Some("fixed") {
                 return request(format!(
                     "{name} is no input but {} {}; give it a start value",
                     article(of.variability.as_deref().unwrap_or(&of.causality)),
@@ -80,18 +110,25 @@ impl<'a> Plan<'a> {
                 ));
             }
             once(&mut names, name, "inputs")?;
-            self.inputs.values.push(self.checked(name, of.base, *trajectory)?);
+            if is_exact(of.base) {
+                self.exact_inputs.push(Input::of(name, &variables, *trajectory, self.time)?);
+                continue;
+            }
+            let is_held =
+                !of.base.is_float() || of.variability.as_deref().is_some_and(|of| of != "continuous");
+            self.inputs.values.push(self.checked(name, of.base, *trajectory, is_held)?);
             self.inputs.variables.push(name, &variables);
         }
         let mut names = Vec::new();
         for (name, trajectory) in &batch.input_derivatives {
             let variables = system.takes_input_derivative(name)?;
             once(&mut names, name, "input derivatives")?;
-            self.derivatives.values.push(self.checked(name, BaseType::Real, *trajectory)?);
+            self.derivatives.values.push(self.checked(name, BaseType::Real, *trajectory, true)?);
             self.derivatives.variables.push(name, &variables);
         }
         let derivatives = self.derivatives.variables.targets();
-        self.set_in_steps = self.inputs.variables.targets().chain(derivatives).collect();
+        let exact = self.exact_inputs.iter().flat_map(|input| input.targets()).copied();
+        self.set_in_steps = self.inputs.variables.targets().chain(derivatives).chain(exact).collect();
         Ok(())
     }
 
@@ -101,17 +138,29 @@ impl<'a> Plan<'a> {
         name: &str,
         base: BaseType,
         trajectory: Trajectory<'a>,
-    ) -> Result<Trajectory<'a>, Error> {
-        let times = self.time.len();
-        let values = match &trajectory {
-            Trajectory::Constant(value) => std::slice::from_ref(value),
-            Trajectory::Shared(values) if values.len() != times => {
-                return request(format!("{name} has {} values for {times} times", values.len()));
+        is_held: bool,
+    ) -> Result<Numbers<'a>, Error> {
+        let numbers = match trajectory {
+            Trajectory::Constant(value) => Numbers::Constant(value),
+            Trajectory::Shared(values) => Numbers::Shared(values),
+            Trajectory::EachRun(values) => Numbers::EachRun(values),
+            Trajectory::Sampled { times, values } => {
+                let grid = Grid::of(name, times, self.time)?;
+                Numbers::Sampled { grid, values, is_held, is_each: values.len() > times.len() }
             }
-            Trajectory::Shared(values) | Trajectory::EachRun(values) => values,
+            Trajectory::Value(_) | Trajectory::Values(_) | Trajectory::SampledValues { .. } => {
+                return request(format!("{name} is a number; give its values as numbers"));
+            }
+        };
+        let values = match &numbers {
+            Numbers::Constant(value) => std::slice::from_ref(value),
+            Numbers::Shared(values) if values.len() != self.time.len() => {
+                return request(format!("{name} has {} values for {} times", values.len(), self.time.len()));
+            }
+            Numbers::Shared(values) | Numbers::EachRun(values) | Numbers::Sampled { values, .. } => values,
         };
         fits(name, base, values)?;
-        Ok(trajectory)
+        Ok(numbers)
     }
 }
 
@@ -135,16 +184,18 @@ fn checked_time(time: &[f64]) -> Result<&[f64], Error> {
 /// Returns the number of runs; checks that all values for each run agree on it.
 fn runs(batch: &Batch) -> Result<usize, Error> {
     let mut found: Option<(&str, usize)> = None;
-    let trajectories = batch.inputs.iter().chain(&batch.input_derivatives).filter_map(
-        |(name, trajectory)| match trajectory {
-            Trajectory::EachRun(values) => Some((*name, values.len(), batch.time.len())),
-            _ => None,
-        },
-    );
+    let trajectories =
+        batch.inputs.iter().chain(&batch.input_derivatives).filter_map(|(name, trajectory)| {
+            let (length, times) = trajectory.counts(batch.time.len())?;
+            let is_each = matches!(trajectory, Trajectory::EachRun(_)) || length > times;
+            (is_each && !matches!(trajectory, Trajectory::Shared(_))).then_some((*name, length, times))
+        });
     let starts = batch.start.iter().filter_map(|(name, start)| Some((*name, start.count()?, 1)));
     for (name, length, times) in trajectories.chain(starts) {
-        if length % times != 0 {
-            return request(format!("{name} has {length} values, which is no multiple of the {times} times"));
+        if times == 0 || length % times != 0 {
+            return request(format!(
+                "{name} has {length} values, which is not a multiple of the {times} times"
+            ));
         }
         let runs = length / times;
         match found {

@@ -1,8 +1,9 @@
 //! Performs a plan: each thread takes the next run, until none is left.
 
-use super::Trajectory;
+use super::Finished;
+use super::grid::Grid;
 use super::measure::Measured;
-use super::plan::{Inputs, Plan};
+use super::plan::{Inputs, Numbers, Plan};
 use super::pulse::Pulse;
 use super::reuse::{Choice, Reuse};
 use crate::error::Error;
@@ -10,6 +11,7 @@ use crate::instance::Experiment;
 use crate::messages::{Feed, Logged, Logging};
 use crate::running::Running;
 use crate::system::System;
+use fmi_abi::Value;
 use fmi_client::Rejection;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -109,7 +111,7 @@ pub(super) fn run(
     plan: &Plan,
     watch: &Watch,
     [trajectories, measures]: [&mut [f64]; 2],
-) -> Result<[Messages; 2], Error> {
+) -> Result<Finished, Error> {
     let begin = time::Instant::now();
     let (trajectory, measured) = (plan.outputs.len() * plan.kept(), plan.outputs.len() * plan.measures.len());
     let fits = trajectories.len() >= plan.runs * trajectory && measures.len() >= plan.runs * measured;
@@ -139,13 +141,15 @@ pub(super) fn run(
             }
             watch.done.fetch_add(1, Ordering::Relaxed);
         }
+        let exact = std::mem::take(&mut worker.exact);
         worker.finish();
-        (failures, notes)
+        ((failures, notes), exact)
     })?;
     drop(rows);
     if watch.is_cancelled() && watch.done() < plan.runs {
         return Err(Error::Cancelled);
     }
+    let (found, exact): (Vec<_>, Vec<_>) = found.into_iter().unzip();
     let (failures, notes): (Vec<_>, Vec<_>) = found.into_iter().unzip();
     let mut failures: Vec<_> = failures.into_iter().flatten().collect();
     let mut notes: Messages = notes.into_iter().flatten().collect();
@@ -155,7 +159,24 @@ pub(super) fn run(
     if failures.iter().any(|(_, failure)| failure.is_silent) {
         repeat_with_logging(system, plan, watch, until, &mut failures)?;
     }
-    Ok([failures.into_iter().map(|(run, failure)| (run, failure.text)).collect(), notes])
+    let errors = failures.into_iter().map(|(run, failure)| (run, failure.text)).collect();
+    Ok(Finished { errors, notes, exact: arranged(plan, exact.into_iter().flatten()) })
+}
+
+/// Values of a run at the kept times that it has reached, output by output at each time.
+type Exact = (usize, Vec<Value>);
+
+/// Returns the values of all runs in the order of [`Runs::exact`](super::Runs::exact).
+fn arranged(plan: &Plan, found: impl Iterator<Item = Exact>) -> Vec<Option<Value>> {
+    let (outputs, kept) = (plan.exact_outputs.len(), plan.kept());
+    let mut all = vec![None; plan.runs * outputs * kept];
+    for (run, values) in found {
+        for (index, value) in values.into_iter().enumerate() {
+            let (time, output) = (index / outputs, index % outputs);
+            all[(run * outputs + output) * kept + time] = Some(value);
+        }
+    }
+    all
 }
 
 /// Repeats runs that failed without a message, because many FMUs give reasons only with logging on. Repeats
@@ -264,6 +285,11 @@ pub(super) struct Worker<'a> {
     pub reuse: Reuse,
     inputs: Signals<'a>,
     derivatives: Signals<'a>,
+    /// Number of the run.
+    number: usize,
+    /// Values of the run that numbers do not have, and those of finished runs.
+    exact_of_run: Vec<Value>,
+    exact: Vec<Exact>,
     /// Orders of the input derivatives.
     orders: Vec<i32>,
     /// Outputs at a time, in their order.
@@ -275,26 +301,48 @@ pub(super) struct Worker<'a> {
 
 /// Inputs of a run.
 struct Signals<'a> {
-    values: Vec<Trajectory<'a>>,
+    values: Vec<Signal<'a>>,
     /// Values at a time.
     row: Vec<f64>,
 }
 
+/// An input of a run.
+#[derive(Clone, Copy)]
+enum Signal<'a> {
+    Constant(f64),
+    Values(&'a [f64]),
+    Sampled(&'a Grid, &'a [f64], bool),
+}
+
 impl<'a> Signals<'a> {
-    fn new(inputs: &Inputs<'a>) -> Self {
-        Self { values: inputs.values.clone(), row: vec![0.0; inputs.values.len()] }
+    fn new(inputs: &Inputs) -> Self {
+        Self { values: Vec::new(), row: vec![0.0; inputs.values.len()] }
     }
 
     /// Selects the values of a run.
-    fn begin(&mut self, inputs: &Inputs<'a>, run: usize, times: usize) {
+    fn begin(&mut self, inputs: &'a Inputs<'a>, run: usize, times: usize) {
         self.values.clear();
-        self.values.extend(inputs.values.iter().map(|values| values.of_run(run, times)));
+        self.values.extend(inputs.values.iter().map(|numbers| match numbers {
+            Numbers::Constant(value) => Signal::Constant(*value),
+            Numbers::Shared(values) => Signal::Values(values),
+            Numbers::EachRun(values) => Signal::Values(&values[run * times..][..times]),
+            Numbers::Sampled { grid, values, is_held, is_each } => {
+                let first = if *is_each { run * grid.length } else { 0 };
+                Signal::Sampled(grid, &values[first..][..grid.length], *is_held)
+            }
+        }));
     }
 
     /// Returns the values at the time with this index.
     #[inline]
     fn at(&mut self, time: usize) -> &[f64] {
-        self.row.iter_mut().zip(&self.values).for_each(|(value, values)| *value = values.at(time));
+        for (value, signal) in self.row.iter_mut().zip(&self.values) {
+            *value = match signal {
+                Signal::Constant(value) => *value,
+                Signal::Values(values) => values[time],
+                Signal::Sampled(grid, values, is_held) => grid.value(values, time, *is_held),
+            };
+        }
         &self.row
     }
 }
@@ -321,6 +369,9 @@ impl<'a> Worker<'a> {
             reuse: Reuse::default(),
             inputs: Signals::new(&plan.inputs),
             derivatives: Signals::new(&plan.derivatives),
+            number: 0,
+            exact_of_run: Vec::new(),
+            exact: Vec::new(),
             orders: vec![1; plan.derivatives.values.len()],
             row: vec![0.0; plan.outputs.len()],
             reached: 0,
@@ -384,9 +435,13 @@ impl<'a> Worker<'a> {
         instance.forget_log();
         self.inputs.begin(&plan.inputs, run, plan.time.len());
         self.derivatives.begin(&plan.derivatives, run, plan.time.len());
-        self.reached = 0;
+        (self.reached, self.number) = (0, run);
+        self.exact_of_run.clear();
         self.measured.begin();
         let stopped = self.follow(times, &mut instance, run, trajectories).err();
+        if !self.is_repeated() && !plan.exact_outputs.is_empty() {
+            self.exact.push((run, std::mem::take(&mut self.exact_of_run)));
+        }
         if !self.is_repeated() {
             let at = stopped.as_ref().and_then(|(at, _)| *at).map_or(0, |at| at.min(times.len() - 1));
             self.report_time(run, plan.time[at]);
@@ -483,6 +538,10 @@ impl<'a> Worker<'a> {
                 for (output, value) in self.row.iter().enumerate() {
                     trajectories[output * kept + index] = *value;
                 }
+                for (_, target) in &plan.exact_outputs {
+                    let value = instance.get_value(*target);
+                    self.exact_of_run.push(value.map_err(|rejection| at(ended.take().unwrap_or(rejection)))?);
+                }
                 index += 1;
                 wait = plan.every.unwrap_or(1);
             }
@@ -537,6 +596,9 @@ impl<'a> Worker<'a> {
 
     #[inline]
     fn set_values(&mut self, instance: &mut Running, time: usize) -> Result<(), Rejection> {
+        for input in &self.plan.exact_inputs {
+            input.set(instance, self.number, time)?;
+        }
         if self.inputs.values.is_empty() {
             return Ok(());
         }

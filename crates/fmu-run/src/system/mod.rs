@@ -1,5 +1,6 @@
 //! Systems of connected FMUs.
 
+mod configured;
 mod elements;
 mod order;
 mod ssp;

@@ -5,7 +5,7 @@
 mod built;
 
 use built::{built, opened};
-use fmu_run::{Batch, Error, Fmu, Setup, Standard, Start, Status, Tolerance, Trajectory, Watch};
+use fmu_run::{Batch, Error, Fmu, Setup, Standard, Start, Status, Tolerance, Trajectory, Value, Watch};
 
 const VERSIONS: [Standard; 2] = [Standard::Fmi2, Standard::Fmi3];
 
@@ -269,5 +269,148 @@ fn a_second_instance_of_an_fmu_that_exists_once_is_an_error() {
         assert_eq!(second, "there is an instance already");
         drop(first);
         fmu.instances(&Setup::default()).unwrap();
+    }
+}
+
+#[test]
+fn exact_values_are_start_values_inputs_and_outputs() {
+    let fmu = opened("plain", Standard::Fmi3);
+    let wide = |number: i64| Value::Integer(number.into());
+    let (large, small) = (wide((1 << 53) + 1), wide(i64::MIN));
+    let bytes = [Value::Binary(vec![0, 1, 2]), Value::Binary(Vec::new()), Value::Binary(vec![255])];
+    let time = [0.0, 0.1, 0.2];
+    let labels = ["a", "", "\u{e4}"].map(Value::from);
+    let naturals = [Value::Integer(u64::MAX.into()), Value::Integer(7)];
+    let sampled = [large.clone(), small.clone()];
+    let batch = Batch {
+        time: &time,
+        inputs: vec![
+            ("label", Trajectory::Values(&labels)),
+            ("bytes", Trajectory::Values(&bytes)),
+            ("wide", Trajectory::SampledValues { times: &[0.0, 0.15], values: &sampled }),
+        ],
+        start: vec![("natural", Start::EachValue(&naturals))],
+        outputs: vec!["echo", "y", "bytes_out", "wide_out", "natural"],
+        every: Some(1),
+        ..Batch::default()
+    };
+    let runs = fmu.run(&batch, &Watch::default()).unwrap();
+    assert_eq!((runs.size.outputs, runs.size.exact, runs.size.runs, runs.errors.len()), (1, 4, 2, 0));
+    for run in 0..2 {
+        let of = |output: usize| {
+            runs.exact[(run * 4 + output) * 3..][..3]
+                .iter()
+                .map(|value| value.clone().unwrap())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(of(0), labels);
+        assert_eq!(of(1), bytes);
+        assert_eq!(of(2), [large.clone(), large.clone(), small.clone()]);
+        assert_eq!(of(3), vec![naturals[run].clone(); 3]);
+    }
+    let mut two = fmu
+        .instances(&Setup { count: 2, start: vec![("wide", Start::Value(&large))], ..Setup::default() })
+        .unwrap();
+    assert_eq!(two.values("wide_out").unwrap(), vec![Some(large.clone()); 2]);
+    two.set_values("wide", &[small.clone(), large.clone()], None).unwrap();
+    two.set_values("label", &["x".into()], Some(&[false, true])).unwrap();
+    assert_eq!(two.values("wide_out").unwrap(), [Some(small), Some(large)]);
+    assert_eq!(two.texts("echo").unwrap().map_or_none(), ["none", "x"]);
+    // A number that f64 rounds is an error.
+    for (name, value, why) in [
+        ("wide", Value::Real(1.5), "its value cannot be 1.5"),
+        ("wide", Value::Real(1e17), "may not be the one that is meant"),
+        ("wide", Value::Integer(1 << 63), "cannot be 9223372036854775808"),
+        ("natural", Value::Integer(-1), "cannot be -1"),
+        ("label", Value::Integer(1), "is a string, its value cannot be 1"),
+        ("label", Value::from("a\0"), "character NUL"),
+        ("bytes", Value::from("text"), "is binary, its value cannot be"),
+        ("u", Value::Real(1.0), "set it with set"),
+        ("wide_out", Value::Integer(1), "read-only"),
+    ] {
+        let found = two.set_values(name, &[value], None).unwrap_err().to_string();
+        assert!(found.contains(why), "{name}: {found}");
+    }
+    let mut rounded = [0.0; 2];
+    two.get(&fmu.select(&["wide_out"]).unwrap(), &mut rounded);
+    assert!(two.errors().all(|(_, why)| why.contains("wide_out")) && rounded[1].is_nan(), "{rounded:?}");
+}
+
+/// Strings of all instances.
+trait Texts {
+    fn map_or_none(self) -> Vec<String>;
+}
+
+impl Texts for Vec<Option<String>> {
+    fn map_or_none(self) -> Vec<String> {
+        self.into_iter().map(|text| text.unwrap_or_default()).collect()
+    }
+}
+
+#[test]
+fn structural_parameters_change_the_sizes_of_arrays() {
+    let fmu = opened("plain", Standard::Fmi3);
+    let time = [0.0, 1.0];
+    for (size, outputs, sum) in [(2.0, vec!["sum", "vector[2]"], 3.0), (5.0, vec!["sum", "vector[5]"], 15.0)]
+    {
+        let batch = Batch {
+            time: &time,
+            start: vec![("size", Start::Same(size))],
+            outputs,
+            every: Some(2),
+            ..Batch::default()
+        };
+        let runs = fmu.run(&batch, &Watch::default()).unwrap();
+        assert_eq!((runs.errors.len(), &runs.trajectories[..]), (0, &[sum, size][..]), "{:?}", runs.errors);
+    }
+    let start = vec![("size", Start::Value(&Value::Integer(4))), ("vector[4]", Start::Same(10.0))];
+    let mut one = fmu.instances(&Setup { start, ..Setup::default() }).unwrap();
+    let mut sum = [0.0];
+    let selection = one.system().select(&["sum"]).unwrap();
+    one.get(&selection, &mut sum);
+    assert_eq!(sum, [16.0]);
+    one.reset(None);
+    one.get(&selection, &mut sum);
+    assert_eq!(sum, [16.0], "a reset keeps them");
+    let wrong =
+        |start| fmu.instances(&Setup { start, count: 2, ..Setup::default() }).unwrap_err().to_string();
+    assert!(wrong(vec![("size", Start::Each(&[1.0, 2.0]))]).contains("one value for all"));
+    assert!(wrong(vec![("size", Start::Same(9.0))]).contains("fmi3SetUInt64"));
+    assert!(wrong(vec![("size", Start::Same(2.0)), ("vector[3]", Start::Same(0.0))]).contains("no variable"));
+    let set = one.set(&one.system().select(&["size"]).unwrap(), &[3.0], None).unwrap_err().to_string();
+    assert!(set.contains("size is a structural parameter"), "{set}");
+}
+
+#[test]
+fn inputs_have_their_own_times() {
+    for standard in VERSIONS {
+        let (fmu, time) = (opened("plain", standard), times());
+        let batch = Batch {
+            time: &time,
+            inputs: vec![
+                (
+                    "u",
+                    Trajectory::Sampled {
+                        times: &[0.0, 0.5, 0.5, 1.0],
+                        values: &[0.0, 1.0, 3.0, 3.0, 5.0, 5.0, 5.0, 5.0],
+                    },
+                ),
+                ("valve", Trajectory::Sampled { times: &[0.0, 0.3], values: &[1.0, 4.0] }),
+            ],
+            outputs: vec!["u", "valve"],
+            every: Some(1),
+            ..Batch::default()
+        };
+        let runs = fmu.run(&batch, &Watch::default()).unwrap();
+        assert_eq!(runs.size.runs, 2);
+        let row = |index: usize| &runs.trajectories[11 * index..][..11];
+        let expected = [0.0, 0.2, 0.4, 0.6, 0.8, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0];
+        assert!(
+            row(0).iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-12),
+            "{:?}",
+            row(0)
+        );
+        assert_eq!(row(1), [1.0, 1.0, 1.0, 4.0, 4.0, 4.0, 4.0, 4.0, 4.0, 4.0, 4.0]);
+        assert_eq!(row(2), [5.0; 11]);
     }
 }

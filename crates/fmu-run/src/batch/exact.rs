@@ -1,0 +1,79 @@
+//! Inputs and outputs whose values `f64` does not have: strings, bytes, integers of 64 bits.
+
+use super::Trajectory;
+use super::grid::Grid;
+use crate::error::{Error, request};
+use crate::found::Found;
+use crate::running::Running;
+use crate::selection::Target;
+use crate::start::exact;
+use fmi_abi::Value;
+use fmi_client::Rejection;
+
+/// An input of a run, held between the times at which it changes.
+pub(super) struct Input {
+    targets: Vec<Target>,
+    values: Vec<Value>,
+    /// Number of values of a run; 0 if one value is for all times of all runs.
+    length: usize,
+    /// Whether each run has its own values.
+    is_each: bool,
+    /// Index of the value at each communication point, if the input has its own times.
+    indices: Option<Vec<usize>>,
+}
+
+impl Input {
+    /// Checks the values of an input.
+    pub fn of(name: &str, found: &[Found], trajectory: Trajectory, time: &[f64]) -> Result<Self, Error> {
+        let reals = |values: &[f64]| values.iter().copied().map(Value::Real).collect::<Vec<_>>();
+        let mut indices = None;
+        let (values, length) = match trajectory {
+            Trajectory::Constant(value) => (reals(&[value]), 0),
+            Trajectory::Shared(values) | Trajectory::EachRun(values) => (reals(values), time.len()),
+            Trajectory::Value(value) => (vec![value.clone()], 0),
+            Trajectory::Values(values) => (values.to_vec(), time.len()),
+            Trajectory::Sampled { times, values } => {
+                indices = Some(Grid::of(name, times, time)?.indices());
+                (reals(values), times.len())
+            }
+            Trajectory::SampledValues { times, values } => {
+                indices = Some(Grid::of(name, times, time)?.indices());
+                (values.to_vec(), times.len())
+            }
+        };
+        if length != 0 && (values.len() % length != 0 || values.is_empty()) {
+            return request(format!("{name} has {} values for {length} times", values.len()));
+        }
+        let values = values.into_iter().map(|value| exact(found[0], name, value));
+        let values = values.collect::<Result<Vec<_>, _>>()?;
+        let is_each = length != 0 && values.len() > length;
+        Ok(Self {
+            targets: found.iter().copied().map(Target::of).collect(),
+            values,
+            length,
+            is_each,
+            indices,
+        })
+    }
+
+    pub fn targets(&self) -> &[Target] {
+        &self.targets
+    }
+
+    fn value(&self, run: usize, time: usize) -> &Value {
+        if self.length == 0 {
+            return &self.values[0];
+        }
+        let index = self.indices.as_ref().map_or(time, |indices| indices[time]);
+        &self.values[if self.is_each { run * self.length } else { 0 } + index]
+    }
+
+    /// Sets the value at the time with this index, if it differs from the one before.
+    pub fn set(&self, instance: &mut Running, run: usize, time: usize) -> Result<(), Rejection> {
+        let value = self.value(run, time);
+        if time > 0 && value == self.value(run, time - 1) {
+            return Ok(());
+        }
+        self.targets.iter().try_for_each(|target| instance.set_value(*target, value))
+    }
+}

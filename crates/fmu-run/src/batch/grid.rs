@@ -1,0 +1,96 @@
+//! Inputs with their own times.
+
+use crate::error::{Error, request};
+
+/// Position of each communication point among the times of an input.
+pub(super) struct Grid {
+    /// Number of times of the input.
+    pub length: usize,
+    /// Index of the last time that is not after the communication point, and how far the point is on the way to the next time,
+    /// from 0 to 1.
+    at: Vec<(usize, f64)>,
+}
+
+impl Grid {
+    /// Checks the times of an input: finite and not decreasing. Equal times are a step, whose last value holds from there on.
+    pub fn of(name: &str, times: &[f64], points: &[f64]) -> Result<Self, Error> {
+        if times.is_empty() {
+            return request(format!("{name} has no times"));
+        }
+        if let Some(index) = times.iter().position(|time| !time.is_finite()) {
+            return request(format!("time {index} of {name} is {}; times must be finite", times[index]));
+        }
+        if let Some(index) = times.windows(2).position(|pair| pair[1] < pair[0]) {
+            let (before, after) = (times[index], times[index + 1]);
+            return request(format!("the times of {name} decrease: {after} follows {before}"));
+        }
+        let at = (0..points.len()).map(|k| {
+            // A communication point that rounding puts before a time of the input is at this time.
+            let step = if k > 0 {
+                points[k] - points[k - 1]
+            } else {
+                points.get(1).map_or(0.0, |next| next - points[0])
+            };
+            let point = points[k];
+            let after = times.partition_point(|time| *time <= point + 1e-9 * step);
+            match (after.checked_sub(1), times.get(after)) {
+                (None, _) => (0, 0.0),
+                (Some(before), None) => (before, 0.0),
+                (Some(before), Some(next)) => {
+                    (before, ((point - times[before]) / (next - times[before])).max(0.0))
+                }
+            }
+        });
+        Ok(Self { length: times.len(), at: at.collect() })
+    }
+
+    /// Returns the value at a communication point: on the line between two values, or the earlier one if they are held.
+    #[inline]
+    pub fn value(&self, values: &[f64], point: usize, is_held: bool) -> f64 {
+        let (index, way) = self.at[point];
+        let value = values[index];
+        if is_held || way == 0.0 { value } else { value + way * (values[index + 1] - value) }
+    }
+
+    /// Returns the index of the value that holds at each communication point.
+    pub fn indices(&self) -> Vec<usize> {
+        self.at.iter().map(|(index, _)| *index).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Grid;
+
+    #[test]
+    fn values_between_times() {
+        let points = [-1.0, 0.0, 0.25, 0.5, 1.0, 3.0];
+        let (times, values) = ([0.0, 0.5, 0.5, 1.0], [1.0, 2.0, 5.0, 6.0]);
+        let grid = Grid::of("u", &times, &points).unwrap();
+        let all = |is_held| {
+            points.iter().enumerate().map(|(k, _)| grid.value(&values, k, is_held)).collect::<Vec<_>>()
+        };
+        assert_eq!(all(false), [1.0, 1.0, 1.5, 5.0, 6.0, 6.0]);
+        assert_eq!(all(true), [1.0, 1.0, 1.0, 5.0, 6.0, 6.0]);
+        assert_eq!(grid.indices(), [0, 0, 0, 2, 3, 3]);
+    }
+
+    #[test]
+    fn rounding_of_times_does_not_delay_a_step() {
+        // The sum is below 0.3 by one bit.
+        let points: Vec<_> = (0..4).map(|k| 0.1 * f64::from(k) - 1e-17).collect();
+        let points = [points[0], 0.1, 0.2, f64::from_bits(0.3_f64.to_bits() - 1)];
+        let grid = Grid::of("u", &[0.0, 0.3], &points).unwrap();
+        assert_eq!((grid.value(&[1.0, 2.0], 3, true), grid.value(&[1.0, 2.0], 3, false)), (2.0, 2.0));
+        assert!((grid.value(&[0.0, 3.0], 1, false) - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn wrong_times() {
+        for (times, why) in
+            [(&[][..], "no times"), (&[0.0, f64::NAN], "must be finite"), (&[0.0, 1.0, 0.5], "decrease")]
+        {
+            assert!(Grid::of("u", times, &[0.0, 1.0]).is_err_and(|error| error.to_string().contains(why)));
+        }
+    }
+}

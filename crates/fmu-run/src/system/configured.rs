@@ -1,0 +1,65 @@
+//! Systems whose structural parameters have other values than in the model description (section 2.3.2 of FMI 3.0).
+
+use super::{Component, Definition, System};
+use crate::description::Structural;
+use crate::error::{Error, request};
+use crate::selection::Target;
+use crate::start::{Start, StartValues};
+use fmi_abi::Value;
+use std::sync::Arc;
+
+/// Start values by name.
+type Given<'s, 'a> = Vec<(&'s str, Start<'a>)>;
+
+impl System {
+    /// Returns the system with the values of structural parameters among the start values, and the other start values. Arrays then
+    /// have other sizes, so that the system has other variables.
+    pub(crate) fn configured<'s, 'a>(
+        &self,
+        start: &[(&'s str, Start<'a>)],
+    ) -> Result<(Self, Given<'s, 'a>), Error> {
+        let is_structural = |name: &str| {
+            self.find(name).is_ok_and(|found| found.iter().any(|found| found.variable.is_structural()))
+        };
+        let (structural, others): (Vec<_>, Vec<_>) =
+            start.iter().copied().partition(|(name, _)| is_structural(name));
+        if structural.is_empty() {
+            return Ok((self.clone(), others));
+        }
+        let mut values: Vec<Vec<Structural>> = vec![Vec::new(); self.components().len()];
+        let given = StartValues::given(self, &structural)?;
+        for (target, value) in one_for_all(&given)? {
+            let Target { component, base, reference } = target;
+            values[component].push(Structural { base, reference, value });
+        }
+        let components = self.components().iter().zip(values).map(|(component, structure)| {
+            let fmu = if structure.is_empty() {
+                Arc::clone(&component.fmu)
+            } else {
+                Arc::new(component.fmu.configured(structure)?)
+            };
+            Ok(Component { name: component.name.clone(), fmu })
+        });
+        let mut definition = Definition::of(self.name(), components.collect::<Result<_, Error>>()?);
+        definition.connectors.clone_from(&self.0.connectors);
+        definition.connections.clone_from(&self.0.connections);
+        definition.start.clone_from(&self.0.start);
+        definition.stop_time = self.0.stop_time;
+        let system = match self.sole() {
+            Some(_) => Self(Arc::new(definition)),
+            None => definition.finish(self.exchange().order)?,
+        };
+        Ok((system, others))
+    }
+}
+
+/// Returns values that are the same for all runs or instances.
+fn one_for_all(given: &StartValues) -> Result<Vec<(Target, Value)>, Error> {
+    let all = given.values(0).map(|(target, value)| (target, value.clone()));
+    // The only types that structural parameters have are integers (section 2.4.7.4 of FMI 3.0).
+    let numbers = given.numbers(0).map(|(target, number)| (target, Value::Integer(number as i128)));
+    if !given.is_for_all() {
+        return request("a structural parameter needs one value for all runs or instances".to_owned());
+    }
+    Ok(all.chain(numbers).collect())
+}
