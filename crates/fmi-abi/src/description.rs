@@ -217,6 +217,10 @@ impl ModelDescription {
         let (standard, token) = match version.as_str() {
             "2.0" => (Standard::Fmi2, "guid"),
             version if version.starts_with("3.") => (Standard::Fmi3, "instantiationToken"),
+            "1.0" => {
+                let why = "its fmiVersion is \"1.0\"; FMI 2.0 and 3.0 are supported here, and FMPy and PyFMI run FMI 1.0";
+                return Err(why.to_owned());
+            }
             other => return Err(format!("its fmiVersion is {other:?}; FMI 2.0 and 3.0 are supported")),
         };
         let mut faults = Vec::new();

@@ -95,7 +95,12 @@ impl Description {
         };
         let written = ModelDescription::parse_configured(text, &structure.iter().filter_map(size).collect())?;
         if written.co_simulation.is_none() && written.model_exchange.is_none() {
-            return Err("it has neither Co-Simulation nor Model Exchange".to_owned());
+            let why = if written.scheduled_execution {
+                "it has only Scheduled Execution, which is not supported here; FMPy calls it by its class FMU3ScheduledExecution"
+            } else {
+                "it has neither Co-Simulation nor Model Exchange"
+            };
+            return Err(why.to_owned());
         }
         if let Some((_, why)) = written.faults.iter().find(|(fault, _)| *fault != Fault::Structure) {
             return Err(format!("modelDescription.xml: {why}"));
@@ -131,6 +136,17 @@ impl Description {
     /// Returns the variables of these unknowns, with the elements of arrays.
     pub fn elements<'a>(&'a self, of: &'a [Unknown]) -> impl Iterator<Item = &'a Variable> {
         of.iter().flat_map(|unknown| &self.variables[self.spans[unknown.variable].clone()])
+    }
+
+    /// Returns the reason why a variable of the file is not among the variables.
+    pub(crate) fn why_missing(&self, name: &str) -> Option<&'static str> {
+        let of = self.written.variables.iter().find(|of| of.name == name)?;
+        match (of.base, &of.dimensions) {
+            (None, _) => Some("is a clock, and clocks are not supported here; FMPy sets and reads them"),
+            (_, Some(sizes)) if sizes.is_empty() => None,
+            (_, None) => Some("is an array of unknown size"),
+            _ => None,
+        }
     }
 
     /// Returns the variable of this name.

@@ -2,22 +2,24 @@
 
 use crate::description::{Description, Structural};
 use crate::error::Error;
+use crate::files::{Files, Kind};
 use crate::library::Library;
 use crate::machine;
 use fmi_abi::description::Offer;
 use fmi_abi::{Interface, Standard};
 use std::env::consts::{ARCH, DLL_SUFFIX, OS};
 use std::error::Error as _;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tempfile::TempDir;
+
+/// File with the model description.
+const DESCRIPTION: &str = "modelDescription.xml";
 
 /// An unpacked and loaded FMU.
 #[derive(Debug)]
 pub(crate) struct Loaded {
     pub description: Arc<Description>,
-    directory: Arc<TempDir>,
+    files: Arc<Files>,
     co_simulation: Option<Arc<Library>>,
     /// Library for Model Exchange, or the reason why it cannot be loaded although the library for
     /// Co-Simulation can.
@@ -31,12 +33,11 @@ impl Loaded {
     /// The requirement of [`Fmu::open`](crate::Fmu::open); if `execution_tool` is true, the program may be started.
     pub unsafe fn open(path: &Path, execution_tool: bool) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
-        let directory = unpacked(path).map_err(fail)?;
-        let description =
-            content(directory.path()).and_then(|text| Description::parse(&text)).map_err(fail)?;
-        let directory = Arc::new(directory);
+        let files = Files::open(path, Kind::Fmu).map_err(fail)?;
+        let description = files.xml(DESCRIPTION).and_then(|text| Description::parse(&text)).map_err(fail)?;
+        let files = Arc::new(files);
         // SAFETY: the caller guarantees that the library is sound.
-        let load = |offer: &Offer| unsafe { load(&directory, description.standard, offer, execution_tool) };
+        let load = |offer: &Offer| unsafe { load(&files, description.standard, offer, execution_tool) };
         let co_simulation = description.co_simulation.as_ref().map(load).transpose().map_err(fail)?;
         let same = |offer: &&Offer| {
             description.co_simulation.as_ref().is_some_and(|own| own.identifier == offer.identifier)
@@ -49,17 +50,17 @@ impl Loaded {
         if co_simulation.is_none() {
             model_exchange = Ok(model_exchange.map_err(fail)?);
         }
-        Ok(Self { description: Arc::new(description), directory, co_simulation, model_exchange })
+        Ok(Self { description: Arc::new(description), files, co_simulation, model_exchange })
     }
 
     /// Returns the FMU with other values of structural parameters.
     pub fn configured(&self, structure: Vec<Structural>) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", self.description.model_name));
         let description =
-            content(self.directory.path()).and_then(|text| Description::parse_configured(&text, structure));
+            self.files.xml(DESCRIPTION).and_then(|text| Description::parse_configured(&text, structure));
         Ok(Self {
             description: Arc::new(description.map_err(fail)?),
-            directory: Arc::clone(&self.directory),
+            files: Arc::clone(&self.files),
             co_simulation: self.co_simulation.clone(),
             model_exchange: self.model_exchange.clone(),
         })
@@ -87,18 +88,12 @@ impl Loaded {
     }
 }
 
-/// Returns the model description of an unpacked FMU.
-fn content(directory: &Path) -> Result<String, String> {
-    std::fs::read_to_string(directory.join("modelDescription.xml"))
-        .map_err(|_| "there is no readable modelDescription.xml in it; it is no FMU".to_owned())
-}
-
 /// Loads the library for an interface type.
 ///
 /// # Safety
 /// The requirement of [`Fmu::open`](crate::Fmu::open).
 unsafe fn load(
-    directory: &Arc<TempDir>,
+    files: &Arc<Files>,
     standard: Standard,
     offer: &Offer,
     execution_tool: bool,
@@ -108,10 +103,10 @@ unsafe fn load(
             open it with execution_tool=True, in Rust with open_with_execution_tool";
         return Err(why.to_owned());
     }
-    let file = library_of(directory.path(), standard, offer)?;
-    let resources = standard.resources(&directory.path().join("resources"));
+    let file = library_of(files.path(), standard, offer)?;
+    let resources = standard.resources(&files.path().join("resources"));
     // SAFETY: the caller guarantees that the library is sound.
-    let loaded = unsafe { Library::load(&file, standard, resources, Arc::clone(directory)) };
+    let loaded = unsafe { Library::load(&file, standard, resources, Arc::clone(files)) };
     loaded.map(Arc::new).map_err(|error| {
         // The loader's error names the failed call; its source gives the reason.
         let why = machine::mismatch(&file).unwrap_or_else(|| match error.source() {
@@ -120,19 +115,6 @@ unsafe fn load(
         });
         format!("its library cannot be loaded: {why}")
     })
-}
-
-pub(crate) fn unpacked(path: &Path) -> Result<TempDir, String> {
-    let file = File::open(path).map_err(|error| format!("cannot be opened ({error})"))?;
-    let mut archive =
-        zip::ZipArchive::new(file).map_err(|error| format!("is no FMU, which is a zip file ({error})"))?;
-    let directory = tempfile::Builder::new()
-        .prefix("fmu-run-")
-        .tempdir()
-        .map_err(|error| format!("no temporary directory can be made ({error})"))?;
-    // `extract` rejects entries that would leave the directory.
-    archive.extract(directory.path()).map_err(|error| format!("cannot be unpacked ({error})"))?;
-    Ok(directory)
 }
 
 /// Returns the directories of `binaries/` that may contain a library for this machine. The names of FMI 2.0
@@ -160,12 +142,28 @@ fn library_of(directory: &Path, standard: Standard, offer: &Offer) -> Result<Pat
     {
         return Ok(found);
     }
+    // A tuple of FMI 3.0 may name the ABI, too: x86_64-linux-gnu (section 2.5.1.4.1).
+    let with_abi =
+        |name: &String| standard == Standard::Fmi3 && name.starts_with(&format!("{}-", directories[0]));
     let mut others: Vec<_> = std::fs::read_dir(&binaries)
         .into_iter()
         .flatten()
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
         .collect();
     others.sort();
+    if let Some(found) = others
+        .iter()
+        .filter(|name| with_abi(name))
+        .map(|other| binaries.join(other).join(&name))
+        .find(|path| path.is_file())
+    {
+        return Ok(found);
+    }
+    if others.is_empty() && directory.join("sources").is_dir() {
+        return Err(
+            "has only C sources, which must be compiled first; `fmpy compile FMU` of FMPy does it".to_owned()
+        );
+    }
     let others = if others.is_empty() { "none".to_owned() } else { others.join(", ") };
     Err(format!("has no library for this platform (binaries/{}/{name}); it has: {others}", directories[0]))
 }

@@ -10,6 +10,7 @@ mod arrays;
 mod batch;
 mod description;
 mod error;
+mod files;
 mod fmu;
 mod found;
 mod instance;

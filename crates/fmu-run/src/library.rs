@@ -1,10 +1,10 @@
 //! The shared library of an FMU with its files.
 
+use crate::files::Files;
 use fmi_abi::Standard;
 use std::ffi::CString;
 use std::path::Path;
 use std::sync::Arc;
-use tempfile::TempDir;
 
 /// A loaded library, with the files of its FMU.
 #[derive(Debug)]
@@ -13,7 +13,7 @@ pub(crate) struct Library {
     /// Location of its resources, as importers write it.
     pub resources: CString,
     // Removed after the library is unloaded.
-    _directory: Arc<TempDir>,
+    _files: Arc<Files>,
 }
 
 impl Library {
@@ -25,10 +25,10 @@ impl Library {
         path: &Path,
         standard: Standard,
         resources: CString,
-        directory: Arc<TempDir>,
+        files: Arc<Files>,
     ) -> Result<Self, impl std::error::Error> {
         // SAFETY: the caller guarantees that loading is sound.
         let client = unsafe { fmi_client::Library::load(path, standard) };
-        client.map(|client| Self { client: Arc::new(client), resources, _directory: directory })
+        client.map(|client| Self { client: Arc::new(client), resources, _files: files })
     }
 }

@@ -451,6 +451,16 @@ impl Definition {
         if !found.is_empty() {
             return Ok(found);
         }
+        let missing = self.components.iter().find_map(|component| {
+            let own = match component.name.as_str() {
+                "" => name,
+                of => name.strip_prefix(of)?.strip_prefix('.')?,
+            };
+            component.fmu.description.why_missing(own)
+        });
+        if let Some(why) = missing {
+            return request(format!("{name} {why}"));
+        }
         let names = self.components.iter().flat_map(|component| {
             component.fmu.description.variables.iter().map(|of| joined(&component.name, &of.name))
         });

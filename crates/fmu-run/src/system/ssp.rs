@@ -2,7 +2,8 @@
 
 use super::{Component, Definition, Order, StartValue, System};
 use crate::error::Error;
-use crate::fmu::{Loaded, unpacked};
+use crate::files::{Files, Kind};
+use crate::fmu::Loaded;
 use crate::start::StartValues;
 use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
@@ -41,9 +42,8 @@ impl System {
     /// are no FMUs, parameter mappings, signal dictionaries, transformations of connections.
     pub unsafe fn open(path: &Path, order: Order) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
-        let directory = unpacked(path).map_err(|why| fail(why.replace("no FMU", "no SSP")))?;
-        let text = std::fs::read_to_string(directory.path().join("SystemStructure.ssd"))
-            .map_err(|_| fail("there is no readable SystemStructure.ssd in it; it is no SSP".to_owned()))?;
+        let directory = Files::open(path, Kind::Ssp).map_err(fail)?;
+        let text = directory.xml("SystemStructure.ssd").map_err(fail)?;
         let document = Document::parse(&text)
             .map_err(|error| fail(format!("SystemStructure.ssd is no XML: {error}")))?;
         let root = document.root_element();

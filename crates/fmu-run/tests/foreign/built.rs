@@ -52,18 +52,24 @@ pub fn built(manner: &str, standard: Standard, directory: &Path, changes: &[(&st
         xml = xml.replace("<CoSimulation", "<CoSimulation canBeInstantiatedOnlyOncePerProcess=\"true\"");
     }
     let path = directory.join(format!("{manner}.fmu"));
-    let mut archive = zip::ZipWriter::new(File::create(&path).unwrap());
     let library = library(if manner == "exceptions" { "c++" } else { "c" });
-    for (name, content) in [
+    let entries = [
         ("modelDescription.xml".to_owned(), xml.into_bytes()),
         (format!("binaries/{platform}/foreign.so"), std::fs::read(library).unwrap()),
         ("resources/gain.txt".to_owned(), b"2.5".to_vec()),
-    ] {
+    ];
+    packed(&path, entries);
+    path
+}
+
+/// Packs a zip file.
+pub fn packed(path: &Path, entries: impl IntoIterator<Item = (String, Vec<u8>)>) {
+    let mut archive = zip::ZipWriter::new(File::create(path).unwrap());
+    for (name, content) in entries {
         archive.start_file(name, SimpleFileOptions::default()).unwrap();
         archive.write_all(&content).unwrap();
     }
     archive.finish().unwrap();
-    path
 }
 
 /// Opens the FMU with a manner.

@@ -3,6 +3,7 @@
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 mod built;
+mod opening;
 
 use built::{built, opened};
 use fmu_run::{Batch, Error, Fmu, Setup, Standard, Start, Status, Tolerance, Trajectory, Value, Watch};

@@ -1,0 +1,114 @@
+//! Files that are opened as an FMU, FMUs and others.
+
+use crate::built::{built, packed};
+use crate::end;
+use fmu_run::{Error, Fmu, Order, Standard, System};
+use std::path::Path;
+
+fn opened(path: &Path) -> Result<Fmu, String> {
+    // SAFETY: an FMU of these tests.
+    unsafe { Fmu::open(path) }.map_err(|error| match error {
+        Error::Fmu(why) => why,
+        other => panic!("{other:?}"),
+    })
+}
+
+#[test]
+fn messages_say_what_a_file_is() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = |name: &str, content: &[u8]| {
+        let path = directory.path().join(name);
+        std::fs::write(&path, content).unwrap();
+        path
+    };
+    let archive = |name: &str, entries: &[(&str, &str)]| {
+        let path = directory.path().join(name);
+        packed(&path, entries.iter().map(|(name, text)| ((*name).to_owned(), text.as_bytes().to_vec())));
+        path
+    };
+    let xml = |version: &str, rest: &str| {
+        format!(
+            "<fmiModelDescription fmiVersion=\"{version}\" modelName=\"M\" instantiationToken=\"x\">{rest}</fmiModelDescription>"
+        )
+    };
+    let (one, scheduled) = (xml("1.0", ""), xml("3.0", "<ScheduledExecution modelIdentifier=\"m\"/>"));
+    let sources = xml("3.0", "<CoSimulation modelIdentifier=\"m\"/>");
+    for (path, why) in [
+        (directory.path().join("missing.fmu"), "cannot be opened (No such file"),
+        (file("empty.fmu", b""), "it is empty"),
+        (file("pointer.fmu", b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n"), "git lfs pull"),
+        (file("page.fmu", b"<!DOCTYPE html><html></html>"), "it is a web page"),
+        (file("model.so", b"\x7fELF\x02\x01\x01"), "it is a shared library"),
+        (file("text.fmu", b"hello"), "is not an FMU, which is a zip file: it cannot be read as one"),
+        (archive("other.fmu", &[("readme", "x")]), "is not an FMU: the zip file has no modelDescription.xml"),
+        (
+            archive("deep.fmu", &[("Model/modelDescription.xml", &one)]),
+            "has its modelDescription.xml in the directory Model;",
+        ),
+        (
+            archive("system.ssp", &[("SystemStructure.ssd", "<a/>")]),
+            "is not an FMU but a system (SSP); open it with System",
+        ),
+        (archive("one.fmu", &[("modelDescription.xml", &one)]), "FMPy and PyFMI run FMI 1.0"),
+        (archive("scheduled.fmu", &[("modelDescription.xml", &scheduled)]), "only Scheduled Execution"),
+        (
+            archive("sources.fmu", &[("modelDescription.xml", &sources), ("sources/m.c", "")]),
+            "has only C sources, which must be compiled first",
+        ),
+        (archive("outside.fmu", &[("../outside", "x")]), "would be outside of the directory"),
+        (archive("absolute.fmu", &[("/tmp/outside", "x")]), "would be outside of the directory"),
+        (archive("windows.fmu", &[("..\\outside", "x")]), "would be outside of the directory"),
+        (directory.path().to_owned(), "is not an FMU: the directory has no modelDescription.xml"),
+    ] {
+        let found = opened(&path).unwrap_err();
+        assert!(found.starts_with(&path.display().to_string()), "{found}");
+        assert!(found.contains(why), "{found}");
+        assert!(!found.contains('\n'), "{found}");
+    }
+    // SAFETY: it is not loaded.
+    let system =
+        unsafe { System::open(&archive("fmu.ssp", &[("modelDescription.xml", &one)]), Order::Jacobi) };
+    assert!(system.unwrap_err().to_string().contains("is not a system (SSP) but an FMU; open it with Fmu"));
+}
+
+#[test]
+fn unusual_archives_are_read() {
+    for standard in [Standard::Fmi2, Standard::Fmi3] {
+        let directory = tempfile::tempdir().unwrap();
+        // An unpacked FMU, whose files stay.
+        let unpacked = directory.path().join("unpacked");
+        let archive = built("resources", standard, directory.path(), &[]);
+        zip::ZipArchive::new(std::fs::File::open(archive).unwrap()).unwrap().extract(&unpacked).unwrap();
+        assert_eq!(opened(&unpacked).and_then(|fmu| end(&fmu)), Ok(3.5));
+        assert!(unpacked.join("modelDescription.xml").is_file());
+        // Backslashes, and ISO-8859-1.
+        let text = std::fs::read_to_string(unpacked.join("modelDescription.xml")).unwrap();
+        let text = text
+            .replace("UTF-8", "ISO-8859-1")
+            .replace("modelName=\"Foreign\"", "modelName=\"For\u{eb}ign\"");
+        let latin: Vec<u8> = text.chars().map(|char| u8::try_from(char).unwrap()).collect();
+        let platform = if standard == Standard::Fmi2 { "linux64" } else { "x86_64-linux" };
+        let library = std::fs::read(unpacked.join(format!("binaries/{platform}/foreign.so"))).unwrap();
+        let platform = if standard == Standard::Fmi2 { platform } else { "x86_64-linux-gnu" };
+        let strange = directory.path().join("strange.fmu");
+        let entries = [
+            ("modelDescription.xml".to_owned(), latin),
+            (format!("binaries\\{platform}\\foreign.so"), library),
+            ("resources\\gain.txt".to_owned(), b"1.5".to_vec()),
+        ];
+        packed(&strange, entries);
+        let fmu = opened(&strange).unwrap();
+        assert_eq!((end(&fmu), fmu.name()), (Ok(2.5), "For\u{eb}ign"));
+    }
+}
+
+#[test]
+fn clocks_are_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let clock = "<ModelVariables><Clock name=\"tick\" valueReference=\"99\" causality=\"input\" intervalVariability=\"triggered\"/>";
+    let path = built("plain", Standard::Fmi3, directory.path(), &[("<ModelVariables>", clock)]);
+    let fmu = opened(&path).unwrap();
+    assert_eq!(end(&fmu), Ok(1.0));
+    let why = fmu.select(&["tick"]).unwrap_err().to_string();
+    assert!(why.starts_with("tick is a clock, and clocks are not supported here"), "{why}");
+}
