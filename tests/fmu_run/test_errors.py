@@ -98,7 +98,7 @@ def test_rejected_runs_do_not_affect_the_others(fmu):
     "content, message",
     [
         (None, "cannot be opened"),
-        ({}, "no readable modelDescription.xml"),
+        ({}, "is not an FMU: the zip file has no modelDescription.xml"),
         ({"modelDescription.xml": "<a"}, "is not well-formed XML"),
         ({"modelDescription.xml": '<fmiModelDescription fmiVersion="1.0"/>'}, 'its fmiVersion is "1.0"'),
         (
@@ -106,7 +106,7 @@ def test_rejected_runs_do_not_affect_the_others(fmu):
             "neither Co-Simulation nor Model Exchange",
         ),
         ({"../outside": "x"}, "cannot be unpacked|no readable modelDescription.xml"),
-        ("text", "is no FMU, which is a zip file"),
+        ("text", "is not an FMU, which is a zip file"),
     ],
 )
 def test_files_that_are_no_fmu(tmp_path, content, message):
@@ -252,7 +252,8 @@ def test_other_types(unruly):
         one = fmu.instances(start={"label": "held", "behaviour": "Good", "flag": "true"})
         assert one.texts("label") == ["held"] and list(one.get(("behaviour", "flag"))[0]) == [0.0, 1.0]
         for call, message in [
-            (lambda: fmu.run(TIME, outputs=["label"]), "label is no number"),
+            (lambda: one.get(["label", "y"]), "label is no number"),
+            (lambda: fmu.run(TIME, outputs=["y"], inputs={"label": 2.0}), "label is a string, its value cannot be 2"),
             (lambda: one.texts("y"), "y is a number, not a string"),
             (
                 lambda: fmu.run(TIME, outputs=["y"], start={"behaviour": "Glad"}),

@@ -226,7 +226,7 @@ def test_an_ssp_is_the_same_system(order, tmp_path) -> None:
 def test_unsupported_ssps(old, new, message, tmp_path) -> None:
     with pytest.raises(fmu_run.FmuError, match=message):
         fmu_run.System(rewritten(tmp_path, lambda text: text.replace(old, new)))
-    with pytest.raises(fmu_run.FmuError, match="it is no SSP"):
+    with pytest.raises(fmu_run.FmuError, match=r"is not a system \(SSP\) but an FMU"):
         fmu_run.System(built("prw_testbed.fmu"))
     with pytest.raises(ValueError, match="an SSP has its own connections"):
         fmu_run.System(built("prw_closed_loop.ssp"), {})

@@ -116,11 +116,28 @@ impl System {
     /// not support the interface type or makes no instances.
     pub fn instances(&self, setup: &Setup) -> Result<Instances, Error> {
         let (system, start) = self.configured(&setup.start)?;
-        system.instances_of(setup, &start)
+        system.instances_of(setup, &start, setup.listening.then(|| self.feed()))
+    }
+
+    /// Makes instances as [`instances`](Self::instances) does, and returns the messages so far also if there is an error.
+    ///
+    /// # Errors
+    /// Same errors as [`instances`](Self::instances).
+    pub fn instances_with(&self, setup: &Setup, messages: &mut Vec<Logged>) -> Result<Instances, Error> {
+        let (system, start) = self.configured(&setup.start)?;
+        let feed = setup.listening.then(|| self.feed());
+        let made = system.instances_of(setup, &start, feed.clone());
+        messages.extend(feed.iter().flat_map(|feed| feed.take()));
+        made
     }
 
     /// Makes instances, whose structural parameters have their values.
-    fn instances_of(&self, setup: &Setup, given: &[(&str, Start)]) -> Result<Instances, Error> {
+    fn instances_of(
+        &self,
+        setup: &Setup,
+        given: &[(&str, Start)],
+        feed: Option<Arc<Feed>>,
+    ) -> Result<Instances, Error> {
         self.check_interface(setup.interface)?;
         if setup.count == 0 {
             return request("count must be at least 1".to_owned());
@@ -141,7 +158,7 @@ impl System {
             interface: setup.interface,
             all,
             begin: Begin { start, experiment: Experiment { start_time, stop_time, tolerance } },
-            feed: setup.listening.then(|| self.feed()),
+            feed,
             threads: (threads > 1).then(|| Threads::new(threads - 1)).transpose()?,
         };
         instances.start_from(given)?;
@@ -202,7 +219,7 @@ impl Instances {
     /// instances.
     pub fn start_from(&mut self, start: &[(&str, Start)]) -> Result<(), Error> {
         for (name, values) in start {
-            if self.system.find(name)?.iter().any(|found| found.variable.is_structural()) {
+            if self.system.is_structural(name) {
                 return request(format!(
                     "{name} is a structural parameter; give its value when the instances are made"
                 ));

@@ -17,6 +17,7 @@ Values are in the FMU's units, see `Fmu.variables`. FMI 2.0 and 3.0.
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -31,7 +32,7 @@ from fmu_run._native import Loaded as _Loaded
 from fmu_run._native import numbers as _numbers
 from fmu_run.runs import Runs
 
-__all__ = ["Fmu", "FmuError", "Instances", "Measure", "Runs", "Start", "States", "System", "Variable"]
+__all__ = ["Fmu", "FmuError", "Instances", "Log", "Measure", "Runs", "Start", "States", "System", "Variable"]
 
 Measure = Literal["min", "max", "peak", "time_of_peak", "mean", "rms", "end"]
 _Array = NDArray[np.float64]
@@ -39,8 +40,11 @@ _Array = NDArray[np.float64]
 #: A start value: one for all runs or instances, or one for each. Strings are values of strings or names of enumeration items; a
 #: number or array with a unit is in that unit, which the FMU must have among its display units.
 Start = ArrayLike | str | Sequence[str] | tuple[ArrayLike, str]
-#: Values of an input over time, with a unit or without, as for `Start`.
-Trajectory = ArrayLike | tuple[ArrayLike, str]
+#: Values of an input over time, with a unit or without, as for `Start`; at its own times as (times, values) or (times, values, unit).
+Trajectory = ArrayLike | tuple[ArrayLike, str] | tuple[ArrayLike, ArrayLike] | tuple[ArrayLike, ArrayLike, str]
+#: Receiver of messages of the FMU: a logger, or a function that is called with the index of the run or instance, the status, the
+#: category and the message.
+Log = Callable[[int | None, str, str, str], Any] | logging.Logger
 
 
 @dataclass(frozen=True)
@@ -105,6 +109,8 @@ class _Model:
         threads: int | None = None,
         read_before_set: bool = False,
         progress: Callable[[int, int], Any] | None = None,
+        tolerance: float | Literal["default"] | None = "default",
+        log: Log | None = None,
     ) -> Runs:
         """Run the FMU, once for each run that has values, or once if all values are for all runs.
 
@@ -118,15 +124,19 @@ class _Model:
             (times,), the communication points, s. At each the inputs are set, the outputs read, and the step to the next
             is taken.
         outputs
-            The variables to read, any that are numbers.
+            The variables to read, of any type but clocks.
         inputs
             By name: (times,) for all runs, (runs, times) for each run, or a constant number; with a unit or without,
-            {"theta1": (angles, "deg")}. Inputs that are not named keep their start values.
+            {"theta1": (angles, "deg")}. Inputs that are not named keep their start values. An input with its own times is
+            {"u": (times, values)}, values of the shape (times,) or (runs, times): between its times, a continuous variable follows the
+            line, and any other keeps the earlier value; equal times are a step; before the first and after the last time the
+            value is constant. Strings and bytes are given in the same shapes.
         input_derivatives
             d/dt of inputs, in the same shapes, for FMUs of FMI 2.0 that can interpolate inputs.
         start
             Start values of parameters, states and so on by name: one for all runs or (runs,) for each run; numbers,
-            strings, enumeration items, or numbers with a unit, {"k1": (1.9, "N.m/deg")}.
+            strings, bytes, enumeration items, or numbers with a unit, {"k1": (1.9, "N.m/deg")}. A structural parameter has one
+            value for all runs, and determines the sizes of arrays.
         every
             Keep the outputs at the first time and each `every` times after it. Default: all, or none if there are
             measures.
@@ -139,6 +149,12 @@ class _Model:
             Read outputs before the inputs of their time are set, as FMPy does.
         progress
             Called with the numbers of finished runs and of all runs, ten times per second.
+        tolerance
+            Relative tolerance for a solver inside the FMU. Default: that of the default experiment in the model description, as
+            in FMPy; None leaves it to the FMU.
+        log
+            Receives the messages of the FMU, whose logging is then switched on: a function that is called with the index of the
+            run, status, category and message, or a `logging.Logger`. The index is None if the FMU does not tell.
 
         Returns
         -------
@@ -160,7 +176,18 @@ class _Model:
         """
         return Runs(
             *self._loaded.run(
-                time, outputs, inputs, input_derivatives, start, every, measures, threads, read_before_set, progress
+                time,
+                outputs,
+                inputs,
+                input_derivatives,
+                start,
+                every,
+                measures,
+                threads,
+                read_before_set,
+                progress,
+                tolerance,
+                log,
             )
         )
 
@@ -200,6 +227,8 @@ class _Model:
         start_time: float = 0.0,
         stop_time: float | None = None,
         threads: int | None = 1,
+        tolerance: float | Literal["default"] | None = "default",
+        log: Log | None = None,
     ) -> Instances:
         """Make instances, set their start values and initialize them.
 
@@ -216,6 +245,8 @@ class _Model:
         threads
             More than one is faster if a call takes much longer than waking a thread, about 0.01 ms: with hundreds of instances,
             or for slow models. None takes one for each processor.
+        tolerance, log
+            As in `run`; the index of a message is that of the instance. Messages are passed on at the end of a call.
 
         Returns
         -------
@@ -231,7 +262,7 @@ class _Model:
         FmuError
             If the FMU has no such interface type, or rejects all instances.
         """
-        return Instances(self._loaded, count, interface, start, start_time, stop_time, threads)
+        return Instances(self._loaded, count, interface, start, start_time, stop_time, threads, tolerance, log)
 
 
 class Fmu(_Model):
@@ -249,7 +280,7 @@ class Fmu(_Model):
     Raises
     ------
     FmuError
-        If the file is no FMU, or has no library for this platform.
+        If the file is not an FMU, or has no library for this platform.
     """
 
     def __init__(self, path: str | os.PathLike[str], *, execution_tool: bool = False):

@@ -27,8 +27,10 @@ class Runs(Mapping[str, _Array]):
 
     runs["roll"]: (runs, times), at the kept times. runs["roll", "peak"]: (runs,). A whole array is (runs, times, *shape), its
     measures are (runs, *shape). Times that a run has not reached are NaN. Measures are NaN for a rejected run, and if a value is
-    NaN; for a run that the FMU ended they cover the times until then. As a mapping, the object contains time series by
-    output, none if only measures were requested; its truth value is always true.
+    NaN; for a run that the FMU ended they cover the times until then. Strings and bytes are arrays of objects; an Int64 or UInt64
+    is an array of integers, or of objects if a run has not reached a time. These have None instead of NaN, and no measures.
+    As a mapping, the object contains time series by output, none if only measures were requested; its truth value is
+    always true.
 
     A RuntimeWarning reports NaN at the first use of a result. It reports failed runs only if neither `errors` nor `ok` was
     read before.
@@ -50,6 +52,7 @@ class Runs(Mapping[str, _Array]):
         notes: Iterable[tuple[int, str]],
         start: Mapping[str, Any],
         arrays: Mapping[str, tuple[tuple[int, ...], list[str]]] | None = None,
+        exact: Mapping[str, NDArray[Any]] | None = None,
     ):
         self.time, self._errors, self.notes = time, dict(errors), dict(notes)
         self._reported, self._checked = not self._errors, set[str | tuple[str, str]]()
@@ -57,12 +60,16 @@ class Runs(Mapping[str, _Array]):
         self._outputs, self._measures, self._start = outputs, measures, start
         #: Shape and names of the elements of the arrays among outputs and start values.
         self._arrays = arrays or {}
+        #: Outputs whose values float64 does not have.
+        self._exact = exact or {}
 
     @cached_property
-    def start(self) -> dict[str, _Array | str]:
-        """(runs,) or (runs, *shape): the given start values by name; strings unchanged."""
+    def start(self) -> dict[str, Any]:
+        """(runs,) or (runs, *shape): the given start values by name; a single string or bytes unchanged."""
         return {
-            name: value if isinstance(value, str) else np.broadcast_to(value, (self.count, *self._shape(name)))
+            name: value
+            if isinstance(value, str | bytes)
+            else np.broadcast_to(_column(value), (self.count, *self._shape(name)))
             for name, value in self._start.items()
         }
 
@@ -73,10 +80,17 @@ class Runs(Mapping[str, _Array]):
         elements: dict[str, int] = {}
         first = 0
         for name in self._outputs:
+            if name in self._exact:
+                continue
             columns[name] = first
             elements |= {element: first + k for k, element in enumerate(self._elements(name))}
             first += len(self._elements(name))
         return elements | columns
+
+    @property
+    def _numbers(self) -> list[str]:
+        """The outputs that have measures."""
+        return [name for name in self._outputs if name not in self._exact]
 
     def _shape(self, name: str) -> tuple[int, ...]:
         return self._arrays[name][0] if name in self._arrays else ()
@@ -113,6 +127,10 @@ class Runs(Mapping[str, _Array]):
 
     def __getitem__(self, key: str | tuple[str, str]) -> _Array:
         output, *measure = (key,) if isinstance(key, str) else key if isinstance(key, tuple) else (None,)
+        if output in self._exact:
+            if measure:
+                raise KeyError(f"{output} has no measures; only numbers up to 2**53 have")
+            return self._exact[output]
         if output not in self._columns or len(measure) > 1:
             raise KeyError(
                 f"no output {output if isinstance(output, str) else key!r} was requested; there are {', '.join(self._outputs)}"
@@ -197,7 +215,7 @@ class Runs(Mapping[str, _Array]):
         }
         measures = {
             f"{output}_{measure}": (dims(output, "run"), self[output, measure])
-            for output in self._outputs
+            for output in self._numbers
             for measure in self._measures
         }
         times = {"time": self.time} if len(self) else {}
@@ -207,12 +225,12 @@ class Runs(Mapping[str, _Array]):
         )
         return dataset
 
-    def _starts(self) -> dict[str, _Array | str]:
+    def _starts(self) -> dict[str, Any]:
         return {f"{name}{AT_START}" if name in self else name: value for name, value in self.start.items()}
 
     def _by_name(self) -> dict[str, _Array]:
         found: dict[str, _Array] = {}
-        for output in self._outputs:
+        for output in self._numbers:
             for measure in self._measures:
                 of_elements = self._split(output, self[output, measure], 1)
                 found |= {f"{element}_{measure}": values for element, values in of_elements}
@@ -231,6 +249,15 @@ class Runs(Mapping[str, _Array]):
         measures = f", measures {', '.join(self._measures)}" if self._measures else ""
         failed = f", {len(self._errors)} failed" if self._errors else ""
         return f"<Runs: {self.count} of {', '.join(self._outputs)}, {len(self.time)} times{measures}{failed}>"
+
+
+def _column(values: Any) -> NDArray[Any]:
+    """Start values as an array. NumPy would remove zeros at the end of bytes."""
+    if isinstance(values, Sequence) and any(isinstance(value, bytes) for value in values):
+        column = np.empty(len(values), dtype=object)
+        column[:] = values
+        return column
+    return np.asarray(values)
 
 
 def _needed(package: str) -> Any:

@@ -1,7 +1,7 @@
 //! Arguments of Python functions. An error names the argument.
 
 use crate::buffers::array_of;
-use fmu_run::System;
+use fmu_run::{System, Tolerance};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString, PyTuple};
@@ -37,6 +37,19 @@ pub fn number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
     }
     let is_number = !value.is_instance_of::<PyBool>() && !value.is_instance_of::<PyString>();
     value.extract().ok().filter(|_| is_number).ok_or_else(|| wrong(name, "a number", value))
+}
+
+/// Returns a tolerance: that of the default experiment, none or a number.
+pub fn tolerance(value: &Bound<'_, PyAny>) -> PyResult<Tolerance> {
+    if value.is_none() {
+        return Ok(Tolerance::None);
+    }
+    if value.extract::<String>().is_ok_and(|text| text == "default") {
+        return Ok(Tolerance::Default);
+    }
+    number("tolerance", value)
+        .map(Tolerance::Value)
+        .map_err(|_| wrong("tolerance", "a number, None or 'default'", value))
 }
 
 /// Returns a Boolean of Python or NumPy, or one of the numbers 0 and 1.

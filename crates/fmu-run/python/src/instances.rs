@@ -2,9 +2,11 @@
 
 use crate::arguments::{self, shape, wrong};
 use crate::buffers::{Numbers, Output};
+use crate::exact::{self, Exact, exact_type};
+use crate::log::Log;
 use crate::start::Start;
 use crate::{FmuError, python};
-use fmu_run::{Continuous, Error, Interface, Selection, Setup, System, process};
+use fmu_run::{BaseType, Continuous, Error, Interface, Selection, Setup, System, process};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
@@ -30,6 +32,8 @@ pub struct Instances {
     instances: Arc<Shared>,
     /// Cache of looked-up names, by the objects that named them.
     known: Mutex<Vec<(Py<PyAny>, Arc<Named>)>>,
+    /// Receives the messages of the FMU.
+    log: Option<Log>,
 }
 
 /// Variables of a call.
@@ -115,6 +119,8 @@ impl Instances {
         start_time: &Bound<'_, PyAny>,
         stop_time: Optional,
         threads: Optional,
+        tolerance: &Bound<'_, PyAny>,
+        log: Optional,
     ) -> PyResult<Self> {
         let interface = match interface.extract::<String>().as_deref() {
             Ok("co-simulation") => Interface::CoSimulation,
@@ -125,8 +131,8 @@ impl Instances {
         let threads = arguments::count("threads", threads.as_ref())?;
         let start_time = finite("start_time", start_time)?;
         let stop_time = stop_time.map(|time| finite("stop_time", &time)).transpose()?;
-        let system = System::clone(&*loaded.model()?);
-        let start = Start::of(&system, start.as_ref())?;
+        let (system, start) = Start::configured(&*loaded.model()?, start.as_ref())?;
+        let log = Log::of(log.as_ref())?;
         let setup = Setup {
             interface,
             count,
@@ -134,10 +140,16 @@ impl Instances {
             start_time,
             stop_time,
             threads,
-            ..Setup::default()
+            tolerance: arguments::tolerance(tolerance)?,
+            listening: log.is_some(),
         };
-        let made = py.detach(|| system.instances(&setup)).map_err(python)?;
-        Ok(Self { system, count, instances: Shared::of(made), known: Mutex::default() })
+        let mut messages = Vec::new();
+        let made = py.detach(|| system.instances_with(&setup, &mut messages));
+        if let Some(log) = &log {
+            log.pass(py, messages)?;
+        }
+        let instances = Shared::of(made.map_err(python)?);
+        Ok(Self { system, count, instances, known: Mutex::default(), log })
     }
 
     fn __len__(&self) -> usize {
@@ -205,10 +217,16 @@ impl Instances {
         values: &Bound<'_, PyAny>,
         mask: Optional,
     ) -> PyResult<()> {
+        if let Some((name, _)) = self.exact(variables)? {
+            let (mask, values) = (self.mask(mask)?, Exact::of("values", values)?);
+            values.check("values", &[&[], &[self.count]])?;
+            return self.attempt(py, |all| all.set_values(&name, &values.values, mask.as_deref()));
+        }
         self.put(py, variables, values, mask, fmu_run::Instances::set)
     }
 
-    /// Read variables: (n,) for a str, (n, variables) for a sequence; written to `out` if it is given.
+    /// Read variables: (n,) for a str, (n, variables) for a sequence; written to `out` if it is given. A single Int64 or UInt64 is
+    /// an array of int64 or uint64, a string or bytes an array of objects, with None for an instance that has dropped out.
     #[pyo3(signature = (variables, out=None))]
     fn get<'py>(
         &self,
@@ -216,6 +234,10 @@ impl Instances {
         variables: &Bound<'py, PyAny>,
         out: Optional<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        if let (Some((name, base)), None) = (self.exact(variables)?, &out) {
+            let values = self.attempt(py, |all| all.values(&name))?;
+            return exact::array(py, base, &values, &[self.count]);
+        }
         let named = self.named("variables", variables)?;
         self.read(py, &named.row, out, |all, values| {
             all.get(&named.selection, values);
@@ -574,12 +596,32 @@ impl Instances {
         py: Python,
         body: impl FnOnce(&mut fmu_run::Instances) -> Result<T, Error> + Send,
     ) -> PyResult<T> {
-        let (result, none_left) = py.detach(|| {
+        let called = py.detach(|| {
             let mut all = self.instances.lock()?;
             let result = body(&mut all).map_err(python)?;
             PyResult::Ok((result, all.none_left().map(str::to_owned)))
-        })?;
+        });
+        self.pass_messages(py)?;
+        let (result, none_left) = called?;
         none_left.map_or(Ok(result), |why| Err(FmuError::new_err(why)))
+    }
+
+    /// Passes the messages of a call on, without the lock, so that the receiver may use the instances.
+    fn pass_messages(&self, py: Python) -> PyResult<()> {
+        let Some(log) = &self.log else { return Ok(()) };
+        let messages = self.instances.lock()?.take_messages();
+        log.pass(py, messages)
+    }
+
+    /// Returns name and type of a single variable whose values float64 does not have.
+    fn exact(&self, variables: &Bound<'_, PyAny>) -> PyResult<Option<(String, BaseType)>> {
+        let Ok(name) = variables.cast::<PyString>() else { return Ok(None) };
+        // Numbers are in the cache.
+        if lock(&self.known).iter().any(|(object, _)| object.is(variables)) {
+            return Ok(None);
+        }
+        let name: String = name.extract()?;
+        Ok(exact_type(&self.system, &name)?.map(|base| (name, base)))
     }
 
     /// Sets values of variables: a row for each instance or one for all.

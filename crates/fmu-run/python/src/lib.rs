@@ -3,12 +3,15 @@
 
 mod arguments;
 mod buffers;
+mod exact;
 mod instances;
+mod log;
 mod signals;
 mod start;
 
 use buffers::{Numbers, Output};
-use fmu_run::{Batch, Composition, Elements, Error, Fmu, Order, Planned, System, Watch};
+use fmu_run::{Batch, Composition, Elements, Error, Finished, Fmu, Order, Planned, System, Watch};
+use log::Log;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -55,7 +58,7 @@ type Stages = Vec<Pairs>;
 /// Messages by run.
 type Messages = Vec<(usize, String)>;
 /// Kept times; outputs; trajectories, (runs, outputs, times); names and values of statistics, (runs, outputs, statistics); errors;
-/// notes; start values; shapes and elements of whole arrays.
+/// notes; start values; shapes and elements of whole arrays; values that float64 does not have, (runs, times) by output.
 type Results<'py> = (
     Bound<'py, PyAny>,
     Vec<String>,
@@ -66,6 +69,7 @@ type Results<'py> = (
     Messages,
     Bound<'py, PyDict>,
     Option<Bound<'py, PyDict>>,
+    Bound<'py, PyDict>,
 );
 
 fn python(error: Error) -> PyErr {
@@ -206,8 +210,11 @@ impl Loaded {
         threads: Option<Bound<'py, PyAny>>,
         read_before_set: Bound<'py, PyAny>,
         progress: Option<Bound<'py, PyAny>>,
+        tolerance: Bound<'py, PyAny>,
+        log: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Results<'py>> {
-        let model = self.model()?;
+        let (model, start) = Start::configured(&*self.model()?, start.as_ref())?;
+        let log = Log::of(log.as_ref())?;
         let time = times(&time)?;
         let measures = arguments::names("measures", &measures)?;
         let outputs = arguments::names("outputs", &outputs)?;
@@ -216,7 +223,6 @@ impl Loaded {
         };
         let inputs = given("inputs", inputs.as_ref())?;
         let input_derivatives = given("input_derivatives", input_derivatives.as_ref())?;
-        let start = Start::of(&model, start.as_ref())?;
         let every = arguments::count("every", every.as_ref())?;
         arguments::callable("progress", progress.as_ref())?;
         let arrays = Arrays::of(&model, outputs.iter().map(String::as_str).chain(start.names()));
@@ -231,7 +237,7 @@ impl Loaded {
             measures: parsed.map_err(PyValueError::new_err)?,
             threads: arguments::count("threads", threads.as_ref())?,
             read_before_set: arguments::flag("read_before_set", &read_before_set)?,
-            ..Batch::default()
+            tolerance: arguments::tolerance(&tolerance)?,
         };
         let planned = model.plan(&batch).map_err(python)?;
         let size = planned.size();
@@ -250,11 +256,30 @@ impl Loaded {
         let mut measured = (!measures.is_empty()).then(|| array(size.measures)).transpose()?;
         let measured_values = measured.as_mut().map_or(&mut [][..], |(_, output)| output.values());
         let results = [kept.values(), measured_values];
-        let [errors, notes] = carry_out(py, &planned, results, progress.map(Bound::unbind))?;
+        let Finished { errors, notes, exact } =
+            carry_out(py, &planned, results, progress.map(Bound::unbind), log)?;
+        let exact = exact_outputs(py, &model, &planned, &exact)?;
         let measured = measured.map(|(array, _)| array);
         let (start, arrays) = (start.dict(py)?, arrays.dict(py)?);
-        Ok((times, outputs, trajectories, measures, measured, errors, notes, start, arrays))
+        Ok((times, outputs, trajectories, measures, measured, errors, notes, start, arrays, exact))
     }
+}
+
+/// Returns the values that float64 does not have, (runs, times) by output.
+fn exact_outputs<'py>(
+    py: Python<'py>,
+    system: &System,
+    planned: &Planned,
+    all: &[Option<fmu_run::Value>],
+) -> PyResult<Bound<'py, PyDict>> {
+    let (dict, size) = (PyDict::new(py), planned.size());
+    for (output, name) in planned.exact_outputs().enumerate() {
+        let Some(base) = exact::exact_type(system, name)? else { continue };
+        let of_run = |run: usize| &all[(run * size.exact + output) * size.kept..][..size.kept];
+        let values: Vec<_> = (0..size.runs).flat_map(of_run).cloned().collect();
+        dict.set_item(name, exact::array(py, base, &values, &[size.runs, size.kept])?)?;
+    }
+    Ok(dict)
 }
 
 /// Whole arrays among names.
@@ -319,12 +344,16 @@ fn carry_out(
     planned: &Planned,
     [trajectories, measures]: [&mut [f64]; 2],
     progress: Option<Py<PyAny>>,
-) -> PyResult<[Messages; 2]> {
+    log: Option<Log>,
+) -> PyResult<Finished> {
     let (raised, runs) = (Arc::new(Mutex::new(None)), planned.size().runs);
     let error = Arc::clone(&raised);
-    let watch = Watch::pulsing(move |watch| {
+    let log = log.map(Arc::new);
+    let receiver = log.clone();
+    let mut watch = Watch::pulsing(move |watch| {
         let reported = Python::attach(|py| {
             py.check_signals()?;
+            receiver.as_ref().map_or(Ok(()), |log| log.pass(py, watch.take_messages()))?;
             progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (watch.done(), runs)).map(drop))
         });
         if let Err(reason) = reported {
@@ -332,9 +361,13 @@ fn carry_out(
             error.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(reason);
         }
     });
+    if log.is_some() {
+        watch = watch.and_listening();
+    }
     let result = py.detach(|| planned.run(&watch, trajectories, measures));
+    let rest = log.map_or(Ok(()), |log| log.pass(py, watch.take_messages()));
     let raised = raised.lock().unwrap_or_else(PoisonError::into_inner).take();
-    raised.map_or_else(|| result.map_err(python), Err)
+    rest.and_then(|()| raised.map_or_else(|| result.map_err(python), Err))
 }
 
 /// Converts an argument to a NumPy array of float64.

@@ -2,9 +2,12 @@
 
 use crate::arguments::{in_own_unit, shape};
 use crate::buffers::Numbers;
-use fmu_run::{System, Trajectory};
+use crate::exact::{Exact, exact_type};
+use fmu_run::{System, Trajectory, Value};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::{PyString, PyTuple};
+use std::sync::Arc;
 
 /// Values of inputs.
 #[derive(Default)]
@@ -12,33 +15,70 @@ pub struct Signals(Vec<Signal>);
 
 struct Signal {
     name: String,
-    values: Numbers,
+    values: Values,
+    /// Times of the input, if it has its own.
+    times: Option<Arc<Numbers>>,
     /// Whether there is a value for each time, and whether for each run.
     by_time: bool,
     by_run: bool,
 }
 
+enum Values {
+    Numbers(Numbers),
+    Exact(Vec<Value>),
+}
+
 impl Signals {
-    /// Reads inputs, each for this number of times.
+    /// Reads inputs, each for this number of times or with its own times.
     pub fn of(system: &System, given: &[(String, Bound<'_, PyAny>)], times: usize) -> PyResult<Self> {
         let mut signals = Self::default();
         for (name, value) in given {
-            let values = Numbers::of(name, &in_own_unit(system, name, value)?)?;
+            let (own_times, value) = with_times(name, value)?;
+            let times = own_times.as_ref().map_or(times, |times| times.values().len());
+            if exact_type(system, name)?.is_some() {
+                signals.push_exact(name, Exact::of(name, &value)?, own_times, times)?;
+                continue;
+            }
+            let values = Numbers::of(name, &in_own_unit(system, name, &value)?)?;
             match system.array(name) {
-                None => signals.push(name, &[], values, &[name.clone()], times)?,
-                Some(array) => signals.push(name, &array.sizes, values, &array.names, times)?,
+                None => signals.push(name, &[], values, &[name.clone()], (own_times, times))?,
+                Some(array) => signals.push(name, &array.sizes, values, &array.names, (own_times, times))?,
             }
         }
         Ok(signals)
     }
 
+    fn push_exact(
+        &mut self,
+        name: &str,
+        given: Exact,
+        own_times: Option<Arc<Numbers>>,
+        times: usize,
+    ) -> PyResult<()> {
+        let runs = given.shape.first().copied().unwrap_or(1);
+        given.check(name, &[&[], &[times], &[runs, times]])?;
+        let (by_time, by_run) = (!given.shape.is_empty(), given.shape.len() == 2);
+        let (name, values) = (name.to_owned(), Values::Exact(given.values));
+        self.0.push(Signal { name, values, times: own_times, by_time, by_run });
+        Ok(())
+    }
+
     /// Returns the values for the Rust interface.
     pub fn trajectories(&self) -> Vec<(&str, Trajectory<'_>)> {
-        let trajectories = self.0.iter().map(|Signal { name, values, by_time, by_run }| {
-            let trajectory = match (by_time, by_run) {
-                (false, _) => Trajectory::Constant(values.values()[0]),
-                (true, false) => Trajectory::Shared(values.values()),
-                (true, true) => Trajectory::EachRun(values.values()),
+        let trajectories = self.0.iter().map(|Signal { name, values, times, by_time, by_run }| {
+            let times = times.as_ref().filter(|_| *by_time).map(|times| times.values());
+            let trajectory = match (values, by_time, by_run) {
+                (Values::Exact(values), false, _) => Trajectory::Value(&values[0]),
+                (Values::Exact(values), true, _) => match times {
+                    Some(times) => Trajectory::SampledValues { times, values },
+                    None => Trajectory::Values(values),
+                },
+                (Values::Numbers(values), false, _) => Trajectory::Constant(values.values()[0]),
+                (Values::Numbers(values), true, by_run) => match (times, by_run) {
+                    (Some(times), _) => Trajectory::Sampled { times, values: values.values() },
+                    (None, false) => Trajectory::Shared(values.values()),
+                    (None, true) => Trajectory::EachRun(values.values()),
+                },
             };
             (name.as_str(), trajectory)
         });
@@ -52,7 +92,7 @@ impl Signals {
         sizes: &[usize],
         values: Numbers,
         elements: &[String],
-        times: usize,
+        (own_times, times): (Option<Arc<Numbers>>, usize),
     ) -> PyResult<()> {
         let given = values.shape();
         let has_sizes = given.ends_with(sizes);
@@ -74,7 +114,8 @@ impl Signals {
             }
         };
         if elements.len() == 1 && sizes.is_empty() {
-            self.0.push(Signal { name: name.to_owned(), values, by_time, by_run });
+            let (name, values) = (name.to_owned(), Values::Numbers(values));
+            self.0.push(Signal { name, values, times: own_times, by_time, by_run });
             return Ok(());
         }
         let all = values.values();
@@ -83,8 +124,40 @@ impl Signals {
                 true => all.to_vec(),
                 false => all.iter().skip(number).step_by(elements.len()).copied().collect(),
             };
-            self.0.push(Signal { name: element.clone(), values: Numbers::Row(own), by_time, by_run });
+            let (name, values) = (element.clone(), Values::Numbers(Numbers::Row(own)));
+            self.0.push(Signal { name, values, times: own_times.clone(), by_time, by_run });
         }
         Ok(())
     }
+}
+
+/// Separates (times, values) or (times, values, unit) into the times and the values; other values are returned unchanged. The times
+/// are a sequence, so that a tuple of two numbers is an input for two times.
+#[allow(clippy::type_complexity, reason = "a pair")]
+fn with_times<'py>(
+    name: &str,
+    given: &Bound<'py, PyAny>,
+) -> PyResult<(Option<Arc<Numbers>>, Bound<'py, PyAny>)> {
+    let none = || Ok((None, given.clone()));
+    let Some(tuple) = given.cast::<PyTuple>().ok().filter(|tuple| matches!(tuple.len(), 2 | 3)) else {
+        return none();
+    };
+    let [times, values] = [tuple.get_item(0)?, tuple.get_item(1)?];
+    let is_sequence = |of: &Bound<'py, PyAny>| of.len().is_ok() && !of.is_instance_of::<PyString>();
+    let has_unit = tuple.len() == 3;
+    if !is_sequence(&times) || !has_unit && !is_sequence(&values) {
+        return none();
+    }
+    let times = Numbers::of(&format!("the times of {name}"), &times)?;
+    if times.shape().len() != 1 {
+        return Err(PyValueError::new_err(format!(
+            "the times of {name} have the shape {}; (times, values) has one dimension of times",
+            shape(times.shape())
+        )));
+    }
+    let values = match has_unit {
+        true => PyTuple::new(given.py(), [values, tuple.get_item(2)?])?.into_any(),
+        false => values,
+    };
+    Ok((Some(Arc::new(times)), values))
 }

@@ -2,6 +2,7 @@
 
 use crate::arguments::{in_own_unit, items, shape};
 use crate::buffers::Numbers;
+use crate::exact::{Exact, exact_type};
 use fmu_run::{Elements, System};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -22,6 +23,8 @@ enum Value {
     Each(Vec<f64>),
     Text(String),
     Texts(Vec<String>),
+    /// A string, bytes or an integer of 64 bits, for all or for each.
+    Exact(Exact),
 }
 
 impl Start {
@@ -29,14 +32,43 @@ impl Start {
     pub fn of(system: &System, given: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let mut start = Self::default();
         for (name, value) in items("start", given)? {
-            let value = in_own_unit(system, &name, &value)?;
-            match system.array(&name) {
-                None => start.values.push((name.clone(), Value::of(&name, &value)?)),
-                Some(array) => start.add_array(&name, array, &value)?,
-            }
-            start.given.push((name, value.unbind()));
+            start.add(system, name, value)?;
         }
         Ok(start)
+    }
+
+    /// Separates the structural parameters among start values, and returns the system that has them with the other start values.
+    pub fn configured(system: &System, given: Option<&Bound<'_, PyAny>>) -> PyResult<(System, Self)> {
+        let (mut structural, mut others) = (Self::default(), Vec::new());
+        for (name, value) in items("start", given)? {
+            if system.is_structural(&name) {
+                structural.add(system, name, value)?;
+            } else {
+                others.push((name, value));
+            }
+        }
+        let (system, _) = system.configured(&structural.values()).map_err(crate::python)?;
+        let mut start = Self { values: Vec::new(), ..structural };
+        others.into_iter().try_for_each(|(name, value)| start.add(&system, name, value))?;
+        Ok((system, start))
+    }
+
+    fn add(&mut self, system: &System, name: String, value: Bound<'_, PyAny>) -> PyResult<()> {
+        if system.array(&name).is_none() && exact_type(system, &name)?.is_some() {
+            let of = Exact::of(&name, &value)?;
+            let count = of.shape.first().copied().unwrap_or(1);
+            of.check(&format!("the start value of {name}"), &[&[], &[count]])?;
+            self.values.push((name.clone(), Value::Exact(of)));
+            self.given.push((name, value.unbind()));
+            return Ok(());
+        }
+        let value = in_own_unit(system, &name, &value)?;
+        match system.array(&name) {
+            None => self.values.push((name.clone(), Value::of(&name, &value)?)),
+            Some(array) => self.add_array(&name, array, &value)?,
+        }
+        self.given.push((name, value.unbind()));
+        Ok(())
     }
 
     /// Returns the values for the Rust interface.
@@ -107,6 +139,8 @@ impl Value {
             Self::Each(numbers) => fmu_run::Start::Each(numbers),
             Self::Text(text) => fmu_run::Start::Text(text),
             Self::Texts(texts) => fmu_run::Start::EachText(texts),
+            Self::Exact(of) if of.shape.is_empty() => fmu_run::Start::Value(&of.values[0]),
+            Self::Exact(of) => fmu_run::Start::EachValue(&of.values),
         }
     }
 

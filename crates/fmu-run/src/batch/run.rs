@@ -62,6 +62,12 @@ impl Watch {
         Self { listening: true, ..Self::default() }
     }
 
+    /// Receives all messages of the FMU, too. Logging is switched on.
+    #[must_use]
+    pub fn and_listening(self) -> Self {
+        Self { listening: true, ..self }
+    }
+
     /// Removes and returns the messages so far.
     pub fn take_messages(&self) -> Vec<Logged> {
         self.feed.get().map(|feed| feed.take()).unwrap_or_default()

@@ -12,17 +12,19 @@ use std::sync::Arc;
 type Given<'s, 'a> = Vec<(&'s str, Start<'a>)>;
 
 impl System {
+    /// Returns whether a variable is a structural parameter, which determines the sizes of arrays.
+    pub fn is_structural(&self, name: &str) -> bool {
+        self.find(name).is_ok_and(|found| found.iter().any(|found| found.variable.is_structural()))
+    }
+
     /// Returns the system with the values of structural parameters among the start values, and the other start values. Arrays then
-    /// have other sizes, so that the system has other variables.
-    pub(crate) fn configured<'s, 'a>(
-        &self,
-        start: &[(&'s str, Start<'a>)],
-    ) -> Result<(Self, Given<'s, 'a>), Error> {
-        let is_structural = |name: &str| {
-            self.find(name).is_ok_and(|found| found.iter().any(|found| found.variable.is_structural()))
-        };
+    /// have other sizes, so that the system has other variables. [`run`](Self::run) and [`instances`](Self::instances) do this, too.
+    ///
+    /// # Errors
+    /// Returns [`Error::Request`] if a structural parameter has different values for several runs or instances.
+    pub fn configured<'s, 'a>(&self, start: &[(&'s str, Start<'a>)]) -> Result<(Self, Given<'s, 'a>), Error> {
         let (structural, others): (Vec<_>, Vec<_>) =
-            start.iter().copied().partition(|(name, _)| is_structural(name));
+            start.iter().copied().partition(|(name, _)| self.is_structural(name));
         if structural.is_empty() {
             return Ok((self.clone(), others));
         }

@@ -12,6 +12,7 @@ use crate::found::Found;
 use crate::kept::Kept;
 use crate::messages::Feed;
 use crate::selection::Selection;
+use crate::start::is_exact;
 pub use elements::Elements;
 use fmi_abi::description::Offer;
 use fmi_abi::{BaseType, Interface};
@@ -169,6 +170,18 @@ impl System {
             elements::arrays(names.iter().map(String::as_str))
         });
         all.get(name)
+    }
+
+    /// Returns the type of a variable if it has values that `f64` does not have: String, Binary, Int64 and UInt64. `None` for other
+    /// variables and for the names of arrays.
+    ///
+    /// # Errors
+    /// Returns [`Error::Request`] if the name is unknown.
+    pub fn exact_type(&self, name: &str) -> Result<Option<BaseType>, Error> {
+        if self.array(name).is_some() {
+            return Ok(None);
+        }
+        Ok(Some(self.find_first(name)?.variable.base).filter(|base| is_exact(*base)))
     }
 
     /// Returns the conversion between the unit of a variable and another unit, as factor and offset: value in

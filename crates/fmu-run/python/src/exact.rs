@@ -1,0 +1,140 @@
+//! Values that float64 does not have: strings, bytes and integers of 64 bits.
+
+use crate::arguments::{shape, wrong};
+use fmu_run::{BaseType, System, Value};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyByteArray, PyBytes, PyFloat, PyInt, PyList, PyString, PyTuple};
+
+/// Values of a variable, with the lengths of the sequences around them: none for a single value.
+#[derive(Debug)]
+pub struct Exact {
+    pub values: Vec<Value>,
+    pub shape: Vec<usize>,
+}
+
+/// Returns the type of a variable, if it has values that float64 does not have.
+pub fn exact_type(system: &System, name: &str) -> PyResult<Option<BaseType>> {
+    system.exact_type(name).map_err(crate::python)
+}
+
+impl Exact {
+    /// Reads a value or nested sequences of values.
+    pub fn of(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let mut found = Self { values: Vec::new(), shape: Vec::new() };
+        found.add(name, given, 0)?;
+        Ok(found)
+    }
+
+    /// Fails unless the values have one of these shapes.
+    pub fn check(&self, name: &str, shapes: &[&[usize]]) -> PyResult<()> {
+        if shapes.contains(&&*self.shape) {
+            return Ok(());
+        }
+        let known = shapes.iter().map(|sizes| match sizes {
+            [] => "one value".to_owned(),
+            sizes => shape(sizes),
+        });
+        let known = known.collect::<Vec<_>>().join(" or ");
+        Err(PyValueError::new_err(format!("{name} has the shape {}; it must be {known}", shape(&self.shape))))
+    }
+
+    fn add(&mut self, name: &str, given: &Bound<'_, PyAny>, depth: usize) -> PyResult<()> {
+        if let Some(value) = value_of(given) {
+            if depth != self.shape.len() && !self.values.is_empty() {
+                return Err(ragged(name));
+            }
+            self.values.push(value?);
+            return Ok(());
+        }
+        // Arrays of NumPy.
+        let list = given.call_method0("tolist").unwrap_or_else(|_| given.clone());
+        if let Some(value) = value_of(&list) {
+            self.values.push(value?);
+            return Ok(());
+        }
+        if !list.is_instance_of::<PyList>() && !list.is_instance_of::<PyTuple>() {
+            return Err(wrong(name, "a string, bytes, an integer or a sequence of them", given));
+        }
+        let length = list.len()?;
+        match self.shape.get(depth) {
+            None if self.values.is_empty() => self.shape.push(length),
+            Some(known) if *known == length => {}
+            _ => return Err(ragged(name)),
+        }
+        list.try_iter()?.try_for_each(|one| self.add(name, &one?, depth + 1))
+    }
+}
+
+fn ragged(name: &str) -> PyErr {
+    PyValueError::new_err(format!("{name}: the sequences have different lengths"))
+}
+
+/// Returns a single value; `None` for anything else.
+fn value_of(given: &Bound<'_, PyAny>) -> Option<PyResult<Value>> {
+    if given.is_instance_of::<PyBool>() {
+        return Some(given.extract().map(Value::Boolean));
+    }
+    if given.is_instance_of::<PyInt>() {
+        return Some(integer(given));
+    }
+    if given.is_instance_of::<PyFloat>() {
+        return Some(given.extract().map(Value::Real));
+    }
+    if given.is_instance_of::<PyString>() {
+        return Some(given.extract().map(Value::String));
+    }
+    if given.is_instance_of::<PyBytes>() || given.is_instance_of::<PyByteArray>() {
+        return Some(given.extract().map(Value::Binary));
+    }
+    None
+}
+
+/// Returns an integer; one that no type has is rejected with the others that the variable cannot have.
+fn integer(given: &Bound<'_, PyAny>) -> PyResult<Value> {
+    let small = given.extract::<i64>().map(i128::from);
+    let large = || given.extract::<u64>().map(i128::from);
+    match small.or_else(|_| large()) {
+        Ok(integer) => Ok(Value::Integer(integer)),
+        Err(_) => Ok(Value::Integer(if given.lt(0)? { i128::MIN } else { i128::MAX })),
+    }
+}
+
+/// Returns a value as a Python object; None if there is none.
+fn object<'py>(py: Python<'py>, value: Option<&Value>) -> PyResult<Bound<'py, PyAny>> {
+    Ok(match value {
+        None => py.None().into_bound(py),
+        Some(Value::Real(number)) => number.into_pyobject(py)?.into_any(),
+        Some(Value::Boolean(boolean)) => boolean.into_pyobject(py)?.to_owned().into_any(),
+        Some(Value::String(text)) => text.into_pyobject(py)?.into_any(),
+        Some(Value::Binary(bytes)) => PyBytes::new(py, bytes).into_any(),
+        Some(Value::Integer(number)) => match (i64::try_from(*number), u64::try_from(*number)) {
+            (Ok(number), _) => number.into_pyobject(py)?.into_any(),
+            (_, Ok(number)) => number.into_pyobject(py)?.into_any(),
+            _ => number.to_string().into_pyobject(py)?.into_any(),
+        },
+    })
+}
+
+/// Returns a NumPy array of this shape: of int64 or uint64 if the type has integers and all exist, otherwise of objects, with None
+/// where there is no value.
+pub fn array<'py>(
+    py: Python<'py>,
+    base: BaseType,
+    values: &[Option<Value>],
+    shape: &[usize],
+) -> PyResult<Bound<'py, PyAny>> {
+    let kind = match base {
+        BaseType::Int64 if values.iter().all(Option::is_some) => "int64",
+        BaseType::UInt64 if values.iter().all(Option::is_some) => "uint64",
+        _ => "object",
+    };
+    let objects = values.iter().map(|value| object(py, value.as_ref())).collect::<PyResult<Vec<_>>>()?;
+    let numpy = py.import("numpy")?;
+    // NumPy would take strings and bytes for sequences of fixed length.
+    let array = numpy.call_method1("empty", (objects.len(), kind))?;
+    for (index, object) in objects.into_iter().enumerate() {
+        array.set_item(index, object)?;
+    }
+    array.call_method1("reshape", (PyTuple::new(py, shape)?,))
+}

@@ -1,0 +1,36 @@
+"""Packs the FMUs in C with the manners of other producers, which crates/fmu-run/tests/foreign/foreign.c names."""
+
+from __future__ import annotations
+
+import functools
+import subprocess
+import tempfile
+import zipfile
+from pathlib import Path
+
+import fmpy
+
+SOURCE = Path(__file__).parents[2] / "crates" / "fmu-run" / "tests" / "foreign"
+
+
+@functools.cache
+def library() -> bytes:
+    """The library, compiled once."""
+    headers = Path(fmpy.__file__).parent / "c-code"
+    with tempfile.TemporaryDirectory() as folder:
+        to = Path(folder) / "foreign.so"
+        flags = ["-std=gnu99", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", "-I", headers]
+        subprocess.run(["cc", *flags, SOURCE / "foreign.c", "-o", to], check=True)
+        return to.read_bytes()
+
+
+def foreign(folder: Path, manner: str, version: str = "2.0") -> Path:
+    """Returns the FMU with this manner, for this FMI version."""
+    fmu = folder / f"{manner}{version[0]}.fmu"
+    platform = "linux64" if version == "2.0" else "x86_64-linux"
+    with zipfile.ZipFile(fmu, "w") as archive:
+        description = (SOURCE / f"foreign{version[0]}.xml").read_text(encoding="utf-8")
+        archive.writestr("modelDescription.xml", description.replace("MANNER", manner))
+        archive.writestr(f"binaries/{platform}/foreign.so", library())
+        archive.writestr("resources/gain.txt", "2.5")
+    return fmu

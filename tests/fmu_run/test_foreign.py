@@ -1,0 +1,250 @@
+"""FMUs with the manners of other producers: messages, values of all types, inputs with their own times. The Rust tests of the crate
+cover the manners one by one."""
+
+from __future__ import annotations
+
+import gc
+import logging
+import platform
+import re
+import subprocess
+import sys
+
+import fmu_run
+import numpy as np
+import pytest
+from foreign import foreign
+
+if platform.machine() != "x86_64" or platform.system() != "Linux":
+    pytest.skip("the FMUs are built for Linux on x86_64", allow_module_level=True)
+
+TIME = np.arange(11) / 10
+VERSIONS = ["2.0", "3.0"]
+
+
+@pytest.fixture(params=VERSIONS)
+def made(request, tmp_path):
+    """Opens FMUs of both versions."""
+    opened = []
+
+    def make(manner, version=request.param):
+        opened.append(fmu_run.Fmu(foreign(tmp_path, manner, version)))
+        return opened[-1]
+
+    yield make
+    for fmu in opened:
+        fmu.close()
+
+
+@pytest.mark.parametrize(
+    "manner",
+    ["memory", "unchecked_memory", "null_environment", "freed_environment", "other_thread", "free", "percent", "libm"],
+)
+def test_manners(made, manner):
+    runs = made(manner).run(TIME, inputs={"u": 1.0}, outputs=["y"], start={"gain": [0.0, 1.0]}).check()
+    np.testing.assert_allclose(runs["y"][:, -1], [1.0, 2.0])
+    del runs
+    gc.collect()
+
+
+def test_the_reason_of_an_fmu_with_another_environment(made):
+    with pytest.raises(fmu_run.FmuError, match=r"^at 0\.5 s: .*the stranger gives up$"):
+        made("other_environment").run(TIME, outputs=["y"]).check()
+
+
+def test_tolerance(made):
+    fmu = made("tolerance")
+    for tolerance, error in (("default", 1e-5), (1e-3, 1e-3), (None, 1e-2)):
+        runs = fmu.run(TIME, inputs={"u": 1.0}, outputs=["y", "tolerance", "stop"], tolerance=tolerance)
+        assert runs["y"][0, -1] == pytest.approx(1 + error, abs=1e-12) and runs["stop"][0, 0] == 1.0
+        assert fmu.instances(tolerance=tolerance).get("tolerance")[0] == (-1.0 if tolerance is None else error)
+    for wrong in (0.0, -1e-3, np.inf, "tight", True):
+        with pytest.raises(ValueError, match="tolerance"):
+            fmu.run(TIME, outputs=["y"], tolerance=wrong)
+
+
+def test_a_function_receives_messages(made):
+    fmu, heard = made("chatty"), []
+    runs = fmu.run(TIME, outputs=["y"], start={"gain": [1.0, 2.0]}, log=lambda *message: heard.append(message))
+    assert runs.ok.all()
+    assert sorted(heard) == [(run, "OK", "step", "a step") for run in (0, 1) for _ in range(10)]
+    heard.clear()
+    model = fmu.instances(3, log=lambda *message: heard.append(message))
+    assert heard == []
+    model.step(0.1, mask=[True, False, True])
+    assert sorted(heard) == [(0, "OK", "step", "a step"), (2, "OK", "step", "a step")]
+    greetings = []
+    stranger = made("null_environment").instances(2, log=lambda *message: greetings.append(message))
+    assert {message[1:] for message in greetings} == {("Warning", "greeting", "my environment is not yours")}
+    # It may use the instances, and its exceptions reach the caller.
+    times = []
+    made("chatty").instances(log=lambda *_: times.append(stranger.time[0])).step(0.5)
+    assert times == [0.0]
+
+    def fail(*message):
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        fmu.run(TIME, outputs=["y"], log=fail)
+    with pytest.raises(RuntimeError, match="enough"):
+        fmu.instances(log=fail).step(0.1)
+
+
+def test_a_logger_receives_messages(made, caplog):
+    caplog.set_level(logging.DEBUG)
+    assert made("discard").run(TIME, outputs=["y"], log=logging.getLogger("fmu")).errors
+    (record,) = caplog.records
+    assert (record.name, record.levelname) == ("fmu", "WARNING")
+    assert record.getMessage() == "instance 0, error: the step is too large"
+    with pytest.raises(ValueError, match="log must be a function or a logging.Logger"):
+        made("plain").run(TIME, outputs=["y"], log="messages.txt")
+
+
+def test_messages_of_an_fmu_that_makes_no_instance(made):
+    heard = []
+    with pytest.raises(fmu_run.FmuError, match="the stop time is missing"):
+        made("stop_time").instances(log=lambda *message: heard.append(message))
+    assert heard == [(0, "Error", "error", "the stop time is missing")]
+
+
+def test_values_of_formats(made):
+    heard = []
+    made("format", "2.0").instances(log=lambda *message: heard.append(message[3]))
+    assert heard == ["tank has 7 of 8, 0.500 and 1.0e-09, ab  |%|z"]
+
+
+def test_exact_values(made, tmp_path):
+    fmu = made("plain", "3.0")
+    wide, natural = [2**53 + 1, -(2**63)], 2**64 - 1
+    runs = fmu.run(
+        TIME[:3],
+        inputs={"label": ["a", "", "ä"], "bytes": (([0.0, 0.15]), [b"\0\1", b""])},
+        start={"wide": wide, "natural": natural},
+        outputs=["echo", "bytes_out", "wide_out", "natural", "y"],
+    )
+    assert runs["echo"].tolist() == [["a", "", "ä"]] * 2
+    assert runs["bytes_out"].tolist() == [[b"\0\1", b"\0\1", b""]] * 2
+    assert runs["wide_out"].dtype == np.int64 and runs["wide_out"].tolist() == [[value] * 3 for value in wide]
+    assert runs["natural"].dtype == np.uint64 and (runs["natural"] == np.uint64(natural)).all()
+    assert list(runs) == ["echo", "bytes_out", "wide_out", "natural", "y"]
+    assert runs.start["wide"].tolist() == wide
+    one = fmu.run(TIME, inputs={"wide": np.arange(11) + 2**60}, outputs=["wide_out"])
+    assert one["wide_out"][0].tolist() == [2**60 + k for k in range(11)]
+    two = fmu.instances(2, start={"wide": wide, "bytes": b"x\0", "label": ["one", "two"]})
+    assert two.get("wide_out").tolist() == wide and two.get("bytes_out").tolist() == [b"x\0"] * 2
+    two.set("wide", [2**62 + 1, 7])
+    two.set("label", "both", mask=[True, False])
+    assert two.get("wide_out").tolist() == [2**62 + 1, 7] and two.get("echo").tolist() == ["both", "two"]
+    assert two.texts("echo") == ["both", "two"]
+    for name, value, why in [
+        ("wide", 2**63, "wide is an integer from -9223372036854775808 to 9223372036854775807 and cannot be"),
+        ("wide", 1.5, "its value cannot be 1.5"),
+        ("wide", 1e17, "may not be the one that is meant"),
+        ("natural", -1, "cannot be -1"),
+        ("label", 3, "label is a string, its value cannot be 3"),
+        ("bytes", "text", "bytes is binary"),
+        ("label", ["a", "b", "c"], "the shape (3,); it must be one value or (2,)"),
+    ]:
+        for call in (lambda name=name, value=value: two.set(name, value),):
+            with pytest.raises(ValueError, match=re.escape(why)):
+                call()
+        if not isinstance(value, list):
+            with pytest.raises(ValueError, match=re.escape(why)):
+                fmu.run(TIME, outputs=["y"], start={name: value})
+    # A failed run has no values: objects instead of integers.
+    failed = made("discard", "3.0").run(TIME, start={"wide": wide[0]}, outputs=["wide_out", "echo"])
+    assert failed.errors and failed["wide_out"][0].tolist() == [wide[0]] * 6 + [None] * 5
+    assert failed["echo"][0].tolist() == ["none"] * 6 + [None] * 5
+    runs.to_pandas()
+
+
+def test_inputs_with_their_own_times(made):
+    fmu = made("plain")
+    runs = fmu.run(
+        TIME,
+        inputs={
+            "u": ([0.0, 0.5, 0.5, 1.0], [[0.0, 1.0, 3.0, 3.0], [5.0] * 4]),
+            "valve": (np.array([0.0, 0.3]), [1, 4]),
+        },
+        outputs=["u", "valve"],
+    )
+    np.testing.assert_allclose(runs["u"], [[0, 0.2, 0.4, 0.6, 0.8, 3, 3, 3, 3, 3, 3], [5] * 11])
+    np.testing.assert_array_equal(runs["valve"], [[1, 1, 1, 4, 4, 4, 4, 4, 4, 4, 4]] * 2)
+    # A tuple of numbers is an input for each time, a list of rows an input for each run.
+    two = fmu.run(TIME[:2], inputs={"u": (1.0, 2.0)}, outputs=["u"])
+    assert two["u"].tolist() == [[1.0, 2.0]]
+    assert fmu.run(TIME[:2], inputs={"u": [[1.0, 2.0], [3.0, 4.0]]}, outputs=["u"])["u"].tolist() == [[1, 2], [3, 4]]
+    for value, why in [
+        (([0.0, 1.0], [1.0, 2.0, 3.0]), "u has the shape (3,); it must be (2,), (runs, 2), or a number"),
+        (([1.0, 0.0], [1.0, 2.0]), "the times of u decrease: 0 follows 1"),
+        (([0.0, np.nan], [1.0, 2.0]), "times must be finite"),
+        (([[0.0], [1.0]], [1.0, 2.0]), "the times of u have the shape (2, 1)"),
+        (([0.0, 1.0], [1.0, 2.0], "deg"), "u has no unit"),
+    ]:
+        with pytest.raises(ValueError, match=re.escape(why)):
+            fmu.run(TIME, inputs={"u": value}, outputs=["u"])
+
+
+def test_structural_parameters(made):
+    fmu = made("plain", "3.0")
+    runs = fmu.run(TIME, start={"size": 5, "vector": np.arange(5.0)}, outputs=["vector", "sum"])
+    assert runs["vector"].shape == (1, 11, 5) and (runs["sum"] == 10).all()
+    assert fmu.run(TIME, start={"size": 2}, outputs=["sum"])["sum"][0, 0] == 3.0
+    model = fmu.instances(2, start={"size": 4})
+    assert model.get("vector").tolist() == [[1.0, 2.0, 3.0, 4.0]] * 2
+    model.reset()
+    assert model.get("sum").tolist() == [10.0, 10.0]
+    for start in ({"size": [2, 3]}, {"size": 2, "vector": [1.0, 2.0, 3.0]}):
+        with pytest.raises(ValueError):
+            fmu.run(TIME, start=start, outputs=["sum"])
+    with pytest.raises(ValueError, match="size is a structural parameter"):
+        model.reset(start={"size": 3})
+
+
+def test_states_after_a_reset(made):
+    model = made("no_reset").instances()
+    before = model.save()
+    model.reset()
+    with pytest.raises(ValueError, match="the state was saved before a reset that made a new instance"):
+        model.restore(before)
+    assert not model.errors
+    later = model.save()
+    del before
+    model.restore(later)
+
+
+@pytest.mark.parametrize("manner", ["huge_state", "endless_state"])
+def test_absurd_sizes_of_states(made, manner):
+    model = made(manner).instances()
+    with pytest.raises(fmu_run.FmuError, match="for which there is not enough memory"):
+        model.serialize(model.save())
+
+
+CRASH = """
+import sys, fmu_run
+for path in sys.argv[1:]:
+    with fmu_run.Fmu(path) as fmu:
+        many = fmu.instances(4, threads=2)
+        for _ in range(3):
+            many.step(0.1)
+        fmu.run([0.0, 0.1, 0.2], start={"gain": [0.0, 1.0, 2.0]}, outputs=["y"])
+        del many
+print("alive")
+"""
+
+
+def test_python_survives(tmp_path):
+    """None of the manners ends the process, also while instances are freed and the library is unloaded."""
+    manners = [
+        "unchecked_memory",
+        "other_environment",
+        "freed_environment",
+        "thread",
+        "other_thread",
+        "free",
+        "percent",
+        "rounding",
+    ]
+    paths = [foreign(tmp_path, manner, version) for manner in manners for version in VERSIONS]
+    done = subprocess.run([sys.executable, "-c", CRASH, *paths], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "alive\n"), done.stderr
