@@ -33,12 +33,12 @@ def fmu(testbed):
         ({"outputs": ["Roll_Rate"]}, 'has no variable "Roll_Rate"; did you mean "roll_rate"?'),
         ({"inputs": {"theta1": np.zeros(4)}}, "theta1 has the shape (4,); it must be (11,), (runs, 11) or a number"),
         ({"inputs": {"theta1": np.zeros((2, 2, 11))}}, "theta1 has the shape (2, 2, 11)"),
-        ({"inputs": {"theta1": ["a"] * 11}}, "theta1: the values are no numbers"),
+        ({"inputs": {"theta1": ["a"] * 11}}, "theta1: the values are not numbers"),
         ({"inputs": {"k1": TIME}}, "k1 is no input but a fixed parameter; give it a start value"),
         ({"inputs": {"roll": TIME}}, "roll is no input but a continuous output"),
         (
             {"start": {"k1": [[1.0]]}},
-            "the start value of k1 has the shape [1, 1]; it must be a number, or an array with one for each",
+            "the start value of k1 has the shape (1, 1); it must be one number for all, or (n,) with one value for each",
         ),
         ({"start": {"k1": "stiff"}}, 'k1 is a number, its start value cannot be "stiff"'),
         ({"start": {"M": 2.5}}, "M is an integer from -2147483648 to 2147483647 and cannot be 2.5"),
@@ -264,9 +264,9 @@ def test_other_types(unruly):
             ),
             (lambda: one.set("count", 2.5), "count is an integer from .* and cannot be 2.5"),
             (lambda: one.set(["slope", "flag"], [1.0, 2.0]), "flag is a Boolean and cannot be 2"),
-            (lambda: one.set("slope", None), "None is no number"),
-            (lambda: fmu.run(TIME, outputs=["y"], inputs={"slope": None}), "slope: None is no number"),
-            (lambda: fmu.run(TIME, outputs=["y"], start={"slope": None}), "slope: None is no number"),
+            (lambda: one.set("slope", None), "None is not a number"),
+            (lambda: fmu.run(TIME, outputs=["y"], inputs={"slope": None}), "slope: None is not a number"),
+            (lambda: fmu.run(TIME, outputs=["y"], start={"slope": None}), "slope: None is not a number"),
         ]:
             with pytest.raises(ValueError, match=message):
                 call()

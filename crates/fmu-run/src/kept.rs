@@ -2,15 +2,15 @@
 //!
 //! An instance that was reset should behave like a new one (fmi2Reset, section 2.1.6 of FMI 2.0), but in many
 //! FMUs something survives: a parameter, a state, or a value calculated from a parameter. A run must not
-//! depend on earlier runs, so an instance is used again only after a check: the same run in a reset instance and
-//! in a new one gives the same bits. [`Trust`] records the variables whose values differed before the reset.
+//! depend on earlier runs, so an instance is used again only if a new one takes long, and only after checks: the same run in a reset
+//! instance and in a new one gives the same bits. [`Trust`] counts the checks for each variable whose value differed before the reset.
 
 use crate::error::Error;
 use crate::instance::{Instance, Tolerance};
 use crate::selection::Target;
 use crate::threads::Threads;
 use fmi_abi::Value;
-use std::collections::HashSet;
+use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -82,8 +82,8 @@ pub(crate) struct Given {
     pub experiment: ([u64; 2], Tolerance),
     pub numbers: Vec<(Target, u64)>,
     pub values: Vec<(Target, Value)>,
-    /// Variables that are set at each time.
-    pub inputs: Arc<[Target]>,
+    /// Variables that are set at each time, and a hash of their values.
+    pub inputs: (Arc<[Target]>, u64),
 }
 
 /// A difference between successive runs of an instance, which the reset has to remove.
@@ -93,7 +93,9 @@ pub(crate) enum Change {
     Steps,
     /// Start time, stop time or tolerance differ.
     Experiment,
-    /// The value of a variable differs.
+    /// Values of inputs during the run differ.
+    Inputs,
+    /// The start value of a variable differs.
     Value(Target),
     /// A variable was set, and is not set in the next run.
     Unset(Target),
@@ -108,12 +110,16 @@ impl Given {
         }
         add(&mut changes, &self.numbers, &next.numbers, next);
         add(&mut changes, &self.values, &next.values, next);
-        changes.extend(self.inputs.iter().filter(|target| !next.sets(**target)).copied().map(Change::Unset));
+        if self.inputs != next.inputs {
+            changes.push(Change::Inputs);
+        }
+        changes
+            .extend(self.inputs.0.iter().filter(|target| !next.sets(**target)).copied().map(Change::Unset));
         changes
     }
 
     fn sets(&self, target: Target) -> bool {
-        self.inputs.contains(&target)
+        self.inputs.0.contains(&target)
             || self.numbers.iter().any(|(other, _)| *other == target)
             || self.values.iter().any(|(other, _)| *other == target)
     }
@@ -141,25 +147,40 @@ fn add<T: PartialEq>(changes: &mut Vec<Change>, now: &[(Target, T)], next: &[(Ta
 pub(crate) struct Trust {
     /// Whether a reset failed, or left something of the earlier run.
     forgets: bool,
-    /// Changes after which a reset instance behaved like a new one.
-    proven: HashSet<Change>,
+    /// Number of checks by change in which a reset instance behaved like a new one.
+    proofs: HashMap<Change, u32>,
+    /// Shortest time that a new instance took.
+    fastest: Option<Duration>,
     /// Time spent on new instances and on checks.
     creating: Duration,
     checking: Duration,
 }
 
 impl Trust {
-    pub fn proves(&self, changes: impl IntoIterator<Item = Change>) -> bool {
-        !self.forgets && changes.into_iter().all(|change| self.proven.contains(&change))
+    /// Time below which a new instance is made for each run, because no check can prove that a reset forgets nothing.
+    const LONG: Duration = Duration::from_micros(50);
+    /// Number of checks in which a change has to occur. The values of one run may hide what a reset forgets.
+    const PROOFS: u32 = 3;
+
+    /// Returns whether an instance is worth keeping.
+    pub fn may_keep(&self) -> bool {
+        !self.forgets && self.fastest.is_some_and(|fastest| fastest >= Self::LONG)
     }
 
-    /// Returns whether a check, which takes as long as a run, is worthwhile. So at most as much time is spent on checks as on new instances.
+    pub fn proves(&self, changes: impl IntoIterator<Item = Change>) -> bool {
+        let is_proven = |change| self.proofs.get(&change).is_some_and(|proofs| *proofs >= Self::PROOFS);
+        self.may_keep() && changes.into_iter().all(is_proven)
+    }
+
+    /// Returns whether a check, which takes as long as a run, is worthwhile. So at most as much time is spent on checks as on new
+    /// instances.
     pub fn is_check_due(&self, run: Duration) -> bool {
-        !self.forgets && self.creating >= self.checking + run
+        self.may_keep() && self.creating >= self.checking + run
     }
 
     pub fn created(&mut self, took: Duration) {
         self.creating += took;
+        self.fastest = Some(self.fastest.map_or(took, |fastest| fastest.min(took)));
     }
 
     pub fn checked(&mut self, took: Duration) {
@@ -167,7 +188,7 @@ impl Trust {
     }
 
     pub fn prove(&mut self, changes: impl IntoIterator<Item = Change>) {
-        self.proven.extend(changes);
+        changes.into_iter().for_each(|change| *self.proofs.entry(change).or_default() += 1);
     }
 
     /// Records that the FMU cannot be reset properly. From then on, each run has a new instance.

@@ -3,7 +3,7 @@
 use crate::instance::{Experiment, Instance};
 use crate::messages::Logging;
 use crate::selection::{Selection, Target};
-use crate::start::StartValues;
+use crate::start::{StartValues, is_exact};
 use crate::system::{Exchange, Order, System};
 use fmi_abi::{BaseType, Interface, Value};
 use fmi_client::Rejection;
@@ -14,6 +14,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub(crate) struct Saved {
     generation: u64,
     state: fmi_client::Saved,
+}
+
+/// Values of all variables at one time.
+#[derive(Debug, Default, PartialEq)]
+pub(crate) struct Observed {
+    bits: Vec<u64>,
+    values: Vec<Value>,
 }
 
 /// One instance of each component; each function acts on all of them. A single FMU is a system with one
@@ -81,26 +88,26 @@ impl Running {
         Some(self)
     }
 
-    /// Reads all numbers, by their bits; `None` for numbers that an FMU does not return.
-    pub fn observe(&mut self) -> Vec<Option<u64>> {
-        let mut seen = Vec::new();
+    /// Reads all values except bytes. If an FMU returns an error, it may not be usable any more.
+    pub fn observe(&mut self) -> Result<Observed, Rejection> {
+        let mut seen = Observed::default();
         for (instance, component) in self.components.iter_mut().zip(self.system.components()) {
-            for base in BaseType::ALL {
-                if matches!(base, BaseType::String | BaseType::Binary) {
-                    continue;
-                }
-                let variables = &component.fmu.description.variables;
-                let references: Vec<_> =
-                    variables.iter().filter(|of| of.base == base).map(|of| of.reference).collect();
+            for base in BaseType::ALL.into_iter().filter(|base| *base != BaseType::Binary) {
+                let of_base = component.fmu.description.variables.iter().filter(|of| of.base == base);
+                let references: Vec<_> = of_base.map(|of| of.reference).collect();
                 if references.is_empty() {
                     continue;
                 }
-                let mut values = vec![0.0; references.len()];
-                let is_read = instance.get_numbers(base, &references, &mut values).is_ok();
-                seen.extend(values.iter().map(|value| is_read.then_some(value.to_bits())));
+                if is_exact(base) {
+                    seen.values.extend(instance.get_values(base, &references)?);
+                    continue;
+                }
+                let mut numbers = vec![0.0; references.len()];
+                instance.get_numbers(base, &references, &mut numbers)?;
+                seen.bits.extend(numbers.iter().map(|number| number.to_bits()));
             }
         }
-        seen
+        Ok(seen)
     }
 
     /// Sets start values and enters Initialization Mode, in an order that both FMI versions allow.

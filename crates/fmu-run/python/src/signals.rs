@@ -106,9 +106,9 @@ impl Signals {
                 of_time.extend(sizes.iter().map(usize::to_string));
                 let of_time = of_time.join(", ");
                 let comma = if sizes.is_empty() { "," } else { "" };
-                let constant = if sizes.is_empty() { String::new() } else { format!("{}, ", shape(sizes)) };
+                let constant = if sizes.is_empty() { String::new() } else { format!(", {}", shape(sizes)) };
                 return Err(PyValueError::new_err(format!(
-                    "{name} has the shape {}; it must be ({of_time}{comma}), (runs, {of_time}), {constant}or a number",
+                    "{name} has the shape {}; it must be ({of_time}{comma}), (runs, {of_time}){constant} or a number",
                     shape(given)
                 )));
             }

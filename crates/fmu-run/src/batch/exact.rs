@@ -9,6 +9,7 @@ use crate::selection::Target;
 use crate::start::exact;
 use fmi_abi::Value;
 use fmi_client::Rejection;
+use std::hash::{Hash, Hasher};
 
 /// An input of a run, held between the times at which it changes.
 pub(super) struct Input {
@@ -66,6 +67,11 @@ impl Input {
         }
         let index = self.indices.as_ref().map_or(time, |indices| indices[time]);
         &self.values[if self.is_each { run * self.length } else { 0 } + index]
+    }
+
+    /// Adds the values of a run to a hash.
+    pub fn hash(&self, run: usize, times: usize, hash: &mut impl Hasher) {
+        (0..times).for_each(|time| self.value(run, time).to_string().hash(hash));
     }
 
     /// Sets the value at the time with this index, if it differs from the one before.

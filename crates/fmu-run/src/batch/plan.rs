@@ -10,6 +10,7 @@ use crate::selection::{Selection, Target, fits};
 use crate::start::{Start, StartValues, is_exact};
 use crate::system::System;
 use fmi_abi::{BaseType, Interface};
+use std::hash::{DefaultHasher, Hasher};
 use std::sync::Arc;
 
 /// A checked batch.
@@ -130,6 +131,27 @@ impl<'a> Plan<'a> {
         let exact = self.exact_inputs.iter().flat_map(|input| input.targets()).copied();
         self.set_in_steps = self.inputs.variables.targets().chain(derivatives).chain(exact).collect();
         Ok(())
+    }
+
+    /// Returns a hash of the values of all inputs in a run.
+    pub fn hash_of_inputs(&self, run: usize) -> u64 {
+        let mut hash = DefaultHasher::new();
+        let times = self.time.len();
+        for numbers in self.inputs.values.iter().chain(&self.derivatives.values) {
+            let of_run = |values: &'a [f64], length| &values[run * length..][..length];
+            let values = match numbers {
+                Numbers::Constant(value) => std::slice::from_ref(value),
+                Numbers::Shared(values) => values,
+                Numbers::EachRun(values) => of_run(values, times),
+                Numbers::Sampled { values, is_each: false, .. } => values,
+                Numbers::Sampled { grid, values, .. } => of_run(values, grid.length),
+            };
+            values.iter().for_each(|value| hash.write_u64(value.to_bits()));
+        }
+        for input in &self.exact_inputs {
+            input.hash(run, times, &mut hash);
+        }
+        hash.finish()
     }
 
     /// Checks the values of an input.

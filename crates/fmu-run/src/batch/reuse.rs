@@ -2,7 +2,7 @@
 
 use super::run::{Failure, Worker};
 use crate::kept::{Change, Given, Idle};
-use crate::running::Running;
+use crate::running::{Observed, Running};
 use fmi_abi::Interface;
 use std::time::{Duration, Instant};
 
@@ -39,8 +39,10 @@ pub(super) struct Reuse {
     is_trusted: bool,
     /// Whether a run is only a check of the reset, which the caller does not observe.
     is_check: bool,
-    /// All numbers at the end of a run, if they are compared.
-    seen: Option<Vec<Option<u64>>>,
+    /// Whether all values at the end of a run are compared.
+    compares: bool,
+    /// These values; `None` if they cannot be read.
+    seen: Option<Observed>,
 }
 
 impl Reuse {
@@ -48,11 +50,12 @@ impl Reuse {
         self.is_check
     }
 
-    /// Records all numbers of an instance, if they are compared.
-    pub fn observe(&mut self, instance: &mut Running) {
-        if let Some(seen) = &mut self.seen {
-            *seen = instance.observe();
+    /// Records all values of an instance, if they are compared. Returns whether the instance is usable.
+    pub fn observe(&mut self, instance: &mut Running) -> bool {
+        if self.compares {
+            self.seen = instance.observe().ok();
         }
+        !self.compares || self.seen.is_some()
     }
 }
 
@@ -71,7 +74,7 @@ impl Worker<'_> {
     /// Keeps the instance for a later batch.
     pub fn finish(mut self) {
         let Some(Used { instance, origin, took }) = self.reuse.used.take() else { return };
-        if self.is_logging() || !self.system.may_be_idle(Interface::CoSimulation) {
+        if !self.system.may_be_idle(Interface::CoSimulation) {
             return;
         }
         let given = self.given_in(origin);
@@ -81,7 +84,7 @@ impl Worker<'_> {
     /// Keeps the instance of a complete run for the next run.
     pub fn keep(&mut self, instance: Running, run: usize, took: Duration) {
         // With logging on, each run has a new instance, so that its messages are complete.
-        if !self.is_logging() {
+        if !self.is_logging() && self.system.kept().trust().may_keep() {
             self.reuse.used = Some(Used { instance, origin: Origin::Run(run), took });
         }
     }
@@ -93,7 +96,7 @@ impl Worker<'_> {
         if !(self.reuse.is_trusted && is_of_this_batch) {
             let changes = self.given_in(origin).changes(&self.given(run));
             let trust = self.system.kept().trust();
-            let all = self.plan.start.targets().map(Change::Value).chain([Change::Steps]);
+            let all = self.plan.start.targets().map(Change::Value).chain([Change::Steps, Change::Inputs]);
             self.reuse.is_trusted = trust.proves(all);
             if !trust.proves(changes.iter().copied()) {
                 let is_due = trust.is_check_due(took);
@@ -119,16 +122,16 @@ impl Worker<'_> {
     ) -> Result<Option<String>, Failure> {
         let begin = Instant::now();
         let [mut kept, mut measured] = [&trajectories, &measures].map(|values| vec![0.0; values.len()]);
-        (self.reuse.is_check, self.reuse.seen) = (true, Some(Vec::new()));
+        (self.reuse.is_check, self.reuse.compares, self.reuse.seen) = (true, true, None);
         let reset = instance.reset();
         let again = reset.map(|instance| self.perform(instance, run, times, &mut kept, &mut measured));
-        let seen = self.reuse.seen.replace(Vec::new());
+        let (seen, exact) = (self.reuse.seen.take(), self.take_exact());
         self.reuse.is_check = false;
         // Some FMUs permit only one instance.
         self.reuse.used = None;
         let took = begin.elapsed();
         let result = self.run_new(run, times, trajectories, measures);
-        let seen_in_new = self.reuse.seen.take();
+        self.reuse.compares = false;
         if self.watch.is_cancelled() {
             return result;
         }
@@ -136,7 +139,8 @@ impl Worker<'_> {
             one.iter().map(|x| x.to_bits()).eq(other.iter().map(|x| x.to_bits()))
         };
         let is_same = again.as_ref() == Some(&result)
-            && seen == seen_in_new
+            && seen == self.reuse.seen
+            && self.has_exact(run, &exact)
             && same(&kept, trajectories)
             && same(&measured, measures);
         let mut trust = self.system.kept().trust();
@@ -144,6 +148,8 @@ impl Worker<'_> {
         match (is_same, &self.reuse.used) {
             (false, _) => trust.distrust(),
             (true, Some(_)) => trust.prove(changes),
+            // Values that cannot be read are not compared.
+            (true, None) if result.is_ok() => trust.distrust(),
             // An incomplete run proves nothing.
             (true, None) => {}
         }
@@ -173,7 +179,7 @@ impl Worker<'_> {
             experiment: (times, plan.tolerance),
             numbers: plan.start.numbers(run).map(|(target, value)| (target, value.to_bits())).collect(),
             values: plan.start.values(run).map(|(target, value)| (target, value.clone())).collect(),
-            inputs: plan.set_in_steps.clone(),
+            inputs: (plan.set_in_steps.clone(), plan.hash_of_inputs(run)),
         }
     }
 }

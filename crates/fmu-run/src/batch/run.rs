@@ -228,32 +228,43 @@ fn on_threads<T: Send>(
         return Ok(vec![work(0)]);
     }
     let others = system.kept().take_threads(threads - 1)?;
-    let (found, arrived) = (Mutex::new(Vec::new()), Condvar::new());
+    let (found, running, arrived) = (Mutex::new(Vec::new()), Mutex::new(threads - 1), Condvar::new());
     others.pool().in_place_scope(|scope| {
         for number in 1..threads {
-            let (found, arrived, work) = (&found, &arrived, &work);
+            let (found, arrival, work) = (&found, Arrival(&running, &arrived), &work);
             scope.spawn(move |_| {
+                let arrival = arrival;
                 let result = work(number);
                 lock(found).push(result);
-                arrived.notify_one();
+                drop(arrival);
             });
         }
         let own = work(0);
-        let mut all = lock(&found);
-        all.push(own);
-        while all.len() < threads {
+        lock(&found).push(own);
+        let mut others = lock(&running);
+        while *others > 0 {
             let (waited, timeout) =
-                arrived.wait_timeout(all, Pulse::INTERVAL).unwrap_or_else(PoisonError::into_inner);
-            all = waited;
+                arrived.wait_timeout(others, Pulse::INTERVAL).unwrap_or_else(PoisonError::into_inner);
+            others = waited;
             if timeout.timed_out() {
-                drop(all);
+                drop(others);
                 watch.pulse();
-                all = lock(&found);
+                others = lock(&running);
             }
         }
     });
     system.kept().put_threads(others);
     Ok(found.into_inner().unwrap_or_else(PoisonError::into_inner))
+}
+
+/// Counts a thread as arrived when it is dropped, also after a panic.
+struct Arrival<'a>(&'a Mutex<usize>, &'a Condvar);
+
+impl Drop for Arrival<'_> {
+    fn drop(&mut self) {
+        *lock(self.0) -= 1;
+        self.1.notify_one();
+    }
 }
 
 /// Returns the requested number of parts of equal length; parts after the end of the values are empty.
@@ -465,11 +476,12 @@ impl<'a> Worker<'a> {
             }
         }
         let is_complete = stopped.is_none() && self.reached == plan.time.len();
-        if is_complete {
-            self.reuse.observe(&mut instance);
-        }
-        let terminated = if rejected { Ok(()) } else { instance.terminate() };
-        if is_complete && terminated.is_ok() {
+        let is_usable = is_complete && self.reuse.observe(&mut instance);
+        let mut terminated = if rejected { Ok(()) } else { instance.terminate() };
+        if is_complete && !is_usable {
+            // The error comes from the comparison, not from the run.
+            terminated = Ok(());
+        } else if is_complete && terminated.is_ok() {
             self.keep(instance, run, begin.elapsed());
         }
         let Some((at, rejection)) = stopped else {
@@ -483,6 +495,17 @@ impl<'a> Worker<'a> {
             _ => rejection.to_string(),
         };
         Err(Failure { at, text, is_silent: rejection.is_silent() })
+    }
+
+    /// Returns the values of a check that numbers do not have.
+    pub fn take_exact(&mut self) -> Vec<Value> {
+        std::mem::take(&mut self.exact_of_run)
+    }
+
+    /// Returns whether a run had the same values.
+    pub fn has_exact(&self, run: usize, values: &[Value]) -> bool {
+        let last = self.exact.last().filter(|(number, _)| *number == run);
+        last.map_or(values.is_empty(), |(_, found)| found == values)
     }
 
     /// Returns whether the caller does not observe the run.

@@ -1,0 +1,82 @@
+//! Compiles and packs the FMU of `resets.c`.
+
+use fmu_run::Fmu;
+use fmu_test_kit::c_programs::headers;
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+use tempfile::TempDir;
+use zip::write::SimpleFileOptions;
+
+const DESCRIPTION: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="Resets" guid="GUID">
+  <CoSimulation modelIdentifier="resets" canHandleVariableCommunicationStepSize="true"/>
+  <ModelVariables>
+    <ScalarVariable name="u" valueReference="0" causality="input" variability="continuous"><Real start="0"/></ScalarVariable>
+    <ScalarVariable name="y" valueReference="1" causality="output" variability="continuous"><Real/></ScalarVariable>
+    <ScalarVariable name="factor" valueReference="2" causality="parameter" variability="fixed"><Real start="1"/></ScalarVariable>
+    <ScalarVariable name="bias" valueReference="3" causality="parameter" variability="fixed"><Real start="0"/></ScalarVariable>
+    <ScalarVariable name="fails" valueReference="4" causality="parameter" variability="fixed"><Real start="-1"/></ScalarVariable>
+    <ScalarVariable name="hidden" valueReference="5" variability="discrete"><Real/></ScalarVariable>
+  </ModelVariables>
+  <ModelStructure><Outputs><Unknown index="2"/></Outputs></ModelStructure>
+</fmiModelDescription>
+"#;
+
+/// The FMU with a manner, in a directory with the record of its instances.
+pub struct Recorded {
+    pub fmu: Option<Fmu>,
+    directory: TempDir,
+}
+
+fn library() -> &'static Path {
+    static COMPILED: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
+    let (_, path) = COMPILED.get_or_init(|| {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("resets.so");
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/batches/resets.c");
+        let flags =
+            ["-std=c99", "-Wall", "-Wextra", "-Werror", "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-I"];
+        let status =
+            Command::new("cc").args(flags).arg(headers(&source)).arg(&source).arg("-o").arg(&path).status();
+        assert!(status.expect("these tests need a C compiler").success());
+        (directory, path)
+    });
+    path
+}
+
+impl Recorded {
+    /// Opens the FMU with a manner and an attribute of its Co-Simulation.
+    pub fn open(manner: &str, attribute: &str) -> Self {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("resets.fmu");
+        let guid = format!("{{{manner}:{}}}", directory.path().join("record").display());
+        let xml = DESCRIPTION
+            .replace("GUID", &guid)
+            .replace("<CoSimulation", &format!("<CoSimulation {attribute}"));
+        let mut archive = zip::ZipWriter::new(File::create(&path).unwrap());
+        for (name, content) in [
+            ("modelDescription.xml", xml.into_bytes()),
+            ("binaries/linux64/resets.so", std::fs::read(library()).unwrap()),
+        ] {
+            archive.start_file(name, SimpleFileOptions::default()).unwrap();
+            archive.write_all(&content).unwrap();
+        }
+        archive.finish().unwrap();
+        // SAFETY: the FMU of these tests.
+        let fmu = unsafe { Fmu::open(&path) }.unwrap();
+        Self { fmu: Some(fmu), directory }
+    }
+
+    pub fn fmu(&self) -> &Fmu {
+        self.fmu.as_ref().unwrap()
+    }
+
+    /// Returns the numbers of instances made, reset and freed so far.
+    pub fn counts(&self) -> [usize; 3] {
+        let record = std::fs::read_to_string(self.directory.path().join("record")).unwrap_or_default();
+        ['+', 'r', '-'].map(|of| record.matches(of).count())
+    }
+}

@@ -1,0 +1,267 @@
+//! Runs do not depend on earlier runs, on their order, or on the number of threads, whatever a reset of the FMU forgets.
+#![allow(unsafe_code, reason = "FMUs are opened")]
+#![cfg(all(target_os = "linux", target_arch = "x86_64"))]
+
+mod built;
+
+use built::Recorded;
+use fmu_run::{Batch, Error, Measure, Runs, Start, Trajectory, Watch};
+use proptest::prelude::*;
+
+/// Manners in which a reset fails, or forgets a part of the earlier run. Only instances that take long to make are reset.
+const MANNERS: [&str; 8] =
+    ["good", "state", "parameter", "derived", "slow", "slow no reset", "slow unreadable", "slow parameter"];
+const MEASURES: [Measure; 7] = [
+    Measure::Min,
+    Measure::Max,
+    Measure::Peak,
+    Measure::TimeOfPeak,
+    Measure::Mean,
+    Measure::Rms,
+    Measure::End,
+];
+
+/// Values of a run; `fails` is the number of its failing step.
+#[derive(Clone, Debug)]
+struct Case {
+    factor: f64,
+    bias: f64,
+    fails: Option<usize>,
+    u: Vec<f64>,
+}
+
+/// Expected results of a run by their bits: outputs, statistics, and whether it fails.
+#[derive(Debug, PartialEq)]
+struct Expected {
+    outputs: Vec<u64>,
+    measures: Vec<u64>,
+    fails: bool,
+}
+
+fn times(count: usize) -> Vec<f64> {
+    (0..count).map(|k| 0.125 * k as f64).collect()
+}
+
+impl Case {
+    /// Calculates a run as the C code of the FMU does in a new instance.
+    fn expected(&self, has_bias: bool) -> Expected {
+        let time = times(self.u.len());
+        let (gain, bias) = (2.0 * self.factor, if has_bias { self.bias } else { 0.0 });
+        let mut outputs = vec![0.0];
+        for k in 1..time.len() {
+            if self.fails == Some(k - 1) {
+                break;
+            }
+            outputs.push(outputs[k - 1] + (time[k] - time[k - 1]) * (gain * self.u[k - 1] + bias));
+        }
+        let fails = outputs.len() < time.len();
+        let measures = if fails { vec![f64::NAN; MEASURES.len()] } else { statistics(&time, &outputs) };
+        outputs.resize(time.len(), f64::NAN);
+        Expected { outputs: bits(&outputs), measures: bits(&measures), fails }
+    }
+}
+
+/// Statistics by their definitions, in the order of [`MEASURES`].
+fn statistics(time: &[f64], values: &[f64]) -> Vec<f64> {
+    let count = values.len() as f64;
+    let end = values[values.len() - 1];
+    if values.iter().any(|value| value.is_nan()) {
+        return [vec![f64::NAN; MEASURES.len() - 1], vec![end]].concat();
+    }
+    let peak = values.iter().fold(0.0, |peak: f64, value| peak.max(value.abs()));
+    let first = values.iter().position(|value| value.abs() == peak).unwrap();
+    // The first of 0.0 and -0.0 counts.
+    let extreme = |is_beyond: fn(f64, f64) -> bool| {
+        values.iter().fold(values[0], |found, value| if is_beyond(*value, found) { *value } else { found })
+    };
+    vec![
+        extreme(|value, found| value < found),
+        extreme(|value, found| value > found),
+        peak,
+        time[first],
+        values.iter().fold(0.0, |sum, value| sum + value) / count,
+        (values.iter().fold(0.0, |sum, value| sum + value * value) / count).sqrt(),
+        end,
+    ]
+}
+
+/// Returns the bits of numbers, with the same bits for all NaN.
+fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|value| if value.is_nan() { f64::NAN.to_bits() } else { value.to_bits() }).collect()
+}
+
+/// Runs all cases as one batch. Only some callers set the bias.
+fn run(of: &Recorded, cases: &[Case], threads: usize, has_bias: bool) -> Vec<Expected> {
+    let time = times(cases[0].u.len());
+    let each = |value: fn(&Case) -> f64| cases.iter().map(value).collect::<Vec<_>>();
+    let (factor, bias) = (each(|case| case.factor), each(|case| case.bias));
+    let fails = each(|case| case.fails.map_or(-1.0, |step| step as f64));
+    let u = cases.concat_inputs();
+    let mut start = vec![("factor", Start::Each(&factor)), ("fails", Start::Each(&fails))];
+    if has_bias {
+        start.push(("bias", Start::Each(&bias)));
+    }
+    let batch = Batch {
+        time: &time,
+        inputs: vec![("u", Trajectory::EachRun(&u))],
+        start,
+        outputs: vec!["y"],
+        every: Some(1),
+        measures: MEASURES.to_vec(),
+        threads: Some(threads),
+        ..Batch::default()
+    };
+    let runs = of.fmu().run(&batch, &Watch::default()).unwrap();
+    found(&runs, time.len())
+}
+
+trait Inputs {
+    fn concat_inputs(&self) -> Vec<f64>;
+}
+
+impl Inputs for [Case] {
+    fn concat_inputs(&self) -> Vec<f64> {
+        self.iter().flat_map(|case| case.u.iter().copied()).collect()
+    }
+}
+
+fn found(runs: &Runs, times: usize) -> Vec<Expected> {
+    let results = runs.trajectories.chunks(times).zip(runs.measures.chunks(MEASURES.len())).enumerate();
+    let found = results.map(|(run, (outputs, measures))| Expected {
+        outputs: bits(outputs),
+        measures: bits(measures),
+        fails: runs.errors.iter().any(|(failed, _)| *failed == run),
+    });
+    found.collect()
+}
+
+fn value() -> impl Strategy<Value = f64> {
+    prop_oneof![8 => -4.0..4.0, 1 => Just(0.0), 1 => Just(f64::NAN)]
+}
+
+fn case(times: usize) -> impl Strategy<Value = Case> {
+    // Few values, so that successive runs often differ in one of them only.
+    let parameter = || prop_oneof![Just(0.0), Just(1.0), Just(2.5), -3.0..3.0];
+    let fails = prop_oneof![4 => Just(None), 1 => (0..times).prop_map(Some)];
+    let u =
+        prop_oneof![2 => prop::collection::vec(-4.0..4.0, times), 1 => prop::collection::vec(value(), times)];
+    (parameter(), parameter(), fails, u).prop_map(|(factor, bias, fails, u)| Case { factor, bias, fails, u })
+}
+
+/// A batch: cases with the same number of times, threads, and whether the bias is set.
+fn batch() -> impl Strategy<Value = (Vec<Case>, usize, bool)> {
+    let cases = (2..9_usize).prop_flat_map(|times| prop::collection::vec(case(times), 1..7));
+    (cases, 1..4_usize, any::<bool>())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
+
+    /// Successive batches of an FMU, with failed runs and NaN among them, have the results of runs in new instances.
+    #[test]
+    fn runs_are_independent(batches in prop::collection::vec(batch(), 1..12), manner in 0..MANNERS.len()) {
+        let recorded = Recorded::open(MANNERS[manner], "");
+        for (cases, threads, has_bias) in &batches {
+            let expected: Vec<_> = cases.iter().map(|case| case.expected(*has_bias)).collect();
+            prop_assert_eq!(run(&recorded, cases, *threads, *has_bias), expected, "{}", MANNERS[manner]);
+        }
+        let mut recorded = recorded;
+        drop(recorded.fmu.take());
+        let [made, _, freed] = recorded.counts();
+        prop_assert_eq!(made, freed);
+    }
+}
+
+fn single(factor: f64) -> Case {
+    Case { factor, bias: 0.0, fails: None, u: vec![1.0, 2.0, 3.0] }
+}
+
+#[test]
+fn instances_are_used_again_if_they_can_be_reset() {
+    let recorded = Recorded::open("slow", "");
+    for k in 0..50 {
+        let case = single(f64::from(k));
+        assert_eq!(run(&recorded, std::slice::from_ref(&case), 1, true), [case.expected(true)], "run {k}");
+    }
+    let [made, reset, freed] = recorded.counts();
+    // A new instance takes more than 0.1 ms and a run much less, so that the reset is checked soon.
+    assert!(made < 15 && reset > 35 && freed < made, "{made} {reset} {freed}");
+    recorded.fmu().release();
+    let [made, _, freed] = recorded.counts();
+    assert_eq!(made, freed);
+    // After the release, runs are possible.
+    assert_eq!(run(&recorded, &[single(3.0)], 1, true), [single(3.0).expected(true)]);
+}
+
+#[test]
+fn instances_that_must_not_stay_are_freed() {
+    for attribute in ["canBeInstantiatedOnlyOncePerProcess=\"true\"", ""] {
+        let recorded = Recorded::open("slow", attribute);
+        for k in 0..10 {
+            run(&recorded, &[single(f64::from(k))], 1, true);
+        }
+        let [made, reset, freed] = recorded.counts();
+        assert_eq!((made - freed, reset > 0), if attribute.is_empty() { (1, true) } else { (0, false) });
+    }
+}
+
+#[test]
+fn an_fmu_whose_reset_forgets_has_new_instances() {
+    for manner in ["slow state", "slow derived", "slow parameter", "slow no reset", "slow unreadable"] {
+        let recorded = Recorded::open(manner, "");
+        for k in 0..40 {
+            let case = Case { bias: 0.5, ..single(f64::from(k + 1)) };
+            let has_bias = k % 2 == 0;
+            let found = run(&recorded, std::slice::from_ref(&case), 1, has_bias);
+            assert_eq!(found, [case.expected(has_bias)], "{manner}, run {k}");
+        }
+        let [made, reset, freed] = recorded.counts();
+        assert!(
+            made >= 40 && (1..20).contains(&reset) && freed >= made - 1,
+            "{manner}: {made} {reset} {freed}"
+        );
+    }
+}
+
+#[test]
+fn threads_run_an_fmu_at_the_same_time() {
+    for manner in MANNERS {
+        let recorded = Recorded::open(manner, "");
+        std::thread::scope(|scope| {
+            for thread in 0..6 {
+                let recorded = &recorded;
+                scope.spawn(move || {
+                    for k in 0..40 {
+                        let cases: Vec<_> =
+                            (0..1 + k % 3).map(|n| single(f64::from(100 * thread + k + n))).collect();
+                        let expected: Vec<_> = cases.iter().map(|case| case.expected(false)).collect();
+                        assert_eq!(run(recorded, &cases, 2, false), expected, "{manner}");
+                    }
+                });
+            }
+        });
+    }
+}
+
+#[test]
+fn a_pulse_cancels_runs() {
+    let recorded = Recorded::open("good", "");
+    // As many steps as take much longer than the time between two pulses.
+    let time: Vec<f64> = (0..20_000_000).map(f64::from).collect();
+    for threads in [1, 2] {
+        let factor = [1.0; 64];
+        let batch = Batch {
+            time: &time,
+            start: vec![("factor", Start::Each(&factor))],
+            outputs: vec!["y"],
+            measures: vec![Measure::End],
+            threads: Some(threads),
+            ..Batch::default()
+        };
+        let watch = Watch::pulsing(Watch::cancel);
+        assert_eq!(recorded.fmu().run(&batch, &watch).unwrap_err(), Error::Cancelled);
+        assert!(watch.done() < factor.len());
+    }
+    // A cancelled run leaves nothing behind.
+    assert_eq!(run(&recorded, &[single(3.0)], 1, true), [single(3.0).expected(true)]);
+}
