@@ -219,7 +219,10 @@ def test_invalid_arguments(testbed) -> None:
         wrists = fmu.instances(3)
         for call, message in [
             (lambda: wrists.set("theta", 0.0), r"no variable \"theta\"; did you mean \"theta1\""),
-            (lambda: wrists.set(MOTORS, np.zeros((2, 2))), r"values has the shape \(2, 2\); it must be \(3, 2\), \(2,\) or a number"),
+            (
+                lambda: wrists.set(MOTORS, np.zeros((2, 2))),
+                r"values has the shape \(2, 2\); it must be \(3, 2\), \(2,\) or a number",
+            ),
             (lambda: wrists.set("theta1", [0.0, 1.0]), r"values has the shape \(2,\); it must be \(3,\) or a number"),
             (lambda: wrists.get(MOTORS, out=np.zeros((3, 3))), r"shape \(3, 2\)"),
             (lambda: wrists.get(MOTORS, out=np.zeros((2, 3)).T), "contiguous"),
