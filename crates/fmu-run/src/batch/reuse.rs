@@ -81,10 +81,12 @@ impl Worker<'_> {
         self.system.kept().put(Idle { components: instance.into_components(), given, took });
     }
 
-    /// Keeps the instance of a complete run for the next run.
-    pub fn keep(&mut self, instance: Running, run: usize, took: Duration) {
+    /// Keeps the instance of a complete run for the next run, if the duration of the run was measured.
+    pub fn keep(&mut self, instance: Running, run: usize, took: Option<Duration>) {
         // With logging on, each run has a new instance, so that its messages are complete.
-        if !self.is_logging() && self.system.kept().trust().may_keep() {
+        if !self.is_logging()
+            && let Some(took) = took
+        {
             self.reuse.used = Some(Used { instance, origin: Origin::Run(run), took });
         }
     }

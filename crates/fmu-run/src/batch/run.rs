@@ -161,8 +161,8 @@ pub(super) fn run(
     let mut notes: Messages = notes.into_iter().flatten().collect();
     failures.sort_unstable_by_key(|(run, _)| *run);
     notes.sort_unstable_by_key(|(run, _)| *run);
-    let until = time::Instant::now() + begin.elapsed() + PATIENCE;
     if failures.iter().any(|(_, failure)| failure.is_silent) {
+        let until = time::Instant::now() + begin.elapsed() + PATIENCE;
         repeat_with_logging(system, plan, watch, until, &mut failures)?;
     }
     let errors = failures.into_iter().map(|(run, failure)| (run, failure.text)).collect();
@@ -448,7 +448,8 @@ impl<'a> Worker<'a> {
         trajectories: &mut [f64],
         measures: &mut [f64],
     ) -> Result<Option<String>, Failure> {
-        let (plan, begin) = (self.plan, time::Instant::now());
+        let plan = self.plan;
+        let begin = self.system.kept().trust().may_keep().then(time::Instant::now);
         instance.forget_log();
         self.inputs.begin(&plan.inputs, run, plan.time.len());
         self.derivatives.begin(&plan.derivatives, run, plan.time.len());
@@ -482,7 +483,7 @@ impl<'a> Worker<'a> {
             // The error comes from the comparison, not from the run.
             terminated = Ok(());
         } else if is_complete && terminated.is_ok() {
-            self.keep(instance, run, begin.elapsed());
+            self.keep(instance, run, begin.map(|begin| begin.elapsed()));
         }
         let Some((at, rejection)) = stopped else {
             return Ok(terminated.err().map(|rejection| format!("finished; then {rejection}")));
