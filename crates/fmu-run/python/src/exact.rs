@@ -39,6 +39,11 @@ impl Exact {
         Err(PyValueError::new_err(format!("{name} has the shape {}; it must be {known}", shape(&self.shape))))
     }
 
+    /// Returns whether all values are strings.
+    pub fn is_text(&self) -> bool {
+        self.values.iter().all(|value| matches!(value, Value::String(_)))
+    }
+
     fn add(&mut self, name: &str, given: &Bound<'_, PyAny>, depth: usize) -> PyResult<()> {
         if let Some(value) = value_of(given) {
             if depth != self.shape.len() && !self.values.is_empty() {

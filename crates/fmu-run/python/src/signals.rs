@@ -35,12 +35,18 @@ impl Signals {
         for (name, value) in given {
             let (own_times, value) = with_times(name, value)?;
             let times = own_times.as_ref().map_or(times, |times| times.values().len());
-            if exact_type(system, name)?.is_some() {
-                signals.push_exact(name, Exact::of(name, &value)?, own_times, times)?;
+            let array = system.array(name);
+            let element = array.and_then(|array| array.names.first()).unwrap_or(name);
+            if exact_type(system, element)?.is_some() {
+                let (sizes, elements) = match array {
+                    None => (&[][..], std::slice::from_ref(name)),
+                    Some(array) => (&*array.sizes, &*array.names),
+                };
+                signals.push_exact(name, sizes, Exact::of(name, &value)?, elements, (own_times, times))?;
                 continue;
             }
             let values = Numbers::of(name, &in_own_unit(system, name, &value)?)?;
-            match system.array(name) {
+            match array {
                 None => signals.push(name, &[], values, &[name.clone()], (own_times, times))?,
                 Some(array) => signals.push(name, &array.sizes, values, &array.names, (own_times, times))?,
             }
@@ -51,15 +57,22 @@ impl Signals {
     fn push_exact(
         &mut self,
         name: &str,
+        sizes: &[usize],
         given: Exact,
-        own_times: Option<Arc<Numbers>>,
-        times: usize,
+        elements: &[String],
+        (own_times, times): (Option<Arc<Numbers>>, usize),
     ) -> PyResult<()> {
         let runs = given.shape.first().copied().unwrap_or(1);
-        given.check(name, &[&[], &[times], &[runs, times]])?;
-        let (by_time, by_run) = (!given.shape.is_empty(), given.shape.len() == 2);
-        let (name, values) = (name.to_owned(), Values::Exact(given.values));
-        self.0.push(Signal { name, values, times: own_times, by_time, by_run });
+        let [by_time, by_run] = [&[times][..], &[runs, times]].map(|ahead| [ahead, sizes].concat());
+        given.check(name, &[&[], sizes, &by_time, &by_run])?;
+        let (by_run, is_same) = (given.shape == by_run, given.shape.is_empty());
+        let by_time = by_run || given.shape == by_time;
+        for (number, element) in elements.iter().enumerate() {
+            let (skip, step) = if is_same { (0, 1) } else { (number, elements.len()) };
+            let own = given.values.iter().skip(skip).step_by(step).cloned().collect();
+            let (name, values) = (element.clone(), Values::Exact(own));
+            self.0.push(Signal { name, values, times: own_times.clone(), by_time, by_run });
+        }
         Ok(())
     }
 

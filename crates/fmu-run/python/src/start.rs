@@ -1,7 +1,7 @@
 //! Start values that are given as a dict.
 
 use crate::arguments::{in_own_unit, items, shape};
-use crate::buffers::Numbers;
+use crate::buffers::{Numbers, array_of};
 use crate::exact::{Exact, exact_type};
 use fmu_run::{Elements, System};
 use pyo3::exceptions::PyValueError;
@@ -65,7 +65,7 @@ impl Start {
         let value = in_own_unit(system, &name, &value)?;
         match system.array(&name) {
             None => self.values.push((name.clone(), Value::of(&name, &value)?)),
-            Some(array) => self.add_array(&name, array, &value)?,
+            Some(array) => self.add_array(system, &name, array, &value)?,
         }
         self.given.push((name, value.unbind()));
         Ok(())
@@ -90,40 +90,60 @@ impl Start {
         Ok(dict)
     }
 
-    /// Adds the elements of an array, which all have the given number, or their own numbers or strings.
-    fn add_array(&mut self, name: &str, array: &Elements, value: &Bound<'_, PyAny>) -> PyResult<()> {
-        let given = value.py().import("numpy")?.call_method1("asarray", (value,))?;
-        let is_text = matches!(given.getattr("dtype")?.getattr("kind")?.extract()?, 'U' | 'T');
-        let sizes: Vec<usize> = given.getattr("shape")?.extract()?;
-        let (count, by_run) = (array.names.len(), sizes.len() == array.sizes.len() + 1);
-        if !sizes.is_empty() && (!sizes.ends_with(&array.sizes) || sizes.len() > array.sizes.len() + 1) {
-            let own = array.sizes.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
-            return Err(PyValueError::new_err(format!(
-                "the start value of {name} has the shape {}; it must be {}, (n, {own}) with one array for each, or one number for all \
-                 elements",
-                shape(&sizes),
-                shape(&array.sizes)
-            )));
-        }
-        let is_same = sizes.is_empty();
-        if is_text {
-            let all: Vec<String> = given.call_method0("ravel")?.call_method0("tolist")?.extract()?;
+    /// Adds the elements of an array: the same value for all, an array for all runs or instances, or an array for each.
+    fn add_array(
+        &mut self,
+        system: &System,
+        name: &str,
+        array: &Elements,
+        value: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let count = array.names.len();
+        let is_exact = array.names.first().map_or(Ok(None), |first| exact_type(system, first))?.is_some();
+        // Names of items and Booleans.
+        let is_text =
+            || array_of(name, value).is_err() && Exact::of(name, value).is_ok_and(|of| of.is_text());
+        if is_exact || is_text() {
+            let of = Exact::of(name, value)?;
+            let by_run = check_shape(name, &of.shape, array)?;
             for (number, element) in array.names.iter().enumerate() {
-                let own = if is_same { all.clone() } else { every(&all, number, count) };
-                let own = if by_run { Value::Texts(own) } else { Value::Text(own.concat()) };
+                let values =
+                    if of.shape.is_empty() { of.values.clone() } else { every(&of.values, number, count) };
+                let own = if is_exact {
+                    let shape = if by_run { vec![values.len()] } else { Vec::new() };
+                    Value::Exact(Exact { values, shape })
+                } else {
+                    let texts: Vec<_> = values.iter().map(ToString::to_string).collect();
+                    if by_run { Value::Texts(texts) } else { Value::Text(texts.concat()) }
+                };
                 self.values.push((element.clone(), own));
             }
             return Ok(());
         }
         let numbers = Numbers::of(name, value)?;
+        let by_run = check_shape(name, numbers.shape(), array)?;
         for (number, element) in array.names.iter().enumerate() {
-            let own =
-                if is_same { numbers.values().to_vec() } else { every(numbers.values(), number, count) };
+            let all = numbers.values();
+            let own = if numbers.shape().is_empty() { all.to_vec() } else { every(all, number, count) };
             let own = if by_run { Value::Each(own) } else { Value::Numbers(Numbers::One(own[0])) };
             self.values.push((element.clone(), own));
         }
         Ok(())
     }
+}
+
+/// Checks the shape of the start value of an array. Returns whether there is an array for each run or instance.
+fn check_shape(name: &str, given: &[usize], array: &Elements) -> PyResult<bool> {
+    let by_run = given.len() == array.sizes.len() + 1 && given.ends_with(&array.sizes);
+    if by_run || given.is_empty() || *given == array.sizes {
+        return Ok(by_run);
+    }
+    let own = array.sizes.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
+    Err(PyValueError::new_err(format!(
+        "the start value of {name} has the shape {}; it must be {}, (n, {own}) with an array for each, or one value for all elements",
+        shape(given),
+        shape(&array.sizes)
+    )))
 }
 
 /// Returns every `step`-th value from `first` on.
