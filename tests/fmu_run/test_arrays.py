@@ -133,3 +133,119 @@ def test_states_and_indicators(rods) -> None:
     for one, other in zip(of_fmi2, of_fmi3, strict=True):
         assert np.array_equal(one, other) and one.shape == (1, 8)
     assert of_fmi3[4][0].tolist() == list(range(8)) and np.array_equal(of_fmi3[5], of_fmi3[6])
+
+
+def test_whole_arrays_in_runs(rods) -> None:
+    """Whole arrays have the results of their elements: FMI 2.0 has only the elements, FMI 3.0 the arrays."""
+    time = np.linspace(0.0, 1.0, 11)
+    limits, power = np.array([[10.0, 20.5], [11.0, 21.0]]), np.stack([3 + np.sin(time), np.cos(time)], axis=1)
+    capacities = np.stack([np.linspace(1.0, 2.0, 8), np.linspace(2.0, 4.0, 8), np.full(8, 3.0)])
+    elements = {
+        **{f"limits[{i + 1},{j + 1}]": limits[i, j] for i in range(2) for j in range(2)},
+        **{f"capacities[{k + 1}]": capacities[:, k] for k in range(8)},
+        **{f"T[{k + 1}]": 30.0 for k in range(8)},
+        "labels[1]": "one",
+        "labels[2]": "two",
+    }
+    names = [*TEMPERATURES, "limits[1,1]", "limits[1,2]", "limits[2,1]", "limits[2,2]"]
+
+    def use(fmu):
+        whole = fmu.run(
+            time,
+            inputs={"power": power},
+            start={"limits": limits, "capacities": capacities, "T": 30.0, "labels": ["one", "two"]},
+            outputs=["T", "mean", "limits"],
+            every=2,
+            measures=["peak", "end"],
+        ).check()
+        by_element = fmu.run(
+            time,
+            inputs={"power[1]": power[:, 0], "power[2]": power[:, 1]},
+            start=elements,
+            outputs=["mean", *names],
+            every=2,
+            measures=["peak", "end"],
+        ).check()
+        assert whole["T"].shape == (3, 6, 8) and whole["limits"].shape == (3, 6, 2, 2)
+        assert (
+            whole["T", "peak"].shape == (3, 8)
+            and whole["mean"].shape == (3, 6)
+            and list(whole) == ["T", "mean", "limits"]
+        )
+        assert np.array_equal(whole["mean"], by_element["mean"])
+        for key, one in [("T", TEMPERATURES), ("limits", names[8:])]:
+            expected = np.stack([by_element[name] for name in one], axis=-1)
+            assert np.array_equal(whole[key], expected.reshape(whole[key].shape))
+            peaks = np.stack([by_element[name, "peak"] for name in one], axis=-1)
+            assert np.array_equal(whole[key, "peak"], peaks.reshape(whole[key, "peak"].shape))
+            assert all(np.array_equal(whole[name], by_element[name]) for name in one)
+        assert np.array_equal(whole["limits"][1, 0], limits)
+        assert whole.start["limits"].shape == (3, 2, 2) and np.array_equal(whole.start["capacities"], capacities)
+        frame, dataset = whole.to_pandas(), whole.to_xarray()
+        assert np.array_equal(frame["T[3]"], by_element["T[3]"].ravel()) and "T[8]_end" in frame
+        assert dataset["limits"].dims == ("run", "time", "limits_0", "limits_1")
+        assert dataset["T_end"].dims == ("run", "T_0") and dataset["capacities"].dims == ("run", "capacities_0")
+        return whole
+
+    for one, other in zip(*(runs.values() for runs in both(rods, use)), strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_whole_arrays_of_inputs_for_each_run(rods) -> None:
+    time = np.linspace(0.0, 1.0, 5)
+    power = np.random.default_rng(2).uniform(0.0, 9.0, (3, 5, 2))
+
+    def use(fmu):
+        found = [
+            fmu.run(time, inputs={"power": given}, outputs=["T"])["T"] for given in (power, power[1], power[1, 0], 4.0)
+        ]
+        elements = {"power[1]": power[:, :, 0], "power[2]": power[:, :, 1]}
+        expected = fmu.run(time, inputs=elements, outputs=TEMPERATURES)
+        assert np.array_equal(found[0], np.stack([expected[name] for name in TEMPERATURES], axis=-1))
+        assert np.array_equal(found[1][0], found[0][1]) and not np.array_equal(found[2], found[3])
+        for inputs, start, message in [
+            (
+                {"power": power[:, :, :1]},
+                {},
+                r"power has the shape \(3, 5, 1\); it must be \(5, 2\), \(runs, 5, 2\), \(2,\) or a number",
+            ),
+            ({"power": np.zeros(5)}, {}, r"power has the shape \(5,\)"),
+            (
+                {},
+                {"limits": np.eye(3)},
+                r"limits has the shape \(3, 3\); it must be \(2, 2\), \(n, 2, 2\) with an array for each",
+            ),
+            ({}, {"limits": [1.0, 2.0]}, r"limits has the shape \(2,\)"),
+            ({}, {"limits": np.ones((3, 2, 2)), "capacities": np.ones((2, 8))}, "is given for 3 runs, .* for 2"),
+            ({}, {"limit": np.eye(2)}, r'no variable "limit"; did you mean "limits'),
+        ]:
+            with pytest.raises(ValueError, match=message):
+                fmu.run(time, inputs=inputs, start=start, outputs=["T"])
+        return found
+
+    for one, other in zip(*both(rods, use), strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_whole_arrays_of_instances(rods) -> None:
+    def use(fmu):
+        starts = np.arange(24.0).reshape(3, 8)
+        rod = fmu.instances(3, start={"T": starts, "limits": np.eye(2)})
+        found = [rod.get("T"), rod.get("limits"), rod.get(["T", "mean"])]
+        assert np.array_equal(found[0], starts) and np.array_equal(found[1], [np.eye(2)] * 3)
+        assert found[2].shape == (3, 9) and np.array_equal(found[2][:, :8], starts)
+        rod.set("power", [1.0, 2.0])
+        rod.set("power", [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]], mask=[True, False, True])
+        found.append(rod.get("power"))
+        found.append(rod.advance("power", np.ones((3, 2)), 0.1, "T"))
+        found.append(rod.directional_derivative("T", "power", [1.0, 0.0]))
+        rod.reset(start={"T": 5.0})
+        found.append(rod.get("T"))
+        assert np.array_equal(found[3], [[1.0, 2.0], [1.0, 2.0], [5.0, 6.0]])
+        assert found[4].shape == found[5].shape == (3, 8) and (found[6] == 5.0).all()
+        with pytest.raises(ValueError, match=r"values has the shape \(3,\); it must be \(3, 2\), \(2,\) or a number"):
+            rod.set("power", np.zeros(3))
+        return found
+
+    for one, other in zip(*both(rods, use), strict=True):
+        assert np.array_equal(one, other)

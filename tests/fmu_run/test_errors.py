@@ -335,3 +335,77 @@ def test_runs_need_co_simulation(tmp_path, unruly):
         for call in (lambda: fmu.run([0.0, 1.0], outputs=["y"]), fmu.instances):
             with pytest.raises(fmu_run.FmuError, match="no Co-Simulation, only Model Exchange, which needs a solver"):
                 call()
+
+
+def test_arguments_of_wrong_types_are_named(fmu):
+    """Each argument of each function, with objects that it cannot be."""
+    one, continuous = fmu.instances(3), fmu.instances(2, interface="model-exchange")
+    system = {"source": {"wrist": fmu}, "connections": {}, "order": "jacobi"}
+    nothing = object()
+    for call, argument, wrong in [
+        (fmu.run, "time", [None, "noon", nothing, [[0.0], [0.0, 1.0]]]),
+        (fmu.run, "outputs", [3, None, [3], b"roll", nothing]),
+        (fmu.run, "inputs", [3, ["theta1"], "theta1", {3: 0.0}, {"theta1": nothing}, {"theta1": [[0.0], [0.0, 1.0]]}]),
+        (fmu.run, "input_derivatives", [3, ["theta1"], {None: 0.0}]),
+        (fmu.run, "start", [3, ["k1"], "k1", {3: 1.0}]),
+        (fmu.run, "every", ["2", 1.5, True, [1]]),
+        (fmu.run, "measures", [3, [3], nothing]),
+        (fmu.run, "threads", ["2", 1.5, False, [1]]),
+        (fmu.run, "read_before_set", ["no", None, 2, 0.5]),
+        (fmu.run, "progress", [3, "bar", True]),
+        (fmu.converted, "values", [None, "x", nothing]),
+        (fmu.converted, "unit", [None, 3]),
+        (fmu.converted, "name", [None, 3]),
+        (fmu.instances, "count", ["2", 1.5, None, True]),
+        (fmu.instances, "interface", [3, None, "both"]),
+        (fmu.instances, "start", [3, ["k1"], {3: 1.0}]),
+        (fmu.instances, "start_time", ["now", None, np.nan, True]),
+        (fmu.instances, "stop_time", ["now", np.inf, [1.0]]),
+        (fmu.instances, "threads", ["2", 1.5]),
+        (fmu_run.Fmu, "path", [3, None, nothing]),
+        (fmu_run.Fmu, "execution_tool", ["yes", None]),
+        (fmu_run.System, "source", [3, None, {"wrist": 3}, {3: fmu}]),
+        (fmu_run.System, "connections", [3, [1, 2], {"wrist.roll": 3}, np.array([1, 2])]),
+        (fmu_run.System, "order", [3, None, "random"]),
+        (one.set, "variables", [3, None, [3]]),
+        (one.set, "values", [None, "x", [[1.0], [1.0, 2.0]], np.zeros(2)]),
+        (one.set, "mask", [3, [1, 0, 1], np.array([0, 2]), np.array([1, 0, 1]), "yes", [True]]),
+        (one.get, "variables", [3, None, [None]]),
+        (one.get, "out", [3, [0.0], np.zeros(2), np.zeros(3, dtype=int)]),
+        (one.texts, "variable", [3, None, ["roll"]]),
+        (one.step, "size", ["1", [1e-3], True]),
+        (one.advance, "set", [3, None]),
+        (one.advance, "values", [None, "x", np.zeros((3, 3))]),
+        (one.advance, "size", ["1", None]),
+        (one.advance, "get", [3, None]),
+        (one.advance, "out", [3, np.zeros(2)]),
+        (one.reset, "mask", [3, [1, 0, 1]]),
+        (one.reset, "start", [3, ["k1"], {None: 1.0}]),
+        (one.restore, "states", [3, None, [3]]),
+        (one.serialize, "states", [3, None, b"state"]),
+        (one.deserialize, "states", [3, None, [3], b"state", "state"]),
+        (one.directional_derivative, "unknowns", [3, None]),
+        (one.directional_derivative, "knowns", [3, None]),
+        (one.directional_derivative, "seed", [None, "x", np.zeros((2, 2))]),
+        (continuous.set_time, "time", [None, "noon", np.zeros(3)]),
+        (continuous.set_continuous_states, "states", [None, "x", np.zeros(5)]),
+        (continuous.get_derivatives, "out", [3, np.zeros((2, 5))]),
+        (continuous.handle_events, "values", [3j, "x", np.zeros(3)]),
+    ]:
+        valid = {
+            fmu.run: {"time": TIME, "outputs": ["roll"]},
+            fmu.converted: {"name": "k1", "values": 1.0, "unit": "N.m/deg"},
+            fmu_run.System: system,
+            one.set: {"variables": "theta1", "values": 0.0},
+            one.advance: {"set": "theta1", "values": 0.0, "size": 1e-3, "get": "roll"},
+            one.get: {"variables": "roll"},
+            one.directional_derivative: {"unknowns": "roll", "knowns": "theta1", "seed": 1.0},
+            continuous.handle_events: {"variables": "theta1", "values": 0.0},
+        }.get(call, {})
+        for value in wrong:
+            with pytest.raises(ValueError) as raised:
+                call(**{**valid, argument: value})
+            named = [argument, *(value if isinstance(value, dict) else ())]
+            assert any(str(name) in str(raised.value) for name in named), (argument, value, raised.value)
+            assert "\n" not in str(raised.value)
+    assert one.errors == continuous.errors == {}, "no instance has failed"

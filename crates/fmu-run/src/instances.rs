@@ -785,19 +785,15 @@ fn in_parts(
     }
     let Some(threads) = threads else { return work(0, all, values) };
     let part = all.len().div_ceil(threads.count() + 1);
-    // This thread works too, because a waiting thread takes time to wake up.
-    threads.pool().in_place_scope(|scope| {
-        let (own, others) = all.split_at_mut(part);
-        let (own_values, other_values) = values.split_at_mut(part * length);
-        let mut rest = other_values;
-        for (number, others) in others.chunks_mut(part).enumerate() {
-            let (now, after) = std::mem::take(&mut rest).split_at_mut(others.len() * length);
-            rest = after;
-            let work = &work;
-            scope.spawn(move |_| work((number + 1) * part, others, now));
-        }
-        work(0, own, own_values);
+    let (own, others) = all.split_at_mut(part);
+    let (own_values, mut rest) = values.split_at_mut(part * length);
+    let others = others.chunks_mut(part).enumerate().map(|(number, others)| {
+        let (now, after) = std::mem::take(&mut rest).split_at_mut(others.len() * length);
+        rest = after;
+        let work = &work;
+        move || work((number + 1) * part, others, now)
     });
+    threads.share(|| work(0, own, own_values), others);
 }
 
 /// Returns the row of an instance, from a row for each instance or one row for all.

@@ -7,6 +7,7 @@ use crate::start::{StartValues, is_exact};
 use crate::system::{Exchange, Order, System};
 use fmi_abi::{BaseType, Interface, Value};
 use fmi_client::Rejection;
+use std::ops::{Deref, DerefMut};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A state that instances of all components have saved.
@@ -23,13 +24,43 @@ pub(crate) struct Observed {
     values: Vec<Value>,
 }
 
+/// Instances of the components. A single one is part of the value, because with thousands of instances each step in memory
+/// counts.
+#[derive(Debug)]
+enum Components {
+    One(Instance),
+    Several(Vec<Instance>),
+}
+
+impl Deref for Components {
+    type Target = [Instance];
+
+    #[inline]
+    fn deref(&self) -> &[Instance] {
+        match self {
+            Self::One(instance) => std::slice::from_ref(instance),
+            Self::Several(instances) => instances,
+        }
+    }
+}
+
+impl DerefMut for Components {
+    #[inline]
+    fn deref_mut(&mut self) -> &mut [Instance] {
+        match self {
+            Self::One(instance) => std::slice::from_mut(instance),
+            Self::Several(instances) => instances,
+        }
+    }
+}
+
 /// One instance of each component; each function acts on all of them. A single FMU is a system with one
 /// component and no connections.
 #[derive(Debug)]
 pub(crate) struct Running {
     /// Differs from the numbers of all other values: states belong to the instances that saved them.
     generation: u64,
-    components: Vec<Instance>,
+    components: Components,
     system: System,
     /// Whether inputs must be updated before the next get or step ([`Order::Dependencies`]).
     is_due: bool,
@@ -67,7 +98,9 @@ impl Running {
     }
 
     /// Returns these instances of the components of the system.
-    pub fn of(system: &System, components: Vec<Instance>) -> Self {
+    pub fn of(system: &System, mut components: Vec<Instance>) -> Self {
+        let only = if components.len() == 1 { components.pop() } else { None };
+        let components = only.map_or(Components::Several(components), Components::One);
         static GENERATION: AtomicU64 = AtomicU64::new(0);
         let generation = GENERATION.fetch_add(1, Ordering::Relaxed);
         let (system, [passed, row, buffer]) = (system.clone(), [const { Vec::new() }; 3]);
@@ -75,7 +108,10 @@ impl Running {
     }
 
     pub fn into_components(self) -> Vec<Instance> {
-        self.components
+        match self.components {
+            Components::One(instance) => vec![instance],
+            Components::Several(instances) => instances,
+        }
     }
 
     /// Resets the instances, if their FMUs can.

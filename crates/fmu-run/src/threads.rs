@@ -1,8 +1,10 @@
 //! Threads that wait for work between calls.
 
 use crate::error::Error;
-use std::sync::Once;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::hint::spin_loop;
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
+use std::sync::{Arc, Once};
+use std::time::{Duration, Instant};
 
 /// Number of forks from the first process with this library to this process.
 static FORKS: AtomicU32 = AtomicU32::new(0);
@@ -34,6 +36,8 @@ fn count_forks() {}
 #[derive(Debug)]
 pub(crate) struct Threads {
     process: u32,
+    /// Number of threads that look for work without sleeping.
+    awake: Arc<AtomicUsize>,
     /// `None` only while dropping.
     pool: Option<rayon::ThreadPool>,
 }
@@ -42,7 +46,7 @@ impl Threads {
     pub fn new(count: usize) -> Result<Self, Error> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build();
         let pool = pool.map_err(|error| Error::Fmu(format!("no threads can be made: {error}")))?;
-        Ok(Self { process: process(), pool: Some(pool) })
+        Ok(Self { process: process(), awake: Arc::default(), pool: Some(pool) })
     }
 
     /// Returns whether the threads belong to this process.
@@ -52,6 +56,50 @@ impl Threads {
 
     pub fn count(&self) -> usize {
         self.pool().current_num_threads()
+    }
+
+    /// Time for which threads look for work before they sleep. Waking a thread takes about as long.
+    const AWAKE: Duration = Duration::from_micros(50);
+
+    /// Calls `own` in this thread and each of the others in another thread. Returns when all are done.
+    pub fn share<'s>(&'s self, own: impl FnOnce(), others: impl Iterator<Item = impl FnOnce() + Send + 's>) {
+        let running = AtomicUsize::new(0);
+        self.pool().in_place_scope(|scope| {
+            for other in others {
+                running.fetch_add(1, Ordering::Relaxed);
+                let running = &running;
+                scope.spawn(move |_| {
+                    other();
+                    running.fetch_sub(1, Ordering::Release);
+                });
+            }
+            self.stay_awake();
+            own();
+            // The end of the scope would sleep if a thread needs a little longer.
+            let begin = Instant::now();
+            while running.load(Ordering::Acquire) > 0 && begin.elapsed() < Self::AWAKE {
+                spin_loop();
+            }
+        });
+    }
+
+    /// Lets the threads look for the work of a call that follows soon.
+    fn stay_awake(&self) {
+        if self.awake.load(Ordering::Relaxed) > 0 {
+            return;
+        }
+        self.awake.store(self.count(), Ordering::Relaxed);
+        let awake = Arc::clone(&self.awake);
+        self.pool().spawn_broadcast(move |_| {
+            let mut last = Instant::now();
+            while last.elapsed() < Self::AWAKE {
+                match rayon::yield_now() {
+                    Some(rayon::Yield::Executed) => last = Instant::now(),
+                    _ => spin_loop(),
+                }
+            }
+            awake.fetch_sub(1, Ordering::Relaxed);
+        });
     }
 
     pub fn pool(&self) -> &rayon::ThreadPool {

@@ -214,7 +214,7 @@ class _Model:
             If the FMU has no such variable, or the variable no such unit.
         """
         factor, offset = self._loaded.display_unit(name, unit)
-        array: _Array = _numbers(name, values)
+        array: _Array = _numbers("values", values)
         found = (array - offset) / factor
         return float(found) if found.ndim == 0 else found
 
@@ -336,8 +336,10 @@ class System(_Model):
         order: Literal["dependencies", "jacobi"] = "dependencies",
     ):
         if isinstance(source, Mapping):
-            fmus = [(name, (fmu if isinstance(fmu, Fmu) else Fmu(fmu))._loaded) for name, fmu in source.items()]
+            fmus = [(name, _component(name, fmu)._loaded) for name, fmu in source.items()]
             super().__init__(_Loaded.connected("system", fmus, _pairs(connections), order))
+        elif not isinstance(source, str | os.PathLike):
+            raise ValueError(f"source must be the path of an SSP or a dict of FMUs by name, it is {source!r}")
         elif connections is not None:
             raise ValueError("an SSP has its own connections; give connections with FMUs only")
         else:
@@ -350,12 +352,20 @@ class System(_Model):
         return f"<System {self.name}, {connections} connections, {len(self.variables)} variables>"
 
 
+def _component(name: str, fmu: Fmu | str | os.PathLike[str]) -> Fmu:
+    if not isinstance(name, str):
+        raise ValueError(f"the names in source must be str, one is {name!r}")
+    if not isinstance(fmu, Fmu | str | os.PathLike):
+        raise ValueError(f"source: {name} must be an Fmu or a path, it is {fmu!r}")
+    return fmu if isinstance(fmu, Fmu) else Fmu(fmu)
+
+
 def _pairs(
     connections: Mapping[str, str | Sequence[str]] | Iterable[tuple[str, str | Sequence[str]]] | None,
 ) -> list[tuple[str, str]]:
     """Connections from an output to an input, (output, input) each."""
-    given = connections.items() if isinstance(connections, Mapping) else connections or ()
     try:
+        given = connections.items() if isinstance(connections, Mapping) else () if connections is None else connections
         found = [(output, to) for output, ends in given for to in ([ends] if isinstance(ends, str) else ends)]
     except (TypeError, ValueError):
         found = [("", None)]

@@ -28,6 +28,7 @@ use std::time::{Duration, Instant};
 #[pyclass(frozen, module = "fmu_run")]
 pub struct Instances {
     system: System,
+    interface: Interface,
     count: usize,
     instances: Arc<Shared>,
     /// Cache of looked-up names, by the objects that named them.
@@ -149,7 +150,7 @@ impl Instances {
             log.pass(py, messages)?;
         }
         let instances = Shared::of(made.map_err(python)?);
-        Ok(Self { system, count, instances, known: Mutex::default(), log })
+        Ok(Self { system, interface, count, instances, known: Mutex::default(), log })
     }
 
     fn __len__(&self) -> usize {
@@ -315,14 +316,18 @@ impl Instances {
 
     /// Restore states that these instances have saved.
     #[pyo3(signature = (states, mask=None))]
-    fn restore(&self, py: Python, states: &States, mask: Optional) -> PyResult<()> {
+    fn restore(&self, py: Python, states: &Bound<'_, PyAny>, mask: Optional) -> PyResult<()> {
         let (mask, states) = (self.mask(mask)?, self.own(states)?);
         self.revive(py, |all| all.restore(&states, mask.as_deref()))
     }
 
     /// Return saved states as bytes, for use in another process: one for each instance, None for an instance
     /// without a state.
-    fn serialize<'py>(&self, py: Python<'py>, states: &States) -> PyResult<Vec<Option<Bound<'py, PyBytes>>>> {
+    fn serialize<'py>(
+        &self,
+        py: Python<'py>,
+        states: &Bound<'py, PyAny>,
+    ) -> PyResult<Vec<Option<Bound<'py, PyBytes>>>> {
         let states = self.own(states)?;
         let found = self.attempt(py, |all| all.serialize(&states))?;
         Ok(found.into_iter().map(|bytes| bytes.map(|bytes| PyBytes::new(py, &bytes))).collect())
@@ -330,7 +335,10 @@ impl Instances {
 
     /// Read states from the bytes that `serialize` returned, here or in another process: one or None for each
     /// instance.
-    fn deserialize(&self, py: Python, states: Vec<Option<PyBackedBytes>>) -> PyResult<States> {
+    fn deserialize(&self, py: Python, states: &Bound<'_, PyAny>) -> PyResult<States> {
+        let must = "a sequence of bytes or None, one for each instance";
+        let states =
+            states.extract::<Vec<Option<PyBackedBytes>>>().map_err(|_| wrong("states", must, states))?;
         let read = py.detach(|| self.instances.lock()?.deserialize(&states).map_err(python))?;
         Ok(States { instances: Arc::clone(&self.instances), states: Some(Arc::new(read)) })
     }
@@ -552,7 +560,7 @@ impl Instances {
 
     /// Fails if the instances are for another interface type, before the FMU would reject the call.
     fn only(&self, wanted: Interface) -> PyResult<()> {
-        let why = match (wanted, self.instances.lock()?.interface()) {
+        let why = match (wanted, self.interface) {
             (wanted, interface) if wanted == interface => return Ok(()),
             (Interface::ModelExchange, _) => {
                 "these instances are for Co-Simulation; this is for Model Exchange: instances(interface=\"model-exchange\")"
@@ -565,7 +573,9 @@ impl Instances {
     }
 
     /// Returns the states if they belong to these instances.
-    fn own(&self, states: &States) -> PyResult<Arc<fmu_run::States>> {
+    fn own(&self, states: &Bound<'_, PyAny>) -> PyResult<Arc<fmu_run::States>> {
+        let states =
+            states.cast::<States>().map_err(|_| wrong("states", "what save() returned", states))?.get();
         let own = states.states.clone().filter(|_| Arc::ptr_eq(&self.instances, &states.instances));
         own.ok_or_else(|| {
             PyValueError::new_err(
@@ -580,14 +590,15 @@ impl Instances {
         py: Python,
         body: impl FnOnce(&mut fmu_run::Instances) -> Result<T, Error> + Send,
     ) -> PyResult<T> {
-        if let Some(why) = self.instances.lock()?.none_left() {
-            let all = if self.count == 1 { "the instance has" } else { "all instances have" };
-            let why = format!(
-                "{all} dropped out before; reset() or restore() brings them back (instance 0: {why})"
-            );
-            return Err(FmuError::new_err(why));
-        }
-        self.revive(py, body)
+        self.called(py, |all| match all.none_left() {
+            None => body(all).map_err(python),
+            Some(why) => {
+                let gone = if all.len() == 1 { "the instance has" } else { "all instances have" };
+                Err(FmuError::new_err(format!(
+                    "{gone} dropped out before; reset() or restore() brings them back (instance 0: {why})"
+                )))
+            }
+        })
     }
 
     /// Runs a call that may make instances usable again.
@@ -596,9 +607,17 @@ impl Instances {
         py: Python,
         body: impl FnOnce(&mut fmu_run::Instances) -> Result<T, Error> + Send,
     ) -> PyResult<T> {
+        self.called(py, |all| body(all).map_err(python))
+    }
+
+    fn called<T: Send>(
+        &self,
+        py: Python,
+        body: impl FnOnce(&mut fmu_run::Instances) -> PyResult<T> + Send,
+    ) -> PyResult<T> {
         let called = py.detach(|| {
             let mut all = self.instances.lock()?;
-            let result = body(&mut all).map_err(python)?;
+            let result = body(&mut all)?;
             PyResult::Ok((result, all.none_left().map(str::to_owned)))
         });
         self.pass_messages(py)?;
