@@ -229,10 +229,10 @@ def test_whole_arrays_of_inputs_for_each_run(rods) -> None:
 
 def test_whole_arrays_of_instances(rods) -> None:
     def use(fmu):
-        starts = np.arange(24.0).reshape(3, 8)
-        rod = fmu.instances(3, start={"T": starts, "limits": np.eye(2)})
+        starts, limits = np.arange(24.0).reshape(3, 8), np.array([[10.0, 20.0], [11.0, 21.0]])
+        rod = fmu.instances(3, start={"T": starts, "limits": limits})
         found = [rod.get("T"), rod.get("limits"), rod.get(["T", "mean"])]
-        assert np.array_equal(found[0], starts) and np.array_equal(found[1], [np.eye(2)] * 3)
+        assert np.array_equal(found[0], starts) and np.array_equal(found[1], [limits] * 3)
         assert found[2].shape == (3, 9) and np.array_equal(found[2][:, :8], starts)
         rod.set("power", [1.0, 2.0])
         rod.set("power", [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]], mask=[True, False, True])

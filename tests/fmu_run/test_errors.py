@@ -337,7 +337,7 @@ def test_runs_need_co_simulation(tmp_path, unruly):
                 call()
 
 
-def test_arguments_of_wrong_types_are_named(fmu):
+def test_arguments_of_wrong_types_are_named(fmu, testbed):
     """Each argument of each function, with objects that it cannot be."""
     one, continuous = fmu.instances(3), fmu.instances(2, interface="model-exchange")
     system = {"source": {"wrist": fmu}, "connections": {}, "order": "jacobi"}
@@ -395,6 +395,7 @@ def test_arguments_of_wrong_types_are_named(fmu):
         valid = {
             fmu.run: {"time": TIME, "outputs": ["roll"]},
             fmu.converted: {"name": "k1", "values": 1.0, "unit": "N.m/deg"},
+            fmu_run.Fmu: {"path": testbed},
             fmu_run.System: system,
             one.set: {"variables": "theta1", "values": 0.0},
             one.advance: {"set": "theta1", "values": 0.0, "size": 1e-3, "get": "roll"},

@@ -179,6 +179,28 @@ def test_coarse_sampling_is_reported(testbed: Path, rates: bool) -> None:
     assert fine.sampling_errors["tau1"] < 0.003 and fine.doubt == ""
 
 
+def test_the_rates_of_coarse_sampling() -> None:
+    """Rates are written without exponents, and the proposed rate is above the given rate even if 1 % is barely exceeded."""
+    motion = prw.Motion(np.arange(1001) / 1000, np.zeros((1001, 2)))
+    for error, proposed in [(0.0101, "1100"), (0.0121, "1100"), (0.04, "2000"), (0.0401, "2100"), (1.0, "10000")]:
+        doubt = prw.Run(motion, {}, {}, {"tau1": error}).doubt
+        assert f"sampled with 1000 Hz: with some {proposed} Hz it would be 1%" in doubt
+
+
+def test_two_times(testbed: Path) -> None:
+    """Two rows are enough, as the error for a single row says. They are too few for an estimate of the sampling error."""
+    run = prw.simulate({"time": [0.0, 1e-3], "theta1": [0.0, 1e-4], "theta2": [0.0, -1e-4]}, fmu=testbed)
+    assert len(run["roll"]) == 2 and run.sampling_errors == {} and run.doubt == ""
+    assert (
+        len(
+            prw.simulate({"time": [0.0, 1e-3, 2e-3], "theta1": 0.0 * np.ones(3), "theta2": np.zeros(3)}, fmu=testbed)[
+                "roll"
+            ]
+        )
+        == 3
+    )
+
+
 def test_wrong_motions() -> None:
     time, theta = [0.0, 1.0], [[0.0, 0.0], [1.0, 1.0]]
     for arguments, complaint in [

@@ -1,7 +1,6 @@
 //! Threads that wait for work between calls.
 
 use crate::error::Error;
-use std::hint::spin_loop;
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Arc, Once};
 use std::time::{Duration, Instant};
@@ -78,7 +77,7 @@ impl Threads {
             // The end of the scope would sleep if a thread needs a little longer.
             let begin = Instant::now();
             while running.load(Ordering::Acquire) > 0 && begin.elapsed() < Self::AWAKE {
-                spin_loop();
+                std::thread::yield_now();
             }
         });
     }
@@ -95,7 +94,7 @@ impl Threads {
             while last.elapsed() < Self::AWAKE {
                 match rayon::yield_now() {
                     Some(rayon::Yield::Executed) => last = Instant::now(),
-                    _ => spin_loop(),
+                    _ => std::thread::yield_now(),
                 }
             }
             awake.fetch_sub(1, Ordering::Relaxed);

@@ -65,12 +65,12 @@ class Run(Mapping[str, Array]):
         worst = max(self.sampling_errors, key=self.sampling_errors.__getitem__, default="")
         if not worst or (error := self.sampling_errors[worst]) < DOUBTFUL:
             return ""
-        times = float(np.sqrt(error / DOUBTFUL))
         rate = (len(self.time) - 1) / float(self.time[-1] - self.time[0])
+        needed = _rounded_up(rate * float(np.sqrt(error / DOUBTFUL)))
         rates = "; give the motors' rates omega1 and omega2, too" if self.motion.omega is None else ""
         return (
-            f"{worst} may be off by {error:.1%} of its peak, because the motors are sampled with {rate:.3g} Hz: with some "
-            f"{float(f'{times * rate:.2g}'):g} Hz it would be {DOUBTFUL:.0%}{rates}"
+            f"{worst} may be off by {error:.1%} of its peak, because the motors are sampled with "
+            f"{float(f'{rate:.3g}'):.10g} Hz: with some {needed:.10g} Hz it would be {DOUBTFUL:.0%}{rates}"
         )
 
     @property
@@ -180,8 +180,10 @@ def simulate(
         values = testbed.with_starts(given)
         check_names("outputs", names, testbed.loaded.variables)
         found = testbed.respond(moved, names, given)
-        coarse = Motion(moved.time[::2], moved.theta[::2], None if moved.omega is None else moved.omega[::2])
-        other = testbed.respond(coarse, names, given) if len(coarse.time) >= MIN_TIMES else {}
+        other: dict[str, Array] = {}
+        if len(moved.time[::2]) >= MIN_TIMES:
+            coarse = Motion(moved.time[::2], moved.theta[::2], None if moved.omega is None else moved.omega[::2])
+            other = testbed.respond(coarse, names, given)
     errors = {name: _sampling_error(found[name], other[name]) for name in other}
     run = Run(moved, found, values, errors)
     if run.doubt:
@@ -194,6 +196,13 @@ def _sampling_error(fine: Array, coarse: Array) -> float:
     of second order, so that its error is four times as large."""
     peak = float(np.abs(fine).max())
     return float(np.abs(coarse - fine[::2]).max()) / 3 / peak if peak > ROUNDING else 0.0
+
+
+def _rounded_up(number: float) -> float:
+    """The next number of two digits."""
+    digits = 10.0 ** (np.floor(np.log10(number)) - 1)
+    # Rounding errors of the division do not count.
+    return float(np.ceil(number / digits - 1e-9) * digits)
 
 
 def motion_of(source: Motion | Recording | Run | str | os.PathLike[str] | Table | None) -> Motion:

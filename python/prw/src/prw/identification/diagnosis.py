@@ -93,10 +93,11 @@ def _looks(solution: Solution, i: int, experiment: Experiment) -> Iterator[str]:
     gains, likes = [], []
     for outputs in (before.compare(first)[0].response.outputs, solution.comparisons[i].response.outputs):
         y, m = experiment.observed(outputs)[2:], experiment.measured[2:]
-        size = np.maximum(np.linalg.norm(y, axis=0), 1e-300)
+        # The square of any smaller size would be 0; channels of a testbed at rest have the size 0.
+        size, measured = (np.maximum(np.linalg.norm(values, axis=0), 1e-150) for values in (y, m))
         product = (y.conj().T @ m).real
         gains.append(np.diag(product) / size**2)
-        likes.append(product / np.outer(size, np.maximum(np.linalg.norm(m, axis=0), 1e-300)))
+        likes.append(product / np.outer(size, measured))
     angles = [j for j, name in enumerate(experiment.channels) if QUANTITIES[name] != "torque"]
     if len(angles) > 1 and all(_slip(gains[0][j]) == 1 / 57.3 and likes[0][j, j] > UNLIKE for j in angles):
         yield "theta1, theta2 look as if they were in degrees, not radians"
