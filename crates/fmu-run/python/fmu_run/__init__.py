@@ -124,25 +124,28 @@ class _Model:
             (times,), the communication points, s. At each the inputs are set, the outputs read, and the step to the next
             is taken.
         outputs
-            The variables to read, of any type but clocks.
+            The variables to read, of any type but clocks. The name of an array means all of its elements: (runs, times, ...) in the
+            results, with the dimensions of the array last. In FMI 2.0, y[1], y[2] and so on are the array y.
         inputs
             By name: (times,) for all runs, (runs, times) for each run, or a constant number; with a unit or without,
             {"theta1": (angles, "deg")}. Inputs that are not named keep their start values. An input with its own times is
             {"u": (times, values)}, values of the shape (times,) or (runs, times): between its times, a continuous variable follows the
             line, and any other keeps the earlier value; equal times are a step; before the first and after the last time the
-            value is constant. Strings and bytes are given in the same shapes.
+            value is constant. Strings and bytes are given in the same shapes. Values of a whole array have its dimensions after
+            these; a constant array has only its own.
         input_derivatives
             d/dt of inputs, in the same shapes, for FMUs of FMI 2.0 that can interpolate inputs.
         start
             Start values of parameters, states and so on by name: one for all runs or (runs,) for each run; numbers,
-            strings, bytes, enumeration items, or numbers with a unit, {"k1": (1.9, "N.m/deg")}. A structural parameter has one
+            strings, bytes, enumeration items, or numbers with a unit, {"k1": (1.9, "N.m/deg")}. A whole array has its own shape for all
+            runs, {"A": np.eye(3)}, or (runs, ...). A structural parameter has one
             value for all runs, and determines the sizes of arrays.
         every
             Keep the outputs at the first time and each `every` times after it. Default: all, or none if there are
             measures.
         measures
             Statistics of each output over all times: min, max, peak (of the magnitude), time_of_peak, mean and rms (of
-            the samples), end.
+            the samples), end. If a value is NaN, all of them except end, the last value, are NaN.
         threads
             Default: one for each processor. FMUs with at most one instance per process get one.
         read_before_set
@@ -244,7 +247,7 @@ class _Model:
             Start time, s, and stop time, if it is known.
         threads
             More than one is faster if a call takes much longer than waking a thread, about 0.01 ms: with hundreds of instances,
-            or for slow models. None takes one for each processor.
+            or for slow models. The threads look for work for 0.05 ms after a call before they sleep. None takes one for each processor.
         tolerance, log
             As in `run`; the index of a message is that of the instance. Messages are passed on at the end of a call.
 

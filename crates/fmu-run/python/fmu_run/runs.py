@@ -25,8 +25,8 @@ AT_START = " at start"
 class Runs(Mapping[str, _Array]):
     """Results of `Fmu.run`: time series by output, statistics by output and measure.
 
-    runs["roll"]: (runs, times), at the kept times. runs["roll", "peak"]: (runs,). A whole array is (runs, times, *shape), its
-    measures are (runs, *shape). Times that a run has not reached are NaN. Measures are NaN for a rejected run, and if a value is
+    runs["roll"]: (runs, times), at the kept times. runs["roll", "peak"]: (runs,). A whole array is (runs, times, ...), its
+    measures are (runs, ...). Times that a run has not reached are NaN. Measures are NaN for a rejected run, and if a value is
     NaN; for a run that the FMU ended they cover the times until then. Strings and bytes are arrays of objects; an Int64 or UInt64
     is an array of integers, or of objects if a run has not reached a time. These have None instead of NaN, and no measures.
     As a mapping, the object contains time series by output, none if only measures were requested; its truth value is

@@ -65,7 +65,7 @@ pub fn names(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
         return Ok(vec![text.extract()?]);
     }
     let of = |value: &Bound<'_, PyAny>| -> PyResult<Vec<String>> {
-        value.try_iter()?.map(|one| Ok(one?.cast::<PyString>().map_err(PyErr::from)?.extract()?)).collect()
+        value.try_iter()?.map(|one| one?.cast::<PyString>().map_err(PyErr::from)?.extract()).collect()
     };
     of(value).map_err(|error| match error.is_instance_of::<PyTypeError>(value.py()) {
         true => wrong(name, "a str or a sequence of str", value),

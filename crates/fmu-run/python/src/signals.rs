@@ -47,7 +47,7 @@ impl Signals {
             }
             let values = Numbers::of(name, &in_own_unit(system, name, &value)?)?;
             match array {
-                None => signals.push(name, &[], values, &[name.clone()], (own_times, times))?,
+                None => signals.push(name, &[], values, std::slice::from_ref(name), (own_times, times))?,
                 Some(array) => signals.push(name, &array.sizes, values, &array.names, (own_times, times))?,
             }
         }

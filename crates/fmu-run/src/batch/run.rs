@@ -24,10 +24,13 @@ pub(super) type Messages = Vec<(usize, String)>;
 /// Maximum time for [`repeat_with_logging`], in addition to the time of the runs.
 const PATIENCE: Duration = Duration::from_secs(2);
 
+/// Function that is called ten times per second.
+type OnPulse = Box<dyn Fn(&Watch) + Send + Sync>;
+
 /// Access to the progress of [`System::run`] for another thread, or for the thread that calls it.
 #[derive(Default)]
 pub struct Watch {
-    pulse: Option<Box<dyn Fn(&Self) + Send + Sync>>,
+    pulse: Option<OnPulse>,
     done: AtomicUsize,
     cancelled: AtomicBool,
     ended: Mutex<Vec<(usize, f64, Vec<f64>)>>,
