@@ -65,7 +65,7 @@ class Runs(Mapping[str, _Array]):
 
     @cached_property
     def start(self) -> dict[str, Any]:
-        """(runs,) or (runs, *shape): the given start values by name; a single string or bytes unchanged."""
+        """The given start values by name, (runs,) each, for a whole array (runs, ...); strings and exact values are unchanged."""
         return {
             name: value
             if isinstance(value, str | bytes)
