@@ -213,6 +213,23 @@ def test_results_that_are_not_a_number_are_reported(testbed, unruly):
         endless["y"]
 
 
+def test_statistics_of_outputs_that_are_not_a_number(unruly):
+    """Runs with NaN at the end, and everywhere, between runs without: no statistic of theirs is a number, and the others are right."""
+    time, measures = np.arange(11) / 10, ["min", "max", "peak", "time_of_peak", "mean", "rms", "end"]
+    slopes = np.array([np.ones(11), np.where(time < 0.35, -1.0, np.nan), np.full(11, np.nan), 2.0 * np.ones(11)])
+    with fmu_run.Fmu(unruly) as fmu:
+        runs = fmu.run(time, inputs={"slope": slopes}, outputs=["y", "slope"], measures=measures, every=1).check()
+    for measure in measures:
+        with pytest.warns(RuntimeWarning, match="is not a number in 2 finished runs, run 1 among them"):
+            found = runs["slope", measure]
+        assert np.isnan(found[1:3]).all() and np.isfinite(found[[0, 3]]).all(), measure
+        # The first output of the third run, 4, precedes the first step.
+        with pytest.warns(RuntimeWarning, match="is not a number in 2 finished runs"):
+            found = runs["y", measure]
+        assert np.isnan(found[1:3]).all() and np.isfinite(found[[0, 3]]).all(), measure
+    assert runs["y", "time_of_peak"].tolist()[::3] == [1.0, 1.0]
+
+
 def test_many_short_runs_leave_nothing_behind(testbed, tmp_path, monkeypatch):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     time, inputs = motion(20)

@@ -117,7 +117,7 @@ def test_torques_are_passed_on_after_the_motors_are_set(fmus) -> None:
         ({"controller.pitch": "testbed.theta1"}, "jacobi", "controller.pitch is input, not output"),
         ({"testbed.pitch": "testbed.roll"}, "jacobi", "testbed.roll is output, not input"),
         ({"testbed.pitch": ["controller.pitch", "controller.pitch"]}, "jacobi", "controller.pitch is fed twice"),
-        ({}, "gauss", "order must be 'dependencies' or 'jacobi', not \"gauss\""),
+        ({}, "gauss", "order must be 'dependencies' or 'jacobi', it is 'gauss'"),
     ],
 )  # fmt: skip
 def test_invalid_connections(connections, order, message) -> None:
