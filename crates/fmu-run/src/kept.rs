@@ -158,7 +158,7 @@ pub(crate) struct Trust {
 
 impl Trust {
     /// Time below which a new instance is made for each run, because no check can prove that a reset forgets nothing.
-    const LONG: Duration = Duration::from_micros(200);
+    const LONG: Duration = Duration::from_millis(1);
     /// Number of checks in which a change has to occur. The values of one run may hide what a reset forgets.
     const PROOFS: u32 = 3;
 

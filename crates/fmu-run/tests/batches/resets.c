@@ -46,7 +46,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     if (i->file < 0) return NULL;
     set_defaults(i);
     record(i, "+");
-    if (has_manner(i, "slow")) nanosleep(&(struct timespec){.tv_nsec = 400000}, NULL);
+    if (has_manner(i, "slow")) nanosleep(&(struct timespec){.tv_nsec = 1500000}, NULL);
     return i;
 }
 
