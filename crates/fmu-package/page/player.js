@@ -2,7 +2,7 @@
 
 /**
  * An image of the model at one time, next to the plots.
- * @typedef {{element: HTMLElement, draw(table: Table, time: number): void, set?(parameters: (name: string) => number): void, touch?(): void}} View
+ * @typedef {{element: HTMLElement, draw(table: Table, time: number, caption?: string): void, set?(parameters: (name: string) => number): void, touch?(): void}} View
  */
 
 /** Whether the user's system allows animations. */
@@ -14,9 +14,11 @@ const SPEEDS = new Map([["2", "2 × real time"], ["1", "real time"], ["0.5", "1/
 class Player {
   /**
    * `span` returns the time span of the plots. `advance` calculates the run until a time and returns the time that it reached.
-   * `recorded` returns the end of the time slider, `limit` the end of the run.
+   * `recorded` returns the end of the time slider, `limit` the end of the run. `other` is a run for comparison. At the end of a run that plays,
+   * `goesOn` starts another one and returns true, or returns false.
    * @param {{plots: (seek: (time: number) => void) => Plots, view: View | null, begin: number, isLooping?(): boolean, table: Table,
-   *   span(now: number): [number, number], recorded(): number, limit(): number, advance?(now: number): number, earlier?(): Table | null}} options
+   *   span(now: number): [number, number], recorded(): number, limit(): number, advance?(now: number): number, other?(): Comparison | null,
+   *   notes?(): Note[], goesOn?(): boolean}} options
    */
   constructor(options) {
     this.options = options;
@@ -42,8 +44,8 @@ class Player {
     this.pace.addEventListener("change", () => this.setSpeed(Number(this.pace.value)));
     this.late = element("span", { class: "live-late", hidden: "" });
     this.bar = element("div", { class: "live-bar" }, this.play, this.slider, this.clock, this.pace, this.late);
-    this.side = element("div", { class: "live-side" }, ...(options.view ? [options.view.element] : []), this.bar);
-    this.element = element("div", { class: "live-player" }, this.side, this.plots.element);
+    this.stage = element("div", { class: "live-stage" }, ...(options.view ? [options.view.element] : []), this.bar);
+    this.element = element("div", { class: "live-player" }, this.stage, this.plots.element);
     new ResizeObserver(() => this.requestFrame()).observe(this.element);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.requestFrame());
     new IntersectionObserver((entries) => {
@@ -56,7 +58,7 @@ class Player {
   /** @param {number} speed */
   setSpeed(speed) {
     this.speed = speed;
-    if (!SPEEDS.has(String(speed))) {
+    if (![...this.pace.options].some(({ value }) => value === String(speed))) {
       this.pace.append(element("option", { value: String(speed) }, `${Number(speed.toPrecision(2))} × real time`));
     }
     this.pace.value = String(speed);
@@ -114,7 +116,7 @@ class Player {
     }
     this.checkPace(waited, this.now - before);
     if (table.count && !(isBehind && reached < before - 1e-9)) {
-      this.plots.draw(table, this.now, ...this.options.span(this.now), this.options.earlier?.() ?? null);
+      this.plots.draw(table, this.now, ...this.options.span(this.now), this.options.other?.() ?? null, this.options.notes?.());
       view?.draw(table, this.now);
     }
     this.slider.value = String(Math.round((1000 * (this.now - begin)) / (this.options.recorded() - begin || 1)));
@@ -124,7 +126,7 @@ class Player {
     if (this.isPlaying && this.now >= limit - 1e-9 && !isBehind) {
       if (this.options.isLooping?.()) {
         this.now = begin;
-      } else {
+      } else if (!this.options.goesOn?.()) {
         this.setPlaying(false);
       }
     }
