@@ -7,99 +7,20 @@ import csv
 import io
 import os
 import re
-import shutil
 import subprocess
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import toolchain
 from built import ROOT
 from fmu_run import Fmu
 from PIL import Image
-from playwright.sync_api import Browser, CDPSession, Locator, Page, expect, sync_playwright
+from playwright.sync_api import Browser, CDPSession, expect
+from visiting import button, clock, drag, field, find_part, image, middle, until
 
-SIZE = {"width": 1000, "height": 900}
 PHONE = {"width": 360, "height": 740}
-
-
-@pytest.fixture(scope="module")
-def address(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
-    with zipfile.ZipFile(fmu) as archive:
-        path = archive.extract("documentation/index.html", tmp_path_factory.mktemp("page"))
-    return Path(path).as_uri()
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    toolchain.need("chromium")
-    with sync_playwright() as playwright:
-        path = shutil.which("chromium")
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        yield browser
-        browser.close()
-
-
-@pytest.fixture
-def visit(browser: Browser, address: str) -> Iterator[Any]:
-    """Opens the page in a context with these settings. Only the page may be requested, and no script may fail."""
-    requested: list[str] = []
-    contexts = []
-
-    def visit(fragment: str = "", script: str = "", **settings: Any) -> Page:
-        contexts.append(browser.new_context(**{"viewport": SIZE, **settings}))
-        page = contexts[-1].new_page()
-        page.route("**/*", lambda route: route.continue_())
-        page.on("request", lambda request: requested.append(request.url))
-        page.on("pageerror", lambda error: requested.append(f"error: {error}"))
-        # The browser reports violations of the page's policy there.
-        page.on("console", lambda message: requested.append(message.text) if message.type == "error" else None)
-        if script:
-            page.add_init_script(script)
-        page.goto(address + fragment)
-        return page
-
-    yield visit
-    for context in contexts:
-        context.close()
-    assert {url.split("#")[0] for url in requested if not url.startswith("blob:")} == {address}
-
-
-def drawn(page: Page) -> None:
-    """Waits until the next frame shows the effect of the last action."""
-    page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
-
-
-def until(page: Page, condition: str) -> None:
-    """Waits for a condition; the page's policy forbids Playwright to do that in the page."""
-    for _ in range(1500):
-        if page.evaluate(condition):
-            return
-        page.wait_for_timeout(20)
-    raise AssertionError(f"the condition stays false: {condition}")
-
-
-def clock(page: Page) -> float:
-    drawn(page)
-    return float(page.locator(".live-clock").inner_text().split()[0])
-
-
-def middle(element: Locator) -> tuple[float, float]:
-    box = element.bounding_box()
-    assert box
-    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-
-
-def image(page: Page) -> str:
-    drawn(page)
-    return str(page.locator(".live-scene").evaluate("canvas => canvas.toDataURL()"))
-
-
-def button(page: Page, name: str) -> Locator:
-    return page.locator(".live").get_by_role("button", name=name, exact=True)
 
 
 def test_with_a_mouse(visit: Any, tmp_path: Path) -> None:
@@ -151,32 +72,11 @@ def test_with_a_mouse(visit: Any, tmp_path: Path) -> None:
     drag(again, (x, y + 120), (x + 80, y + 120))
     assert image(again) != before
     again.get_by_label("Motion", exact=True).select_option("hand")
-    find_motor(again)
+    find_part(again)
     again.mouse.down()
     again.mouse.move(*(100, 100), steps=4)
     again.mouse.up()
     expect(again.locator("#live-theta1")).not_to_have_value("0")
-
-
-def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> None:
-    page.mouse.move(*start)
-    page.mouse.down()
-    page.mouse.move(*end, steps=4)
-    page.mouse.up()
-
-
-def find_motor(page: Page) -> tuple[float, float]:
-    """Returns the position of motor 1 in the image, found by the cursor's shape. The mouse stays there."""
-    scene = page.locator(".live-scene")
-    box = scene.bounding_box()
-    assert box
-    for x in range(10, int(box["width"] / 2), 10):
-        for y in range(20, int(box["height"]), 20):
-            page.mouse.move(box["x"] + x, box["y"] + y)
-            if scene.evaluate("canvas => canvas.style.cursor") == "ns-resize":
-                page.mouse.move(box["x"] + x + 4, box["y"] + y + 4)
-                return box["x"] + x + 4, box["y"] + y + 4
-    raise AssertionError("no motor is found")
 
 
 def swipe(touch: CDPSession, start: tuple[float, float], shift: tuple[float, float]) -> None:
@@ -202,7 +102,7 @@ def test_with_a_finger_on_a_phone(visit: Any) -> None:
     assert image(page) != before
     swipe(touch, (x, y + 40), (-120, 0))
     # A finger on a motor turns the motor, and the page does not scroll.
-    motor, scrolled = find_motor(page), page.evaluate("scrollY")
+    motor, scrolled = find_part(page), page.evaluate("scrollY")
     swipe(touch, motor, (0, 60))
     until(page, "document.querySelector('#live-theta1').value > 10")
     assert page.evaluate("scrollY") == scrolled
@@ -285,10 +185,6 @@ def test_the_page_reports_why_it_cannot_run_the_fmu(visit: Any, script: str, rea
     expect(page.locator("main h2").first).to_have_text("The testbed")
 
 
-def field(page: Page, name: str) -> Locator:
-    return page.locator(f"#live-{name}")
-
-
 def test_a_field_can_be_filled_in_while_a_motion_plays(visit: Any) -> None:
     page = visit("#try&motion=chirp&speed=0.2")
     field(page, "theta1").press_sequentially("30", delay=150)
@@ -345,7 +241,7 @@ def test_a_motor_follows_the_hand(visit: Any) -> None:
         scene.focus()
         for _ in range(turns):
             page.keyboard.press("ArrowLeft")
-        motor = find_motor(page)
+        motor = find_part(page)
         drag(page, motor, (motor[0], motor[1] + 40))
         page.wait_for_timeout(500)
         moved = [float(field(page, name).input_value()) for name in ("theta1", "theta2")]
@@ -380,42 +276,6 @@ WebAssembly.Instance = function (...all) {
   } };
 };
 """
-
-
-def test_the_guide(visit: Any, tmp_path: Path) -> None:
-    """Each paragraph shows its run. Its numbers can be dragged or changed by keys, and are included in the link."""
-    page = visit("#try", reduced_motion="reduce")
-    response = page.locator(".live-plots .live-plots .live-number")
-    for name, motion in [("1. Pitch", "pitch"), ("2. Roll", "roll"), ("4. Shape", "shaped"), ("3. Shake", "shake")]:
-        button(page, name).click()
-        expect(page.get_by_label("Motion", exact=True)).to_have_value(motion)
-        expect(page.locator("[aria-pressed=true]")).to_have_text(name)
-        assert response.is_visible() == (motion == "shake")
-    frequency = page.get_by_role("slider", name="Frequency")
-    for key, value in [("Home", 0.5), ("ArrowRight", 0.6), ("PageUp", 1.6), ("ArrowDown", 1.5), ("End", 15)]:
-        frequency.press(key)
-        assert float(frequency.get_attribute("aria-valuenow") or "") == value, key
-    start = middle(frequency)
-    drag(page, start, (start[0] - 200, start[1]))
-    expect(frequency).to_have_text("3.4\u00a0Hz")
-    stiffness = page.get_by_role("slider", name="Stiffness k2").and_(page.locator(".live-dial:visible"))
-    stiffness.press("PageUp")
-    expect(field(page, "k2")).to_have_value("0.5")
-    # The response at the cursor equals the response of the run, in which the motors move by 4 degrees.
-    with page.expect_download() as download:
-        button(page, "Save as CSV").click()
-    download.value.save_as(tmp_path / "run.csv")
-    run = np.genfromtxt(tmp_path / "run.csv", delimiter=",", names=True, skip_header=2)
-    swing = np.ptp(run["pitch"][run["time"] > 2]) / np.deg2rad(4)
-    assert float(response.inner_text()) == pytest.approx(swing, rel=5e-3)
-    # A click on the response chooses its frequency.
-    page.mouse.click(*middle(page.locator(".live-plots .live-plots canvas")))
-    assert 7 < float(frequency.get_attribute("aria-valuenow") or "") < 8.5
-    button(page, "Link to this").click()
-    expect(page.locator(".live-status")).to_contain_text("contains these settings")
-    again = visit(page.evaluate("location.hash"), reduced_motion="reduce")
-    expect(again.get_by_role("slider", name="Frequency")).to_have_text(frequency.inner_text())
-    expect(field(again, "k2")).to_have_value("0.5")
 
 
 def test_a_run_that_the_fmu_ends(visit: Any) -> None:

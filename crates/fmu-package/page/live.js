@@ -10,14 +10,14 @@
  *   lead: Part[], guide: Chapter[], numbers: Record<string, number>, limits?: Dial[], near: Record<string, string>, panels: Panel[], isMinor(name: string): boolean,
  *   isAtRest?: boolean, companion?: Companion,
  *   follow(inputs: Record<string, number>, targets: Map<string, number>, size: number): void,
- *   view(move: (increments: Record<string, number>) => void, value: (name: string) => number): View & {controls?: HTMLElement[], settings?: Map<string, Setting>},
+ *   view(move: (increments: Record<string, number>) => void, value: (name: string) => number, pace: (speed: number) => void): View & {controls?: HTMLElement[], settings?: Map<string, Setting>},
  *   response?(change: (name: string, value: number) => void): ResponsePlot,
  * }} AddOn
  * A setting of the view in a link: its value, its value as the page opens, and a function that sets it and returns whether the value is possible.
  * @typedef {{value(): string, preset: string, set(value: string): boolean}} Setting
  * A plot above the others, the value of its curve at a frequency, and the highest point of its curve now and with the values as the page opens.
  * @typedef {{element: HTMLElement, draw(motion: Motion | null, time: number, start: Map<Variable, number | string>): void,
- *   at(frequency: number): number, peaks(): {now: number[], preset: number[]} | null}} ResponsePlot
+ *   update(start: Map<Variable, number | string>): void, at(frequency: number): number, peaks(): {now: number[], preset: number[]} | null}} ResponsePlot
  */
 
 /** Add-ons by model identifier. @type {Record<string, (own: Package, others: Package[]) => AddOn>} */
@@ -66,7 +66,7 @@ class Trial {
       this.recalculate();
     });
     this.guide = new Guide(this.addOn.lead, this.addOn.guide, (chapter) => this.follow(chapter), (name, value) => this.change(name, value));
-    this.view = this.addOn.view((increments) => this.drag(increments), (name) => this.value(name));
+    this.view = this.addOn.view((increments) => this.drag(increments), (name) => this.value(name), (speed) => this.player.setSpeed(speed));
     this.response = this.addOn.response?.((name, value) => this.change(name, value));
     this.player = this.createPlayer();
   }
@@ -83,7 +83,7 @@ class Trial {
       return this.addOn.numbers[name];
     }
     const { session } = this;
-    const own = one.causality === "parameter" ? Number(session.parameter(one)) : session.motion ? session.table.at(name, this.player.now) : (session.targets.get(name) ?? startOf(one));
+    const own = one.causality === "parameter" ? Number(session.parameter(one)) : session.motion ? session.table.column(name)[session.table.row(this.player.now)] : (session.targets.get(name) ?? startOf(one));
     return own * one.factor + one.offset;
   }
 
@@ -151,6 +151,9 @@ class Trial {
     const { session, addOn } = this;
     if (session.error || (session.motion && !this.isWhole)) {
       return;
+    }
+    if (session.motion?.frequency) {
+      this.response?.update(session.start);
     }
     this.guide.write({
       value: (name) => this.value(name),

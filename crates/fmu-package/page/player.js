@@ -42,7 +42,7 @@ class Player {
     this.pace.append(...[...SPEEDS].map(([value, text]) => element("option", { value }, text)));
     this.pace.value = "1";
     this.pace.addEventListener("change", () => this.setSpeed(Number(this.pace.value)));
-    this.late = element("span", { class: "live-late", hidden: "" });
+    this.late = element("span", { class: "live-late" });
     this.bar = element("div", { class: "live-bar" }, this.play, this.slider, this.clock, this.pace, this.late);
     this.stage = element("div", { class: "live-stage" }, ...(options.view ? [options.view.element] : []), this.bar);
     this.element = element("div", { class: "live-player" }, this.stage, this.plots.element);
@@ -72,7 +72,7 @@ class Player {
     }
     this.isPlaying = isPlaying;
     this.paced = { passed: 0, played: 0 };
-    this.late.hidden = true;
+    this.late.textContent = "";
     this.play.textContent = isPlaying ? "Pause" : "Play";
     this.last = 0;
     this.requestFrame();
@@ -144,8 +144,7 @@ class Player {
     this.paced.played += played;
     if (this.paced.passed >= 1) {
       const pace = this.paced.played / this.paced.passed;
-      this.late.hidden = pace > 0.9 * this.speed;
-      this.late.textContent = `slower here: ${Number(pace.toPrecision(2))} \u00d7 real time`;
+      this.late.textContent = pace > 0.9 * this.speed ? "" : `slower here: ${Number(pace.toPrecision(2))} \u00d7 real time`;
       this.paced = { passed: 0, played: 0 };
     }
   }

@@ -257,11 +257,11 @@ class Plots {
       const value = (/** @type {number} */ row) => y(curve.factor * column[row] + (curve.offset || 0));
       const until = Math.min(table.row(now), last);
       pen.strokeStyle = colour(curve.colour);
+      pen.setLineDash(curve.isGoal ? [1.5, 3] : isDashed(panel, index) ? [5, 3] : []);
       pen.globalAlpha = 0.35;
       drawCurve(pen, table.column("time"), x, value, until, last, curve.isStepwise);
       pen.globalAlpha = 1;
       pen.lineWidth = curve.isGoal ? 1.3 : 1.8;
-      pen.setLineDash(curve.isGoal ? [1.5, 3] : isDashed(panel, index) ? [5, 3] : []);
       drawCurve(pen, table.column("time"), x, value, first, until, curve.isStepwise);
       pen.setLineDash([]);
       pen.lineWidth = 1;

@@ -61,8 +61,7 @@ const WHAT_ONE = [
 ];
 /** @type {Part[]} */
 const WHY_ONE = [
-  "Each motor drives only its own side of a cam in the middle. One side alone carries the cam along half of the way, and that tilts the ring; because the other side holds on, the cam must also roll, and the gripper is on the cam. ",
-  ({ value }) => (value("N") === value("M") ? "" : `${value("N")} rollers on each side push ${value("M")} lobes of the cam, so the roll is ${fraction(value("N"), value("M"))} of what equal numbers would give.`),
+  "The cam in the middle is held between the two sides, like a pencil between two palms. When one side moves and the other rests, the cam rolls along the side that rests, and its axis moves half as far as the moving side. The axis carries the ring along: that is the pitch. The rolling turns the gripper, which is fixed to the cam: that is the roll.",
 ];
 /** @type {Part[]} */
 const WHAT_BOTH = [
@@ -71,7 +70,7 @@ const WHAT_BOTH = [
 ];
 /** @type {Part[]} */
 const WHY_BOTH = [
-  "Hold a pencil upright between your palms. Palms that move together carry it along; palms that move against each other roll it. The cam is the pencil, and the palms are two discs ",
+  "Hold a pencil upright between your palms: palms that move together carry it along; palms that move against each other roll it. In the machine the cam is the pencil, and the palms are two discs ",
   ({ value }) => `with ${value("N")} ${value("N") === 1 ? "roller" : "rollers"} each, which push the ${value("M")} ${value("M") === 1 ? "lobe" : "lobes"} of the cam as the teeth of gears do. `,
   "\u201cLook inside\u201d shows them.",
 ];

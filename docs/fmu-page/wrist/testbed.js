@@ -112,7 +112,7 @@ class Resonance {
     const find = (/** @type {string} */ name) => /** @type {Variable} */ (own.description.byName.get(name));
     this.motors = this.fmu.group(MOTORS.map(find));
     this.pitch = this.fmu.group([find("pitch")]);
-    this.plots = new Plots([{ title: "How far the wrist swings, as a multiple of the motors\u2019 swing", unit: "", isNoted: true, curves: [{ name: "gain", label: "at this frequency", colour: "curve-3", factor: 1 }] }], choose, "frequency (Hz)");
+    this.plots = new Plots([{ title: "Swing of the wrist, as a multiple of the motors\u2019", unit: "", isNoted: true, curves: [{ name: "gain", label: "at this frequency", colour: "curve-3", factor: 1 }] }], choose, "frequency (Hz)");
     this.element = this.plots.element;
     this.key = "";
     /** Responses with the parameters as the page opens, and with the current parameters. @type {(Table | undefined)[]} */
@@ -259,12 +259,12 @@ addOns.prw_testbed = (own, others) => {
         inputs[omega] = (inputs[omega] - FOLLOW * slope * size) * decay;
       }
     },
-    view: (turn, value) =>
+    view: (turn, value, pace) =>
       wristView(({ theta1 = 0, theta2 = 0, pitch = 0, roll = 0 }) => {
         // The inverse of eq. (1): the motor angles of a pitch and a roll angle.
         const half = (value("M") / value("N")) * roll;
         const all = { theta1: theta1 + pitch + half, theta2: theta2 + pitch - half };
         turn(pitch || roll ? all : theta1 ? { theta1 } : { theta2 });
-      }, ["motors", "gripper"]),
+      }, ["motors", "gripper"], pace),
   };
 };

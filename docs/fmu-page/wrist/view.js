@@ -2,16 +2,19 @@
 
 /**
  * The view, with the number of lobes and rollers of these parameters.
- * @param {Move} move @param {("motors" | "gripper")[]} handles parts that can be dragged
+ * @param {Move} move @param {("motors" | "gripper")[]} handles parts that can be dragged @param {(speed: number) => void} pace sets the speed of the run
  */
-function wristView(move, handles) {
+function wristView(move, handles, pace) {
   const wrist = new Wrist(WRIST, move, handles);
   const inside = element("button", { type: "button", "aria-pressed": "false" }, "Look inside");
   const lookInside = (/** @type {boolean} */ isInside) => {
     inside.setAttribute("aria-pressed", String(isInside));
     wrist.lookInside(isInside);
   };
-  inside.addEventListener("click", () => lookInside(!wrist.isInside));
+  inside.addEventListener("click", () => {
+    lookInside(!wrist.isInside);
+    pace(wrist.isInside ? 0.2 : 1);
+  });
   const boxes = Object.entries(PARTS_SHOWN).map(([part, label]) => {
     const box = element("input", { type: "checkbox", checked: "", "data-part": part });
     box.addEventListener("change", () => wrist.show(part, box.checked));

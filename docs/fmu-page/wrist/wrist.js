@@ -433,8 +433,8 @@ class Wrist {
     const rotation = multiplied([1, 0, 0, 0, ce, -se, 0, se, ce], [ca, 0, -sa, 0, 1, 0, sa, 0, ca]);
     const { width, height } = sizeOf(this.element);
     if (this.isInside) {
-      const scale = Math.min(width / 3.1, height / 2.7);
-      return { rotation, scale, centre: [0.5 * width, 0.5 * height + 0.3 * scale * ce] };
+      const scale = Math.min(width / 3.4, height / 2.2);
+      return { rotation, scale, centre: [0.5 * width, 0.5 * height + 0.42 * scale * ce] };
     }
     return { rotation, scale: Math.min(width / 10.3, height / 5.2), centre: [0.47 * width, 0.53 * height] };
   }
@@ -583,10 +583,10 @@ class Wrist {
       const torques = SHAFTS.map(({ torque }) => `${format(at(torque), this.hottest.most)}`);
       label(`the redder, the more torque: motor 1 ${torques[0]}, motor 2 ${torques[1]} N\u00b7m`, [8, 20], "soft", "left");
       if (isOn("carriers")) {
-        SHAFTS.forEach(({ side }, index) => label(`rollers of motor ${index + 1}`, this.project([side * 0.98, -0.98, 0]), `text-${index + 1}`, "center"));
+        SHAFTS.forEach(({ side }, index) => label(`rollers of motor ${index + 1}`, this.project([side * 1.5, 0.24, 0]), `text-${index + 1}`, "center"));
       }
       if (isOn("cam")) {
-        label("cam of the gripper", this.project([0, 1.62, 0]), "text-4", "center");
+        label("cam of the gripper", this.project([0.62, 1.05, 0]), "text-4", "left");
       }
     } else {
       if (isOn("motors")) {
@@ -594,10 +594,10 @@ class Wrist {
         label("motor 2", this.project([4.1, 0.95, 0]), "text-2", "center");
       }
       if (isOn("ring")) {
-        label("ring: pitch", [width - 8, 20], "text-3", "right");
+        label("ring: pitch", this.project(transformed(this.turns.pitch, [1.05, -1.25, 0])), "text-3", "left");
       }
       if (isOn("gripper")) {
-        label("gripper: roll", [width - 8, 38], "text-4", "right");
+        label("gripper: roll", this.project(transformed(this.turns.output, [0, 2, 0])).map((value, axis) => value + (axis ? 0 : 0.75 * this.camera().scale)), "text-4", "left");
       }
       if (isOn("couplings")) {
         label(`couplings\u2019 twist drawn \u00d7 ${twist}`, [8, 20], "soft", "left");
