@@ -89,7 +89,9 @@ def test_one_motor_does_both(visit: Any, fmu: Path) -> None:
         found, rows = replayed(fmu, saved(page), **counts)
         numbers = [float(one) for one in re.findall(r"(-?[\d.]+)°", text(page))]
         assert numbers[0] == angle and not rows["theta2"].any()
-        assert numbers[1:] == pytest.approx([float(np.rad2deg(np.interp(1.9, found["time"], found[name]))) for name in ("pitch", "roll")], abs=0.06)
+        assert numbers[1:] == pytest.approx(
+            [float(np.rad2deg(np.interp(1.9, found["time"], found[name]))) for name in ("pitch", "roll")], abs=0.06
+        )
 
 
 def test_mean_and_difference(visit: Any, fmu: Path) -> None:

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from built import ROOT
+from built import ROOT, built
 from fmu_run import Fmu
 from PIL import Image
-from playwright.sync_api import Browser, CDPSession, expect
-from visiting import button, clock, drag, field, find_part, image, middle, until
+from playwright.sync_api import Browser, CDPSession, Page, expect
+from visiting import button, clock, drag, field, find_part, image, middle, saved, until
 
 PHONE = {"width": 360, "height": 740}
 
@@ -32,7 +32,7 @@ def test_with_a_mouse(visit: Any, tmp_path: Path) -> None:
     assert clock(page) < 0.5
     button(page, "Pause").click()
     stiffness = page.locator(".live-row", has_text=re.compile("^k1"))
-    expect(stiffness).to_contain_text("N.m/deg > 0")
+    expect(stiffness).to_contain_text("N·m/° > 0")
     stiffness.get_by_role("spinbutton").fill("1.5")
     stiffness.get_by_role("spinbutton").press("Enter")
     # Sets the time by its slider and by a click on a plot.
@@ -54,14 +54,18 @@ def test_with_a_mouse(visit: Any, tmp_path: Path) -> None:
     assert values["use_omega"] == "1" and values["M"] == "4" and float(values["k1"]) == pytest.approx(np.rad2deg(1.5))
     rows = list(csv.reader(lines))
     assert rows[0][:3] == ["time", "theta1", "theta2"] and len(rows) == 1002
-    page.get_by_label("Enlargement").select_option("5")
+    page.get_by_text("Parts", exact=True).click()
+    page.get_by_label("twist of the couplings").select_option("5")
+    page.get_by_label("ring").uncheck()
     button(page, "Link to this").click()
     expect(page.locator(".live-status")).to_contain_text("contains these settings")
     again = visit(page.evaluate("location.hash"))
     expect(again.get_by_label("Motion", exact=True)).to_have_value("step")
     expect(again.locator("#live-k1")).to_have_value("1.5")
     expect(again.get_by_label("Speed")).to_have_value("0.05")
-    expect(again.get_by_label("Enlargement")).to_have_value("5")
+    again.get_by_text("Parts", exact=True).click()
+    expect(again.get_by_label("twist of the couplings")).to_have_value("5")
+    expect(again.get_by_label("ring")).not_to_be_checked()
     button(again, "Default parameters").click()
     expect(again.locator("#live-k1")).not_to_have_value("1.5")
     expect(again.locator("#live-use_omega")).not_to_be_checked()
@@ -135,7 +139,7 @@ def test_with_the_keyboard_only(visit: Any) -> None:
     assert list(reached) == list(dict.fromkeys(expected))
     page.get_by_label("Motion", exact=True).focus()
     page.keyboard.press("ArrowDown")
-    expect(page.get_by_label("Motion", exact=True)).to_have_value("move")
+    expect(page.get_by_label("Motion", exact=True)).to_have_value("stop")
     until(page, "parseFloat(document.querySelector('.live-clock').textContent) > 0")
     button(page, "Pause").focus()
     page.keyboard.press("Space")
@@ -194,42 +198,208 @@ def test_a_field_can_be_filled_in_while_a_motion_plays(visit: Any) -> None:
     until(page, "document.querySelector('.live-player > .live-plots > figure .live-number').textContent > 29")
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("k1", "-1", "k1 must be greater than 0 N·m/°, but it is −1 N·m/°"),
+        ("c1", "-0.5", "c1 must be at least 0 N·m·s/°, but it is −0.5 N·m·s/°"),
+        ("theta1", "1e308", "Motor 1 must be from −36000 to 36000°, but it is 1e+308°"),
+        ("M", "2.5", "M must be an integer below 2³¹, but it is 2.5"),
+        ("M", "0", "M must be at least 1, but it is 0"),
+        ("J2", "", ""),
+    ],
+)
+def test_an_impossible_value(visit: Any, name: str, value: str, message: str) -> None:
+    """The field says its name, its unit and its range, and the run goes on with the value before."""
+    page = visit("#try&motion=chirp&speed=0.2", viewport={"width": 1300, "height": 900})
+    page.locator(".live-parameters").evaluate("e => e.open = true")
+    before = saved(page).splitlines()[1]
+    field(page, name).fill(value)
+    field(page, name).press("Enter")
+    expect(page.locator(f"#live-{name}-message")).to_have_text(message)
+    assert field(page, name).get_attribute("aria-invalid") == ("true" if message else None)
+    expect(page.locator(".live-rejected")).to_have_count(0)
+    assert saved(page).splitlines()[1] == before
+    start = clock(page)
+    until(page, f"parseFloat(document.querySelector('.live-clock').textContent) > {start + 0.02}")
+    if message:
+        field(page, name).fill("2")
+        field(page, name).press("Enter")
+        expect(page.locator(f"#live-{name}-message")).to_have_text("")
+        expect(field(page, name)).not_to_have_attribute("aria-invalid", "true")
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("speed=1e9", "speed must be from 0.001 to 100, but it is 1e9"),
+        ("speed=fast", "speed must be from 0.001 to 100, but it is fast"),
+        ("frequency=-5", "Frequency must be from 0.5 to 15\u00a0Hz, but it is -5"),
+        ("k1=-5", "k1 must be greater than 0\u00a0N·m/°, but it is −0.0872665\u00a0N·m/°"),
+        ("M=99999999999", "M must be an integer below 2³¹, but it is 100000000000"),
+        ("theta1=1e300", "Motor 1 must be from −36000 to 36000°, but it is 5.72958e+301°"),
+        ("motion=dance", "motion must be one of the list below, but it is dance"),
+        ("twist=3", "twist cannot be 3"),
+        ("off=wheels", "off cannot be wheels"),
+        ("k9=1", "there is no k9"),
+    ],
+)
+def test_an_impossible_value_in_a_link(visit: Any, setting: str, message: str) -> None:
+    name, _, _ = setting.partition("=")
+    page = visit(f"#try&{'' if name == 'motion' else 'motion=shake&'}{setting}")
+    expect(page.locator(".live-status.live-error")).to_have_text(
+        f"The link is applied without these values: {message}."
+    )
+    expect(page.get_by_label("Speed")).to_have_value("1")
+    assert saved(page).count("\n") > 1000
+
+
+#: The module rejects motor angles above 1 rad.
+REJECTING = """
+const { Instance } = WebAssembly;
+WebAssembly.Instance = function (...all) {
+  const { exports } = new Instance(...all);
+  return { exports: { ...exports,
+    fmi2SetReal: (fmu, references, count, values) => count === 4 && [...new Float64Array(exports.memory.buffer, values, 2)].some((angle) => angle > 1)
+      ? 3 : exports.fmi2SetReal(fmu, references, count, values),
+  } };
+};
+"""
+
+
 def test_a_value_that_the_fmu_rejects(visit: Any) -> None:
     """The run stops until another value is set, and continues from there."""
-    page = visit("#try&motion=hand&theta1=0.5&speed=1")
+    page = visit("#try&motion=hand&theta1=0.5&speed=1", script=REJECTING)
     page.locator(".live-clock").wait_for()
     until(page, "parseFloat(document.querySelector('.live-clock').textContent) > 0.1")
-    for name, wrong, right in [("theta1", "1e308", "20"), ("k1", "0", "1.5")]:
-        before = field(page, name).input_value()
-        field(page, name).fill(wrong)
-        field(page, name).press("Enter")
-        expect(field(page, name)).to_have_attribute("aria-invalid", "true")
-        expect(page.locator(f"#live-{name}-message")).to_have_text(f"The FMU rejects this value of {name}.")
-        expect(page.locator(".live-rejected")).to_have_count(1)
-        stopped = clock(page)
-        page.wait_for_timeout(300)
-        assert clock(page) == stopped, before
-        field(page, name).fill(right)
-        field(page, name).press("Enter")
-        expect(page.locator(".live-rejected")).to_have_count(0)
-        expect(field(page, name)).not_to_have_attribute("aria-invalid", "true")
-        button(page, "Pause").wait_for() if name == "theta1" else button(page, "Play").click()
-        until(page, f"parseFloat(document.querySelector('.live-clock').textContent) > {stopped + 0.05}")
+    field(page, "theta1").fill("80")
+    field(page, "theta1").press("Enter")
+    expect(field(page, "theta1")).to_have_attribute("aria-invalid", "true")
+    expect(page.locator("#live-theta1-message")).to_have_text("The FMU rejects this value of Motor 1.")
+    expect(page.locator(".live-status")).to_contain_text("The FMU rejects this value of Motor 1")
+    expect(page.locator(".live-rejected")).to_have_count(1)
+    stopped = clock(page)
+    page.wait_for_timeout(300)
+    assert clock(page) == stopped
+    field(page, "theta1").fill("20")
+    field(page, "theta1").press("Enter")
+    expect(page.locator(".live-rejected")).to_have_count(0)
+    expect(field(page, "theta1")).not_to_have_attribute("aria-invalid", "true")
+    button(page, "Pause").wait_for()
+    until(page, f"parseFloat(document.querySelector('.live-clock').textContent) > {stopped + 0.05}")
 
 
-def test_integers_are_integers(visit: Any) -> None:
-    page = visit("#try&motion=fig4&M=99999999999")
-    expect(page.locator("#live-M-message")).to_contain_text("The link sets M = 99999999999; it must be an integer")
-    expect(field(page, "M")).to_have_value("4")
+def test_the_cam_has_as_many_lobes_as_the_fmu(visit: Any) -> None:
+    page = visit("#try&motion=fig4", reduced_motion="reduce")
     page.locator(".live-parameters").evaluate("e => e.open = true")
-    field(page, "M").fill("2.5")
-    field(page, "M").press("Enter")
-    expect(page.locator("#live-M-message")).to_have_text("M must be an integer below 2\u00b3\u00b9")
     before = image(page)
     field(page, "M").fill("6")
     field(page, "M").press("Enter")
-    expect(page.locator("#live-M-message")).to_have_text("")
     assert image(page) != before
+
+
+def motors_and_wrist(page: Page) -> tuple[float, float, float, float]:
+    """Motor angles of the sliders, and pitch and roll at the end of the run, deg."""
+    rows = np.genfromtxt(io.StringIO(saved(page)), delimiter=",", names=True, skip_header=2)
+    motors = (float(field(page, name).input_value()) for name in ("theta1", "theta2"))
+    return (*motors, *(float(np.rad2deg(rows[name][-1])) for name in ("pitch", "roll")))
+
+
+def test_the_gripper_follows_the_hand(visit: Any) -> None:
+    """A drag to the side rolls the wrist, a drag down pitches it, and the motors turn to the angles of the inverse of eq. (1)."""
+    for turns in (0, 36):
+        page = visit("#try&motion=hand")
+        page.locator(".live-scene").focus()
+        for _ in range(turns):
+            page.keyboard.press("ArrowLeft")
+        gripper = find_part(page, "move")
+        drag(page, gripper, (gripper[0] + 25, gripper[1]))
+        page.wait_for_timeout(2500)
+        theta1, theta2, pitch, roll = motors_and_wrist(page)
+        assert (pitch, roll) == pytest.approx(((theta1 + theta2) / 2, 7 / 8 * (theta1 - theta2)), abs=0.5)
+        # The side of the gripper that faces the viewer moves to the right, from the front and from behind.
+        assert abs(pitch) < 0.5 and roll > 20
+        gripper = find_part(page, "move")
+        drag(page, gripper, (gripper[0], gripper[1] + 30))
+        page.wait_for_timeout(2500)
+        theta1, theta2, pitch, roll_after = motors_and_wrist(page)
+        # From the front the gripper comes towards the viewer, and from behind, too.
+        assert (pitch > 10) if turns == 0 else (pitch < -10)
+        assert roll_after == pytest.approx(roll, abs=0.5)
+        says = page.locator(".live-what p.live-chosen").inner_text().replace("−", "-")
+        assert [float(one) for one in re.findall(r"(-?[\d.]+)°", says)] == pytest.approx(
+            [pitch, roll_after, theta1, theta2], abs=0.3
+        )
+
+
+def test_a_run_by_hand_goes_on(visit: Any) -> None:
+    """After two minutes a new run begins where the last one ended, and the page says so."""
+    page = visit("#try&motion=hand&theta1=0.3&speed=100")
+    expect(page.locator(".live-status")).to_contain_text("a new one has begun where the last one ended", timeout=60000)
+    expect(button(page, "Pause")).to_be_visible()
+    button(page, "Pause").click()
+    expect(field(page, "theta1")).to_have_value("17.19")
+    rows = np.genfromtxt(io.StringIO(saved(page)), delimiter=",", names=True, skip_header=2)
+    assert np.abs(rows["theta1"] - 0.3).max() < 1e-6 and np.abs(rows["pitch"] - 0.15).max() < 1e-6
+
+
+def test_the_address_and_back(visit: Any) -> None:
+    """Each address shows what it says; a link to the run does not restart it."""
+    page = visit("#try&motion=chirp&speed=0.2")
+    button(page, "Pause").wait_for()
+    until(page, "parseFloat(document.querySelector('.live-clock').textContent) > 0.1")
+    stiffness = field(page, "k1")
+    stiffness.fill("1.5")
+    stiffness.press("Enter")
+    entries, before = page.evaluate("history.length"), clock(page)
+    button(page, "Link to this").click()
+    assert "motion=chirp" in page.evaluate("location.hash") and "k1=85.9" in page.evaluate("location.hash")
+    assert page.evaluate("history.length") == entries and before <= clock(page) < before + 2
+    expect(button(page, "Pause")).to_be_visible()
+    button(page, "3. Resonance").click()
+    button(page, "2. Both motors").click()
+    for motion, pressed, value in [("shake", 1, "2.11"), ("chirp", 0, "1.5")]:
+        page.go_back()
+        expect(page.get_by_label("Motion", exact=True)).to_have_value(motion)
+        expect(page.locator("[aria-pressed=true]")).to_have_count(pressed)
+        expect(stiffness).to_have_value(value)
+    page.go_forward()
+    expect(page.get_by_label("Motion", exact=True)).to_have_value("shake")
+    # A link within the page leaves the run as it is.
+    frequency = page.get_by_role("slider", name="Frequency")
+    frequency.press("ArrowRight")
+    page.get_by_role("link", name="The equations").click()
+    page.go_back()
+    expect(frequency).to_have_text("1.05\u00a0Hz")
+
+
+def test_the_controllers_page_runs_the_loop(visit: Any, controllers: str) -> None:
+    """The testbed runs next to the controller: the wrist goes where it is wanted, also by hand."""
+    page = visit(at=controllers)
+    button(page, "Pause").click()
+    rows = np.genfromtxt(io.StringIO(saved(page)), delimiter=",", names=True, skip_header=2)
+    late = np.searchsorted(rows["time"], 1.85)
+    assert np.rad2deg([rows["pitch"][late], rows["roll"][late]]) == pytest.approx([25, 50], abs=0.1)
+    with Fmu(built("prw_controller.fmu")) as controller, Fmu(built("prw_testbed.fmu")) as testbed:
+        motors, measured = (
+            ("theta1", "theta2", "omega1", "omega2"),
+            ("pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2"),
+        )
+        loop, wrist = controller.instances(), testbed.instances(start={"use_omega": True})
+        for number, row in enumerate(rows[:1500]):
+            np.testing.assert_array_equal(wrist.get(measured)[0], [row[name] for name in measured])
+            loop.set(("pitch_ref", "roll_ref", *measured), [row[name] for name in ("pitch_ref", "roll_ref", *measured)])
+            np.testing.assert_array_equal(loop.get(motors)[0], [row[name] for name in motors], str(number))
+            wrist.set(motors, loop.get(motors)[0])
+            for instance in (loop, wrist):
+                instance.step(to=rows["time"][number + 1])
+    page.get_by_label("Goals", exact=True).select_option("hand")
+    field(page, "pitch_ref").fill("12")
+    field(page, "pitch_ref").press("Enter")
+    page.wait_for_timeout(1500)
+    button(page, "Pause").click()
+    rows = np.genfromtxt(io.StringIO(saved(page)), delimiter=",", names=True, skip_header=2)
+    assert np.rad2deg(rows["pitch"][-1]) == pytest.approx(12, abs=0.3)
 
 
 def test_a_motor_follows_the_hand(visit: Any) -> None:

@@ -44,6 +44,11 @@ class Guide {
     this.texts.forEach((both, index) => both.forEach((text) => text.classList.toggle("live-chosen", index === this.chosen + 1)));
   }
 
+  /** Whether the paragraphs have sentences that depend on values. */
+  get isWritten() {
+    return (this.written[this.chosen + 1] || []).length > 0;
+  }
+
   /** Writes the sentences that depend on values. @param {Facts} facts */
   write(facts) {
     for (const { target, write } of this.written[this.chosen + 1] || []) {

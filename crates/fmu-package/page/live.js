@@ -284,11 +284,11 @@ class Trial {
     this.compare();
     player.setPlaying(false);
     player.now = this.description.startTime;
-    if (this.guide.chosen >= 0) {
-      // The sentences of a step have their numbers from the first moment.
+    if (motion && this.guide.isWritten) {
+      // The sentences have their numbers from the first moment.
       session.finish(this.end, this.move);
-      this.write();
     }
+    this.write();
     player.setPlaying(motion !== undefined && allowsMotion());
   }
 
