@@ -2,12 +2,13 @@
 
 /** A unit as it is printed: N·m/° for N.m/deg. @param {string} unit */
 function printed(unit) {
-  return unit.replaceAll(".", "\u00b7").replace(/\bdeg\b/g, "\u00b0").replace(/(?<=[a-z])2\b/g, "\u00b2");
+  return unit.replaceAll(".", "\u00b7").replace(/\bdeg(?=C?\b)/g, "\u00b0").replace(/(?<=[a-z])2\b/g, "\u00b2");
 }
 
 /** A number with its unit: 1.4 N·m/°, 20°. @param {number} value @param {string} unit */
 function quantity(value, unit) {
-  const [number, text] = [String(Number(value.toPrecision(6))).replace("-", "\u2212"), printed(unit)];
+  const short = Number(value.toPrecision(6));
+  const [number, text] = [(Math.abs(short) >= 1e6 ? short.toExponential().replace("e+", "e") : String(short)).replace("-", "\u2212"), printed(unit)];
   return text ? `${number}${text === "\u00b0" ? "" : "\u00a0"}${text}` : number;
 }
 

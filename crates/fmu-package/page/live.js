@@ -517,7 +517,13 @@ class Trial {
       ...near,
       element("div", { class: "live-buttons" }, ...buttons),
       this.status,
+      ...(this.isShort && this.settable.length ? [element("b", {}, "Parameters"), ...this.settable.map((one) => this.parameters.row(one, one.name, null)), this.button("Default parameters", () => this.reset({}))] : []),
     );
+  }
+
+  /** Whether all parameters are in one grid with the inputs: those of a small model without its own add-on. */
+  get isShort() {
+    return addOns[this.description.identifier] === undefined && this.settable.length <= 12;
   }
 
   /** The parameters that are not near the sliders. */
@@ -554,7 +560,7 @@ class Trial {
     const isPlain = addOns[description.identifier] === undefined;
     const section = element(
       "section", { class: "live", "aria-labelledby": "try" }, element("h2", { id: "try" }, "Try it"), player.element,
-      ...(this.settable.length ? [this.fields()] : []), ...(isPlain ? [tableOfVariables(description)] : []), about,
+      ...(this.settable.length && !this.isShort ? [this.fields()] : []), ...(isPlain ? [tableOfVariables(description)] : []), about,
     );
     for (const kind of ["pointerdown", "keydown"]) {
       section.addEventListener(kind, () => (this.isTouched = true), { capture: true });

@@ -5,9 +5,13 @@ function plain({ description }) {
   const real = description.numbers("input");
   const length = description.stopTime - description.startTime;
   /** @param {Variable} one */
-  const reach = (one) => (Number.isFinite(one.max - one.min) ? (one.max - one.min) / 2 : roundAbove(Math.max(3 * Math.abs(startOf(one)), 3 * one.nominal) * one.factor) / one.factor);
+  const reach = (one) => {
+    const [below, above] = [startOf(one) - one.min, one.max - startOf(one)];
+    return Number.isFinite(below + above) ? Math.max(below, above) : roundAbove(Math.max(3 * Math.abs(startOf(one)), 3 * one.nominal) * one.factor) / one.factor;
+  };
   const motions = real.filter((one) => one.type === "Real").slice(0, 6).flatMap((one) => {
-    const [start, size] = [startOf(one), reach(one) / 3];
+    // A round part of what the slider reaches.
+    const [start, size] = [startOf(one), roundAbove((reach(one) * one.factor) / 5) / one.factor];
     const end = start + size > one.max ? start - size : start + size;
     return [
       { id: `step-${one.name}`, title: `Step of ${one.name}`, length, inputs: (/** @type {number} */ time, /** @type {Record<string, number>} */ inputs) => void (inputs[one.name] = time < 0.1 * length ? start : end) },
