@@ -31,7 +31,7 @@ class Player {
     this.isRequested = false;
     this.isVisible = true;
     this.plots = options.plots((time) => this.seek(time));
-    this.play = element("button", { type: "button", class: "live-play" });
+    this.play = element("button", { type: "button", class: "live-play" }, "Play");
     this.play.addEventListener("click", () => this.setPlaying(!this.isPlaying));
     this.slider = element("input", { type: "range", min: "0", max: "1000", step: "1", value: "0", "aria-label": "Time", class: "live-time" });
     this.slider.addEventListener("input", () => {
@@ -69,6 +69,11 @@ class Player {
   setPlaying(isPlaying) {
     if (isPlaying && !this.isPlaying && this.now >= this.options.limit() - 1e-9) {
       this.now = this.options.begin;
+    }
+    if (isPlaying === this.isPlaying) {
+      // A run that is moved by hand goes on.
+      this.requestFrame();
+      return;
     }
     this.isPlaying = isPlaying;
     this.paced = { passed: 0, played: 0 };
