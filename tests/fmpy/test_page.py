@@ -24,7 +24,8 @@ from tools.documentation.pages import CONTROLLER, TESTBED
 PAGE = "documentation/index.html"
 #: The parts of the page that build_fmu adds: policy, space with a note for browsers without scripts, styles and scripts.
 LIVE = re.compile(
-    r'<meta http-equiv="Content-Security-Policy"[^>]*>\n|<div id="live".*?</noscript></div>|<style>\n\.live,.*</script>\n?', re.S
+    r'<meta http-equiv="Content-Security-Policy"[^>]*>\n|<div id="live".*?</noscript></div>|<style>\n\.live,.*</script>\n?',
+    re.S,
 )
 PACKED = re.compile(r'\{ description: "([^"]*)", module: "([^"]*)" \},')
 OUTPUTS = ("tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3", "theta4")

@@ -62,6 +62,8 @@ class Player {
       this.pace.append(element("option", { value: String(speed) }, `${Number(speed.toPrecision(2))} × real time`));
     }
     this.pace.value = String(speed);
+    this.paced = { passed: 0, played: 0 };
+    this.late.textContent = "";
     this.setPlaying(true);
   }
 
