@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,14 +11,9 @@ import pytest
 import toolchain
 from built import built
 from playwright.sync_api import Browser, Page, sync_playwright
+from visiting import page_of
 
 SIZE = {"width": 1000, "height": 900}
-
-
-def page_of(fmu: Path, directory: Path) -> str:
-    """Unpacks the page of an FMU; returns its address."""
-    with zipfile.ZipFile(fmu) as archive:
-        return Path(archive.extract("documentation/index.html", directory)).as_uri()
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,6 @@ import io
 import os
 import re
 import subprocess
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from built import ROOT, built
 from fmu_run import Fmu
 from PIL import Image
 from playwright.sync_api import Browser, CDPSession, Page, expect
-from visiting import button, clock, drag, field, find_part, image, middle, saved, until
+from visiting import button, clock, drag, drawn, field, find_part, image, middle, page_of, saved, until
 
 PHONE = {"width": 360, "height": 740}
 
@@ -457,17 +456,36 @@ def test_a_run_that_the_fmu_ends(visit: Any) -> None:
     assert clock(page) == 0.5
 
 
+def make_model(directory: Path, name: str) -> Path:
+    """Builds an example of `cargo fmu`; returns its FMU."""
+    cargo_fmu = [ROOT / "target/debug/cargo-fmu", "fmu"]
+    subprocess.run([*cargo_fmu, "new", name, "--from", name], cwd=directory, check=True, capture_output=True)
+    environment = {**os.environ, "CARGO_TARGET_DIR": str(ROOT / "target/models")}
+    subprocess.run([*cargo_fmu, "build"], cwd=directory / name, env=environment, check=True, capture_output=True)
+    return directory / name / "target/fmu" / f"{name}.fmu"
+
+
+#: Counts the lines of the kept canvas that are neither level nor upright, in a colour of a curve.
+LINES = """
+const { moveTo, lineTo, stroke } = CanvasRenderingContext2D.prototype;
+let path = [];
+CanvasRenderingContext2D.prototype.moveTo = function (x, y) { path = [[x, y]]; moveTo.call(this, x, y); };
+CanvasRenderingContext2D.prototype.lineTo = function (x, y) { path.push([x, y]); lineTo.call(this, x, y); };
+CanvasRenderingContext2D.prototype.stroke = function () {
+  for (let k = 1; this.canvas === window.kept && this.lineWidth > 1.5 && k < path.length; k++) {
+    const [right, down] = [0, 1].map((axis) => Math.abs(path[k][axis] - path[k - 1][axis]));
+    right > 0.51 && down > 0.01 ? window.slanted++ : window.level++;
+  }
+  stroke.call(this);
+};"""
+
+
 def test_a_model_reads_its_resources(browser: Browser, tmp_path: Path) -> None:
     """The page of `cargo fmu build` contains the resources, and its results equal the results of the library."""
-    cargo_fmu = [ROOT / "target/debug/cargo-fmu", "fmu"]
-    subprocess.run([*cargo_fmu, "new", "house", "--from", "house"], cwd=tmp_path, check=True, capture_output=True)
-    environment = {**os.environ, "CARGO_TARGET_DIR": str(ROOT / "target/models")}
-    subprocess.run([*cargo_fmu, "build"], cwd=tmp_path / "house", env=environment, check=True, capture_output=True)
-    fmu = tmp_path / "house/target/fmu/house.fmu"
-    with zipfile.ZipFile(fmu) as archive:
-        path = archive.extract("documentation/index.html", tmp_path)
+    fmu = make_model(tmp_path, "house")
+    path = page_of(fmu, tmp_path)
     page = browser.new_page(viewport=PHONE)
-    page.goto(f"{Path(path).as_uri()}#try&motion=run")
+    page.goto(f"{path}#try&motion=run")
     with page.expect_download() as download:
         button(page, "Save as CSV").click()
     assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
@@ -491,3 +509,49 @@ def test_a_link_in_the_page_leads_there(visit: Any) -> None:
     page.get_by_role("link", name="The equations").click()
     page.wait_for_timeout(300)
     assert page.locator("#equations").evaluate("e => Math.abs(e.getBoundingClientRect().top)") < 60
+
+
+def test_time_goes_on_while_a_motor_is_dragged(visit: Any) -> None:
+    page = visit("#try&motion=hand", reduced_motion="reduce")
+    button(page, "Play").wait_for()
+    motor = find_part(page)
+    page.clock.install(time=0)
+    page.clock.pause_at(1000)
+    page.mouse.down()
+    before = float(page.locator(".live-clock").inner_text().split()[0])
+    for number in range(40):
+        page.mouse.move(motor[0], motor[1] + number)
+        page.clock.run_for(25)
+    page.mouse.up()
+    assert float(page.locator(".live-clock").inner_text().split()[0]) - before == pytest.approx(1, abs=0.1)
+
+
+def test_generated_pages(browser: Browser, tmp_path: Path) -> None:
+    """Signals that switch are drawn as steps, parameters are in one grid with inputs, steps and ranges are round, and a table lists the variables."""
+    pages = {}
+    for name in ("ball", "lag"):
+        address = page_of(make_model(tmp_path, name), tmp_path / name)
+        pages[name] = browser.new_page(viewport=PHONE, reduced_motion="reduce")
+        pages[name].add_init_script(LINES)
+        pages[name].goto(f"{address}#try")
+        button(pages[name], "Play").wait_for()
+        assert pages[name].evaluate("document.documentElement.scrollWidth") == PHONE["width"]
+        expect(pages[name].locator(".live-variables tbody tr")).not_to_have_count(0)
+    ball, lag = pages["ball"], pages["lag"]
+    saved(ball)
+    for panel, is_stepwise in [("bounces", True), ("height", False)]:
+        canvas = ball.locator(f".live-plots canvas[aria-label*='{panel}']")
+        canvas.evaluate("canvas => { window.kept = canvas; window.slanted = 0; window.level = 0; }")
+        ball.get_by_label("Time", exact=True).evaluate(
+            "e => { e.value = '1000'; e.dispatchEvent(new Event('input')); }"
+        )
+        drawn(ball)
+        assert ball.evaluate("window.level + window.slanted") > 0
+        assert (ball.evaluate("window.slanted") == 0) == is_stepwise, panel
+    row = lag.locator(".live-variables tr", has_text="Input")
+    expect(row.locator("td")).to_have_text(["u", "input", "0", "", "Input"])
+    lag.get_by_label("Time", exact=True).evaluate("e => { e.value = '1000'; e.dispatchEvent(new Event('input')); }")
+    drawn(lag)
+    expect(field(lag, "u")).to_have_value("1")
+    for page in pages.values():
+        page.close()

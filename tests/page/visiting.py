@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 
 from playwright.sync_api import Locator, Page
+
+
+def page_of(fmu: Path, directory: Path) -> str:
+    """Unpacks the page of an FMU; returns its address."""
+    with zipfile.ZipFile(fmu) as archive:
+        return Path(archive.extract("documentation/index.html", directory)).as_uri()
 
 
 def drawn(page: Page) -> None:

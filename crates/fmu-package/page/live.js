@@ -603,7 +603,4 @@ async function live(packed, resources, missing) {
   trial.settle();
   addEventListener("popstate", () => trial.settle());
   addEventListener("hashchange", () => trial.settle());
-  if (location.hash.startsWith("#try")) {
-    section.scrollIntoView();
-  }
 }

@@ -226,10 +226,10 @@ class Identification:
             lines += [f"perhaps     {cause}" for cause in self.diagnosis or ["no known cause"]]
         for name, found in self.parameters.items():
             factor, unit = self._unit(name, shown)
-            value, _, low, high = found.rounded(factor)
+            estimate, _, low, high = found.rounded(factor)
             sureness = f"+- {found.relative:.2%}   95 % interval {low} to {high}"
             sureness = "not determined" if found.hopeless else sureness
-            lines.append(f"  {name:<9} {value} {unit}  {sureness}{', prior' if found.prior else ''}")
+            lines.append(f"  {name:<9} {estimate} {unit}  {sureness}{', prior' if found.prior else ''}")
         for name, (value, error) in self.distortions.items():
             factor, unit = (1.0, "") if name.startswith("gain") else (1e3, " ms")
             lines.append(f"  {name}: {' +- '.join(rounded(value * factor, error * factor))}{unit}")
