@@ -102,7 +102,7 @@ def test_mean_and_difference(visit: Any, fmu: Path) -> None:
         field(page, "M").fill(str(lobes))
         field(page, "M").press("Enter")
         dial(page, "Angle of the motors", angle)
-        assert f"roll is {ratio} of their difference" in text(page)
+        assert f"roll is {ratio} times their difference" in text(page)
         found, rows = replayed(fmu, saved(page), M=lobes)
         together = rows["time"] < 2.5
         assert np.abs(found["roll"][together]).max() < 1e-9 and np.abs(found["pitch"][~together]).max() < 1e-2

@@ -16,7 +16,7 @@ function degrees(value) {
   return quantity(Math.round(10 * value) / 10 || 0, "deg");
 }
 
-/** A ratio of two integers: "7/4", "twice", or "all" if it is 1. @param {number} top @param {number} bottom */
+/** A ratio of two integers: "7/4", or "2". @param {number} top @param {number} bottom */
 function fraction(top, bottom) {
   let [divisor, rest] = [top, bottom];
   while (rest) {
@@ -65,7 +65,7 @@ const WHY_ONE = [
 ];
 /** @type {Part[]} */
 const WHAT_BOTH = [
-  ({ value }) => `Pitch is the mean of the two motor angles, and roll is ${fraction(value("N"), 2 * value("M"))} of their difference. So if both turn by `, ANGLE,
+  ({ value }) => `Pitch is the mean of the two motor angles, and roll is ${fraction(value("N"), 2 * value("M"))} times their difference. So if both turn by `, ANGLE,
   ({ value }) => ` together, the difference is zero and the wrist only pitches. Against each other, their mean is zero, and the wrist only rolls, by ${degrees((value("N") / value("M")) * value("angle"))}.`,
 ];
 /** @type {Part[]} */
@@ -151,7 +151,7 @@ const WHY_STOP = [
 ];
 /** @type {Part[]} */
 const WHAT_LOOP = [
-  "A second FMU, a controller, measures the wrist and turns both motors until pitch is ", PITCH_GOAL, " and, from 0.9\u00a0s on, roll is ", ROLL_GOAL, "; at 1.7\u00a0s it brings both back to zero. ",
+  "A second FMU, a controller, measures the wrist and turns both motors towards a pitch of ", PITCH_GOAL, " and, from 0.9\u00a0s on, a roll of ", ROLL_GOAL, "; from 1.7\u00a0s on, it turns them back. ",
   (facts) => {
     const [theta1, theta2] = motorsFor(facts, facts.value("pitch_goal"), facts.value("roll_goal"));
     const there = facts.table ? ` At 1.65\u00a0s the wrist is at ${degrees(facts.table.at("pitch", 1.65) / DEGREE)} and ${degrees(facts.table.at("roll", 1.65) / DEGREE)}.` : "";
