@@ -34,15 +34,11 @@ fn main() -> ExitCode {
     exit(builder.run(&Options::parse().build))
 }
 
-/// Returns the sources of the testbed, which runs next to the controller in its page. The guid of the testbed is a hash of them, as in
-/// `build_fmu.rs` of the testbed.
+/// Returns the sources of the testbed, which runs next to the controller in its page.
 fn testbed() -> Sources {
-    let project = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("this package is in the project");
-    Sources {
-        not_content: vec!["modelDescription.xml", "parameters.json"],
-        licenses: vec!["LICENSE-APACHE", "LICENSE-MIT"],
-        ..Sources::of_package(project)
-    }
+    let project =
+        Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("this package is in the project");
+    Sources { licenses: vec!["LICENSE-APACHE", "LICENSE-MIT"], ..Sources::of_package(project) }
 }
 
 /// Returns the terminals. Motors and sensors are connected to the terminals of the testbed with the same names.
