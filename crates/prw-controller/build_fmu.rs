@@ -38,7 +38,11 @@ fn main() -> ExitCode {
 fn testbed() -> Sources {
     let project =
         Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("this package is in the project");
-    Sources { licenses: vec!["LICENSE-APACHE", "LICENSE-MIT"], ..Sources::of_package(project) }
+    Sources {
+        not_content: vec!["modelDescription.xml", "parameters.json"],
+        licenses: vec!["LICENSE-APACHE", "LICENSE-MIT"],
+        ..Sources::of_package(project)
+    }
 }
 
 /// Returns the terminals. Motors and sensors are connected to the terminals of the testbed with the same names.
