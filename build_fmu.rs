@@ -57,7 +57,9 @@ fn run(options: &Options) -> Result<()> {
         page_scripts: vec![
             include_str!("docs/fmu-page/wrist/wrist.js"),
             concat!("WRIST = ", include_str!("docs/fmu-page/wrist/wrist.json"), ";\n"),
+            include_str!("docs/fmu-page/wrist/view.js"),
             include_str!("docs/fmu-page/wrist/testbed.js"),
+            include_str!("docs/fmu-page/wrist/steps.js"),
         ],
         page_fmus: vec![(
             "prw_controller",

@@ -3,6 +3,7 @@
 use clap::Parser;
 use fmu_package::terminal::exit;
 use fmu_package::{BuildOptions, Builder, Sources, Terminal};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Builds the FMU of the wrist's controller, target/fmu/prw_controller.fmu.
@@ -21,9 +22,27 @@ fn main() -> ExitCode {
             ..Sources::of_package(env!("CARGO_MANIFEST_DIR"))
         },
         terminals: terminals(),
+        page_scripts: vec![
+            include_str!("../../docs/fmu-page/wrist/wrist.js"),
+            concat!("WRIST = ", include_str!("../../docs/fmu-page/wrist/wrist.json"), ";\n"),
+            include_str!("../../docs/fmu-page/wrist/view.js"),
+            include_str!("../../docs/fmu-page/wrist/controller.js"),
+        ],
+        page_fmus: vec![("prw_testbed", testbed())],
         ..Builder::new(env!("CARGO_PKG_NAME"), env!("CARGO_MANIFEST_DIR"))
     };
     exit(builder.run(&Options::parse().build))
+}
+
+/// Returns the sources of the testbed, which runs next to the controller in its page.
+fn testbed() -> Sources {
+    let project =
+        Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("this package is in the project");
+    Sources {
+        not_content: vec!["modelDescription.xml", "parameters.json"],
+        licenses: vec!["LICENSE-APACHE", "LICENSE-MIT"],
+        ..Sources::of_package(project)
+    }
 }
 
 /// Returns the terminals. Motors and sensors are connected to the terminals of the testbed with the same names.

@@ -15,6 +15,9 @@ import rig
 from built import ROOT, program
 from lxml import etree
 
+from prw.identification.report import _prose
+from prw.identification.rounding import rounded
+
 DEGREES = dict.fromkeys(("theta1", "theta2", "theta3", "theta4", "pitch", "roll"), ("deg", np.pi / 180))
 
 
@@ -65,6 +68,10 @@ def test_only_torques_and_the_exchanged_couplings(prw, tmp_path, experiment):
     result = prw("identify", "run.csv", "--starts", 2)
     assert result.returncode == 0, result.stderr
     assert "the couplings exchanged" in result.stdout and "theta3 and theta4 would distinguish them" in result.stdout
+    # The note has the units of the table.
+    page = (tmp_path / "out" / "identified" / "report.html").read_text(encoding="utf-8")
+    (note,) = re.findall(r'<p class="note">The data fit as well with (.*?)</p>', page)
+    assert "N·m/deg" in note and "N·m/rad" not in page
     check_estimates(report(tmp_path / "out" / "identified"), experiment.parameters)
 
 
@@ -130,7 +137,8 @@ def test_equal_motors_do_not_determine_the_roll_inertia(prw, tmp_path):
     )
     assert "`excite` proposes it for tau1,tau2 as" in result.stderr
     assert not (out / "identified.json").exists() and (out / "report.html").exists()
-    assert "do not determine all" in (out / "report.html").read_text(encoding="utf-8")
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "do not determine all" in page and "<code>excite</code> proposes" in page and "`" not in page
 
 
 def test_inertias_that_only_occur_together_are_named_and_a_prior_settles_them(prw, tmp_path, experiment):
@@ -181,3 +189,25 @@ def test_encoder_steps_are_not_taken_for_motion(prw, tmp_path):
     assert re.search(r"J3 .*not determined", result.stdout)
     assert prw("identify", "run.csv", "--starts", 1).returncode == 0
     check_estimates(report(tmp_path / "out" / "identified"), simulated.parameters)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "shown"),
+    [
+        ((2.9491, 1.5), ["2.9", "1.5"]),
+        ((2.9491, 0.0996, 2.75, 3.14), ["2.95", "0.10", "2.75", "3.14"]),
+        ((131.94, 0.317, 131.32, 132.56), ["131.94", "0.32", "131.32", "132.56"]),
+        ((13194.0, 317.0), ["13190", "320"]),
+        ((-0.0019, 0.00061), ["-0.00190", "0.00061"]),
+        ((3.8681e-7, 2.1e-9), ["3.868e-07", "2.1e-09"]),
+        ((1.0, float("inf")), ["1", "inf"]),
+    ],
+)
+def test_digits_follow_the_standard_error(numbers, shown):
+    assert rounded(*numbers) == shown
+
+
+def test_options_in_the_report_are_code():
+    assert (
+        str(_prose("add `--delay tau1`; k1 < 2 +- 1 N.m/deg")) == "add <code>--delay tau1</code>; k1 &lt; 2 ± 1 N·m/deg"
+    )

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from built import ROOT, script_of
+from built import ROOT, built, script_of
 from fmpy import read_model_description
 from fmu_run import Fmu
 from test_references import NAMES
@@ -22,9 +22,10 @@ from prw.checking.experiments import read_experiments
 from tools.documentation.pages import CONTROLLER, TESTBED
 
 PAGE = "documentation/index.html"
-#: The parts of the page that build_fmu adds: policy, note for browsers without scripts, styles and scripts.
+#: The parts of the page that build_fmu adds: policy, space with a note for browsers without scripts, styles and scripts.
 LIVE = re.compile(
-    r'<meta http-equiv="Content-Security-Policy"[^>]*>\n|<noscript>.*?</noscript>|<style>\n\.live,.*</script>\n?', re.S
+    r'<meta http-equiv="Content-Security-Policy"[^>]*>\n|<div id="live".*?</noscript></div>|<style>\n\.live,.*</script>\n?',
+    re.S,
 )
 PACKED = re.compile(r'\{ description: "([^"]*)", module: "([^"]*)" \},')
 OUTPUTS = ("tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3", "theta4")
@@ -101,7 +102,14 @@ def test_the_controllers_page_runs_it(controller):
     page = page_of(controller)
     assert LIVE.sub("", page) == (ROOT / CONTROLLER.path).read_text(encoding="utf-8")
     script = script_of(page)
-    assert len(PACKED.findall(script)) == 1 and "\n], ...[{},[]]).catch(" in script
+    assert len(PACKED.findall(script)) == 2 and "\n], ...[{},[]]).catch(" in script
+    # The testbed that runs next to the controller is the one in the testbed's FMU, except for its guid.
+    description, module = (zlib.decompress(base64.b64decode(part), wbits=-15) for part in PACKED.findall(script)[1])
+    with zipfile.ZipFile(built("prw_testbed.fmu")) as archive:
+        original = archive.read("modelDescription.xml")
+    guid = rb' guid="(\{[-0-9a-f]+\})"'
+    assert re.sub(guid, b"", description) == re.sub(guid, b"", original)
+    assert re.findall(guid, description)[0] in module
 
 
 def test_it_is_small_and_loads_nothing(page):

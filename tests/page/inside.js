@@ -72,10 +72,10 @@
     report.runs.hand = { parameters: { use_omega: true, k1: (1 / Math.PI) * 180 }, csv: await csv() };
     report.motion = find("#live-motion").value;
     change(find("#live-k1"), "-1");
-    await until(() => find(".live-error"));
-    report.error = find(".live-status").textContent;
+    await until(() => find("#live-k1-message").textContent);
+    report.error = find("#live-k1-message").textContent;
     change(find("#live-k1"), "2");
-    await until(() => !find(".live-error"));
+    await until(() => !find("#live-k1-message").textContent);
     button("Link to this").click();
     await wait(50);
     report.link = location.hash;

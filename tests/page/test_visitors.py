@@ -7,99 +7,19 @@ import csv
 import io
 import os
 import re
-import shutil
 import subprocess
-import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import toolchain
-from built import ROOT
+from built import ROOT, built
 from fmu_run import Fmu
 from PIL import Image
-from playwright.sync_api import Browser, CDPSession, Locator, Page, expect, sync_playwright
+from playwright.sync_api import Browser, CDPSession, Page, expect
+from visiting import button, clock, drag, drawn, field, find_part, image, middle, page_of, saved, until
 
-SIZE = {"width": 1000, "height": 900}
 PHONE = {"width": 360, "height": 740}
-
-
-@pytest.fixture(scope="module")
-def address(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
-    with zipfile.ZipFile(fmu) as archive:
-        path = archive.extract("documentation/index.html", tmp_path_factory.mktemp("page"))
-    return Path(path).as_uri()
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    toolchain.need("chromium")
-    with sync_playwright() as playwright:
-        path = shutil.which("chromium")
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        yield browser
-        browser.close()
-
-
-@pytest.fixture
-def visit(browser: Browser, address: str) -> Iterator[Any]:
-    """Opens the page in a context with these settings. Only the page may be requested, and no script may fail."""
-    requested: list[str] = []
-    contexts = []
-
-    def visit(fragment: str = "", script: str = "", **settings: Any) -> Page:
-        contexts.append(browser.new_context(**{"viewport": SIZE, **settings}))
-        page = contexts[-1].new_page()
-        page.route("**/*", lambda route: route.continue_())
-        page.on("request", lambda request: requested.append(request.url))
-        page.on("pageerror", lambda error: requested.append(f"error: {error}"))
-        # The browser reports violations of the page's policy there.
-        page.on("console", lambda message: requested.append(message.text) if message.type == "error" else None)
-        if script:
-            page.add_init_script(script)
-        page.goto(address + fragment)
-        return page
-
-    yield visit
-    for context in contexts:
-        context.close()
-    assert {url.split("#")[0] for url in requested if not url.startswith("blob:")} == {address}
-
-
-def drawn(page: Page) -> None:
-    """Waits until the next frame shows the effect of the last action."""
-    page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
-
-
-def until(page: Page, condition: str) -> None:
-    """Waits for a condition; the page's policy forbids Playwright to do that in the page."""
-    for _ in range(1500):
-        if page.evaluate(condition):
-            return
-        page.wait_for_timeout(20)
-    raise AssertionError(f"the condition stays false: {condition}")
-
-
-def clock(page: Page) -> float:
-    drawn(page)
-    return float(page.locator(".live-clock").inner_text().split()[0])
-
-
-def middle(element: Locator) -> tuple[float, float]:
-    box = element.bounding_box()
-    assert box
-    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-
-
-def image(page: Page) -> str:
-    drawn(page)
-    return str(page.locator(".live-scene").evaluate("canvas => canvas.toDataURL()"))
-
-
-def button(page: Page, name: str) -> Locator:
-    return page.locator(".live").get_by_role("button", name=name, exact=True)
 
 
 def test_with_a_mouse(visit: Any, tmp_path: Path) -> None:
@@ -111,7 +31,7 @@ def test_with_a_mouse(visit: Any, tmp_path: Path) -> None:
     assert clock(page) < 0.5
     button(page, "Pause").click()
     stiffness = page.locator(".live-row", has_text=re.compile("^k1"))
-    expect(stiffness).to_contain_text("N.m/deg > 0")
+    expect(stiffness).to_contain_text("N·m/° > 0")
     stiffness.get_by_role("spinbutton").fill("1.5")
     stiffness.get_by_role("spinbutton").press("Enter")
     # Sets the time by its slider and by a click on a plot.
@@ -133,14 +53,18 @@ def test_with_a_mouse(visit: Any, tmp_path: Path) -> None:
     assert values["use_omega"] == "1" and values["M"] == "4" and float(values["k1"]) == pytest.approx(np.rad2deg(1.5))
     rows = list(csv.reader(lines))
     assert rows[0][:3] == ["time", "theta1", "theta2"] and len(rows) == 1002
-    page.get_by_label("Enlargement").select_option("5")
+    page.get_by_text("Parts", exact=True).click()
+    page.get_by_label("twist of the couplings").select_option("5")
+    page.get_by_label("ring").uncheck()
     button(page, "Link to this").click()
     expect(page.locator(".live-status")).to_contain_text("contains these settings")
     again = visit(page.evaluate("location.hash"))
     expect(again.get_by_label("Motion", exact=True)).to_have_value("step")
     expect(again.locator("#live-k1")).to_have_value("1.5")
     expect(again.get_by_label("Speed")).to_have_value("0.05")
-    expect(again.get_by_label("Enlargement")).to_have_value("5")
+    again.get_by_text("Parts", exact=True).click()
+    expect(again.get_by_label("twist of the couplings")).to_have_value("5")
+    expect(again.get_by_label("ring")).not_to_be_checked()
     button(again, "Default parameters").click()
     expect(again.locator("#live-k1")).not_to_have_value("1.5")
     expect(again.locator("#live-use_omega")).not_to_be_checked()
@@ -151,32 +75,11 @@ def test_with_a_mouse(visit: Any, tmp_path: Path) -> None:
     drag(again, (x, y + 120), (x + 80, y + 120))
     assert image(again) != before
     again.get_by_label("Motion", exact=True).select_option("hand")
-    find_motor(again)
+    find_part(again)
     again.mouse.down()
     again.mouse.move(*(100, 100), steps=4)
     again.mouse.up()
     expect(again.locator("#live-theta1")).not_to_have_value("0")
-
-
-def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> None:
-    page.mouse.move(*start)
-    page.mouse.down()
-    page.mouse.move(*end, steps=4)
-    page.mouse.up()
-
-
-def find_motor(page: Page) -> tuple[float, float]:
-    """Returns the position of motor 1 in the image, found by the cursor's shape. The mouse stays there."""
-    scene = page.locator(".live-scene")
-    box = scene.bounding_box()
-    assert box
-    for x in range(10, int(box["width"] / 2), 10):
-        for y in range(20, int(box["height"]), 20):
-            page.mouse.move(box["x"] + x, box["y"] + y)
-            if scene.evaluate("canvas => canvas.style.cursor") == "ns-resize":
-                page.mouse.move(box["x"] + x + 4, box["y"] + y + 4)
-                return box["x"] + x + 4, box["y"] + y + 4
-    raise AssertionError("no motor is found")
 
 
 def swipe(touch: CDPSession, start: tuple[float, float], shift: tuple[float, float]) -> None:
@@ -202,7 +105,7 @@ def test_with_a_finger_on_a_phone(visit: Any) -> None:
     assert image(page) != before
     swipe(touch, (x, y + 40), (-120, 0))
     # A finger on a motor turns the motor, and the page does not scroll.
-    motor, scrolled = find_motor(page), page.evaluate("scrollY")
+    motor, scrolled = find_part(page), page.evaluate("scrollY")
     swipe(touch, motor, (0, 60))
     until(page, "document.querySelector('#live-theta1').value > 10")
     assert page.evaluate("scrollY") == scrolled
@@ -235,7 +138,7 @@ def test_with_the_keyboard_only(visit: Any) -> None:
     assert list(reached) == list(dict.fromkeys(expected))
     page.get_by_label("Motion", exact=True).focus()
     page.keyboard.press("ArrowDown")
-    expect(page.get_by_label("Motion", exact=True)).to_have_value("move")
+    expect(page.get_by_label("Motion", exact=True)).to_have_value("stop")
     until(page, "parseFloat(document.querySelector('.live-clock').textContent) > 0")
     button(page, "Pause").focus()
     page.keyboard.press("Space")
@@ -285,10 +188,6 @@ def test_the_page_reports_why_it_cannot_run_the_fmu(visit: Any, script: str, rea
     expect(page.locator("main h2").first).to_have_text("The testbed")
 
 
-def field(page: Page, name: str) -> Locator:
-    return page.locator(f"#live-{name}")
-
-
 def test_a_field_can_be_filled_in_while_a_motion_plays(visit: Any) -> None:
     page = visit("#try&motion=chirp&speed=0.2")
     field(page, "theta1").press_sequentially("30", delay=150)
@@ -298,42 +197,208 @@ def test_a_field_can_be_filled_in_while_a_motion_plays(visit: Any) -> None:
     until(page, "document.querySelector('.live-player > .live-plots > figure .live-number').textContent > 29")
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("k1", "-1", "k1 must be greater than 0 N·m/°, but it is −1 N·m/°"),
+        ("c1", "-0.5", "c1 must be at least 0 N·m·s/°, but it is −0.5 N·m·s/°"),
+        ("theta1", "1e308", "Motor 1 must be from −36000 to 36000°, but it is 1e308°"),
+        ("M", "2.5", "M must be an integer below 2³¹, but it is 2.5"),
+        ("M", "0", "M must be at least 1, but it is 0"),
+        ("J2", "", ""),
+    ],
+)
+def test_an_impossible_value(visit: Any, name: str, value: str, message: str) -> None:
+    """The field says its name, its unit and its range, and the run goes on with the value before."""
+    page = visit("#try&motion=chirp&speed=0.2", viewport={"width": 1300, "height": 900})
+    page.locator(".live-parameters").evaluate("e => e.open = true")
+    before = saved(page).splitlines()[1]
+    field(page, name).fill(value)
+    field(page, name).press("Enter")
+    expect(page.locator(f"#live-{name}-message")).to_have_text(message)
+    assert field(page, name).get_attribute("aria-invalid") == ("true" if message else None)
+    expect(page.locator(".live-rejected")).to_have_count(0)
+    assert saved(page).splitlines()[1] == before
+    start = clock(page)
+    until(page, f"parseFloat(document.querySelector('.live-clock').textContent) > {start + 0.02}")
+    if message:
+        field(page, name).fill("2")
+        field(page, name).press("Enter")
+        expect(page.locator(f"#live-{name}-message")).to_have_text("")
+        expect(field(page, name)).not_to_have_attribute("aria-invalid", "true")
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("speed=1e9", "speed must be from 0.001 to 100, but it is 1e9"),
+        ("speed=fast", "speed must be from 0.001 to 100, but it is fast"),
+        ("frequency=-5", "Frequency must be from 0.5 to 15\u00a0Hz, but it is -5"),
+        ("k1=-5", "k1 must be greater than 0\u00a0N·m/°, but it is −0.0872665\u00a0N·m/°"),
+        ("M=99999999999", "M must be an integer below 2³¹, but it is 1e11"),
+        ("theta1=1e300", "Motor 1 must be from −36000 to 36000°, but it is 5.72958e301°"),
+        ("motion=dance", "motion must be one of the list below, but it is dance"),
+        ("twist=3", "twist cannot be 3"),
+        ("off=wheels", "off cannot be wheels"),
+        ("k9=1", "there is no k9"),
+    ],
+)
+def test_an_impossible_value_in_a_link(visit: Any, setting: str, message: str) -> None:
+    name, _, _ = setting.partition("=")
+    page = visit(f"#try&{'' if name == 'motion' else 'motion=shake&'}{setting}")
+    expect(page.locator(".live-status.live-error")).to_have_text(
+        f"The link is applied without these values: {message}."
+    )
+    expect(page.get_by_label("Speed")).to_have_value("1")
+    assert saved(page).count("\n") > 1000
+
+
+#: The module rejects motor angles above 1 rad.
+REJECTING = """
+const { Instance } = WebAssembly;
+WebAssembly.Instance = function (...all) {
+  const { exports } = new Instance(...all);
+  return { exports: { ...exports,
+    fmi2SetReal: (fmu, references, count, values) => count === 4 && [...new Float64Array(exports.memory.buffer, values, 2)].some((angle) => angle > 1)
+      ? 3 : exports.fmi2SetReal(fmu, references, count, values),
+  } };
+};
+"""
+
+
 def test_a_value_that_the_fmu_rejects(visit: Any) -> None:
     """The run stops until another value is set, and continues from there."""
-    page = visit("#try&motion=hand&theta1=0.5&speed=1")
+    page = visit("#try&motion=hand&theta1=0.5&speed=1", script=REJECTING)
     page.locator(".live-clock").wait_for()
     until(page, "parseFloat(document.querySelector('.live-clock').textContent) > 0.1")
-    for name, wrong, right in [("theta1", "1e308", "20"), ("k1", "0", "1.5")]:
-        before = field(page, name).input_value()
-        field(page, name).fill(wrong)
-        field(page, name).press("Enter")
-        expect(field(page, name)).to_have_attribute("aria-invalid", "true")
-        expect(page.locator(f"#live-{name}-message")).to_have_text(f"The FMU rejects this value of {name}.")
-        expect(page.locator(".live-rejected")).to_have_count(1)
-        stopped = clock(page)
-        page.wait_for_timeout(300)
-        assert clock(page) == stopped, before
-        field(page, name).fill(right)
-        field(page, name).press("Enter")
-        expect(page.locator(".live-rejected")).to_have_count(0)
-        expect(field(page, name)).not_to_have_attribute("aria-invalid", "true")
-        button(page, "Pause").wait_for() if name == "theta1" else button(page, "Play").click()
-        until(page, f"parseFloat(document.querySelector('.live-clock').textContent) > {stopped + 0.05}")
+    field(page, "theta1").fill("80")
+    field(page, "theta1").press("Enter")
+    expect(field(page, "theta1")).to_have_attribute("aria-invalid", "true")
+    expect(page.locator("#live-theta1-message")).to_have_text("The FMU rejects this value of Motor 1.")
+    expect(page.locator(".live-status")).to_contain_text("The FMU rejects this value of Motor 1")
+    expect(page.locator(".live-rejected")).to_have_count(1)
+    stopped = clock(page)
+    page.wait_for_timeout(300)
+    assert clock(page) == stopped
+    field(page, "theta1").fill("20")
+    field(page, "theta1").press("Enter")
+    expect(page.locator(".live-rejected")).to_have_count(0)
+    expect(field(page, "theta1")).not_to_have_attribute("aria-invalid", "true")
+    button(page, "Pause").wait_for()
+    until(page, f"parseFloat(document.querySelector('.live-clock').textContent) > {stopped + 0.05}")
 
 
-def test_integers_are_integers(visit: Any) -> None:
-    page = visit("#try&motion=fig4&M=99999999999")
-    expect(page.locator("#live-M-message")).to_contain_text("The link sets M = 99999999999; it must be an integer")
-    expect(field(page, "M")).to_have_value("4")
+def test_the_cam_has_as_many_lobes_as_the_fmu(visit: Any) -> None:
+    page = visit("#try&motion=fig4", reduced_motion="reduce")
     page.locator(".live-parameters").evaluate("e => e.open = true")
-    field(page, "M").fill("2.5")
-    field(page, "M").press("Enter")
-    expect(page.locator("#live-M-message")).to_have_text("M must be an integer below 2\u00b3\u00b9")
     before = image(page)
     field(page, "M").fill("6")
     field(page, "M").press("Enter")
-    expect(page.locator("#live-M-message")).to_have_text("")
     assert image(page) != before
+
+
+def motors_and_wrist(page: Page) -> tuple[float, float, float, float]:
+    """Motor angles of the sliders, and pitch and roll at the end of the run, deg."""
+    rows = np.genfromtxt(io.StringIO(saved(page)), delimiter=",", names=True, skip_header=2)
+    motors = (float(field(page, name).input_value()) for name in ("theta1", "theta2"))
+    return (*motors, *(float(np.rad2deg(rows[name][-1])) for name in ("pitch", "roll")))
+
+
+def test_the_gripper_follows_the_hand(visit: Any) -> None:
+    """A drag to the side rolls the wrist, a drag down pitches it, and the motors turn to the angles of the inverse of eq. (1)."""
+    for turns in (0, 36):
+        page = visit("#try&motion=hand")
+        page.locator(".live-scene").focus()
+        for _ in range(turns):
+            page.keyboard.press("ArrowLeft")
+        gripper = find_part(page, "move")
+        drag(page, gripper, (gripper[0] + 25, gripper[1]))
+        page.wait_for_timeout(2500)
+        theta1, theta2, pitch, roll = motors_and_wrist(page)
+        assert (pitch, roll) == pytest.approx(((theta1 + theta2) / 2, 7 / 8 * (theta1 - theta2)), abs=0.5)
+        # The side of the gripper that faces the viewer moves to the right, from the front and from behind.
+        assert abs(pitch) < 0.5 and roll > 20
+        gripper = find_part(page, "move")
+        drag(page, gripper, (gripper[0], gripper[1] + 30))
+        page.wait_for_timeout(2500)
+        theta1, theta2, pitch, roll_after = motors_and_wrist(page)
+        # From the front the gripper comes towards the viewer, and from behind, too.
+        assert (pitch > 10) if turns == 0 else (pitch < -10)
+        assert roll_after == pytest.approx(roll, abs=0.5)
+        says = page.locator(".live-what p.live-chosen").inner_text().replace("−", "-")
+        assert [float(one) for one in re.findall(r"(-?[\d.]+)°", says)] == pytest.approx(
+            [pitch, roll_after, theta1, theta2], abs=0.3
+        )
+
+
+def test_a_run_by_hand_goes_on(visit: Any) -> None:
+    """After two minutes a new run begins where the last one ended, and the page says so."""
+    page = visit("#try&motion=hand&theta1=0.3&speed=100")
+    expect(page.locator(".live-status")).to_contain_text("a new one has begun where the last one ended", timeout=60000)
+    expect(button(page, "Pause")).to_be_visible()
+    button(page, "Pause").click()
+    expect(field(page, "theta1")).to_have_value("17.19")
+    rows = np.genfromtxt(io.StringIO(saved(page)), delimiter=",", names=True, skip_header=2)
+    assert np.abs(rows["theta1"] - 0.3).max() < 1e-6 and np.abs(rows["pitch"] - 0.15).max() < 1e-6
+
+
+def test_the_address_and_back(visit: Any) -> None:
+    """Each address shows what it says; a link to the run does not restart it."""
+    page = visit("#try&motion=chirp&speed=0.2")
+    button(page, "Pause").wait_for()
+    until(page, "parseFloat(document.querySelector('.live-clock').textContent) > 0.1")
+    stiffness = field(page, "k1")
+    stiffness.fill("1.5")
+    stiffness.press("Enter")
+    entries, before = page.evaluate("history.length"), clock(page)
+    button(page, "Link to this").click()
+    assert "motion=chirp" in page.evaluate("location.hash") and "k1=85.9" in page.evaluate("location.hash")
+    assert page.evaluate("history.length") == entries and before <= clock(page) < before + 2
+    expect(button(page, "Pause")).to_be_visible()
+    button(page, "3. Resonance").click()
+    button(page, "2. Both motors").click()
+    for motion, pressed, value in [("shake", 1, "2.11"), ("chirp", 0, "1.5")]:
+        page.go_back()
+        expect(page.get_by_label("Motion", exact=True)).to_have_value(motion)
+        expect(page.locator("[aria-pressed=true]")).to_have_count(pressed)
+        expect(stiffness).to_have_value(value)
+    page.go_forward()
+    expect(page.get_by_label("Motion", exact=True)).to_have_value("shake")
+    # A link within the page leaves the run as it is.
+    frequency = page.get_by_role("slider", name="Frequency")
+    frequency.press("ArrowRight")
+    page.get_by_role("link", name="The equations").click()
+    page.go_back()
+    expect(frequency).to_have_text("1.05\u00a0Hz")
+
+
+def test_the_controllers_page_runs_the_loop(visit: Any, controllers: str) -> None:
+    """The testbed runs next to the controller: the wrist goes where it is wanted, also by hand."""
+    page = visit(at=controllers)
+    button(page, "Pause").click()
+    rows = np.genfromtxt(io.StringIO(saved(page)), delimiter=",", names=True, skip_header=2)
+    late = np.searchsorted(rows["time"], 1.85)
+    assert np.rad2deg([rows["pitch"][late], rows["roll"][late]]) == pytest.approx([25, 50], abs=0.1)
+    with Fmu(built("prw_controller.fmu")) as controller, Fmu(built("prw_testbed.fmu")) as testbed:
+        motors, measured = (
+            ("theta1", "theta2", "omega1", "omega2"),
+            ("pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2"),
+        )
+        loop, wrist = controller.instances(), testbed.instances(start={"use_omega": True})
+        for number, row in enumerate(rows[:1500]):
+            np.testing.assert_array_equal(wrist.get(measured)[0], [row[name] for name in measured])
+            loop.set(("pitch_ref", "roll_ref", *measured), [row[name] for name in ("pitch_ref", "roll_ref", *measured)])
+            np.testing.assert_array_equal(loop.get(motors)[0], [row[name] for name in motors], str(number))
+            wrist.set(motors, loop.get(motors)[0])
+            for instance in (loop, wrist):
+                instance.step(to=rows["time"][number + 1])
+    page.get_by_label("Goals", exact=True).select_option("hand")
+    field(page, "pitch_ref").fill("12")
+    field(page, "pitch_ref").press("Enter")
+    page.wait_for_timeout(1500)
+    button(page, "Pause").click()
+    rows = np.genfromtxt(io.StringIO(saved(page)), delimiter=",", names=True, skip_header=2)
+    assert np.rad2deg(rows["pitch"][-1]) == pytest.approx(12, abs=0.3)
 
 
 def test_a_motor_follows_the_hand(visit: Any) -> None:
@@ -345,7 +410,7 @@ def test_a_motor_follows_the_hand(visit: Any) -> None:
         scene.focus()
         for _ in range(turns):
             page.keyboard.press("ArrowLeft")
-        motor = find_motor(page)
+        motor = find_part(page)
         drag(page, motor, (motor[0], motor[1] + 40))
         page.wait_for_timeout(500)
         moved = [float(field(page, name).input_value()) for name in ("theta1", "theta2")]
@@ -382,42 +447,6 @@ WebAssembly.Instance = function (...all) {
 """
 
 
-def test_the_guide(visit: Any, tmp_path: Path) -> None:
-    """Each paragraph shows its run. Its numbers can be dragged or changed by keys, and are included in the link."""
-    page = visit("#try", reduced_motion="reduce")
-    response = page.locator(".live-plots .live-plots .live-number")
-    for name, motion in [("1. Pitch", "pitch"), ("2. Roll", "roll"), ("4. Shape", "shaped"), ("3. Shake", "shake")]:
-        button(page, name).click()
-        expect(page.get_by_label("Motion", exact=True)).to_have_value(motion)
-        expect(page.locator("[aria-pressed=true]")).to_have_text(name)
-        assert response.is_visible() == (motion == "shake")
-    frequency = page.get_by_role("slider", name="Frequency")
-    for key, value in [("Home", 0.5), ("ArrowRight", 0.6), ("PageUp", 1.6), ("ArrowDown", 1.5), ("End", 15)]:
-        frequency.press(key)
-        assert float(frequency.get_attribute("aria-valuenow") or "") == value, key
-    start = middle(frequency)
-    drag(page, start, (start[0] - 200, start[1]))
-    expect(frequency).to_have_text("3.4\u00a0Hz")
-    stiffness = page.get_by_role("slider", name="Stiffness k2").and_(page.locator(".live-dial:visible"))
-    stiffness.press("PageUp")
-    expect(field(page, "k2")).to_have_value("0.5")
-    # The response at the cursor equals the response of the run, in which the motors move by 4 degrees.
-    with page.expect_download() as download:
-        button(page, "Save as CSV").click()
-    download.value.save_as(tmp_path / "run.csv")
-    run = np.genfromtxt(tmp_path / "run.csv", delimiter=",", names=True, skip_header=2)
-    swing = np.ptp(run["pitch"][run["time"] > 2]) / np.deg2rad(4)
-    assert float(response.inner_text()) == pytest.approx(swing, rel=5e-3)
-    # A click on the response chooses its frequency.
-    page.mouse.click(*middle(page.locator(".live-plots .live-plots canvas")))
-    assert 7 < float(frequency.get_attribute("aria-valuenow") or "") < 8.5
-    button(page, "Link to this").click()
-    expect(page.locator(".live-status")).to_contain_text("contains these settings")
-    again = visit(page.evaluate("location.hash"), reduced_motion="reduce")
-    expect(again.get_by_role("slider", name="Frequency")).to_have_text(frequency.inner_text())
-    expect(field(again, "k2")).to_have_value("0.5")
-
-
 def test_a_run_that_the_fmu_ends(visit: Any) -> None:
     """The end of a run is no error, and the time stays at the last result."""
     page = visit("#try&motion=tour&speed=2", script=ENDING)
@@ -427,17 +456,36 @@ def test_a_run_that_the_fmu_ends(visit: Any) -> None:
     assert clock(page) == 0.5
 
 
+def make_model(directory: Path, name: str) -> Path:
+    """Builds an example of `cargo fmu`; returns its FMU."""
+    cargo_fmu = [ROOT / "target/debug/cargo-fmu", "fmu"]
+    subprocess.run([*cargo_fmu, "new", name, "--from", name], cwd=directory, check=True, capture_output=True)
+    environment = {**os.environ, "CARGO_TARGET_DIR": str(ROOT / "target/models")}
+    subprocess.run([*cargo_fmu, "build"], cwd=directory / name, env=environment, check=True, capture_output=True)
+    return directory / name / "target/fmu" / f"{name}.fmu"
+
+
+#: Counts the lines of the kept canvas that are neither level nor upright, in a colour of a curve.
+LINES = """
+const { moveTo, lineTo, stroke } = CanvasRenderingContext2D.prototype;
+let path = [];
+CanvasRenderingContext2D.prototype.moveTo = function (x, y) { path = [[x, y]]; moveTo.call(this, x, y); };
+CanvasRenderingContext2D.prototype.lineTo = function (x, y) { path.push([x, y]); lineTo.call(this, x, y); };
+CanvasRenderingContext2D.prototype.stroke = function () {
+  for (let k = 1; this.canvas === window.kept && this.lineWidth > 1.5 && k < path.length; k++) {
+    const [right, down] = [0, 1].map((axis) => Math.abs(path[k][axis] - path[k - 1][axis]));
+    right > 0.51 && down > 0.01 ? window.slanted++ : window.level++;
+  }
+  stroke.call(this);
+};"""
+
+
 def test_a_model_reads_its_resources(browser: Browser, tmp_path: Path) -> None:
     """The page of `cargo fmu build` contains the resources, and its results equal the results of the library."""
-    cargo_fmu = [ROOT / "target/debug/cargo-fmu", "fmu"]
-    subprocess.run([*cargo_fmu, "new", "house", "--from", "house"], cwd=tmp_path, check=True, capture_output=True)
-    environment = {**os.environ, "CARGO_TARGET_DIR": str(ROOT / "target/models")}
-    subprocess.run([*cargo_fmu, "build"], cwd=tmp_path / "house", env=environment, check=True, capture_output=True)
-    fmu = tmp_path / "house/target/fmu/house.fmu"
-    with zipfile.ZipFile(fmu) as archive:
-        path = archive.extract("documentation/index.html", tmp_path)
+    fmu = make_model(tmp_path, "house")
+    path = page_of(fmu, tmp_path)
     page = browser.new_page(viewport=PHONE)
-    page.goto(f"{Path(path).as_uri()}#try&motion=run")
+    page.goto(f"{path}#try&motion=run")
     with page.expect_download() as download:
         button(page, "Save as CSV").click()
     assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
@@ -461,3 +509,49 @@ def test_a_link_in_the_page_leads_there(visit: Any) -> None:
     page.get_by_role("link", name="The equations").click()
     page.wait_for_timeout(300)
     assert page.locator("#equations").evaluate("e => Math.abs(e.getBoundingClientRect().top)") < 60
+
+
+def test_time_goes_on_while_a_motor_is_dragged(visit: Any) -> None:
+    page = visit("#try&motion=hand", reduced_motion="reduce")
+    button(page, "Play").wait_for()
+    motor = find_part(page)
+    page.clock.install(time=0)
+    page.clock.pause_at(1000)
+    page.mouse.down()
+    before = float(page.locator(".live-clock").inner_text().split()[0])
+    for number in range(40):
+        page.mouse.move(motor[0], motor[1] + number)
+        page.clock.run_for(25)
+    page.mouse.up()
+    assert float(page.locator(".live-clock").inner_text().split()[0]) - before == pytest.approx(1, abs=0.1)
+
+
+def test_generated_pages(browser: Browser, tmp_path: Path) -> None:
+    """Signals that switch are drawn as steps, parameters are in one grid with inputs, steps and ranges are round, and a table lists the variables."""
+    pages = {}
+    for name in ("ball", "lag"):
+        address = page_of(make_model(tmp_path, name), tmp_path / name)
+        pages[name] = browser.new_page(viewport=PHONE, reduced_motion="reduce")
+        pages[name].add_init_script(LINES)
+        pages[name].goto(f"{address}#try")
+        button(pages[name], "Play").wait_for()
+        assert pages[name].evaluate("document.documentElement.scrollWidth") == PHONE["width"]
+        expect(pages[name].locator(".live-variables tbody tr")).not_to_have_count(0)
+    ball, lag = pages["ball"], pages["lag"]
+    saved(ball)
+    for panel, is_stepwise in [("bounces", True), ("height", False)]:
+        canvas = ball.locator(f".live-plots canvas[aria-label*='{panel}']")
+        canvas.evaluate("canvas => { window.kept = canvas; window.slanted = 0; window.level = 0; }")
+        ball.get_by_label("Time", exact=True).evaluate(
+            "e => { e.value = '1000'; e.dispatchEvent(new Event('input')); }"
+        )
+        drawn(ball)
+        assert ball.evaluate("window.level + window.slanted") > 0
+        assert (ball.evaluate("window.slanted") == 0) == is_stepwise, panel
+    row = lag.locator(".live-variables tbody tr").first
+    expect(row.locator("td")).to_have_text(["u", "input", "0", "", "Input"])
+    lag.get_by_label("Time", exact=True).evaluate("e => { e.value = '1000'; e.dispatchEvent(new Event('input')); }")
+    drawn(lag)
+    expect(field(lag, "u")).to_have_value("1")
+    for page in pages.values():
+        page.close()

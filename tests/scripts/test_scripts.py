@@ -110,7 +110,7 @@ def test_figures_are_written(fmu: Path, tmp_path: Path, monkeypatch: pytest.Monk
     built("prw_controller.fmu")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(film, "SPEED", 20)
-    monkeypatch.setattr(visit, "FRAMES", 2)
+    monkeypatch.setattr(visit, "GESTURES", ((1, False, (0, 0)), (1, True, (4, 0))))
     draw = gallery.figures
     some = ("fig4_pair", "poles")
     monkeypatch.setattr(gallery, "figures", lambda found: {k: v for k, v in draw(found).items() if k in some})

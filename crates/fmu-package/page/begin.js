@@ -1,11 +1,20 @@
 "use strict";
 
+/** The space that the page has for the section that runs the FMU. */
+function space() {
+  const found = document.getElementById("live") || document.createElement("div");
+  if (!found.isConnected) {
+    (document.querySelector("main") || document.body).prepend(found);
+  }
+  return found;
+}
+
 /** Shows why the page cannot run the FMU. @param {Error} error */
 function showFailure(error) {
   const paragraph = document.createElement("p");
   paragraph.className = "note";
   paragraph.textContent = `Here this page would run the FMU for you to try, but that is not possible: ${error.message}. The rest of the page is complete.`;
-  (document.querySelector("main") || document.body).prepend(paragraph);
+  space().replaceWith(paragraph);
 }
 
 /** Decodes base 64 and decompresses the result. @param {string} text */

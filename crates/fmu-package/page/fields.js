@@ -1,15 +1,51 @@
 // Sliders and number fields for variables.
 
-/** The reason why a variable cannot have a value; "" if it can. @param {Variable} one @param {number | string} value */
-function problem(one, value) {
+/** A unit as it is printed: N·m/° for N.m/deg. @param {string} unit */
+function printed(unit) {
+  return unit.replaceAll(".", "\u00b7").replace(/\bdeg(?=C?\b)/g, "\u00b0").replace(/(?<=[a-z])2\b/g, "\u00b2");
+}
+
+/** A number with its unit: 1.4 N·m/°, 20°. @param {number} value @param {string} unit */
+function quantity(value, unit) {
+  const short = Number(value.toPrecision(6));
+  const [number, text] = [(Math.abs(short) >= 1e6 ? short.toExponential().replace("e+", "e") : String(short)).replace("-", "\u2212"), printed(unit)];
+  return text ? `${number}${text === "\u00b0" ? "" : "\u00a0"}${text}` : number;
+}
+
+/** The values that a variable can have, in the unit of the page, after "must be"; "" if all numbers are possible. @param {Variable} one */
+function rangeOf(one) {
+  const [least, most] = [one.min, one.max].map((value) => value * one.factor + one.offset);
+  // A tiny minimum stands for a positive number.
+  const isPositive = least > 0 && least < 1e-200;
+  const low = isPositive ? `greater than ${quantity(0, one.unit)}` : `at least ${quantity(least, one.unit)}`;
+  if (Number.isFinite(most)) {
+    return Number.isFinite(least) && !isPositive ? `from ${quantity(least, "")} to ${quantity(most, one.unit)}` : `at most ${quantity(most, one.unit)}`;
+  }
+  return Number.isFinite(least) ? low : "";
+}
+
+/** The reason why a variable cannot have a value; "" if it can. @param {Variable} one @param {number | string} value @param {string} [label] of its field */
+function problem(one, value, label = one.name) {
   if (one.type === "String") {
     return "";
   }
-  if (value === "" || !Number.isFinite(Number(value))) {
-    return "must be a number";
+  const number = Number(value);
+  if (value === "" || !Number.isFinite(number)) {
+    return `${label} must be a number`;
   }
-  const isInteger = Number.isInteger(value) && Math.abs(Number(value)) < 2 ** 31;
-  return one.type === "Real" || isInteger ? "" : "must be an integer below 2\u00b3\u00b9";
+  const given = quantity(number * one.factor + one.offset, one.unit);
+  if (one.type !== "Real" && !(Number.isInteger(number) && Math.abs(number) < 2 ** 31)) {
+    return `${label} must be an integer below 2\u00b3\u00b9, but it is ${given}`;
+  }
+  // A minimum in the unit of the page may differ in the last digit.
+  const tolerance = 1e-12 * Math.abs(number);
+  return number < one.min - tolerance || number > one.max + tolerance ? `${label} must be ${rangeOf(one)}, but it is ${given}` : "";
+}
+
+/** The smallest of 1, 2 and 5 times a power of ten that is not below a positive number. @param {number} value */
+function roundAbove(value) {
+  const power = 10 ** Math.floor(Math.log10(value) + 1e-12);
+  return power * ([1, 2, 5].find((factor) => factor * power >= value * (1 - 1e-9)) || 10);
 }
 
 /** Rows with a slider and a number field for variables, in the units of the page. */
@@ -21,15 +57,27 @@ class Fields {
     this.show = new Map();
     /** Functions that mark the field of a variable as invalid with a message, or as valid with "". @type {Map<string, (message: string) => void>} */
     this.mark = new Map();
+    /** The labels of the fields, by variable. @type {Map<string, string>} */
+    this.labels = new Map();
+    /** Largest absolute values that a field accepts, by variable. @type {Map<string, number>} */
+    this.reaches = new Map();
   }
 
   /** Calls `changed`, or marks the field of an impossible value. @param {Variable} one @param {number | string} value */
   change(one, value) {
-    const reason = problem(one, value);
-    this.mark.get(one.name)?.(reason && `${one.name} ${reason}`);
+    const reason = this.problem(one, value);
+    this.mark.get(one.name)?.(reason);
     if (!reason) {
       this.changed(one, value);
     }
+  }
+
+  /** The reason why a field cannot have a value, with the label of the field. @param {Variable} one @param {number | string} value */
+  problem(one, value) {
+    const label = this.labels.get(one.name) || one.name;
+    const reach = this.reaches.get(one.name);
+    const reason = problem(one, value, label);
+    return reason || !reach || Math.abs(Number(value)) <= reach ? reason : `${label} must be from ${quantity(-reach * one.factor, "")} to ${quantity(reach * one.factor, one.unit)}, but it is ${quantity(Number(value) * one.factor, one.unit)}`;
   }
 
   /** An element below a field for its message. @param {Variable} one @param {HTMLElement} field @returns {HTMLElement} */
@@ -51,6 +99,7 @@ class Fields {
   /** A row. @param {Variable} one @param {string} label @param {[number, number] | null} ends of the slider; `null` derives them from min, max and start @param {string} [about] */
   row(one, label, ends, about = one.description) {
     const id = `live-${one.name.replace(/\W/g, "-")}`;
+    this.labels.set(one.name, label);
     const name = element("label", { for: id }, element("b", {}, label), about ? ` ${about}` : "");
     if (one.type === "Real" || (one.type === "Integer" && !ends)) {
       return this.number(one, id, name, ends);
@@ -79,8 +128,8 @@ class Fields {
     const [least, most] = [one.min * factor + offset, one.max * factor + offset];
     // A positive quantity has a logarithmic slider: from a tenth to ten times its start value.
     const isLog = !ends && !isInteger && least >= 0 && start > 0;
-    const size = Math.max(Math.abs(start), Math.abs(one.nominal * factor));
-    const [low, high] = ends || (isLog ? [start / 10, start * 10] : [start - size, start + (isInteger ? 2 : 1) * size]);
+    const size = roundAbove(Math.max(Math.abs(start), Math.abs(one.nominal * factor)));
+    const [low, high] = ends || (isLog ? [start / 10, start * 10] : isInteger ? [start - size, start + 2 * size] : [Math.min(-size, start), Math.max(size, start)]);
     const [begin, end] = [Math.max(low, least), Math.min(high, most)];
     const digits = Math.max(0, 4 - Math.floor(Math.log10(end - begin)));
     const toShare = (/** @type {number} */ value) => (isLog ? Math.log(Math.max(value, 1e-300) / begin) / Math.log(end / begin) : (value - begin) / (end - begin));
@@ -91,7 +140,7 @@ class Fields {
     const show = (/** @type {number} */ value) => {
       const text = String(ends ? Number(value.toFixed(digits)) : Number(value.toPrecision(6)));
       slider.value = String(toShare(value));
-      slider.setAttribute("aria-valuetext", `${text} ${one.unit}`);
+      slider.setAttribute("aria-valuetext", `${text} ${printed(one.unit)}`);
       // Does not overwrite what the user is typing.
       if (document.activeElement !== field) {
         field.value = text;
@@ -115,8 +164,9 @@ class Fields {
     field.addEventListener("focus", () => field.select());
     field.addEventListener("blur", () => show(last));
     this.show.set(one.name, (value) => show((last = Number(value) * factor + offset)));
-    const hint = Number.isFinite(most) ? `${least} to ${most}` : least > 0 && least < 1e-200 ? "> 0" : Number.isFinite(least) ? `\u2265 ${least}` : "";
-    const unit = element("span", { class: "live-unit" }, one.unit, hint ? element("small", {}, ` ${hint}`) : "");
+    const round = (/** @type {number} */ value) => quantity(value, "");
+    const hint = Number.isFinite(most) ? `${round(least)} to ${round(most)}` : least > 0 && least < 1e-200 ? "> 0" : Number.isFinite(least) ? `\u2265 ${round(least)}` : "";
+    const unit = element("span", { class: "live-unit" }, printed(one.unit), hint ? element("small", {}, ` ${hint}`) : "");
     return element("div", { class: "live-row" }, name, slider, field, unit, this.message(one, field));
   }
 }

@@ -1,15 +1,20 @@
-// The guide: short paragraphs, each with a run. The reader can drag numbers in them.
+// The guide: steps with a short explanation each. The reader can drag numbers in them.
 
 /**
  * A number in a paragraph: a parameter of the FMU in the unit of the page, or a number that motions read.
  * @typedef {{name: string, label: string, low: number, high: number, step: number, unit: string}} Dial
- * A paragraph, and the settings of its run as in a link: `motion`, start values, and numbers that motions read.
- * @typedef {{title: string, parts: (string | Dial)[], settings: Record<string, string> & {motion: string}}} Chapter
+ * The values that a sentence is written by. `value` returns a parameter or a number that motions read, `preset` its value as the page opens.
+ * `table` has all results of the run, or is `null` while the run is calculated; `motion` is the chosen motion.
+ * @typedef {{value(name: string): number, preset(name: string): number, table: Table | null, motion: Motion | null, response: ResponsePlot | null}} Facts
+ * A part of a paragraph: plain text, a number to drag, or text that depends on values.
+ * @typedef {string | Dial | ((facts: Facts) => string)} Part
+ * A step: its motions, the first of which is played, the explanation, the reason, and the settings of its run as in a link.
+ * @typedef {{title: string, parts: Part[], why: Part[], settings: Record<string, string> & {motion: string}}} Chapter
  */
 
 class Guide {
   /**
-   * @param {string} lead the paragraph without a chapter @param {Chapter[]} chapters
+   * @param {Part[]} lead the paragraph for runs outside of the steps @param {Chapter[]} chapters
    * @param {(chapter: Chapter) => void} choose @param {(name: string, value: number) => void} change
    */
   constructor(lead, chapters, choose, change) {
@@ -17,23 +22,54 @@ class Guide {
     this.change = change;
     /** Functions that show the value of a number. @type {Map<string, ((value: number) => void)[]>} */
     this.show = new Map();
+    /** Texts that depend on values, by step; the first are those of the lead. @type {{target: HTMLElement, write(facts: Facts): string}[][]} */
+    this.written = [];
+    this.chosen = -1;
     this.buttons = chapters.map((chapter, index) => {
       const button = element("button", { type: "button", "aria-pressed": "false" }, `${index + 1}. ${chapter.title}`);
       button.addEventListener("click", () => choose(chapter));
       return button;
     });
-    this.texts = [[lead], ...chapters.map(({ parts }) => parts)].map((parts) =>
-      element("p", {}, ...parts.map((part) => (typeof part === "string" ? part : this.dial(part)))),
-    );
-    const buttons = element("div", { class: "live-buttons", role: "group", "aria-label": "Guide" }, ...this.buttons);
-    this.element = element("div", { class: "live-guide" }, ...(chapters.length ? [buttons] : []), element("div", { class: "live-texts", "aria-live": "polite" }, ...this.texts));
+    const steps = [{ parts: lead, why: /** @type {Part[]} */ ([]) }, ...chapters];
+    this.texts = steps.map(({ parts, why }, index) => [parts, why].map((one) => element("p", {}, ...one.map((part) => this.part(part, index)))));
+    const buttons = element("div", { class: "live-buttons live-steps", role: "group", "aria-label": "Steps" }, ...this.buttons);
+    const blocks = [0, 1].map((block) => element("div", { class: `live-texts ${block ? "live-why" : "live-what"}` }, ...this.texts.map((both) => both[block])));
+    this.elements = [...(chapters.length ? [buttons] : []), blocks[0], ...(chapters.length ? [blocks[1]] : [])];
   }
 
-  /** Shows the paragraph of a motion. @param {string} motion */
+  /** Shows the paragraphs of a motion. @param {string} motion */
   read(motion) {
-    const chosen = this.chapters.findIndex(({ settings }) => settings.motion === motion);
-    this.buttons.forEach((button, index) => button.setAttribute("aria-pressed", String(index === chosen)));
-    this.texts.forEach((text, index) => text.classList.toggle("live-chosen", index === chosen + 1));
+    this.chosen = this.chapters.findIndex(({ settings }) => settings.motion === motion);
+    this.buttons.forEach((button, index) => button.setAttribute("aria-pressed", String(index === this.chosen)));
+    this.texts.forEach((both, index) => both.forEach((text) => text.classList.toggle("live-chosen", index === this.chosen + 1)));
+  }
+
+  /** Whether the paragraphs have sentences that depend on values. */
+  get isWritten() {
+    return (this.written[this.chosen + 1] || []).length > 0;
+  }
+
+  /** Writes the sentences that depend on values. @param {Facts} facts */
+  write(facts) {
+    for (const { target, write } of this.written[this.chosen + 1] || []) {
+      const text = write(facts);
+      if (target.textContent !== text) {
+        target.textContent = text;
+      }
+    }
+  }
+
+  /** @param {Part} part @param {number} step */
+  part(part, step) {
+    if (typeof part === "string") {
+      return part;
+    }
+    if (typeof part !== "function") {
+      return this.dial(part);
+    }
+    const target = element("span");
+    (this.written[step] ||= []).push({ target, write: part });
+    return target;
   }
 
   /** A number that can be dragged. @param {Dial} dial */

@@ -2,15 +2,22 @@
 
 /**
  * What a model adds to the page. `label` is the label of the list of motions. The table contains the outputs, the variables `recorded` and the columns `written`
- * by motions. `follow` moves inputs towards the sliders; `move` of a view moves a slider. Motions read `numbers`, and paragraphs of the guide change them.
- * The parameters `near`, each with a short description, are next to the sliders. `response` is drawn above the plots.
+ * by motions. `follow` moves inputs towards the sliders; `move` of a view moves sliders by increments. Motions read `numbers`, and paragraphs of the guide change
+ * them within `limits`. The parameters `near`, each with a short description, are next to the sliders. `response` is drawn above the plots. If `isAtRest`, a run by
+ * hand starts at rest with any inputs, so it can go on after its last row.
  * @typedef {{
  *   label: string, start: Record<string, number>, sliders: {name: string, label: string, reach: number}[], recorded: string[], written: string[], motions: Motion[],
- *   lead: string, guide: Chapter[], numbers: Record<string, number>, near: Record<string, string>, panels: Panel[], isMinor(name: string): boolean,
+ *   lead: Part[], guide: Chapter[], numbers: Record<string, number>, limits?: Dial[], near: Record<string, string>, panels: Panel[], isMinor(name: string): boolean,
+ *   isAtRest?: boolean, companion?: Companion,
  *   follow(inputs: Record<string, number>, targets: Map<string, number>, size: number): void,
- *   view(move: (name: string, by: number) => void): View & {controls?: HTMLElement[], settings?: Map<string, HTMLInputElement | HTMLSelectElement>},
- *   response?(change: (name: string, value: number) => void): {element: HTMLElement, draw(motion: Motion | null, time: number, start: Map<Variable, number | string>): void},
+ *   view(move: (increments: Record<string, number>) => void, value: (name: string) => number, pace: (speed: number) => void): View & {controls?: HTMLElement[], settings?: Map<string, Setting>},
+ *   response?(change: (name: string, value: number) => void): ResponsePlot,
  * }} AddOn
+ * A setting of the view in a link: its value, its value as the page opens, and a function that sets it and returns whether the value is possible.
+ * @typedef {{value(): string, preset: string, set(value: string): boolean}} Setting
+ * A plot above the others, the value of its curve at a frequency, and the highest point of its curve now and with the values as the page opens.
+ * @typedef {{element: HTMLElement, draw(motion: Motion | null, time: number, start: Map<Variable, number | string>): void,
+ *   update(start: Map<Variable, number | string>): void, at(frequency: number): number, peaks(): {now: number[], preset: number[]} | null}} ResponsePlot
  */
 
 /** Add-ons by model identifier. @type {Record<string, (own: Package, others: Package[]) => AddOn>} */
@@ -19,50 +26,8 @@ const addOns = {};
 /** Time span of the plots of a run by hand, s. */
 const WINDOW = 8;
 const BY_HAND = "hand";
-
-/** The add-on of a model without its own: a step and a sine of each input, and plots of all outputs. @param {Package} own @returns {AddOn} */
-function plain({ description }) {
-  const real = description.numbers("input");
-  const length = description.stopTime - description.startTime;
-  /** @param {Variable} one */
-  const reach = (one) => (Number.isFinite(one.max - one.min) ? (one.max - one.min) / 2 : Math.max(3 * Math.abs(startOf(one)), 3 * one.nominal));
-  const motions = real.filter((one) => one.type === "Real").slice(0, 6).flatMap((one) => {
-    const [start, size] = [startOf(one), reach(one) / 3];
-    const end = start + size > one.max ? start - size : start + size;
-    return [
-      { id: `step-${one.name}`, title: `Step of ${one.name}`, length, inputs: (/** @type {number} */ time, /** @type {Record<string, number>} */ inputs) => void (inputs[one.name] = time < 0.1 * length ? start : end) },
-      { id: `sine-${one.name}`, title: `Sine of ${one.name}`, length, inputs: (/** @type {number} */ time, /** @type {Record<string, number>} */ inputs) => void (inputs[one.name] = start + 0.5 * (end - start) * (1 - Math.cos((8 * Math.PI * time) / length))) },
-    ];
-  });
-  /** @type {Panel[]} */
-  const panels = [];
-  for (const [title, causality] of [["Outputs", "output"], ["Inputs", "input"]]) {
-    const numbers = description.numbers(causality);
-    for (const unit of new Set(numbers.map((one) => one.unit))) {
-      const curves = numbers.filter((one) => one.unit === unit).map(({ name, factor, offset, type }, index) => ({ name, label: name, colour: `curve-${(index % 6) + 1}`, factor, offset, isInteger: type !== "Real" }));
-      for (let first = 0; first < curves.length; first += 6) {
-        panels.push({ title, unit, curves: curves.slice(first, first + 6) });
-      }
-    }
-  }
-  const free = { id: "run", title: "At their start values", length, inputs: () => {} };
-  return {
-    lead: "This page runs the FMU: move its inputs, or change its parameters.",
-    guide: [],
-    numbers: {},
-    near: {},
-    label: "Inputs",
-    start: {},
-    sliders: real.map((one) => ({ name: one.name, label: one.name, reach: reach(one) })),
-    recorded: [],
-    written: [],
-    motions: [...motions, free],
-    panels,
-    isMinor: () => false,
-    follow: (inputs, targets) => targets.forEach((value, name) => void (inputs[name] = value)),
-    view: () => ({ element: element("div"), draw: () => {} }),
-  };
-}
+/** Largest angle of a slider's field, as a multiple of the slider's reach. */
+const FARTHEST = 400;
 
 /** The section *Try it*: a run of the FMU and its controls. */
 class Trial {
@@ -79,28 +44,31 @@ class Trial {
     this.settable = description.variables.filter((one) => one.causality === "parameter" && one.variability !== "constant" && one.start !== null);
     /** The last change, which is undone if the FMU rejects it; `rows` and `targets` are those before a change by hand. @type {{fields: Fields, one: Variable, rows: number, targets: Map<string, number>} | null} */
     this.latest = null;
-    /** The run before the last change, and the time of that change, ms. @type {Table | null} */
-    this.earlier = null;
+    /** A run for comparison, and the time of the last change, ms. @type {Comparison | null} */
+    this.other = null;
     this.changedAt = -Infinity;
     this.isTouched = false;
     this.shownError = "";
+    /** Settings in the address of the page, as far as they were applied. @type {string | null} */
+    this.applied = null;
+    /** Speed as the page opens. */
+    this.pace = 1;
     this.status = element("p", { class: "live-status", role: "status" });
     this.choice = element("select", { id: "live-motion" }, ...this.addOn.motions.map(({ id, title }) => element("option", { value: id }, title)));
     if (this.addOn.sliders.length) {
       this.choice.append(element("option", { value: BY_HAND }, "By hand"));
     }
-    this.choice.addEventListener("change", () => this.choose(this.choice.value));
-    this.sliders = new Fields((one, value) => this.byHand(one.name, Number(value)));
+    this.choice.addEventListener("change", () => this.visit(this.choice.value));
+    this.sliders = new Fields((one, value) => this.byHand({ [one.name]: Number(value) }));
     this.parameters = new Fields((one, value) => {
       this.latest = { fields: this.parameters, one, rows: 0, targets: this.session.targets };
       this.session.start.set(one, value);
       this.recalculate();
     });
-    this.guide = new Guide(this.addOn.lead, this.addOn.guide, ({ settings }) => this.apply(new URLSearchParams(settings)), (name, value) => this.change(name, value));
-    this.view = this.addOn.view((name, by) => this.drag(name, by));
+    this.guide = new Guide(this.addOn.lead, this.addOn.guide, (chapter) => this.follow(chapter), (name, value) => this.change(name, value));
+    this.view = this.addOn.view((increments) => this.drag(increments), (name) => this.value(name), (speed) => this.player.setSpeed(speed));
     this.response = this.addOn.response?.((name, value) => this.change(name, value));
     this.player = this.createPlayer();
-    this.follow = (/** @type {Record<string, number>} */ inputs) => this.addOn.follow(inputs, this.session.targets, description.step);
   }
 
   /** @param {string} name */
@@ -108,10 +76,22 @@ class Trial {
     return /** @type {Variable} */ (this.description.byName.get(name));
   }
 
+  /** A parameter, the position of a slider, or a number that motions read, in the unit of the page. @param {string} name */
+  value(name) {
+    const one = this.description.byName.get(name);
+    if (!one) {
+      return this.addOn.numbers[name];
+    }
+    const { session } = this;
+    const own = one.causality === "parameter" ? Number(session.parameter(one)) : session.motion ? session.table.column(name)[session.table.row(this.player.now)] : (session.targets.get(name) ?? startOf(one));
+    return own * one.factor + one.offset;
+  }
+
   /** End of the run, s. */
   get end() {
     const { session, description } = this;
-    return Math.min(session.ended, description.startTime + Math.min(session.motion ? session.motion.length : MAX_BY_HAND, MAX_ROWS * description.step));
+    const byHand = Math.max(MAX_BY_HAND, description.stopTime - description.startTime);
+    return Math.min(session.ended, description.startTime + Math.min(session.motion ? session.motion.length : byHand, MAX_ROWS * description.step));
   }
 
   /** Time up to which inputs are known, s. */
@@ -119,6 +99,16 @@ class Trial {
     return this.session.motion ? this.end : Math.max(this.session.table.end, this.session.timeOf(this.session.known - 1));
   }
 
+  /** Whether all rows of a motion are calculated. */
+  get isWhole() {
+    const { session } = this;
+    return session.motion !== null && !session.error && session.table.end >= this.end - 0.5 * this.description.step;
+  }
+
+  /** Sets the inputs of the next row of a run by hand. @param {Record<string, number>} inputs */
+  move = (inputs) => this.addOn.follow(inputs, this.session.targets, this.description.step);
+
+  /** @returns {Player} */
   createPlayer() {
     const { session, addOn, description, view } = this;
     const begin = description.startTime;
@@ -127,19 +117,21 @@ class Trial {
       view: {
         element: view.element,
         draw: (table, time) => {
-          view.draw(table, time);
+          view.draw(table, time, captionAt(session.motion, time - begin));
           this.response?.draw(session.motion, time - begin, session.start);
         },
       },
       begin,
-      isLooping: () => !this.isTouched && session.motion === addOn.motions[0],
-      earlier: () => this.earlier,
+      isLooping: () => !this.isTouched && !session.error && this.player.speed !== Infinity && session.motion !== null && (this.guide.chosen >= 0 || session.motion === addOn.motions[0]),
+      goesOn: () => this.goesOn(),
+      other: () => this.other,
+      notes: () => session.motion?.notes ?? [],
       table: session.table,
       span: (now) => (session.motion || !(description.step < 0.1) ? [begin, this.end] : [Math.max(begin, now - WINDOW), Math.max(begin + WINDOW, now)]),
       recorded: () => this.recorded,
       limit: () => this.end,
       advance: (now) => {
-        const reached = session.advance(session.motion ? this.end : Math.max(now, session.timeOf(session.known - 1)), this.follow);
+        const reached = session.advance(session.motion ? this.end : Math.max(now, session.timeOf(session.known - 1)), this.move);
         this.showError(session.error);
         if (session.motion) {
           addOn.sliders.forEach(({ name }) => session.table.count && this.sliders.show.get(name)?.(session.table.at(name, now)));
@@ -148,9 +140,49 @@ class Trial {
           // The rest of the run is calculated in the next frames and drawn pale.
           this.player.requestFrame();
         }
+        this.write();
         return session.error ? now : reached;
       },
     });
+  }
+
+  /** Writes the sentences of the guide that depend on values. While a run is calculated, the sentences of the last run stay. */
+  write() {
+    const { session, addOn } = this;
+    if (session.error || (session.motion && !this.isWhole)) {
+      return;
+    }
+    if (session.motion?.frequency) {
+      this.response?.update(session.start);
+    }
+    this.guide.write({
+      value: (name) => this.value(name),
+      preset: (name) => {
+        const one = this.description.byName.get(name);
+        return one ? (addOn.start[name] ?? startOf(one)) * one.factor + one.offset : this.numbers[name];
+      },
+      table: session.motion ? session.table : null,
+      motion: session.motion,
+      response: this.response ?? null,
+    });
+  }
+
+  /** Goes on with a run by hand after its last row, if the model is at rest there; otherwise reports why the run stops. */
+  goesOn() {
+    const { session, addOn, player, description } = this;
+    if (session.motion || session.error) {
+      return false;
+    }
+    const length = `${quantity(this.end - description.startTime, "s")}`;
+    this.status.classList.remove("live-error");
+    if (!addOn.isAtRest) {
+      this.status.textContent = `A run by hand ends after ${length}. \u201cStart again\u201d begins a new one.`;
+      return false;
+    }
+    session.renew();
+    player.now = description.startTime;
+    this.status.textContent = `A run by hand has ${length}; a new one has begun where the last one ended.`;
+    return true;
   }
 
   /** Shows why a run has ended. A rejected run is grey and does not play until the user changes something. @param {string} error */
@@ -162,18 +194,21 @@ class Trial {
     if (error === this.shownError) {
       return;
     }
-    this.shownError = this.status.textContent = error;
+    this.shownError = error;
+    const { latest } = this;
+    const label = latest && (latest.fields.labels.get(latest.one.name) || latest.one.name);
+    this.status.textContent = isRejected ? `The FMU rejects ${label ? `this value of ${label}` : "this"}: ${error}` : error;
     this.status.classList.toggle("live-error", isRejected);
     this.player.element.classList.toggle("live-rejected", isRejected);
     if (isRejected) {
-      this.latest?.fields.mark.get(this.latest.one.name)?.(`The FMU rejects this value of ${this.latest.one.name}.`);
+      latest?.fields.mark.get(latest.one.name)?.(`The FMU rejects this value of ${label}.`);
     } else {
       [this.sliders, this.parameters].forEach((fields) => fields.mark.forEach((mark) => mark("")));
     }
   }
 
-  /** Continues the run by hand from the current time. @param {string} name @param {number} value */
-  byHand(name, value) {
+  /** Continues the run by hand from the current time. @param {Record<string, number>} values of the sliders */
+  byHand(values) {
     const { session, latest, player } = this;
     const { isRejected } = session;
     if (isRejected && latest && !session.motion) {
@@ -191,21 +226,25 @@ class Trial {
     session.motion = null;
     this.choice.value = BY_HAND;
     this.guide.read(BY_HAND);
-    this.earlier = null;
-    this.latest = { fields: this.sliders, one: this.find(name), rows: row + 1, targets: new Map(session.targets) };
-    session.targets.set(name, value);
+    this.other = null;
+    this.latest = { fields: this.sliders, one: this.find(Object.keys(values)[0]), rows: row + 1, targets: new Map(session.targets) };
+    Object.entries(values).forEach(([name, value]) => session.targets.set(name, value));
     player.setPlaying(true);
   }
 
-  /** Moves a slider from the view. @param {string} name @param {number} by */
-  drag(name, by) {
+  /** Moves sliders from the view, as far as they reach. @param {Record<string, number>} increments */
+  drag(increments) {
     const { session } = this;
     this.isTouched = true;
-    const current = session.motion ? session.table.at(name, this.player.now) : (session.targets.get(name) ?? 0);
-    const reach = this.addOn.sliders.find((one) => one.name === name)?.reach ?? 1;
-    const value = Math.max(-reach, Math.min(reach, current + by));
-    this.sliders.show.get(name)?.(value);
-    this.byHand(name, value);
+    /** @type {Record<string, number>} */
+    const values = {};
+    for (const [name, by] of Object.entries(increments)) {
+      const current = session.motion ? session.table.at(name, this.player.now) : (session.targets.get(name) ?? 0);
+      const reach = this.addOn.sliders.find((one) => one.name === name)?.reach ?? 1;
+      values[name] = Math.max(-reach, Math.min(reach, current + by));
+      this.sliders.show.get(name)?.(values[name]);
+    }
+    this.byHand(values);
   }
 
   /** Starts a run from the beginning. @param {Motion | null} motion */
@@ -213,6 +252,19 @@ class Trial {
     this.session.motion = motion;
     this.session.known = 0;
     this.session.restart(0);
+  }
+
+  /** Calculates the motion that the chosen one is compared with, with the same parameters. */
+  compare() {
+    const { session } = this;
+    const { motion } = session;
+    const other = motion?.other && this.motions.get(motion.other.id);
+    if (motion?.other && other) {
+      this.begin(other);
+      session.finish(this.end, this.move);
+      this.other = session.error ? null : { table: session.table.copy(), label: motion.other.label };
+      this.begin(motion);
+    }
   }
 
   /** Plays a motion, or starts a run by hand. @param {string} id */
@@ -226,30 +278,53 @@ class Trial {
     }
     this.choice.value = motion ? id : BY_HAND;
     this.guide.read(this.choice.value);
-    this.earlier = null;
+    this.other = null;
     this.changedAt = -Infinity;
-    const before = motion?.before && this.motions.get(motion.before);
-    if (before) {
-      this.begin(before);
-      session.finish(this.end, this.follow);
-      this.earlier = session.error ? null : session.table.copy();
-    }
     this.begin(motion || null);
+    this.compare();
     player.setPlaying(false);
     player.now = this.description.startTime;
+    if (motion && this.guide.isWritten) {
+      // The sentences have their numbers from the first moment.
+      session.finish(this.end, this.move);
+    }
+    this.write();
     player.setPlaying(motion !== undefined && allowsMotion());
   }
 
-  /** Calculates the run again after a change. The run before the change stays in grey. */
+  /** Chooses a motion with the current parameters. The browser's Back returns to the motion before. @param {string} id */
+  visit(id) {
+    this.choose(id);
+    this.remember(false);
+  }
+
+  /** Shows a step of the guide. @param {Chapter} chapter */
+  follow({ settings }) {
+    this.apply(new URLSearchParams(settings));
+    this.isTouched = false;
+    this.remember(false);
+  }
+
+  /** Puts the settings into the address of the page. @param {boolean} isSame whether the address is changed without a new entry in the browser's history */
+  remember(isSame) {
+    const settings = String(this.settings());
+    if (settings !== this.applied) {
+      this.applied = settings;
+      history[isSame ? "replaceState" : "pushState"](null, "", `#try&${settings}`);
+    }
+  }
+
+  /** Calculates the run again after a change. The run before the change stays in grey, unless the motion is compared with another one. */
   recalculate() {
     const { session } = this;
     const now = performance.now();
-    if (now - this.changedAt > 1000 && session.motion && !session.error && session.table.end >= this.end - 0.5 * this.description.step) {
-      this.earlier = session.table.copy();
+    if (now - this.changedAt > 1000 && this.isWhole && !session.motion?.other) {
+      this.other = { table: session.table.copy(), label: "before the change" };
     }
     this.changedAt = now;
     const { isRejected } = session;
     session.restart(session.motion ? 0 : Infinity);
+    this.compare();
     this.view.set?.((name) => Number(session.parameter(this.find(name))));
     this.showNumbers();
     if (isRejected && session.motion) {
@@ -272,10 +347,7 @@ class Trial {
 
   /** Shows the values of the numbers in the guide. */
   showNumbers() {
-    for (const [name, shown] of this.guide.show) {
-      const one = this.description.byName.get(name);
-      shown.forEach((show) => show(one ? Number(this.session.parameter(one)) * one.factor + one.offset : this.addOn.numbers[name]));
-    }
+    this.guide.show.forEach((shown, name) => shown.forEach((show) => show(this.value(name))));
   }
 
   /** Sets all parameters. @param {Record<string, number>} start values that differ from those of the FMU */
@@ -287,7 +359,7 @@ class Trial {
   }
 
   save() {
-    this.session.finish(this.recorded, this.follow);
+    this.session.finish(this.recorded, this.move);
     const link = element("a", { href: URL.createObjectURL(new Blob([this.session.csv()], { type: "text/csv" })), download: `${this.description.identifier}.csv` });
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
@@ -297,7 +369,7 @@ class Trial {
   settings() {
     const { session, addOn, player } = this;
     const settings = new URLSearchParams({ motion: this.choice.value });
-    if (player.speed !== 1) {
+    if (player.speed !== this.pace) {
       settings.set("speed", String(player.speed));
     }
     for (const [one, value] of session.start) {
@@ -318,12 +390,13 @@ class Trial {
     if (!session.motion) {
       session.targets.forEach((value, name) => settings.set(name, String(value)));
     }
-    this.view.settings?.forEach(({ value }, name) => value !== "0" && settings.set(name, value));
+    this.view.settings?.forEach(({ value, preset }, name) => value() !== preset && settings.set(name, value()));
     return settings;
   }
 
+  /** Puts the settings into the address of the page, and copies it. The run goes on. */
   share() {
-    location.hash = `try&${this.settings()}`;
+    this.remember(true);
     this.status.classList.remove("live-error");
     this.status.textContent = "The address of this page now contains these settings.";
     if (location.protocol === "file:") {
@@ -332,46 +405,88 @@ class Trial {
     navigator.clipboard?.writeText(location.href).then(() => (this.status.textContent += " The address is copied."), () => {});
   }
 
-  /** Applies the settings of a link or a paragraph. All other settings are those of the page as it opens. @param {URLSearchParams} settings */
+  /** Applies the settings in the address of the page if they are others than the last ones. Addresses of other sections have none. */
+  settle() {
+    const settings = /^#try&?(.*)$/.exec(location.hash)?.[1] ?? (location.hash ? null : "");
+    if (settings !== null && settings !== this.applied) {
+      this.applied = settings;
+      this.apply(new URLSearchParams(settings));
+    }
+  }
+
+  /** Applies the settings of a link or a step. All other settings are those of the page as it opens. @param {URLSearchParams} settings */
   apply(settings) {
-    const { session, addOn, parameters } = this;
+    const { session, addOn, player } = this;
     Object.assign(addOn.numbers, this.numbers);
     this.reset(addOn.start);
-    const wanted = settings.get("motion") || this.choice.value;
-    for (const [name, value] of settings) {
-      const one = this.description.byName.get(name);
-      if (one?.causality === "parameter") {
-        const given = one.type === "String" ? value : Number(value);
-        const reason = problem(one, given);
-        parameters.mark.get(name)?.(reason && `The link sets ${name} = ${value}; it ${reason}`);
-        if (!reason) {
-          this.latest = { fields: parameters, one, rows: 0, targets: session.targets };
-          session.start.set(one, given);
-          parameters.show.get(name)?.(given);
-        }
-      } else if (name in addOn.numbers && Number.isFinite(Number(value))) {
-        addOn.numbers[name] = Number(value);
+    this.view.settings?.forEach(({ set, preset }) => set(preset));
+    const wanted = settings.get("motion") || addOn.motions[0].id;
+    const isByHand = wanted === BY_HAND && addOn.sliders.length > 0;
+    const problems = [...settings].map(([name, value]) => this.applyOne(name, value, isByHand)).filter((reason) => reason);
+    this.choose(this.motions.has(wanted) || isByHand ? wanted : addOn.motions[0].id);
+    for (const { name } of isByHand ? addOn.sliders.filter((slider) => settings.has(slider.name)) : []) {
+      const value = Number(settings.get(name));
+      if (!this.sliders.problem(this.find(name), value)) {
+        session.targets.set(name, value);
+        this.sliders.show.get(name)?.(value);
       }
-      const control = this.view.settings?.get(name);
-      if (control) {
-        control.value = value;
-        control.dispatchEvent(new Event("change"));
-      }
-    }
-    this.choose(this.motions.has(wanted) || wanted === BY_HAND ? wanted : addOn.motions[0].id);
-    for (const { name } of wanted === BY_HAND ? addOn.sliders.filter((slider) => settings.has(slider.name)) : []) {
-      session.targets.set(name, Number(settings.get(name)));
-      this.sliders.show.get(name)?.(Number(settings.get(name)));
     }
     this.view.set?.((name) => Number(session.parameter(this.find(name))));
     this.showNumbers();
-    this.isTouched ||= settings.size > 0;
-    const speed = Number(settings.get("speed"));
-    if (speed > 0) {
-      this.player.setSpeed(speed);
-    } else if (wanted === BY_HAND && settings.size > 1) {
-      this.player.setPlaying(true);
+    const speed = settings.get("speed");
+    if (speed !== null && this.isSpeed(Number(speed))) {
+      player.setSpeed(Number(speed));
+    } else {
+      const { isPlaying } = player;
+      player.setSpeed(this.pace);
+      player.setPlaying(isPlaying || (isByHand && settings.size > 1));
     }
+    this.isTouched = false;
+    this.status.classList.toggle("live-error", problems.length > 0);
+    this.status.textContent = problems.length ? `The link is applied without these values: ${problems.join("; ")}.` : "";
+    this.shownError = "";
+  }
+
+  /** Whether a link may set this speed. @param {number} speed */
+  isSpeed(speed) {
+    return speed === Infinity || (speed >= 1e-3 * this.pace && speed <= 100 * this.pace);
+  }
+
+  /** Applies a setting except motion, speed and sliders; returns why it is impossible, or "". @param {string} name @param {string} value @param {boolean} isByHand */
+  applyOne(name, value, isByHand) {
+    const { session, addOn, parameters, description } = this;
+    const one = description.byName.get(name);
+    if (name === "motion") {
+      return this.motions.has(value) || isByHand ? "" : `motion must be one of the list below, but it is ${value}`;
+    }
+    if (name === "speed") {
+      return this.isSpeed(Number(value)) ? "" : `speed must be from ${quantity(1e-3 * this.pace, "")} to ${quantity(100 * this.pace, "")}, but it is ${value}`;
+    }
+    if (one?.causality === "parameter") {
+      const given = one.type === "String" ? value : value === "" ? NaN : Number(value);
+      const reason = parameters.problem(one, given);
+      parameters.mark.get(name)?.(reason && `The link is applied without this value: ${reason}.`);
+      if (!reason) {
+        this.latest = { fields: parameters, one, rows: 0, targets: session.targets };
+        session.start.set(one, given);
+        parameters.show.get(name)?.(given);
+      }
+      return reason;
+    }
+    if (name in addOn.numbers) {
+      const { label = name, low = -Infinity, high = Infinity, unit = "" } = addOn.limits?.find((dial) => dial.name === name) ?? {};
+      const number = value === "" ? NaN : Number(value);
+      if (!(number >= low && number <= high)) {
+        return `${label} must be from ${quantity(low, "")} to ${quantity(high, unit)}, but it is ${value}`;
+      }
+      addOn.numbers[name] = number;
+      return "";
+    }
+    if (addOn.sliders.some((slider) => slider.name === name)) {
+      return one ? this.sliders.problem(one, value === "" ? NaN : Number(value)) : "";
+    }
+    const setting = this.view.settings?.get(name);
+    return setting?.set(value) ? "" : setting ? `${name} cannot be ${value}` : `there is no ${name}`;
   }
 
   /** @param {string} text @param {() => void} action */
@@ -388,6 +503,7 @@ class Trial {
     const sliders = addOn.sliders.map(({ name, label, reach }) => {
       const one = this.find(name);
       const [low, high] = [Math.max(one.min, startOf(one) - reach), Math.min(one.max, startOf(one) + reach)];
+      this.sliders.reaches.set(name, FARTHEST * reach);
       return this.sliders.row(one, label, one.type === "Real" ? [low * one.factor + one.offset, high * one.factor + one.offset] : null, "");
     });
     const near = Object.entries(addOn.near).map(([name, about]) => this.parameters.row(this.find(name), name, null, about));
@@ -399,9 +515,15 @@ class Trial {
       ...(this.choice.length > 1 ? [motion] : []),
       ...sliders,
       ...near,
-      element("div", { class: "live-buttons" }, ...(this.view.controls || []), ...buttons),
+      element("div", { class: "live-buttons" }, ...buttons),
       this.status,
+      ...(this.isShort && this.settable.length ? [element("b", {}, "Parameters"), ...this.settable.map((one) => this.parameters.row(one, one.name, null)), this.button("Default parameters", () => this.reset({}))] : []),
     );
+  }
+
+  /** Whether all parameters are in one grid with the inputs: those of a small model without its own add-on. */
+  get isShort() {
+    return addOns[this.description.identifier] === undefined && this.settable.length <= 12;
   }
 
   /** The parameters that are not near the sliders. */
@@ -412,7 +534,7 @@ class Trial {
     const fields = element(
       "details",
       { class: "live-parameters" },
-      element("summary", {}, "Parameters"),
+      element("summary", {}, Object.keys(this.addOn.near).length ? "All other parameters" : "Parameters"),
       element("div", { class: "live-rows" }, ...major),
       ...(minor.length ? [element("details", {}, element("summary", {}, "Start values"), element("div", { class: "live-rows" }, ...minor))] : []),
       this.button("Default parameters", () => this.reset({})),
@@ -424,22 +546,33 @@ class Trial {
   /** The section at the top of the page. */
   section() {
     const { description, player, missing } = this;
-    player.side.append(this.controls());
+    player.stage.append(...(this.view.controls ? [element("div", { class: "live-buttons live-view" }, ...this.view.controls)] : []));
+    player.element.prepend(...this.guide.elements);
+    player.element.append(this.controls());
     player.plots.element.prepend(...(this.response ? [this.response.element] : []));
-    player.plots.element.append(element("p", { class: "live-legend" }, "Pale: the rest of the run. Grey: the run before the last change."));
     const about = element(
       "p",
-      {},
+      { class: "live-about" },
       `This is the FMU itself: ${description.identifier} ${description.version} calculates every number above in your browser. The page loads nothing and sends nothing. The FMU\u2019s guid is `,
       element("code", {}, description.guid),
       `.${missing.length ? ` This page does not contain ${missing.join(", ")} (too large). Results that depend on them differ from those of other tools.` : ""}`,
     );
-    const section = element("section", { class: "live", "aria-labelledby": "try" }, element("h2", { id: "try" }, "Try it"), this.guide.element, player.element, ...(this.settable.length ? [this.fields()] : []), about);
+    const isPlain = addOns[description.identifier] === undefined;
+    const section = element(
+      "section", { class: "live", "aria-labelledby": "try" }, element("h2", { id: "try" }, "Try it"), player.element,
+      ...(this.settable.length && !this.isShort ? [this.fields()] : []), ...(isPlain ? [tableOfVariables(description)] : []), about,
+    );
     for (const kind of ["pointerdown", "keydown"]) {
       section.addEventListener(kind, () => (this.isTouched = true), { capture: true });
     }
     return section;
   }
+}
+
+/** The note of a motion that is nearest to a time, s. @param {Motion | null} motion @param {number} time */
+function captionAt(motion, time) {
+  const notes = motion?.notes ?? [];
+  return notes.reduce((best, note) => (Math.abs(note[0] - time) < Math.abs(best[0] - time) ? note : best), notes[0] ?? [0, ""])[1];
 }
 
 /** Decompresses an FMU of the page. @param {{description: string, module: string}} packed @param {Record<string, string>} resources @returns {Promise<Package>} */
@@ -453,7 +586,7 @@ async function decompressPackage(packed, resources) {
 }
 
 /**
- * Adds the section at the top of the page.
+ * Puts the section into the space that the page has for it.
  * @param {{description: string, module: string}[]} packed the FMU of this page, and those that its add-on runs
  * @param {Record<string, string>} resources of the FMU of this page @param {string[]} missing resources that are not in the page
  */
@@ -461,20 +594,13 @@ async function live(packed, resources, missing) {
   const [own, ...others] = await Promise.all(packed.map((one, index) => decompressPackage(one, index ? {} : resources)));
   const trial = new Trial(own, others, missing);
   const section = trial.section();
-  (document.querySelector("main") || document.body).prepend(section);
-  const contents = document.querySelector("header nav");
-  if (contents) {
-    section.append(contents);
-  }
-  document.querySelector("nav ul")?.prepend(element("li", {}, element("a", { href: "#try" }, "Try it")));
   const { stopTime, startTime, identifier } = own.description;
   if (addOns[identifier] === undefined && !(stopTime - startTime < 60 && stopTime - startTime > 1)) {
-    trial.player.setSpeed((stopTime - startTime) / 10);
+    trial.pace = (stopTime - startTime) / 10;
   }
-  const settle = () => trial.apply(new URLSearchParams(location.hash.replace(/^#try&?/, "")));
-  settle();
-  addEventListener("hashchange", () => location.hash.startsWith("#try&") && settle());
-  if (location.hash.startsWith("#try")) {
-    section.scrollIntoView();
-  }
+  space().replaceWith(section);
+  document.querySelector("nav ul")?.prepend(element("li", {}, element("a", { href: "#try" }, "Try it")));
+  trial.settle();
+  addEventListener("popstate", () => trial.settle());
+  addEventListener("hashchange", () => trial.settle());
 }

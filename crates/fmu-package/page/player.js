@@ -2,7 +2,7 @@
 
 /**
  * An image of the model at one time, next to the plots.
- * @typedef {{element: HTMLElement, draw(table: Table, time: number): void, set?(parameters: (name: string) => number): void, touch?(): void}} View
+ * @typedef {{element: HTMLElement, draw(table: Table, time: number, caption?: string): void, set?(parameters: (name: string) => number): void, touch?(): void}} View
  */
 
 /** Whether the user's system allows animations. */
@@ -14,9 +14,11 @@ const SPEEDS = new Map([["2", "2 × real time"], ["1", "real time"], ["0.5", "1/
 class Player {
   /**
    * `span` returns the time span of the plots. `advance` calculates the run until a time and returns the time that it reached.
-   * `recorded` returns the end of the time slider, `limit` the end of the run.
+   * `recorded` returns the end of the time slider, `limit` the end of the run. `other` is a run for comparison. At the end of a run that plays,
+   * `goesOn` starts another one and returns true, or returns false.
    * @param {{plots: (seek: (time: number) => void) => Plots, view: View | null, begin: number, isLooping?(): boolean, table: Table,
-   *   span(now: number): [number, number], recorded(): number, limit(): number, advance?(now: number): number, earlier?(): Table | null}} options
+   *   span(now: number): [number, number], recorded(): number, limit(): number, advance?(now: number): number, other?(): Comparison | null,
+   *   notes?(): Note[], goesOn?(): boolean}} options
    */
   constructor(options) {
     this.options = options;
@@ -29,7 +31,7 @@ class Player {
     this.isRequested = false;
     this.isVisible = true;
     this.plots = options.plots((time) => this.seek(time));
-    this.play = element("button", { type: "button", class: "live-play" });
+    this.play = element("button", { type: "button", class: "live-play" }, "Play");
     this.play.addEventListener("click", () => this.setPlaying(!this.isPlaying));
     this.slider = element("input", { type: "range", min: "0", max: "1000", step: "1", value: "0", "aria-label": "Time", class: "live-time" });
     this.slider.addEventListener("input", () => {
@@ -40,10 +42,10 @@ class Player {
     this.pace.append(...[...SPEEDS].map(([value, text]) => element("option", { value }, text)));
     this.pace.value = "1";
     this.pace.addEventListener("change", () => this.setSpeed(Number(this.pace.value)));
-    this.late = element("span", { class: "live-late", hidden: "" });
+    this.late = element("span", { class: "live-late" });
     this.bar = element("div", { class: "live-bar" }, this.play, this.slider, this.clock, this.pace, this.late);
-    this.side = element("div", { class: "live-side" }, ...(options.view ? [options.view.element] : []), this.bar);
-    this.element = element("div", { class: "live-player" }, this.side, this.plots.element);
+    this.stage = element("div", { class: "live-stage" }, ...(options.view ? [options.view.element] : []), this.bar);
+    this.element = element("div", { class: "live-player" }, this.stage, this.plots.element);
     new ResizeObserver(() => this.requestFrame()).observe(this.element);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.requestFrame());
     new IntersectionObserver((entries) => {
@@ -56,10 +58,12 @@ class Player {
   /** @param {number} speed */
   setSpeed(speed) {
     this.speed = speed;
-    if (!SPEEDS.has(String(speed))) {
+    if (![...this.pace.options].some(({ value }) => value === String(speed))) {
       this.pace.append(element("option", { value: String(speed) }, `${Number(speed.toPrecision(2))} × real time`));
     }
     this.pace.value = String(speed);
+    this.paced = { passed: 0, played: 0 };
+    this.late.textContent = "";
     this.setPlaying(true);
   }
 
@@ -68,9 +72,14 @@ class Player {
     if (isPlaying && !this.isPlaying && this.now >= this.options.limit() - 1e-9) {
       this.now = this.options.begin;
     }
+    if (isPlaying === this.isPlaying) {
+      // A run that is moved by hand goes on.
+      this.requestFrame();
+      return;
+    }
     this.isPlaying = isPlaying;
     this.paced = { passed: 0, played: 0 };
-    this.late.hidden = true;
+    this.late.textContent = "";
     this.play.textContent = isPlaying ? "Pause" : "Play";
     this.last = 0;
     this.requestFrame();
@@ -114,7 +123,7 @@ class Player {
     }
     this.checkPace(waited, this.now - before);
     if (table.count && !(isBehind && reached < before - 1e-9)) {
-      this.plots.draw(table, this.now, ...this.options.span(this.now), this.options.earlier?.() ?? null);
+      this.plots.draw(table, this.now, ...this.options.span(this.now), this.options.other?.() ?? null, this.options.notes?.());
       view?.draw(table, this.now);
     }
     this.slider.value = String(Math.round((1000 * (this.now - begin)) / (this.options.recorded() - begin || 1)));
@@ -124,7 +133,7 @@ class Player {
     if (this.isPlaying && this.now >= limit - 1e-9 && !isBehind) {
       if (this.options.isLooping?.()) {
         this.now = begin;
-      } else {
+      } else if (!this.options.goesOn?.()) {
         this.setPlaying(false);
       }
     }
@@ -142,8 +151,7 @@ class Player {
     this.paced.played += played;
     if (this.paced.passed >= 1) {
       const pace = this.paced.played / this.paced.passed;
-      this.late.hidden = pace > 0.9 * this.speed;
-      this.late.textContent = `slower here: ${Number(pace.toPrecision(2))} \u00d7 real time`;
+      this.late.textContent = pace > 0.9 * this.speed ? "" : `slower here: ${Number(pace.toPrecision(2))} \u00d7 real time`;
       this.paced = { passed: 0, played: 0 };
     }
   }

@@ -2,9 +2,14 @@
 
 /**
  * A curve of a plot: the name of its column, its label, the name of a colour, and `factor` and `offset` to the unit of the plot.
- * NaN is not drawn.
- * @typedef {{name: string, label: string, colour: string, factor: number, offset?: number, isInteger?: boolean}} Curve
- * @typedef {{title: string, unit: string, curves: Curve[]}} Panel
+ * NaN is not drawn. A stepwise curve is constant from row to row. A goal is drawn dotted, with its label next to it.
+ * @typedef {{name: string, label: string, colour: string, factor: number, offset?: number, isInteger?: boolean, isStepwise?: boolean, isGoal?: boolean}} Curve
+ * A panel. `isNoted` panels show the notes of a motion.
+ * @typedef {{title: string, unit: string, curves: Curve[], isNoted?: boolean}} Panel
+ * A run for comparison, which is drawn in grey, and its label at the curve.
+ * @typedef {{table: Table, label: string}} Comparison
+ * A remark at a time (or at another abscissa) of the plot.
+ * @typedef {[number, string]} Note
  */
 
 /** Columns of numbers, all with `count` rows; the first is the time. */
@@ -162,7 +167,8 @@ class Plots {
       const value = element("span", { class: "live-number" });
       const key = element("span", { class: "live-key" }, curve.label, " ", value);
       key.style.setProperty("--colour", `var(--${curve.colour})`);
-      key.classList.toggle("live-dashed", index % 2 === 1);
+      key.classList.toggle("live-dashed", isDashed(panel, index));
+      key.classList.toggle("live-goal", Boolean(curve.isGoal));
       return { value, key };
     });
     const unit = panel.unit ? ` (${panel.unit})` : "";
@@ -188,16 +194,17 @@ class Plots {
   }
 
   /**
-   * Draws the trajectories from `begin` to `end`, those after `now` pale, and those of an earlier run in grey.
-   * @param {Table} table @param {number} now @param {number} begin @param {number} end @param {Table | null} [earlier]
+   * Draws the trajectories from `begin` to `end`, those after `now` pale.
+   * @param {Table} table @param {number} now @param {number} begin @param {number} end
+   * @param {Comparison | null} [other] @param {Note[]} [notes]
    */
-  draw(table, now, begin, end, earlier = null) {
+  draw(table, now, begin, end, other = null, notes = []) {
     this.span = { begin, end };
     const axes = this.panels.map(({ panel, canvas }) => {
       const surface = clear(canvas);
       const { pen } = surface;
       pen.font = FONT;
-      const ranges = [table, ...(earlier ? [earlier] : [])].map((run) => range(panel, run, ...rowsOf(run, begin, end)));
+      const ranges = [table, ...(other ? [other.table] : [])].map((run) => range(panel, run, ...rowsOf(run, begin, end)));
       const [low, high] = [Math.min(...ranges.map(([one]) => one)), Math.max(...ranges.map(([, one]) => one))];
       const marks = ticks(low, high, 5);
       return { surface, low, high, marks, textWidth: Math.max(...marks.map(({ text }) => pen.measureText(text).width)) };
@@ -205,81 +212,132 @@ class Plots {
     // The width changes in steps, so that the axes do not move with each digit.
     this.left = Math.max(LEFT, 8 * Math.ceil((12 + Math.max(...axes.map(({ textWidth }) => textWidth))) / 8));
     for (const [index, panel] of this.panels.entries()) {
-      this.drawPanel(panel, axes[index], table, now, index === this.panels.length - 1, earlier);
+      this.drawPanel(panel, axes[index], table, now, index === this.panels.length - 1, other, panel.panel.isNoted ? notes : []);
     }
   }
 
   /**
    * @param {ReturnType<Plots["panel"]>} drawn
    * @param {{surface: ReturnType<typeof clear>, low: number, high: number, marks: {value: number, text: string}[]}} axis
-   * @param {Table} table @param {number} now @param {boolean} isLast @param {Table | null} earlier
+   * @param {Table} table @param {number} now @param {boolean} isLast @param {Comparison | null} other @param {Note[]} notes
    */
-  drawPanel({ panel, keys }, { surface: { pen, width, height }, low, high, marks }, table, now, isLast, earlier) {
+  drawPanel({ panel, keys }, { surface: { pen, width, height }, low, high, marks }, table, now, isLast, other, notes) {
     const colour = (/** @type {string} */ name) => colourAt(this.element, name);
-    const { left } = this;
     const { begin, end } = this.span;
-    const [first, last] = rowsOf(table, begin, end);
-    const bottom = height - (isLast ? 34 : 20);
-    const x = (/** @type {number} */ time) => left + ((time - begin) / (end - begin)) * (width - left - RIGHT);
-    const y = (/** @type {number} */ value) => bottom - ((value - low) / (high - low)) * (bottom - 6);
-    pen.lineWidth = 1;
-    pen.strokeStyle = colour("grid");
-    pen.fillStyle = colour("soft");
-    pen.textAlign = "right";
-    pen.textBaseline = "middle";
-    for (const tick of marks) {
-      line(pen, [left, y(tick.value)], [width - RIGHT, y(tick.value)]);
-      pen.fillText(tick.text, left - 6, y(tick.value));
-    }
-    pen.textAlign = "center";
-    pen.textBaseline = "top";
-    for (const tick of ticks(begin, end, Math.min(8, width / 60))) {
-      line(pen, [x(tick.value), 6], [x(tick.value), bottom]);
-      pen.fillText(tick.text, x(tick.value), bottom + 5);
-    }
-    if (isLast) {
-      pen.fillText(this.axis, (left + width - RIGHT) / 2, bottom + 20);
-    }
+    const area = { left: this.left, right: width - RIGHT, top: notes.length ? 22 : 6, bottom: height - (isLast ? 34 : 20) };
+    const x = (/** @type {number} */ time) => area.left + ((time - begin) / (end - begin)) * (area.right - area.left);
+    const y = (/** @type {number} */ value) => area.bottom - ((value - low) / (high - low)) * (area.bottom - area.top);
+    this.drawGrid(pen, area, marks.map(({ value, text }) => ({ text, at: y(value) })), ticks(begin, end, Math.min(8, width / 60)).map(({ value, text }) => ({ text, at: x(value) })), isLast);
+    const say = (/** @type {string} */ text, /** @type {number} */ left, /** @type {number} */ top, /** @type {string} */ name) => {
+      const half = pen.measureText(text).width / 2 + 2;
+      const middle = Math.max(area.left + half, Math.min(area.right - half, left));
+      pen.textAlign = "center";
+      pen.textBaseline = "alphabetic";
+      pen.lineWidth = 3;
+      pen.strokeStyle = colour("paper-here");
+      pen.strokeText(text, middle, top);
+      pen.lineWidth = 1;
+      pen.fillStyle = colour(name);
+      pen.fillText(text, middle, top);
+    };
     if (table.count) {
       pen.strokeStyle = colour("soft");
-      line(pen, [x(now), 6], [x(now), bottom]);
+      line(pen, [x(now), area.top], [x(now), area.bottom]);
     }
     pen.lineJoin = "round";
-    for (const curve of earlier ? panel.curves : []) {
-      const run = /** @type {Table} */ (earlier);
+    pen.strokeStyle = colour("soft");
+    for (const curve of other ? panel.curves.filter(({ isGoal }) => !isGoal) : []) {
+      const run = /** @type {Comparison} */ (other).table;
       const column = run.column(curve.name);
-      pen.strokeStyle = colour("soft");
-      pen.globalAlpha = 0.6;
-      drawCurve(pen, run.column("time"), x, (row) => y(curve.factor * column[row] + (curve.offset || 0)), ...rowsOf(run, begin, end));
-      pen.globalAlpha = 1;
+      drawCurve(pen, run.column("time"), x, (row) => y(curve.factor * column[row] + (curve.offset || 0)), ...rowsOf(run, begin, end), curve.isStepwise);
     }
+    const [first, last] = rowsOf(table, begin, end);
     for (const [index, curve] of panel.curves.entries()) {
       const column = table.column(curve.name);
       const value = (/** @type {number} */ row) => y(curve.factor * column[row] + (curve.offset || 0));
       const until = Math.min(table.row(now), last);
       pen.strokeStyle = colour(curve.colour);
+      pen.setLineDash(curve.isGoal ? [1.5, 3] : isDashed(panel, index) ? [5, 3] : []);
       pen.globalAlpha = 0.35;
-      drawCurve(pen, table.column("time"), x, value, until, last);
+      drawCurve(pen, table.column("time"), x, value, until, last, curve.isStepwise);
       pen.globalAlpha = 1;
-      pen.lineWidth = 1.8;
-      pen.setLineDash(index % 2 ? [5, 3] : []);
-      drawCurve(pen, table.column("time"), x, value, first, until);
+      pen.lineWidth = curve.isGoal ? 1.3 : 1.8;
+      drawCurve(pen, table.column("time"), x, value, first, until, curve.isStepwise);
       pen.setLineDash([]);
       pen.lineWidth = 1;
       if (table.count) {
-        const here = curve.factor * table.at(curve.name, now) + (curve.offset || 0);
+        const here = curve.factor * (curve.isStepwise ? column[table.row(now)] : table.at(curve.name, now)) + (curve.offset || 0);
         keys[index].key.hidden = Number.isNaN(here);
-        pen.fillStyle = colour(curve.colour);
-        pen.beginPath();
-        pen.arc(x(Math.min(now, table.end)), y(here), 3.5, 0, 2 * Math.PI);
-        pen.fill();
+        if (!curve.isGoal) {
+          pen.fillStyle = colour(curve.colour);
+          pen.beginPath();
+          pen.arc(x(Math.min(now, table.end)), y(here), 3.5, 0, 2 * Math.PI);
+          pen.fill();
+        }
         const text = curve.isInteger ? String(Math.round(here)) : format(here, Math.max(Math.abs(low), Math.abs(high)));
         if (keys[index].value.textContent !== text) {
           keys[index].value.textContent = text;
         }
       }
     }
+    const apart = other && table.count ? farthest(panel, table, other.table, begin, end) : null;
+    if (other && apart && Math.abs(apart.value - apart.own) > 0.03 * (high - low)) {
+      // On the side of the grey curve that is away from the run's own curve.
+      say(other.label, x(apart.time), Math.max(area.top + 10, Math.min(area.bottom - 4, y(apart.value) + (apart.value > apart.own ? -5 : 14))), "soft");
+    }
+    notes.forEach(([time, text]) => say(text, x(time), 13, "ink"));
   }
+
+  /**
+   * Draws the grid and its labels.
+   * @param {CanvasRenderingContext2D} pen @param {{left: number, right: number, top: number, bottom: number}} area
+   * @param {{text: string, at: number}[]} rows @param {{text: string, at: number}[]} columns @param {boolean} isLast
+   */
+  drawGrid(pen, { left, right, top, bottom }, rows, columns, isLast) {
+    pen.lineWidth = 1;
+    pen.strokeStyle = colourAt(this.element, "grid");
+    pen.fillStyle = colourAt(this.element, "soft");
+    pen.textAlign = "right";
+    pen.textBaseline = "middle";
+    for (const { text, at } of rows) {
+      line(pen, [left, at], [right, at]);
+      pen.fillText(text, left - 6, at);
+    }
+    pen.textAlign = "center";
+    pen.textBaseline = "top";
+    for (const { text, at } of columns) {
+      line(pen, [at, top], [at, bottom]);
+      pen.fillText(text, at, bottom + 5);
+    }
+    if (isLast) {
+      pen.fillText(this.axis, (left + right) / 2, bottom + 20);
+    }
+  }
+}
+
+/** Whether a curve is dashed, so that the two curves of a panel differ without colour. @param {Panel} panel @param {number} index */
+function isDashed(panel, index) {
+  return panel.curves.slice(0, index).filter(({ isGoal }) => !isGoal).length % 2 === 1 && !panel.curves[index].isGoal;
+}
+
+/**
+ * The point at which the curves of another run are farthest from those of a run: its time, its value, and the value of the run; `null` if none is comparable.
+ * @param {Panel} panel @param {Table} table @param {Table} other @param {number} begin @param {number} end
+ */
+function farthest(panel, table, other, begin, end) {
+  /** @type {{time: number, value: number, own: number} | null} */
+  let found = null;
+  for (const { name, factor, offset = 0 } of panel.curves.filter(({ isGoal }) => !isGoal)) {
+    const [times, column] = [other.column("time"), other.column(name)];
+    const [first, last] = rowsOf(other, begin, Math.min(end, table.end));
+    for (let row = first; row <= last; row += Math.max(1, (last - first) >> 9)) {
+      const [value, own] = [factor * column[row] + offset, factor * table.at(name, times[row]) + offset];
+      if (Math.abs(value - own) > (found ? Math.abs(found.value - found.own) : 0)) {
+        found = { time: times[row], value, own };
+      }
+    }
+  }
+  return found;
 }
 
 /** Smallest margins of a panel, px, and the font of the tick labels. */
@@ -321,8 +379,9 @@ function line(pen, start, end) {
  * Draws a curve from row to row. Of many rows in one pixel, it draws the extremes.
  * @param {CanvasRenderingContext2D} pen @param {Float64Array} times
  * @param {(time: number) => number} x @param {(row: number) => number} y @param {number} first @param {number} last
+ * @param {boolean} [isStepwise] whether the value is constant until the next row
  */
-function drawCurve(pen, times, x, y, first, last) {
+function drawCurve(pen, times, x, y, first, last, isStepwise = false) {
   if (!(last > first)) {
     return;
   }
@@ -338,12 +397,18 @@ function drawCurve(pen, times, x, y, first, last) {
       high = here > high ? here : high;
     }
     if (next - row > 2) {
+      if (isStepwise) {
+        pen.lineTo(pixel, y(row - 1));
+      }
       const isRising = y(next - 1) > y(row);
       pen.lineTo(pixel, isRising ? low : high);
       pen.lineTo(pixel + 0.5, isRising ? high : low);
       pen.lineTo(x(times[next - 1]), y(next - 1));
     } else {
       for (let k = row; k < next; k++) {
+        if (isStepwise) {
+          pen.lineTo(x(times[k]), y(k - 1));
+        }
         pen.lineTo(x(times[k]), y(k));
       }
     }

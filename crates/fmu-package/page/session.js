@@ -2,8 +2,13 @@
 
 /**
  * A motion: a function that sets the inputs at a time. `table` has the results so far; a motion may write its own columns of the next
- * row. The motion `before` is drawn in grey, for comparison. `frequency` returns the frequency of a vibration, Hz.
- * @typedef {{id: string, title: string, length: number, before?: string, frequency?(time: number): number, begin?(): void, inputs(time: number, inputs: Record<string, number>, table: Table): void}} Motion
+ * row. The motion `other` is drawn in grey for comparison, with its label. `frequency` returns the frequency of a vibration, Hz.
+ * `notes` are drawn in the plots.
+ * @typedef {{id: string, title: string, length: number, other?: {id: string, label: string}, notes?: Note[], frequency?(time: number): number, begin?(): void,
+ *   inputs(time: number, inputs: Record<string, number>, table: Table): void}} Motion
+ * A second FMU that runs next to that of the page, from the first row: `step` moves it to a time with the last row of the table, and sets
+ * inputs and columns of the new row.
+ * @typedef {{begin(start: Map<Variable, number | string>): void, step(time: number, inputs: Record<string, number>, table: Table): void}} Companion
  */
 
 /** Longest run by hand, s, and largest number of rows. */
@@ -14,7 +19,7 @@ const BUDGET = 10;
 /** A run of the FMU. It is calculated up to the requested time, and again after a change. */
 class Session {
   /** @param {Package} own @param {AddOn} addOn */
-  constructor(own, { recorded, written }) {
+  constructor(own, { recorded, written, companion }) {
     const { description } = own;
     this.own = own;
     this.description = description;
@@ -22,6 +27,7 @@ class Session {
     const outputs = description.variables.filter((one) => (one.causality === "output" || recorded.includes(one.name)) && one.type !== "String");
     this.outputs = outputs.filter((one) => !this.inputs.includes(one));
     this.written = written;
+    this.companion = companion;
     this.table = new Table([...[...this.inputs, ...this.outputs].map((one) => one.name), ...written]);
     /** Start values that differ from those of the FMU. @type {Map<Variable, number | string>} */
     this.start = new Map();
@@ -61,6 +67,15 @@ class Session {
     this.ended = Infinity;
   }
 
+  /** Starts a run by hand again with the inputs of the last row. */
+  renew() {
+    for (const { name } of this.inputs) {
+      const column = this.table.column(name);
+      column[0] = column[this.table.count - 1];
+    }
+    this.restart(1);
+  }
+
   /** @param {number} row */
   timeOf(row) {
     return this.description.startTime + row * this.description.step;
@@ -80,7 +95,7 @@ class Session {
       if (error instanceof Terminated) {
         [this.error, this.ended] = [error.message, this.table.end];
       } else {
-        this.error = `The FMU rejects this: ${error instanceof Error ? error.message : error}`;
+        this.error = (error instanceof Error ? error.message : String(error)).replace(/^fmi2\w+: /, "");
       }
       this.instance = this.connect();
       this.isBegun = false;
@@ -102,6 +117,7 @@ class Session {
     if (!this.isBegun) {
       fmu.begin(this.start);
       this.isBegun = true;
+      this.companion?.begin(this.start);
       this.motion?.begin?.();
       this.inputs.forEach((one) => (now[one.name] = startOf(one)));
     } else {
@@ -120,6 +136,7 @@ class Session {
         follow(now);
       }
     }
+    this.companion?.step(time, now, table);
     this.inputs.forEach(({ name }, index) => (table.column(name)[row] = values.inputs[index] = now[name]));
     fmu.set(inputs, values.inputs);
     fmu.get(outputs, values.outputs);

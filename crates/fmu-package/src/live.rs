@@ -17,17 +17,22 @@ const PAGE: &str = "documentation/index.html";
 
 /// The page of a model without page.
 const PLAIN: &str = include_str!("../page/page.html");
-/// Replaced by the scripts with the section that runs the FMU.
-const WITHOUT_SCRIPTS: &str = "<noscript><p class=\"note\">With scripts, this page runs the FMU here. All else on it is complete.</p></noscript>";
+/// Space for the section that runs the FMU, which the scripts put there. It is as high as the window, so that the rest of the page does
+/// not move when the section appears. Without scripts it has only a note.
+const SPACE: &str = concat!(
+    "<div id=\"live\" style=\"min-height:100vh\"><noscript><style>#live{min-height:0!important}</style>",
+    "<p class=\"note\">With scripts, this page runs the FMU here. All else on it is complete.</p></noscript></div>",
+);
 const BEGIN: &str = include_str!("../page/begin.js");
 const STYLE: &str = include_str!("../page/live.css");
-const SCRIPTS: [&str; 7] = [
+const SCRIPTS: [&str; 8] = [
     include_str!("../page/plot.js"),
     include_str!("../page/player.js"),
     include_str!("../page/fmu.js"),
     include_str!("../page/guide.js"),
     include_str!("../page/session.js"),
     include_str!("../page/fields.js"),
+    include_str!("../page/plain.js"),
     include_str!("../page/live.js"),
 ];
 
@@ -128,7 +133,7 @@ fn live(page: &str, script: &str) -> Result<String> {
     let end = page.rfind("</body>").unwrap_or(page.len());
     let begin = ["<main>", "<body>"].iter().find_map(|tag| Some(page.find(tag)? + tag.len())).unwrap_or(end);
     let (head, content, tail) = (&page[..begin], &page[begin..end], &page[end..]);
-    Ok(with_policy(&format!("{head}{WITHOUT_SCRIPTS}{content}{text}{tail}"), script))
+    Ok(with_policy(&format!("{head}{SPACE}{content}{text}{tail}"), script))
 }
 
 /// Adds a Content-Security-Policy to the page. It allows the scripts and style sheets of the page and the compressed script, by their
@@ -228,7 +233,7 @@ mod tests {
         assert!(script.contains("\n], ...[{\"a.csv\":\"AA\"},[\"b\"]]).catch("));
 
         let page = live("<body><p>text</p></body></html>", &script).unwrap();
-        assert!(page.contains(&format!("<body>{WITHOUT_SCRIPTS}<p>text</p><style>")));
+        assert!(page.contains(&format!("<body>{SPACE}<p>text</p><style>")));
         assert!(page.ends_with(".catch(showFailure);\n</script>\n</body></html>"));
     }
 

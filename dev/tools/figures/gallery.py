@@ -9,7 +9,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from prw.plots import BLUE, PAGE_STYLE, VERMILION, draw_into, motion_panel, response_panels
+from prw.plots import BLUE, GREEN, PAGE_STYLE, PURPLE, VERMILION, draw_into, motion_panel, response_panels
 from tools.figures.bode import draw_bode, transfers
 from tools.figures.results import Results, Run
 
@@ -86,7 +86,7 @@ def _fig4_plate(found: Results) -> Figure:
 def _poles(found: Results) -> Figure:
     figure = Figure(figsize=(COLUMN, 3.0), layout="constrained")
     axis = figure.subplots()
-    for mode, name, colour, marker in zip(found.modes, ("pitch", "roll"), (BLUE, VERMILION), "x+"):
+    for mode, name, colour, marker in zip(found.modes, ("pitch", "roll"), (GREEN, PURPLE), "x+"):
         poles, zeros = mode.poles(), mode.zeros()
         cross: dict[str, Any] = {"color": colour, "markersize": 9, "markeredgewidth": 1.6}
         axis.plot(poles.real, poles.imag, marker, linestyle="none", label=f"poles of {name}", **cross)
@@ -103,7 +103,7 @@ def _poles(found: Results) -> Figure:
 def _steps(found: Results) -> Figure:
     figure = Figure(figsize=(COLUMN, 4.4), layout="constrained")
     axes = figure.subplots(2, sharex=True)
-    angles = [("pitch", found.pitch_step, BLUE), ("roll", found.roll_step, VERMILION)]
+    angles = [("pitch", found.pitch_step, GREEN), ("roll", found.roll_step, PURPLE)]
     for axis, kind, title, unit in (
         (axes[0], "", "Angle after a step of 1° at the motors", "deg"),
         (axes[1], "_rate", "Rate", "deg/s"),

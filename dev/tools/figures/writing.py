@@ -13,13 +13,15 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from prw.files import replacing
-from prw.plots import BLUE, PAGE_STYLE, VERMILION
+from prw.plots import BLUE, GREEN, PAGE_STYLE, PURPLE, VERMILION
 
 #: The page's colour by matplotlib's colour, with a default for files without a page.
 COLOURS = {
     "#000000": "currentColor",
     BLUE.lower(): f"var(--curve-1, {BLUE})",
     VERMILION.lower(): f"var(--curve-2, {VERMILION})",
+    GREEN.lower(): f"var(--curve-3, {GREEN})",
+    PURPLE.lower(): f"var(--curve-4, {PURPLE})",
     "#e6e6e6": "var(--grid, #e5e5e5)",
     "#e5e5e5": "var(--grid, #e5e5e5)",
 }

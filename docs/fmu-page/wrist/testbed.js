@@ -1,11 +1,15 @@
-// The add-on of the testbed: motions of the motors, the guide, the frequency response, the wrist.
+// The add-on of the testbed: motions of the motors, the frequency response, the closed loop. steps.js has the guide.
 
 /** Pole of pitch with the parameters of Table 1, 1/s, for the input shaper. */
 const PITCH_POLE = { real: -9.683, imaginary: 34.678 };
-/** Numbers that the guide changes: angle of the motors (deg) and frequency of the vibration (Hz). */
-const NUMBERS = { angle: 40, frequency: 4 };
-/** Lowest and highest frequency of the response, Hz. */
-const BAND = [0.5, 15];
+/** Numbers that the guide changes: angles of the motors (deg), frequency of the vibration (Hz), and goals of the controller (deg). */
+const NUMBERS = { alone: 20, angle: 40, frequency: 1, pitch_goal: 25, roll_goal: 50 };
+/** Angle of the fast move, deg, its duration, and the times at which it begins: in one go, and in two parts, s. */
+const FAST = { angle: 20, duration: 0.1, begin: 0.1, again: 1.9 };
+/** Time between the two parts of the shaped move: half a swing, s. Share of the second part. */
+const [HALF_SWING, SECOND_SHARE] = shaper();
+/** Lowest and highest frequency of the response, and the distance of its points, Hz. */
+const BAND = [0.5, 15, 0.05];
 /** Double pole with which the motors follow the sliders, 1/s. */
 const FOLLOW = 25;
 
@@ -49,17 +53,39 @@ function shaken(time, low, rise) {
   return [2 * (1 - Math.cos(phase)), 4 * Math.PI * (low + rise * time) * Math.sin(phase)];
 }
 
-/** A move of 20 degrees in 0.1 s, or two shaped moves that cancel the vibration. @param {number} time @param {boolean} isShaped */
-function move(time, isShaped) {
+/** The time between the parts of the shaped move, and the share of the second part: they cancel the vibration with the pole of pitch. */
+function shaper() {
   const later = Math.PI / PITCH_POLE.imaginary;
-  const weight = isShaped ? Math.exp(PITCH_POLE.real * later) : 0;
-  const [first, second] = [quintic(time - 0.1, 0.1), quintic(time - 0.1 - later, 0.1)];
-  return [0, 1].map((k) => (20 * (first[k] + weight * second[k])) / (1 + weight));
+  const weight = Math.exp(PITCH_POLE.real * later);
+  return [later, weight / (1 + weight)];
+}
+
+/** A fast move, in one go or in two parts. @param {number} time since it begins @param {boolean} isShaped */
+function move(time, isShaped) {
+  const share = isShaped ? SECOND_SHARE : 0;
+  const [first, second] = [quintic(time, FAST.duration), quintic(time - HALF_SWING, FAST.duration)];
+  return [0, 1].map((k) => FAST.angle * ((1 - share) * first[k] + share * second[k]));
+}
+
+/** The fast move in one go, slowly back, and the same move in two parts. @param {number} time */
+function stops(time) {
+  const [fast, back, shaped] = [move(time - FAST.begin, false), quintic(time - 1.1, 0.6), move(time - FAST.again, true)];
+  return [0, 1].map((k) => fast[k] - FAST.angle * back[k] + shaped[k]);
+}
+
+/** Motor 1 turns, stays, and turns back. @param {number} time */
+function alone(time) {
+  const [there, back] = [quintic(time - 0.2, 0.7), quintic(time - 2, 0.7)];
+  return [0, 1].map((k) => NUMBERS.alone * (there[k] - back[k]));
 }
 
 /** @type {Motion[]} */
 const MOTIONS = [
-  motorMotion("tour", "Both axes: equal angles pitch, opposite angles roll", 5.2, (time) => (time < 2.5 ? both(swing(time)) : both(swing(time - 2.6), -1))),
+  motorMotion("one", "Motor 1 turns, motor 2 stands still", 3, (time) => {
+    const [theta, omega] = alone(time);
+    return [theta, 0, omega, 0];
+  }),
+  { ...motorMotion("tour", "Both motors: equal angles pitch, opposite angles roll", 5.2, (time) => (time < 2.5 ? both(swing(time)) : both(swing(time - 2.6), -1))), notes: [[1.2, "together: pitch"], [3.8, "against each other: roll"]] },
   motorMotion("pitch", "Pitch: equal motor angles", 2.6, (time) => both(swing(time))),
   motorMotion("roll", "Roll: opposite motor angles", 2.6, (time) => both(swing(time), -1)),
   motorMotion("fig4", "The paper\u2019s Fig. 4: opposite rates, sin(10\u03c0t) rad/s", 2, (time) => both(sine(time), -1)),
@@ -70,22 +96,9 @@ const MOTIONS = [
   }),
   { ...motorMotion("shake", "Vibration at one frequency, equal motor angles", 3, (time) => both(shaken(time, NUMBERS.frequency, 0))), frequency: () => NUMBERS.frequency },
   { ...motorMotion("chirp", "A chirp: 0.5 to 15 Hz", 8, (time) => both(shaken(time, BAND[0], (BAND[1] - BAND[0]) / 8))), frequency: (time) => BAND[0] + ((BAND[1] - BAND[0]) * time) / 8 },
-  motorMotion("move", "A move of 20\u00b0 in 0.1 s", 1, (time) => both(move(time, false))),
-  { ...motorMotion("shaped", "The move of 20\u00b0 with an input shaper for the default k\u2081 and k\u2082", 1, (time) => both(move(time, true))), before: "move" },
-];
-
-/** The numbers in the paragraphs of the guide. */
-const [ANGLE, FREQUENCY, SOFTNESS] = [
-  { name: "angle", label: "Angle of the motors", low: 5, high: 60, step: 1, unit: "\u00b0" },
-  { name: "frequency", label: "Frequency", low: 0.5, high: 15, step: 0.1, unit: "Hz" },
-  { name: "k2", label: "Stiffness k2", low: 0.1, high: 2, step: 0.02, unit: "N\u00b7m/deg" },
-];
-/** @type {Chapter[]} */
-const GUIDE = [
-  { title: "Pitch", settings: { motion: "pitch" }, parts: ["Both motors turn by ", ANGLE, " to either side. The ring turns with them, so the wrist pitches by the same angle. Drag the underlined number."] },
-  { title: "Roll", settings: { motion: "roll" }, parts: ["The motors turn by ", ANGLE, " in opposite directions. The ring is at rest, and the gripper rolls by N/M\u00a0=\u00a07/4 of that angle."] },
-  { title: "Shake", settings: { motion: "shake", k2: String(0.3 / DEGREE) }, parts: ["Both motors vibrate at ", FREQUENCY, ", and k\u2082 is reduced to ", SOFTNESS, ". The first plot shows the response at all frequencies, in grey with the default k\u2082. Drag the frequency to the peak."] },
-  { title: "Shape", settings: { motion: "shaped" }, parts: ["A move in 0.1\u00a0s makes the wrist vibrate (grey curve). Two half moves, half a period apart, end without vibration. Drag k\u2082 away from ", SOFTNESS, ": the shaper no longer cancels the vibration."] },
+  { ...motorMotion("stop", "Stop dead: a move of 20\u00b0 in one go, then in two parts", 2.9, (time) => both(stops(time))), notes: [[0.55, "in one go"], [2.3, "in two parts"]] },
+  motorMotion("move", "A move of 20\u00b0 in 0.1 s, in one go", 1, (time) => both(move(time - FAST.begin, false))),
+  { ...motorMotion("shaped", "A move of 20\u00b0 in two parts (an input shaper for the default k\u2081 and k\u2082)", 1, (time) => both(move(time - FAST.begin, true))), other: { id: "move", label: "in one go" } },
 ];
 
 /** Inputs and outputs of the controller. */
@@ -99,10 +112,10 @@ class Resonance {
     const find = (/** @type {string} */ name) => /** @type {Variable} */ (own.description.byName.get(name));
     this.motors = this.fmu.group(MOTORS.map(find));
     this.pitch = this.fmu.group([find("pitch")]);
-    this.plots = new Plots([{ title: "Response: pitch for 1\u00b0 of both motors", unit: "", curves: [{ name: "gain", label: "at the cursor", colour: "curve-3", factor: 1 }] }], choose, "frequency (Hz)");
+    this.plots = new Plots([{ title: "Swing of the wrist, as a multiple of the motors\u2019", unit: "", isNoted: true, curves: [{ name: "gain", label: "at this frequency", colour: "curve-3", factor: 1 }] }], choose, "frequency (Hz)");
     this.element = this.plots.element;
     this.key = "";
-    /** Responses with the default parameters and with the current parameters. @type {(Table | undefined)[]} */
+    /** Responses with the parameters as the page opens, and with the current parameters. @type {(Table | undefined)[]} */
     this.measured = [];
     this.defaults = new Map([[find("use_omega"), 1]]);
   }
@@ -113,6 +126,18 @@ class Resonance {
     if (!motion?.frequency) {
       return;
     }
+    this.update(start);
+    const [preset, measured] = this.measured;
+    const peaks = this.peaks();
+    if (measured && preset && peaks) {
+      const isOther = peaks.now.join() !== peaks.preset.join();
+      const [frequency, gain] = peaks.now;
+      this.plots.draw(measured, motion.frequency(time), BAND[0], BAND[1], isOther ? { table: preset, label: "with the FMU\u2019s own values" } : null, gain > 1.02 ? [[frequency, `peak: ${gain.toFixed(2)} at ${frequency.toFixed(2)} Hz`]] : []);
+    }
+  }
+
+  /** Measures the response with other parameters. @param {Map<Variable, number | string>} start */
+  update(start) {
     const key = [...start].map(([{ name }, value]) => `${name}=${value}`).join();
     if (key !== this.key) {
       this.key = key;
@@ -123,10 +148,21 @@ class Resonance {
         this.measured.length = 1;
       }
     }
-    const [reference, measured] = this.measured;
-    if (measured) {
-      this.plots.draw(measured, motion.frequency(time), BAND[0], BAND[1], reference);
-    }
+  }
+
+  /** The response at a frequency, Hz. @param {number} frequency */
+  at(frequency) {
+    return this.measured[1] ? this.measured[1].at("gain", frequency) : NaN;
+  }
+
+  /** Frequency (Hz) and height of the peak now, and with the parameters as the page opens. */
+  peaks() {
+    const [preset, now] = this.measured.map((table) => {
+      const gains = table ? table.column("gain").subarray(0, table.count) : new Float64Array();
+      const top = gains.reduce((best, gain, row) => (gain > gains[best] ? row : best), 0);
+      return table ? [table.column("time")[top], gains[top]] : [];
+    });
+    return preset && now ? { now, preset } : null;
   }
 
   /** Runs a pulse and divides the Fourier transforms of pitch and pulse. @param {Map<Variable, number | string>} start */
@@ -141,7 +177,8 @@ class Resonance {
       this.fmu.stepTo((step + 1) * size);
     }
     const table = new Table(["gain"]);
-    for (let frequency = BAND[0]; frequency <= BAND[1] + 1e-9; frequency += 0.1) {
+    for (let point = 0; BAND[0] + point * BAND[2] <= BAND[1] + 1e-9; point++) {
+      const frequency = BAND[0] + point * BAND[2];
       const turn = 2 * Math.PI * frequency * size;
       let [real, imaginary] = [0, 0];
       for (let step = 0; step < steps; step++) {
@@ -161,19 +198,19 @@ class Resonance {
 /**
  * A motion in which the controller FMU drives the testbed FMU: at each communication point, they exchange their outputs. The set
  * points pitch the wrist, roll it, and return.
- * @param {Fmu} fmu the controller @param {string} id @param {string} title @param {string[]} off gains that are 0
+ * @param {Fmu} fmu the controller @param {string} id @param {string} title @param {string[]} off gains that are 0 @param {Motion["other"]} [other]
  * @returns {Motion}
  */
-function closedLoop(fmu, id, title, off) {
+function closedLoop(fmu, id, title, off, other) {
   const [controllerInputs, motors] = [new Float64Array(8), new Float64Array(4)];
   const find = (/** @type {string} */ name) => /** @type {Variable} */ (fmu.description.byName.get(name));
   const [inputGroup, outputGroup] = [[...SET_POINTS, ...MEASURED], MOTORS].map((names) => fmu.group(names.map(find)));
   return {
-    id, title, length: 2.6,
+    id, title, length: 2.6, other,
     begin: () => fmu.begin(new Map(off.map((gain) => [find(gain), 0]))),
     inputs: (time, inputs, table) => {
       const row = table.count;
-      SET_POINTS.forEach((name, axis) => (table.column(name)[row] = DEGREE * (time >= [0.1, 0.9][axis] && time < 1.7 ? [25, 50][axis] : 0)));
+      SET_POINTS.forEach((name, axis) => (table.column(name)[row] = DEGREE * (time >= [0.1, 0.9][axis] && time < 1.7 ? [NUMBERS.pitch_goal, NUMBERS.roll_goal][axis] : 0)));
       if (row > 0) {
         [...SET_POINTS, ...MEASURED].forEach((name, index) => (controllerInputs[index] = table.column(name)[row - 1]));
         fmu.set(inputGroup, controllerInputs);
@@ -186,14 +223,13 @@ function closedLoop(fmu, id, title, off) {
 }
 
 addOns.prw_testbed = (own, others) => {
-  const goals = SET_POINTS.map((name) => ({ name, label: name.replace("_", " "), colour: "soft", factor: 1 / DEGREE }));
-  /** @type {HTMLSelectElement} */
-  const twist = element("select", { "aria-label": "Enlargement of the couplings\u2019 twist" }, element("option", { value: "0" }, "twist: automatic"), ...["1", "5", "20", "50", "100"].map((value) => element("option", { value }, `twist \u00d7 ${value}`)));
+  const goals = SET_POINTS.map((name, axis) => ({ name, label: `${["pitch", "roll"][axis]} wanted`, colour: `curve-${3 + axis}`, factor: 1 / DEGREE, isGoal: true }));
   return {
-    lead: "Two motors move a robotic wrist. Drag a motor, or follow the four steps above.",
-    guide: GUIDE,
+    lead: LEAD,
+    guide: others.length ? GUIDE : GUIDE.filter(({ settings }) => settings.motion !== "closed-loop"),
     numbers: NUMBERS,
-    response: (change) => new Resonance(own, (frequency) => change("frequency", Math.round(10 * frequency) / 10)),
+    limits: DIALS,
+    response: (change) => new Resonance(own, (frequency) => change("frequency", Math.round(frequency / BAND[2]) * BAND[2])),
     near: { k1: "stiffness, motor side", k2: "stiffness, wrist side", c1: "damping, motor side", c2: "damping, wrist side" },
     label: "Motion",
     start: { use_omega: 1 },
@@ -203,14 +239,15 @@ addOns.prw_testbed = (own, others) => {
     ],
     recorded: ["theta5", "theta6"],
     written: SET_POINTS,
+    isAtRest: true,
     motions: [
       ...MOTIONS,
       ...others.map((one) => new Fmu(one)).flatMap((controller) => [
-        closedLoop(controller, "closed-loop", "The controller FMU closes the loop (grey: set points)", []),
-        closedLoop(controller, "open-loop", "The controller FMU with gains 0: open loop (grey: set points)", ["Kp", "Ki", "Kd"]),
+        closedLoop(controller, "closed-loop", "The controller FMU closes the loop", [], { id: "open-loop", label: "without feedback" }),
+        closedLoop(controller, "open-loop", "The controller FMU with gains 0: without feedback", ["Kp", "Ki", "Kd"]),
       ]),
     ],
-    panels: WRIST_PANELS.map((panel) => (panel.title === "Wrist" ? { ...panel, curves: [...goals, ...panel.curves] } : panel)),
+    panels: WRIST_PANELS.map((panel) => (panel.title === "Wrist" ? { ...panel, curves: [...panel.curves, ...goals] } : panel)),
     isMinor: (name) => name.endsWith("_start"),
     follow: (inputs, targets, size) => {
       const decay = Math.exp(-FOLLOW * size);
@@ -222,10 +259,12 @@ addOns.prw_testbed = (own, others) => {
         inputs[omega] = (inputs[omega] - FOLLOW * slope * size) * decay;
       }
     },
-    view: (turn) => {
-      const wrist = new Wrist(WRIST, turn);
-      twist.addEventListener("change", () => wrist.enlarge(Number(twist.value)));
-      return { element: wrist.element, draw: (table, time) => wrist.draw(table, time), set: (parameter) => wrist.count(parameter("M"), parameter("N")), controls: [twist], settings: new Map([["twist", twist]]) };
-    },
+    view: (turn, value, pace) =>
+      wristView(({ theta1 = 0, theta2 = 0, pitch = 0, roll = 0 }) => {
+        // The inverse of eq. (1): the motor angles of a pitch and a roll angle.
+        const half = (value("M") / value("N")) * roll;
+        const all = { theta1: theta1 + pitch + half, theta2: theta2 + pitch - half };
+        turn(pitch || roll ? all : theta1 ? { theta1 } : { theta2 });
+      }, ["motors", "gripper"], pace),
   };
 };

@@ -3,10 +3,11 @@
 /**
  * A face of a body: indices of its corners, its colour, and whether only its outside is visible.
  * @typedef {{corners: number[], colour: number[], isClosed: boolean}} Face
- * @typedef {{points: number[], faces: Face[], turn: string}} Solid
- * @typedef {{turns?: string | null, lathe?: number[][], box?: number[][], colours: string[], lobes?: number}} Shape
- * A body on the graphics card: corners and normals of its triangles, the number of corners, and the angle that turns it.
- * @typedef {{buffer: WebGLBuffer, count: number, turn: string}} Mesh
+ * A body: the angle that turns it, the part of the machine, the torque that colours it in the close view, and whether the close view is cut open there.
+ * @typedef {{points: number[], faces: Face[], turn: string, part: string, torque?: string, isCut?: boolean}} Solid
+ * @typedef {{part: string, turns?: string | null, lathe?: number[][], box?: number[][], colours: string[], lobes?: number}} Shape
+ * A body on the graphics card: corners and normals of its triangles, and the number of corners.
+ * @typedef {{buffer: WebGLBuffer, count: number, body: Solid}} Mesh
  */
 
 /** @typedef {{
@@ -23,16 +24,20 @@ let WRIST;
 /** The angles that the image shows. */
 const SHOWN = ["theta1", "theta2", "theta3", "theta4", "theta5", "theta6", "pitch", "roll"];
 const SHAFTS = [
-  { side: -1, colour: "blue", motor: "theta1", middle: "theta3", carrier: "theta5" },
-  { side: 1, colour: "vermilion", motor: "theta2", middle: "theta4", carrier: "theta6" },
+  { side: -1, colour: "blue", motor: "theta1", middle: "theta3", carrier: "theta5", torque: "tau1" },
+  { side: 1, colour: "vermilion", motor: "theta2", middle: "theta4", carrier: "theta6", torque: "tau2" },
 ];
+/** The parts of the machine, with their labels. */
+const PARTS_SHOWN = { motors: "motors", couplings: "couplings", carriers: "carriers with rollers", cam: "cam", ring: "ring", gripper: "gripper" };
+/** The parts in the close view, which is cut open: without the upper arc of the ring. */
+const INSIDE = ["carriers", "cam", "ring"];
 const DEGREE = Math.PI / 180;
 
 /** @type {Panel[]} */
 const WRIST_PANELS = [
-  { title: "Motors", unit: "deg", curves: [{ name: "theta1", label: "\u03b8\u2081", colour: "curve-1", factor: 1 / DEGREE }, { name: "theta2", label: "\u03b8\u2082", colour: "curve-2", factor: 1 / DEGREE }] },
-  { title: "Wrist", unit: "deg", curves: [{ name: "pitch", label: "pitch", colour: "curve-3", factor: 1 / DEGREE }, { name: "roll", label: "roll", colour: "curve-4", factor: 1 / DEGREE }] },
-  { title: "Torques", unit: "N m", curves: [{ name: "tau1", label: "\u03c4\u2081", colour: "curve-1", factor: 1 }, { name: "tau2", label: "\u03c4\u2082", colour: "curve-2", factor: 1 }] },
+  { title: "Motors", unit: "\u00b0", curves: [{ name: "theta1", label: "\u03b8\u2081", colour: "curve-1", factor: 1 / DEGREE }, { name: "theta2", label: "\u03b8\u2082", colour: "curve-2", factor: 1 / DEGREE }] },
+  { title: "Wrist", unit: "\u00b0", isNoted: true, curves: [{ name: "pitch", label: "pitch", colour: "curve-3", factor: 1 / DEGREE }, { name: "roll", label: "roll", colour: "curve-4", factor: 1 / DEGREE }] },
+  { title: "Torques", unit: "N\u00b7m", curves: [{ name: "tau1", label: "\u03c4\u2081", colour: "curve-1", factor: 1 }, { name: "tau2", label: "\u03c4\u2082", colour: "curve-2", factor: 1 }] },
 ];
 
 /** Red, green and blue of a colour such as #12ab9f, from 0 to 255. @param {string} colour */
@@ -47,7 +52,7 @@ function bodies(parts, waves) {
   const round = parts.round * Math.max(1, Math.ceil((6 * waves) / parts.round));
 
   /** A solid of revolution about X from points (x, radius), in stripes of the colours. @param {Shape} shape @param {string} own @returns {Solid} */
-  const lathe = ({ lathe: profile = [], colours, lobes = 0, turns }, own) => {
+  const lathe = ({ lathe: profile = [], colours, lobes = 0, turns, part }, own) => {
     const points = [profile[0]];
     for (let k = 1; k < profile.length; k++) {
       const [begin, end] = [profile[k - 1], profile[k]];
@@ -76,14 +81,14 @@ function bodies(parts, waves) {
         faces.push({ corners: [...inner.map((corner) => ring * round + corner), ...outer.map((corner) => (ring + 1) * round + corner).reverse()], colour: colourOf(k), isClosed });
       }
     }
-    return outward({ points: made, faces, turn: turns ?? "" });
+    return outward({ points: made, faces, turn: turns ?? "", part });
   };
 
   /** @param {Shape} shape @returns {Solid} */
-  const box = ({ box: corners = [], colours, turns }) => {
+  const box = ({ box: corners = [], colours, turns, part }) => {
     const points = Array.from({ length: 8 }, (_, number) => [0, 1, 2].map((axis) => corners[(number >> axis) & 1][axis])).flat();
     const sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    return outward({ points, faces: sides.map((side) => ({ corners: side, colour: rgb(colours[0]), isClosed: true })), turn: turns ?? "" });
+    return outward({ points, faces: sides.map((side) => ({ corners: side, colour: rgb(colours[0]), isClosed: true })), turn: turns ?? "", part });
   };
 
   /** @type {Solid[]} */
@@ -92,11 +97,11 @@ function bodies(parts, waves) {
     const turn = (/** @type {string | null | undefined} */ name) => (name ? shaft[/** @type {"motor"} */ (name)] : "");
     for (const shape of parts.side) {
       const mirrored = { ...shape, turns: turn(shape.turns), lathe: shape.lathe?.map(([x, radius]) => [shaft.side * x, radius]) };
-      all.push(lathe(mirrored, shaft.colour));
+      all.push({ ...lathe(mirrored, shaft.colour), torque: shape.part === "carriers" ? shaft.torque : undefined });
     }
-    all.push({ ...rollers(parts, shaft.side, rgb(parts.rollers.colour)), turn: shaft.carrier });
+    all.push({ ...rollers(parts, shaft.side, rgb(parts.rollers.colour)), turn: shaft.carrier, part: "carriers", torque: shaft.torque });
   }
-  all.push(ring(parts, rgb(parts.ring.colour)));
+  all.push(...[false, true].map((isUpper) => ring(parts, rgb(parts.ring.colour), isUpper)));
   for (const shape of parts.output) {
     const body = shape.box ? box(shape) : lathe(shape, "");
     if (shape.lathe) {
@@ -155,9 +160,10 @@ function rollers({ rollers: shape }, side, colour) {
   return { points, faces };
 }
 
-/** The central ring, which pitches. It has a rectangular section and its axis is Z. @param {Parts} parts @param {number[]} colour @returns {Solid} */
-function ring({ ring: shape, round }, colour) {
+/** The upper arc of the central ring, which the close view leaves out, or the rest. The ring pitches; its section is a rectangle and its axis is Z. @param {Parts} parts @param {number[]} colour @param {boolean} isUpper @returns {Solid} */
+function ring({ ring: shape, round }, colour, isUpper) {
   const sectors = 2 * round;
+  const isUpperAt = (/** @type {number} */ sector) => Math.sin((2 * Math.PI * (sector + 0.5)) / sectors) > 0.45;
   const points = Array.from({ length: sectors }, (_, k) => {
     const angle = (2 * Math.PI * k) / sectors;
     return shape.section.flatMap(([radius, z]) => [shape.radius * radius * Math.cos(angle), shape.radius * radius * Math.sin(angle), z]);
@@ -165,12 +171,18 @@ function ring({ ring: shape, round }, colour) {
   /** @type {Face[]} */
   const faces = [];
   for (let k = 0; k < sectors; k++) {
+    if (isUpperAt(k) !== isUpper) {
+      continue;
+    }
     for (let edge = 0; edge < 4; edge++) {
       const [here, next] = [4 * k, 4 * ((k + 1) % sectors)];
       faces.push({ corners: [here + edge, next + edge, next + ((edge + 1) % 4), here + ((edge + 1) % 4)], colour, isClosed: true });
     }
+    for (const end of [0, 1].filter((side) => isUpperAt(k + 2 * side - 1) !== isUpper)) {
+      faces.push({ corners: [0, 1, 2, 3].map((corner) => 4 * ((k + end) % sectors) + corner), colour, isClosed: false });
+    }
   }
-  return outward({ points, faces, turn: "pitch" });
+  return outward({ points, faces, turn: "pitch", part: "ring", isCut: isUpper });
 }
 
 /** The strands of a coupling between two discs: straight without torque, twisted with torque. @param {Parts} parts @param {number[]} x @param {number} outer @param {number} inner @param {number} twist */
@@ -214,32 +226,48 @@ function rotations(angle) {
   return all;
 }
 
+/** A matrix (3, 3) times a vector. @param {number[]} m @param {number[]} v */
+function transformed(m, v) {
+  return [0, 3, 6].map((row) => m[row] * v[0] + m[row + 1] * v[1] + m[row + 2] * v[2]);
+}
+
 /** @param {number[]} a @param {number[]} b */
 function multiplied(a, b) {
   return [0, 1, 2].flatMap((row) => [0, 1, 2].map((column) => a[3 * row] * b[column] + a[3 * row + 1] * b[3 + column] + a[3 * row + 2] * b[6 + column]));
 }
 
-/** The wrist on a canvas. */
+/**
+ * The wrist on a canvas. `move` turns a motor (theta1, theta2) or the wrist (pitch, roll) by angles, rad. `handles` are the parts that can be dragged.
+ * @typedef {(increments: Record<string, number>) => void} Move
+ */
 class Wrist {
-  /** @param {Parts} parts @param {((motor: string, by: number) => void) | null} move turns a motor, rad */
-  constructor(parts, move) {
+  /** @param {Parts} parts @param {Move | null} move @param {("motors" | "gripper")[]} handles */
+  constructor(parts, move, handles = ["motors", "gripper"]) {
     this.parts = parts;
     /** @type {Solid[]} */
     this.bodies = [];
-    /** Whether the hint that a motor can be dragged is shown. */
+    this.handles = move ? handles : [];
+    /** Whether the hint that a part can be dragged is shown. */
     this.isHinting = move !== null;
+    /** Parts that are switched off. @type {Set<string>} */
+    this.off = new Set();
+    /** Whether the cam and its rollers are shown from close by, cut open, in the colours of their torques. */
+    this.isInside = false;
+    /** A line above the machine. */
+    this.caption = "";
     this.shaded = Shaded.make();
     this.azimuth = parts.azimuth + 90;
     this.elevation = parts.elevation;
     this.twist = 0;
     /** The table and the time of the last image. @type {[Table, number] | null} */
     this.last = null;
-    this.element = element("canvas", {
-      class: "live-scene", role: "img", tabindex: "0",
-      "aria-label": `The wrist in three dimensions. Arrow keys turn it${move ? "; motors are turned by the sliders below, or by dragging them" : ""}.`,
-    });
+    this.turns = rotations(() => 0);
+    const hint = this.handles.length ? `; ${this.handles.join(" and ")} can be dragged, and the sliders below do the same` : "";
+    this.element = element("canvas", { class: "live-scene", role: "img", tabindex: "0", "aria-label": `The wrist in three dimensions. Arrow keys turn the view${hint}.` });
     this.listen(move);
     this.settled = { key: "", factor: 1 };
+    /** The largest torque of a run, N.m. */
+    this.hottest = { key: "", most: 1 };
     this.count(LOBES, parts.rollers.count);
   }
 
@@ -251,42 +279,79 @@ class Wrist {
     this.turn(0, 0);
   }
 
-  /** @param {((motor: string, by: number) => void) | null} move */
+  /** Shows the cam and its rollers from close by, or the whole machine. @param {boolean} isInside */
+  lookInside(isInside) {
+    this.isInside = isInside;
+    this.elevation = isInside ? 38 : this.parts.elevation;
+    this.azimuth = isInside ? 18 : this.parts.azimuth + 90;
+    this.turn(0, 0);
+  }
+
+  /** Switches a part on or off. @param {string} part @param {boolean} isOn */
+  show(part, isOn) {
+    this.off[isOn ? "delete" : "add"](part);
+    this.turn(0, 0);
+  }
+
+  /** Whether a body is in the image. @param {Solid} body */
+  isShown({ part, isCut }) {
+    return !this.off.has(part) && (!this.isInside || (INSIDE.includes(part) && !isCut));
+  }
+
+  /** What the pointer would grab at a position on the canvas: a motor, the gripper, or nothing. @param {number} x @param {number} y @returns {typeof SHAFTS[number] | "gripper" | null} */
+  grabbed(x, y) {
+    const near = (/** @type {number[]} */ centre, /** @type {number[]} */ edge) => {
+      const [a, b] = [this.project(centre), this.project(edge)];
+      return Math.hypot(x - a[0], y - a[1]) < Math.max(24, Math.hypot(b[0] - a[0], b[1] - a[1]));
+    };
+    if (this.handles.includes("gripper") && this.isShown({ part: "gripper", points: [], faces: [], turn: "" })) {
+      const [centre, edge] = [[0, 1.9, 0], [0, 2.45, 0]].map((point) => transformed(this.turns.output, point));
+      if (near(centre, edge)) {
+        return "gripper";
+      }
+    }
+    const isMotor = this.handles.includes("motors") && this.isShown({ part: "motors", points: [], faces: [], turn: "" });
+    return (isMotor && SHAFTS.find(({ side }) => near([side * 4.1, 0, 0], [side * 4.1, 0.8, 0]))) || null;
+  }
+
+  /** @param {Move | null} move */
   listen(move) {
     const canvas = this.element;
-    /** @type {typeof SHAFTS[number] | undefined} */
-    let dragged;
+    /** @type {typeof SHAFTS[number] | "gripper" | null} */
+    let dragged = null;
     let last = [0, 0];
-    /** @param {number} x @param {number} y */
-    const motorAt = (x, y) => (move ? SHAFTS.find(({ side }) => {
-      const [centre, edge] = [this.project([side * 4.1, 0, 0]), this.project([side * 4.1, 0.8, 0])];
-      return Math.hypot(x - centre[0], y - centre[1]) < Math.max(24, Math.hypot(edge[0] - centre[0], edge[1] - centre[1]));
-    }) : undefined);
+    /** Signs with which the gripper follows the pointer: pitch up and down, roll left and right. */
+    let signs = [1, 1];
     canvas.addEventListener("pointerdown", (event) => {
-      dragged = motorAt(event.offsetX, event.offsetY);
+      dragged = this.grabbed(event.offsetX, event.offsetY);
       last = [event.clientX, event.clientY];
+      signs = this.gripperSigns();
       canvas.setPointerCapture(event.pointerId);
     });
-    // A finger on a motor turns the motor. Elsewhere, a vertical swipe scrolls the page.
+    // A finger on a motor or on the gripper moves it. Elsewhere, a vertical swipe scrolls the page.
     canvas.addEventListener("touchstart", (event) => {
       const box = canvas.getBoundingClientRect();
       const [touch] = event.touches;
-      if (motorAt(touch.clientX - box.left, touch.clientY - box.top)) {
+      if (this.grabbed(touch.clientX - box.left, touch.clientY - box.top)) {
         event.preventDefault();
       }
     }, { passive: false });
     canvas.addEventListener("pointermove", (event) => {
       if (!canvas.hasPointerCapture(event.pointerId)) {
-        canvas.style.cursor = motorAt(event.offsetX, event.offsetY) ? "ns-resize" : "grab";
+        const over = this.grabbed(event.offsetX, event.offsetY);
+        canvas.style.cursor = over === "gripper" ? "move" : over ? "ns-resize" : "grab";
         return;
       }
       // In Safari, movementX and movementY of touch events are 0.
       const [right, down] = [event.clientX - last[0], event.clientY - last[1]];
       last = [event.clientX, event.clientY];
-      if (dragged) {
+      this.isHinting &&= !dragged;
+      if (dragged === "gripper") {
+        const { scale } = this.camera();
+        move?.({ pitch: (signs[0] * down) / (1.2 * scale), roll: (signs[1] * right) / (0.5 * scale) });
+      } else if (dragged) {
         const box = canvas.getBoundingClientRect();
-        this.isHinting = false;
-        move?.(dragged.motor, this.angleOf(dragged.side, [event.clientX - box.left, event.clientY - box.top], [right, down]));
+        move?.({ [dragged.motor]: this.angleOf(dragged.side, [event.clientX - box.left, event.clientY - box.top], [right, down]) });
       } else {
         this.turn(-0.4 * right, 0.4 * down);
       }
@@ -298,6 +363,16 @@ class Wrist {
         this.turn(steps[0], steps[1]);
       }
     });
+  }
+
+  /** The signs of pitch for a movement down and of roll for a movement to the right, so that the side of the gripper that faces the viewer follows the pointer. */
+  gripperSigns() {
+    const { rotation } = this.camera();
+    const [, axisY, axisZ] = transformed(this.turns.output, [0, 1, 0]);
+    // Pitch moves the gripper along (0, -z, y); the pointer's y axis points down.
+    const down = rotation[4] * axisZ - rotation[5] * axisY;
+    const axis = transformed(rotation, transformed(this.turns.output, [0, 1, 0]));
+    return [down < 0 ? -1 : 1, axis[1] < 0 ? -1 : 1];
   }
 
   /**
@@ -357,6 +432,10 @@ class Wrist {
     const [ca, sa, ce, se] = [Math.cos(azimuth), Math.sin(azimuth), Math.cos(elevation), Math.sin(elevation)];
     const rotation = multiplied([1, 0, 0, 0, ce, -se, 0, se, ce], [ca, 0, -sa, 0, 1, 0, sa, 0, ca]);
     const { width, height } = sizeOf(this.element);
+    if (this.isInside) {
+      const scale = Math.min(width / 3.4, height / 2.2);
+      return { rotation, scale, centre: [0.5 * width, 0.5 * height + 0.42 * scale * ce] };
+    }
     return { rotation, scale: Math.min(width / 10.3, height / 5.2), centre: [0.47 * width, 0.53 * height] };
   }
 
@@ -366,16 +445,34 @@ class Wrist {
     const { pen, width, height } = clear(this.element);
     const { rotation, scale, centre } = this.camera();
     const angle = (/** @type {string} */ name) => table.at(name, time);
-    const turns = rotations(angle);
+    const turns = this.turns = rotations(angle);
     const twist = this.factor(table);
-    const couplings = this.couplings(angle, twist);
-    const image = this.shaded?.draw({ width, height, rotation, scale, centre, turns, lamp: this.parts.lamp }, couplings);
+    const couplings = this.couplings(angle, twist).filter((body) => this.isShown(body));
+    const isShown = (/** @type {Solid} */ body) => this.isShown(body);
+    const warmth = this.isInside ? this.warmth(table, time) : () => 0;
+    const image = this.shaded?.draw({ width, height, rotation, scale, centre, turns, lamp: this.parts.lamp }, couplings, isShown, warmth);
     if (image) {
       pen.drawImage(image, 0, 0, width, height);
     } else {
-      this.paint(pen, { rotation, scale, centre }, turns, couplings);
+      this.paint(pen, { rotation, scale, centre }, turns, [...this.bodies.filter(isShown), ...couplings], warmth);
     }
-    this.label(pen, width, height, twist);
+    this.label(pen, width, height, twist, (name) => table.at(name, time));
+  }
+
+  /** The share of the warm colour in a body: its torque, in relation to the largest one of the run. @param {Table} table @param {number} time @returns {(body: Solid) => number} */
+  warmth(table, time) {
+    const key = `${table.count} ${table.column("tau1")[table.count - 1]}`;
+    if (key !== this.hottest.key) {
+      let most = 1e-6;
+      for (const { torque } of SHAFTS) {
+        const column = table.column(torque);
+        for (let row = 0; row < table.count; row++) {
+          most = Math.max(most, Math.abs(column[row]));
+        }
+      }
+      this.hottest = { key, most };
+    }
+    return ({ torque }) => (torque ? Math.min(1, Math.abs(table.at(torque, time)) / this.hottest.most) : 0);
   }
 
   /** The strands of all couplings. @param {(name: string) => number} angle @param {number} twist @returns {Solid[]} */
@@ -386,7 +483,7 @@ class Wrist {
         const points = strands(this.parts, x.map((axial) => shaft.side * axial), outer, inner, twist);
         const colour = channels(this.parts.colours[shaft.colour]);
         const faces = Array.from({ length: points.length / 12 }, (_, k) => ({ corners: [0, 1, 2, 3].map((corner) => 4 * k + corner), colour, isClosed: false }));
-        return { points, faces, turn: "" };
+        return { points, faces, turn: "", part: "couplings" };
       }),
     );
   }
@@ -394,9 +491,9 @@ class Wrist {
   /**
    * Paints the faces from the farthest to the nearest, for browsers without WebGL.
    * @param {CanvasRenderingContext2D} pen @param {{rotation: number[], scale: number, centre: number[]}} camera
-   * @param {Record<string, number[]>} turns @param {Solid[]} couplings
+   * @param {Record<string, number[]>} turns @param {Solid[]} bodies @param {(body: Solid) => number} warmth
    */
-  paint(pen, { rotation, scale, centre }, turns, couplings) {
+  paint(pen, { rotation, scale, centre }, turns, bodies, warmth) {
     /** @type {{near: number, points: number[], corners: number[], colour: number[], light: number, isReversed: boolean}[]} */
     const visible = [];
     const lamp = this.parts.lamp;
@@ -413,7 +510,9 @@ class Wrist {
         placed[k + 1] = centre[1] - size * (turned[3] * x + turned[4] * y + turned[5] * z);
         placed[k + 2] = near;
       }
-      for (const { corners, colour, isClosed } of body.faces) {
+      const warm = 0.9 * warmth(body);
+      for (const { corners, colour: own, isClosed } of body.faces) {
+        const colour = warm ? own.map((part, index) => part + warm * (WARM[index] - part)) : own;
         let [area, near] = [0, 0];
         for (let k = 0, before = corners[corners.length - 1]; k < corners.length; before = corners[k++]) {
           const [a, b] = [3 * before, 3 * corners[k]];
@@ -430,7 +529,7 @@ class Wrist {
         visible.push({ near: near / corners.length, points: placed, corners, colour, light, isReversed: area > 0 });
       }
     };
-    [...this.bodies, ...couplings].forEach(add);
+    bodies.forEach(add);
     visible.sort((one, other) => one.near - other.near);
     let shade = "";
     pen.beginPath();
@@ -464,11 +563,12 @@ class Wrist {
     pen.fill();
   }
 
-  /** @param {CanvasRenderingContext2D} pen @param {number} width @param {number} height @param {number} twist */
-  label(pen, width, height, twist) {
+  /** @param {CanvasRenderingContext2D} pen @param {number} width @param {number} height @param {number} twist @param {(name: string) => number} at */
+  label(pen, width, height, twist, at) {
     pen.font = "13px system-ui, sans-serif";
     pen.textBaseline = "alphabetic";
     pen.lineWidth = 3;
+    pen.lineJoin = "round";
     pen.strokeStyle = colourAt(this.element, "tint");
     const label = (/** @type {string} */ text, /** @type {number[]} */ [x, y], /** @type {string} */ colour, /** @type {CanvasTextAlign} */ align) => {
       pen.textAlign = align;
@@ -478,14 +578,37 @@ class Wrist {
       pen.strokeText(text, left, y);
       pen.fillText(text, left, y);
     };
-    label("motor 1", this.project([-4.1, 0.95, 0]), "curve-1", "center");
-    label("motor 2", this.project([4.1, 0.95, 0]), "curve-2", "center");
-    label("ring: pitch", [width - 8, 20], "curve-3", "right");
-    label("gripper: roll", [width - 8, 38], "curve-4", "right");
-    label(`couplings\u2019 twist drawn \u00d7 ${twist}`, [8, 20], "soft", "left");
-    if (this.isHinting) {
-      pen.font = "600 15px system-ui, sans-serif";
-      label("Drag a motor", [width / 2, height - 12], "ink", "center");
+    const isOn = (/** @type {string} */ part) => !this.off.has(part);
+    if (this.isInside) {
+      const torques = SHAFTS.map(({ torque }) => `${format(at(torque), this.hottest.most)}`);
+      label(`the redder, the more torque: motor 1 ${torques[0]}, motor 2 ${torques[1]} N\u00b7m`, [8, 20], "soft", "left");
+      if (isOn("carriers")) {
+        SHAFTS.forEach(({ side }, index) => label(`rollers of motor ${index + 1}`, this.project([side * 1.5, 0.24, 0]), `text-${index + 1}`, "center"));
+      }
+      if (isOn("cam")) {
+        label("cam of the gripper", this.project([0.62, 1.05, 0]), "text-4", "left");
+      }
+    } else {
+      if (isOn("motors")) {
+        label("motor 1", this.project([-4.1, 0.95, 0]), "text-1", "center");
+        label("motor 2", this.project([4.1, 0.95, 0]), "text-2", "center");
+      }
+      if (isOn("ring")) {
+        label("ring: pitch", this.project(transformed(this.turns.pitch, [1.05, -1.25, 0])), "text-3", "left");
+      }
+      if (isOn("gripper")) {
+        label("gripper: roll", this.project(transformed(this.turns.output, [0, 2, 0])).map((value, axis) => value + (axis ? 0 : 0.75 * this.camera().scale)), "text-4", "left");
+      }
+      if (isOn("couplings")) {
+        label(`couplings\u2019 twist drawn \u00d7 ${twist}`, [8, 20], "soft", "left");
+      }
+    }
+    pen.font = "600 15px system-ui, sans-serif";
+    if (this.caption) {
+      label(this.caption, [8, height - 12], "ink", "left");
+    }
+    if (this.isHinting && !this.isInside && this.handles.length) {
+      label(this.handles.length > 1 ? "Drag the gripper or a motor" : `Drag the ${this.handles[0]}`, [this.caption ? width - 10 : width / 2, height - 12], "ink", this.caption ? "right" : "center");
     }
   }
 }
@@ -513,7 +636,7 @@ class Shaded {
     gl.linkProgram(program);
     gl.useProgram(program);
     gl.enable(gl.DEPTH_TEST);
-    const locations = ["camera", "turn", "scale", "centre", "lamp"].map((name) => [name, gl.getUniformLocation(program, name)]);
+    const locations = ["camera", "turn", "scale", "centre", "lamp", "warm"].map((name) => [name, gl.getUniformLocation(program, name)]);
     /** @type {Record<string, WebGLUniformLocation | null>} */
     this.uniforms = Object.fromEntries(locations);
     this.attributes = ["position", "normal", "colour"].map((name) => gl.getAttribLocation(program, name));
@@ -529,16 +652,16 @@ class Shaded {
       const [buffer, corners] = [/** @type {WebGLBuffer} */ (gl.createBuffer()), triangles(body)];
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
       gl.bufferData(gl.ARRAY_BUFFER, corners, gl.STATIC_DRAW);
-      return { buffer, count: corners.length / 9, turn: body.turn };
+      return { buffer, count: corners.length / 9, body };
     });
   }
 
   /**
    * Draws the bodies and the couplings and returns the canvas, or `null` if the WebGL context is lost.
    * @param {{width: number, height: number, rotation: number[], scale: number, centre: number[], turns: Record<string, number[]>, lamp: number[]}} view
-   * @param {Solid[]} couplings
+   * @param {Solid[]} couplings @param {(body: Solid) => boolean} isShown @param {(body: Solid) => number} warmth
    */
-  draw({ width, height, rotation, scale, centre, turns, lamp }, couplings) {
+  draw({ width, height, rotation, scale, centre, turns, lamp }, couplings, isShown, warmth) {
     const { gl } = this;
     const canvas = /** @type {HTMLCanvasElement} */ (gl.canvas);
     const ratio = window.devicePixelRatio || 1;
@@ -559,10 +682,12 @@ class Shaded {
     gl.bindBuffer(gl.ARRAY_BUFFER, this.strands);
     const corners = Float32Array.from(couplings.flatMap((body) => [...triangles(body)]));
     gl.bufferData(gl.ARRAY_BUFFER, corners, gl.DYNAMIC_DRAW);
-    for (const { buffer, count, turn } of [...this.meshes, { buffer: this.strands, count: corners.length / 9, turn: "" }]) {
+    const strands = { buffer: this.strands, count: corners.length / 9, body: { points: [], faces: [], turn: "", part: "couplings" } };
+    for (const { buffer, count, body } of [...this.meshes.filter((mesh) => isShown(mesh.body)), strands]) {
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
       this.attributes.forEach((attribute, index) => gl.vertexAttribPointer(attribute, 3, gl.FLOAT, false, 36, 12 * index));
-      gl.uniformMatrix3fv(this.uniforms.turn, false, columns(turns[turn]));
+      gl.uniformMatrix3fv(this.uniforms.turn, false, columns(turns[body.turn]));
+      gl.uniform4f(this.uniforms.warm, WARM[0] / 255, WARM[1] / 255, WARM[2] / 255, 0.9 * warmth(body));
       gl.drawArrays(gl.TRIANGLES, 0, count);
     }
     return canvas;
@@ -603,6 +728,8 @@ function triangles({ points, faces }) {
   return Float32Array.from(all);
 }
 
+/** Colour of the largest torque. */
+const WARM = [214, 32, 32];
 /** Distance from the viewer to the centre, and the number of cam lobes until the FMU is read. */
 const [DISTANCE, LOBES] = [20, 4];
 
@@ -623,9 +750,10 @@ const PIXELS = `
 precision mediump float;
 uniform mat3 camera;
 uniform vec3 lamp;
+uniform vec4 warm;
 varying vec3 own, face;
 void main() {
   vec3 normal = normalize(face);
   float light = dot(normal, lamp) * (gl_FrontFacing ? 1.0 : -1.0);
-  gl_FragColor = vec4(own * (0.62 + 0.38 * max(0.0, light)), 1.0);
+  gl_FragColor = vec4(mix(own, warm.rgb, warm.a) * (0.62 + 0.38 * max(0.0, light)), 1.0);
 }`;

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from prw.motion import Array, Motion
 
 BLUE, VERMILION = "#0072B2", "#D55E00"
-#: Colours of pitch and roll in figures where the sides have the first two.
+#: Colours of pitch and roll; the sides of the motors have the first two.
 GREEN, PURPLE = "#009E73", "#CC79A7"
 STYLE: Any = {
     "font.family": "DejaVu Sans",  # included in matplotlib
@@ -50,11 +50,12 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Panel:
-    """One set of axes: title, y label with unit, and two curves as (legend entry, values (n,))."""
+    """One set of axes: title, y label with unit, and two curves as (legend entry, values (n,)) with their colours."""
 
     title: str
     label: str
     curves: Sequence[tuple[str, Array]]
+    colours: tuple[str, str] = (BLUE, VERMILION)
 
 
 class ShownFigure(Figure):
@@ -80,13 +81,16 @@ def response_panels(response: Mapping[str, Array], angles: bool) -> list[Panel]:
     them."""
     known = [
         Panel(
-            "Pitch and roll rates", "θ₇′, θ₈′  (rad/s)", _both(response, "pitch_rate", "roll_rate", ("pitch", "roll"))
+            "Pitch and roll rates",
+            "θ₇′, θ₈′  (rad/s)",
+            _both(response, "pitch_rate", "roll_rate", ("pitch", "roll")),
+            (GREEN, PURPLE),
         ),
         Panel("Sensor torques", "τ₁, τ₂  (N m)", _both(response, "tau1", "tau2", ("sensor 1", "sensor 2"))),
     ]
     if angles:
         curves = [(entry, np.rad2deg(y)) for entry, y in _both(response, "pitch", "roll", ("pitch", "roll"))]
-        known.insert(0, Panel("Pitch and roll angles", "θ₇, θ₈  (deg)", curves))
+        known.insert(0, Panel("Pitch and roll angles", "θ₇, θ₈  (deg)", curves, (GREEN, PURPLE)))
     return [panel for panel in known if panel.curves]
 
 
@@ -130,7 +134,7 @@ def _draw_panel(axis: Axes, time: Array, panel: Panel) -> None:
     # The second curve is dashed, so that two equal curves still show as two; a dense one is translucent instead.
     dense = len(time) > 2 * INTERVALS
     second: dict[str, Any] = {"alpha": 0.6} if dense else {"dashes": (4, 2)}
-    for (name, y), colour, style in zip(panel.curves, (BLUE, VERMILION), ({}, second)):
+    for (name, y), colour, style in zip(panel.curves, panel.colours, ({}, second)):
         axis.plot(*envelope(time, y), color=colour, label=name, **style)
     axis.legend(loc="lower right", bbox_to_anchor=(1, 0.97), ncols=2, borderaxespad=0)
     axis.margins(x=0, y=0.08)

@@ -13,6 +13,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from prw.columns import si_unit
+from prw.identification.rounding import rounded
 from prw.motion import Array
 from prw.plots import BLUE, PAGE_STYLE, VERMILION, envelope
 
@@ -42,12 +43,14 @@ def page(found: Identification) -> str:
     environment = Environment(
         loader=PackageLoader("prw.identification", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters.update(digits=_digits, percent=_percent, shade=_shade)
+    environment.filters.update(digits=_digits, percent=_percent, shade=_shade, raised=_raised, prose=_prose)
     return environment.get_template("report.html.j2").render(
         found=found,
         sure=found.sure,
         solution=found.solution,
         estimates=found.parameters,
+        notes=found.notes_in(shown=True),
+        rounded=rounded,
         channels=[_shown(channel) for channel in found.channels],
         figures=figures(found),
     )
@@ -103,7 +106,17 @@ def _shown(channel: ChannelFit) -> ChannelFit:
 
 def _digits(value: float, count: int = 4) -> str:
     """A number with `count` significant digits."""
-    number = f"{value:.{count}g}"
+    return _raised(f"{value:.{count}g}")
+
+
+def _prose(text: str) -> Markup:
+    """A message of the command line: code in backticks as code, and signs and units as printed."""
+    parts = text.replace("+-", "±").replace("N.m", "N·m").split("`")
+    return Markup("").join(Markup("<code>{}</code>").format(part) if k % 2 else part for k, part in enumerate(parts))
+
+
+def _raised(number: str) -> str:
+    """A number with a true minus sign, and its exponent raised."""
     if "e" in number:
         mantissa, exponent = number.split("e")
         return f"{mantissa}·10{str(int(exponent)).translate(RAISED)}"

@@ -17,6 +17,7 @@ from prw.files import write_text
 from prw.identification.experiment import Experiment
 from prw.identification.fit import Prior, Solution
 from prw.identification.model import Parameters
+from prw.identification.rounding import rounded
 from prw.identification.statistics import Certainty
 from prw.identification.verdict import Verdict
 from prw.motion import Array
@@ -47,6 +48,11 @@ class Estimate(NamedTuple):
     def hopeless(self) -> bool:
         """Whether the data hardly determine the parameter."""
         return self.relative > HOPELESS
+
+    def rounded(self, factor: float = 1.0) -> list[str]:
+        """Value, standard error and both ends of the interval, with the digits that the error justifies, in the unit that
+        `factor` converts to SI."""
+        return rounded(*(number / factor for number in (self.value, self.standard_error, *self.interval)))
 
 
 class ChannelFit(NamedTuple):
@@ -164,7 +170,11 @@ class Identification:
 
     @property
     def notes(self) -> list[str]:
-        """Notes and doubts for the user, one line each."""
+        """Notes and doubts for the user, one line each, in SI."""
+        return self.notes_in(shown=False)
+
+    def notes_in(self, *, shown: bool) -> list[str]:
+        """Notes and doubts for the user, one line each; with `shown` parameters in display units."""
         solution, sure = self.solution, self.sure
         lines = [f"{file}: {note}" for file, e in zip(self.files, self.experiments) for note in e.notes]
         for name in solution.task.names:
@@ -173,8 +183,9 @@ class Identification:
                 lines.append(f"{name} ended at its bound; give wider bounds, or doubt the data")
         for point, _ in solution.rivals:
             values = ", ".join(
-                f"{name} {value:.4g} {self.known.real[name].unit}"
+                f"{name} {value / factor:.4g} {unit}"
                 for name, value in zip(solution.task.names, np.exp(point))
+                for factor, unit in [self._unit(name, shown)]
             )
             swapped = " (the couplings exchanged)" if self._exchanged(point) else ""
             lines.append(
@@ -184,7 +195,7 @@ class Identification:
         if self.fits and self.verdict.widening.any() and not sure.undetermined:
             first = self.verdict.faults[0]
             lines.append(
-                f"intervals allow for a {first.name} of {first.size:.2g} +- {first.error:.1g} {first.unit}".rstrip()
+                f"intervals allow for a {first.name} of {' +- '.join(rounded(first.size, first.error))} {first.unit}".rstrip()
                 + ", which the data suggest but do not prove"
             )
         for name in solution.task.noise:
@@ -214,17 +225,17 @@ class Identification:
             lines += [f"  {misfit}" for misfit in self.misfits]
             lines += [f"perhaps     {cause}" for cause in self.diagnosis or ["no known cause"]]
         for name, found in self.parameters.items():
-            factor, unit = (found.factor, found.shown) if shown else (1.0, found.unit)
-            value, low, high = (v / factor for v in (found.value, *found.interval))
-            sureness = f"+- {found.relative:.2%}   95 % interval {low:.5g} to {high:.5g}"
+            factor, unit = self._unit(name, shown)
+            estimate, _, low, high = found.rounded(factor)
+            sureness = f"+- {found.relative:.2%}   95 % interval {low} to {high}"
             sureness = "not determined" if found.hopeless else sureness
-            lines.append(f"  {name:<9} {value:.5g} {unit}  {sureness}{', prior' if found.prior else ''}")
+            lines.append(f"  {name:<9} {estimate} {unit}  {sureness}{', prior' if found.prior else ''}")
         for name, (value, error) in self.distortions.items():
             factor, unit = (1.0, "") if name.startswith("gain") else (1e3, " ms")
-            lines.append(f"  {name}: {value * factor:.4g} +- {error * factor:.2g}{unit}")
+            lines.append(f"  {name}: {' +- '.join(rounded(value * factor, error * factor))}{unit}")
         noise = (f"{name} {value:.2g} {si_unit(name)}" for name, value in self.solution.noise.items())
         lines.append("noise       " + ", ".join(noise))
-        return "\n".join([*lines, *(f"note        {note}" for note in self.notes)])
+        return "\n".join([*lines, *(f"note        {note}" for note in self.notes_in(shown=shown))])
 
     def report(self, path: str | os.PathLike[str]) -> None:
         """Write the report, an HTML page that loads no other file: estimates, doubts, residuals. Raises UserError without
@@ -252,7 +263,7 @@ class Identification:
     def _repr_html_(self) -> str:
         rows = []
         for name, found in self.parameters.items():
-            value, error, low, high = (f"{v:.5g}" for v in (found.value, found.standard_error, *found.interval))
+            value, error, low, high = found.rounded()
             cells = [name, value, f"± {error}", f"{low} to {high}", found.unit]
             cells = [name, "not determined", "", "", found.unit] if found.hopeless else cells
             rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
@@ -261,6 +272,11 @@ class Identification:
             f"<p>{escape(line)}</p>" for line in [*self.misfits, *self.diagnosis, *self.undetermined, *self.notes]
         )
         return f"<table><tr>{head}</tr>{''.join(rows)}</table>{notes}"
+
+    def _unit(self, name: str, shown: bool) -> tuple[float, str]:
+        """Factor and unit of a parameter: the display unit or SI."""
+        parameter = self.known.real[name]
+        return (parameter.factor, parameter.shown) if shown else (1.0, parameter.unit)
 
     def _times_its_noise(self, name: str) -> float:
         """Ratio of a channel's residuals in the band to the expectation from noise and encoders."""
