@@ -92,6 +92,8 @@ impl Model for TestbedFmu {
 }
 
 impl CoSimulation for TestbedFmu {
+    const ATOMIC_STEP: bool = true;
+
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         if !self.step_any_size(step.size) {
             return Err(Error::new("the state would overflow; look for extreme inputs or states"));

@@ -17,10 +17,22 @@ pub trait CoSimulation: Model {
     /// accept models whose steps always reach their end.
     const ENDS_EARLY: bool = false;
 
+    /// Whether a [`step`](Self::step) that fails leaves the model unchanged, because it checks everything that can
+    /// fail first. This crate undoes every other failed step. For that it copies the model before each step, which
+    /// costs a few nanoseconds for a small model, so a model that must be very fast may declare that its steps are
+    /// atomic.
+    ///
+    /// If the model has no heap memory, the copy is a `clone_from`. Otherwise it consists of the places and the
+    /// `memory` of the [table](crate::variables), which are also the content of a serialized state. Copying them needs
+    /// no allocation as long as strings and vectors do not grow. After an error, they are copied back, and
+    /// [`restored`](Model::restored) and [`update`](Model::update) follow.
+    const ATOMIC_STEP: bool = false;
+
     /// Advances the model by one step.
     ///
     /// # Errors
-    /// Fails if the step cannot be carried out. The model must then be unchanged.
+    /// Fails if the step cannot be carried out. The model may have changed by then: this crate undoes the step, unless
+    /// the model declares [`ATOMIC_STEP`](Self::ATOMIC_STEP).
     fn step(&mut self, step: Step) -> Result<Stepped, Error>;
 
     /// Carries out a step and calculates like [`calculate`](Model::calculate), if the model can do both
@@ -46,8 +58,8 @@ pub trait CoSimulation: Model {
 /// Whether the steps of Co-Simulation stop at events.
 ///
 /// If this crate handles the events, a step may have up to 10,000 events with up to 10,000 iterations each.
-/// More count as an endless loop. In FMI 2.0 the step then ends early. In FMI 3.0 the step is undone, and a
-/// message asks for shorter steps.
+/// More count as an endless loop. In FMI 2.0 the step then ends early (`fmi2Discard`). In FMI 3.0 the step is undone,
+/// and a message asks for shorter steps. If an event or the step after it fails, the whole step is undone in both.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Events {
     /// No step stops at an event.
@@ -120,7 +132,7 @@ pub trait ModelExchange: Model {
     /// events. This crate calls it again while its result has `again` set.
     ///
     /// # Errors
-    /// Fails if the model cannot continue. The model must then be unchanged.
+    /// Fails if the model cannot continue. The model may have changed by then: this crate undoes the event.
     fn event(&mut self, _time: f64) -> Result<Event, Error> {
         Ok(Event::default())
     }

@@ -70,6 +70,8 @@ pub struct CoSimulationOffer {
     pub events: Events,
     /// Whether steps may end early, at events or at other times.
     pub ends_early: bool,
+    /// Whether a step that fails leaves the model unchanged.
+    pub atomic_step: bool,
 }
 
 impl CoSimulationOffer {
@@ -143,6 +145,7 @@ macro_rules! offer {
                 events: <Self as $crate::CoSimulation>::EVENTS,
                 ends_early: <Self as $crate::CoSimulation>::ENDS_EARLY
                     || !::core::matches!(<Self as $crate::CoSimulation>::EVENTS, $crate::Events::None),
+                atomic_step: <Self as $crate::CoSimulation>::ATOMIC_STEP,
             });
 
         #[inline]

@@ -30,8 +30,8 @@ use std::path::{Path, PathBuf};
 /// | set parameters | as above, then [`update`](Self::update) once; an error undoes the change |
 /// | enter initialization | [`initialize`](Self::initialize), undone after an error; an error while the last value set for some start value was rejected |
 /// | get | [`calculate`](Self::calculate), if a value was set or a step was done since the last time; then the `by` of the table |
-/// | step | [`CoSimulation::step_fast`](crate::CoSimulation::step_fast), then [`step_any_size`](crate::CoSimulation::step_any_size) and [`step`](crate::CoSimulation::step), until one of them does it |
-/// | event | [`ModelExchange::event`](crate::ModelExchange::event) |
+/// | step | [`CoSimulation::step_fast`](crate::CoSimulation::step_fast), then [`step_any_size`](crate::CoSimulation::step_any_size) and [`step`](crate::CoSimulation::step), until one of them does it; an error undoes the step |
+/// | event | [`ModelExchange::event`](crate::ModelExchange::event); an error undoes it |
 /// | enter Continuous-Time Mode | [`ModelExchange::continuous_time_entered`](crate::ModelExchange::continuous_time_entered) |
 /// | save, restore | `clone_from` |
 /// | de-serialize | on a copy, sets the fields and the memory of the table; then [`restored`](Self::restored) and [`update`](Self::update) |
@@ -80,7 +80,7 @@ pub trait Model: Variables + Clone + Send + Sync {
     /// Mode. The importer may set further values before it leaves this mode.
     ///
     /// # Errors
-    /// Fails if the model cannot start with these values. The model is then unchanged.
+    /// Fails if the model cannot start with these values. The model may have changed by then: this crate undoes it.
     fn initialize(&mut self, _experiment: &Experiment) -> Result<(), Error> {
         Ok(())
     }

@@ -66,6 +66,10 @@ pub unsafe trait Variables: Sized + 'static {
     #[doc(hidden)]
     fn visit_memory(&mut self, visitor: &mut dyn StateVisitor);
 
+    /// Copies the memory of another model, then all its values that are stored in fields of the table.
+    #[doc(hidden)]
+    fn copy_values(&mut self, from: &Self);
+
     /// Visits all values of a serialized state.
     #[doc(hidden)]
     fn visit_state(&mut self, visitor: &mut dyn StateVisitor) {
@@ -610,6 +614,22 @@ macro_rules! variables {
                             visitor,
                         );
                     )+)?
+                }
+
+                fn copy_values(&mut self, from: &Self) {
+                    $($(
+                        ::core::clone::Clone::clone_from(
+                            &mut self.$memory $([$memory_at])* $( .$memory_field $([$memory_index])* )*,
+                            &from.$memory $([$memory_at])* $( .$memory_field $([$memory_index])* )*,
+                        );
+                    )+)?
+                    $($(
+                        #[allow(clippy::assigning_clones)]
+                        ::core::clone::Clone::clone_from(
+                            &mut (*self).$first $([$at])* $( .$field $([$index])* )*,
+                            &(*from).$first $([$at])* $( .$field $([$index])* )*,
+                        );
+                    )?)+
                 }
             }
         };

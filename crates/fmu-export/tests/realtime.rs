@@ -33,6 +33,22 @@ fn arrays_are_set_and_read_without_allocation() {
     assert_eq!((count, of_fmi3), (0, of_fmi2));
 }
 
+/// The model may fail half-way, so it is copied before each step. Its vector has its final length after three steps.
+#[test]
+fn steps_that_can_be_undone_do_not_allocate() {
+    use fmu_test_kit::Either;
+    fn check<F: Either>() {
+        let fmu = F::initialized_at::<models::ClumsyOnHeap>(0.0);
+        (0..4).for_each(|step| fmu.step(f64::from(step) * 0.125, 0.125));
+        let count = fmu_test_kit::realtime::allocations(|| {
+            (4..7).for_each(|step| fmu.step(f64::from(step) * 0.125, 0.125));
+        });
+        assert_eq!(count, 0);
+    }
+    check::<fmu_test_kit::Importer>();
+    check::<fmu_test_kit::fmi3::Importer>();
+}
+
 #[cfg(rtsan)]
 #[test]
 #[ignore = "the sanitizer must end it, and does if make sanitize goes on"]

@@ -54,6 +54,7 @@ impl Model for Controller {
 impl CoSimulation for Controller {
     /// A sample at the end of a step waits for the inputs of the next step.
     const EVENTS: Events = Events::StopIfHandled;
+    const ATOMIC_STEP: bool = true;
 
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         if step.stop_at_events

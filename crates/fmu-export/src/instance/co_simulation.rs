@@ -1,6 +1,6 @@
 //! Co-Simulation (section 4.2).
 
-use super::{Instance, Outcome, Rejection, State, discard, reject, reject_with};
+use super::{Importer, Instance, Outcome, Rejection, discard, reject, reject_with};
 use crate::capabilities::{Events, Step, Stepped};
 use crate::export::Exported;
 use crate::model::Error;
@@ -27,6 +27,24 @@ impl<M: Exported> Instance<M> {
         Some(offer) => offer.ends_early,
         None => false,
     };
+
+    /// Whether a failed step leaves the model unchanged. A constant, so that these models have no overhead.
+    const IS_ATOMIC: bool = match M::CO_SIMULATION {
+        Some(offer) => offer.atomic_step,
+        None => true,
+    };
+
+    /// Returns whether a step may fail after a part of it is done: the model itself may fail then, or the events
+    /// that this crate handles within the step. In FMI 3.0, a step may also stop where an importer does not accept an
+    /// early return.
+    pub(super) fn needs_undo(importer: Importer) -> bool {
+        let handles_events = M::CO_SIMULATION.is_some_and(|offer| offer.events == Events::Stop);
+        !Self::IS_ATOMIC
+            || match importer.standard {
+                Standard::Fmi2 => handles_events,
+                Standard::Fmi3 => Self::ENDS_EARLY && !(importer.event_mode && importer.early_return),
+            }
+    }
 
     /// Performs a step of FMI 2.0 (section 4.2.2 there).
     #[inline]
@@ -64,12 +82,12 @@ impl<M: Exported> Instance<M> {
 
     /// Restores the state at the start of the step, which then returns an error, or `fmi3Discard` if a
     /// shorter step may help. Section 4.2.1 of FMI 3.0 requires the state before the step and no early return
-    /// then.
+    /// then. FMI 2.0 leaves the state open (section 2.1.3); this crate has one rule for both.
     #[cold]
     fn go_back<T>(&mut self, why: Outcome<T>) -> Outcome<T> {
         self.listen();
         if let Some(before) = &self.before {
-            self.state.clone_from(before);
+            self.state.undo(before);
             self.enter(self.state.mode);
         }
         why
@@ -140,11 +158,16 @@ impl<M: Exported> Instance<M> {
                 self.state.time = point;
                 return Ok(Stepped::Terminate(point));
             }
-            if let Some(before) = &mut self.before {
-                State::clone_from(before, &self.state);
-            }
         }
-        let stepped = self.exported_step(point, step_size)?;
+        if (Self::ENDS_EARLY || !Self::IS_ATOMIC)
+            && let Some(before) = &mut self.before
+        {
+            before.back_up(&self.state);
+        }
+        let stepped = match self.exported_step(point, step_size) {
+            Ok(stepped) => stepped,
+            Err(error) => return self.go_back(Err(error.into())),
+        };
         self.state.stale = stepped != Stepped::Calculated;
         if !self.state.started {
             self.state.started = true;
@@ -201,17 +224,15 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// Ends a step that fails after a part of it is done. In FMI 2.0 the step ends early. FMI 3.0 does not
-    /// allow this for errors, so the step is undone.
+    /// Ends a step that fails after a part of it is done. The step is undone, except that in FMI 2.0 a step with too
+    /// many events ends early.
     fn stuck(&mut self, time: f64, mut why: Rejection) -> Outcome<Stepped> {
         why.message = format!("the step cannot go on at {time}: {}", why.message);
-        match self.standard() {
-            Standard::Fmi2 => {
-                self.logger.log(Status::Warning, why.message);
-                Ok(Stepped::Early(time))
-            }
-            Standard::Fmi3 => self.go_back(Err(Box::new(why))),
+        if self.standard() == Standard::Fmi2 && why.status == Status::Discard {
+            self.logger.log(Status::Warning, why.message);
+            return Ok(Stepped::Early(time));
         }
+        self.go_back(Err(Box::new(why)))
     }
 
     /// Performs the event iteration in Co-Simulation, for importers that do not handle events.

@@ -42,8 +42,8 @@ pub(crate) struct Instance<M> {
     rejected: Sorted<u32, String>,
     /// States that the importer has saved and not freed.
     kept: saved_states::Kept<M>,
-    /// State at the start of the last step, if a step of FMI 3.0 may fail after a part of it is done. An importer
-    /// that handles events and accepts early returns does not need it.
+    /// State at the start of the last step, if a step may fail after a part of it is done; see
+    /// [`needs_undo`](Self::needs_undo).
     before: Option<Box<State<M>>>,
     /// Strings that the importer reads until the next call.
     pub strings: Vec<std::ffi::CString>,
@@ -99,6 +99,40 @@ impl<M: Clone> Clone for State<M> {
 }
 
 impl<M: Exported> State<M> {
+    /// Whether a copy that undoes a step consists of the values in the table only, because a clone of the model may
+    /// allocate.
+    const COPIES_VALUES: bool = std::mem::needs_drop::<M>();
+
+    /// Copies what [`undo`](Self::undo) needs.
+    fn back_up(&mut self, source: &Self) {
+        if !Self::COPIES_VALUES {
+            return self.clone_from(source);
+        }
+        let Self { mode, stale, started, ended, time, experiment, model } = source;
+        (self.mode, self.stale, self.started) = (*mode, *stale, *started);
+        (self.ended, self.time) = (*ended, *time);
+        self.experiment = *experiment;
+        self.model.copy_values(model);
+    }
+
+    /// Returns to a state that was [backed up](Self::back_up).
+    ///
+    /// # Panics
+    /// Panics if the model rejects the state that it was in.
+    #[cold]
+    fn undo(&mut self, before: &Self) {
+        self.back_up(before);
+        if Self::COPIES_VALUES {
+            self.stale = true;
+            let model = &mut *self.model;
+            if let Err(error) = model.restored().and_then(|()| model.update()) {
+                panic!(
+                    "a failed step cannot be undone, because the model rejects its state before the step: {error}"
+                );
+            }
+        }
+    }
+
     /// Creates the state of a new instance and after a reset.
     fn new(setup: &Setup) -> Result<Self, Error> {
         Ok(Self {
@@ -130,16 +164,13 @@ impl<M: Exported> Instance<M> {
             return reject("this FMU has no event mode in Co-Simulation (hasEventMode is false)");
         }
         let state = State::new(&setup)?;
-        let may_fail_half_way = Self::ENDS_EARLY
-            && setup.interface == Interface::CoSimulation
-            && importer.standard == Standard::Fmi3
-            && !(importer.event_mode && importer.early_return);
+        let needs_undo = setup.interface == Interface::CoSimulation && Self::needs_undo(importer);
         let mut instance = Self {
             logger: Logger::new(importer.standard, logging_on),
             situation: Situation::new(importer.standard, setup.interface, state.mode),
             importer,
             setup,
-            before: may_fail_half_way.then(|| Box::new(state.clone())),
+            before: needs_undo.then(|| Box::new(state.clone())),
             state,
             rejected: Sorted::new(),
             kept: Sorted::new(),

@@ -290,7 +290,7 @@ fn a_step_that_fails_half_way() {
     }
 }
 
-/// Checks that in FMI 2.0 the first iteration of a failed event is undone, and the step ends at the event.
+/// Checks that in FMI 2.0 the first iteration of a failed event is undone, and with it the whole step.
 #[test]
 fn an_event_that_fails_in_its_second_round() {
     let fmu = Importer::new::<Grumbler>(CoSimulation);
@@ -303,8 +303,12 @@ fn an_event_that_fails_in_its_second_round() {
     let rounds = || fmu.integer(grumbler::Name::rounds as u32);
     assert_eq!(rounds(), 2);
     trouble(&fmu, Trouble::SecondRound);
-    assert_eq!(fmu.try_step(0.0, 1.5), Status::Discard);
-    assert_eq!((progress(&fmu), rounds()), ((1.0, false), 2));
+    fmu.take_log();
+    assert_eq!(fmu.try_step(0.0, 1.5), Status::Error);
+    let log = fmu.take_log();
+    assert!(log[1].message.ends_with("the step cannot go on at 1: SecondRound has failed"), "{log:?}");
+    assert_eq!((progress(&fmu), rounds()), ((0.0, false), 2));
+    fmu.step(0.0, 0.5);
 }
 
 /// Checks that a shorter step succeeds.

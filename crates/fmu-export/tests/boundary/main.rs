@@ -35,6 +35,7 @@ mod settable;
 mod simulation;
 mod start_values;
 mod tolerances;
+mod undone;
 mod valid_calls;
 mod variables;
 

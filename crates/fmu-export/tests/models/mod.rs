@@ -3,6 +3,7 @@
 
 #[path = "../../../cargo-fmu/models/ball/src/ball.rs"]
 pub mod ball;
+pub mod clumsy;
 pub mod counter;
 pub mod faulty;
 pub mod fuse;
@@ -18,6 +19,7 @@ pub mod talker;
 pub mod ticker;
 
 pub use ball::Ball;
+pub use clumsy::{Clumsy, ClumsyOnHeap};
 pub use counter::Counter;
 pub use faulty::Faulty;
 pub use fuse::Fuse;

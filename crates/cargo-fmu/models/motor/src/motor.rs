@@ -148,19 +148,16 @@ impl CoSimulation for Motor {
         if (end - self.next) / self.period > MOST || end + self.period == end {
             return Err(Error::new(format!("a step may have {MOST} periods, and they must not vanish")));
         }
-        // A step that fails must not change the model.
-        let mut motor = self.clone();
         let mut time = step.time;
-        while motor.next < last {
-            motor.integrate(Step::new(time, (motor.next - time).max(0.0)))?;
-            time = motor.next;
-            motor.switch();
+        while self.next < last {
+            self.integrate(Step::new(time, (self.next - time).max(0.0)))?;
+            time = self.next;
+            self.switch();
         }
-        motor.integrate(Step::new(time, end - time))?;
-        if !(motor.current.is_finite() && motor.speed.is_finite()) {
+        self.integrate(Step::new(time, end - time))?;
+        if !(self.current.is_finite() && self.speed.is_finite()) {
             return Err(Error::new("current or speed leave the range of numbers"));
         }
-        *self = motor;
         Ok(Stepped::Done)
     }
 }

@@ -1,0 +1,133 @@
+//! An error leaves the instance as it was, even if the model has changed everything before it failed.
+
+use crate::models::clumsy::{ClumsyName, Fails};
+use crate::models::*;
+use fmu_export::Interface::*;
+use fmu_export::{Exported, Status};
+use fmu_test_kit::{Arguments, Either, Importer, fmi3};
+
+const U: u32 = ClumsyName::u as u32;
+const GAIN: u32 = ClumsyName::gain as u32;
+const FAILS: u32 = ClumsyName::fails as u32;
+const REALS: [u32; 5] = [U, ClumsyName::x as u32, ClumsyName::der_x as u32, ClumsyName::sum as u32, GAIN];
+
+fn fails(fmu: &impl Either, fails: Fails) {
+    fmu.ok(fmu.set_integer(FAILS, fails as i32));
+}
+
+/// All that an importer can see: bits of Reals, the number of events, the serialized state.
+type Seen = (Vec<u64>, i32, Vec<u8>);
+
+/// Returns all that an importer can see.
+fn seen(fmu: &impl Either) -> Seen {
+    let reals = fmu.read(&REALS).into_iter().map(f64::to_bits).collect();
+    (reals, fmu.integer(ClumsyName::count as u32), fmu.bytes())
+}
+
+/// Checks that the call fails and changes nothing, then removes the cause.
+#[track_caller]
+fn undone<F: Either>(fmu: &F, cause: Fails, call: impl FnOnce(&F) -> Status) {
+    fails(fmu, cause);
+    let before = seen(fmu);
+    let message = fmu.rejected(&format!("{cause:?}"), call);
+    assert!(message.contains("it has failed half-way"), "{message}");
+    assert_eq!(seen(fmu), before, "{cause:?}");
+    fails(fmu, Fails::Nothing);
+}
+
+/// Initializes, after failed attempts if there are any.
+fn begin<F: Either>(fmu: &F, with_failures: bool) {
+    fmu.set(&[U], &[0.5]);
+    if with_failures {
+        fails(fmu, Fails::Initialize);
+        fmu.rejected_with(&["it has failed half-way"], |fmu| fmu.enter_initialization_mode(0.0, None));
+        fmu.rejected_with(&["it has failed half-way"], |fmu| fmu.set_integer(FAILS, Fails::Update as i32));
+        fails(fmu, Fails::Nothing);
+    }
+    fmu.initialize(0.0);
+}
+
+/// Simulates in Co-Simulation with events in some steps. Returns the results of all steps.
+fn simulate<F: Either, M: Exported>(with_failures: bool) -> Vec<Seen> {
+    let fmu = F::new::<M>(CoSimulation);
+    begin(&fmu, with_failures);
+    let step = |step: u32| {
+        let time = 0.35 * f64::from(step);
+        fmu.set(&[U], &[0.1 + time]);
+        if with_failures {
+            undone(&fmu, Fails::Step, |fmu| fmu.try_step(time, 0.35));
+            undone(&fmu, Fails::Step, |fmu| fmu.try_step(time, 1e-3));
+            if (time + 0.35).floor() > time.floor() {
+                undone(&fmu, Fails::Event, |fmu| fmu.try_step(time, 0.35));
+                undone(&fmu, Fails::StepAfterEvent, |fmu| fmu.try_step(time, 0.35));
+            }
+        }
+        fmu.step(time, 0.35);
+        seen(&fmu)
+    };
+    (0..8).map(step).collect()
+}
+
+#[test]
+fn a_simulation_with_failures_is_the_same_as_without() {
+    fn check<F: Either, M: Exported>() {
+        assert_eq!(simulate::<F, M>(true), simulate::<F, M>(false), "{}", M::INFO.name);
+    }
+    check::<Importer, Clumsy>();
+    check::<Importer, ClumsyOnHeap>();
+    check::<fmi3::Importer, Clumsy>();
+    check::<fmi3::Importer, ClumsyOnHeap>();
+}
+
+/// Checks an importer that handles events and accepts early returns.
+#[test]
+fn steps_of_an_importer_that_handles_events() {
+    fn check<M: Exported>() {
+        let fmu = fmi3::Importer::make::<M>(&Arguments::with_events::<M>(CoSimulation)).unwrap();
+        fmu.initialize(0.0);
+        fmu.leave_event_mode();
+        undone(&fmu, Fails::Step, |fmu| fmu.try_step(0.0, 0.5));
+        let stepped = fmu.do_step(0.0, 1.5).unwrap();
+        assert_eq!((stepped.event_handling_needed, stepped.last_successful_time), (true, 1.0));
+        fmu.ok(fmu.fmi3EnterEventMode());
+        undone(&fmu, Fails::Event, |fmu| fmu.try_update().unwrap_err());
+        fmu.update();
+        fmu.ok(fmu.fmi3EnterStepMode());
+        undone(&fmu, Fails::StepAfterEvent, |fmu| fmu.try_step(1.0, 0.5));
+        fmu.step(1.0, 0.5);
+    }
+    check::<Clumsy>();
+    check::<ClumsyOnHeap>();
+}
+
+#[test]
+fn in_model_exchange() {
+    fn check<F: Either, M: Exported>() {
+        let fmu = F::new::<M>(ModelExchange);
+        begin(&fmu, true);
+        fmu.enter_continuous_time();
+        fmu.ok(fmu.set_time(1.0));
+        fmu.ok(fmu.enter_event_mode());
+        undone(&fmu, Fails::Event, |fmu| fmu.try_update().unwrap_err());
+        assert_eq!(fmu.update().next, Some(2.0));
+    }
+    check::<Importer, Clumsy>();
+    check::<Importer, ClumsyOnHeap>();
+    check::<fmi3::Importer, Clumsy>();
+    check::<fmi3::Importer, ClumsyOnHeap>();
+}
+
+#[test]
+fn a_failed_step_may_be_tried_again_after_a_reset() {
+    fn check<F: Either>() {
+        let fmu = F::new::<ClumsyOnHeap>(CoSimulation);
+        for _ in 0..2 {
+            begin(&fmu, true);
+            fmu.step(0.0, 0.5);
+            undone(&fmu, Fails::Step, |fmu| fmu.try_step(0.5, 0.25));
+            fmu.ok(fmu.reset());
+        }
+    }
+    check::<Importer>();
+    check::<fmi3::Importer>();
+}
