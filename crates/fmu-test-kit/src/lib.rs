@@ -4,17 +4,21 @@
 //! [`fmi3`] contains the importer of FMI 3.0. [`Either`] contains the operations that both share, and
 //! assertions. [`serialized`] describes the bytes of saved states; [`c_programs`] supports tests with C
 //! programs. [`fault_injection`] is a fault-injecting importer that makes any calls in any order. [`realtime`]
-//! checks that code may run in a control loop. [`checks`] contains checks that hold for every FMU.
+//! checks that code may run in a control loop. [`checks`] contains checks that hold for every FMU,
+//! [`history`] and [`costs`] those of instances with a past.
 
 // Under Miri, the logger is variadic as in C.
 #![cfg_attr(miri, feature(c_variadic))]
 
 pub mod c_programs;
 pub mod checks;
+pub mod costs;
 mod either;
 pub mod fault_injection;
 pub mod fmi2;
 pub mod fmi3;
+pub mod history;
+mod instructions;
 mod importer;
 mod library;
 mod random;
@@ -24,6 +28,7 @@ pub mod serialized;
 pub use either::{Either, Updated, Version};
 pub use fmi_abi::calls;
 pub use fmi2::{FUNCTIONS, Functions, Importer};
+pub use instructions::instructions;
 pub use importer::{Arguments, Hook, Message};
 pub use library::{functions_of, load};
 pub use random::Random;

@@ -16,4 +16,14 @@ impl Random {
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * ((self.bits() >> 11) as f64 / (1_u64 << 53) as f64)
     }
+
+    /// Returns true with this probability.
+    pub fn chance(&mut self, probability: f64) -> bool {
+        self.between(0.0, 1.0) < probability
+    }
+
+    /// Returns an index below a number, which must not be 0.
+    pub fn below(&mut self, count: usize) -> usize {
+        (self.bits() >> 33) as usize % count
+    }
 }

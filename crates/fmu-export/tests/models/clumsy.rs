@@ -116,7 +116,7 @@ macro_rules! clumsy {
         impl ModelExchange for $model {
             fn event(&mut self, time: f64) -> Result<Event, Error> {
                 if time >= self.next {
-                    self.count += 1;
+                    self.count = self.count.saturating_add(1);
                     self.next += 1.0;
                     self.collect(time);
                     self.fail_if(self.fails == Fails::Event as i32)?;

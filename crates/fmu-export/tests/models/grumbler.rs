@@ -115,7 +115,7 @@ impl ModelExchange for Grumbler {
     fn event(&mut self, time: f64) -> Result<Event, Error> {
         let mut again = false;
         if time >= self.next {
-            self.rounds += 1;
+            self.rounds = self.rounds.saturating_add(1);
             again = self.rounds % 2 == 1 || self.trouble == Trouble::Rounds;
             if !again {
                 self.fail_at(Trouble::SecondRound)?;

@@ -1,0 +1,83 @@
+//! Counts the instructions of some work, the same number on every run and machine with the same program.
+
+/// Counts the instructions that the work executes in a copy of this process, which the kernel stops after each of them.
+/// A thousand take some milliseconds. The work leaves this process unchanged. Returns `None` if this process may not
+/// trace another, as in some containers.
+///
+/// # Panics
+/// Panics if the process cannot be copied, or if the work ends it.
+#[cfg(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")))]
+pub fn instructions(work: &mut dyn FnMut()) -> Option<u64> {
+    let own = counted(&mut || ())?;
+    Some(counted(work)?.saturating_sub(own))
+}
+
+#[cfg(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")))]
+fn counted(work: &mut dyn FnMut()) -> Option<u64> {
+    use std::ptr::null_mut;
+    // SAFETY: the child stops, does the work, stops again and is then ended. If the work allocates, the child may wait for
+    // a lock of another thread only if that thread held it during the fork, which glibc prevents for its allocator.
+    let child = unsafe { libc::fork() };
+    assert!(child >= 0, "fork: {}", std::io::Error::last_os_error());
+    if child == 0 {
+        // SAFETY: only affects this process, which never returns.
+        unsafe {
+            if libc::ptrace(libc::PTRACE_TRACEME, 0, null_mut::<()>(), null_mut::<()>()) != 0 {
+                libc::_exit(1);
+            }
+            libc::raise(libc::SIGSTOP);
+            work();
+            libc::raise(libc::SIGSTOP);
+            libc::_exit(0)
+        }
+    }
+    let wait = || {
+        let mut status = 0;
+        // SAFETY: waits for the child; the pointer is a live reference.
+        assert_eq!(unsafe { libc::waitpid(child, &raw mut status, 0) }, child);
+        status
+    };
+    if libc::WIFEXITED(wait()) {
+        return None;
+    }
+    for count in 0.. {
+        // SAFETY: the child is stopped and traced by this process.
+        let stepped = unsafe { libc::ptrace(libc::PTRACE_SINGLESTEP, child, null_mut::<()>(), null_mut::<()>()) };
+        assert_eq!(stepped, 0, "PTRACE_SINGLESTEP: {}", std::io::Error::last_os_error());
+        let status = wait();
+        assert!(libc::WIFSTOPPED(status), "the work has ended its process");
+        match libc::WSTOPSIG(status) {
+            libc::SIGTRAP => {}
+            libc::SIGSTOP => {
+                // SAFETY: the child of this process.
+                unsafe { libc::kill(child, libc::SIGKILL) };
+                wait();
+                return Some(count);
+            }
+            signal => panic!("the work got signal {signal}"),
+        }
+    }
+    None
+}
+
+/// Counts nothing on other systems.
+#[cfg(not(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64"))))]
+pub fn instructions(_: &mut dyn FnMut()) -> Option<u64> {
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::instructions;
+
+    #[test]
+    fn the_count_is_proportional_to_the_work() {
+        let sum = |numbers: u64| {
+            instructions(&mut || _ = (0..numbers).fold(0, |sum, number| std::hint::black_box(sum + number)))
+        };
+        let counts = [100, 200, 300].map(sum);
+        if let [Some(one), Some(two), Some(three)] = counts {
+            assert!(one > 100 && three - two == two - one, "{counts:?}");
+        }
+    }
+}
