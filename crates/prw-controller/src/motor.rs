@@ -41,17 +41,19 @@ impl Motor {
     ///
     /// Within the limits the motor reaches the goal in the least number of samples. If the goal lies behind,
     /// or is nearer than the stopping distance, the motor passes it and returns. Returns whether the motor is
-    /// at its goal, or will be at rest there in two samples.
+    /// at rest at its goal, or will be within two samples.
     pub fn turn_towards(&mut self, goal: f64, limits: &Limits, period: f64) -> bool {
         let Limits { rate: max_rate, acceleration: max } = *limits;
-        // Units: the changes of rate and angle by full acceleration during one period.
+        // Units: the rate a T that the motor gains in one period T at full acceleration a, and the angle a T^2 that it
+        // travels in one period at that rate.
         let (rate_unit, angle_unit) = (max * period, max * period * period);
         let distance = (goal - self.angle - 0.5 * self.rate * period) / angle_unit;
-        let rate = rate_unit * fastest_rate(distance.abs(), max_rate / rate_unit).copysign(distance);
-        let rate = rate.clamp(-max_rate, max_rate);
+        let wanted = rate_unit * fastest_rate(distance.abs(), max_rate / rate_unit).copysign(distance);
+        let rate = wanted.clamp(-max_rate, max_rate);
         let acceleration = (rate - self.rate) / period;
         self.acceleration = acceleration.clamp(-max, max);
-        distance.abs() < 1.0 && acceleration == self.acceleration
+        // Braking from less than one unit takes one period. Neither limit may be in the way.
+        distance.abs() < 1.0 && rate == wanted && acceleration == self.acceleration
     }
 }
 
@@ -106,7 +108,7 @@ mod tests {
             for goal in [1.1220, -0.5, 1e-3, 3.3e-5, 1e-5, -1e-7, 0.022_2] {
                 let (samples, farthest, _) = go(Motor::default(), goal, &limits);
                 assert!((farthest - goal) * f64::signum(goal) <= 1e-12, "{goal}: {farthest}");
-                // Bang-bang motion in continuous time, rounded up to whole samples; at most two more samples.
+                // Time of bang-bang motion in continuous time; sampling may add up to three samples.
                 let distance = goal.abs();
                 let peak = (distance * acceleration).sqrt().min(rate);
                 let shortest = distance / peak + peak / acceleration;
@@ -117,6 +119,32 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// The last limits permit no rate of one unit, so the motor needs several periods for the last unit of its way.
+    #[test]
+    fn it_says_so_when_two_samples_are_enough() {
+        let mut announced = 0;
+        for (rate, acceleration) in [(3.0, 30.0), (2.345, 17.89), (0.5, 1e3), (0.02, 30.0), (0.004, 30.0)] {
+            let limits = Limits { rate, acceleration };
+            for goal in [1.1220, -0.5, 1e-3, 3.3e-5, 1e-5, -1e-7, 0.022_2, 6e-6, 1.7e-5] {
+                let mut motor = Motor::default();
+                for _ in 0..400_000 {
+                    let is_near = motor.turn_towards(goal, &limits, PERIOD);
+                    if is_near {
+                        let mut two_later = motor.after(PERIOD);
+                        two_later.turn_towards(goal, &limits, PERIOD);
+                        two_later = two_later.after(PERIOD);
+                        assert!((two_later.angle - goal).abs() < 1e-12, "{goal} {limits:?} {two_later:?}");
+                        assert!(two_later.rate.abs() < 1e-9, "{goal} {limits:?} {two_later:?}");
+                        announced += 1;
+                        break;
+                    }
+                    motor = motor.after(PERIOD);
+                }
+            }
+        }
+        assert_eq!(announced, 45);
     }
 
     #[test]
