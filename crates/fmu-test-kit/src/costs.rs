@@ -6,7 +6,7 @@
 use crate::checks::start_of;
 use crate::{Either, Importer, fmi3, instructions};
 use fmu_export::Interface::CoSimulation;
-use fmu_export::{Exported, Experiment, Setup, Status, Step};
+use fmu_export::{Experiment, Exported, Setup, Status, Step};
 use std::ptr::null_mut;
 
 /// Step sizes of a round, relative to the default step size.

@@ -3,7 +3,7 @@
 //! A history consists of random calls, many of which fail, of saved, restored and serialized states, resets and copies
 //! that continue in another instance. The calls that remain are the *path*: calls that failed are not in it, and a
 //! restored state or a reset ends it where it was then. A fresh instance that makes only the calls of the path must
-//! return the same bits from every getter, then and after more calls. 
+//! return the same bits from every getter, then and after more calls.
 
 use crate::either::Version;
 use crate::serialized::{MODE, fnv1a, time};
@@ -164,7 +164,10 @@ impl<F: Either, M: Exported> Traveller<F, M> {
 
     /// Sets a valid start value, because an instance remembers rejected ones.
     fn set_again(&mut self, random: &mut Random, rejected: &Call, world: &World) {
-        let (Call::Real(index, _) | Call::Integer(index, _) | Call::Item(index, _) | Call::Boolean(index, _)
+        let (Call::Real(index, _)
+        | Call::Integer(index, _)
+        | Call::Item(index, _)
+        | Call::Boolean(index, _)
         | Call::String(index, _)) = *rejected
         else {
             return;
@@ -246,7 +249,8 @@ impl<F: Either, M: Exported> Traveller<F, M> {
                 _ => (Status::Ok, 0),
             }
         });
-        let seen = values.map(|(status, bits)| (status, if status == Status::Ok { bits } else { 0 })).collect();
+        let seen =
+            values.map(|(status, bits)| (status, if status == Status::Ok { bits } else { 0 })).collect();
         let seen = (seen, self.serialized());
         self.fmu.take_log();
         seen
@@ -280,7 +284,8 @@ fn value<M: Exported>(random: &mut Random, index: u32, extreme: f64, world: &Wor
     let extreme = random.chance(extreme);
     Some(match (&variable.variable_type().attributes, world.starts[index as usize].clone()?) {
         (Attributes::Real { .. }, Value::Real(start)) if variable.base() == BaseType::Real => {
-            let near = if start == 0.0 { random.between(-1.0, 1.0) } else { start * random.between(0.8, 1.25) };
+            let near =
+                if start == 0.0 { random.between(-1.0, 1.0) } else { start * random.between(0.8, 1.25) };
             let far = [f64::NAN, f64::INFINITY, 1e300, -1e300, -start - 1.0, 1e9][random.below(6)];
             Call::Real(index, if extreme { far } else { near })
         }
@@ -340,7 +345,9 @@ fn call<M: Exported>(random: &mut Random, mode: Option<Mode>, world: &World) -> 
             let sizes = [1.0, 1.0, 1.0, 0.5, 2.0, 3.7, random.between(0.1, 30.0), 1e3, 1e300, -1.0, f64::NAN];
             Some(Call::Step(near * sizes[random.below(sizes.len())]))
         }
-        Event => Some([Call::Update, Call::EnterStepMode, Call::EnterContinuousTime][random.below(3)].clone()),
+        Event => {
+            Some([Call::Update, Call::EnterStepMode, Call::EnterContinuousTime][random.below(3)].clone())
+        }
         ContinuousTime => Some(match random.below(4) {
             0 => Call::EnterEventMode,
             1 => Call::Advance(near * random.between(0.0, 20.0)),

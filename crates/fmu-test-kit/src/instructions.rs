@@ -42,7 +42,8 @@ fn counted(work: &mut dyn FnMut()) -> Option<u64> {
     }
     for count in 0.. {
         // SAFETY: the child is stopped and traced by this process.
-        let stepped = unsafe { libc::ptrace(libc::PTRACE_SINGLESTEP, child, null_mut::<()>(), null_mut::<()>()) };
+        let stepped =
+            unsafe { libc::ptrace(libc::PTRACE_SINGLESTEP, child, null_mut::<()>(), null_mut::<()>()) };
         assert_eq!(stepped, 0, "PTRACE_SINGLESTEP: {}", std::io::Error::last_os_error());
         let status = wait();
         assert!(libc::WIFSTOPPED(status), "the work has ended its process");

@@ -4,6 +4,7 @@
 
 mod co_simulation;
 mod derivatives;
+mod handles;
 mod model_exchange;
 mod origin;
 mod reference;
@@ -173,7 +174,7 @@ impl<M: Exported> Instance<M> {
             before: needs_undo.then(|| Box::new(state.clone())),
             state,
             rejected: Sorted::new(),
-            kept: Sorted::new(),
+            kept: handles::Handles::new(),
             strings: Vec::new(),
             bytes: Vec::new(),
             elements: Vec::with_capacity(if M::ARRAYS { M::TABLE.len() } else { 0 }),

@@ -1,20 +1,16 @@
 //! Saved states (section 2.1.8 of FMI 2.0, 2.2.7.4 of FMI 3.0).
 
+use super::handles::{Handles, NULL};
 use super::origin::Origin;
-use super::sorted::Sorted;
 use super::{Instance, Outcome, State, reject, serialized};
 use crate::export::Exported;
 use fmi_abi::{Interface, Mode};
 
-/// States that an importer keeps. Addresses identify them, and each address is only looked up here, never
-/// dereferenced. So the address of a freed state, of another instance's state or of any other object is
-/// rejected safely.
+/// States that an importer keeps. Their handles are numbers, never dereferenced. So the handle of a freed state, of
+/// another instance's state or any other pointer is rejected.
 ///
 /// The instance owns the states and frees them at its end (section 2.1.5 of FMI 2.0, 2.3.1 of FMI 3.0).
-pub(super) type Kept<M> = Sorted<usize, Box<State<M>>>;
-
-/// The handle that denotes no state.
-const NULL: usize = 0;
+pub(super) type Kept<M> = Handles<Box<State<M>>>;
 
 impl<M: Exported> Instance<M> {
     fn origin(&self) -> Origin {
@@ -31,17 +27,17 @@ impl<M: Exported> Instance<M> {
     /// reused without allocation if the model's `clone_from` does not allocate.
     pub fn save(&mut self, handle: usize) -> Outcome<usize> {
         if handle == NULL {
-            return Ok(self.keep(self.state.clone()));
+            return self.keep(self.state.clone());
         }
         find(&mut self.kept, handle)?.clone_from(&self.state);
         Ok(handle)
     }
 
-    fn keep(&mut self, state: State<M>) -> usize {
-        let state = Box::new(state);
-        let handle = (&raw const *state).addr();
-        self.kept.insert(handle, state);
-        handle
+    fn keep(&mut self, state: State<M>) -> Outcome<usize> {
+        match self.kept.insert(Box::new(state)) {
+            Some(handle) => Ok(handle),
+            None => reject("the instance has too many saved states; free some"),
+        }
     }
 
     pub fn restore(&mut self, handle: usize) -> Outcome {
@@ -83,7 +79,7 @@ impl<M: Exported> Instance<M> {
         read?;
         self.check_event_mode(&state)?;
         if handle == NULL {
-            return Ok(self.keep(state));
+            return self.keep(state);
         }
         *find(&mut self.kept, handle)? = state;
         Ok(handle)

@@ -13,11 +13,6 @@ impl<K: Ord + Copy, V> Sorted<K, V> {
         self.0.binary_search_by_key(&key, |(key, _)| *key)
     }
 
-    pub fn get_mut(&mut self, key: K) -> Option<&mut V> {
-        let index = self.index(key).ok()?;
-        self.0.get_mut(index).map(|(_, value)| value)
-    }
-
     /// Inserts a value or replaces the value of the key.
     pub fn insert(&mut self, key: K, value: V) {
         match self.index(key) {
@@ -29,11 +24,6 @@ impl<K: Ord + Copy, V> Sorted<K, V> {
     pub fn remove(&mut self, key: K) -> Option<V> {
         let index = self.index(key).ok()?;
         Some(self.0.remove(index).1)
-    }
-
-    /// Removes any entry.
-    pub fn pop(&mut self) -> Option<V> {
-        self.0.pop().map(|(_, value)| value)
     }
 
     pub fn clear(&mut self) {
@@ -61,9 +51,9 @@ mod tests {
                 sorted.insert(key, step);
                 map.insert(key, step);
             }
-            assert_eq!(sorted.get_mut(key), map.get_mut(&key));
             assert!(sorted.values().eq(map.values()));
         }
-        assert!(std::iter::from_fn(|| sorted.pop()).eq(map.into_values().rev()));
+        sorted.clear();
+        assert_eq!(sorted.values().count(), 0);
     }
 }

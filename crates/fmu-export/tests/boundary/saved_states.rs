@@ -61,6 +61,43 @@ fn handles_that_are_none() {
     fmu.ok(fmu.fmi2SetFMUstate(own));
 }
 
+/// Checks that a handle stays invalid after its state was freed, although the next state may have its memory.
+#[test]
+fn freed_handles_stay_invalid() {
+    fn check<F: Either>() {
+        let fmu = F::in_mode::<Oscillator>(CoSimulation, StepComplete);
+        let mut freed = Vec::new();
+        for _ in 0..20 {
+            let state = fmu.save();
+            assert!(!freed.contains(&state));
+            fmu.forget(state);
+            freed.push(state);
+        }
+        let _last = fmu.save();
+        for state in freed {
+            fmu.rejected_with(&["no state of this instance"], |fmu| fmu.set_state(state));
+        }
+    }
+    check::<Importer>();
+    check::<fmi3::Importer>();
+}
+
+/// Checks that freeing the oldest of many states takes as long as freeing the oldest of few.
+#[test]
+fn states_are_freed_in_constant_time() {
+    use fmu_test_kit::instructions;
+    let fmu = Importer::in_mode::<Oscillator>(CoSimulation, StepComplete);
+    let instructions_with = |count: usize| {
+        let states: Vec<_> = (0..count).map(|_| fmu.save()).collect();
+        let counted = instructions(&mut || fmu.forget(states[0]));
+        states.into_iter().for_each(|state| fmu.forget(state));
+        counted
+    };
+    if let [Some(few), Some(many)] = [10, 20_000].map(instructions_with) {
+        assert!(many < few + few / 2, "{few} instructions, and {many} among 20,000");
+    }
+}
+
 /// Checks that the model's memory may contain any number. A variable that is not finite could not be read
 /// back, so it is not written.
 #[test]
