@@ -1,7 +1,8 @@
 //! The table of variables: [`variables!`](crate::variables) and the code that it generates.
 
+use crate::offsets::Filling;
 use crate::saved::StateVisitor;
-use crate::variable::{Index, Letters, Read, Variable, reject};
+use crate::variable::{Index, Read, Variable, reject};
 use std::fmt::Debug;
 use std::mem::MaybeUninit;
 
@@ -159,17 +160,37 @@ pub const fn count_elements<M>(lines: &[Variable<M>]) -> usize {
     index_of(lines, lines.len())
 }
 
+// The compiler interprets the following functions, and a call of a generic function takes it a microsecond. So the code
+// for each element of an array has few calls.
+
 /// Returns the total length in bytes of the names of all array elements.
 #[doc(hidden)]
 pub const fn count_letters<M>(lines: &[Variable<M>]) -> usize {
     let (mut count, mut line) = (0, 0);
     while line < lines.len() {
-        let mut element = 0;
-        while is_array(&lines[line]) && element < lines[line].length() {
-            count += name_of_element(&lines[line], element).bytes().len();
-            element += 1;
+        let (sizes, length) = (lines[line].dimensions(), lines[line].length());
+        // A bracket or a comma before each index, and a bracket after the last.
+        if !sizes.is_empty() {
+            count += length * (lines[line].name_of_array().len() + sizes.len() + 1);
+        }
+        let mut direction = 0;
+        while direction < sizes.len() && length > 0 {
+            count += length / sizes[direction] * count_digits_up_to(sizes[direction]);
+            direction += 1;
         }
         line += 1;
+    }
+    count
+}
+
+/// Returns the number of digits of all numbers from 1 to `last`.
+const fn count_digits_up_to(last: usize) -> usize {
+    let (mut count, mut digits, mut first) = (0, 1, 1);
+    while first <= last {
+        let end = if last / 10 >= first { first * 10 - 1 } else { last };
+        count += digits * (end + 1 - first);
+        digits += 1;
+        first *= 10;
     }
     count
 }
@@ -178,17 +199,13 @@ pub const fn count_letters<M>(lines: &[Variable<M>]) -> usize {
 #[doc(hidden)]
 pub const fn write_names<M, const LETTERS: usize>(lines: &[Variable<M>]) -> [u8; LETTERS] {
     let mut letters = [0; LETTERS];
-    let (mut written, mut line) = (0, 0);
+    let (mut at, mut line) = (0, 0);
     while line < lines.len() {
+        let (name, sizes) = (lines[line].name_of_array().as_bytes(), lines[line].dimensions());
+        let length = if sizes.is_empty() { 0 } else { lines[line].length() };
         let mut element = 0;
-        while is_array(&lines[line]) && element < lines[line].length() {
-            let name = name_of_element(&lines[line], element);
-            let mut index = 0;
-            while index < name.bytes().len() {
-                letters[written] = name.bytes()[index];
-                written += 1;
-                index += 1;
-            }
+        while element < length {
+            at = write_name(name, sizes, element, &mut letters, at);
             element += 1;
         }
         line += 1;
@@ -196,34 +213,70 @@ pub const fn write_names<M, const LETTERS: usize>(lines: &[Variable<M>]) -> [u8;
     letters
 }
 
-/// Returns the name of an array element: the name of the array with indices that count from 1 (section 2.2.9 of
-/// FMI 2.0). Indices follow the variable, as in `der(T[3])`.
-const fn name_of_element<M>(array: &Variable<M>, element: usize) -> Letters {
-    let name = array.name_of_array().as_bytes();
+/// Writes the name of an array element: the name of the array with indices that count from 1 (section 2.2.9 of FMI
+/// 2.0). Indices follow the variable, as in `der(T[3])`. Returns the index after it.
+const fn write_name(
+    name: &[u8],
+    sizes: &[usize],
+    element: usize,
+    letters: &mut [u8],
+    mut at: usize,
+) -> usize {
     let is_derivative = matches!(name, [b'd', b'e', b'r', b'(', ..]);
-    let mut end = 0;
-    while end < name.len() && !(is_derivative && matches!(name[end], b',' | b')')) {
-        end += 1;
+    let mut letter = 0;
+    while letter < name.len() && !(is_derivative && (name[letter] == b',' || name[letter] == b')')) {
+        letters[at] = name[letter];
+        at += 1;
+        letter += 1;
     }
-    let mut written = Letters::new().with(name.split_at(end).0);
-    let sizes = array.dimensions();
     let mut direction = 0;
     while direction < sizes.len() {
-        let (mut row, mut inner) = (1, direction + 1);
-        while inner < sizes.len() {
-            row *= sizes[inner];
-            inner += 1;
+        letters[at] = if direction == 0 { b'[' } else { b',' };
+        at += 1;
+        let number = index_in(sizes, element, direction);
+        let mut unit = 1;
+        while number / unit >= 10 {
+            unit *= 10;
         }
-        written = written.with(if direction == 0 { b"[" } else { b"," });
-        written = with_number(written, element / row % sizes[direction] + 1);
+        while unit > 0 {
+            letters[at] = b'0' + (number / unit % 10) as u8;
+            at += 1;
+            unit /= 10;
+        }
         direction += 1;
     }
-    written.with(b"]").with(name.split_at(end).1)
+    letters[at] = b']';
+    at += 1;
+    while letter < name.len() {
+        letters[at] = name[letter];
+        at += 1;
+        letter += 1;
+    }
+    at
 }
 
-const fn with_number(letters: Letters, number: usize) -> Letters {
-    let written = if number < 10 { letters } else { with_number(letters, number / 10) };
-    written.with(&[b'0' + (number % 10) as u8])
+/// Returns the index of the element in a direction, counted from 1.
+const fn index_in(sizes: &[usize], element: usize, direction: usize) -> usize {
+    let (mut row, mut inner) = (1, direction + 1);
+    while inner < sizes.len() {
+        row *= sizes[inner];
+        inner += 1;
+    }
+    element / row % sizes[direction] + 1
+}
+
+const fn length_of_name(name: &str, sizes: &[usize], element: usize) -> usize {
+    let (mut length, mut direction) = (name.len() + 1, 0);
+    while direction < sizes.len() {
+        let mut rest = index_in(sizes, element, direction);
+        length += 2;
+        while rest >= 10 {
+            length += 1;
+            rest /= 10;
+        }
+        direction += 1;
+    }
+    length
 }
 
 /// Returns the table of variables; the names of array elements are slices of the result of [`write_names`].
@@ -232,74 +285,76 @@ pub const fn spread<M, const COUNT: usize>(
     lines: &[Variable<M>],
     letters: &'static [u8],
 ) -> [Variable<M>; COUNT] {
-    let mut table = [lines[0]; COUNT];
-    let (mut index, mut line, mut letters) = (0, 0, letters);
+    let Ok(mut letters) = std::str::from_utf8(letters) else { panic!("a name is not UTF-8") };
+    let mut table = Filling::new();
+    let mut line = 0;
     while line < lines.len() {
         let of = &lines[line];
-        let differentiated = match of.differentiates() {
+        let first = match of.differentiates() {
             Some(line) => Some(index_of(lines, line as usize)),
             None => None,
         };
+        let (array, sizes, length) = (of.name_of_array(), of.dimensions(), of.length());
         let mut element = 0;
-        while element < of.length() {
-            let name = if is_array(of) {
-                let (name, rest) = letters.split_at(name_of_element(of, element).bytes().len());
-                letters = rest;
-                match std::str::from_utf8(name) {
-                    Ok(name) => name,
-                    Err(_) => of.name(),
-                }
-            } else {
-                of.name()
-            };
-            table[index] = of.spread(line, element, name);
-            if let Some(first) = differentiated {
-                table[index] = table[index].differentiating(first + element);
+        while element < length {
+            let mut name = of.name();
+            if !sizes.is_empty() {
+                (name, letters) = letters.split_at(length_of_name(array, sizes, element));
             }
-            index += 1;
+            table.push(of.spread(line, element, name, first));
             element += 1;
         }
         line += 1;
     }
-    table
+    table.filled()
 }
 
-/// Returns the number of states in a table.
+/// Returns the number of states of the lines; each element of an array counts.
 #[doc(hidden)]
-pub const fn count_states<M>(table: &[Variable<M>]) -> usize {
-    let (mut count, mut index) = (0, 0);
-    while index < table.len() {
-        count += table[index].is_state() as usize;
-        index += 1;
+pub const fn count_states<M>(lines: &[Variable<M>]) -> usize {
+    let (mut count, mut line) = (0, 0);
+    while line < lines.len() {
+        if lines[line].is_state() {
+            count += lines[line].length();
+        }
+        line += 1;
     }
     count
 }
 
-/// Returns the `N` states in a table.
+/// Returns the `N` states of the lines. The derivative of an array is searched once.
 #[doc(hidden)]
-pub const fn find_states<M, const N: usize>(table: &[Variable<M>]) -> [StateOfTable; N] {
+pub const fn find_states<M, const N: usize>(lines: &[Variable<M>]) -> [StateOfTable; N] {
     let mut states = [StateOfTable { state: 0, derivative: 0 }; N];
-    let (mut found, mut index) = (0, 0);
-    while index < table.len() {
+    let (mut found, mut index, mut line) = (0, 0, 0);
+    while line < lines.len() {
         // `check_line` rejects a state without derivative.
-        if table[index].is_state()
-            && let Some(derivative) = derivative(table, index as u32)
+        if lines[line].is_state()
+            && let Some(derivative) = derivative(lines, line as u32)
         {
-            states[found] = StateOfTable { state: index as u32, derivative };
-            found += 1;
+            let (first, length) = (index_of(lines, derivative as usize), lines[line].length());
+            let mut element = 0;
+            while element < length {
+                states[found] =
+                    StateOfTable { state: (index + element) as u32, derivative: (first + element) as u32 };
+                found += 1;
+                element += 1;
+            }
         }
-        index += 1;
+        index += lines[line].length();
+        line += 1;
     }
     states
 }
 
-const fn derivative<M>(table: &[Variable<M>], state: u32) -> Option<u32> {
-    let mut index = 0;
-    while index < table.len() {
-        if matches!(table[index].differentiates(), Some(of) if of == state) {
-            return Some(index as u32);
+/// Returns the line that is the derivative of a line.
+const fn derivative<M>(lines: &[Variable<M>], state: u32) -> Option<u32> {
+    let mut line = 0;
+    while line < lines.len() {
+        if matches!(lines[line].differentiates(), Some(of) if of == state) {
+            return Some(line as u32);
         }
-        index += 1;
+        line += 1;
     }
     None
 }
@@ -347,8 +402,13 @@ const fn is_element<M>(one: &Variable<M>, array: &Variable<M>) -> bool {
     }
     let mut element = 0;
     while has_index && is_array(array) && element < array.length() {
-        if is_equal(name, name_of_element(array, element).bytes()) {
-            return true;
+        let (of, sizes) = (array.name_of_array(), array.dimensions());
+        let mut letters = [0; 400];
+        if length_of_name(of, sizes, element) == name.len() && name.len() <= letters.len() {
+            let length = write_name(of.as_bytes(), sizes, element, &mut letters, 0);
+            if is_equal(name, letters.split_at(length).0) {
+                return true;
+            }
         }
         element += 1;
     }
@@ -545,18 +605,16 @@ macro_rules! variables {
                 const TABLE: &'static [$crate::Variable<Self>] = {
                     const LINES: &[$crate::Variable<$model>] = <$model as $crate::Variables>::LINES;
                     const LETTERS: &[u8] = &$crate::write_names::<$model, { $crate::count_letters(LINES) }>(LINES);
-                    const TABLE: [$crate::Variable<$model>; $crate::count_elements(LINES)] =
-                        $crate::spread(LINES, LETTERS);
-                    &TABLE
+                    &$crate::spread::<$model, { $crate::count_elements(LINES) }>(LINES, LETTERS)
                 };
 
                 const NAMES: &'static [Self::Name] = &[$(<<$model as $crate::Variables>::Name>::$name),+];
 
                 #[allow(long_running_const_eval)]
                 const STATES: &'static [$crate::StateOfTable] = {
-                    const COUNT: usize = $crate::count_states(<$model as $crate::Variables>::TABLE);
+                    const COUNT: usize = $crate::count_states(<$model as $crate::Variables>::LINES);
                     const STATES: [$crate::StateOfTable; COUNT] =
-                        $crate::find_states(<$model as $crate::Variables>::TABLE);
+                        $crate::find_states(<$model as $crate::Variables>::LINES);
                     &STATES
                 };
 

@@ -345,18 +345,23 @@ impl<M> Variable<M> {
         self
     }
 
-    /// Returns an element of the array of this line, or the only variable of the line.
-    pub(crate) const fn spread(mut self, line: usize, element: usize, name: &'static str) -> Self {
-        self.line = line as u32;
-        self.element = element as u32;
-        self.name = name;
-        self
-    }
-
-    /// Sets the index of the variable of which this one is the derivative.
-    pub(crate) const fn differentiating(mut self, index: usize) -> Self {
-        self.derivative_of = Some(Index(index as u32));
-        self
+    /// Returns an element of the array of this line, or the only variable of the line. `first` is the index of the first
+    /// element of which the line is the derivative.
+    pub(crate) const fn spread(
+        &self,
+        line: usize,
+        element: usize,
+        name: &'static str,
+        first: Option<usize>,
+    ) -> Self {
+        let mut variable = *self;
+        variable.line = line as u32;
+        variable.element = element as u32;
+        variable.name = name;
+        if let Some(first) = first {
+            variable.derivative_of = Some(Index((first + element) as u32));
+        }
+        variable
     }
 
     /// Returns the fault of a variable that is invalid by itself.

@@ -89,3 +89,51 @@ fn rejected_as_before() {
     rejected::<Importer>();
     rejected::<fmi3::Importer>();
 }
+
+/// Arrays as long as a discretized equation has them.
+mod long {
+    use fmu_export::*;
+
+    #[derive(Clone)]
+    pub struct Long {
+        pub field: [f64; 1500],
+        pub grid: [[f64; 12]; 101],
+        pub heat: [f64; 1500],
+    }
+
+    variables! { for Long;
+        /// Source
+        heat = input(&NUMBER) in heat;
+        /// State
+        field = output(&NUMBER).state() in field;
+        /// Values on a grid
+        grid = local(&NUMBER).state() in grid;
+        /// Its rate
+        der_grid as "der(grid)" = local(&NUMBER).derivative_of(grid) by |long| long.grid;
+        /// Its rate
+        der_field as "der(field)" = local(&NUMBER).derivative_of(field) by |long| long.heat;
+    }
+}
+
+#[test]
+fn long_arrays_have_names_states_and_derivatives() {
+    use fmu_export::Variables;
+    let table = long::Long::TABLE;
+    let mut expected: Vec<String> = ["heat", "field"]
+        .iter()
+        .flat_map(|name| (1..=1500).map(move |index| format!("{name}[{index}]")))
+        .collect();
+    let grid = |end: &'static str| {
+        (1..=101).flat_map(move |row| (1..=12).map(move |column| format!("grid[{row},{column}]{end}")))
+    };
+    expected.extend(grid(""));
+    expected.extend(grid(")").map(|name| format!("der({name}")));
+    expected.extend((1..=1500).map(|index| format!("der(field[{index}])")));
+    assert!(table.iter().map(|variable| variable.name()).eq(&expected));
+    assert_eq!(long::Long::STATES.len(), 1500 + 1212);
+    for state in long::Long::STATES {
+        let [state, derivative] = [state.state, state.derivative].map(|index| &table[index as usize]);
+        assert_eq!(derivative.name(), format!("der({})", state.name()));
+        assert_eq!(derivative.differentiates().map(|index| table[index as usize].name()), Some(state.name()));
+    }
+}
