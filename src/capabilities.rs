@@ -1,6 +1,6 @@
 //! Capabilities of the testbed FMU.
 
-use crate::fmu::{Moving, TestbedFmu};
+use crate::fmu::{Moving, Row, TestbedFmu, moving_variables};
 use crate::instant::Instant;
 use crate::motor::Motions;
 use crate::pair::Pair;
@@ -9,9 +9,9 @@ use crate::start::Start;
 use crate::testbed::{State, Testbed, by_sides};
 use crate::variables::Name;
 use fmu_export::{
-    CoSimulation, DefaultExperiment, Error, Experiment, Info, InputDerivatives, Interface, Model,
-    ModelExchange, OutputDerivatives, Partials, Saved, Setup, StateVisitor, Step, Stepped, Variables, info,
-    saved,
+    BaseType, Causality, CoSimulation, DefaultExperiment, Error, Experiment, Info, InputDerivatives,
+    Interface, Model, ModelExchange, OutputDerivatives, Partials, Saved, Setup, StateVisitor, Step, Stepped,
+    Variables, info, saved,
 };
 use std::borrow::Cow;
 
@@ -48,7 +48,7 @@ impl Model for TestbedFmu {
     fn new(setup: &Setup) -> Result<Self, Error> {
         let testbed = Testbed::new(Parameters::BUILT_IN)?;
         let (interface, start, two) = (setup.interface, Start::default(), [0.0; 2]);
-        let jacobian = Default::default();
+        let jacobian = [[0.0; _]; 10];
         let mut fmu = Self { testbed, interface, start, torques: two, angles: two, rates: two, jacobian };
         fmu.jacobian = fmu.jacobian();
         Ok(fmu)
@@ -126,6 +126,65 @@ impl ModelExchange for TestbedFmu {
     }
 }
 
+/// Defines the variables that are products or other functions of [`Moving`] variables. Each line gives the change of a
+/// variable: a function of the values now and of their changes, for a product `now.a * change.b + change.a * now.b`.
+macro_rules! products {
+    ($($name:ident = |$now:ident, $change:ident| $value:expr;)*) => {
+        const PRODUCTS: &[Name] = &[$(Name::$name),*];
+
+        #[allow(unused_variables, reason = "there may be no products")]
+        fn change_of_product(of: Name, now: &Moving, change: &Moving) -> Option<f64> {
+            match of {
+                $(Name::$name => {
+                    let ($now, $change) = (now, change);
+                    Some($value)
+                })*
+                _ => None,
+            }
+        }
+    };
+}
+products! {}
+
+macro_rules! names {
+    ($($name:ident)+) => { [$(Name::$name),+] };
+}
+/// The variables of [`Moving`] in the order of [`Row`].
+const MOVING: [Name; size_of::<Row>() / size_of::<f64>()] = moving_variables!(names);
+
+/// Position of each line of the table in a [`Row`]; its length for a variable that is not there.
+const POSITIONS: [usize; TestbedFmu::NAMES.len()] = {
+    let mut positions = [MOVING.len(); _];
+    let mut position = 0;
+    while position < MOVING.len() {
+        positions[MOVING[position] as usize] = position;
+        position += 1;
+    }
+    positions
+};
+
+/// Rejects a table with a variable whose derivatives are unknown.
+const _: () = {
+    let mut line = 0;
+    while line < TestbedFmu::TABLE.len() {
+        let variable = &TestbedFmu::TABLE[line];
+        let has_derivatives = matches!(variable.base(), BaseType::Real)
+            && matches!(variable.causality(), Causality::Input | Causality::Output | Causality::Local);
+        let mut is_known = POSITIONS[line] < MOVING.len();
+        let mut product = 0;
+        while product < PRODUCTS.len() {
+            is_known |= PRODUCTS[product] as usize == line;
+            product += 1;
+        }
+        assert!(
+            !has_derivatives || is_known,
+            "a Real variable in variables.rs has no derivatives: add its name to moving_variables! in fmu.rs, or its change \
+             to products! in capabilities.rs"
+        );
+        line += 1;
+    }
+};
+
 impl InputDerivatives for TestbedFmu {
     /// Accepts order 1 of theta, the slope over the next step. Higher orders and derivatives of omega are
     /// ignored: between communication points the motors move on straight lines.
@@ -140,7 +199,7 @@ impl InputDerivatives for TestbedFmu {
 
 impl OutputDerivatives for TestbedFmu {
     fn output_derivative(&self, of: Name, _: u32) -> f64 {
-        self.moving(&self.now().rates(self.system()))[of as usize]
+        self.change(of, &self.moving(&self.now().rates(self.system())).into()).unwrap_or(f64::NAN)
     }
 }
 
@@ -160,15 +219,25 @@ impl Partials for TestbedFmu {
         _initial: bool,
     ) -> impl Fn((Name, usize)) -> Option<f64> {
         let sensitivities = self.sensitivities(known.map(|(known, _)| known));
-        move |(unknown, _)| sensitivities.get(unknown as usize).copied()
+        move |(unknown, _)| self.change(unknown, &sensitivities)
     }
 }
 
 impl TestbedFmu {
+    /// Returns the change of a variable if the [`Moving`] variables change by `row`.
+    #[inline(always)]
+    fn change(&self, of: Name, row: &Row) -> Option<f64> {
+        match row.get(POSITIONS[of as usize]) {
+            None if PRODUCTS.is_empty() => None,
+            None => change_of_product(of, &self.moving(&self.now()), &(*row).into()),
+            change => change.copied(),
+        }
+    }
+
     /// Returns the partial derivatives of the variables with respect to a known. `None` stands for time, on
     /// which no variable depends explicitly.
     #[inline(never)]
-    fn sensitivities(&self, known: Option<Name>) -> Cow<'_, Moving> {
+    fn sensitivities(&self, known: Option<Name>) -> Cow<'_, Row> {
         let [_, _, _, _, of_states @ ..] = &self.jacobian;
         let has_start = !self.start.is_over && !self.start.at_rest;
         let start = |state: usize| if has_start { &of_states[state] } else { &[0.0; _] };
@@ -197,7 +266,7 @@ impl TestbedFmu {
     /// Returns the partial derivatives with respect to a motor angle. A change of the angle also changes the
     /// estimated rate and, before the simulation has started, the states.
     #[inline(never)]
-    fn sensitivities_to_angle(&self, motor: usize) -> Cow<'_, Moving> {
+    fn sensitivities_to_angle(&self, motor: usize) -> Cow<'_, Row> {
         let mut theta = [0.0; 2];
         theta[motor] = 1.0;
         let motors = self.motions(&self.testbed.motors.sensitivity(theta));
@@ -206,17 +275,17 @@ impl TestbedFmu {
             return Cow::Borrowed(&self.jacobian[motor]);
         }
         let x = if follows { self.start.from(motors.angle) } else { State::default() };
-        Cow::Owned(self.moving(&Instant { x, motors }))
+        Cow::Owned(self.moving(&Instant { x, motors }).into())
     }
 
-    fn sensitivities_to_rate(&self, motor: usize) -> &Moving {
+    fn sensitivities_to_rate(&self, motor: usize) -> &Row {
         let takes_omega =
             self.interface == Interface::ModelExchange || self.testbed.motors.takes_omega(motor);
         if takes_omega { &self.jacobian[2 + motor] } else { &[0.0; _] }
     }
 
     /// Returns the partial derivatives with respect to angles and rates of the motors and to the states.
-    fn jacobian(&self) -> [Moving; 10] {
+    fn jacobian(&self) -> [Row; 10] {
         std::array::from_fn(|column| {
             let mut unit = Instant::default();
             match column {
@@ -224,7 +293,7 @@ impl TestbedFmu {
                 2 | 3 => unit.motors.rate[column - 2] = 1.0,
                 _ => unit.x[column - 4] = 1.0,
             }
-            self.moving(&unit)
+            self.moving(&unit).into()
         })
     }
 
@@ -240,29 +309,46 @@ impl TestbedFmu {
                 .map(Pair::array);
         let [pitch, roll] = [instant.pitch(system), instant.roll(system)];
         let [pitch_rate, roll_rate] = [instant.pitch_rate(system), instant.roll_rate(system)];
-        [
-            theta1, theta2, omega1, omega2, tau1, tau2, pitch, roll, pitch_rate, roll_rate, theta3, theta4,
-            theta5, theta6, omega5, omega6, der_theta3, der_theta4, omega5, omega6, der_omega5, der_omega6,
-        ]
+        Moving {
+            theta1,
+            theta2,
+            omega1,
+            omega2,
+            tau1,
+            tau2,
+            pitch,
+            roll,
+            pitch_rate,
+            roll_rate,
+            theta3,
+            theta4,
+            theta5,
+            theta6,
+            omega5,
+            omega6,
+            der_theta3,
+            der_theta4,
+            der_theta5: omega5,
+            der_theta6: omega6,
+            der_omega5,
+            der_omega6,
+        }
     }
 
     /// Returns the partial derivatives with respect to a parameter. The setter of the variable table writes 1
     /// to this parameter; all others are 0.
     #[cold]
     #[inline(never)]
-    fn sensitivities_to_parameter(&self, parameter: Name) -> Cow<'_, Moving> {
+    fn sensitivities_to_parameter(&self, parameter: Name) -> Cow<'_, Row> {
         let mut unit = self.clone();
         unit.testbed.parameters = Parameters::ZERO;
         Self::TABLE[Self::index(parameter)].set(&mut unit, &1.0.into());
         let (now, system, change) = (self.now(), self.system(), &unit.testbed.parameters);
-        let mut sensitivities: Moving = [0.0; _];
-        for (first, [one, two]) in [
-            (Name::tau1, now.change_of_torques(system, change).array()),
-            (Name::der_theta3, now.change_of_shaft_rates(system, change).array()),
-            (Name::der_omega5, now.change_of_accelerations(system, change).array()),
-        ] {
-            sensitivities[first as usize..][..2].copy_from_slice(&[one, two]);
-        }
-        Cow::Owned(sensitivities)
+        let [tau1, tau2] = now.change_of_torques(system, change).array();
+        let [der_theta3, der_theta4] = now.change_of_shaft_rates(system, change).array();
+        let [der_omega5, der_omega6] = now.change_of_accelerations(system, change).array();
+        let sensitivities =
+            Moving { tau1, tau2, der_theta3, der_theta4, der_omega5, der_omega6, ..Moving::default() };
+        Cow::Owned(sensitivities.into())
     }
 }

@@ -22,11 +22,47 @@ pub struct TestbedFmu {
     pub(crate) rates: [f64; 2],
     /// Partial derivatives with respect to angles and rates of the motors and to the states. They depend only
     /// on the parameters.
-    pub(crate) jacobian: [Moving; 10],
+    pub(crate) jacobian: [Row; 10],
 }
 
-/// One number for each variable before the parameters, in the order of the table.
-pub(crate) type Moving = [f64; 22];
+/// Passes the names of the Real variables that are linear functions of the states and of the motor motion to the macro
+/// `$make`.
+macro_rules! moving_variables {
+    ($make:ident) => {
+        $make! {
+            theta1 theta2 omega1 omega2 tau1 tau2 pitch roll pitch_rate roll_rate theta3 theta4 theta5 theta6 omega5 omega6
+            der_theta3 der_theta4 der_theta5 der_theta6 der_omega5 der_omega6
+        }
+    };
+}
+pub(crate) use moving_variables;
+
+macro_rules! moving {
+    ($($name:ident)+) => {
+        /// Values of these variables, or their derivatives.
+        #[derive(Clone, Copy, Debug, Default)]
+        pub(crate) struct Moving {
+            $(pub $name: f64),+
+        }
+
+        /// The same numbers as an array, which an index reads quickly.
+        pub(crate) type Row = [f64; [$(stringify!($name)),+].len()];
+
+        impl From<Moving> for Row {
+            #[inline(always)]
+            fn from(moving: Moving) -> Self {
+                [$(moving.$name),+]
+            }
+        }
+
+        impl From<Row> for Moving {
+            fn from([$($name),+]: Row) -> Self {
+                Self { $($name),+ }
+            }
+        }
+    };
+}
+moving_variables!(moving);
 
 impl Clone for TestbedFmu {
     fn clone(&self) -> Self {

@@ -55,10 +55,15 @@ macro_rules! parameters {
             /// All parameters 0: a direction in which no parameter changes.
             pub const ZERO: Self = Self { $($name: 0 as $kind,)+ };
 
-            /// Returns the parameters with every measured value replaced, in the order of Table 1.
+            /// Returns other parameters, for tests: every measured value times exp of the next exponent, in the order of
+            /// Table 1. The value 0 would stay 0, so the largest value with its unit takes its place.
             #[must_use]
-            pub fn map_reals(&self, mut change: impl FnMut(f64) -> f64) -> Self {
-                Self { $($name: self.$name.mapped(&mut change),)+ }
+            pub fn varied(&self, mut exponent: impl FnMut() -> f64) -> Self {
+                let values = [$(($unit, f64::from(self.$name))),+];
+                let largest = |unit: &str| {
+                    values.into_iter().filter(|(of, _)| *of == unit).fold(0.0, |most, (_, value)| value.max(most))
+                };
+                Self { $($name: self.$name.varied(largest($unit), &mut exponent),)+ }
             }
 
             fn check_ranges(&self) -> Result<(), InvalidParameter> {
@@ -75,19 +80,20 @@ macro_rules! parameters {
 }
 table!(parameters);
 
-/// Applies the function of [`Parameters::map_reals`] to a parameter of each type.
-trait Mapped {
-    fn mapped(self, change: &mut impl FnMut(f64) -> f64) -> Self;
+/// Varies a parameter of each type; see [`Parameters::varied`].
+trait Varied {
+    fn varied(self, instead_of_0: f64, exponent: &mut impl FnMut() -> f64) -> Self;
 }
 
-impl Mapped for Real {
-    fn mapped(self, change: &mut impl FnMut(f64) -> f64) -> Self {
-        change(self)
+impl Varied for Real {
+    fn varied(self, instead_of_0: f64, exponent: &mut impl FnMut() -> f64) -> Self {
+        let value = if self == 0.0 { instead_of_0 } else { self };
+        value * exponent().exp()
     }
 }
 
-impl Mapped for Integer {
-    fn mapped(self, _: &mut impl FnMut(f64) -> f64) -> Self {
+impl Varied for Integer {
+    fn varied(self, _: f64, _: &mut impl FnMut() -> f64) -> Self {
         self
     }
 }
@@ -126,3 +132,17 @@ impl fmt::Display for InvalidParameter {
 }
 
 impl std::error::Error for InvalidParameter {}
+
+#[cfg(test)]
+mod tests {
+    use super::Parameters;
+
+    #[test]
+    fn a_parameter_that_is_0_is_varied_too() {
+        let built_in = Parameters { c1: 0.0, ..Parameters::BUILT_IN };
+        let varied = built_in.varied(|| 0.5);
+        assert_eq!(varied.k1, built_in.k1 * 0.5_f64.exp());
+        assert_eq!(varied.c1, built_in.c2.max(built_in.c3) * 0.5_f64.exp());
+        assert_eq!((varied.M, varied.N), (built_in.M, built_in.N));
+    }
+}

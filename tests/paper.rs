@@ -112,7 +112,16 @@ fn erratum_last_term_of_eq_6_has_k2() {
 /// negative mixed derivatives of the potential energy and of the dissipation.
 #[test]
 fn matrices_of_eq_8_follow_from_the_energies() {
-    let p = &TABLE_1;
+    let mut exponent = 0.0;
+    // No parameter is 0.
+    let varied = TABLE_1.varied(|| {
+        exponent += 0.1;
+        exponent
+    });
+    [TABLE_1, varied].iter().for_each(follow_from_the_energies);
+}
+
+fn follow_from_the_energies(p: &Parameters) {
     let kinetic = hessian(|rates| kinetic_energy(p, rates));
     let (damping, stiffness) = (hessian(|rates| dissipation(p, rates)), hessian(|q| potential_energy(p, q)));
     for (found, expected) in

@@ -13,7 +13,7 @@ fn parameters() -> impl Strategy<Value = Parameters> {
     // A factor of up to 5 around Table 1 for each parameter; the vector has more entries than needed.
     (prop::collection::vec(-1.6..1.6f64, 32), 1..9i32, 1..15i32).prop_map(|(exponents, M, N)| {
         let mut exponents = exponents.into_iter();
-        let near = Parameters::BUILT_IN.map_reals(|value| value * exponents.next().unwrap().exp());
+        let near = Parameters::BUILT_IN.varied(|| exponents.next().unwrap());
         Parameters { M, N, ..near }
     })
 }

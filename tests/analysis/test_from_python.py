@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 import rig
+from lagrange import table_1
 from lxml import etree
 
 import prw
@@ -80,12 +81,17 @@ def test_either_version_of_fmi(recording, fmu, found):
         ({"priors": {"k1": -0.1}}, "priors: k1 -0.1 is not a positive number"),
         ({"priors": {"J3": 10}}, "priors: J3 has a standard deviation of 1000%; 100 % is the most"),
         ({"priors": {"J3": (None, 0.1)}}, "priors: J3 None is not a positive number"),
-        ({"parameters": {"k1": None}}, "parameters: k1 None is not a positive number"),
+        ({"parameters": {"k1": None}}, "parameters: k1 None is not a number of 0 or more"),
         ({"bounds": {"k1": None}}, "bounds: k1 None; write (least, greatest)"),
-        ({"parameters": {"k1": float("nan")}}, "parameters: k1 nan is not a positive number"),
+        ({"parameters": {"k1": float("nan")}}, "parameters: k1 nan is not a number of 0 or more"),
         ({"bounds": {"k1": (5, 2)}}, "bounds: k1 from 5 to 2"),
         ({"noise": {"pitch": 0.1}}, "noise: pitch is not known; there are tau1"),
         ({"noise": {"tau1": None}}, "noise: tau1 None is not a positive number"),
+        (
+            {"parameters": {"c3": 0}, "estimate": "c3"},
+            "c3 starts at 0, from where it cannot be estimated; pass priors={'c3'",
+        ),
+        ({"parameters": {"c3": 0}, "priors": {"c3": 0.1}}, "priors: c3 starts at 0; write (value, fraction)"),
         ({"starts": 0}, "starts 0: at least 1"),
         ({"starts": None}, "starts None: at least 1"),
         ({"fmu": "none.fmu"}, "none.fmu: no such FMU"),
@@ -95,6 +101,19 @@ def test_wrong_arguments(recording, fmu, options, message):
     with pytest.raises(prw.UserError) as error:
         prw.identify(recording, **{"fmu": fmu, **options})
     assert message in str(error.value)
+
+
+def test_a_parameter_that_is_0(recording, fmu):
+    """It can be fixed. It can be estimated from a prior's value or from between its bounds, as from another start value."""
+    found = prw.identify(recording, estimate="k1", parameters={"c3": 0}, starts=1, fmu=fmu)
+    assert found.values["c3"] == 0 and list(found.parameters) == ["k1"]
+    expected = prw.identify(recording, estimate="c3", starts=1, fmu=fmu)
+    zero = {"parameters": {"c3": 0}, "starts": 1, "fmu": fmu}
+    start = table_1()["c3"]
+    from_bounds = prw.identify(recording, estimate="c3", bounds={"c3": (start / 10, start * 20)}, **zero)
+    from_prior = prw.identify(recording, priors={"c3": (start, 1)}, **zero)
+    assert from_bounds.values["c3"] == pytest.approx(expected.values["c3"], rel=1e-6)
+    assert from_prior.values["c3"] == pytest.approx(expected.values["c3"], rel=0.05)
 
 
 def test_sources_that_are_not_recordings():

@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 from fmpy import simulate_fmu
 from instance import assert_close
-from lagrange import OUTPUTS, REAL, linear_model, table_1
+from lagrange import OUTPUTS, REAL, linear_model, table_1, varied
 from reference import backward_slope, follow, integrate
 
 
 def random_case(seed: int, points: int, decades: float):
     """Returns parameters within `decades` of Table 1, uneven times, and continuous piecewise-linear angles that start at rest."""
     rng = np.random.default_rng(seed)
-    spread = {name: 10 ** rng.uniform(-decades, decades) for name in REAL}
-    parameters = {name: value * spread[name] for name, value in table_1().items() if name in REAL}
+    parameters = varied([10 ** rng.uniform(-decades, decades) for _ in REAL])
     parameters.update(M=int(rng.integers(1, 12)), N=int(rng.integers(1, 12)))
     t = rng.uniform(-5, 5) + np.cumsum(10 ** rng.uniform(-4.5, -0.5, points))
     theta = rng.uniform(-1, 1, 2) + np.cumsum(rng.normal(0, 0.1, (points, 2)), axis=0)

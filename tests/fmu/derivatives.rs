@@ -1,7 +1,7 @@
 //! Derivatives with respect to variables (section 2.1.9) and to time (4.2.1).
 
 use crate::exact::{
-    INPUTS, STARTS, STATES, UNKNOWNS, jacobian, parameters, real_parameters, set_parameters, start_at,
+    INPUTS, LINEAR, STARTS, STATES, jacobian, parameters, real_parameters, set_parameters, start_at, unknowns,
 };
 use crate::in_mode;
 use crate::{TABLE, new, vr};
@@ -31,6 +31,7 @@ fn differences<F: Either>(fmu: &F, unknowns: &[u32], known: u32) -> Vec<(f64, f6
     let [value] = fmu.get([known]);
     let is_linear = [&INPUTS[..], &STATES, &STARTS].concat().contains(&known);
     let width = if is_linear { 1.0 } else { 1e-4 * value };
+    assert!(width > 0.0, "{} is {value}; vary it in exact::parameters", TABLE[known as usize].name());
     let state = fmu.save();
     let [above, below] = [value + width, value - width].map(|value| {
         fmu.ok(fmu.set_state(state));
@@ -54,8 +55,8 @@ fn differences<F: Either>(fmu: &F, unknowns: &[u32], known: u32) -> Vec<(f64, f6
 fn fit_differences<F: Either>(fmu: &F, mode: Mode, started: bool, label: &str) {
     let structure = &*STRUCTURE;
     let (unknowns, listed) = match mode {
-        Initialization => ([&UNKNOWNS[..], &STATES].concat(), vec![&structure.initial_unknowns]),
-        _ => (UNKNOWNS.to_vec(), vec![&structure.outputs, &structure.derivatives]),
+        Initialization => ([unknowns(), STATES.to_vec()].concat(), vec![&structure.initial_unknowns]),
+        _ => (unknowns(), vec![&structure.outputs, &structure.derivatives]),
     };
     let declares = |unknown: u32, known: u32| {
         let mut listed = listed.iter().copied().flatten().filter(|variable| variable.index == unknown);
@@ -108,7 +109,7 @@ fn co_simulation<F: Either>(use_omega: bool, at_rest: bool, with_rates: bool) {
         restored.restore(&fmu.bytes());
         fmu = restored;
         fits(&fmu);
-        for (row, unknown) in UNKNOWNS.into_iter().enumerate() {
+        for (row, unknown) in LINEAR.into_iter().enumerate() {
             for (column, state) in STATES.into_iter().enumerate() {
                 let (found, expected) = (fmu.partial(unknown, state), jacobian[(row, column)]);
                 assert!((found - expected).abs() <= 1e-13 * expected.abs(), "{label}: {found} {expected}");
@@ -117,7 +118,10 @@ fn co_simulation<F: Either>(use_omega: bool, at_rest: bool, with_rates: bool) {
         fmu.step(time, size);
         time += size;
     }
-    let all = |fmu: &F| UNKNOWNS.map(|unknown| INPUTS.map(|known| fmu.partial(unknown, known)));
+    let all = |fmu: &F| {
+        let of = |unknown| INPUTS.map(|known| fmu.partial(unknown, known));
+        unknowns().into_iter().map(of).collect::<Vec<_>>()
+    };
     let before = all(&fmu);
     fmu.ok(fmu.terminate());
     assert_eq!(all(&fmu), before, "{label}, terminated");

@@ -30,8 +30,8 @@ pub const STARTS: [u32; 6] = [
     vr(Name::omega5_start),
     vr(Name::omega6_start),
 ];
-/// The derivatives, then the outputs.
-pub const UNKNOWNS: [u32; 14] = [
+/// The variables of eqs. (1), (9) and (11), in the order of [`jacobian`].
+pub const LINEAR: [u32; 14] = [
     vr(Name::der_theta3),
     vr(Name::der_theta4),
     vr(Name::der_theta5),
@@ -48,7 +48,16 @@ pub const UNKNOWNS: [u32; 14] = [
     vr(Name::theta4),
 ];
 
-/// Returns the partial derivatives of [`UNKNOWNS`] with respect to [`STATES`] and [`INPUTS`]: A and B, the
+/// Returns all variables that have partial derivatives after the initialization (section 2.1.9): Real outputs and the
+/// derivatives of the states.
+pub fn unknowns() -> Vec<u32> {
+    let is_one = |v: &Variable<TestbedFmu>| {
+        v.base() == BaseType::Real && (v.causality() == Causality::Output || v.differentiates().is_some())
+    };
+    (0..).zip(TABLE).filter(|(_, variable)| is_one(variable)).map(|(vr, _)| vr).collect()
+}
+
+/// Returns the partial derivatives of [`LINEAR`] with respect to [`STATES`] and [`INPUTS`]: A and B, the
 /// torque rows of C and D, and eq. (1).
 pub fn jacobian(p: &Parameters) -> SMatrix<f64, 14, 10> {
     let system = state_space(p);
@@ -128,6 +137,6 @@ pub fn real_parameters() -> impl Iterator<Item = u32> {
 pub fn parameters(seed: u64) -> Parameters {
     let mut random = Random(seed);
     let [M, N] = [8.0, 14.0].map(|end| random.between(1.0, end) as i32);
-    let near = Parameters::BUILT_IN.map_reals(|value| value * random.between(-1.5, 1.5).exp());
+    let near = Parameters::BUILT_IN.varied(|| random.between(-1.5, 1.5));
     Parameters { M, N, ..near }
 }

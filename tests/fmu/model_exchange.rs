@@ -1,6 +1,6 @@
 //! Model Exchange (section 3.2): eq. (11) for an importer's integrator.
 
-use crate::exact::{INPUTS, STATES, UNKNOWNS, distance, jacobian, parameters, set_parameters};
+use crate::exact::{INPUTS, LINEAR, STATES, distance, jacobian, parameters, set_parameters};
 use crate::{new, vr};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_test_kit::{Either, Random};
@@ -25,7 +25,7 @@ fn equations() {
             fmu.set(&INPUTS, &point.as_slice()[6..]);
             let jacobian = jacobian(&p);
             let expected = jacobian * point;
-            let found = fmu.get(UNKNOWNS);
+            let found = fmu.get(LINEAR);
             for row in 0..14 {
                 let tolerance = 1e-13 * jacobian.row(row).abs().sum();
                 assert!((found[row] - expected[row]).abs() < tolerance, "row {row}: {found:?} {expected:?}");
@@ -68,7 +68,7 @@ fn integrated(p: &Parameters, steps: i32) -> [f64; 14] {
         slope(t + h, next);
         fmu.ok(fmu.fmi2CompletedIntegratorStep(1, &mut 0, &mut 0));
     }
-    fmu.get(UNKNOWNS)
+    fmu.get(LINEAR)
 }
 
 /// Simulates the motion in Co-Simulation, from samples or with given rates.
@@ -85,7 +85,7 @@ fn simulated(p: &Parameters, steps: i32, use_omega: bool) -> [f64; 14] {
             fmu.step(f64::from(step) * h, h);
         }
     }
-    fmu.get(UNKNOWNS)
+    fmu.get(LINEAR)
 }
 
 /// Checks that both interface types give equal motions. In Co-Simulation the states follow the last sample

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from controlled import MOTORS, Law, control
-from lagrange import OUTPUTS, linear_model, table_1
+from lagrange import OUTPUTS, REAL, linear_model, table_1, varied
 from reference import follow, integrate
 
 #: Tolerances of angles, rates and torques, as fractions of the largest value of the variables of the same kind. In
@@ -74,6 +74,7 @@ def experiments() -> list[Experiment]:
             "other_parameters",
             "Another testbed: every parameter differs from Table 1; sines of 3 and 5 Hz",
             {
+                **with_counts(varied([0.5] * len(REAL))),
                 "J2": 5e-3,
                 "J3": 0.02,
                 "H3": 0.03,

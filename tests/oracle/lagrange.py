@@ -28,9 +28,21 @@ TABLE_1 = {
     "M": "4",
     "N": "7",
 }
-PER_DEGREE = ("c1", "c2", "c3", "k1", "k2")
+PER_DEGREE = tuple(name for name in TABLE_1 if name[0] in "ck")
 #: The parameters that are measured, not counted.
 REAL = tuple(name for name in TABLE_1 if name not in ("M", "N"))
+
+
+def varied(factors) -> dict[str, Any]:
+    """Other parameters: Table 1 in SI units, each measured value times the next of `factors`. The value 0 would stay 0, so
+    the largest value of its kind takes its place. M and N are those of Table 1."""
+    table = table_1()
+    largest = {name: max(table[other] for other in REAL if other[0] == name[0]) for name in REAL}
+    return {
+        **table,
+        **{name: (table[name] or largest[name]) * factor for name, factor in zip(REAL, factors, strict=True)},
+    }
+
 
 # Order of the six angles in every quadratic form below.
 TH1, TH2, TH3, TH4, TH5, TH6 = range(6)
@@ -127,7 +139,7 @@ class LinearModel:
         pitch, roll = pitch_roll(x[2], x[3], self.parameters)
         pitch_rate, roll_rate = pitch_roll(x[4], x[5], self.parameters)
         values = (tau[0], tau[1], pitch, roll, pitch_rate, roll_rate, x[0], x[1])
-        return dict(zip(OUTPUTS, values))
+        return dict(zip(OUTPUTS, values, strict=True))
 
 
 OUTPUTS = ("tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3", "theta4")

@@ -9,11 +9,14 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+from fmu_run import Fmu
+
 from prw.checking import check
 from prw.checking.agreement import Agreement, compare
 from prw.checking.experiments import Experiment, find, read_experiments
 from prw.checking.result import Result
 from prw.columns import MEASURED
+from prw.identification.model import Parameters
 from prw.motion import Array
 from prw.testbed import existing_fmu
 from tools.validation import masters, system
@@ -21,8 +24,8 @@ from tools.validation.importers import IMPORTERS, Tool, by_fmu_run
 
 #: Paths of the FMUs by FMI version.
 FMUS = {"2.0": Path("prw_testbed.fmu"), "3.0": Path("fmi3/prw_testbed.fmu")}
-#: Parameters that are changed to find the sensitivity of the tolerances, and the relative change.
-CHANGED, CHANGE = ("J2", "J3", "H3", "k1", "k2", "c1", "c2", "c3"), 0.01
+#: Relative change of a parameter to find the sensitivity of the tolerances.
+CHANGE = 0.01
 
 
 @dataclass(frozen=True)
@@ -131,7 +134,10 @@ def of_testbed(values: Mapping[str, Array]) -> Result:
 def sensitivity(fmu: Path, experiment: Experiment) -> dict[str, float]:
     """The share of the tolerance that a change of each parameter takes, in Co-Simulation."""
     found = {}
-    for name in CHANGED:
-        changed = {**experiment.parameters, name: experiment.parameters[name] * (1 + CHANGE)}
+    with Fmu(fmu) as loaded:
+        measured = Parameters(loaded).real
+    for name in measured:
+        # A parameter that is 0 changes by this number.
+        changed = {**experiment.parameters, name: experiment.parameters[name] * (1 + CHANGE) or CHANGE}
         found[name] = share(compare(by_fmu_run(fmu, experiment, changed), experiment, "CoSimulation"))
     return found

@@ -53,10 +53,19 @@ def positive(argument: str, value: Any, name: str = "") -> float:
     return float(value)
 
 
+def not_negative(argument: str, value: Any, name: str = "") -> float:
+    """A finite number that is 0 or above; name: the parameter that it belongs to."""
+    if not isinstance(value, Real) or not 0 <= float(value) < math.inf:
+        raise UserError(f"{name} {value!r} is not a number of 0 or more".lstrip(), argument=argument)
+    return float(value)
+
+
 def spread_of(argument: str, name: str, given: Any, start: float) -> tuple[float, float]:
     """The central value of a parameter and its relative standard deviation. `given` is both, or only the deviation;
     then the central value is `start`."""
     value, relative = given if isinstance(given, Sequence) and len(given) == 2 else (start, given)
+    if value is start and start == 0:
+        raise UserError(f"{name} starts at 0; write (value, fraction)", argument=argument)
     value, relative = positive(argument, value, name), positive(argument, relative, name)
     if relative > MAX_RELATIVE:
         raise UserError(

@@ -59,7 +59,7 @@ def add_task_options(parser: argparse.ArgumentParser) -> None:
         "--set",
         dest="parameters",
         action=Named,
-        read=number,
+        read=not_negative,
         metavar="NAME=VALUE",
         help="start value, or value of a fixed parameter, in SI (default: the FMU's). May be repeated",
     )
@@ -127,13 +127,27 @@ class Named(argparse.Action):
 
 def number(string: str) -> float:
     """A positive number. Raises ValueError."""
+    value = finite(string)
+    if not value > 0:
+        raise ValueError(f"{string!r} is not a positive number")
+    return value
+
+
+def not_negative(string: str) -> float:
+    """A number that is 0 or above. Raises ValueError."""
+    value = finite(string)
+    if not value >= 0:
+        raise ValueError(f"{string!r} is not a number of 0 or more")
+    return value
+
+
+def finite(string: str) -> float:
+    """A finite number, or NaN."""
     try:
         value = float(string)
     except ValueError:
-        value = math.nan
-    if not (math.isfinite(value) and value > 0):
-        raise ValueError(f"{string!r} is not a positive number")
-    return value
+        return math.nan
+    return value if math.isfinite(value) else math.nan
 
 
 def listed(string: str) -> tuple[str, ...]:

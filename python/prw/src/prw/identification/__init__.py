@@ -8,11 +8,12 @@ experiments), results and report. `identify` below combines them.
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
-from prw.arguments import Table, check_names, counted, is_path, is_table, names_of, positive, spread_of
+from prw.arguments import Table, check_names, counted, is_path, is_table, names_of, not_negative, positive, spread_of
 from prw.errors import UserError, need
 
 if TYPE_CHECKING:
@@ -187,13 +188,10 @@ def task_of(
         raise UserError(f"nothing is named; there are {', '.join(known.real)}", argument="estimate")
     beliefs = {name: Prior(*spread_of("priors", name, p, start[name])) for name, p in priors.items()}
     chosen = tuple(name for name in known.real if name in estimate or name in beliefs)
-    for argument, values in (("parameters", parameters), ("noise", noise)):
-        for name, value in values.items():
-            positive(argument, value, name)
-    for name in chosen:
-        if start[name] <= 0:
-            raise UserError(f"{name} starts at {start[name]:g} and cannot be estimated from there; fix another value")
-    spans = {**{name: (value / BOUNDS_FACTOR, value * BOUNDS_FACTOR) for name, value in start.items()}, **bounds}
+    for name, value in parameters.items():
+        not_negative("parameters", value, name)
+    for name, value in noise.items():
+        positive("noise", value, name)
     for name, span in bounds.items():
         if not isinstance(span, Sequence) or len(span) != 2:
             raise UserError(f"{name} {span!r}; write (least, greatest)", argument="bounds")
@@ -201,4 +199,16 @@ def task_of(
             raise UserError(
                 f"{name} from {span[0]:g} to {span[1]:g}; the first must be below the second", argument="bounds"
             )
+    # The logarithm of 0 is not a number, so the search begins elsewhere.
+    for name in chosen:
+        if start[name] == 0 and name in beliefs:
+            start[name] = beliefs[name].value
+        elif start[name] == 0 and name in bounds:
+            start[name] = math.sqrt(bounds[name][0] * bounds[name][1])
+        elif start[name] == 0:
+            raise UserError(
+                f"{name} starts at 0, from where it cannot be estimated; pass priors={{{name!r}: (value, fraction)}}, bounds, "
+                "or another start value in parameters"
+            )
+    spans = {**{name: (value / BOUNDS_FACTOR, value * BOUNDS_FACTOR) for name, value in start.items()}, **bounds}
     return Task(chosen, start, spans, beliefs, dict(noise), offsets, distortions)
