@@ -36,7 +36,7 @@ fn costs_of_model<M: Exported>() -> Option<[u64; 2]> {
     model.calculate_start();
     model.initialize(&Experiment::default()).expect("an initial state");
     let mut step = |time: f64, size: f64| {
-        if !model.exported_step_at_once(size) {
+        if !model.exported_step_fast(size) && !model.exported_step_any_size(size) {
             model.exported_step(Step::new(time, size)).expect("a step");
             model.calculate(time + size);
         }

@@ -401,7 +401,7 @@ pub struct Histories<'a> {
     /// Location of the resources, if the model reads files.
     pub resource_location: Option<&'a CStr>,
     /// Whether a history may continue in another instance, from a serialized state. The first step there takes the general
-    /// path, which a model with its own `step_at_once` can count.
+    /// path, which a model with its own `step_fast` can count.
     pub with_copies: bool,
 }
 
