@@ -32,8 +32,8 @@ def declared(version: int) -> set[str]:
 
 FMI2_FUNCTIONS = declared(2)
 FMI3_FUNCTIONS = declared(3)
-#: fmu_export_describe describes a library to the program that packs it.
-FUNCTIONS = FMI2_FUNCTIONS | FMI3_FUNCTIONS | {"fmu_export_describe"}
+#: fmu_export_describe describes a library to the program that packs it, fmu_export_report_panics tells it the places of panics.
+FUNCTIONS = FMI2_FUNCTIONS | FMI3_FUNCTIONS | {"fmu_export_describe", "fmu_export_report_panics"}
 ELF_MACHINE = {"x86_64": lief.ELF.ARCH.X86_64, "aarch64": lief.ELF.ARCH.AARCH64}
 MACHO_PROCESSOR = {"x86_64": lief.MachO.Header.CPU_TYPE.X86_64, "aarch64": lief.MachO.Header.CPU_TYPE.ARM64}
 

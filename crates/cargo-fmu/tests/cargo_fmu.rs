@@ -401,3 +401,39 @@ fn the_guide_leads_to_a_checked_fmu() {
     let output = directory.prints("tank", &[&options[..], &fmus].concat());
     assert!(output.contains("(FMI 2.0,") && output.contains("(FMI 3.0,"), "{output}");
 }
+
+/// Checks that the build fails with the place of the first panic, or with the name of a call that does not return, and
+/// writes no FMU.
+#[test]
+fn trials_that_panic_or_do_not_return() {
+    let directory = Directory::new();
+    directory.prints("", &["new", "ball", "--from", "ball"]);
+    let source = directory.read("ball/src/ball.rs");
+    let rejects = |old: &str, new: &str| {
+        assert_eq!(source.matches(old).count(), 1, "{old}");
+        fs::write(directory.path("ball/src/ball.rs"), source.replace(old, new)).unwrap();
+        let errors = directory.rejects("ball", &["build", "--no-page", "--time-limit", "2"]);
+        assert!(!directory.path("ball/target/fmu/ball.fmu").exists(), "{errors}");
+        errors.lines().last().unwrap_or_default().to_owned()
+    };
+    let line = 1 + source.lines().position(|line| line.contains("indicators[0] = ")).unwrap();
+    let error = rejects("indicators[0] = self.height;", "indicators[1] = self.height;");
+    assert!(
+        error.contains("the model panics in its description (new, start values, indicators): "),
+        "{error}"
+    );
+    assert!(
+        error.contains(&format!("src/ball.rs:{line}:")) && error.contains("index out of bounds"),
+        "{error}"
+    );
+    let error = rejects(
+        "        let terminate = self.bounce();",
+        "        let terminate = self.bounce();\n        assert!(self.height > 0.0);",
+    );
+    assert!(error.contains("the model panics in event: ") && error.contains("src/ball.rs:"), "{error}");
+    let error = rejects(
+        "        let terminate = self.bounce();",
+        "        let terminate = self.bounce();\n        while self.height <= 0.0 {}",
+    );
+    assert!(error.contains(": event has not returned for 2 s"), "{error}");
+}

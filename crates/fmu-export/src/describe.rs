@@ -46,6 +46,30 @@ pub unsafe fn pass_description<M: Exported>(
     unsafe { receive(context, json.as_ptr(), json.len()) }
 }
 
+/// Passes the place and the message of each panic to `receive` from now on, instead of printing them.
+///
+/// # Safety
+/// The caller guarantees that `receive` may be called with this context at any time, from any thread.
+#[doc(hidden)]
+pub unsafe fn pass_panics(receive: Receive, context: *mut c_void) {
+    struct Context(*mut c_void);
+    // SAFETY: the caller guarantees it for any thread.
+    unsafe impl Send for Context {}
+    // SAFETY: as above.
+    unsafe impl Sync for Context {}
+    let context = Context(context);
+    std::panic::set_hook(Box::new(move |panic| {
+        let Context(context) = &context;
+        let message = panic.payload_as_str().unwrap_or("no message");
+        let text = match panic.location() {
+            Some(place) => format!("{place}: {message}"),
+            None => message.to_owned(),
+        };
+        // SAFETY: the caller guarantees that `receive` accepts `context`; pointer and length come from one string.
+        unsafe { receive(*context, text.as_ptr(), text.len()) }
+    }));
+}
+
 /// Returns the description of a model in this program, which has no resources.
 pub fn describe<M: Exported>() -> String {
     describe_with::<M>(None)

@@ -58,7 +58,7 @@ pub use variable::{Index, Variable};
 
 #[doc(hidden)]
 pub use {
-    describe::{Receive, pass_description},
+    describe::{Receive, pass_description, pass_panics},
     fmi_abi::{fmi2_functions, fmi3_functions},
     offsets::{both_offsets, offset_in, offset_of_real},
     table::{

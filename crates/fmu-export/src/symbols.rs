@@ -86,6 +86,16 @@ macro_rules! symbols {
                 // SAFETY: the caller guarantees the contract of this function.
                 unsafe { $crate::pass_description::<__fmu_model>(resources, receive, context) }
             }
+
+            /// See `fmu_export::pass_panics`.
+            #[unsafe(no_mangle)]
+            pub unsafe extern "C" fn fmu_export_report_panics(
+                receive: $crate::Receive,
+                context: *mut ::core::ffi::c_void,
+            ) {
+                // SAFETY: the caller guarantees the contract of this function.
+                unsafe { $crate::pass_panics(receive, context) }
+            }
         }
     };
     (

@@ -25,6 +25,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 use tempfile::TempDir;
 use zip::ZipArchive;
 
@@ -61,10 +62,16 @@ pub struct BuildOptions {
     /// Leave out the page documentation/index.html that runs the FMU in a browser (as with --c-sources)
     #[arg(long)]
     pub no_page: bool,
+    /// Time that the model may take for one call while the build tries it [default: 60]
+    #[arg(long, value_name = "SECONDS")]
+    pub time_limit: Option<u64>,
     /// Accept a library for another processor than that of its platform (in FMI 2.0, importers on ARM look in linux64)
     #[arg(long, requires = "binary")]
     pub any_processor: bool,
 }
+
+/// The default of [`BuildOptions::time_limit`].
+const TIME_LIMIT: Duration = Duration::from_secs(60);
 
 fn binary(text: &str) -> Result<(String, PathBuf), String> {
     text.split_once('=')
@@ -169,7 +176,8 @@ impl Builder {
         // Another build would overwrite the library of this one.
         let _lock = lock(&workspace.join("target"));
         let mut libraries = self.libraries(options, &guid)?;
-        let model = self.model(&libraries, &guid)?;
+        let time_limit = options.time_limit.map_or(TIME_LIMIT, Duration::from_secs);
+        let model = self.model(&libraries, &guid, time_limit)?;
         let sources = match options.c_sources {
             true => self.c_sources(&guid, model.identifier())?,
             false => CSources::new(),
@@ -321,7 +329,7 @@ impl Builder {
     }
 
     /// Loads the model from a library for this machine: one that is packed, or one that is compiled for this purpose.
-    fn model(&self, libraries: &[Library], guid: &str) -> Result<LoadedModel> {
+    fn model(&self, libraries: &[Library], guid: &str, time_limit: Duration) -> Result<LoadedModel> {
         let host = Platform::host()?;
         let is_for_here = |library: &&Library| {
             fs::read(&library.path).is_ok_and(|bytes| check_platform(&bytes, host, false).is_ok())
@@ -330,9 +338,10 @@ impl Builder {
             Some(library) => library.path.clone(),
             None => self.build(guid).run()?,
         };
+        let resources = self.sources.directory.join(RESOURCES);
         // SAFETY: cargo has just compiled it from the author's model, or it has the guid of these sources.
         #[allow(unsafe_code)]
-        let model = unsafe { LoadedModel::load(&path, Some(&self.sources.directory.join(RESOURCES))) }?;
+        let model = unsafe { LoadedModel::load_within(&path, Some(&resources), Some(time_limit)) }?;
         check_guid(&fs::read(&path)?, guid, &path)?;
         Ok(model)
     }

@@ -40,8 +40,15 @@ pub fn describe(model: &LoadedModel, fmi: Standard, changes: &Changes) -> Result
             variable.base()
         );
     }
-    let starts = checked_starts(model)?;
-    let structure = ModelStructure::of(model, fmi, changes.tunable_parameters)?;
+    let tried = || {
+        let starts = checked_starts(model)?;
+        Ok((starts, ModelStructure::of(model, fmi, changes.tunable_parameters)?))
+    };
+    let tried: Result<_> = tried();
+    model.trials.end();
+    // A panic is the cause of all that follows it.
+    model.trials.check()?;
+    let (starts, structure) = tried?;
     Description { table, fmi, changes }.document(starts, &structure)
 }
 

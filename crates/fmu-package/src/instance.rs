@@ -42,49 +42,61 @@ impl<'a> Instance<'a> {
             early_return: true,
             ..Settings::new(interface)
         };
+        model.trials.begin("the instantiation");
         let client = fmi_client::Instance::new(model.functions(standard), &settings).map_err(message)?;
         Ok(Self { model, client, interface, standard, event_mode, time: 0.0 })
     }
 
+    /// Returns the client for a call, which has this name in messages.
+    fn client(&mut self, call: &'static str) -> &mut fmi_client::Instance {
+        self.model.trials.begin(call);
+        &mut self.client
+    }
+
     pub fn initialize(&mut self, start: f64, stop: Option<f64>, tolerance: Option<f64>) -> Outcome {
         self.time = start;
-        self.client.initialize(start, stop, tolerance).map_err(message)
+        self.client("initialize").initialize(start, stop, tolerance).map_err(message)
     }
 
     pub fn initialized(&mut self) -> Outcome {
-        self.client.exit_initialization_mode().map_err(message)
+        self.client("exit_initialization_mode").exit_initialization_mode().map_err(message)
     }
 
     /// Leaves Event Mode after the initialization, without an event, which would change discrete variables.
     pub fn run(&mut self) -> Outcome {
         match self.interface {
-            Interface::ModelExchange => self.client.enter_continuous_time_mode().map_err(message),
-            Interface::CoSimulation if self.event_mode => self.client.enter_step_mode().map_err(message),
+            Interface::ModelExchange => {
+                self.client("enter_continuous_time_mode").enter_continuous_time_mode().map_err(message)
+            }
+            Interface::CoSimulation if self.event_mode => {
+                self.client("enter_step_mode").enter_step_mode().map_err(message)
+            }
             Interface::CoSimulation => Ok(()),
         }
     }
 
     /// Iterates the event in Model Exchange, and enters Continuous-Time Mode.
     pub fn handle_event(&mut self) -> Outcome {
-        if self.client.event().map_err(message)?.terminate {
+        if self.client("event").event().map_err(message)?.terminate {
             return Err("the model ends the simulation".to_owned());
         }
-        self.client.enter_continuous_time_mode().map_err(message)
+        self.client("enter_continuous_time_mode").enter_continuous_time_mode().map_err(message)
     }
 
     pub fn enter_event_mode(&mut self) -> Outcome {
-        self.client.enter_event_mode().map_err(message)
+        self.client("enter_event_mode").enter_event_mode().map_err(message)
     }
 
     pub fn set_time(&mut self, time: f64) -> Outcome {
-        self.client.set_time(time).map_err(message)?;
+        self.client("set_time").set_time(time).map_err(message)?;
         self.time = time;
         Ok(())
     }
 
     /// Makes a step of Co-Simulation. Returns false if the model ends the simulation.
     pub fn step(&mut self, size: f64) -> Outcome<bool> {
-        match self.client.step(self.time, size) {
+        let time = self.time;
+        match self.client("step").step(time, size) {
             Ok(reached) => {
                 self.time = reached;
                 Ok(true)
@@ -100,7 +112,7 @@ impl<'a> Instance<'a> {
     }
 
     pub fn step_completed(&mut self) -> Outcome {
-        self.client.completed_integrator_step().map(drop).map_err(message)
+        self.client("completed_integrator_step").completed_integrator_step().map(drop).map_err(message)
     }
 
     /// Sets first time derivatives of inputs, in FMI 2.0 only.
@@ -108,7 +120,9 @@ impl<'a> Instance<'a> {
         if self.standard != Standard::Fmi2 || indices.is_empty() {
             return Ok(());
         }
-        self.client.set_input_derivatives(indices, &vec![1; indices.len()], values).map_err(message)
+        self.client("set_input_derivatives")
+            .set_input_derivatives(indices, &vec![1; indices.len()], values)
+            .map_err(message)
     }
 
     /// Sets the variables that are selected and have a value, arrays as a whole. Variables of a type are set together. Values must
@@ -143,7 +157,8 @@ impl<'a> Instance<'a> {
                     return false;
                 }
                 let references = self.references(&indices);
-                let outcome = self.client.set_values(group.base, &references, &values).map_err(message);
+                let outcome =
+                    self.client("set_values").set_values(group.base, &references, &values).map_err(message);
                 let is_rejected = outcome.is_err();
                 rejected = outcome.err().or(rejected.take());
                 is_rejected
@@ -168,13 +183,13 @@ impl<'a> Instance<'a> {
     /// Sets variables of type Real, arrays as a whole.
     pub fn set_reals(&mut self, indices: &[u32], values: &[f64]) -> Outcome {
         let references = self.references(indices);
-        self.client.set_numbers(BaseType::Real, &references, values).map_err(message)
+        self.client("set_numbers").set_numbers(BaseType::Real, &references, values).map_err(message)
     }
 
     /// Returns the values of variables of type Real, arrays as a whole; NaN for a value that the model does not return.
     pub fn reals(&mut self, indices: &[u32]) -> Vec<f64> {
         let (references, mut values) = (self.references(indices), vec![f64::NAN; indices.len()]);
-        if self.client.get_numbers(BaseType::Real, &references, &mut values).is_err() {
+        if self.client("get_numbers").get_numbers(BaseType::Real, &references, &mut values).is_err() {
             let all = self.values();
             return indices.iter().map(|index| all[*index as usize].real()).collect();
         }
@@ -217,7 +232,7 @@ impl<'a> Instance<'a> {
             // Constant, as FMI 2.0 lacks the type.
             return Ok(vec![Value::Boolean(false); count]);
         }
-        self.client.get_values(base, vr, count).map_err(message)
+        self.client("get_values").get_values(base, vr, count).map_err(message)
     }
 
     /// Returns the partial derivatives of Reals, arrays as a whole, with respect to one Real: `None` if the model provides none, NaN
@@ -252,13 +267,15 @@ impl<'a> Instance<'a> {
         let known = [self.standard.reference(known - element as u32)];
         let references = self.references(unknowns);
         let mut found = vec![f64::NAN; unknowns.len()];
-        self.client.directional_derivative(&references, &known, &seed, &mut found).map_err(message)?;
+        self.client("directional_derivative")
+            .directional_derivative(&references, &known, &seed, &mut found)
+            .map_err(message)?;
         Ok(found)
     }
 
     fn continuous(&mut self, what: Continuous, count: usize) -> Outcome<Vec<f64>> {
         let mut values = vec![0.0; count];
-        self.client.get_continuous(what, &mut values).map_err(message)?;
+        self.client("get_continuous").get_continuous(what, &mut values).map_err(message)?;
         Ok(values)
     }
 
@@ -267,7 +284,7 @@ impl<'a> Instance<'a> {
     }
 
     pub fn set_states(&mut self, states: &[f64]) -> Outcome {
-        self.client.set_continuous_states(states).map_err(message)
+        self.client("set_continuous_states").set_continuous_states(states).map_err(message)
     }
 
     pub fn derivatives(&mut self) -> Outcome<Vec<f64>> {
@@ -286,24 +303,24 @@ impl<'a> Instance<'a> {
     }
 
     pub fn save(&mut self) -> Outcome<Saved> {
-        let state = self.client.save().map_err(message)?;
+        let state = self.client("save").save().map_err(message)?;
         Ok(Saved { state, time: self.time })
     }
 
     pub fn restore(&mut self, saved: Saved) -> Outcome {
-        self.client.restore(saved.state).map_err(message)?;
+        self.client("restore").restore(saved.state).map_err(message)?;
         self.time = saved.time;
         Ok(())
     }
 
     /// Returns a saved state as bytes.
     pub fn serialize(&mut self, saved: Saved) -> Outcome<Vec<u8>> {
-        self.client.serialize(saved.state).map_err(message)
+        self.client("serialize").serialize(saved.state).map_err(message)
     }
 
     /// Restores a state from bytes.
     pub fn deserialize(&mut self, bytes: &[u8], time: f64) -> Outcome {
-        let state = self.client.deserialize(bytes).map_err(message)?;
+        let state = self.client("deserialize").deserialize(bytes).map_err(message)?;
         self.restore(Saved { state, time })
     }
 }

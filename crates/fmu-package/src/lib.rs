@@ -44,6 +44,7 @@ mod sources;
 pub mod structure;
 mod table;
 pub mod terminal;
+mod trials;
 mod universal;
 mod variant;
 pub mod xml;

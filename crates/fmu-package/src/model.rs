@@ -2,6 +2,7 @@
 #![allow(unsafe_code, reason = "C functions of a library are found by their names")]
 
 use crate::table::Table;
+use crate::trials::Trials;
 use anyhow::{Context, Result, ensure};
 use fmi_abi::c_types::{c_char, c_void};
 use fmi_abi::{BaseType, Standard, Value, fmi2, fmi3};
@@ -10,9 +11,13 @@ use std::ffi::{CStr, CString};
 use std::path::Path;
 use std::ptr::null;
 use std::sync::{Arc, OnceLock};
+use std::time::Duration;
 
 /// The function of a library that describes its model; `fmu-export` declares it.
 const DESCRIPTION: &str = "fmu_export_describe";
+/// The function of a library that reports panics with their places.
+const PANICS: &str = "fmu_export_report_panics";
+type ReportPanics = unsafe extern "C" fn(receive: Receive, context: *mut c_void);
 type Describe = unsafe extern "C" fn(resources: *const c_char, receive: Receive, context: *mut c_void);
 type Receive = unsafe extern "C" fn(context: *mut c_void, text: *const u8, length: usize);
 
@@ -28,6 +33,7 @@ pub struct LoadedModel {
     pub(crate) starts: OnceLock<Vec<Option<Value>>>,
     /// The directory with the files that the model reads.
     resources: Option<CString>,
+    pub(crate) trials: Arc<Trials>,
     _library: Option<libloading::Library>,
 }
 
@@ -48,7 +54,7 @@ impl LoadedModel {
     /// When the description cannot be read.
     pub unsafe fn new(description: &str, fmi2: fmi2::Functions, fmi3: fmi3::Functions) -> Result<Self> {
         // SAFETY: the caller guarantees it.
-        unsafe { Self::with(description, fmi2, fmi3, None, None) }
+        unsafe { Self::with(description, fmi2, fmi3, None, None, Arc::default()) }
     }
 
     /// Loads the model of a shared library for this machine. The model may read the files in the directory `resources`,
@@ -61,6 +67,26 @@ impl LoadedModel {
     /// # Errors
     /// When the library cannot be loaded, or does not describe itself.
     pub unsafe fn load(path: &Path, resources: Option<&Path>) -> Result<Self> {
+        // SAFETY: the caller guarantees it.
+        unsafe { Self::load_within(path, resources, None) }
+    }
+
+    /// Does the same as [`load`](Self::load), and ends this process if a call of the model takes longer than the limit.
+    ///
+    /// # Safety
+    /// The requirements of [`load`](Self::load).
+    ///
+    /// # Errors
+    /// The errors of [`load`](Self::load), and if the model panics while it describes itself.
+    pub(crate) unsafe fn load_within(
+        path: &Path,
+        resources: Option<&Path>,
+        limit: Option<Duration>,
+    ) -> Result<Self> {
+        let trials = Arc::<Trials>::default();
+        if let Some(limit) = limit {
+            trials.watch(path.display().to_string(), limit);
+        }
         let path_of = || path.display().to_string();
         // SAFETY: the caller guarantees it, here and below.
         let library = unsafe { libloading::Library::new(path) }.with_context(path_of)?;
@@ -88,13 +114,22 @@ impl LoadedModel {
                     env!("CARGO_PKG_VERSION")
                 )
             })?;
+            if let Ok(report_panics) = library.get::<ReportPanics>(PANICS) {
+                // The library may report a panic at any time, so this value is never freed.
+                let context = Arc::into_raw(Arc::clone(&trials)).cast_mut().cast();
+                report_panics(Trials::receive, context);
+            }
             let directory = resources.as_ref().map_or(null(), |path| path.as_ptr());
+            let call = "its description (new, start values, indicators)";
+            trials.begin(call);
             describe(directory, keep, (&raw mut description).cast());
+            trials.end();
+            trials.check()?;
             (fmi2, fmi3)
         };
         let description = std::str::from_utf8(&description)?;
         // SAFETY: the functions are those of the library, which describes itself.
-        unsafe { Self::with(description, fmi2, fmi3, resources, Some(library)) }.with_context(path_of)
+        unsafe { Self::with(description, fmi2, fmi3, resources, Some(library), trials) }.with_context(path_of)
     }
 
     /// # Safety
@@ -105,6 +140,7 @@ impl LoadedModel {
         fmi3: fmi3::Functions,
         resources: Option<CString>,
         library: Option<libloading::Library>,
+        trials: Arc<Trials>,
     ) -> Result<Self> {
         let table = Table::read(description)?;
         let functions = [Functions::Fmi2(Box::new(fmi2)), Functions::Fmi3(Box::new(fmi3))];
@@ -113,7 +149,7 @@ impl LoadedModel {
         let functions = functions.map(|functions| Arc::new(unsafe { Library::of(functions) }));
         let group = |base| Group { base, indices: table.find(|variable| variable.base() == base) };
         let groups = BaseType::ALL.into_iter().map(group).filter(|group| !group.indices.is_empty()).collect();
-        Ok(Self { table, functions, groups, starts: OnceLock::new(), resources, _library: library })
+        Ok(Self { table, functions, groups, starts: OnceLock::new(), resources, trials, _library: library })
     }
 
     /// Returns the directory of resources, if there is one.
