@@ -132,17 +132,3 @@ impl fmt::Display for InvalidParameter {
 }
 
 impl std::error::Error for InvalidParameter {}
-
-#[cfg(test)]
-mod tests {
-    use super::Parameters;
-
-    #[test]
-    fn a_parameter_that_is_0_is_varied_too() {
-        let built_in = Parameters { c1: 0.0, ..Parameters::BUILT_IN };
-        let varied = built_in.varied(|| 0.5);
-        assert_eq!(varied.k1, built_in.k1 * 0.5_f64.exp());
-        assert_eq!(varied.c1, built_in.c2.max(built_in.c3) * 0.5_f64.exp());
-        assert_eq!((varied.M, varied.N), (built_in.M, built_in.N));
-    }
-}

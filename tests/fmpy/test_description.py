@@ -11,7 +11,7 @@ import pytest
 from built import built
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
-from lagrange import OUTPUTS
+from lagrange import OUTPUTS, TABLE_1
 from lxml import etree
 from packaging.version import Version
 
@@ -43,6 +43,18 @@ def fmu3():
 def test_fmpy_finds_no_problem(testbed):
     assert fmpy.read_model_description(str(testbed), validate=True).modelName == "PitchRollWristTestbed"
     assert validate_fmu(str(testbed)) == []
+
+
+def test_the_oracle_has_all_parameters_and_outputs(description):
+    """Without this test, a parameter that is 0 by default could be missing in the equations of the oracle."""
+    listed = {
+        causality: [v.name for v in description.modelVariables if v.causality == causality and v.type != "Boolean"]
+        for causality in ("parameter", "output")
+    }
+    parameters = {name for name in listed["parameter"] if not name.endswith("_start")}
+    hint = "add them to tests/oracle/lagrange.py: "
+    assert parameters == set(TABLE_1), f"{hint}TABLE_1 and the energies"
+    assert listed["output"] == list(OUTPUTS), f"{hint}OUTPUTS and LinearModel.outputs"
 
 
 def test_attributes_that_importers_need(description):

@@ -74,7 +74,7 @@ def test_the_parameter_sets_are_valid_and_complete(texts):
         if path.suffix == ".ssv":
             root = etree.fromstring(text.encode())
             valid.assertValid(root)
-            assert {p.get("name"): etree.QName(p[0]).localname for p in root.iter("{*}Parameter")} == parameters
+            assert {p.get("name"): etree.QName(p[0]).localname for p in root.iter("{*}Parameter")} == parameters, HINT
 
 
 def test_a_motor_brakes_in_whole_samples():
