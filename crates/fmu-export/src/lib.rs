@@ -68,6 +68,6 @@ pub use {
     value::{Dimensions, visit_enumeration},
     variable::{
         Read, Shape, Store, read_real, read_real_by, read_reals, read_reals_by, read_value, read_value_by,
-        set_real, set_value, shape_of_calculation, shape_of_field, type_of,
+        reject, set_real, set_value, shape_of_calculation, shape_of_field, type_of,
     },
 };

@@ -640,8 +640,9 @@ pub fn read_reals_by<M, T: Place>(
 }
 
 /// Ends the compilation with a message that contains a variable's name and its fault.
+#[doc(hidden)]
 #[track_caller]
-pub(crate) const fn reject(name: &str, fault: &str) -> ! {
+pub const fn reject(name: &str, fault: &str) -> ! {
     let message =
         Letters::new().with(b"the variable ").with(name.as_bytes()).with(b": ").with(fault.as_bytes());
     match std::str::from_utf8(message.bytes()) {
