@@ -201,7 +201,8 @@ impl InputDerivatives for TestbedFmu {
 
 impl OutputDerivatives for TestbedFmu {
     fn output_derivative(&self, of: Name, _: u32) -> f64 {
-        self.change(of, &self.moving(&self.now().rates(self.system())).into()).unwrap_or(f64::NAN)
+        let rates = self.moving(&self.now().rates(self.system()));
+        self.change(of, &rates.into(), None).unwrap_or(f64::NAN)
     }
 }
 
@@ -220,20 +221,33 @@ impl Partials for TestbedFmu {
         known: Option<(Name, usize)>,
         _initial: bool,
     ) -> impl Fn((Name, usize)) -> Option<f64> {
-        let sensitivities = self.sensitivities(known.map(|(known, _)| known));
-        move |(unknown, _)| self.change(unknown, &sensitivities)
+        let known = known.map(|(known, _)| known);
+        let sensitivities = self.sensitivities(known);
+        move |(unknown, _)| self.change(unknown, &sensitivities, known)
     }
 }
 
 impl TestbedFmu {
-    /// Returns the change of a variable if the [`Moving`] variables change by `row`.
+    /// Returns the change of a variable if the [`Moving`] variables change by `row`, because a known is set or because time
+    /// passes.
     #[inline(always)]
-    fn change(&self, of: Name, row: &Row) -> Option<f64> {
+    fn change(&self, of: Name, row: &Row, known: Option<Name>) -> Option<f64> {
         match row.get(POSITIONS[of as usize]) {
             None if PRODUCTS.is_empty() => None,
-            None => change_of_product(of, &self.moving(&self.now()), &(*row).into()),
+            None => change_of_product(of, &self.moving(&self.set_again(known)), &(*row).into()),
             change => change.copied(),
         }
+    }
+
+    /// Returns the state and the motor motion after a known has been set to its value again. An angle is then a new sample.
+    fn set_again(&self, known: Option<Name>) -> Instant {
+        let mut motors = self.testbed.motors;
+        match known {
+            Some(Name::theta1) => motors.theta_changed(0),
+            Some(Name::theta2) => motors.theta_changed(1),
+            _ => {}
+        }
+        Instant { x: self.testbed.state, motors: self.motions(&motors) }
     }
 
     /// Returns the partial derivatives of the variables with respect to a known. `None` stands for time, on
