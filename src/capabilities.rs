@@ -239,15 +239,16 @@ impl TestbedFmu {
         }
     }
 
-    /// Returns the state and the motor motion after a known has been set to its value again. An angle is then a new sample.
+    /// Returns the state and the motor motion after a known has been set to its value again. An angle is then a new sample,
+    /// and a rate takes effect.
+    #[cold]
     fn set_again(&self, known: Option<Name>) -> Instant {
-        let mut motors = self.testbed.motors;
-        match known {
-            Some(Name::theta1) => motors.theta_changed(0),
-            Some(Name::theta2) => motors.theta_changed(1),
-            _ => {}
+        let Some(known) = known else { return self.now() };
+        let (mut again, variable) = (self.clone(), &Self::TABLE[Self::index(known)]);
+        if let Some(value) = variable.value(self) {
+            variable.set(&mut again, &value);
         }
-        Instant { x: self.testbed.state, motors: self.motions(&motors) }
+        again.now()
     }
 
     /// Returns the partial derivatives of the variables with respect to a known. `None` stands for time, on
