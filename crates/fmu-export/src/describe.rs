@@ -60,7 +60,7 @@ pub unsafe fn pass_panics(receive: Receive, context: *mut c_void) {
     let context = Context(context);
     std::panic::set_hook(Box::new(move |panic| {
         let Context(context) = &context;
-        let message = panic.payload_as_str().unwrap_or("no message");
+        let message = panic_message(panic.payload());
         let text = match panic.location() {
             Some(place) => format!("{place}: {message}"),
             None => message.to_owned(),
