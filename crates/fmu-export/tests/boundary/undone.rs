@@ -9,7 +9,15 @@ use fmu_test_kit::{Arguments, Either, Importer, fmi3};
 const U: u32 = ClumsyName::u as u32;
 const GAIN: u32 = ClumsyName::gain as u32;
 const FAILS: u32 = ClumsyName::fails as u32;
-const REALS: [u32; 5] = [U, ClumsyName::x as u32, ClumsyName::der_x as u32, ClumsyName::sum as u32, GAIN];
+const REALS: [u32; 7] = [
+    U,
+    ClumsyName::x as u32,
+    ClumsyName::der_x as u32,
+    ClumsyName::sum as u32,
+    ClumsyName::level as u32,
+    ClumsyName::shown as u32,
+    GAIN,
+];
 
 fn fails(fmu: &impl Either, fails: Fails) {
     fmu.ok(fmu.set_integer(FAILS, fails as i32));
@@ -48,13 +56,13 @@ fn begin<F: Either>(fmu: &F, with_failures: bool) {
 }
 
 /// Simulates in Co-Simulation with events in some steps. Returns the results of all steps.
-fn simulate<F: Either, M: Exported>(with_failures: bool) -> Vec<Seen> {
+fn simulate<F: Either, M: Exported>(with_failures: bool) -> Vec<(Seen, Seen)> {
     let fmu = F::new::<M>(CoSimulation);
     begin(&fmu, with_failures);
     let step = |step: u32| {
         let time = 0.35 * f64::from(step);
-        fmu.set(&[U], &[0.1 + time]);
         if with_failures {
+            fmu.set(&[U], &[0.7]);
             undone(&fmu, Fails::Step, |fmu| fmu.try_step(time, 0.35));
             undone(&fmu, Fails::Step, |fmu| fmu.try_step(time, 1e-3));
             if (time + 0.35).floor() > time.floor() {
@@ -62,8 +70,10 @@ fn simulate<F: Either, M: Exported>(with_failures: bool) -> Vec<Seen> {
                 undone(&fmu, Fails::StepAfterEvent, |fmu| fmu.try_step(time, 0.35));
             }
         }
+        fmu.set(&[U], &[0.1 + time]);
+        let before = seen(&fmu);
         fmu.step(time, 0.35);
-        seen(&fmu)
+        (before, seen(&fmu))
     };
     (0..8).map(step).collect()
 }
@@ -123,6 +133,10 @@ fn a_failed_step_may_be_tried_again_after_a_reset() {
         let fmu = F::new::<ClumsyOnHeap>(CoSimulation);
         for _ in 0..2 {
             begin(&fmu, true);
+            // Until the first step, the level follows the input.
+            undone(&fmu, Fails::StepAfterEvent, |fmu| fmu.try_step(0.0, 1.5));
+            fmu.set(&[U], &[0.9]);
+            assert_eq!(fmu.get([ClumsyName::level as u32]), [0.9]);
             fmu.step(0.0, 0.5);
             undone(&fmu, Fails::Step, |fmu| fmu.try_step(0.5, 0.25));
             fmu.ok(fmu.reset());

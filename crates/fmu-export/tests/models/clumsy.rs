@@ -31,9 +31,14 @@ macro_rules! clumsy {
             /// Gain times u; `update` and `calculate` update it.
             product: f64,
             next: f64,
+            /// Follows u until the first step.
+            level: f64,
+            has_stepped: bool,
+            /// Only `calculate` updates it.
+            shown: f64,
         }
 
-        variables! { for $model, names $names, memory in trace, next;
+        variables! { for $model, names $names, memory in trace, next, level, has_stepped;
             /// Input
             u = input(&NUMBER) in u;
             /// State
@@ -44,6 +49,10 @@ macro_rules! clumsy {
             count = output(&INTEGER).exact() in count;
             /// Follows the memory
             sum = output(&NUMBER) from sum;
+            /// The first u
+            level = output(&NUMBER) by |model| model.level;
+            /// Calculated
+            shown = output(&NUMBER) from shown;
             /// Parameter
             gain = parameter(&NUMBER) in gain;
             /// What fails
@@ -57,6 +66,7 @@ macro_rules! clumsy {
                 }
                 (self.u, self.x, self.count, self.gain) = (-1e3, -2e3, -3, -4e3);
                 (self.next, self.product, self.fails) = (-5e3, -6e3, 0);
+                (self.level, self.shown) = (-8e3, -9e3);
                 self.collect(-7e3);
                 Err(Error::new("it has failed half-way"))
             }
@@ -94,8 +104,15 @@ macro_rules! clumsy {
                 Ok(())
             }
 
-            fn calculate(&mut self, _: f64) {
+            fn calculate(&mut self, time: f64) {
                 self.product = self.gain * self.u;
+                self.shown = self.x + time;
+            }
+
+            fn calculate_start(&mut self) {
+                if !self.has_stepped {
+                    self.level = self.u;
+                }
             }
         }
 
@@ -104,6 +121,7 @@ macro_rules! clumsy {
 
             fn step(&mut self, step: Step) -> Result<Stepped, Error> {
                 let end = (step.time + step.size).min(self.next);
+                self.has_stepped = true;
                 self.x += self.gain * self.u * (end - step.time);
                 self.collect(self.x);
                 self.fail_if(self.fails == Fails::Step as i32)?;
@@ -114,6 +132,10 @@ macro_rules! clumsy {
         }
 
         impl ModelExchange for $model {
+            fn continuous_time_entered(&mut self) {
+                self.has_stepped = true;
+            }
+
             fn event(&mut self, time: f64) -> Result<Event, Error> {
                 if time >= self.next {
                     self.count = self.count.saturating_add(1);
