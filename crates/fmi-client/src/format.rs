@@ -12,8 +12,8 @@ const LONGEST: usize = 1 << 16;
 
 /// Arguments of a variadic call: integers and pointers, and floating-point numbers.
 pub(crate) struct Arguments {
-    words: std::vec::IntoIter<usize>,
-    numbers: std::vec::IntoIter<f64>,
+    words: std::array::IntoIter<usize, 8>,
+    numbers: std::array::IntoIter<f64, 8>,
 }
 
 /// A conversion of a format.
@@ -28,7 +28,7 @@ struct Conversion<'a> {
 
 impl Arguments {
     pub fn new(words: [usize; 8], numbers: [f64; 8]) -> Self {
-        Self { words: words.to_vec().into_iter(), numbers: numbers.to_vec().into_iter() }
+        Self { words: words.into_iter(), numbers: numbers.into_iter() }
     }
 
     /// Returns the text of a format with these arguments.

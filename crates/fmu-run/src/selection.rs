@@ -186,9 +186,9 @@ pub(crate) fn fits(name: &str, base: BaseType, values: &[f64]) -> Result<(), Err
             None => return Ok(()),
         },
     };
-    // Limits of 64 bits are rounded up.
-    let is_above = |value: f64| if high > 1e15 { value >= high } else { value > high };
-    match values.iter().find(|value| value.fract() != 0.0 || !(**value >= low) || is_above(**value)) {
+    // The upper limits of 64 bits are rounded up.
+    let fits = |value: f64| (low..=high).contains(&value) && !(high > 1e15 && value == high);
+    match values.iter().find(|value| value.fract() != 0.0 || !fits(**value)) {
         None => Ok(()),
         Some(value) if base == BaseType::Boolean => {
             request(format!("{name} is a Boolean and cannot be {value}"))

@@ -297,7 +297,7 @@ fn exact_values_are_start_values_inputs_and_outputs() {
     };
     let runs = fmu.run(&batch, &Watch::default()).unwrap();
     assert_eq!((runs.size.outputs, runs.size.exact, runs.size.runs, runs.errors.len()), (1, 4, 2, 0));
-    for run in 0..2 {
+    for (run, natural) in naturals.iter().enumerate() {
         let of = |output: usize| {
             runs.exact[(run * 4 + output) * 3..][..3]
                 .iter()
@@ -307,7 +307,7 @@ fn exact_values_are_start_values_inputs_and_outputs() {
         assert_eq!(of(0), labels);
         assert_eq!(of(1), bytes);
         assert_eq!(of(2), [large.clone(), large.clone(), small.clone()]);
-        assert_eq!(of(3), vec![naturals[run].clone(); 3]);
+        assert_eq!(of(3), vec![natural.clone(); 3]);
     }
     let mut two = fmu
         .instances(&Setup { count: 2, start: vec![("wide", Start::Value(&large))], ..Setup::default() })
