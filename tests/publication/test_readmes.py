@@ -51,9 +51,16 @@ def test_links_are_found() -> None:
 
 def test_the_published_crates() -> None:
     names = {directory.name for directory in published()}
-    assert names == {"cargo-fmu", "fmi-abi", "fmi-client", "fmu-check", "fmu-export", "fmu-package", "fmu-run", "fmu-system"}, (
-        "a package without `publish = false`"
-    )
+    assert names == {
+        "cargo-fmu",
+        "fmi-abi",
+        "fmi-client",
+        "fmu-check",
+        "fmu-export",
+        "fmu-package",
+        "fmu-run",
+        "fmu-system",
+    }, "a package without `publish = false`"
 
 
 @pytest.mark.parametrize("home", published(), ids=lambda directory: directory.name)
