@@ -192,8 +192,8 @@ class Identification:
                 f"the data fit as well with {values}{swapped}; the result is the one nearest to the start values. "
                 "theta3 and theta4 would distinguish them"
             )
-        if self.fits and self.verdict.widening.any() and not sure.undetermined:
-            first = self.verdict.faults[0]
+        first = self.verdict.suggested
+        if self.fits and first is not None and not sure.undetermined:
             lines.append(
                 f"intervals allow for a {first.name} of {' +- '.join(rounded(first.size, first.error))} {first.unit}".rstrip()
                 + ", which the data suggest but do not prove"

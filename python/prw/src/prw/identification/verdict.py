@@ -17,7 +17,7 @@ from scipy.special import fdtrc
 from prw.identification.experiment import Experiment, spectra
 from prw.identification.fit import Comparison, Solution
 from prw.identification.response import Distortion
-from prw.identification.statistics import covariance_of, information_of
+from prw.identification.statistics import MARGIN, covariance_of, information_of
 from prw.motion import Array
 from prw.state_space import Complex
 from prw.testbed import OUTPUTS
@@ -25,7 +25,8 @@ from prw.testbed import OUTPUTS
 #: Probability below which a coherence with the motion is a misfit. It is small, because the steps of encoders are not normally
 #: distributed; 1e-8 occurs in slow motion.
 CHANCE = 1e-10
-#: Ratio of the size of a fault to its standard error above which the fault is significant, and above which it widens intervals.
+#: Ratio of the size of a fault to its standard error above which the fault is significant, and above which a fault of a sensor
+#: widens intervals. Friction and backlash always do, because no mechanism is without them.
 CLEAR, SMALL = 4.7, 2.5
 #: As CLEAR, for faults that follow the sign of a rate. In a periodic motion, steps of encoders also follow that sign.
 CLEAR_SIGN = 7.0
@@ -64,13 +65,15 @@ def named(kind: str, group: Sequence[str]) -> str:
 
 class Fault(NamedTuple):
     """A possible fault. name, unit: of its size. size, error: estimated together with the parameters, and its standard
-    error. shift: (p,), the change of the unknowns that it would cause. gain: rise of twice the log likelihood."""
+    error. shift: (p,), the change of the unknowns that it would cause. per_error: (p,), the change by one standard error.
+    gain: rise of twice the log likelihood."""
 
     name: str
     unit: str
     size: float
     error: float
     shift: Array
+    per_error: Array
     gain: float
 
     @property
@@ -82,6 +85,20 @@ class Fault(NamedTuple):
     def clear(self) -> float:
         """Size in standard errors."""
         return abs(self.size) / self.error if self.error > 0 else 0.0
+
+    @property
+    def possible(self) -> bool:
+        """Whether the size may be other than 0: neither friction nor backlash is ever negative."""
+        return self.size > 0 or not self.signs
+
+    @property
+    def bias(self) -> Array:
+        """Root mean square (p,) of the unknowns' errors by the fault, if its size is normally distributed about the estimate.
+
+        It is not 0 if the estimate is: the fault may then still have the size of its standard error. An interval widened by
+        this contains the true value with at least its probability, however large the fault is."""
+        shift = self.shift if self.possible else np.zeros_like(self.shift)
+        return np.hypot(shift, self.per_error)
 
 
 class Misfit(NamedTuple):
@@ -104,6 +121,11 @@ class Verdict(NamedTuple):
     misfits: tuple[Misfit, ...]
     faults: tuple[Fault, ...]
     widening: Array
+
+    @property
+    def suggested(self) -> Fault | None:
+        """The most significant fault, if it is unlikely to be chance."""
+        return next((fault for fault in self.faults if fault.clear > SMALL), None)
 
     @property
     def fits(self) -> bool:
@@ -136,14 +158,13 @@ def judge(solution: Solution) -> Verdict:
                 misfits.append(Misfit(experiment.name, name, *_where(experiment, comparison, j), "; ".join(reasons)))
         for name, unit, column in single_faults(solution, experiment, comparison):
             fault = score(column[None]).fault(name, unit)
-            # Neither friction nor backlash is ever negative.
-            if fault is not None and (fault.size > 0 or not fault.signs):
+            if fault is not None:
                 faults.append(fault)
-    faults.sort(key=lambda fault: -fault.clear)
     widening = np.zeros(len(inverse))
     for fault in faults:
-        if fault.clear > SMALL:
-            widening = np.maximum(widening, np.abs(fault.shift))
+        if fault.signs or fault.clear > SMALL:
+            widening = np.maximum(widening, fault.bias)
+    faults = sorted((fault for fault in faults if fault.possible), key=lambda fault: -fault.clear)
     clear = [fault for fault in faults if fault.clear > (CLEAR_SIGN if fault.signs else CLEAR)]
     if clear and not misfits:
         fault = clear[0]
@@ -167,8 +188,12 @@ class _Score:
         rest = (flat - jacobian @ self._shift).reshape(table.shape)
         self._rest, self._residual = rest, solution.comparisons[i].residual
         self._score = flat.T @ solution.comparisons[i].residual.ravel()
-        self._variance = solution.comparisons[i].score_variance(rest)
+        # Priors are measurements of the parameters, with errors.
+        prior = self._shift.T @ solution.task.prior_information() @ self._shift
+        self._variance = solution.comparisons[i].score_variance(rest) + prior
         self._information = flat.T @ rest.reshape(flat.shape)
+        # A part of the Jacobian is noise, and so is that part of the difference between the directions and it.
+        self._noise = self._shift.T @ solution.noise_information @ self._shift
         for other, comparison in enumerate(solution.comparisons):
             if other != i:
                 self._variance += comparison.score_variance(solution.jacobians[other] @ self._shift)
@@ -190,7 +215,7 @@ class _Score:
     def fault(self, name: str, unit: str) -> Fault | None:
         """The fault along the only direction; None if the parameters explain it as well."""
         left = float(self._information[0, 0])
-        if left < 1e-6:
+        if left < max(1e-6, MARGIN * float(self._noise[0, 0])):
             return None
         size = float(self._score[0]) / left
         error = float(np.sqrt(self._variance[0, 0])) / left
@@ -200,7 +225,8 @@ class _Score:
         gain = (
             2 * self._residual.shape[1] * float(np.sum(np.log(np.maximum(before, 1e-300) / np.maximum(after, 1e-300))))
         )
-        return Fault(name, unit, -size / scale, error / scale, self._shift[:, 0] * size, gain)
+        shift = self._shift[:, 0]
+        return Fault(name, unit, -size / scale, error / scale, shift * size, np.abs(shift) * error, gain)
 
 
 def _following(experiment: Experiment, comparison: Comparison, j: int) -> Complex:
@@ -245,15 +271,32 @@ def single_faults(
             column = np.zeros_like(there)
             column[:, experiment.channels.index(name)] = signs[:, i]
             yield f"friction at motor {i + 1}", "N.m", column
+    yield from _mechanical_friction(solution, experiment, comparison)
+
+
+def _mechanical_friction(
+    solution: Solution, experiment: Experiment, comparison: Comparison
+) -> Iterator[tuple[str, str, Complex]]:
+    """Dry friction of the output about pitch and roll, and of the input shafts, both or one: as `single_faults`."""
     model, known = solution.fitter.model.at(solution.values), solution.values
     turns = model.C[[OUTPUTS.index("pitch_rate"), OUTPUTS.index("roll_rate")]][:, 4:]
     inertia = known["J2"] * np.eye(2) + turns.T @ np.diag([known["H3"], known["J3"]]) @ turns
-    states, through = response.moving(comparison.initial)
-    rates = np.fft.irfft(states[:, 4:] @ turns.T, len(experiment.time), axis=0, norm="ortho")
-    brake = np.linalg.solve(inertia, turns.T)
-    signs = spectra(np.column_stack([_sign(rates[:, i]) for i in (0, 1)]))[:count]
-    column = (through[:, :, 4:] @ brake @ signs[..., None])[..., 0]
-    yield "friction about pitch and roll", "N.m", -experiment.step * column
+    states, through = comparison.response.moving(comparison.initial)
+    count = experiment.needed_bins
+
+    def braked(torques: Array) -> Complex:
+        """Contribution of torques (n, 2) N.m against the motion of the input shafts."""
+        rates = np.linalg.solve(inertia, spectra(torques)[:count].T)
+        column: Complex = -experiment.step * (through[:, :, 4:] @ rates.T[..., None])[..., 0]
+        return column
+
+    shafts = np.fft.irfft(states[:, 4:], len(experiment.time), axis=0, norm="ortho")
+    output = shafts @ turns.T
+    yield "friction about pitch and roll", "N.m", braked(np.column_stack([_sign(r) for r in output.T]) @ turns)
+    each = np.column_stack([_sign(r) for r in shafts.T])
+    yield "friction in both input shafts", "N.m", braked(each)
+    for i in (0, 1):
+        yield f"friction in input shaft {i + 1}", "N.m", braked(each * np.eye(2)[i])
 
 
 def _sign(rate: Array) -> Array:
