@@ -2,7 +2,7 @@
 
     python tests/analysis/monte_carlo.py target/fmu/prw_testbed.fmu [--repetitions 300] [--sensors all|torque]
         [--motion independent|equal|opposite|fig4|slow|moves] [--seed 0]
-        [--faulty N] [--counts 10000] [--workers N] [--out out/monte_carlo.json]
+        [--faulty N | --friction N] [--counts 10000] [--workers N] [--out out/monte_carlo.json]
 
 Every repetition has its own rig (parameters up to 30 % off Table 1, where the search starts), its own motion of 10 s
 at 1 kHz, its own noise, encoder positions and sensor offsets; see rig.py. Exit status 1 if an estimate is biased by
@@ -11,6 +11,9 @@ than 92 % of the repetitions, or if the verdict is "fits" in less than 97 %. The
 number of repetitions. With --faulty, exit status 1 if the verdict is "fits" although an interval misses by more than two
 of its widths, in more than 1 %.
 
+With --friction, rigs of another origin are identified: plant.py integrates the balances of torques, with friction in the input
+shafts from none to gross. Exit status 1 if, at any friction, 95 % intervals of rigs whose verdict is "fits" hold in less than
+92 %, or if the verdict is "fits" in less than 97 % of the rigs without friction.
 """
 
 from __future__ import annotations
@@ -29,6 +32,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracle"))
 
+import plant  # noqa: E402
 import rig  # noqa: E402
 from scipy.stats import binom  # noqa: E402
 from threadpoolctl import threadpool_limits  # noqa: E402
@@ -76,12 +80,24 @@ def spoilt(simulated: rig.Rig, fault: str, size: float) -> rig.Rig:
     return simulated._replace(outputs=outputs)
 
 
+#: Friction of both input shafts, N.m.
+FRICTIONS = (0.0, 0.0005, 0.001, 0.002, 0.003, 0.005, 0.01, 0.02)
+
+
 def repetition(fmu: str, seed: int, channels, counts: int, motion: str, fault: str = "", size: float = 0.0) -> tuple:
+    """`identified` for a rig of `rig.experiment`, with a fault or without."""
+    simulated = rig.experiment(seed, 6.0 if fault else 10.0, pattern=motion)
+    return identified(fmu, spoilt(simulated, fault, size) if fault else simulated, seed, channels, counts)
+
+
+def braked(fmu: str, seed: int, motion: str, friction: float) -> tuple:
+    """`identified` for a rig of `plant.experiment`, with all sensors."""
+    return identified(fmu, plant.experiment(seed, friction, motion), seed, rig.ALL, rig.COUNTS)
+
+
+def identified(fmu: str, simulated: rig.Rig, seed: int, channels, counts: int) -> tuple:
     """Logarithms of estimate over true value, their standard errors, whether the 95 % intervals contain the true values, all (5,),
     the seconds it took, whether the verdict is that it fits, and the worst miss of an interval in its widths."""
-    simulated = rig.experiment(seed, 6.0 if fault else 10.0, pattern=motion)
-    if fault:
-        simulated = spoilt(simulated, fault, size)
     columns = rig.measure(simulated, seed + 1_000_000, channels, counts)
     with Model(fmu) as model, threadpool_limits(1):
         begin = time.perf_counter()
@@ -140,6 +156,28 @@ def campaign(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[di
     return {"commit": commit(), "rigs": rigs, "faults": rows, "missed_grossly": grossly, "unnoticed": missed}, good
 
 
+def friction(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[dict, bool]:
+    """Verdicts and intervals of rigs by the friction of their input shafts. Also returns whether intervals hold where the verdict is
+    "fits", and rigs without friction fit."""
+    rigs, motions = options.friction, tuple(plant.MOTIONS)
+    jobs = [(options.fmu, options.seed + i, motions[i % len(motions)], size) for size in FRICTIONS for i in range(rigs)]
+    results = iter(pool.map(braked, *zip(*jobs)))
+    print(f"{rigs} rigs for each friction of the input shafts, N.m: accepted; of these, 95 % intervals hold")
+    print(f"  {'':8}{'accepted':>10}" + "".join(f"{name:>6}" for name in rig.NAMES) + f"{'all':>8}")
+    rows, good = [], True
+    for size in FRICTIONS:
+        found = list(itertools.islice(results, rigs))
+        fits = np.array([each[4] for each in found])
+        inside = np.array([each[2] for each in found if each[4]]).reshape(-1, len(rig.NAMES))
+        good &= not inside.size or not is_too_rare(inside, 0.92, 0.95)
+        good &= size > 0 or not is_too_rare(fits, 0.97, 0.99)
+        hold = dict(zip(rig.NAMES, inside.sum(axis=0).tolist()))
+        rows.append({"size": size, "accepted": int(fits.sum()), "hold": hold})
+        share = f"{inside.mean():>8.1%}" if inside.size else ""
+        print(f"  {size:<8g}{fits.sum():>10}" + "".join(f"{n:>6}" for n in hold.values()) + share, flush=True)
+    return {"commit": commit(), "rigs": rigs, "friction": rows}, good
+
+
 def draw(rows: dict, path: Path) -> None:
     """Curves of detection over size; the same rows give the same bytes."""
     from matplotlib import rc_context
@@ -186,14 +224,15 @@ def main() -> int:
     parser.add_argument("--counts", type=int, default=rig.COUNTS)
     parser.add_argument("--workers", type=int, default=multiprocessing.cpu_count())
     parser.add_argument("--faulty", type=int, default=0, metavar="N", help="rigs for each fault and size instead")
+    parser.add_argument("--friction", type=int, default=0, metavar="N", help="rigs for each friction instead")
     parser.add_argument("--figure", type=Path, help="curves of detection over size, SVG")
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
     seeds = range(options.seed, options.seed + options.repetitions)
     jobs = [(options.fmu, seed, SENSORS[options.sensors], options.counts, options.motion) for seed in seeds]
     with ProcessPoolExecutor(options.workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        if options.faulty:
-            rows, good = campaign(pool, options)
+        if options.faulty or options.friction:
+            rows, good = (campaign if options.faulty else friction)(pool, options)
             write(rows, options.out)
             return 0 if good else 1
         found = list(pool.map(repetition, *zip(*jobs)))

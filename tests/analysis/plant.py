@@ -47,7 +47,12 @@ class Drives(NamedTuple):
 
 
 #: Lowest and highest frequency of a motion, Hz, its number of sines, and the exponent by which amplitudes fall.
-MOTIONS = {"broad": (0.1, 20.0, 30, 1.5), "gentle": (0.1, 10.0, 20, 2.0), "narrow": (1.0, 15.0, 12, 1.0), "slow": (0.1, 3.0, 8, 1.0)}
+MOTIONS = {
+    "broad": (0.1, 20.0, 30, 1.5),
+    "gentle": (0.1, 10.0, 20, 2.0),
+    "narrow": (1.0, 15.0, 12, 1.0),
+    "slow": (0.1, 3.0, 8, 1.0),
+}
 
 
 def drives(random: np.random.Generator, motion: str, reach: float = 0.5) -> Drives:
@@ -78,9 +83,7 @@ def experiment(
         angle, turning = motors.at(time)
         shaft, carrier, carrier_rate = x[:2], x[2:4], x[4:]
         # Shafts between the couplings have no mass: the torques of both couplings are equal.
-        shaft_rate = (
-            k1 * (angle - shaft) + c1 * turning - k2 * (shaft - carrier) + c2 * carrier_rate
-        ) / (c1 + c2)
+        shaft_rate = (k1 * (angle - shaft) + c1 * turning - k2 * (shaft - carrier) + c2 * carrier_rate) / (c1 + c2)
         drive = k2 * (shaft - carrier) + c2 * (shaft_rate - carrier_rate) - brake * np.tanh(carrier_rate / KNEE)
         pitch_rate = (carrier_rate[0] + carrier_rate[1]) / 2
         roll_rate = RATIO * (carrier_rate[0] - carrier_rate[1])
@@ -105,9 +108,7 @@ def experiment(
 
     def outputs(when: np.ndarray) -> dict[str, np.ndarray]:
         x, (angle, turning) = solved.sol(when), motors.at(when)
-        shaft_rate = (
-            k1 * (angle - x[:2]) + c1 * turning - k2 * (x[:2] - x[2:4]) + c2 * x[4:]
-        ) / (c1 + c2)
+        shaft_rate = (k1 * (angle - x[:2]) + c1 * turning - k2 * (x[:2] - x[2:4]) + c2 * x[4:]) / (c1 + c2)
         tau = k1 * (x[:2] - angle) + c1 * (shaft_rate - turning)
         return {
             "theta": angle.T,

@@ -27,3 +27,14 @@ def test_one_rig_without_a_fault_and_one_with(fmu, tmp_path, monkeypatch, capsys
     assert rows["gain"][0]["does_not_fit"] == 1
     monte_carlo.draw(rows, tmp_path / "again.svg")
     assert (tmp_path / "again.svg").read_bytes() == figure.read_bytes()
+
+
+def test_rigs_with_friction_in_the_input_shafts(fmu, tmp_path, monkeypatch):
+    monkeypatch.setattr(monte_carlo, "FRICTIONS", (0.0, 0.02))
+    monkeypatch.setattr(monte_carlo, "commit", lambda: "0123abc")
+    out = tmp_path / "friction.json"
+    arguments = ["monte_carlo.py", str(fmu), "--workers", "1", "--friction", "1", "--out", str(out)]
+    monkeypatch.setattr(sys, "argv", arguments)
+    assert monte_carlo.main() == 0
+    sound, braked = json.loads(out.read_text())["friction"]
+    assert sound["accepted"] == 1 and braked["accepted"] == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import plant
 import pytest
 import rig
 from monte_carlo import spoilt
@@ -115,6 +116,47 @@ def test_faults_are_estimated_along(experiment, fmu, fault, option, channels, si
         assert abs(value - size) < 4.5 * error and error < 0.05 * size
     for name, estimate in found.parameters.items():
         assert abs(estimate.value - experiment.parameters[name]) < 4.5 * estimate.standard_error
+
+
+@pytest.mark.parametrize(
+    "friction, place",
+    [((0.003, 0.003), "both input shafts"), ((0.02, 0.02), "both input shafts"), ((0.0, 0.01), "input shaft 2")],
+)
+def test_friction_in_the_input_shafts_is_named(fmu, friction, place):
+    found = prw.identify(recording(plant.experiment(2, friction, duration=6)), starts=1, fmu=fmu)
+    assert not found.fits
+    name = f"friction in {place}"
+    assert found.diagnosis and found.diagnosis[0].startswith(f"{name} of 0.0"), found.diagnosis
+    fault = next(fault for fault in found.verdict.faults if fault.name == name)
+    assert fault.size == pytest.approx(max(friction), rel=0.25)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.0005, 0.001])
+def test_intervals_allow_for_friction_that_is_too_small_to_be_found(fmu, friction):
+    simulated = plant.experiment(2, friction, duration=6)
+    found = prw.identify(recording(simulated), starts=1, fmu=fmu)
+    assert found.fits, found.misfits
+    for name, estimate in found.parameters.items():
+        low, high = estimate.interval
+        assert low < simulated.parameters[name] < high, name
+        # c3 cannot be told from friction as well as without it, but better than a few per cent.
+        assert estimate.relative < 0.02, name
+
+
+def test_an_equal_gain_of_the_torques_is_found_if_inertias_are_known(experiment, fmu):
+    """It looks like stiffer couplings with more inertia. If all inertias are estimated, nothing shows it, and neither does a
+    rig without a gain look faulty."""
+    columns = recording(experiment)
+    gained = {**columns, **{name: 1.01 * columns[name] for name in ("tau1", "tau2")}}
+    found = prw.identify(gained, starts=1, fmu=fmu)
+    assert not found.fits and found.diagnosis[0].startswith("tau1, tau2 reads 1.01 +-"), found.diagnosis
+    names = (*rig.NAMES, "J3", "H3")
+    for measured, factor in ((columns, 1.0), (gained, 1.01)):
+        free = prw.identify(measured, estimate=names, priors={"J2": 0.1}, starts=1, fmu=fmu)
+        assert free.fits, free.misfits
+        for name in rig.NAMES:
+            estimate = free.parameters[name]
+            assert abs(estimate.value - factor * experiment.parameters[name]) < 4.5 * estimate.standard_error, name
 
 
 def test_the_command_reports_and_writes_no_parameters(prw, tmp_path, experiment):

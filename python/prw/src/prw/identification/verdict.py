@@ -286,8 +286,8 @@ def _mechanical_friction(
 
     def braked(torques: Array) -> Complex:
         """Contribution of torques (n, 2) N.m against the motion of the input shafts."""
-        rates = np.linalg.solve(inertia, spectra(torques)[:count].T)
-        column: Complex = -experiment.step * (through[:, :, 4:] @ rates.T[..., None])[..., 0]
+        accelerations = spectra(torques)[:count] @ np.linalg.inv(inertia)
+        column: Complex = -experiment.step * (through[:, :, 4:] @ accelerations[..., None])[..., 0]
         return column
 
     shafts = np.fft.irfft(states[:, 4:], len(experiment.time), axis=0, norm="ortho")
