@@ -7,9 +7,10 @@ PYTHON ?= python3
 INPUT  ?=
 ARGS   ?=
 FUZZ_SECONDS ?= 600
-# Number of rigs that `make monte-carlo` simulates: without a fault, and for each fault and size.
+# Number of rigs that `make monte-carlo` simulates: without a fault, for each fault and size, and for each friction of the shafts.
 RIGS ?= 300
 FAULTY ?= 50
+FRICTION ?= 40
 FIGURE ?= docs/detection.svg
 
 VENV := .venv
@@ -91,7 +92,7 @@ help:
 	@echo 'make test-platforms          build the release, run it on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       build the release twice and compare every byte'
 	@echo 'make study                   install the packages for prw identify, excite, sweep and check (see python/prw/tutorial.md)'
-	@echo 'make monte-carlo             identify 300 simulated rigs and 1500 with faults -> out/'
+	@echo 'make monte-carlo             identify 300 simulated rigs and 1820 with faults -> out/'
 	@echo 'make fuzz                    search for calls that break the FMU, for 10 minutes (FUZZ_SECONDS=600)'
 	@echo 'make sanitize                run the tests under address, leak, thread and real-time sanitizers and valgrind'
 	@echo 'make clean                   remove .venv, .venv-dist, target, out and dist'
@@ -260,6 +261,7 @@ study: $(VENV)/study.stamp fmu
 monte-carlo: $(VENV)/study.stamp fmu
 	$(PY) tests/analysis/monte_carlo.py $(FMU) --repetitions $(RIGS) --out out/monte_carlo.json $(ARGS)
 	$(PY) tests/analysis/monte_carlo.py $(FMU) --faulty $(FAULTY) --figure $(FIGURE) --out out/detection.json $(ARGS)
+	$(PY) tests/analysis/monte_carlo.py $(FMU) --friction $(FRICTION) --out out/friction.json $(ARGS)
 
 # libFuzzer starts from the inputs in corpus.zip and adds new ones to target/fuzz/corpus.
 fuzz: need-rust need-nightly

@@ -27,7 +27,7 @@ PARTS = {
     "fuzzing, 2 minutes": ("fuzz", "FUZZ_SECONDS=120"),
     "importers' validation": ("validation",),
     "benchmarks, small counts": ("bench", "BENCH_QUICK=1"),
-    "identification, 10 rigs": ("monte-carlo", "RIGS=10", "FAULTY=1", "FIGURE=out/detection.svg"),
+    "identification, 10 rigs": ("monte-carlo", "RIGS=10", "FAULTY=1", "FRICTION=1", "FIGURE=out/detection.svg"),
     "figures": ("figures",),
     "documentation": ("docs",),
     "experiments": ("experiments",),
