@@ -25,8 +25,8 @@ from prw.testbed import OUTPUTS
 #: Probability below which a coherence with the motion is a misfit. It is small, because the steps of encoders are not normally
 #: distributed; 1e-8 occurs in slow motion.
 CHANCE = 1e-10
-#: Ratio of the size of a fault to its standard error above which the fault is significant, and above which a fault of a sensor
-#: widens intervals. Friction and backlash always do, because no mechanism is without them.
+#: Ratio of the size of a fault to its standard error above which the fault is significant, and above which it widens
+#: intervals. Friction always does, because no bearing is without it.
 CLEAR, SMALL = 4.7, 2.5
 #: As CLEAR, for faults that follow the sign of a rate. In a periodic motion, steps of encoders also follow that sign.
 CLEAR_SIGN = 7.0
@@ -162,7 +162,7 @@ def judge(solution: Solution) -> Verdict:
                 faults.append(fault)
     widening = np.zeros(len(inverse))
     for fault in faults:
-        if fault.signs or fault.clear > SMALL:
+        if fault.name.startswith("friction") or fault.clear > SMALL:
             widening = np.maximum(widening, fault.bias)
     faults = sorted((fault for fault in faults if fault.possible), key=lambda fault: -fault.clear)
     clear = [fault for fault in faults if fault.clear > (CLEAR_SIGN if fault.signs else CLEAR)]
