@@ -287,7 +287,7 @@ $(VENV)/made.stamp $(DIST_VENV)/made.stamp: | need-python
 
 FMU_RUN := $(wildcard crates/fmu-run/*.toml crates/fmu-run/python/*.toml $(addprefix crates/fmu-run/,\
   src/*.rs src/*/*.rs python/src/*.rs python/fmu_run/*)\
-  crates/fmi-abi/*.toml crates/fmi-abi/src/*.rs crates/fmi-abi/src/*/*.rs)
+  $(foreach crate,fmi-abi fmi-client,crates/$(crate)/*.toml crates/$(crate)/src/*.rs crates/$(crate)/src/*/*.rs))
 
 $(VENV)/fmu_run.stamp: $(VENV)/made.stamp $(FMU_RUN) | need-rust
 	@echo 'compiling fmu-run, which runs FMUs for Python (once)'

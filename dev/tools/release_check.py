@@ -27,6 +27,7 @@ PARTS = {
     "fuzzing, 2 minutes": ("fuzz", "FUZZ_SECONDS=120"),
     "importers' validation": ("validation",),
     "benchmarks, small counts": ("bench", "BENCH_QUICK=1"),
+    "instructions of uses": ("instructions",),
     "identification, 10 rigs": ("monte-carlo", "RIGS=10", "FAULTY=1", "FRICTION=1", "FIGURE=out/detection.svg"),
     "figures": ("figures",),
     "documentation": ("docs",),
