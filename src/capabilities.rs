@@ -126,8 +126,9 @@ impl ModelExchange for TestbedFmu {
     }
 }
 
-/// Defines the variables that are products or other functions of [`Moving`] variables. Each line gives the change of a
-/// variable: a function of the values now and of their changes, for a product `now.a * change.b + change.a * now.b`.
+/// Defines derivatives of variables that are not linear, such as a power. Linear variables need only a name in
+/// `moving_variables!`, because their derivatives do not depend on the state. For each other variable, a line gives its change
+/// as a function of the [`Moving`] values now and of their changes; for a product it is `now.a * change.b + change.a * now.b`.
 macro_rules! products {
     ($($name:ident = |$now:ident, $change:ident| $value:expr;)*) => {
         const PRODUCTS: &[Name] = &[$(Name::$name),*];

@@ -18,7 +18,8 @@ pub struct Logged {
     pub message: Message,
 }
 
-/// Collects the messages of instances. An instance has a number: that of its first component, plus the index of the component.
+/// Collects the messages of all instances of a system. Each component of an instance has a number, so that one callback can
+/// find out which of them logs: the index of the instance times the number of components, plus the index of the component.
 #[derive(Debug)]
 pub(crate) struct Feed {
     components: Vec<String>,
@@ -32,12 +33,12 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Feed {
-    /// Creates a feed for the instances of these components.
+    /// Creates a collector for a system of components with these names.
     pub fn of(components: Vec<String>) -> Arc<Self> {
         Arc::new(Self { components, runs: Mutex::default(), logged: Mutex::default() })
     }
 
-    /// Records which run an instance performs.
+    /// Records the run that an instance performs and its time, which later messages get.
     pub fn at(&self, instance: usize, run: usize, time: f64) {
         lock(&self.runs).insert(instance, (run, time));
     }

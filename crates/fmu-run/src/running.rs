@@ -252,7 +252,7 @@ impl Running {
 
     /// Performs a step. Returns an error also if an FMU ends the simulation; the other FMUs have then done
     /// the step.
-    #[inline]
+    #[inline(always)]
     pub fn step(&mut self, time: f64, size: f64) -> Result<(), Rejection> {
         if let [instance] = &mut *self.components
             && self.system.exchange().stages.is_empty()
@@ -276,13 +276,13 @@ impl Running {
         ended.map_or_else(|| self.stepped(), Err)
     }
 
-    #[inline]
+    #[inline(always)]
     pub fn get(&mut self, variables: &Selection, row: &mut [f64]) -> Result<(), Rejection> {
         self.pass_on()?;
         variables.get(&mut self.components, &mut self.buffer, row)
     }
 
-    #[inline]
+    #[inline(always)]
     pub fn set(&mut self, variables: &Selection, row: &[f64]) -> Result<(), Rejection> {
         variables.set(&mut self.components, &mut self.buffer, row)?;
         let Exchange { order, stages } = self.system.exchange();

@@ -117,7 +117,7 @@ impl Selection {
     }
 
     /// Reads the values into a row, using a buffer.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn get(
         &self,
         components: &mut [Instance],
@@ -156,7 +156,7 @@ impl Selection {
     }
 
     /// Sets the values of a row, using a buffer.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn set(
         &self,
         components: &mut [Instance],

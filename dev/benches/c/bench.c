@@ -5,7 +5,6 @@
  * The last form times RUNS runs of INSTANCES instances with the inputs in stdin, SAMPLES rows of doubles. It stores all
  * outputs, and prints those of the last instance in the last run. INPUTS and OUTPUTS are value references with commas. */
 #define _GNU_SOURCE
-#include <dlfcn.h>
 #include <malloc.h>
 #include <math.h>
 #include <pthread.h>
@@ -14,23 +13,9 @@
 #include <string.h>
 #include <time.h>
 
-#include "fmi2FunctionTypes.h"
-
-/* fmi2Terminate and fmi2Reset are NULL for bare_exact.c and euler.c, which do not define them. */
-#define FUNCTIONS(F) \
-    F(Instantiate) F(SetupExperiment) F(EnterInitializationMode) F(ExitInitializationMode) F(SetReal) F(GetReal) \
-    F(SetBoolean) F(SetRealInputDerivatives) F(DoStep) F(GetFMUstate) F(SetFMUstate) F(FreeFMUstate) \
-    F(GetDirectionalDerivative) F(FreeInstance) F(Terminate) F(Reset)
-#define DEFINE(name) static fmi2##name##TYPE *fmi2##name;
-FUNCTIONS(DEFINE)
+#include "load.h"
 
 static const char *guid;
-
-static void need(int holds, const char *message) {
-    if (holds) return;
-    fprintf(stderr, "bench: %s\n", message);
-    exit(1);
-}
 
 static void print_message(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category,
                           fmi2String message, ...) {
@@ -203,10 +188,7 @@ static double runs(char **argv) {
 
 int main(int argc, char **argv) {
     need(argc == 4 || argc == 6 || argc == 9, "wrong number of arguments; the head of bench.c lists them");
-    void *library = dlopen(argv[1], RTLD_NOW | RTLD_LOCAL);
-    need(library != NULL, "the library cannot be loaded");
-#define LOAD(name) fmi2##name = (fmi2##name##TYPE *)dlsym(library, "fmi2" #name);
-    FUNCTIONS(LOAD)
+    load(argv[1]);
     guid = argv[2];
     make_motion();
     const double found = argc == 4   ? memory()

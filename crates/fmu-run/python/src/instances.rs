@@ -538,7 +538,8 @@ impl Instances {
         [&[self.count], row].concat()
     }
 
-    /// Checks the shape of the values of an argument: one for all, a row for all, or a row for each instance.
+    /// Reads the values of an argument, which may be one number for all instances, one row for all, or a row for each.
+    /// The error names the argument, its shape and the shape that it should have.
     fn fitting(&self, row: &[usize], argument: &str, values: &Bound<'_, PyAny>) -> PyResult<Numbers> {
         let (values, length) = (Numbers::of(argument, values)?, row.iter().product());
         let given = values.shape();

@@ -13,7 +13,7 @@ use pyo3::types::{PyDict, PyString};
 #[derive(Default)]
 pub struct Start {
     values: Vec<(String, Value)>,
-    /// Values as Python objects, in the units of the variables.
+    /// The values as the caller gave them, after conversion to the units of the variables. They are returned as `Runs.start`.
     given: Vec<(String, Py<PyAny>)>,
 }
 

@@ -517,7 +517,7 @@ impl<'a> Worker<'a> {
         self.deadline.is_some() || self.reuse.is_check()
     }
 
-    /// Tells the collector of messages where the run is.
+    /// Records the run and its time, so that messages of the FMU can be logged with both.
     #[inline]
     fn report_time(&self, run: usize, time: f64) {
         if let Some((feed, instance)) = &self.feed {
