@@ -88,7 +88,6 @@ impl<M: Exported> Instance<M> {
         self.listen();
         if let Some(before) = &self.before {
             self.state.undo(before);
-            self.enter(self.state.mode);
         }
         why
     }
@@ -169,10 +168,7 @@ impl<M: Exported> Instance<M> {
             Err(error) => return self.go_back(Err(error.into())),
         };
         self.state.stale = stepped != Stepped::Calculated;
-        if !self.state.started {
-            self.state.started = true;
-            self.enter(self.state.mode);
-        }
+        self.state.started = true;
         if let Stepped::Done | Stepped::Calculated = stepped {
             self.state.time = end;
             return Ok(stepped);
