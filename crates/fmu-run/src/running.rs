@@ -217,7 +217,7 @@ impl Running {
     }
 
     /// Updates the inputs, if necessary.
-    #[inline]
+    #[inline(always)]
     fn pass_on(&mut self) -> Result<(), Rejection> {
         if self.is_due { self.pass_all_on(|_| ()) } else { Ok(()) }
     }

@@ -354,7 +354,7 @@ impl<'a> Signals<'a> {
     }
 
     /// Returns the values at the time with this index.
-    #[inline]
+    #[inline(always)]
     fn at(&mut self, time: usize) -> &[f64] {
         for (value, signal) in self.row.iter_mut().zip(&self.values) {
             *value = match signal {
@@ -518,7 +518,7 @@ impl<'a> Worker<'a> {
     }
 
     /// Records the run and its time, so that messages of the FMU can be logged with both.
-    #[inline]
+    #[inline(always)]
     fn report_time(&self, run: usize, time: f64) {
         if let Some((feed, instance)) = &self.feed {
             feed.at(*instance, run, time);
@@ -617,7 +617,7 @@ impl<'a> Worker<'a> {
         instance.exit_initialization_mode()
     }
 
-    #[inline]
+    #[inline(always)]
     fn set_inputs(&mut self, instance: &mut Running, time: usize) -> Result<(), Rejection> {
         self.set_values(instance, time)?;
         if self.derivatives.values.is_empty() {
@@ -627,7 +627,7 @@ impl<'a> Worker<'a> {
         instance.sole().set_input_derivatives(references, &self.orders, self.derivatives.at(time))
     }
 
-    #[inline]
+    #[inline(always)]
     fn set_values(&mut self, instance: &mut Running, time: usize) -> Result<(), Rejection> {
         for input in &self.plan.exact_inputs {
             input.set(instance, self.number, time)?;
