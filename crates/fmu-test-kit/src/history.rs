@@ -5,6 +5,7 @@
 //! restored state or a reset ends it where it was then. A fresh instance that makes only the calls of the path must
 //! return the same bits from every getter, then and after more calls.
 
+use crate::checks::{inputs, outputs};
 use crate::either::Version;
 use crate::serialized::{MODE, fnv1a, time};
 use crate::{Arguments, Either, Importer, Random, fmi3};
@@ -249,8 +250,20 @@ impl<F: Either, M: Exported> Traveller<F, M> {
                 _ => (Status::Ok, 0),
             }
         });
-        let seen =
-            values.map(|(status, bits)| (status, if status == Status::Ok { bits } else { 0 })).collect();
+        let derivatives = inputs::<M>().into_iter().flat_map(|known| {
+            outputs::<M>().into_iter().map(move |unknown| {
+                let mut partial = 0.0;
+                let status = self.fmu.try_directional(
+                    &[unknown],
+                    &[known],
+                    &[1.0],
+                    std::slice::from_mut(&mut partial),
+                );
+                (status, partial.to_bits())
+            })
+        });
+        let all = values.chain(derivatives);
+        let seen = all.map(|(status, bits)| (status, if status == Status::Ok { bits } else { 0 })).collect();
         let seen = (seen, self.serialized());
         self.fmu.take_log();
         seen
@@ -364,8 +377,45 @@ fn call<M: Exported>(random: &mut Random, mode: Option<Mode>, world: &World) -> 
     }
 }
 
+/// Restores states that were saved with different parameters in turn. The calls after each have the same arguments, so that
+/// values that a model keeps for the last parameters would be used again.
+fn parameters_in_turn<F: Either, M: Exported>(random: &mut Random, world: &World) {
+    let near = M::INFO.default_experiment.step_size;
+    let mut traveller = Traveller::<F, M>::new(world);
+    for _ in 0..2 {
+        traveller.reset();
+        for index in crate::checks::indices::<M>(|variable| variable.causality() == Causality::Parameter) {
+            if let Some(call) = value::<M>(random, index, 0.0, world) {
+                traveller.go(random, call, world);
+            }
+        }
+        for call in [Call::EnterInitialization(0.0), Call::ExitInitialization] {
+            traveller.go(random, call, world);
+        }
+        for _ in 0..8 {
+            let call = match traveller.mode() {
+                Some(Event) => call::<M>(random, Some(Event), world),
+                Some(ContinuousTime) => Some(Call::Advance(near)),
+                _ => Some(Call::Step(near)),
+            };
+            if let Some(call) = call {
+                traveller.go(random, call, world);
+            }
+        }
+        traveller.save(random);
+    }
+    for _ in 0..4 {
+        traveller.restore(random);
+        if traveller.mode() == Some(StepComplete) {
+            traveller.go(random, Call::Step(near), world);
+        }
+        traveller.compare(random, world);
+    }
+}
+
 fn history<F: Either, M: Exported>(seed: u64, world: &World) {
     let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+    parameters_in_turn::<F, M>(&mut random, world);
     let mut all = vec![Traveller::<F, M>::new(world)];
     for _ in 0..CALLS {
         let (number, count) = (random.below(all.len()), all.len());
