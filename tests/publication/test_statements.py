@@ -3,6 +3,7 @@ of the Python packages."""
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -13,6 +14,8 @@ from built import ROOT
 from test_readmes import FILES, PAGES, published, released
 from test_versions import own_packages, read
 
+from tools.documentation.sources import read_table
+
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 RULES = dict(re.findall(r"^([\w-]+):(?!=)(.*)$", MAKEFILE, re.MULTILINE))
 HELP = set(re.findall(r"^\t@echo 'make ([\w-]+)", MAKEFILE, re.MULTILINE))
@@ -21,6 +24,8 @@ PATH = re.compile(r"`([\w.-]+/[\w./-]*|[\w-]+\.(?:rs|py|md|xml|lock))`")
 #: Directories that builds create; git does not track them.
 MADE = ("out/", "dist/", "target/", ".venv")
 INSTALL = re.compile(r"(?:pip|cargo) install ([^`\n#;)]*)")
+#: The rows of the table of importers.
+AT_A_GLANCE = read_table(ROOT / "docs/compatibility.md", "At a glance").rows
 TEXTS = [name for name in FILES if name.endswith((".md", ".py", ".rs", ".toml", ".html", ".yml", "Makefile"))]
 
 
@@ -39,6 +44,20 @@ def test_the_readme_names_the_command_of_the_continuous_integration() -> None:
     called = re.findall(r"^make .*$", (ROOT / ".ci" / "run").read_text(encoding="utf-8"), re.MULTILINE)
     named = re.findall(r"^\| `(make \w+)` \|", (ROOT / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert called == ["make test"] and named == ["make demo", "make test"]
+
+
+def test_the_numbers_of_the_readme() -> None:
+    """Accuracy, speed and importers are the numbers of the tests, of `make bench` and of the page about importers."""
+    rows = dict(re.findall(r"^\| \*\*(\w+)\*\* \| (.*?) \| \[", text("README.md"), re.MULTILINE))
+    tolerance = re.search(r"assert_close\(values, true_values, (\S+)\)", text("tests/fmpy/test_exactness.py"))
+    assert tolerance and f"within {tolerance[1]} of" in rows["Exact"]
+    beside_fmpy = {name: ratios[4] for name, ratios in json.loads(text("dev/benches/ratios.json"))["runs"].items()}
+    assert f"takes 1/{beside_fmpy['testbed']:.0f} of the time" in rows["Fast"]
+    bounds = re.search(r"run (\d+) to (\d+) times\s+as fast as with FMPy", text("crates/fmu-run/README.md"))
+    assert bounds and all(int(bounds[1]) <= ratio <= int(bounds[2]) for ratio in beside_fmpy.values()), beside_fmpy
+    ran = {row[0].split("]")[0].removesuffix("'s runtime") for row in AT_A_GLANCE if {"✓", "(✓)"} & {*row}}
+    others = ran - {"[fmu_run", "[Programs in C"}
+    assert f"{len(others)} other tools have run it" in rows["Portable"], others
 
 
 def test_help_lists_every_target_that_no_other_needs() -> None:
