@@ -77,13 +77,34 @@ def test_named_paths_exist(name: str) -> None:
 
 
 def test_contributing_lists_every_directory_and_every_file_of_the_model() -> None:
-    tree, tables = re.split(r"^```\n?", text("CONTRIBUTING.md"), flags=re.MULTILINE)[1:3]
+    tree, tables = re.split(r"^```\n", text("CONTRIBUTING.md").split("## Directories")[1], flags=re.MULTILINE)[1:3]
     named = set(re.findall(r"^([\w/-]+)/ ", tree, re.MULTILINE))
     assert all((ROOT / path).is_dir() for path in named)
     for path in {path.split("/")[0] for path in FILES if "/" in path and not path.startswith(".")}:
         assert any(f"{other}/".startswith(f"{path}/") for other in named), path
     sources = {path.name for path in (ROOT / "src").glob("*.rs")} - {"lib.rs"}
     assert sources <= set(re.findall(r"`(\w+\.rs)`", tables))
+
+
+def test_the_picture_of_the_crates() -> None:
+    """docs/architecture.md has each dependency among the crates, dashed if it is optional."""
+    expected = set()
+    for name, manifest in own_packages().items():
+        for needed, how in read(manifest).get("dependencies", {}).items():
+            if needed in own_packages():
+                arrow = "-.->" if isinstance(how, dict) and how.get("optional") else "-->"
+                expected.add(f"{name} {arrow} {needed}")
+    (picture,) = re.findall(r"^```mermaid\ngraph TD\n(.*?)^```", text("docs/architecture.md"), re.DOTALL | re.MULTILINE)
+    assert {line.strip() for line in picture.splitlines()} == expected
+
+
+def test_unsafe_code_is_where_the_page_states() -> None:
+    """Also checks that the model contains none."""
+    sources = [name for name in FILES if re.match(r"(?:src|crates/.*/src)/.*\.rs$", name)]
+    code = re.compile(r"^(?!\s*//).*\bunsafe (?:\{|fn|extern|impl|trait)", re.MULTILINE)
+    found = {re.sub(r"/src/.*", "/src", name) for name in sources if code.search(text(name))}
+    section = text("docs/architecture.md").split("## Where unsafe")[1].split("\n## ")[0]
+    assert set(re.findall(r"^\| `(crates/\S+)`", section, re.MULTILINE)) == found
 
 
 def test_dependencies_are_as_stated() -> None:
