@@ -25,6 +25,6 @@ fn run() -> Result<(), String> {
     println!("cargo::rerun-if-changed={}", file.display());
     let parameters = parameter_file::read(&file)?;
     let table = Path::new(&variable("OUT_DIR")?).join("table_1.rs");
-    fs::write(&table, format!("{parameters:?}"))
+    fs::write(&table, parameter_file::rust_expression(&parameters))
         .map_err(|error| format!("cannot write {}: {error}", table.display()))
 }

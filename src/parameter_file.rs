@@ -1,11 +1,12 @@
 //! Reads `modelDescription/parameters.json`, Table 1 of the paper as printed, or a file of the same format.
 //!
 //! The build script compiles the values into the library; `build_fmu` writes them into the model description.
-//! The FMU reads no file at run time. The module uses no derive macros because every build of the library
-//! begins by compiling it.
+//! The FMU reads no file at run time. The module uses no derive macros, because every build of the library
+//! begins by compiling it, and the macros would take longer than everything else in the build script.
 
 use crate::parameters::{Integer, Parameters, Real, table};
 use serde_core::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
+use serde_json::Value;
 use std::f64::consts::PI;
 use std::fmt;
 use std::fs;
@@ -27,126 +28,141 @@ pub fn read(file: &Path) -> Result<Parameters, String> {
 }
 
 fn parse(json: &str) -> Result<Parameters, String> {
-    let File(parameters) = serde_json::from_str(json).map_err(|error| error.to_string())?;
+    let file: Object<Object<Value>> = serde_json::from_str(json).map_err(|error| error.to_string())?;
+    let parameters = from_file(&file)?;
     parameters.check().map_err(|error| format!("in SI units: {error}"))?;
     Ok(parameters)
 }
 
-/// The parameters of a file in SI units.
-struct File(Parameters);
-
-struct FileVisitor;
-
-impl<'de> Deserialize<'de> for File {
-    fn deserialize<D: Deserializer<'de>>(file: D) -> Result<Self, D::Error> {
-        file.deserialize_map(FileVisitor)
-    }
-}
-
 macro_rules! file {
     ($($(#[$_meaning:meta])* $name:ident: $kind:ident $_compare:tt $_limit:literal, $unit:literal;)+) => {
-        const NAMES: &[&str] = &[$(stringify!($name)),+];
+        /// Returns the parameters in SI units.
+        fn from_file(file: &Object<Object<Value>>) -> Result<Parameters, String> {
+            file.check_names(&[$(stringify!($name)),+])?;
+            Ok(Parameters {
+                $($name: in_unit(file.member(stringify!($name))?, $unit)
+                    .map_err(|error| format!("{}: {error}", stringify!($name)))?,)+
+            })
+        }
 
-        impl<'de> Visitor<'de> for FileVisitor {
-            type Value = File;
-
-            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-                f.write_str("an object with the parameters")
-            }
-
-            #[allow(non_snake_case, reason = "the paper's symbols")]
-            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<File, A::Error> {
-                $(let mut $name = None;)+
-                while let Some(key) = map.next_key::<String>()? {
-                    let named = |error: A::Error| A::Error::custom(format_args!("{key}: {error}"));
-                    match key.as_str() {
-                        $(stringify!($name) => {
-                            let entry: Entry<$kind> = map.next_value().map_err(named)?;
-                            let value = entry.in_unit($unit).map_err(A::Error::custom).map_err(named)?;
-                            fill(&mut $name, value as $kind, stringify!($name))?;
-                        })+
-                        unknown => return Err(A::Error::unknown_field(unknown, NAMES)),
-                    }
-                }
-                Ok(File(Parameters {
-                    $($name: $name.ok_or_else(|| A::Error::missing_field(stringify!($name)))?,)+
-                }))
-            }
+        /// Returns the parameters as a Rust expression with typed numbers, which the build script compiles into the
+        /// library.
+        #[allow(dead_code, reason = "build_fmu does not need it")]
+        pub fn rust_expression(parameters: &Parameters) -> String {
+            let fields = [$(format!("{}: {:?}_{}", stringify!($name), parameters.$name, stringify!($kind))),+];
+            let typed = fields.join(",\n    ").replace("_Real", "_f64").replace("_Integer", "_i32");
+            format!("Parameters {{\n    {typed},\n}}\n")
         }
     };
 }
 table!(file);
 
-/// Stores a member of an object; rejects a second value.
-fn fill<T, E: Error>(member: &mut Option<T>, value: T, name: &'static str) -> Result<(), E> {
-    match member.replace(value) {
-        None => Ok(()),
-        Some(_) => Err(E::duplicate_field(name)),
+/// Returns the value of an entry like `{ "value": 2.11, "unit": "N.m/deg" }` in an SI unit. A value per radian may be
+/// given per degree.
+fn in_unit<T: Number>(entry: &Object<Value>, si: &str) -> Result<T, String> {
+    entry.check_names(&["value", "unit", "meaning"])?;
+    let (value, unit) = (entry.member("value")?, entry.member("unit")?);
+    let value = T::from_json(value).ok_or_else(|| format!("the value is {value}; write {}", T::KIND))?;
+    let per_degree = si.strip_suffix("/rad").map(|quantity| format!("{quantity}/deg"));
+    match (unit.as_str(), &per_degree) {
+        (Some(unit), _) if unit == si => value.times(1.0),
+        (Some(unit), Some(per_degree)) if unit == per_degree => value.times(DEG_PER_RAD),
+        (_, Some(per_degree)) => {
+            Err(format!("the unit {unit} is unknown here; use \"{per_degree}\" or \"{si}\""))
+        }
+        (_, None) => Err(format!("the unit {unit} is unknown here; use \"{si}\"")),
     }
 }
 
-/// A value with its unit.
-struct Entry<T> {
-    value: T,
-    unit: String,
+/// A type of parameters.
+trait Number: Sized {
+    /// The values that are read, for messages.
+    const KIND: &str;
+
+    /// Returns the number if it has this type.
+    fn from_json(value: &Value) -> Option<Self>;
+
+    /// Multiplies by a factor between units.
+    fn times(self, factor: f64) -> Result<Self, String>;
 }
 
-struct EntryVisitor<T>(PhantomData<T>);
+impl Number for Real {
+    const KIND: &str = "a number";
 
-impl<'de, T: Deserialize<'de>> Deserialize<'de> for Entry<T> {
-    fn deserialize<D: Deserializer<'de>>(entry: D) -> Result<Self, D::Error> {
-        entry.deserialize_map(EntryVisitor(PhantomData))
+    fn from_json(value: &Value) -> Option<Self> {
+        value.as_f64()
+    }
+
+    fn times(self, factor: f64) -> Result<Self, String> {
+        // Adding 0.0 turns -0.0 into 0.0.
+        let value = self * factor + 0.0;
+        if value.is_finite() { Ok(value) } else { Err("the value is too large".to_owned()) }
     }
 }
 
-impl<'de, T: Deserialize<'de>> Visitor<'de> for EntryVisitor<T> {
-    type Value = Entry<T>;
+impl Number for Integer {
+    const KIND: &str = "an integer of 32 bits without a decimal point";
 
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("an object like { \"value\": 2.11, \"unit\": \"N.m/deg\" }")
+    fn from_json(value: &Value) -> Option<Self> {
+        value.as_i64()?.try_into().ok()
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Entry<T>, A::Error> {
-        let (mut value, mut unit, mut meaning) = (None, None, None);
-        while let Some(key) = map.next_key::<String>()? {
-            match key.as_str() {
-                "value" => fill(&mut value, map.next_value()?, "value")?,
-                "unit" => fill(&mut unit, map.next_value()?, "unit")?,
-                "meaning" => fill(&mut meaning, map.next_value::<String>()?, "meaning")?,
-                unknown => return Err(A::Error::unknown_field(unknown, &["value", "unit", "meaning"])),
+    fn times(self, _: f64) -> Result<Self, String> {
+        Ok(self)
+    }
+}
+
+/// The members of a JSON object in their order. A map would lose the second of two members with one name.
+struct Object<T>(Vec<(String, T)>);
+
+impl<T> Object<T> {
+    fn check_names(&self, known: &[&str]) -> Result<(), String> {
+        for (index, (name, _)) in self.0.iter().enumerate() {
+            if !known.contains(&name.as_str()) {
+                return Err(format!("unknown field `{name}`, expected one of `{}`", known.join("`, `")));
+            }
+            if self.0[..index].iter().any(|(other, _)| other == name) {
+                return Err(format!("duplicate field `{name}`"));
             }
         }
-        Ok(Entry {
-            value: value.ok_or_else(|| A::Error::missing_field("value"))?,
-            unit: unit.ok_or_else(|| A::Error::missing_field("unit"))?,
-        })
+        Ok(())
+    }
+
+    fn member(&self, name: &str) -> Result<&T, String> {
+        let found = self.0.iter().find(|(other, _)| other == name);
+        found.map(|(_, value)| value).ok_or_else(|| format!("missing field `{name}`"))
     }
 }
 
-impl<T: Into<f64>> Entry<T> {
-    /// Converts the value to an SI unit; a value per radian may be given per degree.
-    fn in_unit(self, si: &str) -> Result<f64, String> {
-        let per_degree = si.strip_suffix("/rad").map(|quantity| format!("{quantity}/deg"));
-        let factor = match &per_degree {
-            _ if self.unit == si => 1.0,
-            Some(unit) if self.unit == *unit => DEG_PER_RAD,
-            Some(unit) => {
-                return Err(format!(
-                    "the unit \"{}\" is unknown here; use \"{unit}\" or \"{si}\"",
-                    self.unit
-                ));
-            }
-            None => return Err(format!("the unit \"{}\" is unknown here; use \"{si}\"", self.unit)),
-        };
-        // Adding 0.0 turns -0.0 into 0.0.
-        let value = self.value.into() * factor + 0.0;
-        if value.is_finite() { Ok(value) } else { Err("the value is too large".to_owned()) }
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Object<T> {
+    fn deserialize<D: Deserializer<'de>>(object: D) -> Result<Self, D::Error> {
+        object.deserialize_map(Members(PhantomData))
+    }
+}
+
+struct Members<T>(PhantomData<T>);
+
+impl<'de, T: Deserialize<'de>> Visitor<'de> for Members<T> {
+    type Value = Object<T>;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("parameters like { \"k1\": { \"value\": 2.11, \"unit\": \"N.m/deg\" } }")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Object<T>, A::Error> {
+        let mut members = Vec::new();
+        while let Some(name) = map.next_key::<String>()? {
+            let value =
+                map.next_value().map_err(|error| A::Error::custom(format_args!("{name}: {error}")))?;
+            members.push((name, value));
+        }
+        Ok(Object(members))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{parse, read};
+    use super::{parse, read, rust_expression};
 
     const TABLE_1: &str = include_str!("../modelDescription/parameters.json");
 
@@ -166,6 +182,28 @@ mod tests {
         assert_eq!((p.J2, p.k1, p.k2), (3.8681291e-3, 120.8940947726037, 43.54479242994257));
         assert_eq!((p.c1, p.c2, p.c3), (0.4486259535874346, 0.4784197589342374, 0.3815898915571283));
         assert_eq!((p.M, p.N), (4, 7));
+    }
+
+    /// The constant in the library is an expression that the build script has written, so it must have the same bits.
+    #[test]
+    fn the_expression_has_typed_numbers_with_the_same_bits() {
+        let table_1 = parse(TABLE_1).unwrap();
+        let mut exponents = (-40..).map(f64::from);
+        for parameters in [table_1, table_1.varied(|| exponents.next().unwrap() * 16.3)] {
+            let expression = rust_expression(&parameters);
+            let number = |name: &str, suffix: &str| {
+                let line = expression.lines().find_map(|line| line.trim().strip_prefix(&format!("{name}: ")));
+                line.and_then(|line| line.strip_suffix(&format!("_{suffix},"))).unwrap().to_owned()
+            };
+            assert!(
+                expression.starts_with("Parameters {\n    J2: ") && expression.ends_with(",\n}\n"),
+                "{expression}"
+            );
+            assert_eq!(number("J2", "f64").parse(), Ok(parameters.J2));
+            assert_eq!(number("c3", "f64").parse(), Ok(parameters.c3));
+            assert_eq!(number("N", "i32").parse(), Ok(parameters.N));
+            assert_eq!(expression.matches("_f64").count(), 8, "{expression}");
+        }
     }
 
     #[test]
@@ -194,24 +232,24 @@ mod tests {
             (entry("k1", "1e308", "N.m/deg"), "too large"),
             (entry("k1", "1e999", "N.m/deg"), "out of range at line 5"),
             (entry("k1", "NaN", "N.m/deg"), "expected value at line 5"),
-            (entry("k1", "\"2.11\"", "N.m/deg"), "invalid type: string \"2.11\", expected f64 at line 5"),
-            (entry("k1", "null", "N.m/deg"), "invalid type: null, expected f64"),
+            (entry("k1", "\"2.11\"", "N.m/deg"), "the value is \"2.11\"; write a number"),
+            (entry("k1", "null", "N.m/deg"), "the value is null; write a number"),
             (entry("k1", "2.11", "N.m.s/deg"), "use \"N.m/deg\" or \"N.m/rad\""),
             (entry("J3", "1", "g.cm2"), "the unit \"g.cm2\" is unknown here; use \"kg.m2\""),
-            (entry("M", "4.5", "1"), "`4.5`, expected i32"),
-            (entry("M", "4.0", "1"), "`4.0`, expected i32"),
+            (entry("M", "4.5", "1"), "the value is 4.5; write an integer"),
+            (entry("M", "4.0", "1"), "the value is 4.0; write an integer"),
             (entry("M", "0", "1"), "must be >= 1, it is 0"),
-            (entry("N", "3000000000", "1"), "`3000000000`, expected i32"),
+            (entry("N", "3000000000", "1"), "the value is 3000000000; write an integer"),
             ((with_line("c3", ""), "c3".into()), "missing field `c3`"),
             ((with_line("c3", &line("c3").repeat(2)), "c3".into()), "duplicate field `c3`"),
             (
                 (with_line("c3", &line("c3").replace("c3", "c9")), "`c9`".into()),
                 "unknown field `c9`, expected one of `J2`, `J3`",
             ),
-            ((with_line("k1", "\"k1\": 2.11,"), "k1".into()), "an object like { \"value\""),
+            ((with_line("k1", "\"k1\": 2.11,"), "k1".into()), "{ \"value\": 2.11"),
             ((with_line("k1", "\"k1\": {\"value\": 2.11},"), "k1".into()), "missing field `unit`"),
             ((line("k1").replace(',', "}"), String::new()), "line 1"),
-            (("[]".into(), String::new()), "an object with the parameters"),
+            (("[]".into(), String::new()), "expected parameters like"),
             ((String::new(), String::new()), "line 1"),
             ((TABLE_1.replace("7.83", "0").replace("8.35", "0"), "c1 and c2".into()), "must not both be 0"),
         ];

@@ -294,14 +294,36 @@ def test_the_command_linearize(testbed: Path, tmp_path: Path) -> None:
         assert result.returncode == 1 and complaint in result.stderr and result.stderr.count("\n") == 1
 
 
-def test_the_programs_in_the_readme(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The programs run unchanged in the repository root."""
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    short, program = re.findall(r"^```python\n(.*?)^```", readme, flags=re.S | re.M)
+def blocks(page: str) -> list[tuple[str, str]]:
+    """Returns the language and the text of each block of code of a page."""
+    return re.findall(r"^```(\w+)\n(.*?)^```", (ROOT / page).read_text(encoding="utf-8"), flags=re.S | re.M)
+
+
+@pytest.mark.parametrize("page", ["README.md", "python/prw/README.md"])
+def test_the_programs_in_the_readmes(
+    page: str, testbed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The programs run unchanged in the repository root, and print what the page shows after them."""
+    found = blocks(page)
     monkeypatch.chdir(ROOT)
     names: dict[str, Any] = {}
-    exec(compile(short, "README.md", "exec"), names)
-    assert names["run"].motion.name == "fig4" and names["run"].parameters["k1"] == 100.0
-    exec(compile(program, "README.md", "exec"), names)
-    assert names["run"].parameters["k1"] == pytest.approx(1.8 * 180 / np.pi) and names["model"].A.shape == (6, 6)
-    assert names["table"].num_rows == 100 and names["found"].fits
+    compared = 0
+    for (language, program), (following, output) in zip(found, [*found[1:], ("", "")]):
+        if language == "python":
+            exec(compile(program, page, "exec"), names)
+            printed = capsys.readouterr().out
+            assert printed == (output if following == "text" else "")
+            compared += bool(printed)
+    assert compared == 1 and names["found"].fits
+    if page == "README.md":
+        assert names["run"].parameters["k1"] == pytest.approx(1.8 * 180 / np.pi) and names["model"].A.shape == (6, 6)
+        assert names["table"].num_rows == 100 and prw.simulate(fmu=testbed).parameters["k1"] == pytest.approx(
+            120.9, abs=0.05
+        )
+
+
+def test_the_output_of_the_demo_in_the_readme(testbed: Path, tmp_path: Path) -> None:
+    shown = next(text for language, text in blocks("README.md") if language == "text")
+    command = [sys.executable, "-m", "prw", "simulate", "--fmu", str(testbed)]
+    printed = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True, timeout=120).stdout
+    assert shown in printed

@@ -3,6 +3,7 @@ of the Python packages."""
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -13,6 +14,8 @@ from built import ROOT
 from test_readmes import FILES, PAGES, published, released
 from test_versions import own_packages, read
 
+from tools.documentation.sources import read_table
+
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 RULES = dict(re.findall(r"^([\w-]+):(?!=)(.*)$", MAKEFILE, re.MULTILINE))
 HELP = set(re.findall(r"^\t@echo 'make ([\w-]+)", MAKEFILE, re.MULTILINE))
@@ -21,6 +24,8 @@ PATH = re.compile(r"`([\w.-]+/[\w./-]*|[\w-]+\.(?:rs|py|md|xml|lock))`")
 #: Directories that builds create; git does not track them.
 MADE = ("out/", "dist/", "target/", ".venv")
 INSTALL = re.compile(r"(?:pip|cargo) install ([^`\n#;)]*)")
+#: The rows of the table of importers.
+AT_A_GLANCE = read_table(ROOT / "docs/compatibility.md", "At a glance").rows
 TEXTS = [name for name in FILES if name.endswith((".md", ".py", ".rs", ".toml", ".html", ".yml", "Makefile"))]
 
 
@@ -41,6 +46,20 @@ def test_the_readme_names_the_command_of_the_continuous_integration() -> None:
     assert called == ["make test"] and named == ["make demo", "make test"]
 
 
+def test_the_numbers_of_the_readme() -> None:
+    """Accuracy, speed and importers are the numbers of the tests, of `make bench` and of the page about importers."""
+    rows = dict(re.findall(r"^\| \*\*(\w+)\*\* \| (.*?) \| \[", text("README.md"), re.MULTILINE))
+    tolerance = re.search(r"assert_close\(values, true_values, (\S+)\)", text("tests/fmpy/test_exactness.py"))
+    assert tolerance and f"within {tolerance[1]} of" in rows["Exact"]
+    beside_fmpy = {name: ratios[4] for name, ratios in json.loads(text("dev/benches/ratios.json"))["runs"].items()}
+    assert f"takes 1/{beside_fmpy['testbed']:.0f} of the time" in rows["Fast"]
+    bounds = re.search(r"run (\d+) to (\d+) times\s+as fast as with FMPy", text("crates/fmu-run/README.md"))
+    assert bounds and all(int(bounds[1]) <= ratio <= int(bounds[2]) for ratio in beside_fmpy.values()), beside_fmpy
+    ran = {row[0].split("]")[0].removesuffix("'s runtime") for row in AT_A_GLANCE if {"✓", "(✓)"} & {*row}}
+    others = ran - {"[fmu_run", "[Programs in C"}
+    assert f"{len(others)} other tools have run it" in rows["Portable"], others
+
+
 def test_help_lists_every_target_that_no_other_needs() -> None:
     (phony,) = re.findall(r"^\.PHONY: (.*)$", MAKEFILE, re.MULTILINE)
     internal = {name for needed in RULES.values() for name in needed.split()}
@@ -58,13 +77,34 @@ def test_named_paths_exist(name: str) -> None:
 
 
 def test_contributing_lists_every_directory_and_every_file_of_the_model() -> None:
-    tree, tables = re.split(r"^```\n?", text("CONTRIBUTING.md"), flags=re.MULTILINE)[1:3]
+    tree, tables = re.split(r"^```\n", text("CONTRIBUTING.md").split("## Directories")[1], flags=re.MULTILINE)[1:3]
     named = set(re.findall(r"^([\w/-]+)/ ", tree, re.MULTILINE))
     assert all((ROOT / path).is_dir() for path in named)
     for path in {path.split("/")[0] for path in FILES if "/" in path and not path.startswith(".")}:
         assert any(f"{other}/".startswith(f"{path}/") for other in named), path
     sources = {path.name for path in (ROOT / "src").glob("*.rs")} - {"lib.rs"}
     assert sources <= set(re.findall(r"`(\w+\.rs)`", tables))
+
+
+def test_the_picture_of_the_crates() -> None:
+    """docs/architecture.md has each dependency among the crates, dashed if it is optional."""
+    expected = set()
+    for name, manifest in own_packages().items():
+        for needed, how in read(manifest).get("dependencies", {}).items():
+            if needed in own_packages():
+                arrow = "-.->" if isinstance(how, dict) and how.get("optional") else "-->"
+                expected.add(f"{name} {arrow} {needed}")
+    (picture,) = re.findall(r"^```mermaid\ngraph TD\n(.*?)^```", text("docs/architecture.md"), re.DOTALL | re.MULTILINE)
+    assert {line.strip() for line in picture.splitlines()} == expected
+
+
+def test_unsafe_code_is_where_the_page_states() -> None:
+    """Also checks that the model contains none."""
+    sources = [name for name in FILES if re.match(r"(?:src|crates/.*/src)/.*\.rs$", name)]
+    code = re.compile(r"^(?!\s*//).*\bunsafe (?:\{|fn|extern|impl|trait)", re.MULTILINE)
+    found = {re.sub(r"/src/.*", "/src", name) for name in sources if code.search(text(name))}
+    section = text("docs/architecture.md").split("## Where unsafe")[1].split("\n## ")[0]
+    assert set(re.findall(r"^\| `(crates/\S+)`", section, re.MULTILINE)) == found
 
 
 def test_dependencies_are_as_stated() -> None:

@@ -66,3 +66,11 @@ def test_the_changelog_and_the_citation_have_this_version_and_its_date() -> None
     assert VERSION in days and all(days[version] is None for version in list(days)[: list(days).index(VERSION)])
     stated = dict(re.findall(r"^(version|date-released): (.*)$", citation, re.MULTILINE))
     assert stated == {"version": VERSION} | ({"date-released": days[VERSION]} if days[VERSION] else {})
+
+
+def test_the_newest_section_of_the_changelog_is_in_groups() -> None:
+    """Readers look for changes that break their code first, so each entry belongs to a group."""
+    newest = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").split("\n## ")[1]
+    before, *groups = re.split(r"^### (.*)$", newest, flags=re.MULTILINE)
+    assert groups[::2] == [name for name in ("Breaking", "Added", "Changed", "Fixed") if name in groups]
+    assert "*" not in before and all(re.match(r"\n\n(\*|\|) ", entries) for entries in groups[1::2])

@@ -117,6 +117,14 @@ fn listed(model: &str) -> BTreeSet<String> {
 #[test]
 fn lag() {
     let directory = develop("lag", &["--set", "u=1"], "time,x", "from 0.000000 to 0.632121 1");
+    let printed = directory.prints("my-lag", &["run", "--set", "u=1"]);
+    let is_result = |line: &&str| line.starts_with("x  ") || line.ends_with(" steps");
+    let shown: Vec<&str> = include_str!("../README.md").lines().filter(is_result).collect();
+    assert!(
+        shown.len() == 2 && printed.contains(&shown.join("\n")),
+        "{shown:?} in README.md, printed is\n{printed}"
+    );
+    assert!(include_str!("../../fmu-export/README.md").contains(shown[0]));
     inputs_come_from_a_table(&directory);
     check_makes_the_fmus(&directory);
     options_reach_the_program_that_packs(&directory);
