@@ -1,8 +1,8 @@
 """Motors with inertia and friction, current and angle loops, coupled to the FMU by their torques
 
 You learn to couple the FMU with a model of its motors, which takes the torques of the FMU and returns angles and rates
-(`fmu_run.Instances`), and how small the communication step must be. The motors, their loops and the move are those of
-examples/openmodelica/TorqueDriven.mo.
+(`fmu_run.Instances`), and how small the communication step must be. examples/openmodelica/TorqueDriven.mo has the
+same motors, loops and move for Model Exchange.
 
     make examples; .venv/bin/python examples/torque_driven.py
 """
@@ -101,8 +101,8 @@ def main() -> tuple[Figure, dict[float, tuple[float, float]]]:
     angles, torques = figure.subplots(1, 2)
     for name, colour in (("pitch", "#0072B2"), ("roll", "#D55E00")):
         angles.plot(time, np.rad2deg(moved[name]), color=colour, label=name)
-    coarse, held = simulate(2e-3, False, jump, end=0.1)
-    torques.plot(1e3 * coarse, held["tau1"], ".-", color="#CC79A7", label="tau1 after a step, held over 2 ms")
+    coarse, held = simulate(STEPS[0], False, jump, end=0.1)
+    torques.plot(1e3 * coarse, held["tau1"], ".-", color="#CC79A7", label="tau1 after a step, held over 5 ms")
     torques.plot(1e3 * FINEST * np.arange(len(exact["tau1"])), exact["tau1"], color="#009E73", label="in small steps")
     angles.set(xlabel="time (s)", ylabel="angle (deg)")
     torques.set(xlabel="time (ms)", ylabel="torque (N.m)", xlim=(0, 100))

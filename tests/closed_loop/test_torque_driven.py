@@ -3,6 +3,7 @@ OpenModelica, compared with the machine of tests/oracle/machine.py, whose equati
 
 from __future__ import annotations
 
+import html
 import importlib
 import re
 from typing import Any
@@ -155,3 +156,13 @@ def test_the_models_use_the_names_of_the_fmu():
         assert f"  model {model} " in MODEL
     assert 'loadFile("../TorqueDriven.mo")' in script
     assert 'importFMU("../../../target/fmu/prw_testbed.fmu", workdir = cd() + "/testbed", fullPath = true)' in script
+
+
+def test_the_page_in_the_fmu_shows_lines_of_the_model():
+    page = (ROOT / TESTBED.path).read_text(encoding="utf-8")
+    (shown,) = re.findall(r'<pre data-model="TorqueDriven" tabindex="0"><code>(.*?)</code></pre>', page, flags=re.S)
+    lines = [line for line in html.unescape(shown).splitlines() if line]
+    assert len(lines) > 3 and set(lines) <= set(MODEL.splitlines())
+    # The adaptor of the library has the opposite sign.
+    assert "f = -testbed.tau1" in page and "  drive1.wrist.f = -testbed.tau1;" in MODEL
+    assert "use_pder2 = false" in page and "(use_pder2 = false)" in MODEL
