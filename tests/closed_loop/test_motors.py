@@ -14,6 +14,8 @@ from fmu_run import Fmu, System
 from lagrange import table_1
 from scipy.integrate import solve_ivp
 
+from tools.documentation.sources import read_table
+
 J1 = 1.5e-3
 FROM_MOTORS, FROM_WRIST = ("theta1", "theta2", "omega1", "omega2"), ("tau1", "tau2")
 END = 0.3
@@ -55,6 +57,38 @@ def test_held_torques_cost_the_first_order(version):
     order = np.log2(coarse / fine)
     # In the angles, parts of second order are not yet negligible.
     assert order[:2] == pytest.approx(1, abs=0.1) and np.all((order > 0.9) & (order < 2)), order
+
+
+def with_slopes(slope: str) -> float:
+    """Largest error of the torques in percent, with steps of 1 ms in which the motors extrapolate the torque of the wrist."""
+    h, rows = 1e-3, []
+    time = h * np.arange(round(END / h) + 1)
+    with Fmu(built("prw_motor.fmu")) as motor, Fmu(built("prw_testbed.fmu")) as testbed:
+        motors, wrist = motor.instances(start={"J1": J1}), testbed.instances(start={"use_omega": True})
+        for t in time:
+            wrist.set(FROM_MOTORS, motors.get(FROM_MOTORS))
+            rows.append(wrist.get(FROM_WRIST)[0])
+            motors.set((*FROM_WRIST, "torque1", "torque2"), [[*rows[-1], *torque(t)]])
+            own = (torque(t + 1e-6) - torque(t - 1e-6)) / 2e-6
+            slopes = {
+                "0": np.zeros(2),
+                "output derivatives": wrist.get_output_derivatives(FROM_WRIST)[0],
+                "last two": (rows[-1] - rows[max(len(rows) - 2, 0)]) / h,
+            }
+            motors.set_input_derivatives((*FROM_WRIST, "torque1", "torque2"), [[*slopes[slope], *own]])
+            motors.step(h)
+            wrist.step(h)
+    true = exact(time).tau
+    return float(100 * (np.abs(np.array(rows) - true).max(axis=0) / np.abs(true).max(axis=0)).max())
+
+
+def test_slopes_of_the_torque_in_the_document():
+    rows = read_table(ROOT / "docs/compatibility.md", "Motors driven by torque").rows
+    text = (ROOT / "docs/compatibility.md").read_text(encoding="utf-8")
+    assert len(rows) == 5  # the table of the example, which comes first
+    stated = dict(re.findall(r"^\| (0|output derivatives|through the last two).*? \| ([\d.]+ %) \|$", text, flags=re.M))
+    found = {name: f"{with_slopes(name.removeprefix('through the ')):.2f} %" for name in stated}
+    assert len(stated) == 3 and found == stated
 
 
 def test_model_exchange_needs_no_sample():
