@@ -54,7 +54,7 @@ def slope(time: float, x: np.ndarray, tau: np.ndarray, motion: Motion) -> np.nda
 
 def drive(time: float, x: np.ndarray, h: float, tau: np.ndarray, tau_rate: np.ndarray, motion: Motion) -> np.ndarray:
     """The drives' states after a communication step h, in which the torque of the wrist is tau + tau_rate t; Runge-Kutta."""
-    steps = max(1, round(h / 1e-4))
+    steps = max(1, round(h / 2e-4))
     d = h / steps
     for k in range(steps):
         begin, middle, end = (tau + tau_rate * d * (k + part) for part in (0.0, 0.5, 1.0))
