@@ -94,6 +94,9 @@ package TorqueDriven "The pitch-roll wrist, driven by two motors with inertia, f
     parameter Gains gains;
     input Real theta_ref(unit = "rad") "Angle that the motor should have";
     input Real omega_ref(unit = "rad/s") "Its rate";
+    Modelica.Blocks.Interfaces.RealInput tau(unit = "N.m") "Torque of the wrist on the motor: tau1 or tau2 of the testbed";
+    Modelica.Blocks.Interfaces.RealOutput theta(unit = "rad") "Angle";
+    Modelica.Blocks.Interfaces.RealOutput omega(unit = "rad/s") "Rate";
     Modelica.Mechanics.Rotational.Components.Inertia rotor(J = motor.J1, phi(fixed = true), w(fixed = true));
     Modelica.Mechanics.Rotational.Components.Damper bearing(d = motor.damping);
     // 2 / (1 + exp(-w / (0.01 w0))) - 1 = tanh(w / (0.02 w0))
@@ -122,6 +125,10 @@ package TorqueDriven "The pitch-roll wrist, driven by two motors with inertia, f
     connect(bearing.flange_b, housing.flange);
     connect(friction.flange, rotor.flange_a);
     connect(rotor.flange_b, wrist.flange);
+    connect(wrist.p, theta);
+    connect(wrist.pder, omega);
+    // The adaptor's input f is the torque that flows into its flange, so it has the opposite sign.
+    wrist.f = -tau;
   end DriveOfLibrary;
 
   model MachineOfLibrary "Two drives of the Modelica library and the wrist"
@@ -134,13 +141,12 @@ package TorqueDriven "The pitch-roll wrist, driven by two motors with inertia, f
     drive1.omega_ref = move.omega[1];
     drive2.theta_ref = move.theta[2];
     drive2.omega_ref = move.omega[2];
-    connect(drive1.wrist.p, testbed.theta1);
-    connect(drive1.wrist.pder, testbed.omega1);
-    connect(drive2.wrist.p, testbed.theta2);
-    connect(drive2.wrist.pder, testbed.omega2);
-    // The adaptor's input f is the torque that flows into its flange, so it has the opposite sign.
-    drive1.wrist.f = -testbed.tau1;
-    drive2.wrist.f = -testbed.tau2;
+    connect(drive1.theta, testbed.theta1);
+    connect(drive1.omega, testbed.omega1);
+    connect(drive2.theta, testbed.theta2);
+    connect(drive2.omega, testbed.omega2);
+    connect(testbed.tau1, drive1.tau);
+    connect(testbed.tau2, drive2.tau);
   end MachineOfLibrary;
 
 end TorqueDriven;

@@ -164,5 +164,5 @@ def test_the_page_in_the_fmu_shows_lines_of_the_model():
     lines = [line for line in html.unescape(shown).splitlines() if line]
     assert len(lines) > 3 and set(lines) <= set(MODEL.splitlines())
     # The adaptor of the library has the opposite sign.
-    assert "f = -testbed.tau1" in page and "  drive1.wrist.f = -testbed.tau1;" in MODEL
+    assert "<code>f = -tau1</code>" in page and "    wrist.f = -tau;" in MODEL
     assert "use_pder2 = false" in page and "(use_pder2 = false)" in MODEL
