@@ -201,13 +201,14 @@ experiments: $(VENV)/tests.stamp
 validation: need-rust $(VENV)/importers.stamp closed-loop-fmus
 	@$(PY) dev/tools validation $(ARGS)
 
-# Builds the controller FMU, the closed loop, and the example FMU lag.
+# Builds the controller FMU, the closed loop, the example FMU lag, and the FMU of the motors.
 closed-loop-fmus: fmu
 	@$(BUILD_CONTROLLER)
 	@$(BUILD_CLOSED_LOOP)
 	@$(if $(PROGRAMS),,$(CARGO) build $(LOCKED) --quiet -p cargo-fmu)
 	@rm -rf target/lag && $(NO_JOBS) target/debug/cargo-fmu fmu new target/lag --name lag > /dev/null
 	@cd target/lag && CARGO_TARGET_DIR=$(CURDIR)/target/models $(NO_JOBS) ../debug/cargo-fmu fmu build --out ../fmu
+	@cd crates/prw-motor && $(NO_JOBS) ../../target/debug/cargo-fmu fmu build --no-page --out ../../target/fmu
 
 closed-loop: need-rust $(VENV)/importers.stamp closed-loop-fmus
 	@$(PY) dev/tools closed-loop $(ARGS)

@@ -14,7 +14,16 @@ from prw.files import write_text
 from tools.figures.writing import write_small_png
 
 PAGE, FIGURES = Path("docs/examples.md"), Path("docs/examples")
-EXAMPLES = ("lqr", "quiet_motion", "identify", "tolerances", "gains", "learned_move", "predictive_control")
+EXAMPLES = (
+    "lqr",
+    "quiet_motion",
+    "identify",
+    "tolerances",
+    "gains",
+    "learned_move",
+    "predictive_control",
+    "torque_driven",
+)
 #: The durations and the rate that examples measure and print.
 TIMES = re.compile(r"(?<= s in )[\d.]+(?= s$)|(?<=^learned in )[\d.]+|^[\d.]+(?= decisions per second)", re.MULTILINE)
 HEAD = """# Examples

@@ -14,8 +14,8 @@ equation
   controller.roll_ref = roll_ref;
   connect(controller.theta1, testbed.theta1);
   connect(controller.theta2, testbed.theta2);
-  // In Model Exchange the FMU does not derive the rates from the angles. Without these two connections all rates would be zero, and
-  // the dampers would brake the shafts.
+  // In Model Exchange the FMU does not derive the rates from the angles. Without these two connections OpenModelica reports too few
+  // equations; with rates of zero the dampers would brake the shafts.
   connect(controller.omega1, testbed.omega1);
   connect(controller.omega2, testbed.omega2);
   // These values are sampled, not connected. OpenModelica assumes that all outputs of an FMU depend on all of its inputs. Six

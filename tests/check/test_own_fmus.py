@@ -29,7 +29,7 @@ def needs_new_system(fmu: Path) -> bool:
     return any(int(minor) > 28 for minor in re.findall(rb"GLIBC_2\.(\d+)", library))
 
 
-@pytest.mark.parametrize("model", ["prw_testbed", "prw_controller"])
+@pytest.mark.parametrize("model", ["prw_testbed", "prw_controller", "prw_motor"])
 def test_only_listed_notes_are_found(version: str, model: str) -> None:
     fmu = built(f"{version}{model}.fmu")
     command = [CHECK, "fmu", "check", "--fmu", fmu, "--json", "--no-shrink", "--repeat", "0.3"]

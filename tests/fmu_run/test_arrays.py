@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from built import ROOT
 from fmpy.validation import validate_fmu
+from scipy.integrate import solve_ivp
 
 PIECES = range(1, 9)
 TEMPERATURES = [f"T[{piece}]" for piece in PIECES]
@@ -87,6 +88,56 @@ def test_runs_equal_fmpy(rods, kind) -> None:
     if kind == "CoSimulation":
         for runs in both(rods, lambda fmu: fmu.run(results[0]["time"], outputs=TEMPERATURES)):
             assert np.array_equal(np.transpose([runs[name][0] for name in TEMPERATURES]), of_fmi2)
+
+
+def heated(rod: Path, switches: list[tuple[float, int, int]], **options) -> np.ndarray:
+    """FMPy's results in Model Exchange, with times and values of both switches."""
+    kinds = [("time", float), ("switches[1]", np.int32), ("switches[2]", np.int32)]
+    return fmpy.simulate_fmu(
+        str(rod),
+        fmi_type="ModelExchange",
+        stop_time=2.0,
+        input=np.array(switches, dtype=kinds),
+        output=[*TEMPERATURES, "hot[4]"],
+        **options,
+    )
+
+
+def exact(time: np.ndarray, parts: list[tuple[float, float, list[float]]]) -> np.ndarray:
+    """Temperatures (8, times): in each part, from its begin to its end, the heaters have the given powers."""
+    capacities, temperatures, found = 2.0 + 0.125 * np.arange(8), 20.0 + np.arange(8.0), []
+
+    def rates(_: float, at: np.ndarray, heat: np.ndarray) -> np.ndarray:
+        # The far end loses no heat.
+        return (0.5 * (np.append(20.0, at[:-1]) - at + np.append(np.diff(at), 0.0)) + heat) / capacities
+
+    for begin, end, power in parts:
+        heat = np.repeat(power, 4)
+        solved = solve_ivp(rates, (begin, end), temperatures, "DOP853", rtol=1e-11, args=(heat,), dense_output=True)
+        inside = time[(time >= begin) & (time < end) | (time == 2.0) & (end == 2.0)]
+        found.append(solved.sol(inside))
+        temperatures = solved.y[:, -1]
+    return np.hstack(found)
+
+
+def test_discrete_inputs_that_fmpy_sets_in_continuous_time_mode(rods) -> None:
+    """While CVode looks for roots of the indicators, FMPy sets all inputs, also the discrete ones."""
+    result = heated(rods[0], [(0.0, 3, 0), (2.0, 3, 0)], solver="CVode", output_interval=0.1, relative_tolerance=1e-8)
+    found = np.array([result[name] for name in TEMPERATURES])
+    np.testing.assert_allclose(found, exact(result["time"], [(0.0, 2.0, [10.0, 0.0])]), rtol=1e-6)
+    assert len(np.unique(result["hot[4]"])) == 2, "an indicator changes its sign"
+
+
+def test_a_switch_in_fmpy(rods) -> None:
+    """FMPy's Euler method ends at the event. CVode steps beyond it, and FMPy then sets the other value outside of Event Mode."""
+    switches = [(0.0, 3, 0), (0.6, 3, 0), (0.6, 0, 3), (2.0, 0, 3)]
+    result = heated(rods[0], switches, solver="Euler", output_interval=1e-3)
+    time = result["time"]
+    kept = np.append(np.diff(time) > 1e-9, True) & (np.abs(time - 0.6) > 1e-9)
+    found = np.array([result[name][kept] for name in TEMPERATURES])
+    expected = exact(time[kept], [(0.0, 0.6, [10.0, 0.0]), (0.6, 2.0, [0.0, 5.0])])
+    np.testing.assert_allclose(found, expected, rtol=2e-4)
+    assert len(np.unique(result["hot[4]"])) == 2, "an indicator changes its sign"
 
 
 def test_fmpy_reports_no_problem(rods) -> None:

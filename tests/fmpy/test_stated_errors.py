@@ -1,0 +1,107 @@
+"""Errors that the documents state for importers, from the order in which these importers call the FMU.
+
+The motion is the motion of Fig. 4, the step 1 ms, and the errors are in percent of the peak."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from built import ROOT
+from fmu_run import Fmu
+from lagrange import linear_model, table_1
+from reference import integrate
+
+H = 1e-3
+TIME = H * np.arange(1001)
+MOTORS = ("theta1", "theta2", "omega1", "omega2")
+
+
+def angles(t: float) -> np.ndarray:
+    return np.array([1, -1]) * (1 - np.cos(10 * np.pi * t)) / (10 * np.pi)
+
+
+def rates(t: float) -> np.ndarray:
+    return np.array([1, -1]) * np.sin(10 * np.pi * t)
+
+
+@pytest.fixture(scope="module")
+def exact() -> dict[str, np.ndarray]:
+    return integrate(linear_model(table_1()), TIME, angles, rates)
+
+
+def shares(exact, torque, roll) -> tuple[float, float]:
+    """Largest errors of torque and roll in percent of the peaks."""
+    found = zip((torque, roll), (exact["tau1"], exact["roll"]))
+    torque, roll = (100 * np.abs(values - true).max() / np.abs(true).max() for values, true in found)
+    return torque, roll
+
+
+def states(name: str, *parts: str) -> None:
+    """Checks that the document contains the parts, in this order and in one paragraph; spaces may be narrow or line ends."""
+    text = re.sub(r"&#8239;|&#160;|\s", " ", (ROOT / name).read_text(encoding="utf-8"))
+    text = re.sub(r"<[^>]*>|`", "", text).replace("  ", " ")
+    assert re.search(".{0,160}?".join(map(re.escape, parts)), text), parts
+
+
+def test_outputs_that_are_read_before_inputs_are_set(fmu, exact):
+    """FMIKit in Co-Simulation."""
+    known = dict(zip(MOTORS, np.array([[*angles(t), *rates(t)] for t in TIME]).T))
+    found = {}
+    with Fmu(fmu) as testbed:
+        for use_omega in (True, False):
+            inputs = {name: known[name] for name in MOTORS[: 4 if use_omega else 2]}
+            run = testbed.run(
+                TIME, inputs=inputs, start={"use_omega": use_omega}, outputs=["tau1", "roll"], read_before_set=True
+            ).check()
+            found[use_omega] = shares(exact, run["tau1"][0], run["roll"][0])
+    with_rates, without = (f"{found[use_omega][0]:.1f} %" for use_omega in (True, False))
+    assert max(roll for _, roll in found.values()) < 0.01
+    states("docs/compatibility.md", f"torques are off by {with_rates} of their peak", f"by {without} with angles only")
+    states("docs/fmu-page/text/testbed/3_loading.html", f"off by {with_rates}", f"{without} with angles only")
+
+
+def in_model_exchange(fmu, nodes, weights, moved: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """Integrates with an explicit method of Runge and Kutta, of which each stage needs the one before. `moved` multiplies the rates.
+    Returns torque and roll."""
+    with Fmu(fmu) as testbed:
+        instance = testbed.instances(interface="model-exchange")
+
+        def at(t: float, x: np.ndarray) -> None:
+            instance.set_time(t)
+            instance.set_continuous_states(x)
+            instance.set(MOTORS, [[*angles(t), *(moved * rates(t))]])
+
+        x, rows = instance.get_continuous_states(), []
+        for t in TIME:
+            at(t, x)
+            rows.append(instance.get(["tau1", "roll"])[0])
+            slope, total = 0 * x, 0 * x
+            for node, weight in zip(nodes, weights):
+                at(t + node * H, x + node * H * slope)
+                slope = instance.get_derivatives()
+                total = total + weight * slope
+            x = x + H * total
+    torque, roll = np.array(rows).T
+    return torque, roll
+
+
+ODE4 = (0, 0.5, 0.5, 1), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
+
+
+def test_fixed_steps_in_model_exchange(fmu, exact):
+    """Explicit Euler in OpenModelica, and Simulink's ode4 with FMIKit."""
+    torque, roll = shares(exact, *in_model_exchange(fmu, (0,), (1,)))
+    states("docs/compatibility.md", f"off by {roll:.1f} % in roll and", f"{torque:.1f} % in torque")
+    states("docs/fmu-page/text/testbed/3_loading.html", f"is {roll:.1f} % off in roll", f"{torque:.1f} % in torque")
+    torque, roll = shares(exact, *in_model_exchange(fmu, *ODE4))
+    assert roll < torque
+    for name in ("docs/compatibility.md", "docs/fmu-page/text/testbed/3_loading.html"):
+        states(name, "ode4 at 1 ms", f"{torque:.0e} %".replace("e-0", "e-"))
+
+
+def test_rates_of_zero_in_model_exchange(fmu, exact):
+    torque, roll = shares(exact, *in_model_exchange(fmu, *ODE4, moved=0.0))
+    for name in ("docs/importers-known-faults.md", "docs/fmu-page/text/testbed/3_loading.html"):
+        states(name, "Fig. 4", f"roll is {roll:.0f} %", f"{torque:.0f} %")
