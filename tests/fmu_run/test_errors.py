@@ -333,7 +333,9 @@ def test_the_interface_type_must_exist(tmp_path, unruly):
 
     with fmu_run.Fmu(repacked(unruly, tmp_path / "model_exchange.fmu", change)) as fmu:
         for call in (lambda: fmu.run([0.0, 1.0], outputs=["y"], interface="co_simulation"), fmu.instances):
-            with pytest.raises(fmu_run.FmuError, match="no Co-Simulation, only Model Exchange; `run` of this FMU integrates it"):
+            with pytest.raises(
+                fmu_run.FmuError, match="no Co-Simulation, only Model Exchange; `run` of this FMU integrates it"
+            ):
                 call()
         # The guid belongs to the other description.
         assert list(fmu.run([0.0, 1.0], outputs=["y"]).errors) == [0]

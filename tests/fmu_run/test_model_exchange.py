@@ -152,7 +152,11 @@ def test_arguments(wrist, controller):
             wrist.run([0.0, 1.0], outputs=["roll"], **arguments)
 
     wrong("interface must be 'co-simulation' or 'model-exchange', it is 'cs'", interface="cs")
-    wrong("there is no solver 'euler'|no solver \"euler\"; there are auto, dopri5", interface="model_exchange", solver="euler")
+    wrong(
+        "there is no solver 'euler'|no solver \"euler\"; there are auto, dopri5",
+        interface="model_exchange",
+        solver="euler",
+    )
     wrong("solver, rtol, atol, max_step and events are for Model Exchange", rtol=1e-6)
     wrong("rtol is 0; it must be above 0", interface="model_exchange", rtol=0.0)
     wrong("read_before_set is for Co-Simulation", interface="model_exchange", read_before_set=True)
@@ -165,5 +169,7 @@ def test_arguments(wrist, controller):
     )
     with fmu_run.Fmu(controller) as law:
         loop = fmu_run.System({"law": law, "wrist": wrist}, {"law.theta1": "wrist.theta1"})
-        with pytest.raises(fmu_run.FmuError, match="systems run in Co-Simulation only, and a single FMU also in Model Exchange"):
+        with pytest.raises(
+            fmu_run.FmuError, match="systems run in Co-Simulation only, and a single FMU also in Model Exchange"
+        ):
             loop.run([0.0, 1.0], outputs=["wrist.roll"], interface="model_exchange")

@@ -74,7 +74,7 @@ fn events_at_known_times_are_exact() {
         assert_eq!(runs.trajectories, [0.0, 0.0, 1.0, 2.0, 3.0, 9.0], "values after the events");
         let events: Vec<_> =
             runs.events.iter().map(|event| (event.time, event.before[0], event.after[0])).collect();
-        assert_eq!(events, (1..10).map(|k| f64::from(k)).map(|k| (k, k - 1.0, k)).collect::<Vec<_>>());
+        assert_eq!(events, (1..10).map(f64::from).map(|k| (k, k - 1.0, k)).collect::<Vec<_>>());
     }
 }
 
@@ -159,7 +159,7 @@ fn discrete_inputs_change_at_events() {
             let before = 2.0 * (1.0 - (-(time.min(0.8) - 0.3_f64)).exp());
             if time <= 0.8 { before } else { -1.0 + (before + 1.0) * (-(time - 0.8)).exp() }
         };
-        [(3, 0.5), (4, 1.0)].map(|(k, time)| close(runs.trajectories[k], at(time), 1e-8));
+        [(3, 0.5), (4, 1.0)].iter().for_each(|&(k, time)| close(runs.trajectories[k], at(time), 1e-8));
         assert_eq!(runs.events.iter().map(|event| event.time).collect::<Vec<_>>(), [0.3, 0.8]);
     }
 }
