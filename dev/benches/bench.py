@@ -244,6 +244,58 @@ def many_runs() -> None:
             case.close()
 
 
+def exchange() -> None:
+    """Compares Model Exchange with FMPy's CVode, from the same loaded FMU, and one thread with two."""
+    grid = np.arange(SAMPLES) * STEP
+    angle, rate = 0.3 * np.sin(14 * grid), 4.2 * np.cos(14 * grid)
+    cases: dict[str, dict[str, np.ndarray]] = {
+        "free vibration": {},
+        "a moving motor": {"theta1": angle, "omega1": rate},
+    }
+    start: dict[str, Any] = {"start_at_rest": False, "theta5_start": 0.3}
+    path = FMUS / "prw_testbed.fmu"
+    description, directory = fmpy.read_model_description(str(path)), fmpy.extract(str(path))
+    slave = instantiate_fmu(directory, description, fmi_type="ModelExchange")
+    rows = []
+    with fmu_run.Fmu(path) as fmu:
+        for name, inputs in cases.items():
+            types = [("time", np.float64), *[(one, np.float64) for one in inputs]]
+            signals = np.array(list(zip(grid, *inputs.values())), dtype=types) if inputs else None
+            kept: dict[str, Any] = {"outputs": ["roll", "tau1"], "interface": "model_exchange", "rtol": 1e-6}
+
+            def by_fmpy(signals: Any = signals) -> tuple[float, np.ndarray]:
+                begin = time.perf_counter()
+                found = fmpy.simulate_fmu(
+                    directory,
+                    model_description=description,
+                    fmu_instance=slave,
+                    fmi_type="ModelExchange",
+                    stop_time=grid[-1],
+                    output_interval=STEP,
+                    relative_tolerance=1e-6,
+                    start_values=start,
+                    input=signals,
+                    output=["roll", "tau1"],
+                )
+                seconds = time.perf_counter() - begin
+                slave.reset()
+                return seconds, found["roll"]
+
+            def ours(threads: int, inputs: Any = inputs, kept: Any = kept) -> tuple[float, np.ndarray]:
+                begin, runs = time.perf_counter(), RUNS // 20 or 2
+                values = {**start, "k1": np.full(runs, 120.5)}
+                found = fmu.run(grid, inputs=inputs, start=values, threads=threads, **kept).check()["roll"]
+                return (time.perf_counter() - begin) / runs, found[0]
+
+            if not inputs:
+                np.testing.assert_allclose(ours(1)[1], by_fmpy()[1], rtol=0, atol=1e-3)
+            one = least(ours, 1)
+            rows.append((name, least(by_fmpy) / one, one / least(ours, 2)))
+    slave.freeInstance()
+    shutil.rmtree(directory)
+    table("exchange", ("testbed in Model Exchange", "FMPy with CVode / one thread", "two threads, throughput"), *rows)
+
+
 def least(body: Callable[..., tuple[float, Any]], *arguments: Any) -> float:
     return min(body(*arguments)[0] for _ in range(ROUNDS))
 
@@ -322,6 +374,7 @@ def main() -> None:
     guid = prepare(options.fmu)
     steps(guid, options.sources)
     many_runs()
+    exchange()
     instances(guid)
     loops()
     write_figures()

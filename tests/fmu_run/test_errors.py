@@ -327,14 +327,20 @@ def test_progress(testbed):
         assert fmu.run(TIME, outputs=["roll"]).count == 1
 
 
-def test_runs_need_co_simulation(tmp_path, unruly):
+def test_the_interface_type_must_exist(tmp_path, unruly):
     def change(name, content):
         return content.replace(b"<CoSimulation", b"<ModelExchange")
 
     with fmu_run.Fmu(repacked(unruly, tmp_path / "model_exchange.fmu", change)) as fmu:
-        for call in (lambda: fmu.run([0.0, 1.0], outputs=["y"]), fmu.instances):
-            with pytest.raises(fmu_run.FmuError, match="no Co-Simulation, only Model Exchange, which needs a solver"):
+        for call in (lambda: fmu.run([0.0, 1.0], outputs=["y"], interface="co_simulation"), fmu.instances):
+            with pytest.raises(
+                fmu_run.FmuError, match="no Co-Simulation, only Model Exchange; `run` of this FMU integrates it"
+            ):
                 call()
+        # The guid belongs to the other description.
+        assert list(fmu.run([0.0, 1.0], outputs=["y"]).errors) == [0]
+    with fmu_run.Fmu(unruly) as fmu, pytest.raises(fmu_run.FmuError, match="has no Model Exchange"):
+        fmu.run([0.0, 1.0], outputs=["y"], interface="model_exchange")
 
 
 def test_arguments_of_wrong_types_are_named(fmu, testbed):

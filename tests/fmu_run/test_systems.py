@@ -139,7 +139,7 @@ def test_connected_inputs_cannot_be_set() -> None:
                 call()
         with pytest.raises(ValueError, match="of one FMU and not of a system"):
             pair.directional_derivative("testbed.tau1", "controller.roll_ref", 1.0)
-        with pytest.raises(fmu_run.FmuError, match="system is a system, which has Co-Simulation only"):
+        with pytest.raises(fmu_run.FmuError, match="system is a system; systems run in Co-Simulation only"):
             loop.instances(interface="model-exchange")
         # The error message of an FMU contains the name of its component.
         runs = loop.run([0, 1e-3], start={"testbed.k1": [-1.0, 90.0]}, outputs=["testbed.roll"])

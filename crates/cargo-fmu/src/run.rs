@@ -7,8 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 use fmu_package::terminal::{fmi_version, short};
 use fmu_package::{BuildOptions, Standard};
 use fmu_run::{
-    BaseType, Batch, Description, Fmu, Interface, Logged, Runs, Start, Status, Trajectory, Variable, Watch,
-    nearest,
+    BaseType, Batch, Description, Fmu, Logged, Runs, Start, Status, Trajectory, Variable, Watch, nearest,
 };
 use std::collections::BTreeMap;
 use std::fs;
@@ -163,13 +162,6 @@ fn simulate(options: &Options, path: &Path, directory: &Path) -> Result<bool> {
     #[allow(unsafe_code)]
     let fmu = unsafe { Fmu::open(path) }?;
     let description = fmu.description();
-    ensure!(
-        description.offer(Interface::CoSimulation).is_some(),
-        "{} is for Model Exchange only and needs an importer with a solver; add CoSimulation, or \
-         use such an importer (FMPy: `fmpy simulate {} --show-plot`)",
-        description.model_name,
-        short(path)
-    );
     let table = options.input.as_deref().map(Table::read).transpose()?;
     let shown = shown(&options.show, description)?;
     let starts = options

@@ -1,6 +1,7 @@
 //! The commands of `cargo fmu`, from a new model to a checked FMU.
 #![allow(missing_docs)]
 
+use fmu_run::{Batch, Fmu, Integration, Interface, Start, Watch};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
@@ -85,8 +86,52 @@ fn develop(from: &str, arguments: &[&str], columns: &str, trajectory: &str) -> D
             (&"Co-Simulation".into(), &Value::Array(vec![]))
         );
         assert_eq!(findings(&report), listed(from), "{path}");
+        exchanges(&directory.path(&format!("{name}/{path}")), from);
     }
     directory
+}
+
+/// Model Exchange gives the same results as Co-Simulation, whose steps are independent of it. Tolerances are relative to the peak of
+/// an output; the steps of the motor and of the house are approximations.
+fn exchanges(fmu: &Path, from: &str) {
+    let (outputs, end, tolerance) = match from {
+        "ball" => (vec!["height", "velocity"], 3.0, 1e-8),
+        "motor" => (vec!["current", "speed"], 0.05, 1e-5),
+        "house" => (vec!["room"], 86_400.0, 1e-3),
+        _ => (vec!["x"], 1.0, 1e-8),
+    };
+    // SAFETY: the FMU of these tests.
+    #[allow(unsafe_code)]
+    let fmu = unsafe { Fmu::open(fmu) }.unwrap();
+    let time: Vec<_> = (0..=500).map(|k| end * f64::from(k) / 500.0).collect();
+    let run = |interface| {
+        let integration = match interface {
+            Interface::ModelExchange => Integration { rtol: Some(1e-9), ..Integration::default() },
+            Interface::CoSimulation => Integration::default(),
+        };
+        let start = if from == "lag" { vec![("u", Start::Same(1.0))] } else { vec![] };
+        let (outputs, interface) = (outputs.clone(), Some(interface));
+        let batch =
+            Batch { time: &time, start, outputs, every: Some(1), interface, integration, ..Batch::default() };
+        let watch = Watch::default();
+        let runs = fmu.run(&batch, &watch).unwrap();
+        (runs.trajectories, watch.ended().first().map(|(_, time, _)| *time))
+    };
+    let [(exchanged, end), (stepped, expected)] =
+        [Interface::ModelExchange, Interface::CoSimulation].map(run);
+    assert_eq!(end.is_some(), expected.is_some());
+    assert!((end.unwrap_or_default() - expected.unwrap_or_default()).abs() < 1e-9, "{end:?} {expected:?}");
+    for (name, (one, other)) in outputs.iter().zip(exchanged.chunks(501).zip(stepped.chunks(501))) {
+        let peak = other
+            .iter()
+            .copied()
+            .filter(|value| value.is_finite())
+            .fold(0.0, |peak: f64, x| peak.max(x.abs()));
+        for (k, (one, other)) in one.iter().zip(other).enumerate() {
+            let same = (one - other).abs() <= tolerance * peak || one.is_nan() && other.is_nan();
+            assert!(same, "{name} is {one} at {} s, in Co-Simulation {other}", time[k]);
+        }
+    }
 }
 
 /// Returns the observations of a report, without the names of functions, which depend on the FMI version, and without the version

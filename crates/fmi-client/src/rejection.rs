@@ -48,7 +48,8 @@ impl Rejection {
     }
 
     /// Records that the FMU requests the end of the simulation, at this time, s.
-    pub(crate) fn at_end(mut self, time: f64) -> Self {
+    #[must_use]
+    pub fn at_end(mut self, time: f64) -> Self {
         self.0.ended = Some(time);
         self
     }

@@ -76,7 +76,9 @@ impl Loaded {
         let name = &self.description.model_name;
         match interface {
             Interface::CoSimulation => self.co_simulation.as_ref().ok_or_else(|| {
-                Error::Fmu(format!("{name} has no Co-Simulation, only Model Exchange, which needs a solver"))
+                Error::Fmu(format!(
+                    "{name} has no Co-Simulation, only Model Exchange; `run` of this FMU integrates it, but in systems it is not supported"
+                ))
             }),
             Interface::ModelExchange => match &self.model_exchange {
                 Ok(library) => {

@@ -8,6 +8,7 @@
 
 mod arrays;
 mod batch;
+mod continuous;
 mod description;
 mod error;
 mod files;
@@ -26,7 +27,8 @@ mod system;
 mod threads;
 mod values;
 
-pub use batch::{Batch, Finished, Measure, Planned, Runs, Size, Trajectory, Watch};
+pub use batch::{Batch, Finished, Measure, Occurrence, Planned, Runs, Size, Trajectory, Watch};
+pub use continuous::{Integration, Solver};
 pub use description::{Description, Variable};
 pub use error::Error;
 pub use fmi_abi::description::{ModelDescription, Offer, Unknown};

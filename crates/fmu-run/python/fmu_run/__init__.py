@@ -30,11 +30,14 @@ from numpy.typing import ArrayLike, NDArray
 from fmu_run._native import FmuError, Instances, States
 from fmu_run._native import Loaded as _Loaded
 from fmu_run._native import numbers as _numbers
-from fmu_run.runs import Runs
+from fmu_run.runs import Event, Runs
 
-__all__ = ["Fmu", "FmuError", "Instances", "Log", "Measure", "Runs", "Start", "States", "System", "Variable"]
+__all__ = ["Event", "Fmu", "FmuError", "Instances", "Log", "Measure", "Runs", "Start", "States", "System", "Variable"]
 
 Measure = Literal["min", "max", "peak", "time_of_peak", "mean", "rms", "end"]
+#: Interface type of FMI; both spellings are the same.
+Interface = Literal["co-simulation", "model-exchange", "co_simulation", "model_exchange"]
+Solver = Literal["auto", "dopri5", "dop853", "bdf", "rk4"]
 _Array = NDArray[np.float64]
 
 #: A start value: one for all runs or instances, or one for each. Strings are values of strings or names of enumeration items; a
@@ -111,6 +114,12 @@ class _Model:
         progress: Callable[[int, int], Any] | None = None,
         tolerance: float | Literal["default"] | None = "default",
         log: Log | None = None,
+        interface: Interface | None = None,
+        solver: Solver = "auto",
+        rtol: float | None = None,
+        atol: float | None = None,
+        max_step: float | None = None,
+        events: bool = False,
     ) -> Runs:
         """Run the FMU, once for each run that has values, or once if all values are for all runs.
 
@@ -132,9 +141,10 @@ class _Model:
             {"u": (times, values)}, values of the shape (times,) or (runs, times): between its times, a continuous variable follows the
             line, and any other keeps the earlier value; equal times are a step; before the first and after the last time the
             value is constant. Strings and bytes are given in the same shapes. Values of a whole array have its dimensions after
-            these; a constant array has only its own.
+            these; a constant array has only its own. In Model Exchange, "der(u)" is the derivative of the input u.
         input_derivatives
-            d/dt of inputs, in the same shapes, for FMUs of FMI 2.0 that can interpolate inputs.
+            d/dt of inputs, in the same shapes: in Co-Simulation for FMUs of FMI 2.0 that can interpolate inputs, in Model Exchange for
+            any continuous input, which then follows a cubic between its times instead of a line.
         start
             Start values of parameters, states and so on by name: one for all runs or (runs,) for each run; numbers,
             strings, bytes, enumeration items, or numbers with a unit, {"k1": (1.9, "N.m/deg")}. A whole array has its own shape for all
@@ -158,6 +168,22 @@ class _Model:
         log
             Receives the messages of the FMU, whose logging is then switched on: a function that is called with the index of the
             run, status, category and message, or a `logging.Logger`. The index is None if the FMU does not tell.
+        interface
+            "co-simulation" or "model-exchange". Default: Co-Simulation, or Model Exchange if the FMU has nothing else. In Model
+            Exchange the states are integrated here, from event to event. Continuous inputs are functions of time: the line between
+            two values, also between the values at two communication points, so that results converge with the tolerance of the solver.
+            All other inputs change in Event Mode. Systems run in Co-Simulation only.
+        solver
+            In Model Exchange: "dop853" and "dopri5" (Runge-Kutta of order 8 and 5), "bdf" (for stiff models), "auto" (dop853, and bdf
+            once the model proves stiff), or "rk4": fixed steps from one communication point to the next, or shorter than `max_step`.
+        rtol, atol
+            Tolerances of the solver, in Model Exchange. Default of rtol: the tolerance of the default experiment, or 1e-6; of atol:
+            a hundredth of rtol. atol is for a state whose nominal value is 1; other states have a multiple of it.
+        max_step
+            The largest step of the solver, s. An event indicator that changes its sign twice within a step, and between two
+            communication points, remains unnoticed.
+        events
+            Keep the outputs before and after each event, in `Runs.events`.
 
         Returns
         -------
@@ -191,6 +217,10 @@ class _Model:
                 progress,
                 tolerance,
                 log,
+                interface,
+                solver,
+                (rtol, atol, max_step),
+                events,
             )
         )
 
@@ -225,7 +255,7 @@ class _Model:
         self,
         count: int = 1,
         *,
-        interface: Literal["co-simulation", "model-exchange"] = "co-simulation",
+        interface: Interface = "co-simulation",
         start: Mapping[str, Start] | None = None,
         start_time: float = 0.0,
         stop_time: float | None = None,

@@ -42,6 +42,10 @@ class Loaded:
         progress: Callable[[int, int], Any] | None,
         tolerance: float | str | None,
         log: Any,
+        interface: str | None,
+        solver: str,
+        tolerances: tuple[_Number, _Number, _Number],
+        events: bool,
     ) -> tuple[
         _Array,
         list[str],
@@ -53,6 +57,7 @@ class Loaded:
         dict[str, Any],
         dict[str, tuple[tuple[int, ...], list[str]]] | None,
         dict[str, NDArray[Any]],
+        list[tuple[int, float, list[float], list[float]]],
     ]: ...
 
 def numbers(name: str, values: ArrayLike) -> _Array: ...

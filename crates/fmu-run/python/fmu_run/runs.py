@@ -6,7 +6,7 @@ import importlib
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,18 @@ if TYPE_CHECKING:
 _Array = NDArray[np.float64]
 #: Ending of the name of a start value whose variable is an output, too.
 AT_START = " at start"
+
+
+class Event(NamedTuple):
+    """An event in Model Exchange."""
+
+    #: The index of the run.
+    run: int
+    #: s.
+    time: float
+    #: Outputs before and after the event, by name; the elements of an array by their names, such as y[1].
+    before: dict[str, float]
+    after: dict[str, float]
 
 
 class Runs(Mapping[str, _Array]):
@@ -53,6 +65,7 @@ class Runs(Mapping[str, _Array]):
         start: Mapping[str, Any],
         arrays: Mapping[str, tuple[tuple[int, ...], list[str]]] | None = None,
         exact: Mapping[str, NDArray[Any]] | None = None,
+        events: Iterable[tuple[int, float, list[float], list[float]]] = (),
     ):
         self.time, self._errors, self.notes = time, dict(errors), dict(notes)
         self._reported, self._checked = not self._errors, set[str | tuple[str, str]]()
@@ -62,6 +75,16 @@ class Runs(Mapping[str, _Array]):
         self._arrays = arrays or {}
         #: Outputs whose values float64 does not have.
         self._exact = exact or {}
+        self._events = list(events)
+
+    @cached_property
+    def events(self) -> list[Event]:
+        """The events of all runs in Model Exchange, by run and time; empty unless `Fmu.run` was called with events=True."""
+        names = [element for name in self._numbers for element in self._elements(name)]
+        return [
+            Event(run, time, dict(zip(names, before, strict=True)), dict(zip(names, after, strict=True)))
+            for run, time, before, after in self._events
+        ]
 
     @cached_property
     def start(self) -> dict[str, Any]:

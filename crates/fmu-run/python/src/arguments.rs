@@ -1,7 +1,7 @@
 //! Arguments of Python functions. An error names the argument.
 
 use crate::buffers::array_of;
-use fmu_run::{System, Tolerance};
+use fmu_run::{Integration, Interface, System, Tolerance};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString, PyTuple};
@@ -50,6 +50,30 @@ pub fn tolerance(value: &Bound<'_, PyAny>) -> PyResult<Tolerance> {
     number("tolerance", value)
         .map(Tolerance::Value)
         .map_err(|_| wrong("tolerance", "a number, None or 'default'", value))
+}
+
+/// Returns an interface type; its name may have an underscore, as in Python, or a hyphen.
+pub fn interface(value: &Bound<'_, PyAny>) -> PyResult<Interface> {
+    let name = value.extract::<String>().map(|name| name.replace('_', "-"));
+    match name.as_deref() {
+        Ok("co-simulation") => Ok(Interface::CoSimulation),
+        Ok("model-exchange") => Ok(Interface::ModelExchange),
+        _ => Err(wrong("interface", "'co-simulation' or 'model-exchange'", value)),
+    }
+}
+
+/// Returns the settings of the integration in Model Exchange.
+pub fn integration(
+    solver: &Bound<'_, PyAny>,
+    [rtol, atol, max_step]: [Option<&Bound<'_, PyAny>>; 3],
+) -> PyResult<Integration> {
+    let given = |name, value: Option<&Bound<'_, PyAny>>| value.map(|value| number(name, value)).transpose();
+    Ok(Integration {
+        solver: text("solver", solver)?.parse().map_err(PyValueError::new_err)?,
+        rtol: given("rtol", rtol)?,
+        atol: given("atol", atol)?,
+        max_step: given("max_step", max_step)?,
+    })
 }
 
 /// Returns a Boolean of Python or NumPy, or one of the numbers 0 and 1.

@@ -123,11 +123,7 @@ impl Instances {
         tolerance: &Bound<'_, PyAny>,
         log: Optional,
     ) -> PyResult<Self> {
-        let interface = match interface.extract::<String>().as_deref() {
-            Ok("co-simulation") => Interface::CoSimulation,
-            Ok("model-exchange") => Interface::ModelExchange,
-            _ => return Err(wrong("interface", "'co-simulation' or 'model-exchange'", interface)),
-        };
+        let interface = arguments::interface(interface)?;
         let count = arguments::count("count", Some(count))?.unwrap_or(1);
         let threads = arguments::count("threads", threads.as_ref())?;
         let start_time = finite("start_time", start_time)?;

@@ -58,7 +58,8 @@ type Stages = Vec<Pairs>;
 /// Messages by run.
 type Messages = Vec<(usize, String)>;
 /// Kept times; outputs; trajectories, (runs, outputs, times); names and values of statistics, (runs, outputs, statistics); errors;
-/// notes; start values; shapes and elements of whole arrays; values that float64 does not have, (runs, times) by output.
+/// notes; start values; shapes and elements of whole arrays; values that float64 does not have, (runs, times) by output; events: run,
+/// time, outputs before and after.
 type Results<'py> = (
     Bound<'py, PyAny>,
     Vec<String>,
@@ -70,6 +71,7 @@ type Results<'py> = (
     Bound<'py, PyDict>,
     Option<Bound<'py, PyDict>>,
     Bound<'py, PyDict>,
+    Vec<(usize, f64, Vec<f64>, Vec<f64>)>,
 );
 
 fn python(error: Error) -> PyErr {
@@ -212,6 +214,10 @@ impl Loaded {
         progress: Option<Bound<'py, PyAny>>,
         tolerance: Bound<'py, PyAny>,
         log: Option<Bound<'py, PyAny>>,
+        interface: Option<Bound<'py, PyAny>>,
+        solver: Bound<'py, PyAny>,
+        tolerances: [Option<Bound<'py, PyAny>>; 3],
+        events: Bound<'py, PyAny>,
     ) -> PyResult<Results<'py>> {
         let (model, start) = Start::configured(&*self.model()?, start.as_ref())?;
         let log = Log::of(log.as_ref())?;
@@ -238,6 +244,9 @@ impl Loaded {
             threads: arguments::count("threads", threads.as_ref())?,
             read_before_set: arguments::flag("read_before_set", &read_before_set)?,
             tolerance: arguments::tolerance(&tolerance)?,
+            interface: interface.as_ref().map(arguments::interface).transpose()?,
+            integration: arguments::integration(&solver, tolerances.each_ref().map(Option::as_ref))?,
+            events: arguments::flag("events", &events)?,
         };
         let planned = model.plan(&batch).map_err(python)?;
         let size = planned.size();
@@ -256,12 +265,14 @@ impl Loaded {
         let mut measured = (!measures.is_empty()).then(|| array(size.measures)).transpose()?;
         let measured_values = measured.as_mut().map_or(&mut [][..], |(_, output)| output.values());
         let results = [kept.values(), measured_values];
-        let Finished { errors, notes, exact } =
+        let Finished { errors, notes, exact, events } =
             carry_out(py, &planned, results, progress.map(Bound::unbind), log)?;
         let exact = exact_outputs(py, &model, &planned, &exact)?;
         let measured = measured.map(|(array, _)| array);
         let (start, arrays) = (start.dict(py)?, arrays.dict(py)?);
-        Ok((times, outputs, trajectories, measures, measured, errors, notes, start, arrays, exact))
+        let events =
+            events.into_iter().map(|event| (event.run, event.time, event.before, event.after)).collect();
+        Ok((times, outputs, trajectories, measures, measured, errors, notes, start, arrays, exact, events))
     }
 }
 

@@ -26,6 +26,8 @@ struct Signal {
 enum Values {
     Numbers(Numbers),
     Exact(Vec<Value>),
+    /// The derivative of another input.
+    RateOf(String),
 }
 
 impl Signals {
@@ -43,6 +45,11 @@ impl Signals {
                     Some(array) => (&*array.sizes, &*array.names),
                 };
                 signals.push_exact(name, sizes, Exact::of(name, &value)?, elements, (own_times, times))?;
+                continue;
+            }
+            if let Some(other) = rate_of(name, &value)? {
+                let (name, values) = (name.clone(), Values::RateOf(other));
+                signals.0.push(Signal { name, values, times: None, by_time: false, by_run: false });
                 continue;
             }
             let values = Numbers::of(name, &in_own_unit(system, name, &value)?)?;
@@ -81,6 +88,7 @@ impl Signals {
         let trajectories = self.0.iter().map(|Signal { name, values, times, by_time, by_run }| {
             let times = times.as_ref().filter(|_| *by_time).map(|times| times.values());
             let trajectory = match (values, by_time, by_run) {
+                (Values::RateOf(other), ..) => Trajectory::RateOf(other),
                 (Values::Exact(values), false, _) => Trajectory::Value(&values[0]),
                 (Values::Exact(values), true, _) => match times {
                     Some(times) => Trajectory::SampledValues { times, values },
@@ -141,6 +149,18 @@ impl Signals {
             self.0.push(Signal { name, values, times: own_times.clone(), by_time, by_run });
         }
         Ok(())
+    }
+}
+
+/// Returns the name of the input whose derivative is requested by `der(name)`.
+fn rate_of(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Option<String>> {
+    let Ok(text) = given.cast::<PyString>() else { return Ok(None) };
+    let text: String = text.extract()?;
+    match text.strip_prefix("der(").and_then(|text| text.strip_suffix(')')) {
+        Some(other) => Ok(Some(other.to_owned())),
+        None => Err(PyValueError::new_err(format!(
+            "{name} is {text:?}; the value of a number is a number, or the derivative of another input, such as \"der(u)\""
+        ))),
     }
 }
 

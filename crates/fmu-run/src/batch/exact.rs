@@ -31,6 +31,9 @@ impl Input {
         let (values, length) = match trajectory {
             Trajectory::Constant(value) => (reals(&[value]), 0),
             Trajectory::Shared(values) | Trajectory::EachRun(values) => (reals(values), time.len()),
+            Trajectory::RateOf(_) => {
+                return request(format!("{name} is no floating-point number and has no rate"));
+            }
             Trajectory::Value(value) => (vec![value.clone()], 0),
             Trajectory::Values(values) => (values.to_vec(), time.len()),
             Trajectory::Sampled { times, values } => {
@@ -74,12 +77,17 @@ impl Input {
         (0..times).for_each(|time| self.value(run, time).to_string().hash(hash));
     }
 
+    /// Returns whether the value at the time with this index differs from the one before.
+    pub fn changes(&self, run: usize, time: usize) -> bool {
+        time == 0 || self.value(run, time) != self.value(run, time - 1)
+    }
+
     /// Sets the value at the time with this index, if it differs from the one before.
     pub fn set(&self, instance: &mut Running, run: usize, time: usize) -> Result<(), Rejection> {
-        let value = self.value(run, time);
-        if time > 0 && value == self.value(run, time - 1) {
+        if !self.changes(run, time) {
             return Ok(());
         }
+        let value = self.value(run, time);
         self.targets.iter().try_for_each(|target| instance.set_value(*target, value))
     }
 }

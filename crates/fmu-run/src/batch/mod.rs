@@ -2,6 +2,7 @@
 
 mod exact;
 mod grid;
+mod integrated;
 mod measure;
 mod plan;
 mod pulse;
@@ -11,24 +12,29 @@ mod run;
 pub use measure::Measure;
 pub use run::Watch;
 
+use crate::continuous::Integration;
 use crate::error::Error;
 use crate::instance::Tolerance;
 use crate::start::Start;
 use crate::system::System;
-use fmi_abi::Value;
+use fmi_abi::{Interface, Value};
 
 /// Specification of runs. If an input or a start value is given for each run, there are many runs; otherwise
 /// there is one.
 ///
 /// In each run, start values are set before Initialization Mode, and inputs of the first time in it. At each
 /// time, inputs are set, outputs are read, and a step to the next time follows.
+///
+/// In Model Exchange, the states are integrated between the events. Continuous inputs are functions of time: the line between two
+/// values, or the cubic that has the [given derivatives](Self::input_derivatives), too. All other inputs change in Event Mode.
 #[derive(Clone, Debug, Default)]
 pub struct Batch<'a> {
     /// Communication points, s: finite, increasing, at least two.
     pub time: &'a [f64],
     /// Inputs and their values. All other inputs keep their start values.
     pub inputs: Vec<(&'a str, Trajectory<'a>)>,
-    /// Time derivatives of inputs, of order 1, set together with the inputs (only FMI 2.0).
+    /// Time derivatives of inputs, of order 1. In Co-Simulation they are set together with the inputs (only FMI 2.0); in Model
+    /// Exchange they belong to the values of a continuous input, at the same times.
     pub input_derivatives: Vec<(&'a str, Trajectory<'a>)>,
     /// Start values of parameters, states, inputs and so on.
     pub start: Vec<(&'a str, Start<'a>)>,
@@ -47,6 +53,12 @@ pub struct Batch<'a> {
     pub read_before_set: bool,
     /// Relative tolerance for solvers inside the FMU.
     pub tolerance: Tolerance,
+    /// Interface type; `None` means Co-Simulation, or Model Exchange if the FMU has nothing else.
+    pub interface: Option<Interface>,
+    /// Solver and tolerances, in Model Exchange.
+    pub integration: Integration,
+    /// Whether the outputs before and after each event are kept in [`Runs::events`], in Model Exchange.
+    pub events: bool,
 }
 
 /// Values of an input.
@@ -71,6 +83,8 @@ pub enum Trajectory<'a> {
     Value(&'a Value),
     /// Values of any type: one for each time, or times for each run, concatenated. They are held between times.
     Values(&'a [Value]),
+    /// The time derivative of another input, by its name, in Model Exchange.
+    RateOf(&'a str),
     /// Values of any type at the input's own times, s.
     SampledValues {
         /// Times, s.
@@ -84,7 +98,7 @@ impl Trajectory<'_> {
     /// Returns the number of values, and of times that they are for; `None` if one value is for all times.
     fn counts(&self, times: usize) -> Option<(usize, usize)> {
         match self {
-            Self::Constant(_) | Self::Value(_) => None,
+            Self::Constant(_) | Self::Value(_) | Self::RateOf(_) => None,
             Self::Shared(values) | Self::EachRun(values) => Some((values.len(), times)),
             Self::Values(values) => Some((values.len(), times)),
             Self::Sampled { times, values } => Some((values.len(), times.len())),
@@ -146,6 +160,21 @@ pub struct Runs {
     /// Notes about runs that reached the last time: the FMU ended the simulation there, or its termination
     /// failed.
     pub notes: Vec<(usize, String)>,
+    /// Events of each run, in the order of runs and times, if they were [requested](Batch::events).
+    pub events: Vec<Occurrence>,
+}
+
+/// An event in Model Exchange, with the outputs before and after it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Occurrence {
+    /// Index of the run.
+    pub run: usize,
+    /// Time, s.
+    pub time: f64,
+    /// Outputs before the event, except those in [`Runs::exact`].
+    pub before: Vec<f64>,
+    /// Outputs after the event.
+    pub after: Vec<f64>,
 }
 
 impl System {
@@ -159,8 +188,9 @@ impl System {
         let planned = self.plan(batch)?;
         let size = planned.size();
         let [mut trajectories, mut measures] = [zeros(size.trajectories())?, zeros(size.measures())?];
-        let Finished { errors, notes, exact } = planned.run(watch, &mut trajectories, &mut measures)?;
-        Ok(Runs { size, trajectories, measures, exact, errors, notes })
+        let Finished { errors, notes, exact, events } =
+            planned.run(watch, &mut trajectories, &mut measures)?;
+        Ok(Runs { size, trajectories, measures, exact, errors, notes, events })
     }
 
     /// Checks a batch, for callers that provide the memory for its results.
@@ -188,6 +218,8 @@ pub struct Finished {
     pub notes: Vec<(usize, String)>,
     /// As [`Runs::exact`].
     pub exact: Vec<Option<Value>>,
+    /// As [`Runs::events`].
+    pub events: Vec<Occurrence>,
 }
 
 impl Planned<'_> {

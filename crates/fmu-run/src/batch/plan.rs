@@ -2,9 +2,12 @@
 
 use super::exact::Input;
 use super::grid::Grid;
+use super::integrated::Integrated;
 use super::{Batch, Measure, Trajectory};
+use crate::continuous::Integration;
+use crate::description::Variable;
 use crate::error::{Error, request};
-use crate::found::article;
+use crate::found::{Found, article};
 use crate::instance::Tolerance;
 use crate::selection::{Selection, Target, fits};
 use crate::start::{Start, StartValues, is_exact};
@@ -32,6 +35,9 @@ pub(super) struct Plan<'a> {
     pub threads: usize,
     pub read_before_set: bool,
     pub tolerance: Tolerance,
+    pub interface: Interface,
+    /// Inputs and settings of Model Exchange.
+    pub integrated: Option<Integrated<'a>>,
 }
 
 /// Inputs and their values.
@@ -49,6 +55,7 @@ pub(super) enum Numbers<'a> {
     /// At times of the input; whether they are held, and whether each run has its own.
     Sampled {
         grid: Grid,
+        times: &'a [f64],
         values: &'a [f64],
         is_held: bool,
         is_each: bool,
@@ -57,7 +64,7 @@ pub(super) enum Numbers<'a> {
 
 impl<'a> Plan<'a> {
     pub fn of(system: &System, batch: &'a Batch, start: &[(&str, Start<'a>)]) -> Result<Self, Error> {
-        system.check_interface(Interface::CoSimulation)?;
+        let interface = system.interface(batch.interface)?;
         batch.tolerance.check()?;
         let time = checked_time(batch.time)?;
         let runs = runs(batch)?;
@@ -73,9 +80,11 @@ impl<'a> Plan<'a> {
             exact_outputs: Vec::new(),
             every: batch.every,
             measures: &batch.measures,
-            threads: system.threads(Interface::CoSimulation, batch.threads, runs)?,
+            threads: system.threads(interface, batch.threads, runs)?,
             read_before_set: batch.read_before_set,
             tolerance: batch.tolerance,
+            interface,
+            integrated: None,
         };
         if batch.every == Some(0) {
             return request("every must be at least 1".to_owned());
@@ -88,7 +97,13 @@ impl<'a> Plan<'a> {
                 plan.outputs.push(name, &found);
             }
         }
-        plan.find_inputs(system, batch)?;
+        match interface {
+            Interface::CoSimulation => {
+                check_of_co_simulation(batch)?;
+                plan.find_inputs(system, batch)?;
+            }
+            Interface::ModelExchange => plan.integrate(system, batch)?,
+        }
         Ok(plan)
     }
 
@@ -100,24 +115,14 @@ impl<'a> Plan<'a> {
     fn find_inputs(&mut self, system: &System, batch: &'a Batch) -> Result<(), Error> {
         let mut names = Vec::new();
         for (name, trajectory) in &batch.inputs {
-            let variables = system.find(name)?;
-            variables.iter().try_for_each(|found| found.check_own(name))?;
+            let variables = input(system, name)?;
             let of = variables[0].variable;
-            if !of.is_settable() || of.is_structural() || of.variability.as_deref() == Some("fixed") {
-                return request(format!(
-                    "{name} is no input but {} {}; give it a start value",
-                    article(of.variability.as_deref().unwrap_or(&of.causality)),
-                    of.causality
-                ));
-            }
             once(&mut names, name, "inputs")?;
             if is_exact(of.base) {
                 self.exact_inputs.push(Input::of(name, &variables, *trajectory, self.time)?);
                 continue;
             }
-            let is_held =
-                !of.base.is_float() || of.variability.as_deref().is_some_and(|of| of != "continuous");
-            self.inputs.values.push(self.checked(name, of.base, *trajectory, is_held)?);
+            self.inputs.values.push(self.checked(name, of.base, *trajectory, is_held(of))?);
             self.inputs.variables.push(name, &variables);
         }
         let mut names = Vec::new();
@@ -155,7 +160,7 @@ impl<'a> Plan<'a> {
     }
 
     /// Checks the values of an input.
-    fn checked(
+    pub fn checked(
         &self,
         name: &str,
         base: BaseType,
@@ -168,7 +173,12 @@ impl<'a> Plan<'a> {
             Trajectory::EachRun(values) => Numbers::EachRun(values),
             Trajectory::Sampled { times, values } => {
                 let grid = Grid::of(name, times, self.time)?;
-                Numbers::Sampled { grid, values, is_held, is_each: values.len() > times.len() }
+                Numbers::Sampled { grid, times, values, is_held, is_each: values.len() > times.len() }
+            }
+            Trajectory::RateOf(other) => {
+                return request(format!(
+                    "{name} is the derivative of {other}; derivatives of other inputs are for continuous inputs in Model Exchange"
+                ));
             }
             Trajectory::Value(_) | Trajectory::Values(_) | Trajectory::SampledValues { .. } => {
                 return request(format!("{name} is a number; give its values as numbers"));
@@ -184,6 +194,37 @@ impl<'a> Plan<'a> {
         fits(name, base, values)?;
         Ok(numbers)
     }
+}
+
+/// Finds an input, or another variable that may change during a run.
+pub(super) fn input<'s>(system: &'s System, name: &str) -> Result<Vec<Found<'s>>, Error> {
+    let variables = system.find(name)?;
+    variables.iter().try_for_each(|found| found.check_own(name))?;
+    let of = variables[0].variable;
+    if !of.is_settable() || of.is_structural() || of.variability.as_deref() == Some("fixed") {
+        return request(format!(
+            "{name} is no input but {} {}; give it a start value",
+            article(of.variability.as_deref().unwrap_or(&of.causality)),
+            of.causality
+        ));
+    }
+    Ok(variables)
+}
+
+/// Returns whether a variable keeps its value between the times at which it is given.
+pub(super) fn is_held(of: &Variable) -> bool {
+    !of.base.is_float() || of.variability.as_deref().is_some_and(|of| of != "continuous")
+}
+
+/// Fails if settings of Model Exchange are given for Co-Simulation.
+fn check_of_co_simulation(batch: &Batch) -> Result<(), Error> {
+    if batch.events || batch.integration != Integration::default() {
+        return request(
+            "solver, rtol, atol, max_step and events are for Model Exchange; in Co-Simulation the FMU has its own solver, see tolerance"
+                .to_owned(),
+        );
+    }
+    Ok(())
 }
 
 fn checked_time(time: &[f64]) -> Result<&[f64], Error> {
@@ -230,7 +271,7 @@ fn runs(batch: &Batch) -> Result<usize, Error> {
     Ok(found.map_or(1, |(_, runs)| runs))
 }
 
-fn once<'a>(names: &mut Vec<&'a str>, name: &'a str, list: &str) -> Result<(), Error> {
+pub(super) fn once<'a>(names: &mut Vec<&'a str>, name: &'a str, list: &str) -> Result<(), Error> {
     if names.contains(&name) {
         return request(format!("{name} is twice among the {list}"));
     }

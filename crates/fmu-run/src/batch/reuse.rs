@@ -62,7 +62,7 @@ impl Reuse {
 impl Worker<'_> {
     /// Takes an instance of an earlier batch.
     pub fn begin(&mut self) {
-        if self.is_logging() {
+        if !self.may_reuse() {
             return;
         }
         if let Some(Idle { components, given, took }) = self.system.kept().take() {
@@ -83,8 +83,7 @@ impl Worker<'_> {
 
     /// Keeps the instance of a complete run for the next run, if the duration of the run was measured.
     pub fn keep(&mut self, instance: Running, run: usize, took: Option<Duration>) {
-        // With logging on, each run has a new instance, so that its messages are complete.
-        if !self.is_logging()
+        if self.may_reuse()
             && let Some(took) = took
         {
             self.reuse.used = Some(Used { instance, origin: Origin::Run(run), took });
@@ -161,9 +160,17 @@ impl Worker<'_> {
     /// Creates an instance. The error contains the reason, and whether there is no message.
     pub fn create(&mut self) -> Result<Running, (String, bool)> {
         let begin = Instant::now();
-        let instance = Running::new(self.system, Interface::CoSimulation, &self.logging())?;
-        self.system.kept().trust().created(begin.elapsed());
+        let instance = Running::new(self.system, self.plan.interface, &self.logging())?;
+        if self.may_reuse() {
+            self.system.kept().trust().created(begin.elapsed());
+        }
         Ok(instance)
+    }
+
+    /// Returns whether runs may share an instance. With logging on, each run has a new one, so that its messages are complete; in
+    /// Model Exchange, because resets are only proven for Co-Simulation.
+    fn may_reuse(&self) -> bool {
+        !self.is_logging() && self.plan.interface == Interface::CoSimulation
     }
 
     fn given_in(&self, origin: Origin) -> Given {

@@ -1,11 +1,11 @@
 //! Performs a plan: each thread takes the next run, until none is left.
 
-use super::Finished;
 use super::grid::Grid;
 use super::measure::Measured;
 use super::plan::{Inputs, Numbers, Plan};
 use super::pulse::Pulse;
 use super::reuse::{Choice, Reuse};
+use super::{Finished, Occurrence};
 use crate::error::Error;
 use crate::instance::Experiment;
 use crate::messages::{Feed, Logged, Logging};
@@ -150,15 +150,18 @@ pub(super) fn run(
             }
             watch.done.fetch_add(1, Ordering::Relaxed);
         }
-        let exact = std::mem::take(&mut worker.exact);
+        let (exact, events) = (std::mem::take(&mut worker.exact), std::mem::take(&mut worker.events));
         worker.finish();
-        ((failures, notes), exact)
+        ((failures, notes), (exact, events))
     })?;
     drop(rows);
     if watch.is_cancelled() && watch.done() < plan.runs {
         return Err(Error::Cancelled);
     }
-    let (found, exact): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+    let (found, more): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+    let (exact, events): (Vec<_>, Vec<_>) = more.into_iter().unzip();
+    let mut events: Vec<_> = events.into_iter().flatten().collect();
+    events.sort_by_key(|event| event.run);
     let (failures, notes): (Vec<_>, Vec<_>) = found.into_iter().unzip();
     let mut failures: Vec<_> = failures.into_iter().flatten().collect();
     let mut notes: Messages = notes.into_iter().flatten().collect();
@@ -169,7 +172,7 @@ pub(super) fn run(
         repeat_with_logging(system, plan, watch, until, &mut failures)?;
     }
     let errors = failures.into_iter().map(|(run, failure)| (run, failure.text)).collect();
-    Ok(Finished { errors, notes, exact: arranged(plan, exact.into_iter().flatten()) })
+    Ok(Finished { errors, notes, exact: arranged(plan, exact.into_iter().flatten()), events })
 }
 
 /// Values of a run at the kept times that it has reached, output by output at each time.
@@ -310,12 +313,14 @@ pub(super) struct Worker<'a> {
     /// Values of the run that numbers do not have, and those of finished runs.
     exact_of_run: Vec<Value>,
     exact: Vec<Exact>,
+    /// Events in Model Exchange.
+    pub events: Vec<Occurrence>,
     /// Orders of the input derivatives.
     orders: Vec<i32>,
     /// Outputs at a time, in their order.
-    row: Vec<f64>,
+    pub row: Vec<f64>,
     /// Number of times that the run has reached.
-    reached: usize,
+    pub reached: usize,
     measured: Measured,
 }
 
@@ -346,7 +351,7 @@ impl<'a> Signals<'a> {
             Numbers::Constant(value) => Signal::Constant(*value),
             Numbers::Shared(values) => Signal::Values(values),
             Numbers::EachRun(values) => Signal::Values(&values[run * times..][..times]),
-            Numbers::Sampled { grid, values, is_held, is_each } => {
+            Numbers::Sampled { grid, values, is_held, is_each, .. } => {
                 let first = if *is_each { run * grid.length } else { 0 };
                 Signal::Sampled(grid, &values[first..][..grid.length], *is_held)
             }
@@ -367,8 +372,15 @@ impl<'a> Signals<'a> {
     }
 }
 
+/// Index of the next kept value in a trajectory, and number of times until then.
+#[derive(Default)]
+pub(super) struct Kept {
+    index: usize,
+    wait: usize,
+}
+
 /// Index of the time (`None` before the end of the initialization) and the error.
-type Stopped = (Option<usize>, Rejection);
+pub(super) type Stopped = (Option<usize>, Rejection);
 
 impl<'a> Worker<'a> {
     fn new(
@@ -392,6 +404,7 @@ impl<'a> Worker<'a> {
             number: 0,
             exact_of_run: Vec::new(),
             exact: Vec::new(),
+            events: Vec::new(),
             orders: vec![1; plan.derivatives.values.len()],
             row: vec![0.0; plan.outputs.len()],
             reached: 0,
@@ -459,7 +472,10 @@ impl<'a> Worker<'a> {
         (self.reached, self.number) = (0, run);
         self.exact_of_run.clear();
         self.measured.begin();
-        let stopped = self.follow(times, &mut instance, run, trajectories).err();
+        let stopped = match &plan.integrated {
+            None => self.follow(times, &mut instance, run, trajectories).err(),
+            Some(integrated) => self.integrate(integrated, times, &mut instance, run, trajectories).err(),
+        };
         if !self.is_repeated() && !plan.exact_outputs.is_empty() {
             self.exact.push((run, std::mem::take(&mut self.exact_of_run)));
         }
@@ -513,13 +529,13 @@ impl<'a> Worker<'a> {
     }
 
     /// Returns whether the caller does not observe the run.
-    fn is_repeated(&self) -> bool {
+    pub fn is_repeated(&self) -> bool {
         self.deadline.is_some() || self.reuse.is_check()
     }
 
     /// Records the run and its time, so that messages of the FMU can be logged with both.
     #[inline(always)]
-    fn report_time(&self, run: usize, time: f64) {
+    pub fn report_time(&self, run: usize, time: f64) {
         if let Some((feed, instance)) = &self.feed {
             feed.at(*instance, run, time);
         }
@@ -607,12 +623,59 @@ impl<'a> Worker<'a> {
         Ok(())
     }
 
+    /// Calls the pulse if it is due, and returns whether the run goes on after a step in Model Exchange.
+    pub fn proceeds(&mut self) -> bool {
+        if self.is_caller && self.pulse.is_due() {
+            self.watch.pulse();
+        }
+        !self.watch.is_cancelled() && self.deadline.is_none_or(|deadline| time::Instant::now() <= deadline)
+    }
+
+    /// Reads the outputs at a communication point in Model Exchange.
+    pub fn record(
+        &mut self,
+        instance: &mut Running,
+        kept: &mut Kept,
+        time: f64,
+        trajectories: &mut [f64],
+    ) -> Result<(), Rejection> {
+        let plan = self.plan;
+        instance.get(&plan.outputs, &mut self.row)?;
+        if self.keep_row(kept, time, trajectories) {
+            for (_, target) in &plan.exact_outputs {
+                self.exact_of_run.push(instance.get_value(*target)?);
+            }
+        }
+        Ok(())
+    }
+
+    /// Keeps the outputs of a time. Returns whether they belong to a trajectory.
+    pub fn keep_row(&mut self, kept: &mut Kept, time: f64, trajectories: &mut [f64]) -> bool {
+        let (plan, length) = (self.plan, self.plan.kept());
+        let keeps = kept.wait == 0 && kept.index < length;
+        if keeps {
+            for (output, value) in self.row.iter().enumerate() {
+                trajectories[output * length + kept.index] = *value;
+            }
+            kept.index += 1;
+            kept.wait = plan.every.unwrap_or(1);
+        }
+        kept.wait = kept.wait.saturating_sub(1);
+        if !plan.measures.is_empty() {
+            self.measured.add(time, &self.row);
+        }
+        keeps
+    }
+
+    pub fn experiment(&self) -> Experiment {
+        let (start_time, stop_time) = (self.plan.time[0], self.plan.time.last().copied());
+        Experiment { start_time, stop_time, tolerance: self.plan.tolerance }
+    }
+
     /// Sets start values before Initialization Mode and inputs in it.
     fn start(&mut self, instance: &mut Running, run: usize) -> Result<(), Rejection> {
         let plan = self.plan;
-        let (start_time, stop_time) = (plan.time[0], plan.time.last().copied());
-        let experiment = Experiment { start_time, stop_time, tolerance: plan.tolerance };
-        instance.begin(experiment, &plan.start, run)?;
+        instance.begin(self.experiment(), &plan.start, run)?;
         self.set_values(instance, 0)?;
         instance.exit_initialization_mode()
     }

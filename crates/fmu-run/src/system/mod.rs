@@ -234,9 +234,23 @@ impl System {
     /// Fails if a component does not support this interface type.
     pub(crate) fn check_interface(&self, interface: Interface) -> Result<(), Error> {
         if interface == Interface::ModelExchange && self.sole().is_none() {
-            return Err(Error::Fmu(format!("{} is a system, which has Co-Simulation only", self.name())));
+            return Err(Error::Fmu(format!(
+                "{} is a system; systems run in Co-Simulation only, and a single FMU also in Model Exchange",
+                self.name()
+            )));
         }
         self.components().iter().try_for_each(|component| component.fmu.library(interface).map(drop))
+    }
+
+    /// Returns the interface type of runs: the requested one, or Co-Simulation, or Model Exchange if a single FMU has nothing else.
+    pub(crate) fn interface(&self, asked: Option<Interface>) -> Result<Interface, Error> {
+        let has_only_model_exchange = self.sole().is_some_and(|fmu| fmu.description.co_simulation.is_none());
+        let interface = asked.unwrap_or(match has_only_model_exchange {
+            true => Interface::ModelExchange,
+            false => Interface::CoSimulation,
+        });
+        self.check_interface(interface)?;
+        Ok(interface)
     }
 
     /// Returns whether a process may have only one instance.

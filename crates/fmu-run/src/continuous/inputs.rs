@@ -1,0 +1,282 @@
+//! Inputs as functions of time: polynomials between the times at which they are given.
+
+/// Values of an input over time.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Curve<'a> {
+    /// One value.
+    Constant(f64),
+    /// Values at times that do not decrease; equal times are a step.
+    Samples { times: &'a [f64], values: &'a [f64], slopes: Slopes<'a>, is_held: bool },
+    /// The time derivative of the input with this index.
+    RateOf(usize),
+}
+
+/// Time derivatives at the times of the values.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) enum Slopes<'a> {
+    /// None: the values are connected by lines.
+    #[default]
+    Lines,
+    Constant(f64),
+    Each(&'a [f64]),
+}
+
+impl Slopes<'_> {
+    fn at(self, index: usize) -> Option<f64> {
+        match self {
+            Self::Lines => None,
+            Self::Constant(slope) => Some(slope),
+            Self::Each(slopes) => Some(slopes[index]),
+        }
+    }
+}
+
+/// An input, with the polynomial that holds from the last break to the next.
+#[derive(Debug)]
+struct Signal<'a> {
+    curve: Curve<'a>,
+    /// Index of the first time after the last break.
+    next: usize,
+    piece: Piece,
+    /// Time of the next break, s.
+    until: f64,
+}
+
+/// Cubic polynomial in the time since its origin.
+#[derive(Clone, Copy, Debug, Default)]
+struct Piece {
+    origin: f64,
+    coefficients: [f64; 4],
+}
+
+impl Piece {
+    fn constant(value: f64) -> Self {
+        Self { origin: 0.0, coefficients: [value, 0.0, 0.0, 0.0] }
+    }
+
+    /// Returns the polynomial with these values at two times: a line, or the cubic that has the slopes, too.
+    fn between([t0, t1]: [f64; 2], [v0, v1]: [f64; 2], slopes: Option<[f64; 2]>) -> Self {
+        let h = t1 - t0;
+        let mean = (v1 - v0) / h;
+        let coefficients = match slopes {
+            None => [v0, mean, 0.0, 0.0],
+            Some([s0, s1]) => [v0, s0, (3.0 * mean - 2.0 * s0 - s1) / h, (s0 + s1 - 2.0 * mean) / (h * h)],
+        };
+        Self { origin: t0, coefficients }
+    }
+
+    fn value(&self, time: f64) -> f64 {
+        let ([c0, c1, c2, c3], s) = (self.coefficients, time - self.origin);
+        c0 + s * (c1 + s * (c2 + s * c3))
+    }
+
+    fn rate(&self, time: f64) -> f64 {
+        let ([_, c1, c2, c3], s) = (self.coefficients, time - self.origin);
+        c1 + s * (2.0 * c2 + s * 3.0 * c3)
+    }
+
+    fn is_constant(&self) -> bool {
+        self.coefficients[1..] == [0.0; 3]
+    }
+}
+
+impl<'a> Signal<'a> {
+    fn new(curve: Curve<'a>) -> Self {
+        Self { curve, next: 0, piece: Piece::default(), until: f64::INFINITY }
+    }
+
+    /// Passes all breaks up to this time.
+    fn enter(&mut self, time: f64) {
+        let (times, values, slopes, is_held) = match self.curve {
+            Curve::Constant(value) => return self.piece = Piece::constant(value),
+            Curve::RateOf(_) => return,
+            Curve::Samples { times, values, slopes, is_held } => (times, values, slopes, is_held),
+        };
+        self.next += times[self.next..].iter().take_while(|other| **other <= time).count();
+        let Some(left) = self.next.checked_sub(1) else {
+            (self.piece, self.until) = (Piece::constant(values[0]), times[0]);
+            return;
+        };
+        let value = values[left];
+        if self.next == times.len() || is_held {
+            self.piece = Piece::constant(value);
+        } else {
+            let [t, v] = [times, values].map(|of| [of[left], of[self.next]]);
+            self.piece = Piece::between(t, v, slopes.at(left).zip(slopes.at(self.next)).map(|(a, b)| [a, b]));
+        }
+        // A constant value has no break before it changes.
+        let mut after = self.next;
+        if is_held {
+            after += values[after..].iter().take_while(|other| **other == value).count();
+        } else if self.piece.is_constant() {
+            let is_flat =
+                |index: usize| values[index] == value && slopes.at(index).is_none_or(|slope| slope == 0.0);
+            while after + 1 < times.len() && is_flat(after) && is_flat(after + 1) {
+                after += 1;
+            }
+        }
+        self.until = times.get(after).copied().unwrap_or(f64::INFINITY);
+    }
+}
+
+/// All inputs of a run: those that move continuously, then those that change only at events.
+#[derive(Debug, Default)]
+pub(crate) struct Signals<'a> {
+    all: Vec<Signal<'a>>,
+    moving: usize,
+    is_moving: bool,
+}
+
+/// Passed breaks of inputs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Break {
+    /// None.
+    None,
+    /// Only the slopes of inputs have changed.
+    Kink,
+    /// A value has changed, so that there is an event.
+    Jump,
+}
+
+/// Relative change of a continuous input below which there is no event: lines of the same slope differ by rounding.
+const SAME: f64 = 1e-9;
+
+impl<'a> Signals<'a> {
+    /// Creates the inputs from curves, of which the first `moving` are continuous.
+    pub fn new(curves: impl Iterator<Item = Curve<'a>>, moving: usize) -> Self {
+        Self { all: curves.map(Signal::new).collect(), moving, is_moving: false }
+    }
+
+    /// Returns the time of the next break, s.
+    pub(super) fn until(&self) -> f64 {
+        self.all.iter().map(|signal| signal.until).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Begins at this time.
+    pub(super) fn begin(&mut self, time: f64) {
+        self.all.iter_mut().for_each(|signal| signal.enter(time));
+        self.find_moving();
+    }
+
+    /// Passes the breaks up to this time. At the end of the run, continuous inputs keep their last slopes.
+    pub(super) fn pass(&mut self, time: f64, is_end: bool) -> Break {
+        if self.until() > time {
+            return Break::None;
+        }
+        let mut found = Break::None;
+        let before: Vec<_> = (0..self.all.len()).map(|index| self.value(index, time)).collect();
+        for (index, signal) in self.all.iter_mut().enumerate() {
+            if is_end && index < self.moving {
+                signal.until = f64::INFINITY;
+            } else if signal.until <= time {
+                signal.enter(time);
+                found = Break::Kink;
+            }
+        }
+        for (index, before) in before.into_iter().enumerate() {
+            let (after, same) = (self.value(index, time), if index < self.moving { SAME } else { 0.0 });
+            if (after - before).abs() > same * before.abs().max(after.abs()) {
+                found = Break::Jump;
+            }
+        }
+        self.find_moving();
+        found
+    }
+
+    fn find_moving(&mut self) {
+        self.is_moving = (0..self.moving).any(|index| match self.all[index].curve {
+            Curve::RateOf(of) => self.all[of].piece.coefficients[2..] != [0.0; 2],
+            _ => !self.all[index].piece.is_constant(),
+        });
+    }
+
+    /// Returns whether a continuous input changes before the next break.
+    pub(super) fn is_moving(&self) -> bool {
+        self.is_moving
+    }
+
+    fn value(&self, index: usize, time: f64) -> f64 {
+        match self.all[index].curve {
+            Curve::RateOf(of) => self.all[of].piece.rate(time),
+            _ => self.all[index].piece.value(time),
+        }
+    }
+
+    /// Writes the values of the continuous inputs.
+    pub(super) fn moving(&self, time: f64, row: &mut Vec<f64>) {
+        row.clear();
+        row.extend((0..self.moving).map(|index| self.value(index, time)));
+    }
+
+    /// Writes the values of all other inputs.
+    pub(super) fn held(&self, time: f64, row: &mut Vec<f64>) {
+        row.clear();
+        row.extend((self.moving..self.all.len()).map(|index| self.value(index, time)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines<'a>(times: &'a [f64], values: &'a [f64]) -> Curve<'a> {
+        Curve::Samples { times, values, slopes: Slopes::Lines, is_held: false }
+    }
+
+    #[test]
+    fn values_rates_and_breaks() {
+        let (times, values) = ([0.0, 1.0, 1.0, 3.0, 4.0, 5.0], [0.0, 2.0, 5.0, 1.0, 1.0, 1.0]);
+        let held = Curve::Samples { times: &times, values: &values, slopes: Slopes::Lines, is_held: true };
+        let mut inputs = Signals::new([lines(&times, &values), Curve::RateOf(0), held].into_iter(), 2);
+        inputs.begin(-1.0);
+        let (mut moving, mut held) = (Vec::new(), Vec::new());
+        let mut seen = Vec::new();
+        let mut time = -1.0;
+        while time < 6.0 {
+            let stop = inputs.until().min(6.0);
+            inputs.moving(0.5 * (time + stop), &mut moving);
+            inputs.held(0.5 * (time + stop), &mut held);
+            seen.push((stop, moving[0], moving[1], held[0]));
+            time = stop;
+            inputs.pass(time, false);
+        }
+        assert_eq!(
+            seen,
+            [
+                (0.0, 0.0, 0.0, 0.0),
+                (1.0, 1.0, 2.0, 0.0),
+                (3.0, 3.0, -2.0, 5.0),
+                (5.0, 1.0, 0.0, 1.0),
+                (6.0, 1.0, 0.0, 1.0)
+            ]
+        );
+    }
+
+    #[test]
+    fn a_cubic_is_followed_exactly() {
+        let cubic = |t: f64| [t * t * t - t, 3.0 * t * t - 1.0];
+        let times = [0.0, 0.7, 2.0];
+        let [values, slopes] = [0, 1].map(|of| times.map(|time| cubic(time)[of]));
+        let curve =
+            Curve::Samples { times: &times, values: &values, slopes: Slopes::Each(&slopes), is_held: false };
+        let mut inputs = Signals::new([curve, Curve::RateOf(0)].into_iter(), 2);
+        inputs.begin(0.0);
+        assert_eq!((inputs.until(), inputs.is_moving()), (0.7, true));
+        assert_eq!(inputs.pass(0.7, false), Break::Kink, "neither the value nor its rate jumps");
+        let mut row = Vec::new();
+        inputs.moving(1.3, &mut row);
+        row.iter().zip(cubic(1.3)).for_each(|(found, expected)| assert!((found - expected).abs() < 1e-14));
+        assert_eq!((inputs.pass(2.0, true), inputs.until()), (Break::None, f64::INFINITY));
+    }
+
+    #[test]
+    fn a_jump_is_an_event_and_a_kink_is_not() {
+        let (times, values) = ([0.0, 1.0, 2.0], [0.0, 1.0, 0.0]);
+        let mut inputs = Signals::new([lines(&times, &values)].into_iter(), 1);
+        inputs.begin(0.0);
+        assert_eq!(inputs.pass(1.0, false), Break::Kink);
+        let mut inputs = Signals::new([lines(&times, &values), Curve::RateOf(0)].into_iter(), 2);
+        inputs.begin(0.0);
+        assert_eq!(inputs.pass(1.0, false), Break::Jump);
+    }
+}

@@ -1,0 +1,86 @@
+//! Model Exchange: the states of an FMU are integrated here, from event to event.
+//!
+//! [`inputs`] describes inputs as functions of time, [`model`] evaluates the FMU for the solver, [`march`] takes the steps and handles
+//! the events. The solvers are in the crate `ivp`. They have one step, because every event starts them again.
+
+mod inputs;
+mod march;
+mod model;
+
+pub(crate) use inputs::{Curve, Signals, Slopes};
+pub(crate) use march::{Hooks, March};
+pub(crate) use model::Model;
+
+use crate::error::{Error, request};
+use std::str::FromStr;
+
+/// Method that integrates an FMU in Model Exchange.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Solver {
+    /// [`Dop853`](Self::Dop853), and [`Bdf`](Self::Bdf) as soon as the model proves stiff.
+    #[default]
+    Auto,
+    /// Runge-Kutta method of order 5 (Dormand and Prince).
+    Dopri5,
+    /// Runge-Kutta method of order 8 (Dormand and Prince).
+    Dop853,
+    /// Backward differentiation formulas of order 1 to 5, for stiff models.
+    Bdf,
+    /// The classical Runge-Kutta method, with fixed steps: from one communication point to the next, or shorter ones if there is a
+    /// [largest step](Integration::max_step).
+    Rk4,
+}
+
+impl Solver {
+    /// All solvers, with their names.
+    pub const ALL: [(&str, Self); 5] = [
+        ("auto", Self::Auto),
+        ("dopri5", Self::Dopri5),
+        ("dop853", Self::Dop853),
+        ("bdf", Self::Bdf),
+        ("rk4", Self::Rk4),
+    ];
+}
+
+impl FromStr for Solver {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let found = Self::ALL.iter().find(|(known, _)| *known == name);
+        found.map(|(_, solver)| *solver).ok_or_else(|| {
+            let names = Self::ALL.map(|(known, _)| known).join(", ");
+            format!("there is no solver {name:?}; there are {names}")
+        })
+    }
+}
+
+/// Settings of the integration in Model Exchange.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Integration {
+    /// Method.
+    pub solver: Solver,
+    /// Relative tolerance; `None` means the tolerance of the default experiment, or 1e-6.
+    pub rtol: Option<f64>,
+    /// Absolute tolerance of a state whose nominal value is 1; other states have a multiple of it. `None` means a hundredth of the
+    /// relative tolerance.
+    pub atol: Option<f64>,
+    /// Largest step, s.
+    pub max_step: Option<f64>,
+}
+
+impl Integration {
+    /// Fails unless the tolerances and the largest step are above 0 and finite.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        for (name, value) in [("rtol", self.rtol), ("atol", self.atol), ("max_step", self.max_step)] {
+            if let Some(value) = value.filter(|value| !(*value > 0.0 && value.is_finite())) {
+                return request(format!("{name} is {value}; it must be above 0 and finite"));
+            }
+        }
+        match self.rtol {
+            Some(rtol) if !(1e-13..1.0).contains(&rtol) => {
+                request(format!("rtol is {rtol}; it must be at least 1e-13 and below 1"))
+            }
+            _ => Ok(()),
+        }
+    }
+}

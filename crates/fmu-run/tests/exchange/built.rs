@@ -1,0 +1,131 @@
+//! Compiles and packs the FMUs of `models.c`.
+
+use fmu_run::{Fmu, Standard};
+use fmu_test_kit::c_programs::headers;
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+use tempfile::TempDir;
+use zip::write::SimpleFileOptions;
+
+/// Returns the library, compiled once.
+fn library() -> &'static Path {
+    static COMPILED: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
+    let (_, path) = COMPILED.get_or_init(|| {
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/exchange");
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("models.so");
+        let status = Command::new("cc")
+            .args(["-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", "-I"])
+            .arg(headers(&source))
+            .arg(source.join("models.c"))
+            .arg("-lm")
+            .arg("-o")
+            .arg(&path)
+            .status();
+        assert!(status.expect("these tests need a C compiler").success());
+        (directory, path)
+    });
+    path
+}
+
+/// Returns numbers of states and event indicators.
+fn sizes(model: &str) -> (usize, usize) {
+    let states = match model {
+        "stair" => 0,
+        "ball" | "vanderpol" => 2,
+        _ => 1,
+    };
+    (states, usize::from(["ball", "relay", "ending", "zero"].contains(&model)))
+}
+
+fn description2(model: &str, attributes: &str) -> String {
+    let (states, indicators) = sizes(model);
+    let state = |k: usize| {
+        format!(
+            "<ScalarVariable name=\"x{k}\" valueReference=\"{}\" causality=\"local\"><Real/></ScalarVariable>\
+             <ScalarVariable name=\"der(x{k})\" valueReference=\"{}\" causality=\"local\"><Real derivative=\"{}\"/></ScalarVariable>",
+            8 + k,
+            10 + k,
+            8 + 2 * k
+        )
+    };
+    let all: String = (0..states).map(state).collect();
+    let derivatives: String = (0..states).map(|k| format!("<Unknown index=\"{}\"/>", 9 + 2 * k)).collect();
+    format!(
+        r#"<fmiModelDescription fmiVersion="2.0" modelName="{model}" guid="{{{model}}}" numberOfEventIndicators="{indicators}">
+        <ModelExchange modelIdentifier="models" {attributes}/>
+        <ModelVariables>
+        <ScalarVariable name="u" valueReference="1" causality="input" variability="continuous"><Real start="0"/></ScalarVariable>
+        <ScalarVariable name="w" valueReference="2" causality="input" variability="continuous"><Real start="0" derivative="1"/></ScalarVariable>
+        <ScalarVariable name="n" valueReference="3" causality="input" variability="discrete"><Integer start="0"/></ScalarVariable>
+        <ScalarVariable name="p" valueReference="4" causality="parameter" variability="fixed"><Real start="1"/></ScalarVariable>
+        <ScalarVariable name="y" valueReference="5" causality="output" variability="continuous"><Real/></ScalarVariable>
+        <ScalarVariable name="rate" valueReference="6" causality="output" variability="continuous"><Real/></ScalarVariable>
+        <ScalarVariable name="hits" valueReference="7" causality="output" variability="discrete"><Integer/></ScalarVariable>
+        {all}</ModelVariables>
+        <ModelStructure><Outputs><Unknown index="5"/><Unknown index="6"/><Unknown index="7"/></Outputs>
+        <Derivatives>{derivatives}</Derivatives></ModelStructure></fmiModelDescription>"#
+    )
+}
+
+fn description3(model: &str, attributes: &str) -> String {
+    let (states, indicators) = sizes(model);
+    let state = |k: usize| {
+        format!(
+            "<Float64 name=\"x{k}\" valueReference=\"{}\" causality=\"local\"/>\
+             <Float64 name=\"der(x{k})\" valueReference=\"{}\" causality=\"local\" derivative=\"{}\"/>",
+            8 + k,
+            10 + k,
+            8 + k
+        )
+    };
+    let all: String = (0..states).map(state).collect();
+    let derivatives: String =
+        (0..states).map(|k| format!("<ContinuousStateDerivative valueReference=\"{}\"/>", 10 + k)).collect();
+    let indicators = "<EventIndicator valueReference=\"8\"/>".repeat(indicators);
+    format!(
+        r#"<fmiModelDescription fmiVersion="3.0" modelName="{model}" instantiationToken="{{{model}}}">
+        <ModelExchange modelIdentifier="models" needsCompletedIntegratorStep="true" {attributes}/>
+        <ModelVariables>
+        <Float64 name="u" valueReference="1" causality="input" start="0"/>
+        <Float64 name="w" valueReference="2" causality="input" start="0" derivative="1"/>
+        <Int32 name="n" valueReference="3" causality="input" start="0"/>
+        <Float64 name="p" valueReference="4" causality="parameter" variability="fixed" start="1"/>
+        <Float64 name="y" valueReference="5" causality="output"/>
+        <Float64 name="rate" valueReference="6" causality="output"/>
+        <Int32 name="hits" valueReference="7" causality="output"/>
+        {all}</ModelVariables>
+        <ModelStructure><Output valueReference="5"/><Output valueReference="6"/><Output valueReference="7"/>
+        {derivatives}{indicators}</ModelStructure></fmiModelDescription>"#
+    )
+}
+
+/// Opens a model.
+pub fn opened(model: &str, standard: Standard) -> Fmu {
+    opened_with(model, standard, "")
+}
+
+/// Opens a model with further attributes of the interface type.
+pub fn opened_with(model: &str, standard: Standard, attributes: &str) -> Fmu {
+    let (xml, platform) = match standard {
+        Standard::Fmi2 => (description2(model, attributes), "linux64"),
+        Standard::Fmi3 => (description3(model, attributes), "x86_64-linux"),
+    };
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join(format!("{model}.fmu"));
+    let mut archive = zip::ZipWriter::new(File::create(&path).unwrap());
+    let library = std::fs::read(library()).unwrap();
+    for (name, content) in [
+        ("modelDescription.xml".to_owned(), xml.into_bytes()),
+        (format!("binaries/{platform}/models.so"), library),
+    ] {
+        archive.start_file(name, SimpleFileOptions::default()).unwrap();
+        archive.write_all(&content).unwrap();
+    }
+    archive.finish().unwrap();
+    // SAFETY: the FMU of these tests.
+    unsafe { Fmu::open(&path) }.unwrap()
+}

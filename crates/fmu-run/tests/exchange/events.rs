@@ -1,0 +1,165 @@
+//! Events by event indicators, by time, after steps; the end of the simulation.
+
+use crate::{EXPLICIT, VERSIONS, close, opened, run, tight, times};
+use fmu_run::{Batch, Integration, Solver, Start, Trajectory, Watch};
+
+/// Times of the first hits of a ball that falls from 1 m.
+fn hits(restitution: f64, count: usize) -> Vec<f64> {
+    let mut time = (2.0 / 9.81_f64).sqrt();
+    let mut flight = 2.0 * time;
+    (0..count)
+        .map(|_| {
+            let now = time;
+            flight *= restitution;
+            time += flight;
+            now
+        })
+        .collect()
+}
+
+/// Height of the ball.
+fn height(time: f64, restitution: f64) -> f64 {
+    let all = hits(restitution, 20);
+    let Some(last) = all.iter().rposition(|hit| *hit <= time) else { return 1.0 - 0.5 * 9.81 * time * time };
+    let (speed, since) = (9.81 * all[0] * restitution.powi(last as i32 + 1), time - all[last]);
+    speed * since - 0.5 * 9.81 * since * since
+}
+
+#[test]
+fn a_ball_hits_the_ground_at_the_right_times() {
+    for standard in VERSIONS {
+        let fmu = opened("ball", standard);
+        for solver in EXPLICIT {
+            for count in [1, 40] {
+                let (time, factors) = (times(2.0, count), [0.7, 0.5]);
+                let batch = Batch {
+                    start: vec![("p", Start::Each(&factors))],
+                    integration: Integration { solver, rtol: Some(1e-11), ..Integration::default() },
+                    events: true,
+                    ..Batch::default()
+                };
+                let end = if count == 1 { 1.2 } else { 2.0 };
+                let time: Vec<_> = time.iter().map(|time| time * end / 2.0).collect();
+                let runs = run(&fmu, &time, batch);
+                assert_eq!(runs.errors.iter().filter(|(run, _)| *run == 0).count(), 0, "{:?}", runs.errors);
+                let found: Vec<_> =
+                    runs.events.iter().filter(|event| event.run == 0).map(|event| event.time).collect();
+                let mut expected = hits(0.7, 20);
+                expected.retain(|hit| *hit < end);
+                // The tiny negative height after a hit may give an event on the way up.
+                let mut merged: Vec<f64> = Vec::new();
+                for time in found {
+                    if merged.last().is_none_or(|last| time - last > 1e-6) {
+                        merged.push(time);
+                    }
+                }
+                assert_eq!(merged.len(), expected.len(), "{standard} {solver:?} {merged:?} {expected:?}");
+                merged.iter().zip(&expected).for_each(|(found, expected)| close(*found, *expected, 1e-9));
+                for (k, time) in time.iter().enumerate() {
+                    close(runs.trajectories[k], height(*time, 0.7), 1e-7);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn events_at_known_times_are_exact() {
+    for standard in VERSIONS {
+        let fmu = opened("stair", standard);
+        let time = [0.0, 0.5, 1.0, 2.5, 3.0, 9.75];
+        let batch =
+            Batch { time: &time, outputs: vec!["hits"], every: Some(1), events: true, ..Batch::default() };
+        let runs = fmu.run(&batch, &Watch::default()).unwrap();
+        assert_eq!(runs.trajectories, [0.0, 0.0, 1.0, 2.0, 3.0, 9.0], "values after the events");
+        let events: Vec<_> =
+            runs.events.iter().map(|event| (event.time, event.before[0], event.after[0])).collect();
+        assert_eq!(events, (1..10).map(f64::from).map(|k| (k, k - 1.0, k)).collect::<Vec<_>>());
+    }
+}
+
+#[test]
+fn the_fmu_ends_the_run() {
+    for standard in VERSIONS {
+        let watch = Watch::default();
+        let fmu = opened("stair", standard);
+        let time = times(3.0, 12);
+        let batch = Batch {
+            time: &time,
+            start: vec![("p", Start::Each(&[2.0, 3.0, 4.0]))],
+            outputs: vec!["hits"],
+            every: Some(1),
+            ..Batch::default()
+        };
+        let runs = fmu.run(&batch, &watch).unwrap();
+        assert_eq!(runs.errors, [(0, "ended by the FMU at t = 2 s".to_owned())]);
+        assert_eq!(runs.notes, [(1, "ended by the FMU at t = 3 s".to_owned())]);
+        assert_eq!(watch.ended(), [(0, 2.0, vec![2.0]), (1, 3.0, vec![3.0])]);
+        assert_eq!((runs.trajectories[7], runs.trajectories[13 + 12]), (1.0, 3.0));
+        assert!(runs.trajectories[8].is_nan(), "the end is between two communication points");
+        let watch = Watch::default();
+        let runs = opened("ending", standard)
+            .run(
+                &Batch {
+                    time: &[0.0, 1.0],
+                    outputs: vec!["y"],
+                    every: Some(1),
+                    integration: tight(Solver::Auto),
+                    ..Batch::default()
+                },
+                &watch,
+            )
+            .unwrap();
+        assert!(runs.errors[0].1.starts_with("ended by the FMU at t = 0.693147180"), "{:?}", runs.errors);
+        close(watch.ended()[0].1, std::f64::consts::LN_2, 1e-9);
+    }
+}
+
+#[test]
+fn an_event_after_a_step_may_choose_other_states() {
+    for standard in VERSIONS {
+        let fmu = opened("swap", standard);
+        let time = times(2.0, 20);
+        let batch = Batch { integration: tight(Solver::Auto), events: true, ..Batch::default() };
+        let runs = run(&fmu, &time, batch);
+        assert_eq!((runs.errors.len(), runs.events.len()), (0, 1));
+        for (k, time) in time.iter().enumerate() {
+            close(runs.trajectories[k], time.exp(), 1e-7);
+        }
+    }
+}
+
+#[test]
+fn an_indicator_that_is_always_zero_is_not_an_event() {
+    for standard in VERSIONS {
+        let runs = run(&opened("zero", standard), &[0.0, 1.0], Batch { events: true, ..Batch::default() });
+        assert_eq!((runs.errors.len(), runs.events.len()), (0, 0));
+        close(runs.trajectories[1], (-1.0_f64).exp(), 1e-6);
+    }
+}
+
+#[test]
+fn discrete_inputs_change_at_events() {
+    for standard in VERSIONS {
+        let fmu = opened("lag", standard);
+        let (times, values) = ([0.0, 0.3, 0.8], [0.0, 2.0, -1.0]);
+        let batch = Batch {
+            time: &[0.0, 0.25, 0.3, 0.5, 1.0],
+            inputs: vec![("n", Trajectory::Sampled { times: &times, values: &values })],
+            outputs: vec!["y", "n"],
+            every: Some(1),
+            integration: tight(Solver::Auto),
+            events: true,
+            ..Batch::default()
+        };
+        let runs = fmu.run(&batch, &Watch::default()).unwrap();
+        assert_eq!(runs.errors, []);
+        assert_eq!(runs.trajectories[5..], [0.0, 0.0, 2.0, 2.0, -1.0]);
+        let at = |time: f64| -> f64 {
+            let before = 2.0 * (1.0 - (-(time.min(0.8) - 0.3_f64)).exp());
+            if time <= 0.8 { before } else { -1.0 + (before + 1.0) * (-(time - 0.8)).exp() }
+        };
+        [(3, 0.5), (4, 1.0)].iter().for_each(|&(k, time)| close(runs.trajectories[k], at(time), 1e-8));
+        assert_eq!(runs.events.iter().map(|event| event.time).collect::<Vec<_>>(), [0.3, 0.8]);
+    }
+}

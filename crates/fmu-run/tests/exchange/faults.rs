@@ -1,0 +1,65 @@
+//! Models with faults end with an error that says what and when.
+
+use crate::{VERSIONS, close, opened, run, tight};
+use fmu_run::{Batch, Solver};
+
+fn why(model: &str, standard: fmu_run::Standard, solver: Solver) -> String {
+    let runs = run(
+        &opened(model, standard),
+        &[0.0, 0.25, 3.0],
+        Batch { integration: tight(solver), ..Batch::default() },
+    );
+    assert_eq!(runs.errors.len(), 1, "{model}");
+    runs.errors[0].1.clone()
+}
+
+#[test]
+fn errors_name_cause_and_time() {
+    for standard in VERSIONS {
+        for solver in [Solver::Auto, Solver::Dopri5, Solver::Bdf, Solver::Rk4] {
+            let of = |model| why(model, standard, solver);
+            let nan = of("nan");
+            assert!(
+                nan.starts_with("at 0.25 s: Model Exchange: the derivative of state 1 is NaN at t = 0.5"),
+                "{nan}"
+            );
+            let failing = of("failing");
+            assert!(
+                failing.starts_with("at 0.25 s: fmi") && failing.ends_with("the valve is stuck"),
+                "{failing}"
+            );
+            let endless = of("endless");
+            assert!(endless.ends_with("the event does not end within 10000 iterations"), "{endless}");
+            let announce = of("announce");
+            assert!(
+                announce.ends_with("the FMU announces events without end, the next one for t = 0.5 s: 1000 events from t = 0.5 s to t = 0.5 s"),
+                "{announce}"
+            );
+            let relay = of("relay");
+            assert!(
+                relay.contains("event indicator 1 changes its sign again and again: 1000 events from t = 1"),
+                "{relay}"
+            );
+        }
+        let ball = why("ball", standard, Solver::Auto);
+        assert!(
+            ball.contains("event indicator 1 changes its sign again and again: 1000 events from t = 2.55"),
+            "{ball}"
+        );
+    }
+}
+
+#[test]
+fn a_discarded_state_shortens_the_step() {
+    for standard in VERSIONS {
+        for solver in [Solver::Auto, Solver::Dopri5, Solver::Bdf] {
+            let runs = run(
+                &opened("root", standard),
+                &[0.0, 1.0, 1.9],
+                Batch { integration: tight(solver), ..Batch::default() },
+            );
+            assert_eq!(runs.errors, []);
+            close(runs.trajectories[2], 0.05 * 0.05, 1e-7);
+        }
+    }
+}

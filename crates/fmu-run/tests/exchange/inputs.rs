@@ -1,0 +1,82 @@
+//! Continuous inputs are functions of time.
+
+use crate::{VERSIONS, close, opened, tight, times};
+use fmu_run::{Batch, Solver, Trajectory, Watch};
+
+/// x' = sin(w t) - x from 0.
+fn answer(w: f64, t: f64) -> f64 {
+    ((w * t).sin() - w * (w * t).cos() + w * (-t).exp()) / (1.0 + w * w)
+}
+
+fn error(slopes: bool, count: usize, standard: fmu_run::Standard) -> f64 {
+    const W: f64 = 5.0;
+    let time = times(2.0, count);
+    let u: Vec<_> = time.iter().map(|t| (W * t).sin()).collect();
+    let du: Vec<_> = time.iter().map(|t| W * (W * t).cos()).collect();
+    let batch = Batch {
+        time: &time,
+        inputs: vec![("u", Trajectory::Shared(&u))],
+        input_derivatives: if slopes { vec![("u", Trajectory::Shared(&du))] } else { vec![] },
+        outputs: vec!["y"],
+        every: Some(1),
+        integration: tight(Solver::Auto),
+        ..Batch::default()
+    };
+    let runs = opened("lag", standard).run(&batch, &Watch::default()).unwrap();
+    assert_eq!(runs.errors, []);
+    runs.trajectories.iter().zip(&time).map(|(y, t)| (y - answer(W, *t)).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn results_converge_with_the_interpolation() {
+    for standard in VERSIONS {
+        let order =
+            |slopes, count| (error(slopes, count, standard) / error(slopes, 2 * count, standard)).log2();
+        let (lines, cubics) = (order(false, 100), order(true, 50));
+        assert!((1.9..2.1).contains(&lines) && (3.8..4.2).contains(&cubics), "{lines} {cubics}");
+        assert!(error(true, 800, standard) < 1e-9);
+    }
+}
+
+#[test]
+fn a_ramp_is_followed_exactly() {
+    // u = t until 1 s, then a step to 3 and constant.
+    let (own, values) = ([0.0, 1.0, 1.0, 2.0], [0.0, 1.0, 3.0, 3.0]);
+    for standard in VERSIONS {
+        let batch = Batch {
+            time: &[0.0, 0.7, 1.0, 2.0],
+            inputs: vec![("u", Trajectory::Sampled { times: &own, values: &values })],
+            outputs: vec!["y", "u", "rate"],
+            every: Some(1),
+            integration: tight(Solver::Auto),
+            ..Batch::default()
+        };
+        let runs = opened("lag", standard).run(&batch, &Watch::default()).unwrap();
+        let ramp = |t: f64| t - 1.0 + (-t).exp();
+        close(runs.trajectories[1], ramp(0.7), 1e-9);
+        close(runs.trajectories[2], ramp(1.0), 1e-9);
+        close(runs.trajectories[3], 3.0 + (ramp(1.0) - 3.0) * (-1.0_f64).exp(), 1e-9);
+        assert_eq!(runs.trajectories[4..8], [0.0, 0.7, 3.0, 3.0]);
+        // The model description declares w as the derivative of u.
+        assert_eq!(runs.trajectories[8..], [1.0, 1.0, 0.0, 0.0]);
+    }
+}
+
+#[test]
+fn rates_of_other_inputs() {
+    let (time, u, w) = ([0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 5.0, 5.0], [7.0; 4]);
+    for standard in VERSIONS {
+        let fmu = opened("lag", standard);
+        let rates = |inputs: Vec<(&'static str, Trajectory<'static>)>| {
+            let mut all = vec![("u", Trajectory::Shared(&u))];
+            all.extend(inputs);
+            let batch =
+                Batch { time: &time, inputs: all, outputs: vec!["rate"], every: Some(1), ..Batch::default() };
+            fmu.run(&batch, &Watch::default()).unwrap().trajectories
+        };
+        assert_eq!(rates(vec![]), [1.0, 4.0, 0.0, 0.0]);
+        assert_eq!(rates(vec![("w", Trajectory::RateOf("u"))]), [1.0, 4.0, 0.0, 0.0]);
+        let given: &'static [f64; 4] = Box::leak(Box::new(w));
+        assert_eq!(rates(vec![("w", Trajectory::Shared(given))]), [7.0; 4]);
+    }
+}
