@@ -13,6 +13,7 @@ mod error;
 mod files;
 mod fmu;
 mod found;
+mod index;
 mod instance;
 mod instances;
 mod kept;
@@ -27,7 +28,7 @@ mod threads;
 mod values;
 
 pub use batch::{Batch, Finished, Measure, Planned, Runs, Size, Trajectory, Watch};
-pub use description::{Description, Variable};
+pub use description::{Attributes, Dependencies, Description, Variable};
 pub use error::Error;
 pub use fmi_abi::description::{ModelDescription, Offer, Unknown};
 pub use fmi_abi::{BaseType, Interface, Standard, Status, Value};
