@@ -401,7 +401,7 @@ fn variables(
         let Some(reference) = number(*node, "valueReference") else {
             faults.push((
                 Fault::Reference,
-                format!("{} has no value reference", attribute_or_empty(*node, "name")),
+                format!("{} has no value reference", shown(node.attribute("name").unwrap_or_default())),
             ));
             continue;
         };
@@ -411,7 +411,10 @@ fn variables(
             Standard::Fmi3 => Some(*node),
         };
         let Some(of_type) = of_type else {
-            faults.push((Fault::Type, format!("{} has no type", attribute_or_empty(*node, "name"))));
+            faults.push((
+                Fault::Type,
+                format!("{} has no type", shown(node.attribute("name").unwrap_or_default())),
+            ));
             continue;
         };
         let declared = of_type.attribute("declaredType").and_then(|name| types.get(name));

@@ -62,12 +62,15 @@ pub fn unpack(
     check_count(archive.len() as u64, *limits)?;
     limits.entries -= archive.len();
     let most = limits.bytes;
+    let too_large = || format!("has more than {} MB when it is unpacked, the limit for archives", most >> 20);
+    // What the archive declares may be wrong, so the files are counted, too.
+    if archive.decompressed_size().is_some_and(|size| size > u128::from(most)) {
+        return Err(too_large());
+    }
     for index in 0..archive.len() {
         let written = extract(&mut archive, index, to, limits.bytes, wanted)
             .map_err(|why| format!("cannot be unpacked ({why})"))?;
-        limits.bytes = limits.bytes.checked_sub(written).ok_or_else(|| {
-            format!("has more than {} MB when it is unpacked, the limit for archives", most >> 20)
-        })?;
+        limits.bytes = limits.bytes.checked_sub(written).ok_or_else(too_large)?;
     }
     Ok(())
 }
