@@ -215,7 +215,7 @@ def test_an_ssp_is_the_same_system(order, tmp_path) -> None:
 @pytest.mark.parametrize(
     "old, new, message",
     [
-        ("</ssd:SystemStructureDescription>", "", "SystemStructure.ssd is no XML"),
+        ("</ssd:SystemStructureDescription>", "", "SystemStructure.ssd is not well-formed XML"),
         ("resources/prw_testbed.fmu", "resources/other.fmu", "component testbed: resources/other.fmu: cannot be opened"),
         ("x-fmu-sharedlibrary\" source=\"resources/prw_t", "x-ssp\" source=\"resources/prw_t", "component testbed is no FMU"),
         ("resources/testbed.ssv", "resources/none.ssv", "there is no readable resources/none.ssv"),

@@ -1,12 +1,18 @@
 //! Reads model descriptions without rejecting faulty ones. Missing attributes get the defaults of the standard; faults
 //! are listed.
 
-use crate::{BaseType, Interface, Standard};
-use roxmltree::{Document, Node};
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use crate::{BaseType, Interface, Standard, is_c_identifier, shown};
+use roxmltree::Node;
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::sync::Arc;
 
-/// Largest array whose single start value is repeated for all elements.
-pub const MAX_ELEMENTS: usize = 1 << 20;
+/// Largest number of values that all arrays have together; the size of a further array counts as unknown.
+pub const MAX_VALUES: usize = 1 << 22;
+/// Bytes that a variable and a value in a list take at most, with all that is read of them.
+const VARIABLE: usize = 1000;
+const VALUE: usize = 64;
+/// Number of unknown references of the model structure that are listed.
+const MAX_LOST: usize = 100;
 
 /// A variable; an array of FMI 3.0 is one variable.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,13 +31,14 @@ pub struct Variable {
     pub has_variability: bool,
     /// `exact`, `approx` or `calculated`, with the default of the standard; empty if there is no default.
     pub initial: String,
-    /// Start values as strings. A single start value of an array is repeated for each element; any other number of
-    /// values is kept.
+    /// Start values as strings, as many as are written. A single one of an array is that of each element.
     pub start: Vec<String>,
-    /// Sizes of the dimensions of an array; `None` if a size is unknown.
+    /// Sizes of the dimensions of an array; `None` if a size is unknown or too large.
     pub dimensions: Option<Vec<usize>>,
-    /// Number of values; `None` if it is unknown.
+    /// Number of values; `None` if it is unknown, or too large together with the arrays before.
     pub size: Option<usize>,
+    /// Whether the array has more values than [`MAX_VALUES`], together with the arrays before.
+    pub is_too_large: bool,
     /// Smallest value of the variable or of its declared type, if given.
     pub min: Option<f64>,
     /// Largest value of the variable or of its declared type, if given.
@@ -39,9 +46,9 @@ pub struct Variable {
     /// Nominal value of the variable or of its declared type; 1 by default.
     pub nominal: f64,
     /// Unit of the variable or of its declared type, if given.
-    pub unit: Option<String>,
+    pub unit: Option<Arc<str>>,
     /// Display unit of the variable or of its declared type, if given.
-    pub display_unit: Option<String>,
+    pub display_unit: Option<Arc<str>>,
     /// Name of the declared type, if given.
     pub declared_type: Option<String>,
     /// Index of the variable of which this variable is the time derivative.
@@ -55,16 +62,44 @@ pub struct Variable {
 }
 
 impl Variable {
-    /// Returns the start values as numbers, up to the first that is not a number.
+    /// Returns the start value of an element; a single start value of an array is that of each element.
+    pub fn start_of(&self, element: usize) -> Option<&str> {
+        let is_repeated = self.start.len() == 1 && self.size.is_some_and(|size| element < size);
+        self.start.get(if is_repeated { 0 } else { element }).map(String::as_str)
+    }
+
+    /// Returns the number of start values; a single one of an array counts for each element.
+    pub fn starts_count(&self) -> usize {
+        match (self.size, self.start.len()) {
+            (Some(size), 1) => size,
+            (_, count) => count,
+        }
+    }
+
+    /// Returns the start values of all elements as numbers, up to the first that is not a number.
     pub fn starts(&self) -> Vec<f64> {
-        let number = |value: &String| match value.as_str() {
+        let number = |value: &str| match value {
             "true" => Some(1.0),
             "false" => Some(0.0),
             "INF" => Some(f64::INFINITY),
             "-INF" => Some(f64::NEG_INFINITY),
             other => other.parse().ok(),
         };
-        self.start.iter().map_while(number).collect()
+        match (&*self.start, self.size) {
+            ([one], Some(size)) => number(one).map_or(Vec::new(), |one| vec![one; size]),
+            (all, _) => all.iter().map_while(|value| number(value)).collect(),
+        }
+    }
+
+    /// Takes the values of an array from the number of values that remain for all arrays. The size of an array that has more is unknown.
+    fn limit(&mut self, remaining: &mut usize) {
+        if self.dimensions.as_ref().is_none_or(Vec::is_empty) {
+            return;
+        }
+        match self.size.and_then(|size| remaining.checked_sub(size)) {
+            Some(rest) => *remaining = rest,
+            None => (self.dimensions, self.size, self.is_too_large) = (None, None, true),
+        }
     }
 
     /// Returns whether the values are floating-point numbers.
@@ -123,6 +158,18 @@ impl Offer {
             serializes_states: is_true("canSerializeFMUstate") || is_true("canSerializeFMUState"),
             attributes: attributes(node).into_iter().collect(),
         }
+    }
+
+    /// Fails if the identifier is not one of C: it is the name of a file, and part of names in programs. A missing one is a fault that
+    /// is listed.
+    fn check(&self) -> Result<(), String> {
+        if self.identifier.is_empty() || is_c_identifier(&self.identifier) {
+            return Ok(());
+        }
+        Err(format!(
+            "modelDescription.xml: modelIdentifier \"{}\" is not an identifier of C (letters, digits and _, not beginning with a digit)",
+            shown(&self.identifier)
+        ))
     }
 
     /// Returns whether one of these attributes is true.
@@ -199,7 +246,8 @@ impl ModelDescription {
     /// Reads a `modelDescription.xml`.
     ///
     /// # Errors
-    /// Fails if the string is not well-formed XML, or for other FMI versions. The message names the fault.
+    /// Fails if the string is not well-formed XML or would take too much memory, for other FMI versions, and if `modelIdentifier` is
+    /// not an identifier of C. The message names the fault.
     pub fn parse(xml: &str) -> Result<Self, String> {
         Self::parse_configured(xml, &HashMap::new())
     }
@@ -210,8 +258,7 @@ impl ModelDescription {
     /// # Errors
     /// Fails as [`parse`](Self::parse) does.
     pub fn parse_configured(xml: &str, structure: &HashMap<u32, usize>) -> Result<Self, String> {
-        let document = Document::parse(xml)
-            .map_err(|error| format!("modelDescription.xml is not well-formed XML: {error}"))?;
+        let document = crate::xml::parse(xml, "modelDescription.xml")?;
         let root = document.root_element();
         let version = attribute_or_empty(root, "fmiVersion");
         let (standard, token) = match version.as_str() {
@@ -221,7 +268,9 @@ impl ModelDescription {
                 let why = "its fmiVersion is \"1.0\"; FMI 2.0 and 3.0 are supported here, and FMPy and PyFMI run FMI 1.0";
                 return Err(why.to_owned());
             }
-            other => return Err(format!("its fmiVersion is {other:?}; FMI 2.0 and 3.0 are supported")),
+            other => {
+                return Err(format!("its fmiVersion is \"{}\"; FMI 2.0 and 3.0 are supported", shown(other)));
+            }
         };
         let mut faults = Vec::new();
         let mut needs = |node: Node, name: &str| {
@@ -237,10 +286,11 @@ impl ModelDescription {
             Some(Offer::read(node, standard))
         };
         let (co_simulation, model_exchange) = (offer("CoSimulation"), offer("ModelExchange"));
+        [&co_simulation, &model_exchange].into_iter().flatten().try_for_each(Offer::check)?;
         let experiment = child(root, "DefaultExperiment");
         let time = |name: &str| -> Option<f64> { experiment?.attribute(name)?.trim().parse().ok() };
         let named = |list| elements(root, list).filter_map(|node| Some(node.attribute("name")?.to_owned()));
-        let variables = variables(root, standard, structure, &mut faults);
+        let variables = variables(root, standard, structure, &mut faults)?;
         let mut description = Self {
             standard,
             version,
@@ -282,14 +332,14 @@ impl ModelDescription {
             self.variables.iter().enumerate().rev().map(|(index, of)| (of.reference, index)).collect();
         let (count, standard) = (self.variables.len(), self.standard);
         let mut lost = Vec::new();
-        let mut find = |number: &str| {
-            let number: Option<u32> = number.parse().ok();
+        let mut find = |text: &str| {
+            let number: Option<u32> = text.parse().ok();
             let found = match standard {
                 Standard::Fmi2 => number.and_then(from_one).filter(|index| *index < count),
                 Standard::Fmi3 => number.and_then(|number| by_reference.get(&number).copied()),
             };
-            if found.is_none() {
-                lost.push(format!("ModelStructure refers to {number:?}, which does not exist"));
+            if found.is_none() && lost.len() < MAX_LOST {
+                lost.push(format!("ModelStructure refers to {}, which does not exist", shown(text)));
             }
             found
         };
@@ -302,11 +352,14 @@ impl ModelDescription {
         };
         let mut list = |group: &str, of_fmi3: &str| -> Vec<Unknown> {
             let Some(structure) = child(root, "ModelStructure") else { return Vec::new() };
+            // A second entry of a variable says nothing new.
+            let mut known = HashSet::new();
+            let mut new = |node| unknown(node).filter(|unknown: &Unknown| known.insert(unknown.variable));
             match standard {
-                Standard::Fmi2 => elements(structure, group).filter_map(&mut unknown).collect(),
+                Standard::Fmi2 => elements(structure, group).filter_map(&mut new).collect(),
                 Standard::Fmi3 => {
                     let nodes = structure.children().filter(|node| node.has_tag_name(of_fmi3));
-                    nodes.filter_map(&mut unknown).collect()
+                    nodes.filter_map(&mut new).collect()
                 }
             }
         };
@@ -316,7 +369,9 @@ impl ModelDescription {
         let indicators = list("", "EventIndicator");
         self.event_indicators = match standard {
             Standard::Fmi2 => root.attribute("numberOfEventIndicators").map_or(Some(0), |n| n.parse().ok()),
-            Standard::Fmi3 => indicators.iter().map(|unknown| self.variables[unknown.variable].size).sum(),
+            Standard::Fmi3 => indicators.iter().try_fold(0_usize, |count, unknown| {
+                count.checked_add(self.variables[unknown.variable].size?)
+            }),
         };
         self.faults.extend(lost.into_iter().map(|why| (Fault::Structure, why)));
     }
@@ -327,10 +382,17 @@ fn variables(
     standard: Standard,
     structure: &HashMap<u32, usize>,
     faults: &mut Vec<(Fault, String)>,
-) -> Vec<Variable> {
-    let types: HashMap<&str, Node> =
-        elements(root, "TypeDefinitions").filter_map(|node| Some((node.attribute("name")?, node))).collect();
+) -> Result<Vec<Variable>, String> {
+    let types: HashMap<&str, Declared> = elements(root, "TypeDefinitions")
+        .filter_map(|node| Some((node.attribute("name")?, Declared::read(node))))
+        .collect();
     let nodes: Vec<Node> = elements(root, "ModelVariables").collect();
+    let lists =
+        root.descendants().flat_map(|node| ["start", "dependencies"].map(|name| node.attribute(name)));
+    let values: usize = lists.flatten().map(|list| list.split_ascii_whitespace().count()).sum();
+    crate::xml::reserve(VARIABLE * nodes.len() + VALUE * values)
+        .map_err(|why| format!("modelDescription.xml cannot be read: {why}"))?;
+    let mut remaining = MAX_VALUES;
     let indexed = nodes.iter().enumerate().rev();
     let by_reference: HashMap<u32, usize> =
         indexed.filter_map(|(index, node)| Some((number(*node, "valueReference")?, index))).collect();
@@ -339,7 +401,7 @@ fn variables(
         let Some(reference) = number(*node, "valueReference") else {
             faults.push((
                 Fault::Reference,
-                format!("{} has no value reference", attribute_or_empty(*node, "name")),
+                format!("{} has no value reference", shown(node.attribute("name").unwrap_or_default())),
             ));
             continue;
         };
@@ -349,10 +411,13 @@ fn variables(
             Standard::Fmi3 => Some(*node),
         };
         let Some(of_type) = of_type else {
-            faults.push((Fault::Type, format!("{} has no type", attribute_or_empty(*node, "name"))));
+            faults.push((
+                Fault::Type,
+                format!("{} has no type", shown(node.attribute("name").unwrap_or_default())),
+            ));
             continue;
         };
-        let declared = of_type.attribute("declaredType").and_then(|name| types.get(name)).copied();
+        let declared = of_type.attribute("declaredType").and_then(|name| types.get(name));
         let base = base_of(standard, of_type.tag_name().name());
         // A size is a number, or the start value of a structural parameter (section 2.4.7.5.1 of FMI 3.0).
         let size = |dimension: Node| {
@@ -367,28 +432,48 @@ fn variables(
         });
         let mut variable = variable(*node, of_type, declared, (standard, base), dimensions.collect());
         (variable.reference, variable.derivative_of) = (reference, derivative_of);
+        variable.limit(&mut remaining);
         found.push(variable);
     }
     let count = found.len();
     let exists = |index: &usize| *index < count;
     found.iter_mut().for_each(|of| of.derivative_of = of.derivative_of.filter(exists));
-    found
+    Ok(found)
+}
+
+/// A declared type, whose attributes variables share.
+struct Declared<'a> {
+    node: Node<'a, 'a>,
+    /// In FMI 2.0, the element that has the attributes (section 2.2.3).
+    inner: Option<Node<'a, 'a>>,
+    unit: Option<Arc<str>>,
+    display_unit: Option<Arc<str>>,
+}
+
+impl<'a> Declared<'a> {
+    fn read(node: Node<'a, 'a>) -> Self {
+        let inner = node.first_element_child();
+        let shared =
+            |name| Self { node, inner, unit: None, display_unit: None }.attribute(name).map(Arc::from);
+        Self { node, inner, unit: shared("unit"), display_unit: shared("displayUnit") }
+    }
+
+    fn attribute(&self, name: &str) -> Option<&'a str> {
+        self.node.attribute(name).or_else(|| self.inner?.attribute(name))
+    }
 }
 
 /// Reads a variable whose attributes are in `of_type` and in the declared type.
 fn variable(
     node: Node,
     of_type: Node,
-    declared: Option<Node>,
+    declared: Option<&Declared>,
     (standard, base): (Standard, Option<BaseType>),
     dimensions: Option<Vec<usize>>,
 ) -> Variable {
-    let of_both = |name: &str| {
-        let of_declared = || {
-            let node = declared?;
-            node.attribute(name).or_else(|| node.children().find_map(|child| child.attribute(name)))
-        };
-        of_type.attribute(name).or_else(of_declared)
+    let of_both = |name: &str| of_type.attribute(name).or_else(|| declared?.attribute(name));
+    let shared = |name: &str, of_declared: fn(&Declared) -> Option<Arc<str>>| {
+        of_type.attribute(name).map(Arc::from).or_else(|| of_declared(declared?))
     };
     let limit = |name| of_both(name).and_then(|value| value.trim().parse().ok());
     let causality = node.attribute("causality").unwrap_or("local");
@@ -406,14 +491,15 @@ fn variable(
         variability: variability.to_owned(),
         has_variability,
         initial: initial.to_owned(),
-        start: start_values(node, of_type, base, size),
+        start: start_values(node, of_type, base),
         dimensions,
         size,
+        is_too_large: false,
         min: limit("min"),
         max: limit("max"),
         nominal: limit("nominal").filter(|nominal| *nominal > 0.0).unwrap_or(1.0),
-        unit: of_both("unit").map(str::to_owned),
-        display_unit: of_both("displayUnit").map(str::to_owned),
+        unit: shared("unit", |of| of.unit.clone()),
+        display_unit: shared("displayUnit", |of| of.display_unit.clone()),
         declared_type: of_type.attribute("declaredType").map(str::to_owned),
         derivative_of: None,
         clocked: node.attribute("clocks").is_some(),
@@ -422,23 +508,18 @@ fn variable(
     }
 }
 
-/// Reads the start values; a single value of an array is repeated for all elements. Strings of FMI 3.0 are
-/// child elements (section 2.4.7.5).
-fn start_values(node: Node, of_type: Node, base: Option<BaseType>, size: Option<usize>) -> Vec<String> {
+/// Reads the start values as written. Strings of FMI 3.0 are child elements (section 2.4.7.5).
+fn start_values(node: Node, of_type: Node, base: Option<BaseType>) -> Vec<String> {
     let list = of_type.attribute("start");
-    let mut start: Vec<String> = match base {
+    let start: Vec<String> = match base {
         Some(BaseType::String | BaseType::Binary) | None => list.map(str::to_owned).into_iter().collect(),
         Some(_) => list.unwrap_or_default().split_whitespace().map(str::to_owned).collect(),
     };
-    if start.is_empty() {
-        let starts = node.children().filter(|child| child.has_tag_name("Start"));
-        start = starts.filter_map(|child| Some(child.attribute("value")?.to_owned())).collect();
+    if !start.is_empty() {
+        return start;
     }
-    let is_array = node.children().any(|child| child.has_tag_name("Dimension"));
-    match (size, &start[..]) {
-        (Some(size), [one]) if is_array && size <= MAX_ELEMENTS => vec![one.clone(); size],
-        _ => start,
-    }
+    let starts = node.children().filter(|child| child.has_tag_name("Start"));
+    starts.filter_map(|child| Some(child.attribute("value")?.to_owned())).collect()
 }
 
 /// Returns the default of `initial`: the table of section 2.2.7 of FMI 2.0, 2.4.7.4 of FMI 3.0.

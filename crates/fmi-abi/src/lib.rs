@@ -8,6 +8,8 @@ pub mod calls;
 mod causality;
 #[cfg(feature = "description")]
 pub mod description;
+#[cfg(feature = "files")]
+pub mod files;
 pub mod fmi2;
 pub mod fmi3;
 mod log_category;
@@ -15,7 +17,10 @@ mod mode;
 mod rule;
 mod standard;
 mod status;
+mod text;
 mod value;
+#[cfg(feature = "description")]
+pub mod xml;
 
 pub use base_type::BaseType;
 pub use causality::{Causality, Initial, Variability};
@@ -24,6 +29,7 @@ pub use mode::{Mode, Situation, Situations};
 pub use rule::Rule;
 pub use standard::{Interface, Standard};
 pub use status::Status;
+pub use text::{SHOWN, is_c_identifier, one_line, shown, shown_to};
 pub use value::Value;
 
 /// Defines the items of an FMI version's module from its list of functions.

@@ -1,6 +1,9 @@
 //! Errors of an instance, with the messages of its FMU.
 
-use fmi_abi::Status;
+use fmi_abi::{Status, shown_to};
+
+/// Number of characters of an FMU's message that an error repeats.
+const LONGEST: usize = 500;
 
 /// A log message of an FMU.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -73,18 +76,19 @@ impl Rejection {
 impl std::fmt::Display for Rejection {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Rejected { label, function, status, ended, .. } = &*self.0;
-        let message = self.reason();
+        let text = self.reason().map(|message| shown_to(message.text.trim(), LONGEST));
+        let message = text.as_deref().filter(|text| !text.is_empty());
         if !label.is_empty() {
             write!(f, "{label}: ")?;
         }
         if let Some(time) = ended {
             write!(f, "ended by the FMU at t = {time} s")?;
-            return message.map_or(Ok(()), |message| write!(f, ": {}", message.text.trim()));
+            return message.map_or(Ok(()), |message| write!(f, ": {message}"));
         }
         match message {
             // Some FMUs include the function in the message.
-            Some(message) if message.text.contains(function) => f.write_str(message.text.trim()),
-            Some(message) => write!(f, "{}: {}", function, message.text.trim()),
+            Some(message) if message.contains(function) => f.write_str(message),
+            Some(message) => write!(f, "{function}: {message}"),
             None => write!(f, "{} returned {:?} without a message", function, status),
         }
     }

@@ -68,9 +68,9 @@ impl Description {
             wrong.push(("description.interfaces", "it offers no interface type".to_owned()));
         }
         for offer in [&self.co_simulation, &self.model_exchange].into_iter().flatten() {
-            if !is_c_name(&offer.identifier) {
-                let why = format!("modelIdentifier {:?} is no name in C", offer.identifier);
-                wrong.push(("description.identifier", why));
+            // The reader rejects other names that are not identifiers of C.
+            if offer.identifier.is_empty() {
+                wrong.push(("description.identifier", "modelIdentifier is missing or empty".to_owned()));
             }
         }
         let outputs: HashSet<usize> = self.outputs.iter().map(|unknown| unknown.variable).collect();
@@ -95,7 +95,7 @@ impl Description {
                 let why = format!("{name} is no output, and is among those of ModelStructure");
                 add("description.structure", why);
             }
-            if let Some(unit) = variable.unit.as_ref().filter(|unit| !self.units.contains_key(*unit)) {
+            if let Some(unit) = variable.unit.as_ref().filter(|unit| !self.units.contains_key(&***unit)) {
                 let why = format!("{name} is in {unit:?}, which is no unit of UnitDefinitions");
                 add("description.units", why);
             }
@@ -245,11 +245,4 @@ pub fn kind_of(standard: Standard, base: BaseType) -> Kind {
         "Boolean" if standard == Standard::Fmi3 => Kind::U8,
         _ => Kind::I32,
     }
-}
-
-/// Returns whether a string is a valid C identifier.
-fn is_c_name(text: &str) -> bool {
-    let mut letters = text.chars();
-    letters.next().is_some_and(|first| first.is_ascii_alphabetic() || first == '_')
-        && letters.all(|letter| letter.is_ascii_alphanumeric() || letter == '_')
 }

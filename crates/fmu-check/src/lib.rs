@@ -91,7 +91,7 @@ pub fn command(fmu: &Path, options: &Options) -> ExitCode {
     }) {
         Ok(report) => ExitCode::from(report.status),
         Err(error) => {
-            eprintln!("error: {error:#}");
+            eprintln!("error: {}", fmi_abi::one_line(&format!("{error:#}")));
             ExitCode::from(if worker::interrupted() { 130 } else { 2 })
         }
     }
@@ -132,14 +132,17 @@ fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
 pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<Report> {
     let begin = Instant::now();
     let baseline = options.baseline.as_deref().map(baseline::Baseline::read).transpose()?.unwrap_or_default();
-    let scratch = tempfile::Builder::new().prefix("fmu-check-").tempdir()?;
+    let scratch = fmi_abi::files::Scratch::new("fmu-check-")?;
     // The workers are dropped, and end, before the directory is removed.
     let workers = run::Workers::new(scratch.path().to_owned())?;
     let directory = &scratch.path().join("fmu");
     let zip_observations = checks::package::unpack(path, directory, options.unpacked << 20)?;
-    let text = std::fs::read(directory.join("modelDescription.xml")).with_context(|| {
-        format!("{}: there is no modelDescription.xml in it; it is no FMU", path.display())
-    })?;
+    let file = directory.join("modelDescription.xml");
+    if !file.exists() {
+        anyhow::bail!("{}: there is no modelDescription.xml in it; it is not an FMU", path.display());
+    }
+    let text = fmi_abi::files::read(&file, fmi_abi::files::MAX_XML)
+        .map_err(|why| anyhow::anyhow!("{}: modelDescription.xml {why}", path.display()))?;
     let encoding = encoding(&text);
     // For the further checks, a file that is not UTF-8 is decoded as Latin-1.
     let text = match std::str::from_utf8(&text) {

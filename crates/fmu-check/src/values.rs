@@ -8,7 +8,7 @@ use fmi_abi::BaseType;
 /// a non-ASCII string, or bytes with NULs. Returns `None` if no such value is within the range.
 pub fn other_values(description: &Description, index: usize) -> Option<Values> {
     let variable = &description.variables[index];
-    let (starts, size) = (variable.starts(), variable.start.len());
+    let (starts, size) = (variable.starts(), variable.starts_count());
     let kind = kind_of(description.standard, variable.base?);
     Some(match variable.base? {
         BaseType::Real | BaseType::Float32 => {

@@ -29,7 +29,9 @@ pub fn exit(result: Result<()>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            // Messages contain names from files, which the terminal must not obey.
+            let lines = format!("error: {error:#}");
+            lines.lines().for_each(|line| eprintln!("{}", fmi_abi::one_line(line)));
             ExitCode::FAILURE
         }
     }

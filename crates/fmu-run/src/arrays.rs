@@ -2,9 +2,16 @@
 //! reference. A call of the FMU gets or sets all values of an array (section 2.2.7.2).
 
 use fmi_abi::BaseType;
-use fmi_abi::description::{MAX_ELEMENTS, Variable};
+use fmi_abi::description::Variable;
 use std::collections::HashMap;
 use std::ops::Range;
+use std::sync::Arc;
+
+/// Largest number of elements that all arrays have together. Elements of further arrays are not variables.
+const MAX_ELEMENTS: usize = 1 << 20;
+/// Largest number of bytes of the elements of all arrays, and bytes of an element besides its name.
+const MAX_BYTES: usize = 256 << 20;
+const ELEMENT: usize = 160;
 
 /// The arrays of an FMU. Their elements have numbers that serve as value references; they are larger than all
 /// value references of the FMU.
@@ -15,7 +22,9 @@ pub(crate) struct Arrays {
     by_reference: HashMap<u32, usize>,
     /// Number of the first element. `elements` contains, for each element, the index of its array and its number in it.
     first: u32,
-    elements: Vec<(usize, usize)>,
+    elements: Vec<(u32, u32)>,
+    /// Estimated bytes of the elements.
+    bytes: usize,
 }
 
 /// An array.
@@ -24,13 +33,14 @@ pub(crate) struct Array {
     pub reference: u32,
     pub base: BaseType,
     sizes: Vec<usize>,
-    start: Vec<String>,
+    /// Start values as written: one for all elements, or one for each.
+    start: Vec<Arc<str>>,
 }
 
 impl Array {
     /// Creates an array of the model description.
     pub fn new(of: &Variable, base: BaseType) -> Self {
-        let (reference, start) = (of.reference, of.start.clone());
+        let (reference, start) = (of.reference, of.start.iter().map(|start| Arc::from(&**start)).collect());
         Self { reference, base, sizes: of.dimensions.clone().unwrap_or_default(), start }
     }
 
@@ -40,8 +50,11 @@ impl Array {
     }
 
     /// Returns the start value of an element.
-    pub fn start(&self, number: usize) -> Option<&str> {
-        self.start.get(number).map(String::as_str)
+    pub fn start(&self, number: usize) -> Option<&Arc<str>> {
+        match &*self.start {
+            [one] => Some(one),
+            all => all.get(number),
+        }
     }
 
     /// Returns the name of an element as in FMI 2.0 (section 2.2.9 there): indices count from 1 and follow
@@ -96,19 +109,27 @@ impl Arrays {
         &self.all
     }
 
-    /// Adds an array and returns the numbers of its elements; `None` if there are too many.
-    pub fn push(&mut self, array: Array) -> Option<Range<u32>> {
+    /// Adds an array with this name and returns the numbers of its elements; `None` if there are too many.
+    pub fn push(&mut self, array: Array, name: &str) -> Option<Range<u32>> {
         let length = array.length()?;
         let begin = u32::try_from(self.elements.len()).ok()?.checked_add(self.first)?;
         let end = begin.checked_add(u32::try_from(length).ok()?)?;
-        if self.elements.len() + length > MAX_ELEMENTS {
+        let bytes = self.bytes.checked_add(length.checked_mul(ELEMENT + 2 * name.len())?)?;
+        if self.elements.len() + length > MAX_ELEMENTS || bytes > MAX_BYTES {
             return None;
         }
+        self.bytes = bytes;
         let index = self.all.len();
         self.by_reference.insert(array.reference, index);
-        self.elements.extend((0..length).map(|number| (index, number)));
+        let own = u32::try_from(index).ok()?;
+        self.elements.extend((0..length as u32).map(|number| (own, number)));
         self.all.push(array);
         Some(begin..end)
+    }
+
+    /// Returns how many bytes the elements take at most.
+    pub fn bytes(&self) -> usize {
+        self.bytes
     }
 
     /// Returns the number of values of a variable of the FMU.
@@ -119,7 +140,8 @@ impl Arrays {
     /// Returns the index of the array to which an element belongs, and its number in the array.
     #[inline]
     pub fn find(&self, reference: u32) -> Option<(usize, usize)> {
-        self.elements.get(reference.checked_sub(self.first)? as usize).copied()
+        let (array, number) = self.elements.get(reference.checked_sub(self.first)? as usize)?;
+        Some((*array as usize, *number as usize))
     }
 
     /// Returns whether any of these is an array element.
@@ -192,9 +214,15 @@ mod tests {
         references.sort_unstable();
         references.dedup();
         assert_eq!(references.len(), names.len(), "each has its own");
+        let why = |name| description.why_missing(name).unwrap();
+        assert!(why("huge").starts_with("is an array with too many elements"));
+        assert!(why("more").starts_with("is an array with too many elements"));
+        assert_eq!(why("unsized"), "is an array of unknown size");
         let known: Vec<_> = (1..=2).flat_map(|i| (1..=3).map(move |j| format!("m[{i},{j}]"))).collect();
-        let known = known.iter().map(|name| of(name).reference).chain([1]).collect();
-        assert_eq!(of("x[2]").depends_on, Some(known));
+        let known: Vec<_> = known.iter().map(|name| of(name).reference).chain([1]).collect();
+        let depends_on = of("x[2]").depends_on.as_ref().unwrap();
+        assert!(known.iter().all(|known| depends_on.contains(*known)));
+        assert!(!depends_on.contains(of("x[1]").reference) && !depends_on.contains(7));
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! The model description for running or connecting an FMU: array elements are variables.
 
 use crate::arrays::{Array, Arrays};
-use fmi_abi::description::{Fault, ModelDescription, Unknown, Variable as Declared};
+use crate::index::Index;
+use fmi_abi::description::{Fault, MAX_VALUES, ModelDescription, Unknown, Variable as Declared};
 use fmi_abi::{BaseType, Standard, Value};
-use std::collections::HashMap;
 use std::ops::{Deref, Range};
 use std::sync::Arc;
 
@@ -15,16 +15,25 @@ pub struct Variable {
     pub name: String,
     /// Value reference; for an array element, a number that is no value reference of the FMU.
     pub reference: u32,
+    /// Start value as written in the file, if given.
+    pub start: Option<Arc<str>>,
+    /// Name of the continuous state of which this variable is the time derivative, if it is one.
+    pub derivative_of: Option<String>,
+    /// Further attributes, which the elements of an array share.
+    attributes: Arc<Attributes>,
+}
+
+/// Attributes of a [`Variable`], or of all elements of an array.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Attributes {
     /// Base type; Int32 of FMI 3.0 is Integer, Float64 is Real.
     pub base: BaseType,
     /// `input`, `output`, `parameter` and so on; `local` by default.
     pub causality: String,
     /// `fixed`, `tunable`, `discrete` or `continuous`, if given.
     pub variability: Option<String>,
-    /// Start value as written in the file, if given.
-    pub start: Option<String>,
     /// Unit of the variable or of its declared type, if given.
-    pub unit: Option<String>,
+    pub unit: Option<Arc<str>>,
     /// Smallest value of the variable or of its declared type, if given.
     pub min: Option<f64>,
     /// Largest value of the variable or of its declared type, if given.
@@ -32,14 +41,50 @@ pub struct Variable {
     /// Name of the declared type, if given.
     pub declared_type: Option<String>,
     /// Display unit of the variable or of its declared type, if given.
-    pub display_unit: Option<String>,
-    /// Name of the continuous state of which this variable is the time derivative, if it is one.
-    pub derivative_of: Option<String>,
-    /// For an output: value references of the variables on which it depends without a step. `None` if not
-    /// given; then it may depend on all inputs (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
-    pub depends_on: Option<Vec<u32>>,
+    pub display_unit: Option<Arc<str>>,
+    /// For an output: the variables on which it depends without a step. `None` if not given; then it may depend on all inputs
+    /// (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
+    pub depends_on: Option<Dependencies>,
     /// Description.
     pub description: String,
+}
+
+/// A variable has the attributes that it may share.
+impl Deref for Variable {
+    type Target = Attributes;
+
+    fn deref(&self) -> &Attributes {
+        &self.attributes
+    }
+}
+
+/// Value references of variables. Elements of an array have consecutive ones.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dependencies(Vec<Range<u32>>);
+
+impl Dependencies {
+    fn of(mut ranges: Vec<Range<u32>>) -> Self {
+        ranges.sort_unstable_by_key(|range| (range.start, range.end));
+        ranges.dedup_by(|next, before| {
+            let overlap = next.start <= before.end;
+            if overlap {
+                before.end = before.end.max(next.end);
+            }
+            overlap
+        });
+        Self(ranges)
+    }
+
+    /// Returns whether a variable with this value reference is among them.
+    pub fn contains(&self, reference: u32) -> bool {
+        let index = self.0.partition_point(|range| range.end <= reference);
+        self.0.get(index).is_some_and(|range| range.contains(&reference))
+    }
+
+    /// Returns the ranges of the value references, in increasing order.
+    pub(crate) fn ranges(&self) -> &[Range<u32>] {
+        &self.0
+    }
 }
 
 /// The model description of an FMU, with the variables that running or connecting it needs.
@@ -54,7 +99,7 @@ pub struct Description {
     pub event_indicators: usize,
     /// Arrays to which variables belong.
     pub(crate) arrays: Arc<Arrays>,
-    indices: HashMap<String, usize>,
+    indices: Index,
     /// Variables of each variable of the file: one, or the elements of an array.
     spans: Vec<Range<usize>>,
     /// Structural parameters that are set in Configuration Mode.
@@ -107,25 +152,33 @@ impl Description {
         }
         let event_indicators = match (written.standard, written.event_indicators) {
             (Standard::Fmi2, None) => {
-                return Err("modelDescription.xml: numberOfEventIndicators is no number".to_owned());
+                return Err("modelDescription.xml: numberOfEventIndicators is not a number".to_owned());
             }
             (_, count) => count.unwrap_or_default(),
         };
+        if event_indicators > MAX_VALUES {
+            return Err(format!("modelDescription.xml: {event_indicators} event indicators are too many"));
+        }
         let largest = written.variables.iter().map(|of| of.reference).max();
         let mut arrays = Arrays::after(largest.unwrap_or_default());
         let mut variables = Vec::new();
         let mut spans = Vec::new();
         for of in &written.variables {
             let begin = variables.len();
-            spread(of, &mut arrays, &mut variables);
+            spread(of, &mut arrays, &mut variables)
+                .map_err(|why| format!("modelDescription.xml cannot be read: {why}"))?;
             spans.push(begin..variables.len());
         }
         relate(&written, &spans, &mut variables);
+        let states: usize = written.derivatives.iter().map(|of| spans[of.variable].len()).sum();
+        if states > MAX_VALUES {
+            return Err(format!("modelDescription.xml: {states} continuous states are too many"));
+        }
         Ok(Self {
-            states: written.derivatives.iter().map(|of| spans[of.variable].len()).sum(),
+            states,
             event_indicators,
             arrays: Arc::new(arrays),
-            indices: variables.iter().enumerate().map(|(index, of)| (of.name.clone(), index)).collect(),
+            indices: Index::of(variables.iter().map(|of| of.name.as_str())),
             variables,
             spans,
             written,
@@ -144,14 +197,15 @@ impl Description {
         match (of.base, &of.dimensions) {
             (None, _) => Some("is a clock, and clocks are not supported here; FMPy sets and reads them"),
             (_, Some(sizes)) if sizes.is_empty() => None,
-            (_, None) => Some("is an array of unknown size"),
-            _ => None,
+            (_, None) if !of.is_too_large => Some("is an array of unknown size"),
+            _ if self.variable(&format!("{name}[1]")).is_some() => None,
+            _ => Some("is an array with too many elements; FMPy sets and reads it"),
         }
     }
 
     /// Returns the variable of this name.
     pub fn variable(&self, name: &str) -> Option<&Variable> {
-        self.indices.get(name).map(|index| &self.variables[*index])
+        self.indices.find(name, |index| &self.variables[index].name).map(|index| &self.variables[index])
     }
 
     /// Returns whether directional derivatives with respect to this variable may exist: for inputs,
@@ -163,7 +217,7 @@ impl Description {
 
     /// Returns names and numbers of the items of a variable's enumeration, if it has one.
     pub fn items(&self, of: &Variable) -> Option<&[(String, String)]> {
-        self.enumerations.get(of.declared_type.as_ref()?).map(Vec::as_slice)
+        self.enumerations.get(of.declared_type.as_deref()?).map(Vec::as_slice)
     }
 
     /// Checks that an output may be connected to an input of this or another FMU: types, units and items must
@@ -225,49 +279,62 @@ impl Variable {
 }
 
 /// Adds a variable, or the elements of an array. Skips clocks, and arrays whose size is unknown or too large.
-fn spread(of: &Declared, arrays: &mut Arrays, variables: &mut Vec<Variable>) {
-    let (Some(base), Some(sizes)) = (of.base, &of.dimensions) else { return };
-    let variable = Variable {
-        name: of.name.clone(),
-        reference: of.reference,
+fn spread(of: &Declared, arrays: &mut Arrays, variables: &mut Vec<Variable>) -> Result<(), String> {
+    let (Some(base), Some(sizes)) = (of.base, &of.dimensions) else { return Ok(()) };
+    let attributes = Arc::new(Attributes {
         base,
         causality: of.causality.clone(),
         variability: of.has_variability.then(|| of.variability.clone()),
-        start: of.start.first().cloned(),
         unit: of.unit.clone(),
         min: of.min,
         max: of.max,
         declared_type: of.declared_type.clone(),
         display_unit: of.display_unit.clone(),
-        derivative_of: None,
         depends_on: None,
         description: of.description.clone(),
+    });
+    let variable = |name, reference, start| Variable {
+        name,
+        reference,
+        start,
+        derivative_of: None,
+        attributes: Arc::clone(&attributes),
     };
     if sizes.is_empty() {
-        return variables.push(variable);
+        variables.push(variable(
+            of.name.clone(),
+            of.reference,
+            of.start.first().map(|start| Arc::from(&**start)),
+        ));
+        return Ok(());
     }
-    let Some(references) = arrays.push(Array::new(of, base)) else { return };
+    let before = arrays.bytes();
+    let Some(references) = arrays.push(Array::new(of, base), &of.name) else { return Ok(()) };
+    fmi_abi::xml::reserve(arrays.bytes() - before)?;
     let array = &arrays.all()[arrays.all().len() - 1];
-    variables.extend(references.enumerate().map(|(number, reference)| Variable {
-        name: array.name(&of.name, number),
-        reference,
-        start: array.start(number).map(str::to_owned),
-        ..variable.clone()
+    variables.extend(references.enumerate().map(|(number, reference)| {
+        variable(array.name(&of.name, number), reference, array.start(number).cloned())
     }));
+    Ok(())
 }
 
 /// Sets the dependencies of outputs and the states of derivatives. `spans` contains the variables of each
 /// variable of the file.
 fn relate(written: &ModelDescription, spans: &[Range<usize>], variables: &mut [Variable]) {
+    let references = |span: &Range<usize>, variables: &[Variable]| match &variables[span.clone()] {
+        [] => None,
+        [first, .., last] => Some(first.reference..last.reference + 1),
+        [one] => Some(one.reference..one.reference.saturating_add(1)),
+    };
     for unknown in &written.outputs {
         let own = spans[unknown.variable].clone();
-        let known = unknown.dependencies.as_ref().filter(|known| {
-            // Skips very large arrays; these then depend on all inputs.
-            own.len() * known.iter().map(|known| spans[*known].len()).sum::<usize>() < 1 << 22
-        });
-        let known = known.map(|known| known.iter().flat_map(|known| spans[*known].clone()));
-        let known = known.map(|known| known.map(|index| variables[index].reference).collect::<Vec<_>>());
-        variables[own].iter_mut().for_each(|output| output.depends_on.clone_from(&known));
+        let Some(first) = variables.get(own.start).filter(|_| !own.is_empty()) else { continue };
+        let ranges = |known: &Vec<usize>| {
+            known.iter().filter_map(|known| references(&spans[*known], variables)).collect()
+        };
+        let depends_on = unknown.dependencies.as_ref().map(ranges).map(Dependencies::of);
+        let attributes = Arc::new(Attributes { depends_on, ..(*first.attributes).clone() });
+        variables[own].iter_mut().for_each(|output| output.attributes = Arc::clone(&attributes));
     }
     for (own, of) in spans.iter().zip(&written.variables) {
         let Some(state) = of.derivative_of else { continue };

@@ -32,7 +32,10 @@ pub(crate) fn request<T>(message: String) -> Result<T, Error> {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Fmu(message) | Self::Request(message) | Self::Memory(message) => f.write_str(message),
+            Self::Fmu(message) | Self::Request(message) | Self::Memory(message) => {
+                // Messages contain names of the FMU, which a terminal must not obey.
+                f.write_str(&fmi_abi::one_line(message))
+            }
             Self::Cancelled => f.write_str("cancelled"),
         }
     }

@@ -1,16 +1,14 @@
 //! The files of an FMU or a system: unpacked to a temporary directory, or in a directory of the caller.
 
-use std::fs::File;
-use std::io::Read;
+use fmi_abi::files::{Limits, Scratch, read_xml, unpack};
+use fmi_abi::shown;
 use std::path::{Path, PathBuf};
-use tempfile::TempDir;
-use zip::ZipArchive;
 
 /// Directory with the files.
 #[derive(Debug)]
 pub(crate) enum Files {
     /// Removed when dropped.
-    Temporary(TempDir),
+    Temporary(Scratch),
     /// A directory that the caller has unpacked.
     Own(PathBuf),
 }
@@ -46,14 +44,14 @@ impl Files {
         }
     }
 
-    /// Unpacks a zip file; takes a directory as it is. The message of an error says what the file is instead.
-    pub fn open(path: &Path, kind: Kind) -> Result<Self, String> {
+    /// Unpacks a zip file within these limits; takes a directory as it is. The message of an error says what the file is instead.
+    pub fn open(path: &Path, kind: Kind, limits: &mut Limits) -> Result<Self, String> {
         let files = if path.is_dir() {
             // The FMU gets absolute paths of its resources.
             let path = path.canonicalize().map_err(|error| format!("cannot be opened ({error})"))?;
             Self::Own(path)
         } else {
-            unpacked(path, kind)?
+            unpacked(path, kind, limits)?
         };
         if files.path().join(kind.file()).is_file() {
             return Ok(files);
@@ -74,10 +72,7 @@ impl Files {
 
     /// Returns the content of an XML file at the top.
     pub fn xml(&self, name: &str) -> Result<String, String> {
-        let bytes = std::fs::read(self.path().join(name));
-        decoded(&bytes.map_err(|error| format!("{name} cannot be read ({error})"))?).ok_or_else(|| {
-            format!("{name} is not in an encoding that is supported (UTF-8, UTF-16, ISO-8859-1)")
-        })
+        read_xml(&self.path().join(name)).map_err(|why| format!("{name} {why}"))
     }
 }
 
@@ -86,132 +81,22 @@ fn below(directory: &Path, file: &str) -> Option<String> {
     let directories = std::fs::read_dir(directory).ok()?.flatten();
     directories
         .filter(|entry| entry.path().join(file).is_file())
-        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .map(|entry| shown(&entry.file_name().to_string_lossy()).into_owned())
         .next()
 }
 
-fn unpacked(path: &Path, kind: Kind) -> Result<Files, String> {
-    let mut file = File::open(path).map_err(|error| format!("cannot be opened ({error})"))?;
-    let mut start = [0; 64];
-    let length = file.read(&mut start).map_err(|error| format!("cannot be read ({error})"))?;
-    let mut archive = ZipArchive::new(file).map_err(|error| {
-        let why = instead(&start[..length]).unwrap_or_else(|| format!("it cannot be read as one: {error}"));
-        format!("is not {}, which is a zip file: {why}", kind.name())
+fn unpacked(path: &Path, kind: Kind, limits: &mut Limits) -> Result<Files, String> {
+    let directory =
+        Scratch::new("fmu-run-").map_err(|error| format!("no temporary directory can be made ({error})"))?;
+    unpack(path, kind.name(), directory.path(), limits, &mut |entry| {
+        if entry.is_inside {
+            return Ok(true);
+        }
+        Err(format!("the entry {} would be outside of the directory", shown(entry.name)))
+    })
+    .map_err(|why| match why.contains("limit for archives") {
+        true => format!("{why}; if you trust it, unpack it and open the directory"),
+        false => why,
     })?;
-    let directory = tempfile::Builder::new().prefix("fmu-run-").tempdir();
-    let directory = directory.map_err(|error| format!("no temporary directory can be made ({error})"))?;
-    for index in 0..archive.len() {
-        extract(&mut archive, index, directory.path())
-            .map_err(|why| format!("cannot be unpacked ({why})"))?;
-    }
     Ok(Files::Temporary(directory))
-}
-
-/// Extracts an entry. Links are skipped, because they could lead out of the directory. Permissions are ignored, except that
-/// programs stay executable: some tools write entries that the owner could not read.
-fn extract(archive: &mut ZipArchive<File>, index: usize, directory: &Path) -> Result<(), String> {
-    let mut entry = archive.by_index(index).map_err(|error| error.to_string())?;
-    // Some tools of Windows write backslashes.
-    let name = entry.name().map_err(|error| error.to_string())?.replace('\\', "/");
-    let path = entry.enclosed_name().map(|_| Path::new(&name));
-    let is_inside = |path: &&Path| {
-        path.components()
-            .all(|part| matches!(part, std::path::Component::Normal(_) | std::path::Component::CurDir))
-    };
-    let Some(path) = path.filter(is_inside) else {
-        return Err(format!("the entry {name} would be outside of the directory"));
-    };
-    if entry.is_symlink() {
-        return Ok(());
-    }
-    let to = directory.join(path);
-    let message = |error: std::io::Error| format!("{name}: {error}");
-    if name.ends_with('/') {
-        return std::fs::create_dir_all(&to).map_err(message);
-    }
-    if let Some(parent) = to.parent() {
-        std::fs::create_dir_all(parent).map_err(message)?;
-    }
-    let mut file = File::create(&to).map_err(message)?;
-    std::io::copy(&mut entry, &mut file).map_err(message)?;
-    #[cfg(unix)]
-    if entry.unix_mode().is_some_and(|mode| mode & 0o111 != 0) {
-        use std::os::unix::fs::PermissionsExt;
-        file.set_permissions(std::fs::Permissions::from_mode(0o755)).map_err(message)?;
-    }
-    Ok(())
-}
-
-/// Returns what a file is that is not a zip file, from its first bytes.
-fn instead(start: &[u8]) -> Option<String> {
-    let text = start.trim_ascii_start();
-    let why = match text {
-        [] => "it is empty",
-        _ if text.starts_with(b"version https://git-lfs") => {
-            "it is a pointer of Git LFS to the file, which `git lfs pull` fetches"
-        }
-        _ if text.len() >= 9 && text[..9].eq_ignore_ascii_case(b"<!doctype")
-            || text.starts_with(b"<html") =>
-        {
-            "it is a web page; the download may have failed"
-        }
-        _ if text.starts_with(b"<?xml") => "it is an XML file; open the FMU that contains it",
-        [0x7f, b'E', b'L', b'F', ..] | [b'M', b'Z', ..] => "it is a shared library or a program",
-        [0x1f, 0x8b, ..] | [b'7', b'z', 0xbc, 0xaf, ..] | [b'R', b'a', b'r', b'!', ..] => {
-            "it is an archive of another format"
-        }
-        _ => return None,
-    };
-    Some(why.to_owned())
-}
-
-/// Decodes an XML file: UTF-8, UTF-16 with a byte order mark, or ISO-8859-1, which the XML declaration names.
-fn decoded(bytes: &[u8]) -> Option<String> {
-    let wide = |order: fn([u8; 2]) -> u16| {
-        let units: Vec<u16> = bytes[2..].as_chunks().0.iter().copied().map(order).collect();
-        String::from_utf16(&units).ok()
-    };
-    match bytes {
-        [0xff, 0xfe, ..] => return wide(u16::from_le_bytes),
-        [0xfe, 0xff, ..] => return wide(u16::from_be_bytes),
-        _ => {}
-    }
-    if let Ok(text) = std::str::from_utf8(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)) {
-        return Some(text.to_owned());
-    }
-    let declaration = String::from_utf8_lossy(&bytes[..bytes.len().min(200)]).to_ascii_lowercase();
-    let is_latin = ["iso-8859-1", "iso-8859-15", "windows-1252", "latin1", "us-ascii"]
-        .iter()
-        .any(|name| declaration.contains(name));
-    is_latin.then(|| bytes.iter().copied().map(char::from).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{decoded, instead};
-
-    #[test]
-    fn encodings() {
-        let utf16: Vec<u8> = "\u{feff}<a>\u{e4}</a>".encode_utf16().flat_map(u16::to_le_bytes).collect();
-        assert_eq!(decoded(&utf16).as_deref(), Some("<a>\u{e4}</a>"));
-        assert_eq!(decoded("\u{feff}<a>\u{e4}</a>".as_bytes()).as_deref(), Some("<a>\u{e4}</a>"));
-        let latin = b"<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?><a>\xe4</a>";
-        assert!(decoded(latin).unwrap().ends_with("<a>\u{e4}</a>"));
-        assert_eq!(decoded(b"<a>\xe4</a>"), None);
-    }
-
-    #[test]
-    fn files_that_are_no_archive() {
-        for (start, why) in [
-            (&b""[..], "empty"),
-            (b"version https://git-lfs.github.com/spec/v1\n", "git lfs pull"),
-            (b"\n<!DOCTYPE html>", "web page"),
-            (b"<?xml version", "XML"),
-            (b"\x7fELF\x02\x01", "library"),
-            (b"\x1f\x8b\x08", "another format"),
-        ] {
-            assert!(instead(start).unwrap().contains(why));
-        }
-        assert_eq!(instead(b"text"), None);
-    }
 }

@@ -6,6 +6,7 @@ use crate::files::{Files, Kind};
 use crate::library::Library;
 use crate::machine;
 use fmi_abi::description::Offer;
+use fmi_abi::files::Limits;
 use fmi_abi::{Interface, Standard};
 use std::env::consts::{ARCH, DLL_SUFFIX, OS};
 use std::error::Error as _;
@@ -27,13 +28,13 @@ pub(crate) struct Loaded {
 }
 
 impl Loaded {
-    /// Opens an FMU.
+    /// Opens an FMU; a zip file is unpacked within these limits.
     ///
     /// # Safety
     /// The requirement of [`Fmu::open`](crate::Fmu::open); if `execution_tool` is true, the program may be started.
-    pub unsafe fn open(path: &Path, execution_tool: bool) -> Result<Self, Error> {
+    pub unsafe fn open(path: &Path, execution_tool: bool, limits: &mut Limits) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
-        let files = Files::open(path, Kind::Fmu).map_err(fail)?;
+        let files = Files::open(path, Kind::Fmu, limits).map_err(fail)?;
         let description = files.xml(DESCRIPTION).and_then(|text| Description::parse(&text)).map_err(fail)?;
         let files = Arc::new(files);
         // SAFETY: the caller guarantees that the library is sound.

@@ -63,15 +63,15 @@ impl Found<'_> {
         let Some(own) = &self.variable.unit else {
             return request(format!("{name} has no unit, its values cannot be in {unit}"));
         };
-        if own == unit {
+        if **own == *unit {
             return Ok((1.0, 0.0));
         }
-        let others = self.description.display_units.get(own).map_or(&[][..], Vec::as_slice);
+        let others = self.description.display_units.get(&**own).map_or(&[][..], Vec::as_slice);
         if let Some((_, factor, offset)) = others.iter().find(|(name, ..)| name == unit) {
             return Ok((*factor, *offset));
         }
         let known: Vec<_> =
-            std::iter::once(own.as_str()).chain(others.iter().map(|(name, ..)| name.as_str())).collect();
+            std::iter::once(&**own).chain(others.iter().map(|(name, ..)| name.as_str())).collect();
         request(format!("{name} can be given in {}, not in {unit:?}", known.join(" or ")))
     }
 }

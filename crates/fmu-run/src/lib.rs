@@ -14,6 +14,7 @@ mod error;
 mod files;
 mod fmu;
 mod found;
+mod index;
 mod instance;
 mod instances;
 mod kept;
@@ -29,7 +30,7 @@ mod values;
 
 pub use batch::{Batch, Finished, Measure, Occurrence, Planned, Runs, Size, Trajectory, Watch};
 pub use continuous::{Integration, Solver};
-pub use description::{Description, Variable};
+pub use description::{Attributes, Dependencies, Description, Variable};
 pub use error::Error;
 pub use fmi_abi::description::{ModelDescription, Offer, Unknown};
 pub use fmi_abi::{BaseType, Interface, Standard, Status, Value};

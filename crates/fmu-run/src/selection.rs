@@ -5,6 +5,7 @@ use crate::found::Found;
 use crate::instance::Instance;
 use fmi_abi::BaseType;
 use fmi_client::Rejection;
+use std::collections::HashMap;
 
 /// Numeric variables, looked up once by name. A row of values has one value for each, in this order; 0 and 1
 /// represent Booleans.
@@ -60,14 +61,24 @@ impl Selection {
 
     /// Adds a name and all variables that it denotes.
     pub(crate) fn push(&mut self, name: &str, found: &[Found]) {
+        let known = self.groups.iter().enumerate();
+        let mut known = known.map(|(index, group)| ((group.component, group.base), index)).collect();
+        self.push_to(&mut known, name, found);
+    }
+
+    /// Adds a name and all variables that it denotes; `known` contains the indices of the groups.
+    pub(crate) fn push_to(
+        &mut self,
+        known: &mut HashMap<(usize, BaseType), usize>,
+        name: &str,
+        found: &[Found],
+    ) {
         let row = self.names.len();
         self.names.push(name.to_owned());
         let read_only = found.iter().find_map(|found| found.check_settable(name).err());
         self.read_only = self.read_only.take().or(read_only.map(|error| error.to_string()));
         for Target { component, base, reference } in found.iter().copied().map(Target::of) {
-            let index =
-                self.groups.iter().position(|group| group.component == component && group.base == base);
-            let index = index.unwrap_or_else(|| {
+            let index = *known.entry((component, base)).or_insert_with(|| {
                 self.groups.push(Group { component, base, references: Vec::new(), indices: Vec::new() });
                 self.groups.len() - 1
             });

@@ -85,7 +85,7 @@ impl Instance {
             return known.clone();
         }
         let array = &self.arrays.all()[array];
-        let number = |number| match array.start(number) {
+        let number = |number| match array.start(number).map(|start| &**start) {
             Some("true") => 1.0,
             start => start.and_then(|start| start.parse().ok()).unwrap_or_default(),
         };

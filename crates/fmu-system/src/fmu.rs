@@ -2,7 +2,7 @@
 
 use anyhow::{Result, anyhow, bail, ensure};
 use fmu_package::files::unzip;
-use fmu_run::{Description, Variable};
+use fmu_run::{Attributes, Description, Variable};
 
 /// An FMU that has been read.
 pub struct Fmu {
@@ -59,7 +59,8 @@ impl<'a> Own<'a> {
 
     /// Fails if a system cannot set the start value of this variable.
     pub fn check_settable(self, name: &str) -> Result<()> {
-        let Variable { start, variability, causality, .. } = self.variable;
+        let Variable { start, .. } = self.variable;
+        let Attributes { variability, causality, .. } = &**self.variable;
         let is_constant = variability.as_deref() == Some("constant");
         ensure!(start.is_some() && !is_constant, "{name} is {causality} and takes no start value");
         Ok(())
@@ -74,7 +75,7 @@ impl<'a> Own<'a> {
             _ => None,
         };
         if let Some(value) = number {
-            let Variable { min, max, base, .. } = self.variable;
+            let Attributes { min, max, base, .. } = &**self.variable;
             ensure!(value.is_finite(), "the start value of {name} must be a finite number, it is {value}");
             let [lowest, highest] = match base.range() {
                 Some((lowest, highest)) => [Some(lowest as f64), Some(highest as f64)],

@@ -2,81 +2,51 @@
 
 use crate::description::{Description, Offer};
 use crate::rules::Observation;
-use anyhow::Context as _;
-use fmi_abi::Standard;
+use anyhow::bail;
+use fmi_abi::files::{self, Entry, Limits};
+use fmi_abi::{Standard, shown};
 use object::Object as _;
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 use std::env::consts::{ARCH, DLL_SUFFIX, OS};
-use std::fs::File;
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 /// Unpacks an FMU and returns the findings in its ZIP file.
 ///
 /// # Errors
-/// Fails if the FMU cannot be unpacked or has more than `most` bytes when it is unpacked.
+/// Fails if the FMU cannot be unpacked or has more than `max_bytes` when it is unpacked.
 pub fn unpack(path: &Path, directory: &Path, max_bytes: u64) -> anyhow::Result<Vec<Observation>> {
-    let at = path.display();
-    let file = File::open(path).map_err(|error| anyhow::anyhow!("{at}: cannot be opened ({error})"))?;
-    let mut archive = zip::ZipArchive::new(file)
-        .map_err(|error| anyhow::anyhow!("{at}: is no FMU, which is a ZIP file ({error})"))?;
     let mut found = Vec::new();
-    let mut names = BTreeSet::new();
-    let mut remaining = max_bytes;
-    for index in 0..archive.len() {
-        let name = entry(&mut archive, index, &mut names, &mut found)?;
-        if crate::worker::interrupted() {
-            return Err(crate::run::Stop::Interrupted.into());
-        }
-        let Some(inside) = name else { continue };
-        let mut entry =
-            archive.by_index(index).map_err(|error| anyhow::anyhow!("{at}: cannot be unpacked ({error})"))?;
-        let target = directory.join(inside);
-        if entry.is_dir() {
-            std::fs::create_dir_all(target)?;
-            continue;
-        }
-        std::fs::create_dir_all(target.parent().unwrap_or(directory))?;
-        // The size that the entry declares may be wrong.
-        let written = std::io::copy(&mut (&mut entry).take(remaining + 1), &mut File::create(&target)?)
-            .map_err(|error| anyhow::anyhow!("{at}: cannot be unpacked ({error})"))?;
-        remaining = remaining.checked_sub(written).with_context(|| {
-            let max_megabytes = max_bytes >> 20;
-            format!(
-                "{at}: it has more than {max_megabytes} MB when it is unpacked; if that is right, give --unpacked MB"
-            )
-        })?;
-        #[cfg(unix)]
-        if let Some(mode) = entry.unix_mode().filter(|mode| mode & 0o100 != 0) {
-            use std::os::unix::fs::PermissionsExt as _;
-            std::fs::set_permissions(&target, std::fs::Permissions::from_mode(mode & 0o777 | 0o600))?;
-        }
+    let mut names = HashSet::new();
+    let mut limits = Limits { bytes: max_bytes, ..Limits::default() };
+    let unpacked = files::unpack(path, "an FMU", directory, &mut limits, &mut |entry| {
+        look_at(entry, &mut names, &mut found);
+        if crate::worker::interrupted() { Err("interrupted".to_owned()) } else { Ok(true) }
+    });
+    if crate::worker::interrupted() {
+        return Err(crate::run::Stop::Interrupted.into());
     }
-    Ok(found)
+    match unpacked {
+        Ok(()) => Ok(found),
+        Err(why) if why.contains("MB when it is unpacked") => {
+            bail!("{}: {why}; if that is right, give --unpacked MB", path.display())
+        }
+        Err(why) => bail!("{}: {why}", path.display()),
+    }
 }
 
-/// Inspects an entry of a ZIP file. Returns its path below the FMU's directory, or `None` if it is outside.
-fn entry(
-    archive: &mut zip::ZipArchive<File>,
-    index: usize,
-    names: &mut BTreeSet<String>,
-    found: &mut Vec<Observation>,
-) -> anyhow::Result<Option<PathBuf>> {
-    let mut add = |name: &'static str, observed: String| found.push((name, observed));
-    let entry = archive.by_index_raw(index)?;
-    let name = entry.name()?.into_owned();
-    let inside = entry.enclosed_name();
-    if inside.is_none() || name.contains('\\') {
-        add("package.paths", name.clone());
+/// Inspects an entry of a ZIP file.
+fn look_at(entry: &Entry, names: &mut HashSet<String>, found: &mut Vec<Observation>) {
+    let name = entry.name;
+    let mut add = |rule: &'static str, observed: String| found.push((rule, observed));
+    if !entry.is_inside || name.contains('\\') {
+        add("package.paths", shown(name).into_owned());
     }
-    if !matches!(entry.compression(), zip::CompressionMethod::Stored | zip::CompressionMethod::Deflated) {
-        let observed = format!("{name} is compressed by {}", entry.compression());
-        add("package.compression", observed);
+    if let Some(compression) = &entry.compression {
+        add("package.compression", format!("{} is compressed by {compression}", shown(name)));
     }
     if !names.insert(name.to_lowercase()) {
-        add("package.names", name);
+        add("package.names", shown(name).into_owned());
     }
-    Ok(inside)
 }
 
 /// Returns the names of the directories in `binaries/` for this platform.

@@ -42,7 +42,8 @@ fn is_start(variable: &Variable, value: &Values) -> bool {
     }
     match value {
         Values::Strings(texts) => {
-            let mut pairs = texts.iter().zip(&variable.start);
+            let mut pairs =
+                texts.iter().enumerate().map_while(|(index, text)| Some((text, variable.start_of(index)?)));
             variable.base != Some(BaseType::String)
                 || pairs.all(|(text, start)| text.as_deref() == Some(start.as_bytes()))
         }
@@ -158,7 +159,7 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     // integers, Booleans and strings, so these variables are set one at a time.
     let separate = others.iter().take(checker.at_most(40)).flat_map(|index| {
         // 500 bytes, longer than usual buffers.
-        let long = Values::strings(&b"long ".repeat(100), variable(index).start.len());
+        let long = Values::strings(&b"long ".repeat(100), variable(index).starts_count());
         let long = (variable(index).base == Some(BaseType::String)).then_some((*index, long));
         with_other(index).into_iter().chain(long).map(|value| vec![value])
     });

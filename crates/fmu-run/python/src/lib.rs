@@ -75,10 +75,12 @@ type Results<'py> = (
 );
 
 fn python(error: Error) -> PyErr {
+    // In one line, without control characters.
+    let message = error.to_string();
     match error {
-        Error::Fmu(message) => FmuError::new_err(message),
-        Error::Request(message) => PyValueError::new_err(message),
-        Error::Memory(message) => PyMemoryError::new_err(message),
+        Error::Fmu(_) => FmuError::new_err(message),
+        Error::Request(_) => PyValueError::new_err(message),
+        Error::Memory(_) => PyMemoryError::new_err(message),
         Error::Cancelled => PyRuntimeError::new_err("cancelled"),
     }
 }
@@ -190,8 +192,11 @@ impl Loaded {
 
     fn variables(&self) -> PyResult<Vec<Described>> {
         let describe = |(name, variable): (String, &fmu_run::Variable)| {
-            let fmu_run::Variable { base, causality, variability, start, unit, .. } = variable.clone();
-            let fmu_run::Variable { description, min, max, display_unit, .. } = variable.clone();
+            let fmu_run::Variable { start, .. } = variable.clone();
+            let fmu_run::Attributes { base, causality, variability, unit, .. } = (**variable).clone();
+            let fmu_run::Attributes { description, min, max, display_unit, .. } = (**variable).clone();
+            let [start, unit, display_unit] =
+                [start, unit, display_unit].map(|text| text.map(|text| text.to_string()));
             (name, base.to_string(), causality, variability, start, unit, description, min, max, display_unit)
         };
         Ok(self.model()?.variables().map(describe).collect())

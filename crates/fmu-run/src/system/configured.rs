@@ -44,7 +44,7 @@ impl System {
         });
         let mut definition = Definition::of(self.name(), components.collect::<Result<_, Error>>()?);
         definition.connectors.clone_from(&self.0.connectors);
-        definition.connections.clone_from(&self.0.connections);
+        definition.set_connections(self.0.connections.clone());
         definition.start.clone_from(&self.0.start);
         definition.stop_time = self.0.stop_time;
         let system = match self.sole() {

@@ -3,6 +3,7 @@
 mod configured;
 mod elements;
 mod order;
+mod source;
 mod ssp;
 
 use crate::description::{Description, Variable};
@@ -15,10 +16,11 @@ use crate::selection::Selection;
 use crate::start::is_exact;
 pub use elements::Elements;
 use fmi_abi::description::Offer;
+use fmi_abi::files::Limits;
 use fmi_abi::{BaseType, Interface};
 pub(crate) use order::Exchange;
 pub use order::Order;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::Deref;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -36,9 +38,14 @@ pub struct System(Arc<Definition>);
 struct Definition {
     name: String,
     components: Vec<Component>,
+    /// Indices of the components by name, and the lengths of the names.
+    by_name: HashMap<String, usize>,
+    lengths: BTreeSet<usize>,
     /// Names of the system's inputs and outputs, and the variables that they denote.
     connectors: BTreeMap<String, Vec<String>>,
     connections: Vec<(String, String)>,
+    /// Index of the first connection to each input.
+    sources: HashMap<String, usize>,
     exchange: Exchange,
     start: Vec<(String, StartValue)>,
     stop_time: Option<f64>,
@@ -92,7 +99,7 @@ impl System {
             composition.connections.iter().map(|(from, to)| ((*from).to_owned(), (*to).to_owned()));
         let mut definition =
             Definition::of(composition.name, components.map(|(name, fmu)| Component { name, fmu }).collect());
-        definition.connections = connections.collect();
+        definition.set_connections(connections.collect());
         definition.finish(composition.order)
     }
 
@@ -141,9 +148,9 @@ impl System {
     /// # Errors
     /// Returns [`Error::Request`] if a name is unknown, or a variable is not numeric.
     pub fn select(&self, names: &[impl AsRef<str>]) -> Result<Selection, Error> {
-        let mut selection = Selection::default();
+        let (mut selection, mut known) = (Selection::default(), HashMap::new());
         for name in names.iter().map(AsRef::as_ref) {
-            selection.push(name, &self.find_numbers(name)?);
+            selection.push_to(&mut known, name, &self.find_numbers(name)?);
         }
         Ok(selection)
     }
@@ -354,7 +361,8 @@ impl Fmu {
     /// program.
     pub unsafe fn open(path: &Path) -> Result<Self, Error> {
         // SAFETY: the caller guarantees that the library is sound.
-        unsafe { Loaded::open(path, false) }.map(|loaded| Self(System::of_one(loaded)))
+        unsafe { Loaded::open(path, false, &mut Limits::default()) }
+            .map(|loaded| Self(System::of_one(loaded)))
     }
 
     /// Opens an FMU as [`open`](Self::open) does, and permits libraries that start another program
@@ -368,7 +376,7 @@ impl Fmu {
     /// Same errors as [`open`](Self::open).
     pub unsafe fn open_with_execution_tool(path: &Path) -> Result<Self, Error> {
         // SAFETY: the caller guarantees that the library is sound and that the program may be started.
-        unsafe { Loaded::open(path, true) }.map(|loaded| Self(System::of_one(loaded)))
+        unsafe { Loaded::open(path, true, &mut Limits::default()) }.map(|loaded| Self(System::of_one(loaded)))
     }
 
     /// Returns the model description.
@@ -392,17 +400,32 @@ impl Deref for Fmu {
 
 impl Definition {
     fn of(name: &str, components: Vec<Component>) -> Self {
+        let mut by_name = HashMap::new();
+        for (index, component) in components.iter().enumerate() {
+            by_name.entry(component.name.clone()).or_insert(index);
+        }
         Self {
             name: name.to_owned(),
+            lengths: by_name.keys().map(String::len).collect(),
+            by_name,
             components,
             connectors: BTreeMap::new(),
             connections: Vec::new(),
+            sources: HashMap::new(),
             exchange: Exchange::default(),
             start: Vec::new(),
             stop_time: None,
             kept: Kept::default(),
             arrays: OnceLock::new(),
         }
+    }
+
+    fn set_connections(&mut self, connections: Vec<(String, String)>) {
+        self.sources.clear();
+        for (index, (_, to)) in connections.iter().enumerate() {
+            self.sources.entry(to.clone()).or_insert(index);
+        }
+        self.connections = connections;
     }
 
     /// Checks the connections and sorts them into stages.
@@ -414,13 +437,12 @@ impl Definition {
             if name.is_empty() {
                 return request("a component has no name".to_owned());
             }
-            let before = &self.components[..index];
-            if before.iter().any(|other| other.name == *name) {
+            if self.by_name[name] != index {
                 return request(format!("two components are named {name}"));
             }
             fmu.library(Interface::CoSimulation)?;
             if fmu.once_per_process(Interface::CoSimulation)
-                && before.iter().any(|other| Arc::ptr_eq(&other.fmu, fmu))
+                && self.components[..index].iter().any(|other| Arc::ptr_eq(&other.fmu, fmu))
             {
                 return Err(Error::Fmu(format!(
                     "{} can have only one instance per process (canBeInstantiatedOnlyOncePerProcess)",
@@ -438,7 +460,7 @@ impl Definition {
             if matches!(output.variable.base, BaseType::String | BaseType::Binary) {
                 return request(format!("{from} cannot feed {to}: only numbers and Booleans are passed on"));
             }
-            if self.connections[..index].iter().any(|(_, other)| other == to) {
+            if self.sources[to] != index {
                 return request(format!("{to} is fed twice"));
             }
             ends.push((output, input));
@@ -458,15 +480,21 @@ impl Definition {
     fn look_up(&self, name: &str) -> Option<Found<'_>> {
         let with = |component: usize, own: &str| {
             let description = &self.components[component].fmu.description;
-            let fed = self.connections.iter().find(|(_, to)| to == name);
-            let source = fed.map(|(from, _)| from.as_str());
+            let source = self.sources.get(name).map(|index| self.connections[*index].0.as_str());
             Some(Found { component, variable: description.variable(own)?, description, source })
         };
         match &*self.components {
             [component] if component.name.is_empty() => with(0, name),
-            components => components.iter().enumerate().find_map(|(index, component)| {
-                with(index, name.strip_prefix(component.name.as_str())?.strip_prefix('.')?)
-            }),
+            _ => {
+                // Names of components may have dots; the first component in the system counts.
+                let split = |length: &usize| {
+                    let (component, own) = (name.get(..*length)?, name.get(*length..)?.strip_prefix('.')?);
+                    Some((*self.by_name.get(component)?, own))
+                };
+                let mut candidates: Vec<_> = self.lengths.range(..name.len()).filter_map(split).collect();
+                candidates.sort_unstable();
+                candidates.into_iter().find_map(|(index, own)| with(index, own))
+            }
         }
     }
 

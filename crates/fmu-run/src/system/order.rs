@@ -1,8 +1,12 @@
 //! Sequence in which values are passed at a communication point.
 
+use crate::description::Dependencies;
 use crate::error::{Error, request};
 use crate::found::Found;
 use crate::selection::Selection;
+use fmi_abi::shown;
+use std::collections::HashMap;
+use std::ops::Range;
 
 /// Time at which outputs are passed to the connected inputs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -26,7 +30,7 @@ pub(crate) struct Exchange {
 }
 
 /// Outputs and the connected inputs, in the same order.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Stage {
     pub outputs: Selection,
     pub inputs: Selection,
@@ -35,12 +39,6 @@ pub(crate) struct Stage {
 /// A connection: an output of a component and the connected input.
 type Ends<'a> = (Found<'a>, Found<'a>);
 
-/// Returns whether the output of a connection depends directly on the input of another one.
-fn follows((from, _): &Ends, (_, to): &Ends) -> bool {
-    let depends_on = from.variable.depends_on.as_ref();
-    to.component == from.component && depends_on.is_none_or(|inputs| inputs.contains(&to.variable.reference))
-}
-
 /// Returns the stages, each after the stages that it depends on.
 pub(super) fn stages(names: &[(String, String)], ends: &[Ends], order: Order) -> Result<Vec<Stage>, Error> {
     let levels = match order {
@@ -48,55 +46,115 @@ pub(super) fn stages(names: &[(String, String)], ends: &[Ends], order: Order) ->
         Order::Dependencies => levels(names, ends)?,
     };
     let count = levels.iter().max().map_or(0, |last| last + 1);
-    let stage = |number| {
-        let mut stage = Stage { outputs: Selection::default(), inputs: Selection::default() };
-        let of_stage = levels.iter().enumerate().filter(|(_, level)| **level == number);
-        for (index, _) in of_stage {
-            let ((from, to), (output, input)) = (&names[index], ends[index]);
-            stage.outputs.push(from, &[output]);
-            stage.inputs.push(to, &[input]);
-        }
-        stage
+    let mut stages: Vec<Stage> = (0..count).map(|_| Stage::default()).collect();
+    // Groups of the outputs and the inputs of each stage.
+    let mut known: Vec<[HashMap<_, _>; 2]> = (0..count).map(|_| Default::default()).collect();
+    for (((from, to), (output, input)), level) in names.iter().zip(ends).zip(levels) {
+        let [of_outputs, of_inputs] = &mut known[level];
+        stages[level].outputs.push_to(of_outputs, from, &[*output]);
+        stages[level].inputs.push_to(of_inputs, to, &[*input]);
+    }
+    Ok(stages)
+}
+
+/// The inputs on which outputs of a component depend directly. Outputs with the same dependencies share them.
+struct Set {
+    /// Connections to these inputs.
+    before: Vec<usize>,
+    /// Length of the longest chain of connections that must precede the outputs, if it is known.
+    level: Option<usize>,
+    /// Whether the search for the level has begun and not ended.
+    is_open: bool,
+}
+
+/// Returns for each connection the index of the set of its output, and the sets.
+fn sets(ends: &[Ends]) -> (Vec<usize>, Vec<Set>) {
+    let mut inputs: HashMap<usize, Vec<(u32, usize)>> = HashMap::new();
+    for (index, (_, to)) in ends.iter().enumerate() {
+        inputs.entry(to.component).or_default().push((to.variable.reference, index));
+    }
+    inputs.values_mut().for_each(|inputs| inputs.sort_unstable());
+    let mut known: HashMap<(usize, Option<*const Dependencies>), usize> = HashMap::new();
+    let mut sets = Vec::new();
+    let set = |(from, _): &Ends| {
+        let depends_on = from.variable.depends_on.as_ref();
+        *known.entry((from.component, depends_on.map(std::ptr::from_ref))).or_insert_with(|| {
+            let inputs = inputs.get(&from.component).map_or(&[][..], Vec::as_slice);
+            let before = match depends_on {
+                None => inputs.iter().map(|(_, index)| *index).collect(),
+                Some(depends_on) => {
+                    depends_on.ranges().iter().flat_map(|range| within(inputs, range)).collect()
+                }
+            };
+            sets.push(Set { before, level: None, is_open: false });
+            sets.len() - 1
+        })
     };
-    Ok((0..count).map(stage).collect())
+    (ends.iter().map(set).collect(), sets)
+}
+
+/// Returns the connections to inputs with these value references. `inputs` is sorted.
+fn within<'a>(inputs: &'a [(u32, usize)], range: &Range<u32>) -> impl Iterator<Item = usize> + use<'a> {
+    let [begin, end] =
+        [range.start, range.end].map(|limit| inputs.partition_point(|(reference, _)| *reference < limit));
+    inputs[begin..end].iter().map(|(_, index)| *index)
 }
 
 /// Returns the level of each connection: the length of the longest chain of connections that must precede it.
 fn levels(names: &[(String, String)], ends: &[Ends]) -> Result<Vec<usize>, Error> {
-    let mut levels: Vec<Option<usize>> = vec![None; ends.len()];
+    let (set_of, mut sets) = sets(ends);
     for first in 0..ends.len() {
-        level(names, ends, first, &mut levels, &mut Vec::new())?;
+        // The open connections, each with the number of connections before it that have been visited.
+        let mut path = vec![(first, 0)];
+        while let Some((connection, visited)) = path.last_mut() {
+            let set = &mut sets[set_of[*connection]];
+            if set.level.is_some() {
+                path.pop();
+                continue;
+            }
+            set.is_open = true;
+            if let Some(before) = set.before.get(*visited).copied() {
+                *visited += 1;
+                let other = &sets[set_of[before]];
+                if other.is_open {
+                    let begin =
+                        path.iter().position(|(open, _)| set_of[*open] == set_of[before]).unwrap_or_default();
+                    let cycle = path[begin + 1..].iter().rev().map(|(open, _)| *open).chain([before]);
+                    return request(algebraic_loop(names, &cycle.collect::<Vec<_>>()));
+                }
+                if other.level.is_none() {
+                    path.push((before, 0));
+                }
+                continue;
+            }
+            let index = set_of[*connection];
+            let before = sets[index]
+                .before
+                .iter()
+                .map(|before| sets[set_of[*before]].level.map_or(1, |level| level + 1));
+            let level = before.max().unwrap_or(0);
+            (sets[index].level, sets[index].is_open) = (Some(level), false);
+            path.pop();
+        }
     }
-    Ok(levels.into_iter().map(Option::unwrap_or_default).collect())
+    Ok(set_of.iter().map(|set| sets[*set].level.unwrap_or_default()).collect())
 }
 
-fn level(
-    names: &[(String, String)],
-    ends: &[Ends],
-    index: usize,
-    levels: &mut [Option<usize>],
-    path: &mut Vec<usize>,
-) -> Result<usize, Error> {
-    if let Some(level) = levels[index] {
-        return Ok(level);
-    }
-    if let Some(begin) = path.iter().position(|before| *before == index) {
-        let cycle = path[begin..].iter().rev().map(|index| {
-            let (from, to) = &names[*index];
-            format!("{from} -> {to}")
-        });
-        return request(format!(
-            "there is an algebraic loop: {}; each of these outputs depends on its FMU's input without a step (or its FMU does \
-            not declare its dependencies), so that no order passes all values on. Order Jacobi passes them on a step later",
-            cycle.collect::<Vec<_>>().join(", ")
-        ));
-    }
-    path.push(index);
-    let mut own = 0;
-    for before in (0..ends.len()).filter(|before| follows(&ends[index], &ends[*before])) {
-        own = own.max(1 + level(names, ends, before, levels, path)?);
-    }
-    path.pop();
-    levels[index] = Some(own);
-    Ok(own)
+/// Returns the message for a cycle of connections.
+fn algebraic_loop(names: &[(String, String)], cycle: &[usize]) -> String {
+    /// Number of connections that the message lists.
+    const LISTED: usize = 10;
+    let listed = cycle
+        .iter()
+        .take(LISTED)
+        .map(|index| format!("{} -> {}", shown(&names[*index].0), shown(&names[*index].1)));
+    let more = match cycle.len().saturating_sub(LISTED) {
+        0 => String::new(),
+        more => format!(", and {more} more"),
+    };
+    format!(
+        "there is an algebraic loop: {}{more}; each of these outputs depends on its FMU's input without a step (or its FMU does \
+        not declare its dependencies), so that no order passes all values on. Order Jacobi passes them on a step later",
+        listed.collect::<Vec<_>>().join(", ")
+    )
 }

@@ -1,24 +1,33 @@
 //! Reads systems from SSP files (System Structure and Parameterization 1.0).
 
+use super::source::Base;
 use super::{Component, Definition, Order, StartValue, System};
 use crate::error::Error;
 use crate::files::{Files, Kind};
 use crate::fmu::Loaded;
 use crate::start::StartValues;
-use roxmltree::{Document, Node};
-use std::collections::BTreeMap;
-use std::path::Path;
+use fmi_abi::files::{Limits, read_xml};
+use fmi_abi::{shown, xml};
+use roxmltree::Node;
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// Largest number of bytes of all names and values, which a system repeats for each element of nested systems, and of all parameter
+/// files, which several elements may name.
+const MAX_BYTES: usize = 128 << 20;
+
 /// Content of `SystemStructure.ssd`.
-#[derive(Default)]
-struct Read {
+struct Read<'a> {
+    base: Base<'a>,
     /// Components with the files of their FMUs, in their order.
-    components: Vec<(String, String)>,
+    components: Vec<(String, PathBuf)>,
     /// Connectors of systems.
-    connectors: Vec<String>,
+    connectors: HashSet<String>,
     connections: Vec<(String, String)>,
     start: Vec<(String, Value)>,
+    /// Number of bytes that may still be read.
+    remaining: usize,
 }
 
 /// A start value with its unit.
@@ -31,7 +40,8 @@ struct Value {
 
 impl System {
     /// Unpacks an SSP file, then loads and connects its FMUs. Systems may be nested. A connector of the outer
-    /// system is an input or output with its name. Start values come from parameter bindings.
+    /// system is an input or output with its name. Start values come from parameter bindings. All files that the system names
+    /// must be in the archive; `path` may also be the directory of an unpacked system.
     ///
     /// # Safety
     /// The requirement of [`Fmu::open`](crate::Fmu::open), for each FMU in the file.
@@ -42,27 +52,29 @@ impl System {
     /// are no FMUs, parameter mappings, signal dictionaries, transformations of connections.
     pub unsafe fn open(path: &Path, order: Order) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
-        let directory = Files::open(path, Kind::Ssp).map_err(fail)?;
+        let mut limits = Limits::default();
+        let directory = Files::open(path, Kind::Ssp, &mut limits).map_err(fail)?;
         let text = directory.xml("SystemStructure.ssd").map_err(fail)?;
-        let document = Document::parse(&text)
-            .map_err(|error| fail(format!("SystemStructure.ssd is no XML: {error}")))?;
+        let document = xml::parse(&text, "SystemStructure.ssd").map_err(fail)?;
         let root = document.root_element();
         let system =
             child(root, "System").ok_or_else(|| fail("SystemStructure.ssd has no System".to_owned()))?;
-        let mut read = Read::default();
-        read.system(directory.path(), system, "").map_err(fail)?;
+        let is_archive = matches!(directory, Files::Temporary(_));
+        let mut read = Read::of(Base { directory: directory.path(), is_archive });
+        read.system(system, "").map_err(fail)?;
 
-        let mut loaded: BTreeMap<&str, Arc<Loaded>> = BTreeMap::new();
+        let mut loaded: BTreeMap<&Path, Arc<Loaded>> = BTreeMap::new();
         let mut components = Vec::new();
         for (name, source) in &read.components {
-            let fmu = match loaded.get(source.as_str()) {
+            let fmu = match loaded.get(source.as_path()) {
                 Some(fmu) => Arc::clone(fmu),
                 None => {
                     // SAFETY: the caller guarantees that the libraries are sound.
-                    let opened = unsafe { Loaded::open(&directory.path().join(source), false) };
+                    let opened = unsafe { Loaded::open(source, false, &mut limits) };
                     let opened = opened.map_err(|error| {
-                        let inside = format!("{}/", directory.path().display());
-                        fail(format!("component {name}: {}", error.to_string().replace(&inside, "")))
+                        let inside = directory.path().canonicalize().unwrap_or_default();
+                        let inside = format!("{}/", inside.display());
+                        fail(format!("component {}: {}", shown(name), error.to_string().replace(&inside, "")))
                     })?;
                     Arc::clone(loaded.entry(source).or_insert_with(|| Arc::new(opened)))
                 }
@@ -81,58 +93,100 @@ impl System {
     }
 }
 
-impl Read {
-    /// Reads a system; names of its elements begin with `path`.
-    fn system(&mut self, directory: &Path, node: Node, path: &str) -> Result<(), String> {
-        self.bindings(directory, node, path)?;
+impl<'a> Read<'a> {
+    fn of(base: Base<'a>) -> Self {
+        Self {
+            base,
+            components: Vec::new(),
+            connectors: HashSet::new(),
+            connections: Vec::new(),
+            start: Vec::new(),
+            remaining: MAX_BYTES,
+        }
+    }
+
+    /// Takes bytes from the number that may still be read.
+    fn take(&mut self, bytes: usize) -> Result<(), String> {
+        let remaining = self.remaining.checked_sub(bytes);
+        self.remaining = remaining.ok_or("the names and parameters of its elements take too much memory")?;
+        Ok(())
+    }
+
+    /// Returns the name of an element in the system that is called `path`, which ends with a dot or is empty.
+    fn name(&mut self, path: &str, name: &str) -> Result<String, String> {
+        self.take(path.len() + name.len() + size_of::<String>())?;
+        Ok(format!("{path}{name}"))
+    }
+
+    /// Reads a system; names of its elements begin with `path`. The depth of the file limits the recursion.
+    fn system(&mut self, node: Node, path: &str) -> Result<(), String> {
+        self.bindings(node, path)?;
         for connector in children(node, "Connectors") {
-            self.connectors.push(format!("{path}{}", needed(connector, "name")?));
+            let name = self.name(path, needed(connector, "name")?)?;
+            self.connectors.insert(name);
         }
         for element in children(node, "Elements") {
-            let name = needed(element, "name")?;
+            let name = self.name(path, needed(element, "name")?)?;
             match element.tag_name().name() {
-                "System" => self.system(directory, element, &format!("{path}{name}."))?,
-                "Component" => {
-                    let source = needed(element, "source")?;
-                    let kind = element.attribute("type").unwrap_or("application/x-fmu-sharedlibrary");
-                    if kind != "application/x-fmu-sharedlibrary" {
-                        return Err(format!(
-                            "component {path}{name} is no FMU but {kind}, which cannot be run"
-                        ));
-                    }
-                    self.bindings(directory, element, &format!("{path}{name}."))?;
-                    self.components.push((format!("{path}{name}"), source));
-                }
-                other => return Err(format!("{path}{name} is a {other}, which cannot be run")),
+                "System" => self.system(element, &format!("{name}."))?,
+                "Component" => self.component(element, name)?,
+                other => return Err(format!("{} is a {}, which cannot be run", shown(&name), shown(other))),
             }
         }
         for connection in children(node, "Connections") {
-            let end = |side: &str| -> Result<String, String> {
-                let connector = needed(connection, &format!("{side}Connector"))?;
-                let element = connection.attribute(format!("{side}Element").as_str()).unwrap_or_default();
-                let dot = if element.is_empty() { "" } else { "." };
-                Ok(format!("{path}{element}{dot}{connector}"))
-            };
-            let (from, to) = (end("start")?, end("end")?);
-            if let Some(change) = connection.children().find(Node::is_element)
-                && change.tag_name().name().ends_with("Transformation")
-            {
-                let kind = change.tag_name().name();
-                return Err(format!(
-                    "the connection from {from} to {to} has a {kind}, which is not supported"
-                ));
-            }
-            self.connections.push((from, to));
+            self.connection(connection, path)?;
         }
         Ok(())
     }
 
+    fn component(&mut self, element: Node, name: String) -> Result<(), String> {
+        let source = needed(element, "source")?;
+        let kind = element.attribute("type").unwrap_or("application/x-fmu-sharedlibrary");
+        if kind != "application/x-fmu-sharedlibrary" {
+            return Err(format!(
+                "component {} is no FMU but {}, which cannot be run",
+                shown(&name),
+                shown(kind)
+            ));
+        }
+        self.bindings(element, &format!("{name}."))?;
+        let file = self.base.find(source).map_err(|why| format!("component {}: {why}", shown(&name)))?;
+        self.components.push((name, file));
+        Ok(())
+    }
+
+    fn connection(&mut self, connection: Node, path: &str) -> Result<(), String> {
+        let mut end = |side: &str| -> Result<String, String> {
+            let connector = needed(connection, &format!("{side}Connector"))?;
+            let element = connection.attribute(format!("{side}Element").as_str()).unwrap_or_default();
+            let dot = if element.is_empty() { "" } else { "." };
+            self.name(path, &format!("{element}{dot}{connector}"))
+        };
+        let (from, to) = (end("start")?, end("end")?);
+        if let Some(change) = connection.children().find(Node::is_element)
+            && change.tag_name().name().ends_with("Transformation")
+        {
+            let kind = change.tag_name().name();
+            return Err(format!(
+                "the connection from {} to {} has a {}, which is not supported",
+                shown(&from),
+                shown(&to),
+                shown(kind)
+            ));
+        }
+        self.connections.push((from, to));
+        Ok(())
+    }
+
     /// Reads the start values that are bound to an element; later values replace earlier ones.
-    fn bindings(&mut self, directory: &Path, node: Node, path: &str) -> Result<(), String> {
+    fn bindings(&mut self, node: Node, path: &str) -> Result<(), String> {
         for binding in children(node, "ParameterBindings") {
-            let path = format!("{path}{}", binding.attribute("prefix").unwrap_or_default());
+            let path = self.name(path, binding.attribute("prefix").unwrap_or_default())?;
             if child(binding, "ParameterMapping").is_some() {
-                return Err(format!("the parameters of {path:?} have a mapping, which is not supported"));
+                return Err(format!(
+                    "the parameters of \"{}\" have a mapping, which is not supported",
+                    shown(&path)
+                ));
             }
             match (binding.attribute("source"), child(binding, "ParameterValues")) {
                 (_, Some(values)) => {
@@ -140,13 +194,15 @@ impl Read {
                     set.map_or(Ok(()), |set| self.parameters(set, &path))?;
                 }
                 (Some(source), None) => {
-                    let text = std::fs::read_to_string(directory.join(source))
-                        .map_err(|_| format!("there is no readable {source} in it"))?;
-                    let document =
-                        Document::parse(&text).map_err(|error| format!("{source} is no XML: {error}"))?;
+                    let file = self.base.find(source)?;
+                    let text = read_xml(&file).map_err(|why| format!("{} {why}", shown(source)))?;
+                    self.take(text.len())?;
+                    let document = xml::parse(&text, &shown(source))?;
                     self.parameters(document.root_element(), &path)?;
                 }
-                (None, None) => return Err(format!("a parameter binding of {path:?} has no values")),
+                (None, None) => {
+                    return Err(format!("a parameter binding of \"{}\" has no values", shown(&path)));
+                }
             }
         }
         Ok(())
@@ -154,13 +210,15 @@ impl Read {
 
     fn parameters(&mut self, set: Node, path: &str) -> Result<(), String> {
         for parameter in children(set, "Parameters") {
-            let name = format!("{path}{}", needed(parameter, "name")?);
+            let name = self.name(path, needed(parameter, "name")?)?;
             let value = parameter.children().find(Node::is_element);
-            let value = value.ok_or_else(|| format!("{name} has no value"))?;
+            let no_value = || format!("{} has no value", shown(&name));
+            let value = value.ok_or_else(no_value)?;
             let text = value.attribute("value").or_else(|| value.attribute("name"));
-            let text = text.ok_or_else(|| format!("{name} has no value"))?.to_owned();
+            let text = text.ok_or_else(no_value)?.to_owned();
             let (kind, unit) =
                 (value.tag_name().name().to_owned(), value.attribute("unit").map(str::to_owned));
+            self.take(text.len() + unit.as_ref().map_or(0, String::len) + size_of::<Value>())?;
             self.start.push((name, Value { kind, text, unit }));
         }
         Ok(())
@@ -170,28 +228,42 @@ impl Read {
     /// of the outer system.
     fn connect(&self, definition: &mut Definition) {
         let is_own = |definition: &Definition, name: &str| definition.look_up(name).is_some();
-        for (_, to) in &self.connections {
-            let from = self.origin(to);
+        let mut connections = Vec::new();
+        for ((_, to), from) in self.connections.iter().zip(self.origins()) {
             match [is_own(definition, from), is_own(definition, to)] {
-                [true, true] => definition.connections.push((from.to_owned(), to.clone())),
+                [true, true] => connections.push((from.to_owned(), to.clone())),
                 [false, true] => definition.connectors.entry(from.to_owned()).or_default().push(to.clone()),
                 [true, false] => _ = definition.connectors.insert(to.clone(), vec![from.to_owned()]),
                 [false, false] => {}
             }
         }
+        definition.set_connections(connections);
     }
 
-    /// Returns the origin of a connection that ends here.
-    fn origin<'a>(&'a self, end: &'a str) -> &'a str {
-        let mut at = end;
-        // A path without a circle has at most as many steps as there are connections.
-        for _ in &self.connections {
-            match self.connections.iter().find(|(_, to)| to == at) {
-                Some((from, _)) => at = from,
-                None => break,
-            }
+    /// Returns the origin of each connection: the start of the chain of connections that ends with it.
+    fn origins(&self) -> impl Iterator<Item = &str> {
+        let mut first = HashMap::new();
+        for (index, (_, to)) in self.connections.iter().enumerate() {
+            first.entry(to.as_str()).or_insert(index);
         }
-        at
+        let before = |index: usize| first.get(self.connections[index].0.as_str()).copied();
+        // For each connection the first one of its chain, if it is known.
+        let mut begins: Vec<Option<usize>> = vec![None; self.connections.len()];
+        for index in 0..begins.len() {
+            let (mut at, mut path) = (index, Vec::new());
+            while begins[at].is_none() {
+                // In a circle, any connection counts as the first.
+                begins[at] = Some(at);
+                path.push(at);
+                match before(at) {
+                    Some(next) => at = next,
+                    None => break,
+                }
+            }
+            let begin = begins[at];
+            path.into_iter().for_each(|index| begins[index] = begin);
+        }
+        begins.into_iter().flatten().map(|index| self.connections[index].0.as_str())
     }
 
     /// Returns the start values by variable, in the variable's unit. Omits values of inputs that outputs
@@ -230,7 +302,6 @@ fn children<'a>(node: Node<'a, 'a>, list: &str) -> impl Iterator<Item = Node<'a,
     child(node, list).into_iter().flat_map(|list| list.children()).filter(Node::is_element)
 }
 
-fn needed(node: Node, name: &str) -> Result<String, String> {
-    let value = node.attribute(name).map(str::to_owned);
-    value.ok_or_else(|| format!("a {} lacks {name}", node.tag_name().name()))
+fn needed<'a>(node: Node<'a, 'a>, name: &str) -> Result<&'a str, String> {
+    node.attribute(name).ok_or_else(|| format!("a {} lacks {name}", shown(node.tag_name().name())))
 }

@@ -1,0 +1,189 @@
+//! Unpacks archives.
+
+use super::open;
+use crate::{shown, xml::reserve};
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Component, Path};
+use zip::ZipArchive;
+
+/// Bytes that an entry of the directory of an archive takes at most in memory.
+const ENTRY: usize = 1000;
+
+/// Largest archive that is unpacked.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Number of bytes of all files.
+    pub bytes: u64,
+    /// Number of files and directories.
+    pub entries: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self { bytes: 1000 << 20, entries: 50_000 }
+    }
+}
+
+/// An entry of an archive.
+#[derive(Debug)]
+pub struct Entry<'a> {
+    /// Path as written.
+    pub name: &'a str,
+    /// Whether the path stays in the directory.
+    pub is_inside: bool,
+    /// Name of the compression, if it is not one that the standard permits.
+    pub compression: Option<String>,
+}
+
+/// Unpacks the ZIP file `path`, which is `what` for messages, to the directory `to`. `wanted` returns whether an entry is extracted;
+/// entries outside and links, which could lead outside, never are. What is unpacked is taken from the limits. Permissions are ignored, except that programs stay executable:
+/// some tools write entries that the owner could not read.
+///
+/// # Errors
+/// Fails if the file is not a ZIP file or exceeds the limits, if an entry cannot be extracted, and if `wanted` does.
+pub fn unpack(
+    path: &Path,
+    what: &str,
+    to: &Path,
+    limits: &mut Limits,
+    wanted: &mut dyn FnMut(&Entry) -> Result<bool, String>,
+) -> Result<(), String> {
+    let mut file = open(path)?;
+    let mut start = [0; 64];
+    let length = file.read(&mut start).map_err(|error| format!("cannot be read ({error})"))?;
+    check_count(declared_count(&mut file).unwrap_or_default(), *limits)?;
+    let mut archive = ZipArchive::new(file).map_err(|error| {
+        let error = error.to_string();
+        let why = instead(&start[..length])
+            .unwrap_or_else(|| format!("it cannot be read as one: {}", shown(&error)));
+        format!("is not {what}, which is a zip file: {why}")
+    })?;
+    check_count(archive.len() as u64, *limits)?;
+    limits.entries -= archive.len();
+    let most = limits.bytes;
+    let too_large = || format!("has more than {} MB when it is unpacked, the limit for archives", most >> 20);
+    // What the archive declares may be wrong, so the files are counted, too.
+    if archive.decompressed_size().is_some_and(|size| size > u128::from(most)) {
+        return Err(too_large());
+    }
+    for index in 0..archive.len() {
+        let written = extract(&mut archive, index, to, limits.bytes, wanted)
+            .map_err(|why| format!("cannot be unpacked ({why})"))?;
+        limits.bytes = limits.bytes.checked_sub(written).ok_or_else(too_large)?;
+    }
+    Ok(())
+}
+
+fn check_count(count: u64, limits: Limits) -> Result<(), String> {
+    if count > limits.entries as u64 {
+        return Err(format!("has {count} entries; the limit for archives is {}", limits.entries));
+    }
+    let bytes = usize::try_from(count).unwrap_or(usize::MAX).saturating_mul(ENTRY);
+    reserve(bytes).map_err(|why| format!("cannot be unpacked: {why}"))
+}
+
+/// Returns the number of entries that the end of an archive declares, before the archive's directory is read.
+fn declared_count(file: &mut File) -> Option<u64> {
+    /// Lengths of the record at the end, of its longest comment, and of the records before it in large archives.
+    const LONGEST: u64 = 22 + 65_535 + 76;
+    let length = file.seek(SeekFrom::End(0)).ok()?;
+    file.seek(SeekFrom::Start(length.saturating_sub(LONGEST))).ok()?;
+    let mut tail = Vec::new();
+    file.by_ref().take(LONGEST).read_to_end(&mut tail).ok()?;
+    file.rewind().ok()?;
+    let last = |signature: &[u8; 4]| tail.windows(4).rposition(|window| window == signature);
+    let short = last(b"PK\x05\x06")
+        .and_then(|at| tail.get(at + 10..at + 12)?.try_into().ok().map(u16::from_le_bytes));
+    let long = last(b"PK\x06\x06")
+        .and_then(|at| tail.get(at + 32..at + 40)?.try_into().ok().map(u64::from_le_bytes));
+    short.map(u64::from).max(long)
+}
+
+/// Extracts an entry and returns its size, or `most` + 1 if it is larger than `most`.
+fn extract(
+    archive: &mut ZipArchive<File>,
+    index: usize,
+    directory: &Path,
+    most: u64,
+    wanted: &mut dyn FnMut(&Entry) -> Result<bool, String>,
+) -> Result<u64, String> {
+    let mut entry = archive.by_index(index).map_err(|error| shown(&error.to_string()).into_owned())?;
+    let name = entry.name().map_err(|error| shown(&error.to_string()).into_owned())?.into_owned();
+    // Some tools of Windows write backslashes.
+    let relative = name.replace('\\', "/");
+    let path = Path::new(&relative);
+    let is_normal = |part: Component| matches!(part, Component::Normal(_) | Component::CurDir);
+    let is_inside =
+        entry.enclosed_name().is_some() && !relative.contains('\0') && path.components().all(is_normal);
+    let compression = entry.compression();
+    let is_permitted =
+        matches!(compression, zip::CompressionMethod::Stored | zip::CompressionMethod::Deflated);
+    let compression = (!is_permitted).then(|| compression.to_string());
+    if !wanted(&Entry { name: &name, is_inside, compression })? || !is_inside || entry.is_symlink() {
+        return Ok(0);
+    }
+    let to = directory.join(path);
+    let message = |error: std::io::Error| format!("{}: {error}", shown(&name));
+    if relative.ends_with('/') {
+        return std::fs::create_dir_all(&to).map_err(message).map(|()| 0);
+    }
+    if entry.size() > most {
+        return Ok(most + 1);
+    }
+    if let Some(parent) = to.parent() {
+        std::fs::create_dir_all(parent).map_err(message)?;
+    }
+    let mut file = File::create(&to).map_err(message)?;
+    // The size that the entry declares may be wrong.
+    let size = std::io::copy(&mut (&mut entry).take(most + 1), &mut file).map_err(message)?;
+    #[cfg(unix)]
+    if entry.unix_mode().is_some_and(|mode| mode & 0o111 != 0) {
+        use std::os::unix::fs::PermissionsExt;
+        file.set_permissions(std::fs::Permissions::from_mode(0o755)).map_err(message)?;
+    }
+    Ok(size)
+}
+
+/// Returns what a file is that is not a zip file, from its first bytes.
+fn instead(start: &[u8]) -> Option<String> {
+    let text = start.trim_ascii_start();
+    let why = match text {
+        [] => "it is empty",
+        _ if text.starts_with(b"version https://git-lfs") => {
+            "it is a pointer of Git LFS to the file, which `git lfs pull` fetches"
+        }
+        _ if text.len() >= 9 && text[..9].eq_ignore_ascii_case(b"<!doctype")
+            || text.starts_with(b"<html") =>
+        {
+            "it is a web page; the download may have failed"
+        }
+        _ if text.starts_with(b"<?xml") => "it is an XML file; open the FMU that contains it",
+        [0x7f, b'E', b'L', b'F', ..] | [b'M', b'Z', ..] => "it is a shared library or a program",
+        [0x1f, 0x8b, ..] | [b'7', b'z', 0xbc, 0xaf, ..] | [b'R', b'a', b'r', b'!', ..] => {
+            "it is an archive of another format"
+        }
+        _ => return None,
+    };
+    Some(why.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::instead;
+
+    #[test]
+    fn files_that_are_no_archive() {
+        for (start, why) in [
+            (&b""[..], "empty"),
+            (b"version https://git-lfs.github.com/spec/v1\n", "git lfs pull"),
+            (b"\n<!DOCTYPE html>", "web page"),
+            (b"<?xml version", "XML"),
+            (b"\x7fELF\x02\x01", "library"),
+            (b"\x1f\x8b\x08", "another format"),
+        ] {
+            assert!(instead(start).unwrap().contains(why));
+        }
+        assert_eq!(instead(b"text"), None);
+    }
+}

@@ -1,0 +1,75 @@
+//! Strings of files and FMUs in messages.
+
+use std::borrow::Cow;
+
+/// Number of characters of a name or a message that a line repeats.
+pub const SHOWN: usize = 200;
+
+/// Returns a string for a message of one line: control characters, and characters that reorder or end a line, are escaped as in
+/// Rust, because a terminal would obey them; a string of more than [`SHOWN`] characters is cut.
+pub fn shown(text: &str) -> Cow<'_, str> {
+    shown_to(text, SHOWN)
+}
+
+/// Escapes and cuts as [`shown`] does, after this number of characters.
+pub fn shown_to(text: &str, most: usize) -> Cow<'_, str> {
+    let cut = text.char_indices().nth(most).map_or(text.len(), |(index, _)| index);
+    let mut line = one_line(&text[..cut]);
+    if cut < text.len() {
+        line.to_mut().push_str("...");
+    }
+    line
+}
+
+/// Escapes as [`shown`] does, without cutting the string.
+pub fn one_line(text: &str) -> Cow<'_, str> {
+    if !text.contains(is_unsafe) {
+        return Cow::Borrowed(text);
+    }
+    let mut escaped = String::with_capacity(text.len() + 16);
+    for letter in text.chars() {
+        if is_unsafe(letter) {
+            escaped.extend(letter.escape_default());
+        } else {
+            escaped.push(letter);
+        }
+    }
+    Cow::Owned(escaped)
+}
+
+/// Returns whether a terminal or an editor would obey the character instead of showing it: control characters, line and paragraph
+/// separators, and marks that change the direction of text.
+fn is_unsafe(letter: char) -> bool {
+    letter.is_control()
+        || matches!(letter, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// Returns whether a string is an identifier of C, which the standard requires of `modelIdentifier`.
+pub fn is_c_identifier(text: &str) -> bool {
+    let mut letters = text.chars();
+    letters.next().is_some_and(|first| first.is_ascii_alphabetic() || first == '_')
+        && letters.all(|letter| letter.is_ascii_alphanumeric() || letter == '_')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{is_c_identifier, one_line, shown};
+
+    #[test]
+    fn a_terminal_has_nothing_to_obey() {
+        assert_eq!(shown("x \u{e4}\u{1f600}"), "x \u{e4}\u{1f600}");
+        assert_eq!(shown("\u{1b}[31m\r\n\t\0"), "\\u{1b}[31m\\r\\n\\t\\u{0}");
+        assert_eq!(one_line("a\u{9b}b\u{202e}c\u{2028}d"), "a\\u{9b}b\\u{202e}c\\u{2028}d");
+        assert_eq!(shown(&"\u{e4}".repeat(1000)), format!("{}...", "\u{e4}".repeat(200)));
+    }
+
+    #[test]
+    fn identifiers() {
+        assert!(["a", "_1", "Model_2"].into_iter().all(is_c_identifier));
+        assert!(
+            !["", "1a", "a.b", "a-b", "a\n", "\u{e4}", "a();system(\"x\")", "../a"]
+                .into_iter()
+                .any(is_c_identifier)
+        );
+    }
+}

@@ -1,0 +1,154 @@
+//! XML of files that nobody has checked: the memory and the time to read it are limited before it is read.
+
+use roxmltree::Document;
+
+/// Largest depth of nested elements.
+const MAX_DEPTH: usize = 250;
+/// Comparisons that reading a file may take, and those for each byte. The parser compares the attributes of an element with each
+/// other, and its namespaces with those of the elements around it.
+const COMPARISONS: usize = 1 << 22;
+const COMPARISONS_PER_BYTE: usize = 8;
+/// Largest number of bytes that a step of reading a file may take.
+const MAX_MEMORY: usize = 1 << 30;
+/// Bytes that an element, with the text after it, and an attribute take at most in a document.
+const ELEMENT: usize = 300;
+const ATTRIBUTE: usize = 200;
+
+/// Parses an XML file that is called `name` in messages.
+///
+/// # Errors
+/// Fails if the file is not well-formed, has a document type definition, or would take too much memory or time.
+pub fn parse<'a>(text: &'a str, name: &str) -> Result<Document<'a>, String> {
+    let count = |byte: u8| text.bytes().filter(|other| *other == byte).count();
+    let bytes = ELEMENT * count(b'<') + ATTRIBUTE * count(b'=') + 2 * text.len();
+    reserve(bytes).map_err(|why| format!("{name} cannot be read: {why}"))?;
+    scan(text).map_err(|why| format!("{name} {why}"))?;
+    Document::parse(text)
+        .map_err(|error| format!("{name} is not well-formed XML: {}", crate::shown(&error.to_string())))
+}
+
+/// Checks that this number of bytes is available. Collections that grow end the process if there is no memory, so the memory of a
+/// whole file is requested first, at a location where its absence is an error.
+///
+/// # Errors
+/// Fails if the memory is not available, and for more than 1 GB.
+pub fn reserve(bytes: usize) -> Result<(), String> {
+    let megabytes = bytes.div_ceil(1 << 20);
+    if bytes > MAX_MEMORY {
+        return Err(format!(
+            "it would take about {megabytes} MB of memory, more than the limit of {} MB",
+            MAX_MEMORY >> 20
+        ));
+    }
+    let reserved = Vec::<u8>::new().try_reserve_exact(bytes);
+    reserved.map_err(|_| format!("it would take about {megabytes} MB of memory, which are not available"))
+}
+
+/// Checks the depth of the elements and the numbers of their attributes, in a single pass. A file that is not well-formed may pass,
+/// because the parser stops at the first fault.
+fn scan(text: &str) -> Result<(), String> {
+    let bytes = text.as_bytes();
+    // Numbers of the namespaces of the open elements.
+    let mut open: Vec<usize> = Vec::new();
+    let (mut at, mut comparisons) = (0, 0_usize);
+    while let Some(begin) = text[at..].find('<').map(|offset| at + offset) {
+        let rest = &text[begin..];
+        let skipped = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>"), ("</", ">")]
+            .into_iter()
+            .find(|(start, _)| rest.starts_with(start));
+        if let Some((start, end)) = skipped {
+            if start == "</" {
+                open.pop();
+            }
+            let Some(length) = rest[start.len()..].find(end) else { return Ok(()) };
+            at = begin + start.len() + length + end.len();
+            continue;
+        }
+        let tag = tag(&bytes[begin + 1..]);
+        let namespaces = open.last().copied().unwrap_or_default() + tag.namespaces;
+        let declared = if tag.namespaces > 0 { namespaces } else { 0 };
+        let own = tag.attributes * tag.attributes + declared * declared + namespaces * (1 + tag.attributes);
+        comparisons = comparisons.saturating_add(own);
+        if comparisons > COMPARISONS + COMPARISONS_PER_BYTE * text.len() {
+            return Err("has elements with too many attributes or namespaces".to_owned());
+        }
+        if !tag.is_empty {
+            open.push(namespaces);
+        }
+        if open.len() > MAX_DEPTH {
+            return Err(format!("has elements that are nested more than {MAX_DEPTH} deep"));
+        }
+        at = begin + 1 + tag.length;
+    }
+    Ok(())
+}
+
+/// The tag at which an element begins.
+struct Tag {
+    attributes: usize,
+    namespaces: usize,
+    /// Whether the element ends with the tag.
+    is_empty: bool,
+    length: usize,
+}
+
+fn tag(bytes: &[u8]) -> Tag {
+    let mut tag = Tag { attributes: 0, namespaces: 0, is_empty: false, length: bytes.len() };
+    let mut quote = None;
+    for (index, byte) in bytes.iter().enumerate() {
+        match (quote, byte) {
+            (Some(open), byte) if open == *byte => quote = None,
+            (Some(_), _) => {}
+            (None, b'"' | b'\'') => quote = Some(*byte),
+            (None, b'=') => tag.attributes += 1,
+            (None, b'x')
+                if index > 0
+                    && bytes[index - 1].is_ascii_whitespace()
+                    && bytes[index..].starts_with(b"xmlns") =>
+            {
+                tag.namespaces += 1;
+            }
+            (None, b'>') => {
+                tag.is_empty = index > 0 && bytes[index - 1] == b'/';
+                tag.length = index + 1;
+                break;
+            }
+            (None, _) => {}
+        }
+    }
+    tag
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parse;
+
+    #[test]
+    fn ordinary_files_are_read() {
+        let text =
+            r#"<?xml version="1.0"?><!-- <a> --><a xmlns="u" b="<>'/>"><![CDATA[<x>]]><c d='"'/><c></c></a>"#;
+        let text = text.replace("<>", "&lt;&gt;");
+        assert_eq!(parse(&text, "F").unwrap().descendants().filter(|node| node.is_element()).count(), 3);
+        let deep = "<a>".repeat(250) + &"</a>".repeat(250);
+        assert!(parse(&deep, "F").is_ok());
+    }
+
+    #[test]
+    fn time_and_memory_are_limited() {
+        let attributes: String = (0..20_000).map(|number| format!(" a{number}=''")).collect();
+        let spaces: String = (0..900).map(|number| format!(" xmlns:a{number}='{number}'")).collect();
+        let many = |count: usize| format!("<a{spaces}>{}</a>", "<b xmlns:c='d'/>".repeat(count));
+        for (text, why) in [
+            (format!("<a{attributes}/>"), "F has elements with too many attributes"),
+            ("<a>".repeat(10_000), "F has elements that are nested more than 250 deep"),
+            (many(1000), "F has elements with too many attributes or namespaces"),
+            ("<!DOCTYPE a [<!ENTITY b 'c'>]><a>&b;</a>".to_owned(), "F is not well-formed XML"),
+            ("<a>\u{1b}[31m</a>".to_owned(), "F is not well-formed XML"),
+            (String::new(), "F is not well-formed XML"),
+        ] {
+            let error = parse(&text, "F").unwrap_err();
+            assert!(error.starts_with(why) && !error.contains(char::is_control), "{error:?}");
+        }
+        assert!(parse(&many(1), "F").is_ok());
+    }
+}

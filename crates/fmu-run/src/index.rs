@@ -1,0 +1,43 @@
+//! Finds items by their names without a copy of the names.
+
+use hashbrown::HashTable;
+use std::hash::{BuildHasher, RandomState};
+
+/// Indices of items by name. Of items with the same name, the last counts.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Index {
+    hasher: RandomState,
+    table: HashTable<u32>,
+}
+
+/// The names determine the index.
+impl PartialEq for Index {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl Index {
+    pub fn of<'a>(names: impl ExactSizeIterator<Item = &'a str> + Clone) -> Self {
+        let hasher = RandomState::new();
+        let all: Vec<&str> = names.collect();
+        let mut table: HashTable<u32> = HashTable::with_capacity(all.len());
+        for (index, name) in all.iter().enumerate() {
+            // Value references and therefore variables have 32 bits.
+            let own = index as u32;
+            let hash = |index: &u32| hasher.hash_one(all[*index as usize]);
+            let same = |index: &u32| all[*index as usize] == *name;
+            match table.find_mut(hasher.hash_one(name), same) {
+                Some(before) => *before = own,
+                None => _ = table.insert_unique(hasher.hash_one(name), own, hash),
+            }
+        }
+        Self { hasher, table }
+    }
+
+    /// Returns the index of the item with this name; `name_of` returns the name of an item.
+    pub fn find<'a>(&self, name: &str, name_of: impl Fn(usize) -> &'a str) -> Option<usize> {
+        let same = |index: &u32| name_of(*index as usize) == name;
+        self.table.find(self.hasher.hash_one(name), same).map(|index| *index as usize)
+    }
+}

@@ -1,0 +1,42 @@
+//! What is done with an untrusted file, for the tests and for libFuzzer: reading succeeds or is an error of one line.
+
+use fmu_run::{Description, Fmu, Order, System};
+use std::path::Path;
+
+/// Asserts that the message of an error is one line that a terminal shows as it is.
+fn check<T>(result: Result<T, String>) {
+    if let Err(why) = result {
+        assert!(!why.trim().is_empty(), "a message is empty");
+        let begin: String = why.chars().take(300).collect();
+        assert!(!why.contains(char::is_control), "control characters: {begin:?}");
+        assert!(why.chars().count() < 2000, "too long: {begin}");
+    }
+}
+
+/// Reads a model description.
+pub fn description(bytes: &[u8]) {
+    let text = String::from_utf8_lossy(bytes);
+    check(Description::parse(&text).map_err(|why| fmu_run::Error::Fmu(why).to_string()));
+}
+
+/// Opens a directory as a system, after writing one of its files. The directory contains the other files of the system.
+pub fn file_of_system(directory: &Path, name: &str, bytes: &[u8]) {
+    std::fs::write(directory.join(name), bytes).unwrap();
+    for order in [Order::Dependencies, Order::Jacobi] {
+        // SAFETY: the only FMU in the directory is one of these tests.
+        check(unsafe { System::open(directory, order) }.map_err(|error| error.to_string()));
+    }
+}
+
+/// Opens an archive as an FMU and as a system, in an empty directory.
+pub fn archive(directory: &Path, bytes: &[u8]) {
+    let path = directory.join("archive");
+    std::fs::write(&path, bytes).unwrap();
+    // SAFETY: these archives contain no library.
+    check(unsafe { Fmu::open(&path) }.map_err(|error| error.to_string()));
+    // SAFETY: as above.
+    check(unsafe { System::open(&path, Order::Jacobi) }.map_err(|error| error.to_string()));
+    let names: Vec<_> =
+        std::fs::read_dir(directory).unwrap().flatten().map(|entry| entry.file_name()).collect();
+    assert_eq!(names, ["archive"], "a file is outside");
+}

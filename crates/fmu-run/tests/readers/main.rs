@@ -1,0 +1,184 @@
+//! Files that may hurt: malformed descriptions, systems and archives under limits of memory, and mutations of them.
+#![allow(unsafe_code, reason = "FMUs are opened")]
+#![cfg(all(target_os = "linux", target_arch = "x86_64"))]
+
+#[path = "../foreign/built.rs"]
+#[allow(dead_code, reason = "some functions are used by other tests")]
+mod built;
+mod corpus;
+mod harness;
+
+use corpus::Files;
+use fmu_run::Standard;
+use fmu_test_kit::Random;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use tempfile::TempDir;
+
+/// Megabytes of address space in which all files are read. The process itself needs about 20.
+const LIMITS: [u64; 6] = [48, 64, 96, 128, 256, 1024];
+/// Environment variable with the directory in which the child process works.
+const DIRECTORY: &str = "READERS_DIRECTORY";
+/// Environment variable with the number of mutations of each kind.
+const MUTATIONS: &str = "READERS_MUTATIONS";
+
+/// The directory of a system with the FMU `m`, parameters, and a secret file next to it.
+fn system(outer: &Path) -> PathBuf {
+    let directory = outer.join("system");
+    std::fs::create_dir_all(&directory).unwrap();
+    let archive = built::built("plain", Standard::Fmi2, outer, &[]);
+    let file = std::fs::File::open(archive).unwrap();
+    zip::ZipArchive::new(file).unwrap().extract(directory.join("m")).unwrap();
+    for secret in ["secret.fmu", "secret.ssv"] {
+        std::fs::write(outer.join(secret), corpus::parameters().remove(0).1).unwrap();
+    }
+    let pipe = Command::new("mkfifo").arg(directory.join("pipe")).status().unwrap();
+    assert!(pipe.success());
+    std::os::unix::fs::symlink("../secret.ssv", directory.join("link")).unwrap();
+    reset(&directory);
+    directory
+}
+
+/// Writes the files that one kind of inputs replaces.
+fn reset(directory: &Path) {
+    std::fs::write(directory.join("p.ssv"), corpus::parameters().remove(0).1).unwrap();
+    let names = corpus::systems();
+    let (_, bound) = names.iter().find(|(name, _)| *name == "parameters").unwrap();
+    std::fs::write(directory.join("SystemStructure.ssd"), bound).unwrap();
+}
+
+/// Runs an ignored test of this file in a process with a limit of memory and of processor time.
+fn run_limited(test: &str, megabytes: u64, mutations: usize) {
+    let outer = TempDir::new().unwrap();
+    system(outer.path());
+    let limits = format!("ulimit -c 0; ulimit -t 120; ulimit -v {}; exec \"$0\" \"$@\"", megabytes << 10);
+    let output = Command::new("sh")
+        .args(["-c", &limits])
+        .arg(std::env::current_exe().unwrap())
+        .args(["--ignored", "--exact", test, "--nocapture", "--test-threads=1"])
+        .env(DIRECTORY, outer.path())
+        .env(MUTATIONS, mutations.to_string())
+        .env("TMPDIR", outer.path())
+        .env("RUST_BACKTRACE", "0")
+        .output()
+        .unwrap();
+    let text =
+        [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+    let last: Vec<_> = text.lines().rev().take(12).collect();
+    assert!(
+        output.status.success() && text.contains("1 passed"),
+        "{megabytes} MB, {}: {last:#?}",
+        output.status
+    );
+}
+
+fn directory() -> PathBuf {
+    PathBuf::from(std::env::var_os(DIRECTORY).expect("a parent process starts this test"))
+}
+
+/// Calls `read` with each file, and prints its name, so that the parent process knows which one was the last.
+fn each(kind: &str, files: &Files, mut read: impl FnMut(&[u8])) {
+    for (name, bytes) in files {
+        let begin = std::time::Instant::now();
+        println!("{kind}: {name}");
+        read(bytes);
+        println!("{:.2} s", begin.elapsed().as_secs_f64());
+    }
+}
+
+#[test]
+#[ignore = "started under a limit of memory"]
+fn read_all() {
+    let outer = directory();
+    let system = outer.join("system");
+    each("description", &corpus::descriptions(), harness::description);
+    each("system", &corpus::systems(), |bytes| {
+        harness::file_of_system(&system, "SystemStructure.ssd", bytes)
+    });
+    reset(&system);
+    each("parameters", &corpus::parameters(), |bytes| harness::file_of_system(&system, "p.ssv", bytes));
+    let alone = outer.join("alone");
+    std::fs::create_dir(&alone).unwrap();
+    each("archive", &corpus::archives(), |bytes| harness::archive(&alone, bytes));
+}
+
+#[test]
+fn malformed_files_are_errors_whatever_memory_there_is() {
+    for megabytes in LIMITS {
+        run_limited("read_all", megabytes, 0);
+    }
+}
+
+/// Changes bytes, repeats or removes parts, and inserts tokens of XML.
+fn mutated(random: &mut Random, original: &[u8]) -> Vec<u8> {
+    const TOKENS: [&str; 16] = [
+        "<",
+        ">",
+        "\"",
+        "/>",
+        "<a",
+        "<!--",
+        "-->",
+        "<![CDATA[",
+        "&#0;",
+        "&lt;",
+        "-1",
+        "18446744073709551615",
+        "1e999",
+        "..",
+        "%00",
+        "\u{1b}[2J",
+    ];
+    let mut bytes = original.to_vec();
+    for _ in 0..=random.below(4) {
+        if bytes.is_empty() {
+            return bytes;
+        }
+        let begin = random.below(bytes.len());
+        let end = (begin + 1 + random.below(64)).min(bytes.len());
+        match random.below(5) {
+            0 => bytes[begin] = random.bits() as u8,
+            1 => _ = bytes.drain(begin..end),
+            2 => {
+                let part = bytes[begin..end].repeat(1 + random.below(8));
+                bytes.splice(begin..begin, part);
+            }
+            3 => _ = bytes.splice(begin..begin, TOKENS[random.below(TOKENS.len())].bytes()),
+            _ => bytes[begin] ^= 1 << random.below(8),
+        }
+    }
+    bytes
+}
+
+#[test]
+#[ignore = "started under a limit of memory"]
+fn read_mutations() {
+    let outer = directory();
+    let system = outer.join("system");
+    let count: usize = std::env::var(MUTATIONS).unwrap().parse().unwrap();
+    let mut random = Random(1);
+    let mut mutate = |files: &Files, read: &dyn Fn(&[u8])| {
+        // Large files take time, and small ones find as much.
+        let small: Vec<_> = files.iter().filter(|(_, bytes)| bytes.len() < 5000).collect();
+        for _ in 0..count {
+            let (_, original) = small[random.below(small.len())];
+            let bytes = mutated(&mut random, original);
+            // For the parent process, if this one ends.
+            std::fs::write(outer.join("input"), &bytes).unwrap();
+            read(&bytes);
+        }
+    };
+    mutate(&corpus::descriptions(), &harness::description);
+    mutate(&corpus::systems(), &|bytes| harness::file_of_system(&system, "SystemStructure.ssd", bytes));
+    reset(&system);
+    mutate(&corpus::parameters(), &|bytes| harness::file_of_system(&system, "p.ssv", bytes));
+    let alone = outer.join("alone");
+    std::fs::create_dir(&alone).unwrap();
+    mutate(&corpus::archives(), &|bytes| harness::archive(&alone, bytes));
+}
+
+#[test]
+fn mutations_of_malformed_files_are_errors() {
+    let count = std::env::var(MUTATIONS).map_or(150, |count| count.parse().unwrap());
+    run_limited("read_mutations", 256, count);
+}
