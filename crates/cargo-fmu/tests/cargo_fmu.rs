@@ -116,7 +116,7 @@ fn listed(model: &str) -> BTreeSet<String> {
 /// The state is 1 - e^-1 after a second.
 #[test]
 fn lag() {
-    let directory = develop("lag", &["--set", "u=1"], "time,x", "from 0.000000 to 0.632121 1");
+    let directory = develop("lag", &["--set", "u=1"], "time,x", "x  from 0 to 0.632121\n");
     inputs_come_from_a_table(&directory);
     check_makes_the_fmus(&directory);
     options_reach_the_program_that_packs(&directory);
@@ -148,7 +148,7 @@ fn motor() {
 
 #[test]
 fn house() {
-    let directory = develop("house", &[], "time,room,outside", "from -6.000000 to 2.500000 degC");
+    let directory = develop("house", &[], "time,room,outside,comfort", "from -6 to 2.5 degC\ncomfort  \"comfortable\" and \"cold\"\n");
     let read = "logEvents: read 9 temperatures from winter.csv";
     assert!(directory.prints("my-house", &["run", "--log"]).contains(read));
     assert!(!directory.prints("my-house", &["run"]).contains(read));
