@@ -148,7 +148,12 @@ fn motor() {
 
 #[test]
 fn house() {
-    let directory = develop("house", &[], "time,room,outside,comfort", "from -6 to 2.5 degC\ncomfort  \"comfortable\" and \"cold\"\n");
+    let directory = develop(
+        "house",
+        &[],
+        "time,room,outside,comfort",
+        "from -6 to 2.5 degC\ncomfort  \"comfortable\" and \"cold\"\n",
+    );
     let read = "logEvents: read 9 temperatures from winter.csv";
     assert!(directory.prints("my-house", &["run", "--log"]).contains(read));
     assert!(!directory.prints("my-house", &["run"]).contains(read));
@@ -334,6 +339,30 @@ fn a_model_is_built_in_another_directory() {
 
     let output = directory.prints("", &["new", "outside"]);
     assert!(output.contains("only on this machine; --git URL"), "{output}");
+    let manifest = directory.read("outside/Cargo.toml").replace(root, "/home/someone");
+    fs::write(directory.path("outside/Cargo.toml"), manifest).unwrap();
+    let error = directory.rejects("outside", &["build"]);
+    assert!(
+        error.contains("names /home/someone/crates/fmu-export for fmu-export, which is not on this machine")
+            && error.contains("fmu-export = { path = \"...\" }")
+            && error.lines().count() == 1,
+        "{error}"
+    );
+
+    // A repository that has the crates as a submodule, as colleagues clone it.
+    fs::create_dir(directory.path("plant")).unwrap();
+    let git_in = |arguments: &[&str]| {
+        git(&[&["-C", "plant", "-c", "protocol.file.allow=always"], arguments].concat());
+    };
+    git_in(&["init", "--quiet"]);
+    git_in(&["submodule", "--quiet", "add", "../origin.git", "libraries/wrist"]);
+    let output = directory.prints("plant", &["new", "models/crane"]);
+    assert!(!output.contains("only on this machine"), "{output}");
+    let manifest = directory.read("plant/models/crane/Cargo.toml");
+    assert!(
+        manifest.contains("fmu-export = { path = \"../../libraries/wrist/crates/fmu-export\" }"),
+        "{manifest}"
+    );
 }
 
 /// The README of fmu-export contains the smallest model.
