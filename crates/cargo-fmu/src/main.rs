@@ -3,12 +3,14 @@
 //! ## Inside
 //!
 //! `new` writes a new model, `project` gets the metadata of the package from cargo, `builder` builds the FMUs, `run` simulates an
-//! FMU, and `plot` draws the results.
+//! FMU with the `inputs` of a table, `results` writes its table, and `plot` draws it.
 
 mod builder;
+mod inputs;
 mod new;
 mod plot;
 mod project;
+mod results;
 mod run;
 
 use anyhow::Result;

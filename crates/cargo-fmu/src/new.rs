@@ -149,17 +149,17 @@ impl Dependency {
             })?;
             return Ok(Self::Git(url.to_owned(), revision));
         }
-        if !is_there {
-            return Ok(Self::Registry);
-        }
         let directory = fs::canonicalize(directory).with_context(|| short(directory))?;
         // `cargo new` may have created a repository in the directory itself.
         let parent = directory.parent().unwrap_or(&directory);
         let root = git(parent, &["rev-parse", "--show-toplevel"]).map(PathBuf::from);
-        Ok(match root.filter(|root| package.starts_with(root)) {
-            Some(_) => Self::Relative(relative(&directory, &package)),
-            None => Self::Local(package),
-        })
+        if let Some(root) = &root {
+            let own = package.starts_with(root) && is_there;
+            if let Some(package) = own.then(|| package.clone()).or_else(|| package_in(root)) {
+                return Ok(Self::Relative(relative(&directory, &package)));
+            }
+        }
+        Ok(if is_there { Self::Local(package) } else { Self::Registry })
     }
 
     fn in_manifest(&self) -> String {
@@ -167,12 +167,24 @@ impl Dependency {
         match self {
             Self::Registry => format!("{version:?}"),
             Self::Git(url, revision) => format!("{{ git = {url:?}, rev = {revision:?} }}"),
-            Self::Relative(path) => format!("{{ version = {version:?}, path = {path:?} }}"),
+            Self::Relative(path) => format!("{{ path = {path:?} }}"),
             Self::Local(path) => {
                 format!("{{ version = {version:?}, path = {:?} }}", path.display().to_string())
             }
         }
     }
+}
+
+/// Returns the directory of fmu-export in a repository, which may have these crates as a submodule: others then have the same
+/// version at the same relative path.
+fn package_in(root: &Path) -> Option<PathBuf> {
+    let names = ["fmu-export/Cargo.toml", "*/fmu-export/Cargo.toml"];
+    let files = git(root, &[&["ls-files", "--recurse-submodules", "--"], &names[..]].concat())?;
+    let mut packages = files.lines().filter_map(|file| Some(root.join(file).parent()?.to_owned()));
+    packages.find(|package| {
+        let manifest = fs::read_to_string(package.join("Cargo.toml")).unwrap_or_default();
+        manifest.lines().any(|line| line.trim() == "name = \"fmu-export\"")
+    })
 }
 
 /// Returns the output of git in a directory, if it succeeds.

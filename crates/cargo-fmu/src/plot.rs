@@ -1,20 +1,11 @@
 //! Draws the results of a simulation: an SVG with a panel for each unit.
 
-use anyhow::{Result, anyhow};
+use crate::results::Column;
+use anyhow::{Result, anyhow, bail};
+use fmu_run::BaseType;
 use plotters::prelude::*;
 use std::fs;
 use std::path::Path;
-
-/// A variable over time.
-pub struct Trajectory<'a> {
-    pub name: &'a str,
-    pub unit: &'a str,
-    /// Whether the variable is constant between jumps.
-    pub jumps: bool,
-    /// Whether the values 0 and 1 mean false and true.
-    pub is_boolean: bool,
-    pub values: &'a [f64],
-}
 
 /// Colours that colour-blind people can distinguish (Okabe and Ito).
 const COLOURS: [RGBColor; 7] = [
@@ -27,10 +18,14 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 
-/// Draws the trajectories. Trajectories of one unit share a panel.
-pub fn plot(path: &Path, title: &str, time: &[f64], trajectories: &[Trajectory]) -> Result<()> {
+/// Draws the variables. Variables of one unit share a panel, as do those with the same labels.
+pub fn plot(path: &Path, title: &str, time: &[f64], columns: &[Column]) -> Result<()> {
     let mut svg = String::new();
-    draw(&mut svg, title, time, trajectories).map_err(|error| anyhow!("{error}"))?;
+    let drawn: Vec<_> = columns.iter().filter(|column| is_drawn(column)).collect();
+    if drawn.is_empty() {
+        bail!("there are only strings and bytes");
+    }
+    draw(&mut svg, title, time, &drawn).map_err(|error| anyhow!("{error}"))?;
     // The backend has integer coordinates: it draws a large image, which the SVG then scales down.
     let (begin, rest) = svg.split_once('>').unwrap_or_default();
     let size = |name: &str| {
@@ -52,24 +47,29 @@ fn draw(
     svg: &mut String,
     title: &str,
     time: &[f64],
-    trajectories: &[Trajectory],
+    columns: &[&Column],
 ) -> Result<(), Box<dyn std::error::Error>> {
-    let mut panels: Vec<(&str, Vec<&Trajectory>)> = Vec::new();
-    for trajectory in trajectories {
-        match panels.iter_mut().find(|(unit, panel)| *unit == trajectory.unit && panel.len() < COLOURS.len())
-        {
-            Some((_, panel)) => panel.push(trajectory),
-            None => panels.push((trajectory.unit, vec![trajectory])),
+    let mut panels: Vec<Vec<&Column>> = Vec::new();
+    for column in columns {
+        let shares = |panel: &&mut Vec<&Column>| {
+            panel[0].unit == column.unit && panel[0].labels == column.labels && panel.len() < COLOURS.len()
+        };
+        match panels.iter_mut().find(shares) {
+            Some(panel) => panel.push(column),
+            None => panels.push(vec![column]),
         }
     }
+    let longest =
+        columns.iter().flat_map(|column| &column.labels).map(|(_, text)| shown(text).chars().count());
+    let space_of_labels = (8 * longest.max().unwrap_or_default() as u32 + 12).max(76);
     let height = 70 + 260 * panels.len() as u32;
     let root = SVGBackend::with_string(svg, (840 * FINE, height * FINE)).into_drawing_area();
     root.fill(&WHITE)?;
     let root = root.margin(10 * FINE, 0, 0, 0).titled(title, ("sans-serif", 22 * FINE))?;
-    for (area, (unit, panel)) in root.split_evenly((panels.len(), 1)).iter().zip(&panels) {
-        let values = || {
-            panel.iter().flat_map(|trajectory| trajectory.values).copied().filter(|value| value.is_finite())
-        };
+    for (area, panel) in root.split_evenly((panels.len(), 1)).iter().zip(&panels) {
+        let (unit, labels) = (panel[0].unit, &panel[0].labels);
+        let values =
+            || panel.iter().flat_map(|column| &column.values).copied().filter(|value| value.is_finite());
         let (low, high) =
             (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
         let (low, high) = if low <= high { (low, high) } else { (0.0, 1.0) };
@@ -77,32 +77,41 @@ fn draw(
         let mut chart = ChartBuilder::on(area)
             .margin(12 * FINE)
             .x_label_area_size(40 * FINE)
-            .y_label_area_size(76 * FINE)
+            .y_label_area_size(space_of_labels * FINE)
             .build_cartesian_2d(time[0]..time[time.len() - 1], low - margin..high + margin)?;
-        let [label, label_of_time] = [high - low + 2.0 * margin, time[time.len() - 1] - time[0]]
+        let [label_of_value, label_of_time] = [high - low + 2.0 * margin, time[time.len() - 1] - time[0]]
             .map(|range| move |value: &f64| label(*value, range));
-        chart
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
+        let label_of_value =
+            |value: &f64| match labels.iter().find(|(number, _)| (number - value).abs() < 1e-6) {
+                Some((_, label)) => shown(label),
+                None if labels.is_empty() => label_of_value(value),
+                None => String::new(),
+            };
+        let mut mesh = chart.configure_mesh();
+        if !labels.is_empty() {
+            // One line for each label, not for fractions.
+            mesh.y_labels((high - low) as usize + 1);
+        }
+        mesh.light_line_style(TRANSPARENT)
             .bold_line_style(BLACK.mix(0.12).stroke_width(FINE))
             .axis_style(BLACK.stroke_width(FINE))
             .set_all_tick_mark_size(5 * FINE)
             .x_desc("time in s")
-            .y_desc(if unit.is_empty() || *unit == "1" { String::new() } else { format!("in {unit}") })
+            .y_desc(if unit.is_empty() { String::new() } else { format!("in {unit}") })
             .x_label_formatter(&label_of_time)
-            .y_label_formatter(&label)
+            .y_label_formatter(&label_of_value)
             .label_style(("sans-serif", 14 * FINE))
             .axis_desc_style(("sans-serif", 14 * FINE))
             .draw()?;
-        for (trajectory, colour) in panel.iter().zip(COLOURS) {
+        for (column, colour) in panel.iter().zip(COLOURS) {
             let mut points: Vec<(f64, f64)> = Vec::with_capacity(2 * time.len());
-            for (time, value) in time.iter().zip(trajectory.values).filter(|point| point.1.is_finite()) {
-                let last = points.last().filter(|_| trajectory.jumps).map(|last| (*time, last.1));
+            for (time, value) in time.iter().zip(&column.values).filter(|point| point.1.is_finite()) {
+                let last = points.last().filter(|_| column.jumps).map(|last| (*time, last.1));
                 points.extend(last.into_iter().chain([(*time, *value)]));
             }
             chart
                 .draw_series(LineSeries::new(points, colour.stroke_width(2 * FINE)))?
-                .label(trajectory.name)
+                .label(column.name)
                 .legend(move |(x, y)| {
                     PathElement::new([(x, y), (x + 20 * FINE as i32, y)], colour.stroke_width(2 * FINE))
                 });
@@ -119,6 +128,22 @@ fn draw(
     }
     root.present()?;
     Ok(())
+}
+
+/// Returns whether a variable is drawn: numbers, and strings of which there are few.
+fn is_drawn(column: &Column) -> bool {
+    const MOST: usize = 12;
+    let is_text = column.base == BaseType::String;
+    column.base != BaseType::Binary && !(is_text && column.labels.len() > MOST)
+}
+
+/// Returns a label that fits next to an axis.
+fn shown(label: &str) -> String {
+    const LONGEST: usize = 20;
+    match label.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}...", &label[..end]),
+        None => label.to_owned(),
+    }
 }
 
 /// Returns a label for an axis with this range, with enough digits to distinguish the labels. Zero has no sign.

@@ -1,9 +1,12 @@
 //! The metadata of the package that makes an FMU, from cargo.
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use fmu_package::metadata;
+use fmu_package::terminal::short;
 use serde_json::Value;
+use std::env;
 use std::ffi::OsStr;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The options that name the package of the model.
@@ -34,7 +37,13 @@ impl Project {
     pub fn find(options: &Package) -> Result<Self> {
         let manifest =
             options.manifest_path.iter().flat_map(|path| [OsStr::new("--manifest-path"), path.as_ref()]);
-        let metadata = metadata(manifest)?;
+        let metadata = metadata(manifest).map_err(|error| {
+            let of = options.manifest_path.clone().or_else(nearest_manifest);
+            match of.and_then(|manifest| missing_path(&manifest)) {
+                Some(explanation) => anyhow!("{explanation}"),
+                None => error,
+            }
+        })?;
         let package = chosen(&metadata, options.package.as_deref())?;
         let name = text(&package["name"]);
         let targets = list(&package["targets"]);
@@ -58,6 +67,30 @@ impl Project {
                 .map(str::to_owned),
         })
     }
+}
+
+/// Returns the `Cargo.toml` in this directory or the nearest directory above.
+fn nearest_manifest() -> Option<PathBuf> {
+    let directory = env::current_dir().ok()?;
+    directory.ancestors().map(|directory| directory.join("Cargo.toml")).find(|path| path.is_file())
+}
+
+/// Explains what to do if the path of fmu-export in a `Cargo.toml` does not exist. Cargo's own message names only the file that it
+/// cannot read.
+fn missing_path(manifest: &Path) -> Option<String> {
+    let content = fs::read_to_string(manifest).ok()?;
+    let mut lines = content.lines().filter(|line| line.trim_start().starts_with("fmu-export"));
+    let path = lines.find_map(|line| line.split_once("path")?.1.split('"').nth(1))?;
+    let is_missing = !manifest.parent()?.join(path).join("Cargo.toml").is_file();
+    is_missing.then(|| {
+        let version = env!("CARGO_PKG_VERSION");
+        format!(
+            "{} names {path} for fmu-export, which is not on this machine, because the model was made on another one or in \
+             another directory; write fmu-export = {{ path = \"...\" }} with the directory crates/fmu-export of a clone \
+             (version {version}), or {{ git = \"URL\", rev = \"...\" }} with a repository that others can read, too",
+            short(manifest)
+        )
+    })
 }
 
 fn text(value: &Value) -> &str {

@@ -161,7 +161,7 @@ fn listed(model: &str) -> BTreeSet<String> {
 /// The state is 1 - e^-1 after a second.
 #[test]
 fn lag() {
-    let directory = develop("lag", &["--set", "u=1"], "time,x", "from 0.000000 to 0.632121 1");
+    let directory = develop("lag", &["--set", "u=1"], "time,x", "x  from 0 to 0.632121\n");
     let printed = directory.prints("my-lag", &["run", "--set", "u=1"]);
     let is_result = |line: &&str| line.starts_with("x  ") || line.ends_with(" steps");
     let shown: Vec<&str> = include_str!("../README.md").lines().filter(is_result).collect();
@@ -201,7 +201,12 @@ fn motor() {
 
 #[test]
 fn house() {
-    let directory = develop("house", &[], "time,room,outside", "from -6.000000 to 2.500000 degC");
+    let directory = develop(
+        "house",
+        &[],
+        "time,room,outside,comfort",
+        "from -6 to 2.5 degC\ncomfort  \"comfortable\" and \"cold\"\n",
+    );
     let read = "logEvents: read 9 temperatures from winter.csv";
     assert!(directory.prints("my-house", &["run", "--log"]).contains(read));
     assert!(!directory.prints("my-house", &["run"]).contains(read));
@@ -387,6 +392,30 @@ fn a_model_is_built_in_another_directory() {
 
     let output = directory.prints("", &["new", "outside"]);
     assert!(output.contains("only on this machine; --git URL"), "{output}");
+    let manifest = directory.read("outside/Cargo.toml").replace(root, "/home/someone");
+    fs::write(directory.path("outside/Cargo.toml"), manifest).unwrap();
+    let error = directory.rejects("outside", &["build"]);
+    assert!(
+        error.contains("names /home/someone/crates/fmu-export for fmu-export, which is not on this machine")
+            && error.contains("fmu-export = { path = \"...\" }")
+            && error.lines().count() == 1,
+        "{error}"
+    );
+
+    // A repository that has the crates as a submodule, as colleagues clone it.
+    fs::create_dir(directory.path("plant")).unwrap();
+    let git_in = |arguments: &[&str]| {
+        git(&[&["-C", "plant", "-c", "protocol.file.allow=always"], arguments].concat());
+    };
+    git_in(&["init", "--quiet"]);
+    git_in(&["submodule", "--quiet", "add", "../origin.git", "libraries/wrist"]);
+    let output = directory.prints("plant", &["new", "models/crane"]);
+    assert!(!output.contains("only on this machine"), "{output}");
+    let manifest = directory.read("plant/models/crane/Cargo.toml");
+    assert!(
+        manifest.contains("fmu-export = { path = \"../../libraries/wrist/crates/fmu-export\" }"),
+        "{manifest}"
+    );
 }
 
 /// The README of fmu-export contains the smallest model.

@@ -87,18 +87,77 @@ pub fn find_event(
     tolerance: f64,
     mut indicator: impl FnMut(Step) -> f64,
 ) -> Option<Step> {
-    let part = |size: f64| Step { size, ..step };
-    let begin = indicator(part(0.0));
-    let falls = match crossing {
-        Crossing::Falling | Crossing::Any if begin > 0.0 => true,
-        Crossing::Rising | Crossing::Any if begin < 0.0 => false,
-        _ => return None,
-    };
-    let is_after = |value: f64| if falls { value <= 0.0 } else { value >= 0.0 };
+    let begin = indicator(Step { size: 0.0, ..step });
+    let falls = crossing.falls(begin)?;
     let end = indicator(step);
-    if !is_after(end) {
-        return None;
+    is_after(falls, end).then(|| locate(step, [begin, end], falls, tolerance, indicator))
+}
+
+/// Returns the part of a step up to the first event among several indicators, and the number of the indicator; see
+/// [`find_event`].
+///
+/// Each indicator has its own direction and is observed separately. So an indicator that begins at zero, for example because
+/// its event has just happened, does not hide the others, as it would in the minimum of all indicators. Several events may happen
+/// at the same time: after the event, compare all indicators with zero.
+///
+/// ```
+/// # use fmu_export::{Crossing, Step, find_first_event};
+/// // A ball begins on the floor, and hits the ceiling at 3 m before it falls back.
+/// let height = |part: Step| part.size * (9.0 - 0.5 * 9.81 * part.size);
+/// let (hit, number) = find_first_event(Step::new(0.0, 1.0), [Crossing::Falling; 2], 1e-9, |part| {
+///     [height(part), 3.0 - height(part)]
+/// })
+/// .unwrap();
+/// assert_eq!(number, 1);
+/// assert!((height(hit) - 3.0).abs() < 1e-7);
+/// ```
+pub fn find_first_event<const N: usize>(
+    step: Step,
+    crossings: [Crossing; N],
+    tolerance: f64,
+    mut indicators: impl FnMut(Step) -> [f64; N],
+) -> Option<(Step, usize)> {
+    let begin = indicators(Step { size: 0.0, ..step });
+    let mut end = indicators(step);
+    let mut first = None;
+    let mut before = step;
+    for (number, crossing) in crossings.into_iter().enumerate() {
+        let Some(falls) = crossing.falls(begin[number]) else { continue };
+        // A later event is of no interest, so the search ends at the event that was found last.
+        if is_after(falls, end[number]) {
+            let ends = [begin[number], end[number]];
+            before = locate(before, ends, falls, tolerance, |part| indicators(part)[number]);
+            end = indicators(before);
+            first = Some((before, number));
+        }
     }
+    first
+}
+
+impl Crossing {
+    /// Returns whether an indicator that begins with this value is observed to fall, or to rise; `None` if it is not observed.
+    fn falls(self, begin: f64) -> Option<bool> {
+        match self {
+            Self::Falling | Self::Any if begin > 0.0 => Some(true),
+            Self::Rising | Self::Any if begin < 0.0 => Some(false),
+            _ => None,
+        }
+    }
+}
+
+fn is_after(falls: bool, value: f64) -> bool {
+    if falls { value <= 0.0 } else { value >= 0.0 }
+}
+
+/// Returns the part of a step up to a change of sign. The indicator has these values at the begin and the end of the step.
+fn locate(
+    step: Step,
+    [begin, end]: [f64; 2],
+    falls: bool,
+    tolerance: f64,
+    mut indicator: impl FnMut(Step) -> f64,
+) -> Step {
+    let part = |size: f64| Step { size, ..step };
     // The ITP method (Oliveira and Takahashi, 2020): the regula falsi, with at most one evaluation more than
     // bisection.
     let tolerance = tolerance.max(4.0 * f64::EPSILON * step.size);
@@ -118,14 +177,14 @@ pub fn find_event(
             middle - radius.copysign(middle - falsi)
         };
         let value = indicator(part(size));
-        if is_after(value) {
+        if is_after(falls, value) {
             after = (size, value)
         } else {
             before = (size, value)
         }
         widest *= 0.5;
     }
-    Some(part(after.0))
+    part(after.0)
 }
 
 #[cfg(test)]
@@ -199,6 +258,24 @@ mod tests {
             assert!(indicator(end) <= 0.0 && indicator(end - 1e-9) > 0.0, "indicator {number}: {end}");
             assert!(count <= limit, "indicator {number}: {count} evaluations");
         }
+    }
+
+    /// cos(a t) falls through zero at pi / (2 a); the indicator that begins at zero would hide it in the minimum.
+    #[test]
+    fn the_first_of_several_events_is_found() {
+        let factors = [1.0, 0.0, 2.0, 1.5];
+        let find = |crossing, size| {
+            find_first_event(Step::new(0.0, size), [crossing; 4], 1e-10, |part| {
+                std::array::from_fn(|n| if n == 1 { part.size } else { (factors[n] * part.size).cos() })
+            })
+        };
+        let (event, number) = find(Crossing::Any, 1.9).unwrap();
+        let exact = 0.25 * std::f64::consts::PI;
+        assert!(number == 2 && event.size >= exact && event.size < exact + 2e-10, "{event:?}, {number}");
+        assert_eq!(find(Crossing::Rising, 1.9), None);
+        assert_eq!(find(Crossing::Falling, 0.5), None);
+        // The search ends at the event that was found last, where indicator 2 has changed its sign only once.
+        assert_eq!(find(Crossing::Falling, 2.4).unwrap().1, 2);
     }
 
     #[test]

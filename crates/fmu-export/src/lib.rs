@@ -44,7 +44,7 @@ pub use fmi_abi::{
     Variability,
 };
 pub use info::{DefaultExperiment, Info};
-pub use integrate::{Crossing, find_event, rk4};
+pub use integrate::{Crossing, find_event, find_first_event, rk4};
 pub use log::Log;
 pub use lookup::{LookupTable, interpolate};
 pub use model::{Error, Experiment, Model, Setup, read_resource};

@@ -21,6 +21,9 @@ pub(crate) struct Reached {
 /// Limit of events per step, and of iterations per event; more count as an endless loop.
 const MOST_EVENTS: u32 = 10_000;
 
+/// The remedies for too many events.
+const CHATTER: &str = "make shorter steps, or give the events hysteresis if the model chatters";
+
 impl<M: Exported> Instance<M> {
     /// Whether steps may end early. A constant, so that models without early ends have no overhead.
     pub(super) const ENDS_EARLY: bool = match M::CO_SIMULATION {
@@ -204,7 +207,7 @@ impl<M: Exported> Instance<M> {
             let handled = if events < MOST_EVENTS {
                 self.handle_event()
             } else {
-                discard(format!("it has more than {MOST_EVENTS} events; make shorter steps"))
+                discard(format!("it has more than {MOST_EVENTS} events; {CHATTER}"))
             };
             events += 1;
             let next = handled.and_then(|()| match () {
