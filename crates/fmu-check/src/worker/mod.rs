@@ -46,6 +46,9 @@ pub const OWN_FAULT: i32 = 97;
 /// Exit status of a worker that has executed its call sequence.
 pub const EXECUTED: i32 = 96;
 
+/// Number of repetitions from which on their measurements are evaluated.
+pub const EVALUATED: usize = 50;
+
 #[derive(Serialize, Deserialize)]
 pub struct Job {
     /// Parameters that all call sequences share.
@@ -309,7 +312,10 @@ impl Executor {
                     let begin = Instant::now();
                     memory::KEEP.store(true, Ordering::Relaxed);
                     let (mut done, mut last) = (0, Vec::new());
-                    while done < *times && begin.elapsed().as_secs_f64() < self.setting.repetitions {
+                    // The first repetitions may take longer: fewer are not evaluated, and the machine may be busy.
+                    let patience = |done: usize| if done < EVALUATED { 4.0 } else { 1.0 };
+                    let seconds = || begin.elapsed().as_secs_f64();
+                    while done < *times && seconds() < patience(done) * self.setting.repetitions {
                         last = self.execute(steps, false);
                         done += 1;
                         if last.iter().any(|outcome| outcome.status.is_some_and(|status| status > 2)) {
