@@ -25,6 +25,7 @@ pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -
             broken.extend(call(numbered));
             broken.extend(messages(description, numbered.id).filter(|_| !outcome.log.is_empty()));
             broken.extend(silence(sequence, numbered));
+            broken.extend(environment(numbered).filter(|_| !outcome.strays.is_empty()));
         }
     }
     let mut names = HashSet::new();
@@ -147,6 +148,16 @@ fn messages(description: &Description, id: u32) -> impl Iterator<Item = Broken> 
     })
 }
 
+/// Returns the rule that messages are logged with the environment pointer of the importer.
+fn environment(numbered: &Numbered) -> Option<Broken> {
+    let (id, name) = (numbered.id, step_name(&numbered.step));
+    Some(rule("logs.environment", move |run| {
+        let message = run.outcome(id)?.strays.first()?;
+        let text = show(message.text.as_deref().unwrap_or_default());
+        Some(format!("{name} logs {text} with an environment pointer that no instance has received"))
+    }))
+}
+
 /// Returns the rule that a failed call logs a message; `None` if logging is switched off in the sequence.
 fn silence(sequence: &CallSequence, numbered: &Numbered) -> Option<Broken> {
     let off = sequence.iter().any(|numbered| {
@@ -160,6 +171,7 @@ fn silence(sequence: &CallSequence, numbered: &Numbered) -> Option<Broken> {
     Some(rule("logs.silent", move |run| {
         let outcome = run.outcome(id)?;
         let status = outcome.status.filter(|status| (2..=4).contains(status))?;
-        outcome.log.is_empty().then(|| format!("{name} returns {} without a message", status_name(status)))
+        (outcome.log.is_empty() && outcome.strays.is_empty())
+            .then(|| format!("{name} returns {} without a message", status_name(status)))
     }))
 }

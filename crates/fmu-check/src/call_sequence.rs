@@ -241,14 +241,27 @@ impl Values {
 
     /// Returns the first index at which the values differ.
     pub fn differ(&self, other: &Self) -> Option<usize> {
+        self.differ_beyond(other, 0.0, |_| 1.0)
+    }
+
+    /// Returns the first index at which the values differ, floating-point numbers by more than `tolerance` times the largest of both
+    /// magnitudes and the nominal value at the index.
+    pub fn differ_beyond(
+        &self,
+        other: &Self,
+        tolerance: f64,
+        nominal: impl Fn(usize) -> f64,
+    ) -> Option<usize> {
         match (self, other) {
             (Self::Numbers(kind, one), Self::Numbers(_, two)) => {
                 // Zeros of both signs are equal, and so are all NaNs.
-                let equal =
-                    |one: f64, two: f64| kind.is_float() && (one == two || one.is_nan() && two.is_nan());
-                one.iter()
-                    .zip(two)
-                    .position(|(one, two)| one != two && !equal(kind.number(*one), kind.number(*two)))
+                let equal = |index: usize, one: f64, two: f64| {
+                    let scale = || one.abs().max(two.abs()).max(nominal(index));
+                    one == two || one.is_nan() && two.is_nan() || (one - two).abs() <= tolerance * scale()
+                };
+                one.iter().zip(two).enumerate().position(|(index, (one, two))| {
+                    one != two && !(kind.is_float() && equal(index, kind.number(*one), kind.number(*two)))
+                })
             }
             (Self::Strings(one), Self::Strings(two)) => one.iter().zip(two).position(|(one, two)| one != two),
             _ => Some(0),
@@ -268,6 +281,9 @@ pub struct Outcome {
     pub written: Vec<Values>,
     /// Messages that the FMU logged during the step.
     pub log: Vec<Message>,
+    /// Messages that the FMU logged with an environment pointer that no instance has received.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub strays: Vec<Message>,
     /// Descriptions of writes outside of the arrays for results.
     pub damage: Vec<String>,
     /// String that the function for the version or the platform returned.

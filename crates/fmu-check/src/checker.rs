@@ -315,16 +315,54 @@ impl Checker {
 
     /// Returns the criterion that reads are equal. The message has `{}` for the variable, its value and the other value.
     pub fn differ(&self, one: &[Read], other: &[Read], message: &'static str) -> Box<dyn Criterion> {
+        self.differ_by(0.0, one, other, message)
+    }
+
+    fn differ_by(
+        &self,
+        tolerance: f64,
+        one: &[Read],
+        other: &[Read],
+        message: &'static str,
+    ) -> Box<dyn Criterion> {
         let (description, one, other) = (self.description.clone(), one.to_vec(), other.to_vec());
         Box::new(move |run: &Run| {
-            let values = difference(&description, run, &one, &other)?.into_iter().chain([String::new()]);
+            let found = difference(&description, run, &one, &other, tolerance)?;
+            let values = found.into_iter().chain([String::new()]);
             Some(message.split("{}").zip(values).map(|(text, value)| text.to_owned() + &value).collect())
         })
+    }
+
+    /// Returns the criterion that reads are equal within the tolerance of the default experiment, as those of a solver with variable
+    /// steps are that continues from a restored state.
+    pub fn continued(&self, one: &[Read], other: &[Read], message: &'static str) -> Box<dyn Criterion> {
+        self.differ_by(self.description.tolerance(), one, other, message)
+    }
+
+    /// Returns the reason for which this machine cannot load the library, if other machines can: a shared library that the FMU does
+    /// not contain, or a newer version of a system library, is missing.
+    pub fn lacks(&self, run: &Run) -> Option<String> {
+        let End::Unloadable(why) = &run.end else { return None };
+        let missing = why.split_once(": cannot open shared object file").map(|(name, _)| name.trim());
+        let missing = missing.map(|name| name.rsplit_once(": ").map_or(name, |(_, name)| name));
+        let directory = self.setting.libraries.iter().flatten().find_map(|library| library.parent());
+        // An FMU that contains the missing library does not find it on any machine.
+        let is_missing = |name: &&str| {
+            directory.is_some_and(|directory| !directory.join(name).exists() && !name.contains('/'))
+        };
+        let old = ["`GLIBC_", "`GLIBCXX_", "`CXXABI_", "`GCC_"].iter().any(|version| why.contains(version));
+        match missing.filter(is_missing) {
+            Some(name) => Some(format!("this machine lacks {name}, which the library needs")),
+            None => old.then(|| format!("a system library of this machine is too old: {why}")),
+        }
     }
 
     /// Records the finding of a run that ended before its last step.
     fn ended(&self, rule: &str, sequence: &CallSequence, run: &Run, forbidden: bool) -> anyhow::Result<()> {
         let Some(observed) = ending(run, sequence) else { return Ok(()) };
+        if self.lacks(run).is_some() {
+            return Ok(());
+        }
         let ends: SharedCriterion = {
             let (sequence, kind) = (sequence.clone(), std::mem::discriminant(&run.end));
             let name_at =

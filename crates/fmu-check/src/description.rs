@@ -18,6 +18,8 @@ pub struct Description {
     pub step_size: Option<f64>,
     /// Rules that the model description breaks.
     pub wrong: Vec<Observation>,
+    /// Value references of the variables that may be read in Initialization Mode of FMI 2.0.
+    early: HashSet<u32>,
 }
 
 /// Gives access to the fields of the model description.
@@ -36,6 +38,12 @@ impl Description {
     /// Fails if the string is no XML or has another FMI version.
     pub fn parse(text: &str) -> Result<Self, String> {
         let written = ModelDescription::parse(text)?;
+        if written.standard == Standard::Fmi3 && written.version.contains('-') {
+            return Err(format!(
+                "its fmiVersion is {:?}, a draft of FMI 3.0, whose functions may differ; FMI 2.0 and 3.0 are supported",
+                written.version
+            ));
+        }
         let [start_time, stop_time, step_size] = written.default_experiment;
         let observation = |(fault, why): &(Fault, String)| {
             let rule = match fault {
@@ -51,6 +59,7 @@ impl Description {
             stop_time,
             step_size: step_size.filter(|size| *size > 0.0 && size.is_finite()),
             wrong: written.faults.iter().filter_map(observation).collect(),
+            early: early(&written),
             written,
         };
         let wrong = description.evaluate();
@@ -144,6 +153,18 @@ impl Description {
         kind_of(self.standard, self.variables[index].base.unwrap_or(BaseType::Boolean))
     }
 
+    /// Returns whether a variable may be read in Initialization Mode. FMI 2.0 allows outputs, continuous states, their derivatives (note
+    /// 2 of the tables in sections 3.2.3 and 4.2.4 of FMI 2.0.5) and the initial unknowns, FMI 3.0 all variables.
+    pub fn is_readable_while_initializing(&self, index: usize) -> bool {
+        self.standard == Standard::Fmi3 || self.early.contains(&self.variables[index].reference)
+    }
+
+    /// Returns the relative difference below which results of a solver with variable steps are equal: the tolerance of the default
+    /// experiment, or 1e-4.
+    pub fn tolerance(&self) -> f64 {
+        self.default_tolerance.unwrap_or(1e-4)
+    }
+
     /// Returns the indices of the continuous states, in the order of their derivatives in ModelStructure.
     pub fn states(&self) -> Vec<usize> {
         self.derivatives.iter().filter_map(|unknown| self.variables[unknown.variable].derivative_of).collect()
@@ -153,6 +174,17 @@ impl Description {
     pub fn states_count(&self) -> Option<usize> {
         self.derivatives.iter().map(|unknown| self.variables[unknown.variable].size).sum()
     }
+}
+
+/// Returns the value references of outputs, continuous states, their derivatives and initial unknowns.
+fn early(written: &ModelDescription) -> HashSet<u32> {
+    let unknowns = written.derivatives.iter().chain(&written.outputs).chain(&written.initial_unknowns);
+    let listed = unknowns.map(|unknown| unknown.variable);
+    let states = written.derivatives.iter().filter_map(|of| written.variables[of.variable].derivative_of);
+    let outputs =
+        (0..written.variables.len()).filter(|index| written.variables[*index].causality == "output");
+    let all = listed.chain(states).chain(outputs);
+    all.map(|index| written.variables[index].reference).collect()
 }
 
 /// Causality, variabilities and values of `initial` that may be combined: the tables of section 2.2.7 of FMI 2.0.5 and section

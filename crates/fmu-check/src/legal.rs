@@ -23,6 +23,24 @@ pub fn first_illegal(description: &Description, sequence: &[Numbered]) -> Option
     walk(description, sequence, &mut Objects::default())
 }
 
+/// States of the instances after the steps of a call sequence that were added one after another.
+#[derive(Default)]
+pub struct Modes(Objects);
+
+impl Modes {
+    /// Updates the states for the next step.
+    pub fn add(&mut self, description: &Description, next: &Numbered) {
+        if !matches!(next.step, Step::Repeat(..) | Step::Parallel(_)) {
+            walk(description, std::slice::from_ref(next), &mut self.0);
+        }
+    }
+
+    /// Returns whether an instance is in Initialization Mode.
+    pub fn is_initializing(&self, instance: usize) -> bool {
+        self.0.instances.get(&instance).is_some_and(|state| state.mode == Mode::Initialization)
+    }
+}
+
 /// Index of the instance that saved a state, and the state.
 type SavedState = (usize, State);
 

@@ -6,7 +6,7 @@
 //! the results. The call sequence of a finding is shortened (`shrink`) within the limits of the standard (`legal`), and written as
 //! a program in C (`reproduce`). Only `worker` has `unsafe` code: an FMU may crash its process.
 //!
-//! Each module uses only modules before it: `call_sequence`, `finding`, `rules`, `description`, `values`, `writer`, `legal`,
+//! Each module uses only modules before it: `call_sequence`, `finding`, `rules`, `description`, `values`, `legal`, `writer`,
 //! `shrink`, `worker`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`, `checks`, `baseline`, `report`.
 
 mod always;

@@ -144,7 +144,7 @@ mod tests {
             Point { time: number as f64, size: 1.0, inputs, ..Point::default() }
         };
         let points = (0..6).map(point).collect();
-        Trajectory { interface: Interface::CoSimulation, updates: 0, points, end: 6.0 }
+        Trajectory { interface: Interface::CoSimulation, points, end: 6.0 }
     }
 
     const WHOLE: &[crate::writer::Part] = &[Begin, ReadAll, Run(0), Free];

@@ -12,9 +12,6 @@ use std::time::{Duration, Instant};
 /// Maximum duration of a simulation with long steps, because checks repeat the simulation many times.
 const LONG: Duration = Duration::from_millis(250);
 
-/// Maximum number of updates of the discrete states in an event.
-const UPDATES: usize = 10;
-
 /// Reason for which a simulation fails, and its call sequence.
 #[derive(Debug)]
 pub struct NoTrajectory(pub String, pub CallSequence);
@@ -34,7 +31,7 @@ impl std::error::Error for NoTrajectory {}
 /// Fails with [`NoTrajectory`] if no simulation succeeds, or with [`Stop`](crate::run::Stop).
 pub fn find_trajectory(checker: &Checker, interface: Interface) -> anyhow::Result<Trajectory> {
     let start = checker.description.start_time;
-    let trajectory = Trajectory { interface, updates: 0, points: Vec::new(), end: start };
+    let trajectory = Trajectory { interface, points: Vec::new(), end: start };
     match interface {
         Interface::CoSimulation if checker.description.event_mode() => with_events(checker, trajectory),
         Interface::CoSimulation => in_steps(checker, trajectory),
@@ -85,7 +82,7 @@ fn in_steps(checker: &Checker, trajectory: Trajectory) -> anyhow::Result<Traject
         if reach > 1.0 && (run.end != End::Done || begin.elapsed() > LONG) {
             continue;
         }
-        made(&run, &writer, ids[0])?;
+        made(checker, &run, &writer, ids[0])?;
         let (succeeded, discarded) = successful_steps(checker, &run, &writer.sequence);
         match failure(&writer.sequence, &run, &ids) {
             None => return Ok(up_to(trajectory, succeeded)),
@@ -117,31 +114,28 @@ fn successful_steps(checker: &Checker, run: &Run, sequence: &CallSequence) -> (u
 }
 
 /// Fails if the process ended before the last step or the instantiation failed.
-fn made(run: &Run, writer: &Writer, make: u32) -> anyhow::Result<()> {
-    match ending(run, &writer.sequence).or_else(|| failure_of(&writer.sequence, run, make)) {
+fn made(checker: &Checker, run: &Run, writer: &Writer, make: u32) -> anyhow::Result<()> {
+    match checker
+        .lacks(run)
+        .or_else(|| ending(run, &writer.sequence))
+        .or_else(|| failure_of(&writer.sequence, run, make))
+    {
         Some(why) => Err(NoTrajectory(why, writer.sequence.clone()).into()),
         None => Ok(()),
     }
 }
 
-/// Sets the number of updates that the initialization needs; returns the result of the last update.
-fn initialized(checker: &Checker, trajectory: &mut Trajectory) -> anyhow::Result<Option<Event>> {
-    for updates in 1..=UPDATES {
-        trajectory.updates = updates;
-        let mut writer = checker.writer(trajectory);
-        let parts = [Part::Make, Part::Enter, Part::Call("ExitInitializationMode"), Part::Update(updates)];
-        let ids = writer.write(0, &parts).ids;
-        let run = checker.execute(&writer.sequence)?;
-        made(&run, &writer, ids[0])?;
-        if let Some(why) = failure(&writer.sequence, &run, &ids[1..]) {
-            return Err(NoTrajectory(why, writer.sequence).into());
-        }
-        match ids.last().and_then(|id| checker.event(&run, *id)) {
-            Some(event) if event.again => {}
-            event => return Ok(event),
-        }
+/// Initializes an instance; returns the result of the event iteration after the initialization.
+fn initialized(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<Option<Event>> {
+    let mut writer = checker.writer(trajectory);
+    let ids =
+        writer.write(0, &[Part::Make, Part::Enter, Part::Call("ExitInitializationMode"), Part::Update]).ids;
+    let run = checker.execute(&writer.sequence)?;
+    made(checker, &run, &writer, ids[0])?;
+    match failure(&writer.sequence, &run, &ids[1..]) {
+        Some(why) => Err(NoTrajectory(why, writer.sequence).into()),
+        None => Ok(ids.last().and_then(|id| checker.event(&run, *id))),
     }
-    Ok(None)
 }
 
 /// Results at a point.
@@ -150,14 +144,14 @@ struct Reached {
     states: Vec<f64>,
     slopes: Vec<f64>,
     indicators: Vec<f64>,
-    /// Result of the last update of the discrete states at the point.
+    /// Result of the event iteration at the point.
     event: Option<Event>,
     /// Whether the model ends the simulation or the step returns early.
     ends: bool,
 }
 
-/// Executes the trajectory and the point after it, and sets the number of updates that an event at the point needs. Returns `None`
-/// if a call fails after at least three points.
+/// Executes the trajectory and the point after it, with an event if the FMU reports one. Returns `None` if a call fails after at
+/// least three points.
 fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> anyhow::Result<Option<Reached>> {
     let count = checker.description.states_count().unwrap_or(0);
     let indicators = checker.description.event_indicators.unwrap_or(0);
@@ -174,7 +168,7 @@ fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> any
             |(name, count)| (count > 0 && !trajectory.is_stepped()).then(|| writer.vector(0, name, count));
         let vectors = vectors.map(read);
         let run = checker.execute(&writer.sequence)?;
-        made(&run, &writer, before[0])?;
+        made(checker, &run, &writer, before[0])?;
         if let Some(why) = failure(&writer.sequence, &run, &[&before[1..], &here].concat()) {
             let few = trajectory.points.len() < 3;
             return if few { Err(NoTrajectory(why, writer.sequence).into()) } else { Ok(None) };
@@ -196,9 +190,8 @@ fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> any
             return Ok(Some(Reached { ends: true, ..Reached::default() }));
         }
         let event = here.iter().rev().find_map(|id| checker.event(&run, *id));
-        let again = event.is_some_and(|event| event.again) && point.updates < UPDATES;
-        if again || point.updates == 0 && flag(0) {
-            point.updates += 1;
+        if !point.event && flag(0) {
+            point.event = true;
             continue;
         }
         let [states, slopes, indicators] =
@@ -209,7 +202,7 @@ fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> any
 
 /// Finds successful steps of Co-Simulation with Event Mode, and handles the events that they report.
 fn with_events(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<Trajectory> {
-    initialized(checker, &mut trajectory)?;
+    initialized(checker, &trajectory)?;
     let description = &checker.description;
     for mut point in steps(description, description.start_time, &[step_size(description); 12], false) {
         let reached = reached(checker, &trajectory, &mut point)?;
@@ -232,7 +225,7 @@ fn integrated(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<T
         _ => (range / 500.0).min(description.step_size.unwrap_or(f64::INFINITY)),
     };
     let (near, far, count_max) = if count > 0 { (6, range / 160.0, 166) } else { (14, small, 14) };
-    let mut next_event = initialized(checker, &mut trajectory)?.and_then(|event| event.next);
+    let mut next_event = initialized(checker, &trajectory)?.and_then(|event| event.next);
     let (mut states, mut slopes, mut before) = (Vec::new(), Vec::<f64>::new(), Vec::<f64>::new());
     let (mut time, mut event_now) = (description.start_time, false);
     let begin = Instant::now();
@@ -254,8 +247,8 @@ fn integrated(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<T
             *state += size * slope;
         }
         let phase = if number < near { number } else { near + number / 20 };
-        let (inputs, updates) = (input_values(description, phase, false), usize::from(event_now));
-        let mut point = Point { time, size, inputs, states: states.clone(), updates };
+        let (inputs, event) = (input_values(description, phase, false), event_now);
+        let mut point = Point { time, size, inputs, states: states.clone(), event };
         let Some(reached) = reached(checker, &trajectory, &mut point)? else { return Ok(trajectory) };
         if reached.ends || reached.event.is_some_and(|event| event.terminate) {
             break;
@@ -265,7 +258,7 @@ fn integrated(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<T
         event_now =
             before.iter().zip(&reached.indicators).any(|(before, now)| (*before > 0.0) != (*now > 0.0));
         before = reached.indicators;
-        if number < near || number % 20 == 0 || point.updates > 0 {
+        if number < near || number % 20 == 0 || point.event {
             trajectory.points.push(point);
             trajectory.end = time;
         }

@@ -3,6 +3,7 @@
 use crate::call_sequence::{Arg, CallSequence, Kind, Make, Numbered, Run, Step, Values};
 use crate::description::{Description, kind_of, type_name};
 use crate::finding::status_name;
+use crate::legal::Modes;
 use fmi_abi::calls::signatures;
 use fmi_abi::{Interface, Standard};
 
@@ -34,16 +35,14 @@ pub struct Point {
     pub inputs: Vec<(usize, Values)>,
     /// Continuous states that are set in Model Exchange.
     pub states: Vec<f64>,
-    /// Number of updates of the discrete states in an event at this point; 0 without an event.
-    pub updates: usize,
+    /// Whether there is an event at this point.
+    pub event: bool,
 }
 
 /// Times, inputs and states of a successful simulation.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
     pub interface: Interface,
-    /// Number of updates of the discrete states after the initialization.
-    pub updates: usize,
     pub points: Vec<Point>,
     /// Time at the end.
     pub end: f64,
@@ -74,8 +73,8 @@ pub enum Part {
     ReadAll,
     /// Calls a function without arguments.
     Call(&'static str),
-    /// Updates the discrete states this many times.
-    Update(usize),
+    /// Updates the discrete states until no further update is needed.
+    Update,
     /// Saves the state with this index.
     Save(usize),
     Restore(usize),
@@ -105,11 +104,14 @@ pub struct Writer<'a> {
     pub next: u32,
     /// Whether the standard forbids the next steps.
     pub forbidden: bool,
+    /// Modes of the instances after the last step.
+    pub modes: Modes,
 }
 
 impl<'a> Writer<'a> {
     pub fn new(description: &'a Description, trajectory: &'a Trajectory, readable: &'a [usize]) -> Self {
-        Self { description, trajectory, readable, sequence: Vec::new(), next: 0, forbidden: false }
+        let (sequence, modes) = (Vec::new(), Modes::default());
+        Self { description, trajectory, readable, sequence, next: 0, forbidden: false, modes }
     }
 
     pub fn fmi3(&self) -> bool {
@@ -119,7 +121,9 @@ impl<'a> Writer<'a> {
     pub fn add(&mut self, step: Step) -> u32 {
         let id = self.next;
         self.next += 1;
-        self.sequence.push(Numbered { id, forbidden: self.forbidden, step });
+        let numbered = Numbered { id, forbidden: self.forbidden, step };
+        self.modes.add(self.description, &numbered);
+        self.sequence.push(numbered);
         id
     }
 
@@ -164,7 +168,7 @@ impl<'a> Writer<'a> {
                 Part::Read => calls.reads.extend(self.read(instance)),
                 Part::ReadAll => calls.reads.extend(self.read_all(instance)),
                 Part::Call(function) => calls.ids.push(self.call(instance, function, vec![])),
-                Part::Update(times) => calls.ids.extend(self.update(instance, times)),
+                Part::Update => calls.ids.push(self.update(instance)),
                 Part::Save(slot) => {
                     calls.ids.push(self.call(instance, "GetFMUState", vec![Arg::StateOut(slot)]))
                 }
@@ -243,8 +247,8 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// Writes updates of the discrete states; returns the numbers of the calls.
-    pub fn update(&mut self, instance: usize, times: usize) -> Vec<u32> {
+    /// Writes an update of the discrete states, which the worker repeats until no further update is needed.
+    pub fn update(&mut self, instance: usize) -> u32 {
         let (name, args) = match self.fmi3() {
             true => {
                 let mut args = vec![Arg::Out(Kind::U8, 1); 5];
@@ -254,15 +258,12 @@ impl<'a> Writer<'a> {
             // fmi2EventInfo has five flags, padding and the time.
             false => ("NewDiscreteStates", vec![Arg::Out(Kind::U64, 4)]),
         };
-        (0..times).map(|_| self.call(instance, name, args.clone())).collect()
+        self.call(instance, name, args)
     }
 
     /// Writes an event: enters Event Mode, updates the discrete states and returns to the mode before.
-    pub fn event(&mut self, instance: usize, updates: usize) -> Vec<u32> {
-        let mut ids = vec![self.call(instance, "EnterEventMode", vec![])];
-        ids.extend(self.update(instance, updates));
-        ids.push(self.resume(instance));
-        ids
+    pub fn event(&mut self, instance: usize) -> Vec<u32> {
+        vec![self.call(instance, "EnterEventMode", vec![]), self.update(instance), self.resume(instance)]
     }
 
     /// Leaves Event Mode for the mode in which time advances.
@@ -275,7 +276,7 @@ impl<'a> Writer<'a> {
     pub fn leave(&mut self, instance: usize) -> Vec<u32> {
         let mut ids = vec![self.call(instance, "ExitInitializationMode", vec![])];
         if !self.trajectory.is_stepped() || self.description.event_mode() {
-            ids.extend(self.update(instance, self.trajectory.updates));
+            ids.push(self.update(instance));
             ids.push(self.resume(instance));
         }
         ids
@@ -342,8 +343,19 @@ impl<'a> Writer<'a> {
         self.set(instance, &[(index, Values::new(self.description.kind(index), numbers.iter().copied()))])
     }
 
-    /// Reads the variables at these indices with a call for each type.
+    /// Reads the variables at these indices with a call for each type. In Initialization Mode, reads only those that may be read there.
     pub fn read_these(&mut self, instance: usize, indices: &[usize]) -> Vec<Read> {
+        if !self.modes.is_initializing(instance) {
+            return self.read_anyway(instance, indices);
+        }
+        let allowed = |index: &usize| self.description.is_readable_while_initializing(*index);
+        let indices: Vec<usize> = indices.iter().copied().filter(allowed).collect();
+        self.read_anyway(instance, &indices)
+    }
+
+    /// Reads the variables at these indices with a call for each type. FMI 2.0 allows an FMU to reject some of the calls in Initialization
+    /// Mode, which is no finding.
+    pub fn read_anyway(&mut self, instance: usize, indices: &[usize]) -> Vec<Read> {
         let mut reads = Vec::new();
         for (name, kind, positions) in self.by_type(indices) {
             let size = |index: usize| self.description.variables[index].size.unwrap_or(1);
@@ -382,8 +394,8 @@ impl<'a> Writer<'a> {
                 vec![Arg::Integer(0), flag.clone(), flag],
             ));
         }
-        if point.updates > 0 {
-            ids.extend(self.event(instance, point.updates));
+        if point.event {
+            ids.extend(self.event(instance));
         }
         ids
     }
@@ -493,8 +505,15 @@ pub fn sample(description: &Description, max_count: usize) -> Vec<usize> {
     found
 }
 
-/// Returns the first difference between corresponding reads: the name of the variable and both values.
-pub fn difference(description: &Description, run: &Run, one: &[Read], other: &[Read]) -> Option<[String; 3]> {
+/// Returns the first difference between corresponding reads: the name of the variable and both values. Floating-point numbers differ
+/// if their relative difference is greater than the tolerance.
+pub fn difference(
+    description: &Description,
+    run: &Run,
+    one: &[Read],
+    other: &[Read],
+    tolerance: f64,
+) -> Option<[String; 3]> {
     one.iter().zip(other).find_map(|(one, other)| {
         let (of_one, of_other) = (run.outcome(one.id)?, run.outcome(other.id)?);
         if of_one.status != of_other.status {
@@ -505,7 +524,10 @@ pub fn difference(description: &Description, run: &Run, one: &[Read], other: &[R
         // After an error, the standard does not define the values.
         let pairs = of_one.written.iter().zip(&of_other.written).filter(|_| run.succeeds(one.id));
         let of_pair = |(first, second): (&Values, &Values)| {
-            let index = first.differ(second)?;
+            let nominal = |index| {
+                variable_at(one, index).map_or(1.0, |(variable, ..)| description.variables[variable].nominal)
+            };
+            let index = first.differ_beyond(second, tolerance, nominal)?;
             Some([name_at(description, one, index), first.show(index), second.show(index)])
         };
         pairs.into_iter().find_map(of_pair)
@@ -514,14 +536,18 @@ pub fn difference(description: &Description, run: &Run, one: &[Read], other: &[R
 
 /// Returns the name of the variable whose value is at an index of a read.
 fn name_at(description: &Description, read: &Read, index: usize) -> String {
-    let part = read.parts().find(|(_, begin, size)| (*begin..begin + size).contains(&index));
-    part.map_or_else(
+    variable_at(read, index).map_or_else(
         || format!("number {}", index + 1),
         |(variable, begin, size)| {
             let name = &description.variables[variable].name;
             if size == 1 { name.clone() } else { format!("{name}[{}]", index - begin) }
         },
     )
+}
+
+/// Returns the variable whose value is at an index of a read, the index of its first value, and the number of its values.
+fn variable_at(read: &Read, index: usize) -> Option<(usize, usize, usize)> {
+    read.parts().find(|(_, begin, size)| (*begin..begin + size).contains(&index))
 }
 
 /// Returns the values of the variables of all successful reads.

@@ -124,19 +124,10 @@ fn ended(steps: &[Stepped], run: &Run, id: u32) -> Option<(bool, bool, f64)> {
     (!before.any(is_skipped)).then_some((event, early, reached))
 }
 
-/// Updates the discrete states, at most ten times, until the event needs no further update, and enters Step Mode. Returns the
-/// time of the next event.
+/// Updates the discrete states and enters Step Mode. Returns the time of the next event.
 fn over_event(checker: &Checker, writer: &mut Writer<'_>) -> anyhow::Result<Option<f64>> {
-    let mut next = None;
-    for _ in 0..10 {
-        let ids = writer.update(0, 1);
-        let run = checker.execute(&writer.sequence)?;
-        let event = checker.event(&run, ids[0]);
-        if !event.is_some_and(|event| event.again) {
-            next = event.and_then(|event| event.next);
-            break;
-        }
-    }
+    let id = writer.update(0);
+    let run = checker.execute(&writer.sequence)?;
     writer.call(0, "EnterStepMode", vec![]);
-    Ok(next)
+    Ok(checker.event(&run, id).and_then(|event| event.next))
 }

@@ -4,6 +4,7 @@ use super::Fits::{self, Always, Integrated, Several, Stepped};
 use crate::call_sequence::{Arg, NULL_INSTANCE, Step};
 use crate::checker::{Checker, Random};
 use crate::finding::{event, first_failure};
+use crate::worker::MOST_UPDATES;
 use crate::writer::Part::{
     self, Begin, Call, Drop, Enter, Free, Leave, Make, Points, ReadAll, Restore, Save,
 };
@@ -88,9 +89,8 @@ fn events_everywhere(writer: &mut Writer, trajectory: &Trajectory) {
     writer.begin(0);
     for point in &trajectory.points {
         writer.point(0, point);
-        if point.updates == 0 {
-            // The number of updates that the event needs is not known here; three are enough for most.
-            writer.event(0, 3);
+        if !point.event {
+            writer.event(0);
         }
     }
     writer.write(0, &[ReadAll, Free]);
@@ -98,10 +98,10 @@ fn events_everywhere(writer: &mut Writer, trajectory: &Trajectory) {
 
 fn event_mode(writer: &mut Writer, trajectory: &Trajectory) {
     writer.make_with(0, |how| how.event_mode = true);
-    writer.write(0, &[Enter, Call("ExitInitializationMode"), Part::Update(3), Call("EnterStepMode")]);
+    writer.write(0, &[Enter, Call("ExitInitializationMode"), Part::Update, Call("EnterStepMode")]);
     let size = trajectory.points.first().map_or(1e-3, |point| point.size);
     writer.step(0, writer.description.start_time, size);
-    writer.event(0, 3);
+    writer.event(0);
     writer.write(0, &[ReadAll, TERMINATE, Free]);
 }
 
@@ -232,8 +232,8 @@ pub fn events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     let mut points = vec![(ids, checker.description.start_time)];
     for point in &trajectory.points {
         let mut ids = writer.point(0, point);
-        if point.updates == 0 {
-            ids.extend(writer.event(0, 3));
+        if !point.event {
+            ids.extend(writer.event(0));
         }
         points.push((ids, point.time));
     }
@@ -251,7 +251,7 @@ pub fn events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     writer.begin(0);
     writer.forbidden = true;
     writer.call(0, "SetTime", vec![Arg::real(late)]);
-    let ids = writer.write(0, &[Call("EnterEventMode"), Part::Update(3)]).ids;
+    let ids = writer.write(0, &[Call("EnterEventMode"), Part::Update]).ids;
     checker.check("life_cycle.late-event", writer.sequence, move |run| {
         let event = event(run, *ids.last()?, fmi3)?;
         let next = event.next.filter(|next| !event.again && *next <= late)?;
@@ -259,10 +259,10 @@ pub fn events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     })?;
     let mut writer = checker.writer(trajectory);
     writer.write(0, &[Make, Enter, Call("ExitInitializationMode")]);
-    let ids = writer.update(0, 100);
+    let id = writer.update(0);
     checker.check("life_cycle.event-iteration", writer.sequence, move |run| {
-        let all = ids.iter().all(|id| event(run, *id, fmi3).is_some_and(|event| event.again));
-        all.then(|| "after 100 updates of the discrete states another one is needed".to_owned())
+        let again = event(run, id, fmi3)?.again;
+        again.then(|| format!("after {MOST_UPDATES} updates of the discrete states another one is needed"))
     })
 }
 
@@ -276,10 +276,10 @@ fn changed_states(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<
     writer.begin(0);
     let mut points = Vec::new();
     for point in &trajectory.points {
-        writer.point(0, &Point { updates: 0, ..point.clone() });
+        writer.point(0, &Point { event: false, ..point.clone() });
         let before = writer.vector(0, "GetContinuousStates", count);
         // Event Mode may be entered without an event.
-        let updates = writer.event(0, point.updates.max(3));
+        let updates = writer.event(0);
         let after = writer.vector(0, "GetContinuousStates", count);
         points.push((point.time, before, updates, after));
     }

@@ -294,7 +294,7 @@ pub fn times(checker: &Checker, trajectory: &Trajectory) -> Sequences {
                 writer.step(0, start, number);
             } else {
                 writer.call(0, "SetTime", vec![Arg::real(number)]);
-                writer.write(0, &[Part::ReadAll, Part::Call("EnterEventMode"), Part::Update(1)]);
+                writer.write(0, &[Part::ReadAll, Part::Call("EnterEventMode"), Part::Update]);
             }
             writer.write(0, &[Part::Read, Part::Free]);
         }));

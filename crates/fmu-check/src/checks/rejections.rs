@@ -302,8 +302,8 @@ fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyho
             return None;
         }
         let ends = rejects(&later.reads) || !later.ids.iter().all(|id| run.succeeds(*id));
-        let at_once = difference(&description, run, &single_at_once, &at_once);
-        let later = || difference(&description, run, &single.reads, &later.reads).filter(|_| !ends);
+        let at_once = difference(&description, run, &single_at_once, &at_once, 0.0);
+        let later = || difference(&description, run, &single.reads, &later.reads, 0.0).filter(|_| !ends);
         let [variable, was, is] = at_once.or_else(later)?;
         Some(format!("{named} {}, and {variable} is {is} after it instead of {was}", status_name(status)))
     });

@@ -48,12 +48,12 @@ fn after_values(
     initialized: bool,
 ) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let first = writer.write(0, &[Make, Enter, Read, Call("Reset")]).reads;
+    let first = writer.write(0, &[Make, Enter, Read, Leave, Read, Call("Reset")]).reads;
     writer.set(0, values);
     if initialized {
         writer.write(0, &[Enter, Leave]);
     }
-    let second = writer.write(0, &[Call("Reset"), Enter, Read]).reads;
+    let second = writer.write(0, &[Call("Reset"), Enter, Read, Leave, Read]).reads;
     let message = "{} of the new instance was {}, after values were set and a reset it is {}";
     checker.check("reset.values", writer.sequence, checker.differ(&first, &second, message))
 }

@@ -3,6 +3,7 @@
 use crate::call_sequence::{End, Measured, Run, Step, Values};
 use crate::checker::Checker;
 use crate::finding::failure;
+use crate::worker::EVALUATED;
 use crate::writer::Part::{Begin, Call, Drop, Enter, Free, Leave, Make, Points, ReadAll, Restore, Save};
 use crate::writer::{Part, Trajectory, Writer};
 use fmi_abi::BaseType;
@@ -64,16 +65,16 @@ fn measured(
     let many = writer.add(Step::Repeat(10_000, steps.clone()));
     let last = writer.add(Step::Measure);
     let sequence = writer.sequence;
-    let run = checker.execute_for(&sequence, checker.setting.repetitions * 3.0 + checker.limit)?;
+    let run = checker.execute_for(&sequence, checker.setting.repetitions * 8.0 + checker.limit)?;
     if run.end != End::Done {
         return checker.check("resources.cycles", sequence, |_| None);
     }
     checker.record_always(&sequence, &run);
-    // Measurements before and after the repetitions, and the number of repetitions; `None` if there were fewer than 50.
+    // Measurements before and after the repetitions, and the number of repetitions; `None` if there were too few.
     let done = move |run: &Run| -> Option<(Measured, Measured, usize)> {
         let measured = |id| run.outcome(id)?.measured.clone();
         let (before, times) = (measured(warm)?.times, measured(many)?.times);
-        (before >= 50 && times >= 50).then_some((measured(first)?, measured(last)?, times))
+        (before >= EVALUATED && times >= EVALUATED).then_some((measured(first)?, measured(last)?, times))
     };
     checker.record("resources.memory", &run, &sequence, move |run| {
         let (one, two, times) = done(run)?;

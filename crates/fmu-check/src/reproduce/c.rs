@@ -46,7 +46,7 @@ pub fn program(
     let save = each(bytes, &|slot| format!("    pass_on({slot}, b{slot}, *n{slot});\n"));
     let list: Vec<String> = (0..parts.len()).map(|number| format!("phase{number}")).collect();
     format!(
-        "/*\n{} * cc repro.c -o repro -ldl -lpthread && ./repro DIRECTORY_OF_THE_UNPACKED_FMU\n *\n \
+        "/*\n{} * cc repro.c -o repro -ldl -lpthread -lm && ./repro DIRECTORY_OF_THE_UNPACKED_FMU\n *\n \
          * Exit status: 1 if the finding is reproduced, 0 if it is not, 3 if that is not known.\n */\n\
          #define FMI {}\n{}{declared}\n{threads}{}static void (*const phases[])(void) = {{{}}};\n\
          static const char library_name[] = \"{}\";\n\nstatic void load(void) {{\n{load}}}\n\n\
@@ -91,7 +91,8 @@ fn shows(evidence: &Evidence) -> String {
     let results = match evidence {
         Evidence::None | Evidence::End | Evidence::Orphans => None,
         Evidence::Printed => Some("*result(\"printed\", 0) != 0".to_owned()),
-        Evidence::Damage => Some("damaged()".to_owned()),
+        Evidence::Damage => Some("noted(\"damage\")".to_owned()),
+        Evidence::Strays => Some("noted(\"stray\")".to_owned()),
         Evidence::Differ(pairs) => {
             let list: Vec<String> = pairs.iter().map(|[one, other]| format!("{{{one}, {other}}}")).collect();
             Some(format!("any_differ((const int[][2]){{{}}}, {})", list.join(", "), pairs.len()))
@@ -228,10 +229,16 @@ impl Writer<'_> {
         if *self.evidence == Evidence::Damage {
             after.extend(parts.checks);
         }
+        let updates = ["fmi2NewDiscreteStates", "fmi3UpdateDiscreteStates"].contains(&name)
+            && args.iter().all(|arg| matches!(arg, Arg::Out(..)));
+        let call = match updates {
+            true => "update_states".to_owned(),
+            false => format!("((int (*)(void *{types}))function(\"{name}\"))"),
+        };
         let lines = |lines: Vec<String>| lines.iter().map(|line| format!("    {line}\n")).collect::<String>();
         format!(
             "{guard}{{{comment}\n    size_t before = arrays;\n{}    *messages = 0;\n\
-             \x20   int status = ((int (*)(void *{types}))function(\"{name}\"))({handle}{passed});\n\
+             \x20   int status = {call}({handle}{passed});\n\
              \x20   print(\"{name}: %d\", status);\n{}    print(\"\\n\"); release(before);\n}}\n",
             lines(parts.before),
             lines(after)

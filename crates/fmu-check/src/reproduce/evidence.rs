@@ -18,6 +18,8 @@ pub enum Evidence {
     Printed,
     /// Writes outside of the arrays for results.
     Damage,
+    /// Messages with another environment pointer than the program's.
+    Strays,
     /// Pairs of calls, at least one of which has different results.
     Differ(Vec<[u32; 2]>),
     /// Calls that all have the expected results.
@@ -67,6 +69,9 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     }
     if without(&|run| run.outcomes.values_mut().for_each(|outcome| outcome.damage.clear())) {
         return Evidence::Damage;
+    }
+    if without(&|run| run.outcomes.values_mut().for_each(|outcome| outcome.strays.clear())) {
+        return Evidence::Strays;
     }
     let pairs = pairs(&finding.sequence);
     if !pairs.is_empty() {

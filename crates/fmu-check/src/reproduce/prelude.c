@@ -7,6 +7,7 @@
 #include <stdint.h>
 #include <stdio.h>
 #include <locale.h>
+#include <math.h>
 #include <dirent.h>
 #include <signal.h>
 #include <stdlib.h>
@@ -30,6 +31,9 @@ typedef struct {
 } Callbacks;
 
 enum { NONE, END, ORPHANS, RESULTS };
+
+/* A library that does not name libm among the libraries that it needs can be loaded where the program has it, as importers do. */
+static __attribute__((used)) double (*volatile needs_libm)(double) = cos;
 
 static void *library;
 static char library_path[5000];
@@ -145,10 +149,20 @@ static __attribute__((unused)) void look_at(const void *array, const void *befor
     if (bad) { print(" (an array was damaged)"); fclose(results("damage", 0, "w")); }
 }
 
-static __attribute__((unused)) bool damaged(void) {
+/* Returns whether an observation of this kind was noted in a file. */
+static __attribute__((unused)) bool noted(const char *kind) {
     char path[5100];
-    snprintf(path, sizeof path, "%s/damage0", scratch);
+    snprintf(path, sizeof path, "%s/%s0", scratch, kind);
     return access(path, F_OK) == 0;
+}
+
+/* The environment pointer of all instances, which the library passes to the logger. */
+static char environment_of_importer;
+
+static void look_at_environment(const void *environment) {
+    if (environment == &environment_of_importer) return;
+    print("    the next message has another environment pointer\n");
+    fclose(results("stray", 0, "w"));
 }
 
 static void keep_message(int status, const char *category, const char *text) {
@@ -165,7 +179,7 @@ static void keep_message(int status, const char *category, const char *text) {
 static __attribute__((unused)) void logger2(void *environment, const char *name, int status, const char *category, const char *text, ...) {
     char whole[8000] = "";
     va_list list;
-    (void)environment;
+    look_at_environment(environment);
     va_start(list, text);
     if (text) vsnprintf(whole, sizeof whole, text, list);
     va_end(list);
@@ -174,13 +188,13 @@ static __attribute__((unused)) void logger2(void *environment, const char *name,
 }
 
 static __attribute__((unused)) void logger3(void *environment, int status, const char *category, const char *text) {
-    (void)environment;
+    look_at_environment(environment);
     keep_message(status, category, text);
     print("    log: status %d, category %s: %s\n", status, category ? category : "NULL", text ? text : "NULL");
 }
 
 static char resources[5000];
-static __attribute__((unused)) Callbacks callbacks = {logger2, calloc, free, NULL, NULL};
+static __attribute__((unused)) Callbacks callbacks = {logger2, calloc, free, NULL, &environment_of_importer};
 
 static void *copy(const char *text) { return guarded(text, strlen(text) + 1); }
 
@@ -196,9 +210,9 @@ static __attribute__((unused)) void *make(int index, const char *name, const cha
     made = ((void *(*)(const char *, int, const char *, const char *, const Callbacks *, int, int))function("fmi2Instantiate"))(name, co_simulation, token, location, &callbacks, 0, logging);
 #else
     if (co_simulation)
-        made = ((void *(*)(const char *, const char *, const char *, bool, bool, bool, bool, const uint32_t *, size_t, void *, void *, void *))function("fmi3InstantiateCoSimulation"))(name, token, location, false, logging, events, early, NULL, 0, NULL, (void *)logger3, NULL);
+        made = ((void *(*)(const char *, const char *, const char *, bool, bool, bool, bool, const uint32_t *, size_t, void *, void *, void *))function("fmi3InstantiateCoSimulation"))(name, token, location, false, logging, events, early, NULL, 0, &environment_of_importer, (void *)logger3, NULL);
     else
-        made = ((void *(*)(const char *, const char *, const char *, bool, bool, void *, void *))function("fmi3InstantiateModelExchange"))(name, token, location, false, logging, NULL, (void *)logger3);
+        made = ((void *(*)(const char *, const char *, const char *, bool, bool, void *, void *))function("fmi3InstantiateModelExchange"))(name, token, location, false, logging, &environment_of_importer, (void *)logger3);
 #endif
     release(before);
     print("instance %d: %s\n", index, made ? "made" : "NULL");
@@ -241,6 +255,32 @@ static __attribute__((unused)) void show(const void *array, size_t count, char k
         }
     }
 }
+
+/* Updates the discrete states until no further update is needed, as an importer must before it leaves Event Mode. A flag that
+   reports a change remains set if any of the updates has set it. */
+#if FMI == 2
+static __attribute__((unused)) int update_states(void *instance, void *info) {
+    int32_t *flags = info, seen[5] = {0};
+    int status, times = 0, i;
+    do {
+        status = ((int (*)(void *, void *))function("fmi2NewDiscreteStates"))(instance, info);
+        for (i = 1; i < 4; i++) seen[i] |= flags[i] != 0;
+    } while (status < 2 && flags[0] && ++times < 100);
+    for (i = 1; i < 4; i++) if (status < 2 && times && seen[i]) memset(&flags[i], 1, 1);
+    return status;
+}
+#else
+static __attribute__((unused)) int update_states(void *instance, void *again, void *end, void *nominals, void *values, void *defined, void *next) {
+    char *flags[5] = {again, end, nominals, values, defined}, seen[5] = {0};
+    int status, times = 0, i;
+    do {
+        status = ((int (*)(void *, void *, void *, void *, void *, void *, void *))function("fmi3UpdateDiscreteStates"))(instance, again, end, nominals, values, defined, next);
+        for (i = 1; i < 4; i++) seen[i] |= *flags[i] != 0;
+    } while (status < 2 && *flags[0] && ++times < 100);
+    for (i = 1; i < 4; i++) if (status < 2 && times && seen[i]) *flags[i] = 1;
+    return status;
+}
+#endif
 
 static long entries(const char *path) {
     long count = 0;

