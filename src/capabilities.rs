@@ -6,7 +6,7 @@ use crate::motor::Motions;
 use crate::pair::Pair;
 use crate::parameters::{InvalidParameter, Parameters};
 use crate::start::Start;
-use crate::testbed::{State, Testbed, by_sides};
+use crate::testbed::{State, Testbed, split_by_side};
 use crate::variables::Name;
 use fmu_export::{
     BaseType, Causality, CoSimulation, DefaultExperiment, Error, Experiment, Info, InputDerivatives,
@@ -87,7 +87,7 @@ impl Model for TestbedFmu {
     }
 
     fn calculate(&mut self, _time: f64) {
-        self.calculate_with(by_sides(&self.testbed.state), self.motions(&self.testbed.motors));
+        self.calculate_with(split_by_side(&self.testbed.state), self.motions(&self.testbed.motors));
     }
 }
 
@@ -106,7 +106,7 @@ impl CoSimulation for TestbedFmu {
     fn step_fast(&mut self, size: f64) -> bool {
         let state = self.testbed.step_fast(size);
         if let Some(state) = state {
-            self.calculate_with(state, self.testbed.motors.path_end);
+            self.calculate_with(state, self.testbed.motors.segment_end);
         }
         state.is_some()
     }
@@ -114,7 +114,7 @@ impl CoSimulation for TestbedFmu {
     fn step_any_size(&mut self, size: f64) -> bool {
         let state = self.testbed.step_to(size);
         if let Some(state) = state {
-            self.calculate_with(state, self.testbed.motors.path_end);
+            self.calculate_with(state, self.testbed.motors.segment_end);
         }
         state.is_some()
     }

@@ -18,7 +18,7 @@
 use crate::balance::Balance;
 use crate::motor::Motion;
 use crate::number::Number;
-use crate::pair::{PitchRoll, Sides};
+use crate::pair::{PerSide, PitchRoll};
 use crate::parameters::{InvalidParameter, Parameters};
 use nalgebra::{Matrix3, Vector3};
 use std::ops::{Add, Mul, Sub};
@@ -61,7 +61,7 @@ impl<T: Number> Side<T> {
 
 impl<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T>> Side<T> {
     /// Returns the rate of the massless shaft: the first row of eq. (8), solved for `q_I'`. `T` is a number
-    /// for one side, or [`Sides`] for both.
+    /// for one side, or [`PerSide`] for both.
     #[inline]
     pub fn shaft_rate(&self, q_i: T, q_ii: T, v: T, motor: Motion<T>) -> T {
         let Motion { angle: u, rate: w, .. } = motor;
@@ -71,7 +71,7 @@ impl<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T>> Side<T> {
     }
 
     /// Returns the sensor torque, eq. (9), with [`shaft_rate`](Self::shaft_rate) inserted. `T` is a number
-    /// for one side, or [`Sides`] for both.
+    /// for one side, or [`PerSide`] for both.
     #[inline]
     pub fn torque(&self, q_i: T, q_ii: T, v: T, motor: Motion<T>) -> T {
         let Motion { angle: u, rate: w, .. } = motor;
@@ -81,17 +81,17 @@ impl<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T>> Side<T> {
 
 impl Side {
     /// Returns the coefficients as pairs, to evaluate both sides at once.
-    fn of_both(&self) -> Side<Sides> {
+    fn of_both(&self) -> Side<PerSide> {
         let Self { motor_share, sect_share, rate_motor, rate_sect, stiffness_motor, stiffness_sect, damping } =
             *self;
         Side {
-            motor_share: Sides::both(motor_share),
-            sect_share: Sides::both(sect_share),
-            rate_motor: Sides::both(rate_motor),
-            rate_sect: Sides::both(rate_sect),
-            stiffness_motor: Sides::both(stiffness_motor),
-            stiffness_sect: Sides::both(stiffness_sect),
-            damping: Sides::both(damping),
+            motor_share: PerSide::both(motor_share),
+            sect_share: PerSide::both(sect_share),
+            rate_motor: PerSide::both(rate_motor),
+            rate_sect: PerSide::both(rate_sect),
+            stiffness_motor: PerSide::both(stiffness_motor),
+            stiffness_sect: PerSide::both(stiffness_sect),
+            damping: PerSide::both(damping),
         }
     }
 }
@@ -153,7 +153,7 @@ pub struct Decoupled {
     /// Couplings of one side; both sides have equal couplings.
     pub side: Side,
     /// The coefficients of `side` as pairs, to evaluate both sides at once.
-    pub both_sides: Side<Sides>,
+    pub both_sides: Side<PerSide>,
     /// Mean of the two sides.
     pub pitch: Subsystem,
     /// Half difference of the two sides.

@@ -3,9 +3,9 @@
 use crate::decoupled::Decoupled;
 use crate::instant::{Instant, output_shaft, torques};
 use crate::motor::{Motion, Motions, Motors};
-use crate::pair::Sides;
+use crate::pair::PerSide;
 use crate::start::Start;
-use crate::testbed::{BySides, Testbed};
+use crate::testbed::{StateBySide, Testbed};
 use fmu_export::Interface;
 
 /// The testbed in an FMU. The [table of variables](crate::variables) maps its fields to variables.
@@ -99,10 +99,10 @@ impl TestbedFmu {
 
     /// Calculates the outputs for this state and motion of the motors.
     #[inline(always)]
-    pub(crate) fn calculate_with(&mut self, state: BySides, motors: Motions) {
+    pub(crate) fn calculate_with(&mut self, state: StateBySide, motors: Motions) {
         let system = self.testbed.system();
         self.torques = torques(state, &motors, system).array();
-        [self.angles, self.rates] = output_shaft(state, system).map(Sides::array);
+        [self.angles, self.rates] = output_shaft(state, system).map(PerSide::array);
     }
 
     /// Returns the current state and motor motion.

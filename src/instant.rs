@@ -7,9 +7,9 @@
 
 use crate::decoupled::Decoupled;
 use crate::motor::{Motion, Motions};
-use crate::pair::{PitchRoll, Sides, sides, sum_difference};
+use crate::pair::{PerSide, PitchRoll, from_modes, to_modes};
 use crate::parameters::Parameters;
-use crate::testbed::{BySides, State, by_sides};
+use crate::testbed::{State, StateBySide, split_by_side};
 
 /// State x and motion of the motors at one instant. All functions are linear in the instant, so they return
 /// values, partial derivatives (at unit points) or time derivatives (at the rates of a point).
@@ -23,35 +23,35 @@ pub struct Instant {
 
 /// Returns the sensor torques, eq. (9), N.m.
 #[inline]
-pub fn torques([q_i, q_ii, v]: BySides, motors: &Motions, system: &Decoupled) -> Sides {
+pub fn torques([q_i, q_ii, v]: StateBySide, motors: &Motions, system: &Decoupled) -> PerSide {
     system.both_sides.torque(q_i, q_ii, v, *motors)
 }
 
 /// Returns pitch and roll of the output shaft and their rates, eq. (1), rad and rad/s.
 #[inline]
-pub fn output_shaft([_, q_ii, v]: BySides, system: &Decoupled) -> [PitchRoll; 2] {
-    [q_ii, v].map(|sides| sum_difference(sides) * system.output_shaft)
+pub fn output_shaft([_, q_ii, v]: StateBySide, system: &Decoupled) -> [PitchRoll; 2] {
+    [q_ii, v].map(|sides| to_modes(sides) * system.output_shaft)
 }
 
 impl Instant {
     /// Returns the sensor torques, eq. (9), N.m.
-    pub fn torques(&self, system: &Decoupled) -> Sides {
-        torques(by_sides(&self.x), &self.motors, system)
+    pub fn torques(&self, system: &Decoupled) -> PerSide {
+        torques(split_by_side(&self.x), &self.motors, system)
     }
 
     /// Returns the rates of the massless shafts, eq. (11a), rad/s.
-    pub fn shaft_rates(&self, system: &Decoupled) -> Sides {
-        let [q_i, q_ii, v] = by_sides(&self.x);
+    pub fn shaft_rates(&self, system: &Decoupled) -> PerSide {
+        let [q_i, q_ii, v] = split_by_side(&self.x);
         system.both_sides.shaft_rate(q_i, q_ii, v, self.motors)
     }
 
     /// Returns the accelerations of the SECT input shafts, eq. (11a), rad/s2.
-    pub fn accelerations(&self, system: &Decoupled) -> Sides {
+    pub fn accelerations(&self, system: &Decoupled) -> PerSide {
         // M_II v_II' = -gamma - (load damping), split into pitch and roll.
-        let torque = sum_difference(self.torques(system)) * 0.5;
-        let [.., v] = by_sides(&self.x);
-        let rate = sum_difference(v) * 0.5;
-        sides((-torque - system.load_damping() * rate) / system.inertia())
+        let torque = to_modes(self.torques(system)) * 0.5;
+        let [.., v] = split_by_side(&self.x);
+        let rate = to_modes(v) * 0.5;
+        from_modes((-torque - system.load_damping() * rate) / system.inertia())
     }
 
     /// Returns the pitch angle theta7, eq. (1), rad.
@@ -80,9 +80,9 @@ impl Instant {
 
     /// Returns the time derivatives of state and motion, eq. (11a).
     pub fn rates(&self, system: &Decoupled) -> Self {
-        let [.., v] = by_sides(&self.x);
+        let [.., v] = split_by_side(&self.x);
         let [shafts, v, accelerations] =
-            [self.shaft_rates(system), v, self.accelerations(system)].map(Sides::array);
+            [self.shaft_rates(system), v, self.accelerations(system)].map(PerSide::array);
         let x = [shafts[0], shafts[1], v[0], v[1], accelerations[0], accelerations[1]];
         let Motions { rate, acceleration, .. } = self.motors;
         Self { x, motors: Motion { angle: rate, rate: acceleration, ..Motion::default() } }
@@ -90,8 +90,8 @@ impl Instant {
 
     /// Returns the derivative of [`shaft_rates`](Self::shaft_rates) with respect to the parameters in the
     /// direction `change`.
-    pub fn change_of_shaft_rates(&self, system: &Decoupled, change: &Parameters) -> Sides {
-        let [q_i, q_ii, v] = by_sides(&self.x);
+    pub fn change_of_shaft_rates(&self, system: &Decoupled, change: &Parameters) -> PerSide {
+        let [q_i, q_ii, v] = split_by_side(&self.x);
         let Motions { angle, rate, .. } = self.motors;
         let q_i_rate = self.shaft_rates(system);
         let force = (angle - q_i) * change.k1
@@ -103,8 +103,8 @@ impl Instant {
 
     /// Returns the derivative of [`torques`](Self::torques) with respect to the parameters in the direction
     /// `change`.
-    pub fn change_of_torques(&self, system: &Decoupled, change: &Parameters) -> Sides {
-        let [q_i, ..] = by_sides(&self.x);
+    pub fn change_of_torques(&self, system: &Decoupled, change: &Parameters) -> PerSide {
+        let [q_i, ..] = split_by_side(&self.x);
         let Motions { angle, rate, .. } = self.motors;
         (q_i - angle) * change.k1
             + (self.shaft_rates(system) - rate) * change.c1
@@ -113,15 +113,15 @@ impl Instant {
 
     /// Returns the derivative of [`accelerations`](Self::accelerations) with respect to the parameters in the
     /// direction `change`.
-    pub fn change_of_accelerations(&self, system: &Decoupled, change: &Parameters) -> Sides {
-        let torque = sum_difference(self.change_of_torques(system, change)) * 0.5;
-        let [.., v] = by_sides(&self.x);
-        let rate = sum_difference(v) * 0.5;
-        let acceleration = sum_difference(self.accelerations(system)) * 0.5;
+    pub fn change_of_accelerations(&self, system: &Decoupled, change: &Parameters) -> PerSide {
+        let torque = to_modes(self.change_of_torques(system, change)) * 0.5;
+        let [.., v] = split_by_side(&self.x);
+        let rate = to_modes(v) * 0.5;
+        let acceleration = to_modes(self.accelerations(system)) * 0.5;
         // The shares of J2, H3, J3 and c3 in the inertia and damping of pitch and of roll.
         let roll_share = 2.0 * system.roll_ratio * system.roll_ratio;
         let inertia = PitchRoll::new(change.J2 + 0.5 * change.H3, change.J2 + roll_share * change.J3);
         let damping = PitchRoll::new(0.5 * change.c3, roll_share * change.c3);
-        sides((-torque - damping * rate - inertia * acceleration) / system.inertia())
+        from_modes((-torque - damping * rate - inertia * acceleration) / system.inertia())
     }
 }

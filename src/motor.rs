@@ -1,6 +1,6 @@
 //! Motion of the motors between communication points, estimated from samples of their angles.
 
-use crate::pair::Sides;
+use crate::pair::PerSide;
 
 /// Times of the last two samples before the current one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -15,8 +15,8 @@ pub struct SampleTimes {
     steady_step: f64,
     /// 1 / last_step, 1 / step_before and 1 / mean of both, each for both motors. With them and
     /// `half_last_step`, a step needs no division.
-    inverses: [Sides; 3],
-    half_last_step: Sides,
+    inverses: [PerSide; 3],
+    half_last_step: PerSide,
 }
 
 impl SampleTimes {
@@ -28,7 +28,7 @@ impl SampleTimes {
         }
         self.count = (self.count + 1).min(2);
         (self.step_before, self.last_step) = (self.last_step, h);
-        (self.inverses[1], self.inverses[0]) = (self.inverses[0], Sides::splat(inverse));
+        (self.inverses[1], self.inverses[0]) = (self.inverses[0], PerSide::splat(inverse));
         self.update_both();
     }
 
@@ -41,7 +41,7 @@ impl SampleTimes {
 
     /// Updates the fields that are derived from the steps.
     pub fn update(&mut self) {
-        let inverse = |step: f64| Sides::splat(1.0 / step);
+        let inverse = |step: f64| PerSide::splat(1.0 / step);
         (self.inverses[0], self.inverses[1]) = (inverse(self.last_step), inverse(self.step_before));
         self.update_both();
     }
@@ -52,8 +52,8 @@ impl SampleTimes {
         let Self { count, last_step, step_before, .. } = *self;
         let is_steady = count == 2 && last_step == step_before;
         self.steady_step = if is_steady { last_step } else { 0.0 };
-        self.inverses[2] = Sides::splat(1.0 / (0.5 * (last_step + step_before)));
-        self.half_last_step = Sides::splat(0.5 * last_step);
+        self.inverses[2] = PerSide::splat(1.0 / (0.5 * (last_step + step_before)));
+        self.half_last_step = PerSide::splat(0.5 * last_step);
     }
 }
 
@@ -69,16 +69,16 @@ pub struct Motion<T = f64> {
 }
 
 /// Motions of both motors.
-pub type Motions = Motion<Sides>;
+pub type Motions = Motion<PerSide>;
 
 impl Motions {
     /// Creates the motions of both motors.
     #[inline]
     pub const fn new(motor1: Motion, motor2: Motion) -> Self {
         Self {
-            angle: Sides::new(motor1.angle, motor2.angle),
-            rate: Sides::new(motor1.rate, motor2.rate),
-            acceleration: Sides::new(motor1.acceleration, motor2.acceleration),
+            angle: PerSide::new(motor1.angle, motor2.angle),
+            rate: PerSide::new(motor1.rate, motor2.rate),
+            acceleration: PerSide::new(motor1.acceleration, motor2.acceleration),
         }
     }
 
@@ -130,9 +130,9 @@ pub struct Motors {
     /// Derivatives of theta that the importer has set since the last step, rad/s.
     pub given_rate: [Option<f64>; 2],
     /// theta of the previous two samples, rad; the newer sample first.
-    pub earlier: [Sides; 2],
+    pub earlier: [PerSide; 2],
     /// Motion at the end of the straight lines of the last step.
-    pub path_end: Motions,
+    pub segment_end: Motions,
     /// Times of the samples.
     pub times: SampleTimes,
     /// Whether a rate is given for the next step or comes from omega; see
@@ -143,14 +143,14 @@ pub struct Motors {
 impl Motors {
     /// Returns the motor angles that the importer set, rad.
     #[inline(always)]
-    pub fn theta(&self) -> Sides {
-        Sides::new(self.samples[0].theta, self.samples[1].theta)
+    pub fn theta(&self) -> PerSide {
+        PerSide::new(self.samples[0].theta, self.samples[1].theta)
     }
 
     /// Returns the rates that the importer set, rad/s.
     #[inline]
-    pub fn omega(&self) -> Sides {
-        Sides::new(self.omega[0], self.omega[1])
+    pub fn omega(&self) -> PerSide {
+        PerSide::new(self.omega[0], self.omega[1])
     }
 
     /// Sets the angle of motor 0 or 1.
@@ -178,7 +178,7 @@ impl Motors {
     #[inline]
     pub fn omega_changed(&mut self, motor: usize) {
         if self.takes_omega(motor) {
-            self.path_end.rate[motor] = self.omega[motor];
+            self.segment_end.rate[motor] = self.omega[motor];
         }
     }
 
@@ -205,7 +205,7 @@ impl Motors {
     #[inline]
     pub fn set_rate(&mut self, motor: usize, rate: f64) {
         self.given_rate[motor] = Some(rate);
-        self.path_end.rate[motor] = rate;
+        self.segment_end.rate[motor] = rate;
         self.has_rates = true;
     }
 
@@ -218,14 +218,14 @@ impl Motors {
 
     /// Returns whether each of the last two steps had the size `h`.
     #[inline]
-    pub fn are_steady(&self, h: f64) -> bool {
+    pub fn has_constant_step(&self, h: f64) -> bool {
         h == self.times.steady_step
     }
 
     /// Returns the motions at the current communication point after three samples or more; see
     /// [`sampled`](Self::sampled).
     #[inline(always)]
-    pub fn steady(&self) -> Motions {
+    pub fn extrapolate_fast(&self) -> Motions {
         self.with_rates(self.parabolas())
     }
 
@@ -243,12 +243,12 @@ impl Motors {
     /// Returns the motions at the current communication point. The rates come from the importer's derivative,
     /// from omega, or from the parabolas through the last three samples. Two samples give a straight line;
     /// with one sample the motors are at rest.
-    pub fn sampled(&self) -> Motions {
-        let steady = |rate| Motion { angle: self.theta(), rate, acceleration: Sides::default() };
+    pub fn extrapolate(&self) -> Motions {
+        let at_rate = |rate| Motion { angle: self.theta(), rate, acceleration: PerSide::default() };
         self.with_rates(match self.times.count {
             2 => self.parabolas(),
-            1 => steady((self.theta() - self.earlier[0]) * self.times.inverses[0]),
-            _ => steady(Sides::default()),
+            1 => at_rate((self.theta() - self.earlier[0]) * self.times.inverses[0]),
+            _ => at_rate(PerSide::default()),
         })
     }
 
@@ -258,33 +258,34 @@ impl Motors {
         if !self.has_rates {
             return motions;
         }
-        let [rate, acceleration] = [motions.rate, motions.acceleration].map(Sides::array);
+        let [rate, acceleration] = [motions.rate, motions.acceleration].map(PerSide::array);
         let [motor1, motor2] = [0, 1].map(|motor| {
             let given = self.given_rate[motor].or(self.use_omega.then_some(self.omega[motor]));
             given.map_or((rate[motor], acceleration[motor]), |rate| (rate, 0.0))
         });
         Motions {
-            rate: Sides::new(motor1.0, motor2.0),
-            acceleration: Sides::new(motor1.1, motor2.1),
+            rate: PerSide::new(motor1.0, motor2.0),
+            acceleration: PerSide::new(motor1.1, motor2.1),
             ..motions
         }
     }
 
     /// Returns whether motor 0 or 1 is at the end of the last path because no new sample has been set.
     #[inline]
-    pub fn is_at_path_end(&self, motor: usize) -> bool {
+    pub fn is_at_segment_end(&self, motor: usize) -> bool {
         !self.samples[motor].is_new && self.times.count > 0
     }
 
     /// Returns the current motions: the motion at the sample, or at the end of the path if there is no new
     /// sample.
     pub fn now(&self) -> Motions {
-        if self.is_at_path_end(0) && self.is_at_path_end(1) {
-            return self.path_end;
+        if self.is_at_segment_end(0) && self.is_at_segment_end(1) {
+            return self.segment_end;
         }
-        let motions = self.sampled();
-        let now =
-            |motor| if self.is_at_path_end(motor) { self.path_end.of(motor) } else { motions.of(motor) };
+        let motions = self.extrapolate();
+        let now = |motor| {
+            if self.is_at_segment_end(motor) { self.segment_end.of(motor) } else { motions.of(motor) }
+        };
         Motions::new(now(0), now(1))
     }
 
@@ -304,17 +305,17 @@ impl Motors {
     /// Returns the jumps from the ends of the last paths to the current samples, rad. The first samples do
     /// not jump.
     #[inline]
-    pub fn jumps(&self) -> Sides {
-        if self.times.count == 0 { Sides::default() } else { self.theta() - self.path_end.angle }
+    pub fn input_jumps(&self) -> PerSide {
+        if self.times.count == 0 { PerSide::default() } else { self.theta() - self.segment_end.angle }
     }
 
     /// Makes the samples the earlier ones after a step from the angles `theta` to `end`. The caller updates
     /// `times`.
     #[inline(always)]
-    pub fn finish_step(&mut self, theta: Sides, end: &Motions) {
+    pub fn finish_step(&mut self, theta: PerSide, end: &Motions) {
         self.earlier[1] = self.earlier[0];
         self.earlier[0] = theta;
-        self.path_end = *end;
+        self.segment_end = *end;
         self.samples[0].is_new = false;
         self.samples[1].is_new = false;
         if self.has_rates {

@@ -48,7 +48,7 @@ impl Pair {
 }
 
 /// A quantity of both sides.
-pub type Sides = Pair;
+pub type PerSide = Pair;
 
 /// A quantity of the pitch and of the roll subsystem.
 pub type PitchRoll = Pair;
@@ -56,7 +56,7 @@ pub type PitchRoll = Pair;
 /// Returns the sum and the difference of the two sides, twice the quantities of pitch and roll. The step
 /// matrices contain the factor 1/2.
 #[inline]
-pub fn sum_difference(sides: Sides) -> PitchRoll {
+pub fn to_modes(sides: PerSide) -> PitchRoll {
     #[cfg(target_arch = "x86_64")]
     {
         // [a, b] -> [a, -b] + [b, a]. This shuffle copies, so it takes one instruction.
@@ -73,8 +73,8 @@ pub fn sum_difference(sides: Sides) -> PitchRoll {
 
 /// Returns the two sides from the quantities of pitch and roll, their mean and half difference.
 #[inline]
-pub fn sides(z: PitchRoll) -> Sides {
-    sum_difference(z)
+pub fn from_modes(z: PitchRoll) -> PerSide {
+    to_modes(z)
 }
 
 impl Index<usize> for Pair {

@@ -204,7 +204,7 @@ impl StepMatrices {
     /// Returns the velocity to which the increment adds, from the sum and difference at the start of the
     /// step. Returns `None` if the increment adds to the full velocity.
     #[inline]
-    pub fn left_velocity(&self, v: PitchRoll) -> Option<PitchRoll> {
+    pub fn remaining_velocity(&self, v: PitchRoll) -> Option<PitchRoll> {
         if self.keeps_velocities { None } else { self.left_velocity_of(v) }
     }
 

@@ -1,6 +1,6 @@
 //! Initial state.
 
-use crate::pair::Sides;
+use crate::pair::PerSide;
 use crate::testbed::State;
 
 /// Initial state, and whether the simulation has started.
@@ -23,7 +23,7 @@ impl Default for Start {
 impl Start {
     /// Returns the initial state for motor angles `theta`, rad. At rest, no coupling is twisted: the shafts
     /// of each side have the angle of the motor.
-    pub fn from(&self, theta: Sides) -> State {
+    pub fn from(&self, theta: PerSide) -> State {
         match self.at_rest {
             true => [theta[0], theta[1], theta[0], theta[1], 0.0, 0.0],
             false => self.state,

@@ -2,7 +2,7 @@
 
 use crate::decoupled::Decoupled;
 use crate::motor::{Motions, Motors};
-use crate::pair::{Sides, sides, sum_difference};
+use crate::pair::{PerSide, from_modes, to_modes};
 use crate::parameters::{InvalidParameter, Parameters};
 use crate::propagator::StepCache;
 
@@ -10,7 +10,7 @@ use crate::propagator::StepCache;
 pub type State = [f64; 6];
 
 /// A state x in pairs of both sides: `[q_I, q_II, v]` of eq. (8), rad and rad/s.
-pub type BySides = [Sides; 3];
+pub type StateBySide = [PerSide; 3];
 
 /// The testbed between two communication points.
 #[derive(Debug)]
@@ -80,10 +80,10 @@ impl Testbed {
         Ok(())
     }
 
-    /// Advances the state by step size `h > 0` in s; exact for motors on straight lines.
+    /// Advances the state by step size `h > 0` in s; exact if the motor angles are linear over the step.
     ///
-    /// If an angle differs from the end of the last line, it jumps by d. The jump passes through the dampers
-    /// as an impulse: x jumps by B2 d, where B2 are the rate columns of B in eq. (11).
+    /// If an angle was set that differs by d from the extrapolated end of the previous step, the motor jumps by d. The
+    /// jump passes through the dampers as an impulse: x jumps by B2 d, where B2 are the rate columns of B in eq. (11).
     ///
     /// Returns false and changes nothing if the state would overflow.
     #[must_use]
@@ -93,9 +93,9 @@ impl Testbed {
 
     /// Does the same as [`step`](Self::step) and returns the state, or nothing if it would overflow.
     #[inline]
-    pub fn step_to(&mut self, h: f64) -> Option<BySides> {
+    pub fn step_to(&mut self, h: f64) -> Option<StateBySide> {
         self.cache.prepare(&self.system, h);
-        let state = self.step_from(&self.motors.sampled(), self.motors.jumps(), h)?;
+        let state = self.step_from(&self.motors.extrapolate(), self.motors.input_jumps(), h)?;
         self.motors.times.shift(h, self.cache.inverse_of_current());
         Some(state)
     }
@@ -103,27 +103,30 @@ impl Testbed {
     /// Does the same [step](Self::step) with fewer checks, if the size is that of the last two steps. Returns the
     /// state after it, or nothing if the size differs or the state would overflow.
     #[inline(always)]
-    pub fn step_fast(&mut self, h: f64) -> Option<BySides> {
-        if !(self.motors.are_steady(h) && self.cache.has(h)) {
+    pub fn step_fast(&mut self, h: f64) -> Option<StateBySide> {
+        if !(self.motors.has_constant_step(h) && self.cache.has(h)) {
             return None;
         }
-        self.step_from(&self.motors.steady(), self.motors.theta() - self.motors.path_end.angle, h)
+        self.step_from(
+            &self.motors.extrapolate_fast(),
+            self.motors.theta() - self.motors.segment_end.angle,
+            h,
+        )
     }
 
     #[inline(always)]
-    fn step_from(&mut self, motions: &Motions, jumps: Sides, h: f64) -> Option<BySides> {
+    fn step_from(&mut self, motions: &Motions, jumps: PerSide, h: f64) -> Option<StateBySide> {
         let Self { state, motors, cache, .. } = self;
         let matrices = cache.current()?;
-        let [q_i, q_ii, v] = by_sides(state);
+        let [q_i, q_ii, v] = split_by_side(state);
         let u = motions.angle;
-        let deviation = [sum_difference(q_i - u), sum_difference(q_ii - u), sum_difference(v)];
-        let [d_i, d_ii, d_v] =
-            matrices.increment(&deviation, sum_difference(motions.rate), sum_difference(jumps));
-        let q_i = q_i + sides(d_i);
-        let q_ii = q_ii + sides(d_ii);
-        let v = match matrices.left_velocity(deviation[2]) {
-            None => v + sides(d_v),
-            Some(left) => sides(left + d_v),
+        let deviation = [to_modes(q_i - u), to_modes(q_ii - u), to_modes(v)];
+        let [d_i, d_ii, d_v] = matrices.increment(&deviation, to_modes(motions.rate), to_modes(jumps));
+        let q_i = q_i + from_modes(d_i);
+        let q_ii = q_ii + from_modes(d_ii);
+        let v = match matrices.remaining_velocity(deviation[2]) {
+            None => v + from_modes(d_v),
+            Some(left) => from_modes(left + d_v),
         };
 
         // A sum is finite only if all its terms are finite.
@@ -143,6 +146,6 @@ impl Testbed {
 
 /// Returns the pairs `[q_I, q_II, v]` of a state.
 #[inline]
-pub fn by_sides(x: &State) -> BySides {
-    [0, 2, 4].map(|i| Sides::new(x[i], x[i + 1]))
+pub fn split_by_side(x: &State) -> StateBySide {
+    [0, 2, 4].map(|i| PerSide::new(x[i], x[i + 1]))
 }

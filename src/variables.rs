@@ -20,7 +20,7 @@ variables! {
     for TestbedFmu, memory in
         testbed.motors.times.count, testbed.motors.times.last_step, testbed.motors.times.step_before,
         testbed.motors.samples[0].is_new, testbed.motors.samples[1].is_new,
-        testbed.motors.given_rate, testbed.motors.earlier, testbed.motors.path_end,
+        testbed.motors.given_rate, testbed.motors.earlier, testbed.motors.segment_end,
         start.is_over;
 
     /// Angle of motor 1

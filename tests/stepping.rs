@@ -182,7 +182,7 @@ proptest! {
         let h = 10f64.powf(exponent);
         let system = *Testbed::new(p).unwrap().system();
         let matrices = StepMatrices::new(&system, h);
-        prop_assume!(matrices.left_velocity(PitchRoll::both(1.0)).is_none());
+        prop_assume!(matrices.remaining_velocity(PitchRoll::both(1.0)).is_none());
         let [pitch, roll] = [system.pitch, system.roll].map(|subsystem| Propagator::new(&subsystem, h));
         let zero = PitchRoll::both(0.0);
         for column in 0..3 {
