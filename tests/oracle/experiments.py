@@ -1,7 +1,7 @@
 """The reference experiments: motion of the motors, parameters, and response of the testbed.
 
-The oracle calculates the response. If the motors turn at constant rates, the FMU is exact in both interface types and at any
-step size. Other motions are given by samples, and the tolerances allow for the interpolation of importers between them.
+The oracle calculates the response. If the motors turn at constant rates, the FMU is exact in Co-Simulation at any step size, and in
+Model Exchange up to the solver's tolerance. Other motions are given by samples, and the tolerances allow for the interpolation of importers between them.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from reference import follow, integrate
 #: Tolerances of angles, rates and torques, as fractions of the largest value of the variables of the same kind. In
 #: Co-Simulation, the rates of the motors are constant during a step. Many importers read torques before they set the next
 #: rates, so torques lag one step.
-Fractions = Mapping[str, tuple[float, float, float]]
-INTERFACES = {"CoSimulation": 1e-3, "ModelExchange": 1e-3}
-QUICK: Fractions = {"CoSimulation": (5e-4, 1e-3, 2e-2), "ModelExchange": (5e-4, 1e-3, 2e-3)}
-SLOW: Fractions = {"CoSimulation": (1e-4, 3e-4, 2e-2), "ModelExchange": (1e-4, 3e-4, 2e-3)}
-EXACT: Fractions = {"CoSimulation": (1e-6,) * 3, "ModelExchange": (1e-5,) * 3}
-KINDS = (("pitch", "roll", "theta3", "theta4"), ("pitch_rate", "roll_rate"), ("tau1", "tau2"))
+RelativeTolerances = Mapping[str, tuple[float, float, float]]
+STEP_SIZES = {"CoSimulation": 1e-3, "ModelExchange": 1e-3}
+FAST_MOTION: RelativeTolerances = {"CoSimulation": (5e-4, 1e-3, 2e-2), "ModelExchange": (5e-4, 1e-3, 2e-3)}
+SLOW_MOTION: RelativeTolerances = {"CoSimulation": (1e-4, 3e-4, 2e-2), "ModelExchange": (1e-4, 3e-4, 2e-3)}
+EXACT: RelativeTolerances = {"CoSimulation": (1e-6,) * 3, "ModelExchange": (1e-5,) * 3}
+TOLERANCE_GROUPS = (("pitch", "roll", "theta3", "theta4"), ("pitch_rate", "roll_rate"), ("tau1", "tau2"))
 #: Interval in s between rows of the reference, and between samples of motors that do not turn at constant rates.
-INTERVAL, SAMPLE = 0.01, 1e-3
+INTERVAL, SAMPLE_TIME = 0.01, 1e-3
 #: Duration in s of the experiments, and of the move from point to point.
-STOP, MOVE = 1.0, 0.4
+STOP, MOVE_DURATION = 1.0, 0.4
 
 Function = Callable[[float], Any]
 
@@ -37,7 +37,7 @@ class Experiment:
     """Reference experiment.
 
     `inputs` has `time` and MOTORS by name, which importers interpolate linearly. `reference` has `time` and OUTPUTS by
-    name. `parameters` are parameters of the FMU in SI units. `tolerances` are Fractions.
+    name. `parameters` are parameters of the FMU in SI units. `tolerances` are one of the constants above.
     """
 
     name: str
@@ -45,12 +45,12 @@ class Experiment:
     parameters: dict[str, Any]
     inputs: dict[str, Any]
     reference: dict[str, Any]
-    tolerances: Fractions = field(default_factory=lambda: QUICK)
+    tolerances: RelativeTolerances = field(default_factory=lambda: FAST_MOTION)
 
     def allowed(self, interface: str) -> dict[str, float]:
         """Returns the tolerance of each output in rad, rad/s or N.m."""
         found = {}
-        for names, fraction in zip(KINDS, self.tolerances[interface]):
+        for names, fraction in zip(TOLERANCE_GROUPS, self.tolerances[interface]):
             largest = max(np.abs(self.reference[name]).max() for name in names)
             found.update(dict.fromkeys(names, float(f"{fraction * largest:.3g}")))
         return {name: found[name] for name in OUTPUTS}
@@ -63,14 +63,14 @@ def experiments() -> list[Experiment]:
         fig4("fig4_opposite", "Fig. 4: motors with opposite rates, sin(10 pi t) rad/s; the wrist rolls", -1),
         fig4("fig4_equal", "Fig. 4 with equal rates, sin(10 pi t) rad/s; the wrist pitches", 1),
         rate_step(),
-        moved(
+        experiment_from_motion(
             "from_40_degrees",
             "From rest at a pitch of 40 degrees to a pitch of -10 and a roll of 30 degrees in 0.4 s, and then rest",
             table,
-            *point_to_point(np.deg2rad([40.0, 40.0]), rigid_motors(np.deg2rad([-10.0, 30.0])), MOVE),
-            tolerances=SLOW,
+            *point_to_point(np.deg2rad([40.0, 40.0]), inverse_kinematics(np.deg2rad([-10.0, 30.0])), MOVE_DURATION),
+            tolerances=SLOW_MOTION,
         ),
-        moved(
+        experiment_from_motion(
             "other_parameters",
             "Another testbed: every parameter differs from Table 1; sines of 3 and 5 Hz",
             another_testbed(),
@@ -103,15 +103,15 @@ def with_counts(parameters: dict[str, Any]) -> dict[str, Any]:
     return {**parameters, "M": int(parameters["M"]), "N": int(parameters["N"])}
 
 
-def rigid_motors(wrist: Any) -> Any:
-    """Returns the motor angles (2,) in rad that belong to pitch and roll (2,) in rad at rest; eq. (1)."""
+def inverse_kinematics(wrist: Any) -> Any:
+    """Inverse kinematics at rest, eq. (1): motor angles (2,) for pitch and roll (2,), all in rad."""
     return np.linalg.solve(Law().to_wrist, wrist)
 
 
 def fig4(name: str, description: str, sign: int) -> Experiment:
     """The paper's experiment (Sec. 4), its first second."""
     frequency, sides = 10 * np.pi, np.array([1, sign])
-    return moved(
+    return experiment_from_motion(
         name,
         description,
         with_counts(table_1()),
@@ -142,20 +142,20 @@ def sines(amplitude: Any, frequency: Any) -> tuple[Function, Function]:
     )
 
 
-def moved(
+def experiment_from_motion(
     name: str,
     description: str,
     parameters: dict[str, Any],
     angle: Function,
     rate: Function,
-    tolerances: Fractions = QUICK,
+    tolerances: RelativeTolerances = FAST_MOTION,
 ) -> Experiment:
-    """Returns the motion of motors with the smooth functions angle(t) in rad and rate(t) in rad/s, starting at rest."""
+    """Builds the experiment with motor angles angle(t) in rad and rates rate(t) in rad/s; the testbed starts at rest."""
     model = linear_model({key: float(value) for key, value in parameters.items()})
-    t, fine = times(STOP, INTERVAL), times(STOP, SAMPLE)
+    t, fine = times(STOP, INTERVAL), times(STOP, SAMPLE_TIME)
     motion = np.array([(*angle(s), *rate(s)) for s in fine])
     # The motions are smooth except at the end of a move, where the solver restarts.
-    true_values = integrate(model, t, angle, rate, breaks=(MOVE,))
+    true_values = integrate(model, t, angle, rate, breaks=(MOVE_DURATION,))
     return Experiment(
         name,
         description,
@@ -196,7 +196,7 @@ def closed_loop(parameters: dict[str, Any]) -> Experiment:
         {**parameters, "use_omega": True},
         {"time": fine, **{name: loop[name] for name in MOTORS}},
         {"time": fine[::every], **{name: loop[name][::every] for name in OUTPUTS}},
-        SLOW,
+        SLOW_MOTION,
     )
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from experiments import INTERFACES, KINDS, SAMPLE, Experiment, experiments
+from experiments import SAMPLE_TIME, STEP_SIZES, TOLERANCE_GROUPS, Experiment, experiments
 from lxml import etree
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -83,7 +83,7 @@ def entry(experiment: Experiment) -> dict[str, Any]:
         "parameters": f"{experiment.name}.ssv",
         "interfaces": {
             interface: {"step_size": step, "tolerance": experiment.allowed(interface)}
-            for interface, step in INTERFACES.items()
+            for interface, step in STEP_SIZES.items()
         },
     }
 
@@ -115,7 +115,7 @@ def manifest(found: list[Experiment]) -> str:
 def about(found: list[Experiment]) -> str:
     """documentation/fmi-ls-ref.txt."""
     listed = "\n".join(f"  {e.name:<17} {e.description}" for e in found)
-    kinds = ", ".join(" ".join(names) for names in KINDS)
+    kinds = ", ".join(" ".join(names) for names in TOLERANCE_GROUPS)
     return f"""Reference experiments
 
 The folder extra/{LAYER} contains experiments to test an importer. A program that shares no code with
@@ -130,14 +130,14 @@ For each experiment NAME:
   NAME_ref.csv      outputs over time (s): torques (N.m), angles (rad), rates (rad/s)
   experiments.json  start and stop time, step size and tolerances (in the outputs' units) for each interface type
 
-The tolerances are for communication steps of {INTERFACES["CoSimulation"] * 1e3:g} ms in Co-Simulation, with use_omega = true, and in Model Exchange
+The tolerances are for communication steps of {STEP_SIZES["CoSimulation"] * 1e3:g} ms in Co-Simulation, with use_omega = true, and in Model Exchange
 for solvers with a relative tolerance of {SOLVER:g} or less that interpolate inputs at every evaluation. Inputs that are held
 between communication points cause a first-order error that exceeds the tolerances. Variables of one kind share a tolerance:
 {kinds}. In Co-Simulation the tolerance of torques is wider, because many
 importers read outputs before they set the next inputs: torques then belong to the last rates.
 
 rate_step is exact in both interface types at any step size, because its motors turn at constant rates. The motors of
-the other experiments are sampled every {SAMPLE * 1e3:g} ms.
+the other experiments are sampled every {SAMPLE_TIME * 1e3:g} ms.
 
 `prw check RESULT` compares a table of any tool with an experiment.
 """
