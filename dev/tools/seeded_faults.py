@@ -20,9 +20,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 LISTS = ROOT / "tests/faults"
-COPY = ROOT / "target/faults/sources"
+SOURCE_COPY = ROOT / "target/faults/sources"
 #: Seconds that compiling and one set of tests may take. A fault may make a test hang.
-LONGEST = 600
+TIMEOUT = 600
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Fault:
     new: str
     tests: tuple[str, ...]
 
-    def put_into(self, text: str) -> str:
+    def apply_to(self, text: str) -> str:
         """Return the content of the file with the fault."""
         if text.count(self.old) != 1:
             raise ValueError(f"{self.file}: the text to replace occurs {text.count(self.old)} times: {self.name}")
@@ -59,30 +59,33 @@ def read(path: Path) -> list[Fault]:
 
 
 def copy_sources() -> None:
-    """Makes COPY equal to the files that git tracks. Files that have not changed keep their times, for cargo."""
+    """Makes SOURCE_COPY equal to the files that git tracks. The files that have not changed keep their modification times, so that cargo does not compile
+    them again."""
     command = ["git", "ls-files", "-z"]
     names = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout.split("\0")
-    for path in [path for path in COPY.rglob("*") if path.is_file() and str(path.relative_to(COPY)) not in names]:
+    for path in [
+        path for path in SOURCE_COPY.rglob("*") if path.is_file() and str(path.relative_to(SOURCE_COPY)) not in names
+    ]:
         path.unlink()
     for name in filter(None, names):
-        source, target = ROOT / name, COPY / name
+        source, target = ROOT / name, SOURCE_COPY / name
         if source.is_file() and not (target.is_file() and target.read_bytes() == source.read_bytes()):
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source, target)
 
 
-def fails(arguments: str) -> bool:
+def tests_fail(arguments: str) -> bool:
     """Whether `cargo test` with these arguments fails in the copy."""
-    # The headers of the C programs are in the environment of this interpreter.
+    # FMPy, which is installed with this interpreter, brings the headers of the C programs.
     headers = next(Path(sys.prefix).glob("lib/python3*/site-packages/fmpy/c-code"), None)
     environment = {"FMI2_HEADERS": str(headers)} if headers else {}
     command = ["cargo", "test", "--locked", "--quiet", *arguments.split()]
     try:
         done = subprocess.run(
             command,
-            cwd=COPY,
-            env={**os.environ, **environment, "CARGO_TARGET_DIR": str(COPY.parent / "target")},
-            timeout=LONGEST,
+            cwd=SOURCE_COPY,
+            env={**os.environ, **environment, "CARGO_TARGET_DIR": str(SOURCE_COPY.parent / "target")},
+            timeout=TIMEOUT,
             check=False,
             capture_output=True,
             text=True,
@@ -94,13 +97,13 @@ def fails(arguments: str) -> bool:
     return done.returncode != 0
 
 
-def escapes(fault: Fault) -> bool:
+def survives(fault: Fault) -> bool:
     """Whether all tests pass with the fault."""
-    path = COPY / fault.file
+    path = SOURCE_COPY / fault.file
     text = path.read_text(encoding="utf-8")
-    path.write_text(fault.put_into(text), encoding="utf-8")
+    path.write_text(fault.apply_to(text), encoding="utf-8")
     try:
-        return not any(fails(arguments) for arguments in fault.tests)
+        return not any(tests_fail(arguments) for arguments in fault.tests)
     finally:
         path.write_text(text, encoding="utf-8")
 
@@ -114,20 +117,20 @@ def main() -> int:
     options = parser.parse_args()
     faults = [fault for path in options.lists for fault in read(path) if options.only in fault.name]
     if not faults:
-        parser.error(f"no fault is called {options.only!r}")
+        parser.error(f"no name of a fault contains {options.only!r}")
     for fault in faults:
-        fault.put_into((ROOT / fault.file).read_text(encoding="utf-8"))
+        fault.apply_to((ROOT / fault.file).read_text(encoding="utf-8"))
     if options.check:
         print(f"{len(faults)} faults fit the sources")
         return 0
     copy_sources()
     for arguments in dict.fromkeys(arguments for fault in faults for arguments in fault.tests):
-        if fails(arguments):
+        if tests_fail(arguments):
             print(f"cargo test {arguments} fails without a fault", file=sys.stderr)
             return 1
     escaped = []
     for fault in faults:
-        if escapes(fault):
+        if survives(fault):
             escaped.append(fault.name)
         print(f"{'escaped' if fault.name in escaped else 'found  '}  {fault.name}", flush=True)
     print(f"{len(faults) - len(escaped)} of {len(faults)} faults found")
