@@ -25,7 +25,7 @@ pub mod xml;
 pub use base_type::BaseType;
 pub use causality::{Causality, Initial, Variability};
 pub use log_category::Category;
-pub use mode::{Mode, Situation, Situations};
+pub use mode::{AllowedStates, FmiState, Mode};
 pub use rule::Rule;
 pub use standard::{Interface, Standard};
 pub use status::Status;

@@ -21,72 +21,84 @@ pub enum Mode {
     ContinuousTime = 32,
     /// After the end of the simulation.
     Terminated = 64,
-    /// State of FMI 2.0 after an error. No call leads here, because a rejected call changes nothing. A
-    /// serialized state may contain it.
+    /// State of FMI 2.0 after an error. This implementation never enters it, since a rejected call leaves the
+    /// instance unchanged; states that were serialized with it can be read.
     Error = 128,
     /// After a panic.
     Fatal = 256,
 }
 
-/// Modes with their letters in the tables of allowed calls. In fatal no call is allowed.
-const MODES: [(Mode, u8, &str); 9] = [
-    (Mode::Instantiated, b'I', "instantiated"),
-    (Mode::Initialization, b'N', "initialization mode"),
-    (Mode::StepComplete, b'C', "step complete"),
-    (Mode::StepFailed, b'F', "step failed"),
-    (Mode::Event, b'M', "event mode"),
-    (Mode::ContinuousTime, b'K', "continuous-time mode"),
-    (Mode::Terminated, b'T', "terminated"),
-    (Mode::Error, b'E', "error"),
-    (Mode::Fatal, b' ', "fatal"),
+/// A mode with its letter in the tables of allowed calls and its name in messages.
+struct Row {
+    mode: Mode,
+    letter: u8,
+    name: &'static str,
+}
+
+const fn row(mode: Mode, letter: u8, name: &'static str) -> Row {
+    Row { mode, letter, name }
+}
+
+/// All modes. In fatal no call is allowed, so it has no letter.
+const MODES: [Row; 9] = [
+    row(Mode::Instantiated, b'I', "instantiated"),
+    row(Mode::Initialization, b'N', "initialization mode"),
+    row(Mode::StepComplete, b'C', "step complete"),
+    row(Mode::StepFailed, b'F', "step failed"),
+    row(Mode::Event, b'M', "event mode"),
+    row(Mode::ContinuousTime, b'K', "continuous-time mode"),
+    row(Mode::Terminated, b'T', "terminated"),
+    row(Mode::Error, b'E', "error"),
+    row(Mode::Fatal, b' ', "fatal"),
 ];
 
 impl Mode {
     /// Returns the mode with this number, as stored in serialized states.
     pub fn from_number(number: i64) -> Option<Self> {
-        MODES.into_iter().map(|(mode, ..)| mode).find(|mode| i64::from(*mode as u32) == number)
+        MODES.iter().map(|row| row.mode).find(|mode| i64::from(*mode as u32) == number)
     }
 }
 
 impl fmt::Display for Mode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = MODES.into_iter().find(|(mode, ..)| mode == self).map(|(.., name)| name);
-        f.write_str(name.unwrap_or_default())
+        let row = MODES.iter().find(|row| row.mode == *self);
+        f.write_str(row.map_or("", |row| row.name))
     }
 }
 
-/// A set of modes for each FMI version and interface type: 16 bits for each of the four pairs.
+/// A set of modes for each FMI version and interface type, for example the modes in which a function may be called. Each
+/// of the four pairs has 16 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Situations(u64);
+pub struct AllowedStates(u64);
 
-/// Returns the position of the first bit of an FMI version and interface type.
+/// Bit offset of the 16 modes that belong to an FMI version and an interface type.
 #[inline]
-const fn column(standard: Standard, interface: Interface) -> u32 {
+const fn bit_offset(standard: Standard, interface: Interface) -> u32 {
     16 * (2 * standard as u32 + interface as u32)
 }
 
 /// Returns the bit of an FMI version, an interface type and a mode.
 #[inline]
 const fn bit(standard: Standard, interface: Interface, mode: Mode) -> u64 {
-    (mode as u64) << column(standard, interface)
+    (mode as u64) << bit_offset(standard, interface)
 }
 
-/// Returns the bits of the letters.
+/// Converts mode letters, as in the table MODES, into a bit set.
 const fn bits(letters: &str) -> u64 {
     let mut set = 0;
     let mut rest = letters.as_bytes();
     while let [letter, tail @ ..] = rest {
         let mut known = 0;
-        while MODES[known].1 != *letter {
+        while MODES[known].letter != *letter {
             known += 1; // An unknown letter leads past the end: a compile-time error.
         }
-        set |= MODES[known].0 as u64;
+        set |= MODES[known].mode as u64;
         rest = tail;
     }
     set
 }
 
-impl Situations {
+impl AllowedStates {
     /// The empty set.
     pub const NONE: Self = Self(0);
 
@@ -94,14 +106,14 @@ impl Situations {
     /// failed, M event, K continuous time, T terminated, E error.
     pub const fn new(standard: Standard, co_simulation: &str, model_exchange: &str) -> Self {
         Self(
-            bits(co_simulation) << column(standard, Interface::CoSimulation)
-                | bits(model_exchange) << column(standard, Interface::ModelExchange),
+            bits(co_simulation) << bit_offset(standard, Interface::CoSimulation)
+                | bits(model_exchange) << bit_offset(standard, Interface::ModelExchange),
         )
     }
 
     /// Returns whether the set contains this mode of this FMI version and interface type.
     #[inline]
-    pub const fn contain(self, standard: Standard, interface: Interface, mode: Mode) -> bool {
+    pub const fn contains(self, standard: Standard, interface: Interface, mode: Mode) -> bool {
         self.0 & bit(standard, interface, mode) != 0
     }
 
@@ -122,43 +134,43 @@ impl Situations {
         Self(self.0 & !others.0)
     }
 
-    /// Returns the elements of this set for the interface types for which the other set is not empty.
+    /// Keeps the modes of each FMI version and interface type for which `other` contains at least one mode.
     #[must_use]
-    pub const fn where_any(self, other: Self) -> Self {
-        let (mut mask, mut column) = (0, 0xffff);
-        while column != 0 {
-            if other.0 & column != 0 {
-                mask |= column;
+    pub const fn only_where(self, other: Self) -> Self {
+        let (mut kept, mut mask) = (0, 0xffff);
+        while mask != 0 {
+            if other.0 & mask != 0 {
+                kept |= mask;
             }
-            column <<= 16;
+            mask <<= 16;
         }
-        Self(self.0 & mask)
+        Self(self.0 & kept)
     }
 
-    /// Returns the names of the modes of an interface type.
+    /// Lists the modes of this set for an FMI version and an interface type, for error messages.
     pub fn names(self, standard: Standard, interface: Interface) -> String {
-        let known = MODES.into_iter().filter(|(mode, ..)| self.contain(standard, interface, *mode));
-        let names: Vec<_> = known.map(|(.., name)| name).collect();
+        let contained = MODES.iter().filter(|row| self.contains(standard, interface, row.mode));
+        let names: Vec<_> = contained.map(|row| row.name).collect();
         if names.is_empty() { "no state".to_owned() } else { names.join(", ") }
     }
 }
 
-/// Situation of an instance: FMI version, interface type and mode, as one bit for a fast test of membership.
+/// State of an instance in FMI: version, interface type and mode, as one bit for a fast test of membership.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Situation(u64);
+pub struct FmiState(u64);
 
-impl Situation {
-    /// A situation that no set contains.
-    pub const NOWHERE: Self = Self(0);
+impl FmiState {
+    /// A state that no set contains.
+    pub const NONE: Self = Self(0);
 
-    /// Creates the situation of an instance.
+    /// Creates the state of an instance.
     pub const fn new(standard: Standard, interface: Interface, mode: Mode) -> Self {
         Self(bit(standard, interface, mode))
     }
 
-    /// Returns whether the set contains the situation.
+    /// Returns whether the set contains this state.
     #[inline]
-    pub const fn is_in(self, set: Situations) -> bool {
+    pub const fn is_in(self, set: AllowedStates) -> bool {
         self.0 & set.0 != 0
     }
 }

@@ -1,21 +1,21 @@
 //! A row of the table of allowed calls of an FMI version.
 
-use crate::mode::Situations;
+use crate::mode::AllowedStates;
 use crate::standard::Standard;
 
-/// Situations in which a function may be called.
+/// States in which a function may be called.
 #[derive(Clone, Copy, Debug)]
 pub struct Rule {
     /// Name of the function.
     pub name: &'static str,
-    /// Situations in which the FMI standard allows the call.
-    pub standard: Situations,
-    /// Further situations in which this project tolerates the call.
-    pub tolerated: Situations,
+    /// States in which the FMI standard allows the call.
+    pub standard: AllowedStates,
+    /// Further states in which this project tolerates the call.
+    pub tolerated: AllowedStates,
 }
 
 impl Rule {
-    /// Creates a row from the letters of [`Situations::new`] for each interface type. Tolerated modes apply
+    /// Creates a row from the letters of [`AllowedStates::new`] for each interface type. Tolerated modes apply
     /// only to interface types that have the function, or to both if the standard allows it in no mode here.
     pub const fn new(
         of: Standard,
@@ -24,14 +24,14 @@ impl Rule {
         model_exchange: &str,
         tolerated: &str,
     ) -> Self {
-        let standard = Situations::new(of, co_simulation, model_exchange);
-        let tolerated = Situations::new(of, tolerated, tolerated);
-        let tolerated = if standard.is_empty() { tolerated } else { tolerated.where_any(standard) };
+        let standard = AllowedStates::new(of, co_simulation, model_exchange);
+        let tolerated = AllowedStates::new(of, tolerated, tolerated);
+        let tolerated = if standard.is_empty() { tolerated } else { tolerated.only_where(standard) };
         Self { name, standard, tolerated }
     }
 
-    /// Returns all situations in which the call is accepted.
-    pub const fn accepted(&self) -> Situations {
+    /// Returns all states in which the call is accepted.
+    pub const fn accepted(&self) -> AllowedStates {
         self.standard.union(self.tolerated)
     }
 }

@@ -110,7 +110,7 @@ impl Objects {
     fn call(&mut self, standard: Standard, index: usize, function: &str, args: &[Arg]) -> bool {
         let Some(state) = self.instances.get_mut(&index) else { return false };
         let is_allowed = signature(function)
-            .is_some_and(|signature| signature.rule.standard.contain(standard, state.interface, state.mode));
+            .is_some_and(|signature| signature.rule.standard.contains(standard, state.interface, state.mode));
         let is_legal = match function[4..].to_lowercase().contains("fmustate") {
             true => saved_states(&mut self.slots, &mut self.bytes, index, state, function, args),
             false => state.call(standard, function, args),

@@ -1,13 +1,14 @@
 //! General data of a model for the model description.
 
-/// General data of an FMU (section 2.2.1). [`info!`](crate::info) takes some of it from Cargo.
+/// General data of an FMU (section 2.2.1 of FMI 2.0, 2.4.1 of FMI 3.0). [`info!`](crate::info) takes some of it from Cargo.
 #[derive(Clone, Debug)]
 pub struct Info {
     /// `modelName`, the name that users see.
     pub name: &'static str,
     /// `modelIdentifier`, the name of the library file.
     pub identifier: &'static str,
-    /// Fingerprint that ties the description to the library. An importer passes it when it makes an instance.
+    /// GUID (FMI 2.0) or instantiation token (FMI 3.0). The importer passes it at instantiation, and a library that was
+    /// built from other sources rejects it.
     pub guid: &'static str,
     /// Description in one sentence.
     pub description: &'static str,
@@ -21,18 +22,16 @@ pub struct Info {
     pub copyright: &'static str,
     /// Default experiment, which an importer proposes to its user.
     pub default_experiment: DefaultExperiment,
-    /// Whether outputs and derivatives follow from inputs, states and parameters by smooth equations that are
-    /// the same everywhere and at all times. Smooth equations have no branches, limits, dead zones or effects
-    /// that begin at a certain step. Only Integer, Boolean and Enumeration parameters may switch.
+    /// Whether outputs and derivatives are smooth functions of inputs, states and parameters: no branches, saturation,
+    /// dead zones or events. Integer, Boolean and Enumeration parameters may still select between equations.
     ///
-    /// If true, a variable that does not react near the start values never reacts, so fmu-package determines
-    /// the dependencies and their kinds by tests. Otherwise fmu-package lists the variables that
-    /// [`depends_on`](crate::Variable::depends_on) names for each unknown, and all knowns without
-    /// `depends_on`.
+    /// If true, an unknown that does not change when a known is perturbed near the start values is taken not to depend
+    /// on it, so fmu-package finds the exact dependencies numerically. If false, an unknown depends on the variables in
+    /// its [`depends_on`](crate::Variable::depends_on), or on every known if it has no `depends_on`.
     pub smooth: bool,
 }
 
-/// Default experiment, which an importer proposes to its user (section 2.2.5).
+/// Default experiment, which an importer proposes to its user (section 2.2.5 of FMI 2.0, 2.4.6 of FMI 3.0).
 ///
 /// ```
 /// use fmu_export::DefaultExperiment;

@@ -40,7 +40,7 @@ pub use capabilities::{
 pub use describe::describe;
 pub use export::{CoSimulationOffer, Exported, ModelExchangeOffer};
 pub use fmi_abi::{
-    BaseType, Category, Causality, Initial, Interface, Mode, Rule, Situations, Standard, Status, Value,
+    AllowedStates, BaseType, Category, Causality, Initial, Interface, Mode, Rule, Standard, Status, Value,
     Variability,
 };
 pub use info::{DefaultExperiment, Info};

@@ -1,12 +1,12 @@
 //! Modes in which a variable may be set: those that the standard allows, and those tolerated for existing
 //! importers.
 
+use fmi_abi::{AllowedStates, Standard};
 use fmi_abi::{Causality, Initial, Variability};
-use fmi_abi::{Situations, Standard};
 
 /// Returns the modes of Co-Simulation and of Model Exchange with these letters, in both FMI versions.
-const fn both(co_simulation: &str, model_exchange: &str) -> Situations {
-    Situations::new(Standard::Fmi2, co_simulation, model_exchange).union(Situations::new(
+const fn both(co_simulation: &str, model_exchange: &str) -> AllowedStates {
+    AllowedStates::new(Standard::Fmi2, co_simulation, model_exchange).union(AllowedStates::new(
         Standard::Fmi3,
         co_simulation,
         model_exchange,
@@ -28,13 +28,13 @@ pub(crate) const fn settable(
     state: bool,
     reinit: bool,
     real: bool,
-) -> Situations {
+) -> AllowedStates {
     let exact = matches!(initial, Some(Initial::Exact)) && !matches!(variability, Variability::Constant);
     let approx = matches!(initial, Some(Initial::Approx));
     let input = matches!(causality, Causality::Input);
     let parameter = matches!(causality, Causality::Parameter);
 
-    let mut set = Situations::NONE;
+    let mut set = AllowedStates::NONE;
     if exact || approx || input {
         set = set.union(both("I", "I")); // footnote 1; inputs of FMI 2.0 are tolerated
     }
@@ -43,9 +43,9 @@ pub(crate) const fn settable(
     }
     if input || parameter {
         // Footnotes 6 and 4; fixed parameters are tolerated.
-        set = set.union(both("C", "M")).union(Situations::new(Standard::Fmi3, "M", ""));
+        set = set.union(both("C", "M")).union(AllowedStates::new(Standard::Fmi3, "M", ""));
     } else if state && !reinit {
-        set = set.union(Situations::new(Standard::Fmi3, "", "M")); // section 2.3.5 of FMI 3.0
+        set = set.union(AllowedStates::new(Standard::Fmi3, "", "M")); // section 2.3.5 of FMI 3.0
     }
     if state || input && matches!(variability, Variability::Continuous) || parameter && real {
         set = set.union(both("", "K")); // footnote 5; parameters are tolerated
@@ -54,8 +54,8 @@ pub(crate) const fn settable(
 }
 
 /// Modes in which start values are set.
-pub(crate) const STARTING: Situations = both("IN", "IN");
+pub(crate) const STARTING: AllowedStates = both("IN", "IN");
 
 /// All modes of instances except fatal.
-pub(crate) const POSSIBLE: Situations = Situations::new(Standard::Fmi2, "INCFTE", "INMKTE")
-    .union(Situations::new(Standard::Fmi3, "INCMT", "INMKT"));
+pub(crate) const POSSIBLE: AllowedStates = AllowedStates::new(Standard::Fmi2, "INCFTE", "INMKTE")
+    .union(AllowedStates::new(Standard::Fmi3, "INCMT", "INMKT"));

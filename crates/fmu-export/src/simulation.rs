@@ -212,7 +212,7 @@ impl<M: Exported> Simulation<M> {
         let handle = self.instance.save(0)?;
         let mut bytes = vec![0; self.instance.serialized_size(handle)?];
         self.instance.serialize(handle, &mut bytes)?;
-        drop(self.instance.give(handle)?);
+        drop(self.instance.remove(handle)?);
         Ok(bytes)
     }
 
@@ -223,7 +223,7 @@ impl<M: Exported> Simulation<M> {
     pub fn restore(&mut self, bytes: &[u8]) -> Result<&mut Self, Error> {
         let handle = self.instance.deserialize(bytes, 0)?;
         self.instance.restore(handle)?;
-        drop(self.instance.give(handle)?);
+        drop(self.instance.remove(handle)?);
         Ok(self)
     }
 

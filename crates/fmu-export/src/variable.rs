@@ -4,8 +4,8 @@ use crate::saved::StateVisitor;
 use crate::settable::settable;
 use crate::types::Type;
 use crate::value::{Dimensions, Place, Scalar};
+use fmi_abi::AllowedStates;
 use fmi_abi::BaseType;
-use fmi_abi::Situations;
 use fmi_abi::Value;
 use fmi_abi::{Causality, Initial, Variability};
 use std::marker::PhantomData;
@@ -44,11 +44,11 @@ pub struct Variable<M> {
     state: bool,
     reinit: bool,
     /// Modes in which the importer may set this variable; derived from the other fields.
-    pub(crate) settable: Situations,
+    pub(crate) settable: AllowedStates,
     /// Modes in which setting a Real stores the value without further checks; none for other variables.
-    pub(crate) takes_reals: Situations,
+    pub(crate) takes_reals: AllowedStates,
     /// Modes in which setting only writes the field and the `bool` after `then`, once the model has started.
-    pub(crate) takes_fast: Situations,
+    pub(crate) takes_fast: AllowedStates,
     /// Whether setting it has no side effect except the `bool` after `then`.
     plain: bool,
     pub(crate) read: Option<Read<M>>,
@@ -130,9 +130,9 @@ impl<M> Variable<M> {
             depends_on: None,
             state: false,
             reinit: false,
-            settable: Situations::NONE,
-            takes_reals: Situations::NONE,
-            takes_fast: Situations::NONE,
+            settable: AllowedStates::NONE,
+            takes_reals: AllowedStates::NONE,
+            takes_fast: AllowedStates::NONE,
             plain: false,
             read: None,
             store: None,

@@ -40,7 +40,7 @@ pub fn present(checker: &Checker) -> anyhow::Result<()> {
         let on_instances = signatures(standard).iter().map(|signature| signature.rule).filter(|rule| {
             // fmi2CancelStep belongs to Co-Simulation; the table allows it in no state.
             rule.name == "fmi2CancelStep" && interface == Interface::CoSimulation
-                || modes.iter().any(|mode| rule.standard.contain(standard, interface, *mode))
+                || modes.iter().any(|mode| rule.standard.contains(standard, interface, *mode))
         });
         for name in wanted.chain(on_instances.map(|rule| rule.name)) {
             if !symbols.iter().any(|symbol| symbol == name) && !missing.contains(&name) {

@@ -61,7 +61,7 @@ fn callable(
     let (standard, interface) = (checker.description.standard, trajectory.interface);
     let saves = checker.saves(interface);
     signatures(standard).iter().filter_map(move |signature| {
-        let allowed = |(mode, _): &&(Mode, _)| signature.rule.standard.contain(standard, interface, *mode);
+        let allowed = |(mode, _): &&(Mode, _)| signature.rule.standard.contains(standard, interface, *mode);
         let (_, parts) = MODES.iter().find(allowed)?;
         let name = &signature.rule.name[4..];
         (saves || !name.to_lowercase().contains("fmustate")).then_some((signature, name, *parts))

@@ -6,7 +6,7 @@ use crate::instance::{Instance, Outcome, Rejection};
 use fmi_abi::Rule;
 use fmi_abi::Status;
 use fmi_abi::c_types::c_void;
-use fmi_abi::{Mode, Situations};
+use fmi_abi::{AllowedStates, Mode};
 use std::any::Any;
 use std::cell::{Cell, UnsafeCell};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -21,7 +21,7 @@ compile_error!("an FMU must not end the importer's process: build with panic = \
 /// pairs, so that threads that step them do not slow each other down.
 #[repr(align(128))]
 pub(crate) struct Component<M> {
-    /// Whether the importer's log callback is running; it must not call back. The situation of the instance
+    /// Whether the importer's log callback is running; it must not call back. The state of the instance
     /// forbids calls as well.
     pub delivering: Cell<bool>,
     pub instance: UnsafeCell<Instance<M>>,
@@ -47,7 +47,7 @@ pub(crate) unsafe fn call<M: Exported>(
     // call the importer, and no message is being delivered. The last use of the reference is before any
     // delivery.
     let instance = unsafe { &mut *component.instance.get() };
-    if !instance.situation().is_in(rule.accepted()) {
+    if !instance.fmi_state().is_in(rule.accepted()) {
         return not_allowed(component, rule);
     }
     let ended = catch_unwind(AssertUnwindSafe(|| {
@@ -76,7 +76,7 @@ pub(crate) unsafe fn call_fast<M: Exported>(
     let component = unsafe { c.cast::<Component<M>>().as_ref() }?;
     let instance = component.instance.get();
     // SAFETY: as in `call`.
-    if !unsafe { &*instance }.situation().is_in(rule.accepted()) {
+    if !unsafe { &*instance }.fmi_state().is_in(rule.accepted()) {
         return None;
     }
     // The fast path takes a pointer. With a reference, the compiler may read several values at once. The
@@ -107,7 +107,7 @@ fn not_allowed<M: Exported>(component: &Component<M>, rule: &'static Rule) -> St
     finish(component, rule.name, rejection)
 }
 
-fn reject_call<M: Exported>(instance: &Instance<M>, accepted: Situations) -> Outcome {
+fn reject_call<M: Exported>(instance: &Instance<M>, accepted: AllowedStates) -> Outcome {
     let (interface, mode) = (instance.interface(), instance.mode());
     let allowed = accepted.names(instance.standard(), interface);
     let message = format!("not allowed in state '{mode}' of {interface}; allowed in: {allowed}");

@@ -101,7 +101,7 @@ pub(crate) unsafe fn free<M: Exported>(c: *mut c_void) {
     // freed.
     let mut component = unsafe { Box::from_raw(component) };
     // Drops one model at a time: a second panic while the first unwinds would abort the process.
-    while let Some(model) = component.instance.get_mut().give_any() {
+    while let Some(model) = component.instance.get_mut().remove_any() {
         forget_panic(catch_unwind(AssertUnwindSafe(|| drop(model))));
     }
     forget_panic(catch_unwind(AssertUnwindSafe(|| drop(component))));

@@ -30,7 +30,7 @@ pub unsafe fn free_state<M: Exported>(instance: &mut Instance<M>, state: *mut *m
     // SAFETY: by contract, a pointer to a handle, which is initialized.
     let handle = unsafe { target(state, "FMUstate")?.assume_init_mut() };
     if !handle.is_null() {
-        let state = instance.give(handle.addr())?;
+        let state = instance.remove(handle.addr())?;
         *handle = std::ptr::null_mut();
         drop(state);
     }

@@ -89,7 +89,7 @@ impl<M: Exported> Instance<M> {
     #[cold]
     fn go_back<T>(&mut self, why: Outcome<T>) -> Outcome<T> {
         self.listen();
-        if let Some(before) = &self.before {
+        if let Some(before) = &self.rollback {
             self.state.undo(before);
         }
         why
@@ -162,7 +162,7 @@ impl<M: Exported> Instance<M> {
             }
         }
         if (Self::ENDS_EARLY || !Self::IS_ATOMIC)
-            && let Some(before) = &mut self.before
+            && let Some(before) = &mut self.rollback
         {
             before.back_up(&self.state);
         }

@@ -29,23 +29,23 @@ use fmi_abi::BaseType;
 use fmi_abi::Causality;
 use fmi_abi::Status;
 use fmi_abi::Value;
-use fmi_abi::{Interface, Mode, Situation, Standard};
+use fmi_abi::{FmiState, Interface, Mode, Standard};
 
 /// An instance of model `M`.
 pub(crate) struct Instance<M> {
     pub logger: Logger,
     /// State of the FMI state machine, FMI version and interface type, as one bit; derived from these.
-    situation: Situation,
+    fmi_state: FmiState,
     importer: Importer,
     setup: Setup,
     state: State<M>,
     /// Messages of rejected start values, for the variables that have not been set to a valid value since.
     rejected: Sorted<u32, String>,
     /// States that the importer has saved and not freed.
-    kept: saved_states::Kept<M>,
+    saved: saved_states::SavedStates<M>,
     /// State at the start of the last step, if a step may fail after a part of it is done; see
     /// [`needs_undo`](Self::needs_undo).
-    before: Option<Box<State<M>>>,
+    rollback: Option<Box<State<M>>>,
     /// Strings that the importer reads until the next call.
     pub strings: Vec<std::ffi::CString>,
     /// Bytes that the importer reads until the next call.
@@ -168,13 +168,13 @@ impl<M: Exported> Instance<M> {
         let needs_undo = setup.interface == Interface::CoSimulation && Self::needs_undo(importer);
         let mut instance = Self {
             logger: Logger::new(importer.standard, logging_on),
-            situation: Situation::new(importer.standard, setup.interface, state.mode),
+            fmi_state: FmiState::new(importer.standard, setup.interface, state.mode),
             importer,
             setup,
-            before: needs_undo.then(|| Box::new(state.clone())),
+            rollback: needs_undo.then(|| Box::new(state.clone())),
             state,
             rejected: Sorted::new(),
-            kept: handles::Handles::new(),
+            saved: handles::Handles::new(),
             strings: Vec::new(),
             bytes: Vec::new(),
             elements: Vec::with_capacity(if M::ARRAYS { M::TABLE.len() } else { 0 }),
@@ -197,13 +197,13 @@ impl<M: Exported> Instance<M> {
     }
 
     #[inline]
-    pub fn situation(&self) -> Situation {
-        self.situation
+    pub fn fmi_state(&self) -> FmiState {
+        self.fmi_state
     }
 
     fn enter(&mut self, mode: Mode) {
         self.state.mode = mode;
-        self.situation = Situation::new(self.importer.standard, self.setup.interface, mode);
+        self.fmi_state = FmiState::new(self.importer.standard, self.setup.interface, mode);
     }
 
     /// Forbids all calls while messages are delivered.
@@ -211,7 +211,7 @@ impl<M: Exported> Instance<M> {
     pub fn while_delivering(&mut self, is_delivering: bool) {
         self.enter(self.state.mode);
         if is_delivering {
-            self.situation = Situation::NOWHERE;
+            self.fmi_state = FmiState::NONE;
         }
     }
 

@@ -6,11 +6,12 @@ use super::{Instance, Outcome, State, reject, serialized};
 use crate::export::Exported;
 use fmi_abi::{Interface, Mode};
 
-/// States that an importer keeps. Their handles are numbers, never dereferenced. So the handle of a freed state, of
-/// another instance's state or any other pointer is rejected.
+/// States that the importer has saved. Handles are looked up and never dereferenced, so a wrong handle cannot corrupt
+/// memory. The handle of a freed state stays invalid, because a handle contains the number of states that its slot had
+/// before.
 ///
 /// The instance owns the states and frees them at its end (section 2.1.5 of FMI 2.0, 2.3.1 of FMI 3.0).
-pub(super) type Kept<M> = Handles<Box<State<M>>>;
+pub(super) type SavedStates<M> = Handles<Box<State<M>>>;
 
 impl<M: Exported> Instance<M> {
     fn origin(&self) -> Origin {
@@ -27,51 +28,51 @@ impl<M: Exported> Instance<M> {
     /// reused without allocation if the model's `clone_from` does not allocate.
     pub fn save(&mut self, handle: usize) -> Outcome<usize> {
         if handle == NULL {
-            return self.keep(self.state.clone());
+            return self.insert(self.state.clone());
         }
-        find(&mut self.kept, handle)?.clone_from(&self.state);
+        find(&mut self.saved, handle)?.clone_from(&self.state);
         Ok(handle)
     }
 
-    fn keep(&mut self, state: State<M>) -> Outcome<usize> {
-        match self.kept.insert(Box::new(state)) {
+    fn insert(&mut self, state: State<M>) -> Outcome<usize> {
+        match self.saved.insert(Box::new(state)) {
             Some(handle) => Ok(handle),
             None => reject("the instance has too many saved states; free some"),
         }
     }
 
     pub fn restore(&mut self, handle: usize) -> Outcome {
-        self.state.clone_from(find(&mut self.kept, handle)?);
+        self.state.clone_from(find(&mut self.saved, handle)?);
         self.rejected.clear();
         self.enter(self.state.mode);
         Ok(())
     }
 
     /// Removes a state and returns it, so that the caller can drop it.
-    pub fn give(&mut self, handle: usize) -> Outcome<impl Sized + use<M>> {
-        find(&mut self.kept, handle)?;
-        Ok(self.kept.remove(handle))
+    pub fn remove(&mut self, handle: usize) -> Outcome<impl Sized + use<M>> {
+        find(&mut self.saved, handle)?;
+        Ok(self.saved.remove(handle))
     }
 
     /// Removes any state and returns it; `None` if there are no more.
-    pub fn give_any(&mut self) -> Option<impl Sized + use<M>> {
-        self.before.take().or_else(|| self.kept.pop())
+    pub fn remove_any(&mut self) -> Option<impl Sized + use<M>> {
+        self.rollback.take().or_else(|| self.saved.pop())
     }
 
     pub fn serialized_size(&mut self, handle: usize) -> Outcome<usize> {
-        Ok(serialized::size(find(&mut self.kept, handle)?))
+        Ok(serialized::size(find(&mut self.saved, handle)?))
     }
 
     /// Fills `bytes`, which must have the length from [`serialized_size`](Self::serialized_size).
     pub fn serialize(&mut self, handle: usize, bytes: &mut [u8]) -> Outcome {
         let origin = self.origin();
-        serialized::write(find(&mut self.kept, handle)?, origin, bytes)
+        serialized::write(find(&mut self.saved, handle)?, origin, bytes)
     }
 
     /// De-serializes into the state of this handle, or into a new one; returns the handle.
     pub fn deserialize(&mut self, bytes: &[u8], handle: usize) -> Outcome<usize> {
         if handle != NULL {
-            find(&mut self.kept, handle)?;
+            find(&mut self.saved, handle)?;
         }
         let mut state = self.state.clone();
         let read = serialized::read(bytes, self.origin(), &mut state);
@@ -79,9 +80,9 @@ impl<M: Exported> Instance<M> {
         read?;
         self.check_event_mode(&state)?;
         if handle == NULL {
-            return self.keep(state);
+            return self.insert(state);
         }
-        *find(&mut self.kept, handle)? = state;
+        *find(&mut self.saved, handle)? = state;
         Ok(handle)
     }
 
@@ -91,14 +92,16 @@ impl<M: Exported> Instance<M> {
             && state.mode == Mode::Event
             && !self.importer.event_mode
         {
-            return reject("the state is one of event mode, which this instance was made without");
+            return reject(
+                "the state was saved in Event Mode, but this instance was created without Event Mode (eventModeUsed)",
+            );
         }
         Ok(())
     }
 }
 
-fn find<M>(kept: &mut Kept<M>, handle: usize) -> Outcome<&mut State<M>> {
-    kept.get_mut(handle).map_or_else(|| reject_handle(handle), |state| Ok(&mut **state))
+fn find<M>(saved: &mut SavedStates<M>, handle: usize) -> Outcome<&mut State<M>> {
+    saved.get_mut(handle).map_or_else(|| reject_handle(handle), |state| Ok(&mut **state))
 }
 
 #[cold]
@@ -106,7 +109,7 @@ fn reject_handle<T>(handle: usize) -> Outcome<T> {
     reject(if handle == NULL {
         "the state is NULL; save one first"
     } else {
-        "the handle holds no state of this instance: it was freed, never set to NULL, or is another instance's, which \
-         can be serialized there and de-serialized here"
+        "unknown state handle: it was freed, was not initialized to NULL, or belongs to another instance (to move a state, \
+         serialize it there and de-serialize it here)"
     })
 }

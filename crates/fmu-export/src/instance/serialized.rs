@@ -81,7 +81,7 @@ pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<
     if !reader.rest.is_empty() {
         return reject("the saved state has the wrong length");
     }
-    if !reader.valid || !POSSIBLE.contain(origin.0, origin.1, state.mode) {
+    if !reader.valid || !POSSIBLE.contains(origin.0, origin.1, state.mode) {
         return reject("the saved state holds impossible values");
     }
     check(state)?;

@@ -106,10 +106,10 @@ impl<M: Exported> Instance<M> {
 
     #[inline]
     pub fn set_reals<R: Reference>(&mut self, vr: &[R], values: &[f64]) -> Outcome {
-        let situation = self.situation();
+        let fmi_state = self.fmi_state();
         let simple = |(vr, value): (&R, &f64)| {
             let variable = M::TABLE.get(vr.index() as usize);
-            variable.is_some_and(|variable| situation.is_in(variable.takes_reals)) && value.is_finite()
+            variable.is_some_and(|variable| fmi_state.is_in(variable.takes_reals)) && value.is_finite()
         };
         if !vr.iter().zip(values).all(simple) {
             return self.set_reals_and_parameters(vr, values);
@@ -128,13 +128,13 @@ impl<M: Exported> Instance<M> {
     /// [`set_reals`](Self::set_reals) sets all.
     #[inline(always)]
     pub fn set_reals_fast<R: Reference, const N: usize>(&mut self, vr: &[R; N], values: &[f64; N]) -> bool {
-        let situation = self.situation();
+        let fmi_state = self.fmi_state();
         // Copies the arrays, because the compiler cannot assume that they do not overlap the model.
         let lines: [usize; N] = std::array::from_fn(|number| vr[number].index() as usize);
         let values: [f64; N] = std::array::from_fn(|number| values[number]);
         let is_taken = |line: &usize| {
             let variable = M::TABLE.get(*line);
-            variable.is_some_and(|variable| situation.is_in(variable.takes_fast))
+            variable.is_some_and(|variable| fmi_state.is_in(variable.takes_fast))
         };
         if M::ARRAYS || !self.state.started || !lines.iter().all(is_taken) || !is_finite(values.iter().sum())
         {
@@ -236,7 +236,7 @@ impl<M: Exported> Instance<M> {
     /// use other start values than the user wants. So the initialization fails until the variables are set to
     /// valid values. The record includes all variables of the call.
     fn remember<R: Reference>(&mut self, vr: &[R], blamed: Option<u32>, set: Outcome) -> Outcome {
-        if self.situation().is_in(STARTING) {
+        if self.fmi_state().is_in(STARTING) {
             for vr in vr.iter().map(|vr| vr.index()) {
                 let Err(rejection) = &set else {
                     self.rejected.remove(vr);
@@ -270,11 +270,11 @@ impl<M: Exported> Instance<M> {
     fn set_settable<R: Reference>(&mut self, vr: &[R], value: &dyn Fn(usize) -> Value) -> Outcome {
         let parameters =
             vr.iter().any(|vr| M::TABLE[vr.index() as usize].causality() == Causality::Parameter);
-        let (started, situation) = (self.state.started, self.situation());
+        let (started, fmi_state) = (self.state.started, self.fmi_state());
         let set = |model: &mut M| {
             for (index, vr) in vr.iter().enumerate() {
                 let variable = &M::TABLE[vr.index() as usize];
-                if !situation.is_in(variable.settable) {
+                if !fmi_state.is_in(variable.settable) {
                     continue;
                 }
                 variable.set(model, &value(index));
@@ -309,7 +309,7 @@ impl<M: Exported> Instance<M> {
     }
 
     fn check_settable(&self, variable: &Variable<M>) -> Outcome {
-        if self.situation().is_in(variable.settable) {
+        if self.fmi_state().is_in(variable.settable) {
             return Ok(());
         }
         let (standard, interface, mode) = (self.standard(), self.interface(), self.mode());

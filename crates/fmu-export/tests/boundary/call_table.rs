@@ -381,19 +381,20 @@ fn table_in_the_code() {
                     let label = format!("{} in state '{mode}' of {interface}", rule.name);
                     for standard in [Standard::Fmi2, Standard::Fmi3] {
                         let is_own = standard == F::standard();
-                        let contain = |set: fmu_export::Situations| set.contain(standard, interface, mode);
+                        let contains =
+                            |set: fmu_export::AllowedStates| set.contains(standard, interface, mode);
                         assert_eq!(
-                            contain(rule.standard),
+                            contains(rule.standard),
                             is_own && self::standard(rule.name, interface, mode),
                             "{label}"
                         );
                         assert_eq!(
-                            contain(rule.tolerated),
+                            contains(rule.tolerated),
                             is_own && tolerated(rule.name, interface, mode),
                             "{label}"
                         );
                         assert_eq!(
-                            contain(rule.accepted()),
+                            contains(rule.accepted()),
                             is_own && accepted(rule.name, interface, mode),
                             "{label}"
                         );
