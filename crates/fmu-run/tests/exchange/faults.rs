@@ -1,7 +1,7 @@
 //! Models with faults end with an error that says what and when.
 
 use crate::{VERSIONS, close, opened, run, tight};
-use fmu_run::{Batch, Solver};
+use fmu_run::{Batch, Error, Integration, Solver, Start, Watch};
 
 fn why(model: &str, standard: fmu_run::Standard, solver: Solver) -> String {
     let runs = run(
@@ -24,10 +24,9 @@ fn errors_name_cause_and_time() {
                 "{nan}"
             );
             let failing = of("failing");
-            assert!(
-                failing.starts_with("at 0.25 s: fmi") && failing.ends_with("the valve is stuck"),
-                "{failing}"
-            );
+            // A trial step of the solver may call the FMU beyond the next communication point.
+            let is_early = failing.starts_with("at 0 s: fmi") || failing.starts_with("at 0.25 s: fmi");
+            assert!(is_early && failing.ends_with("the valve is stuck"), "{failing}");
             let endless = of("endless");
             assert!(endless.ends_with("the event does not end within 10000 iterations"), "{endless}");
             let announce = of("announce");
@@ -61,5 +60,42 @@ fn a_discarded_state_shortens_the_step() {
             assert_eq!(runs.errors, []);
             close(runs.trajectories[2], 0.05 * 0.05, 1e-7);
         }
+    }
+}
+
+/// Without the cancellation, the stiff model would keep the explicit method busy for years.
+#[test]
+fn a_run_can_be_cancelled() {
+    for standard in VERSIONS {
+        let watch = Watch::pulsing(Watch::cancel);
+        let batch = Batch {
+            time: &[0.0, 1e12],
+            start: vec![("p", Start::Same(1000.0))],
+            outputs: vec!["y"],
+            every: Some(1),
+            integration: Integration { solver: Solver::Dopri5, ..Integration::default() },
+            ..Batch::default()
+        };
+        assert_eq!(opened("vanderpol", standard).run(&batch, &watch).unwrap_err(), Error::Cancelled);
+    }
+}
+
+#[test]
+fn messages_reach_a_listener() {
+    for standard in VERSIONS {
+        let watch = Watch::listening();
+        let batch = Batch {
+            time: &[0.0, 1.0],
+            start: vec![("p", Start::Each(&[1.0, 2.0]))],
+            outputs: vec!["y"],
+            every: Some(1),
+            ..Batch::default()
+        };
+        opened("failing", standard).run(&batch, &watch).unwrap();
+        let mut heard: Vec<_> =
+            watch.take_messages().into_iter().map(|of| (of.index, of.message.text)).collect();
+        heard.sort();
+        let text = "the valve is stuck".to_owned();
+        assert_eq!(heard, [(Some(0), text.clone()), (Some(1), text)]);
     }
 }
