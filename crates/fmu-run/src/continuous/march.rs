@@ -67,7 +67,7 @@ struct Chatter {
     count: usize,
 }
 
-/// Number of events in such a part of the run after which the model is said to chatter.
+/// Number of events in such a part of the times of the run after which the model is said to chatter.
 const MOST_EVENTS: usize = 1000;
 const SHORT: f64 = 1e-9;
 
@@ -141,9 +141,10 @@ impl<'a> March<'a> {
         self.times[self.times.len() - 1]
     }
 
-    /// Returns the duration of the run, s.
-    fn span(&self) -> f64 {
-        self.last() - self.times[0]
+    /// Returns the size of the times of the run, s, to which rounding is relative.
+    fn scale(&self) -> f64 {
+        let (first, last) = (self.times[0], self.last());
+        (last - first).max(first.abs()).max(last.abs())
     }
 
     /// Returns the time at which the next smooth interval ends at the latest.
@@ -223,7 +224,7 @@ impl<'a> March<'a> {
 
     /// Counts events, and fails if there are too many in a short time.
     fn chatter(&mut self, arrival: Arrival) -> Result<(), Rejection> {
-        let short = SHORT * self.span();
+        let short = SHORT * self.scale();
         let Chatter { since, count } = &mut self.chatter;
         if self.time - *since > short {
             (*since, *count) = (self.time, 0);
@@ -250,10 +251,10 @@ impl<'a> March<'a> {
     fn integrate(&mut self, model: &Model, hooks: &mut impl Hooks, stop: f64) -> Result<Arrival, Rejection> {
         /// Part of the time that rounding may have changed.
         const ROUNDING: f64 = 1e-14;
-        /// First step after an event, as a part of the run.
-        const SMALL: f64 = 1e-9;
+        /// Smallest first step after an event, as a part of the times of the run.
+        const SMALL: f64 = 1e-13;
         loop {
-            let near = ROUNDING * stop.abs().max(self.last().abs());
+            let near = ROUNDING * self.scale();
             if stop - self.time <= near {
                 self.time = stop;
                 return Ok(Arrival::Stop);
@@ -277,7 +278,7 @@ impl<'a> March<'a> {
                 return Ok(Arrival::Stop);
             }
             // The estimate of the solver is far too small if a state is almost 0, as it often is at an event.
-            let small = Some((0.01 * self.taken).max(SMALL * self.span()));
+            let small = Some((0.01 * self.taken).max(SMALL * self.scale()));
             if let Some(arrival) = arrival {
                 self.step = small;
                 return Ok(arrival);

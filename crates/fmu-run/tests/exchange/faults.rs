@@ -19,10 +19,11 @@ fn errors_name_cause_and_time() {
         for solver in [Solver::Auto, Solver::Dopri5, Solver::Bdf, Solver::Rk4] {
             let of = |model| why(model, standard, solver);
             let nan = of("nan");
-            assert!(
-                nan.starts_with("at 0.25 s: Model Exchange: the derivative of state 1 is NaN at t = 0.5"),
-                "{nan}"
-            );
+            // A fixed step cannot be shortened: this is its middle.
+            let time = if solver == Solver::Rk4 { 1.625 } else { 0.5 };
+            let expected =
+                format!("at 0.25 s: Model Exchange: the derivative of state 1 is NaN at t = {time}");
+            assert!(nan.starts_with(&expected), "{nan}");
             let failing = of("failing");
             // A trial step of the solver may call the FMU beyond the next communication point.
             let is_early = failing.starts_with("at 0 s: fmi") || failing.starts_with("at 0.25 s: fmi");
@@ -40,10 +41,10 @@ fn errors_name_cause_and_time() {
                 "{relay}"
             );
         }
-        let ball = why("ball", standard, Solver::Auto);
+        let zeno = why("zeno", standard, Solver::Auto);
         assert!(
-            ball.contains("event indicator 1 changes its sign again and again: 1000 events from t = 2.55"),
-            "{ball}"
+            zeno.contains("event indicator 1 changes its sign again and again: 1000 events from t = 2.55"),
+            "{zeno}"
         );
     }
 }
