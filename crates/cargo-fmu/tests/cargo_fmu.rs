@@ -98,6 +98,7 @@ fn exchanges(fmu: &Path, from: &str) {
         "ball" => (vec!["height", "velocity"], 3.0, 1e-8),
         "motor" => (vec!["current", "speed"], 0.05, 1e-5),
         "house" => (vec!["room"], 86_400.0, 1e-3),
+        "tank" => (vec!["level"], 100.0, 1e-6),
         _ => (vec!["x"], 1.0, 1e-8),
     };
     // SAFETY: the FMU of these tests.
@@ -481,6 +482,7 @@ fn the_guide_leads_to_a_checked_fmu() {
     let fmus = ["--fmu", "target/fmu/tank.fmu", "--fmu", "target/fmu/fmi3/tank.fmu"];
     let options = ["check", "--fail-on", "fragile", "--no-shrink", "--repeat", "0.3"];
     let output = directory.prints("tank", &[&options[..], &fmus].concat());
+    [fmus[1], fmus[3]].iter().for_each(|fmu| exchanges(&directory.path(&format!("tank/{fmu}")), "tank"));
     assert!(output.contains("(FMI 2.0,") && output.contains("(FMI 3.0,"), "{output}");
 }
 

@@ -3,8 +3,9 @@
 //! ## Structure of the crate
 //!
 //! [`Fmu`] is an unpacked and loaded FMU of FMI 2.0 or 3.0. A [`Batch`] runs it many times on all processors;
-//! [`Instances`] are stateful and controlled by the caller. `description` makes array elements variables,
-//! `instance` and `values` call their functions through `fmi-client`. A caller needs `unsafe` only to [open](Fmu::open) an FMU.
+//! [`Instances`] are stateful and controlled by the caller. `continuous` integrates runs in Model Exchange. `description` makes array
+//! elements variables, `instance` and `values` call their functions through `fmi-client`. A caller needs `unsafe` only to
+//! [open](Fmu::open) an FMU.
 
 mod arrays;
 mod batch;

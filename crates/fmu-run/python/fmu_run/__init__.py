@@ -163,8 +163,8 @@ class _Model:
         progress
             Called with the numbers of finished runs and of all runs, ten times per second.
         tolerance
-            Relative tolerance for a solver inside the FMU. Default: that of the default experiment in the model description, as
-            in FMPy; None leaves it to the FMU.
+            Relative tolerance for a solver inside the FMU, and the default of rtol. Default: that of the default experiment in the model
+            description, as in FMPy; None leaves it to the FMU.
         log
             Receives the messages of the FMU, whose logging is then switched on: a function that is called with the index of the
             run, status, category and message, or a `logging.Logger`. The index is None if the FMU does not tell.
@@ -177,8 +177,8 @@ class _Model:
             In Model Exchange: "dop853" and "dopri5" (Runge-Kutta of order 8 and 5), "bdf" (for stiff models), "auto" (dop853, and bdf
             once the model proves stiff), or "rk4": fixed steps from one communication point to the next, or shorter than `max_step`.
         rtol, atol
-            Tolerances of the solver, in Model Exchange. Default of rtol: the tolerance of the default experiment, or 1e-6; of atol:
-            a hundredth of rtol. atol is for a state whose nominal value is 1; other states have a multiple of it.
+            Tolerances of the solver, in Model Exchange. Default of rtol: `tolerance`, or 1e-6 if there is none; of atol: a hundredth of
+            rtol. atol is for a state whose nominal value is 1; other states have a multiple of it.
         max_step
             The largest step of the solver, s. An event indicator that changes its sign twice within a step, and between two
             communication points, remains unnoticed.

@@ -23,13 +23,20 @@ AT_START = " at start"
 
 
 class Event(NamedTuple):
-    """An event in Model Exchange."""
+    """An event in Model Exchange.
 
-    #: The index of the run.
+    Parameters
+    ----------
+    run
+        The index of the run.
+    time
+        s.
+    before, after
+        Outputs before and after the event, by name; the elements of an array by their names, such as y[1].
+    """
+
     run: int
-    #: s.
     time: float
-    #: Outputs before and after the event, by name; the elements of an array by their names, such as y[1].
     before: dict[str, float]
     after: dict[str, float]
 

@@ -213,26 +213,35 @@ impl<'a> Worker<'a> {
         let sizes = [description.states, description.event_indicators];
         let mut march = March::new(times, sizes, integration, *rtol, *reports_steps);
         let mut kept = Kept::default();
-        let mut row = Vec::new();
         let mut observed = Observed { worker: self, times, trajectories, kept: &mut kept, run, before: None };
         let result = march.run(&model, &mut observed);
         result.map_err(|rejection| {
-            let at = march.next.checked_sub(1);
             if let Some(end) = rejection.ended() {
-                row.resize(self.row.len(), 0.0);
-                if model.parts().running.get(&plan.outputs, &mut row).is_err() {
-                    row.fill(f64::NAN);
-                }
-                self.row.copy_from_slice(&row);
-                // An end at a communication point belongs to the run.
-                let is_point = times.get(march.next).is_some_and(|time| *time <= end);
-                if is_point && march.next + 1 == times.len() {
-                    self.keep_row(&mut kept, end, trajectories);
-                    self.reached = times.len();
-                }
+                self.end(model.parts().running, times, (march.next, end), &mut kept, trajectories);
             }
-            (at, rejection)
+            (march.next.checked_sub(1), rejection)
         })
+    }
+
+    /// Reads the outputs at the end of a run that the FMU ends. At a communication point they belong to the results.
+    fn end(
+        &mut self,
+        running: &mut Running,
+        times: &[f64],
+        (next, end): (usize, f64),
+        kept: &mut Kept,
+        trajectories: &mut [f64],
+    ) {
+        let is_point = times.get(next).is_some_and(|time| *time <= end);
+        let read = match is_point {
+            true => self.record(running, kept, end, trajectories),
+            false => running.get(&self.plan.outputs, &mut self.row),
+        };
+        match read {
+            Ok(()) if is_point => self.reached = next + 1,
+            Ok(()) => {}
+            Err(_) => self.row.fill(f64::NAN),
+        }
     }
 }
 

@@ -67,9 +67,9 @@ struct Chatter {
     count: usize,
 }
 
-/// Events in this part of the run, after which the model is said to chatter.
+/// Number of events in such a part of the times of the run after which the model is said to chatter.
 const MOST_EVENTS: usize = 1000;
-const SHORT: f64 = 1e-6;
+const SHORT: f64 = 1e-9;
 
 /// Parts of the first step after an event at which event indicators are evaluated, too: one may return to the side from which it came.
 const PROBES: [f64; 4] = [1e-6, 1e-3, 0.1, 0.5];
@@ -114,7 +114,6 @@ impl<'a> March<'a> {
 
     /// Performs the run after Initialization Mode. Returns early if the caller cancels it.
     pub fn run(&mut self, model: &Model, hooks: &mut impl Hooks) -> Result<(), Rejection> {
-        self.x.iter_mut().for_each(|x| *x = 0.0);
         self.update(model, true)?;
         loop {
             let is_end = self.next + 1 >= self.times.len();
@@ -137,10 +136,20 @@ impl<'a> March<'a> {
         }
     }
 
+    /// Returns the last communication point, s.
+    fn last(&self) -> f64 {
+        self.times[self.times.len() - 1]
+    }
+
+    /// Returns the size of the times of the run, s, to which rounding is relative.
+    fn scale(&self) -> f64 {
+        let (first, last) = (self.times[0], self.last());
+        (last - first).max(first.abs()).max(last.abs())
+    }
+
     /// Returns the time at which the next smooth interval ends at the latest.
     fn stop(&self, model: &Model) -> f64 {
-        let last = self.times[self.times.len() - 1];
-        let mut stop = last.min(model.parts().until()).min(self.event.unwrap_or(f64::INFINITY));
+        let mut stop = self.last().min(model.parts().until()).min(self.event.unwrap_or(f64::INFINITY));
         // Without states, no step shows an event before; a fixed step ends at the communication points.
         if self.x.is_empty() || self.settings.solver == Solver::Rk4 {
             stop = stop.min(self.times[self.next]);
@@ -215,7 +224,7 @@ impl<'a> March<'a> {
 
     /// Counts events, and fails if there are too many in a short time.
     fn chatter(&mut self, arrival: Arrival) -> Result<(), Rejection> {
-        let short = SHORT * (self.times[self.times.len() - 1] - self.times[0]);
+        let short = SHORT * self.scale();
         let Chatter { since, count } = &mut self.chatter;
         if self.time - *since > short {
             (*since, *count) = (self.time, 0);
@@ -242,10 +251,10 @@ impl<'a> March<'a> {
     fn integrate(&mut self, model: &Model, hooks: &mut impl Hooks, stop: f64) -> Result<Arrival, Rejection> {
         /// Part of the time that rounding may have changed.
         const ROUNDING: f64 = 1e-14;
-        /// First step after an event, as a part of the run.
-        const SMALL: f64 = 1e-9;
+        /// Smallest first step after an event, as a part of the times of the run.
+        const SMALL: f64 = 1e-13;
         loop {
-            let near = ROUNDING * stop.abs().max(self.times[self.times.len() - 1].abs());
+            let near = ROUNDING * self.scale();
             if stop - self.time <= near {
                 self.time = stop;
                 return Ok(Arrival::Stop);
@@ -269,8 +278,7 @@ impl<'a> March<'a> {
                 return Ok(Arrival::Stop);
             }
             // The estimate of the solver is far too small if a state is almost 0, as it often is at an event.
-            let small =
-                Some((0.01 * self.taken).max(SMALL * (self.times[self.times.len() - 1] - self.times[0])));
+            let small = Some((0.01 * self.taken).max(SMALL * self.scale()));
             if let Some(arrival) = arrival {
                 self.step = small;
                 return Ok(arrival);

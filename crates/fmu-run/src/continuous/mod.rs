@@ -59,7 +59,7 @@ impl FromStr for Solver {
 pub struct Integration {
     /// Method.
     pub solver: Solver,
-    /// Relative tolerance; `None` means the tolerance of the default experiment, or 1e-6.
+    /// Relative tolerance; `None` means the [tolerance](crate::Batch::tolerance) for the FMU, or 1e-6 if there is none.
     pub rtol: Option<f64>,
     /// Absolute tolerance of a state whose nominal value is 1; other states have a multiple of it. `None` means a hundredth of the
     /// relative tolerance.

@@ -35,10 +35,10 @@ fn library() -> &'static Path {
 fn sizes(model: &str) -> (usize, usize) {
     let states = match model {
         "stair" => 0,
-        "ball" | "vanderpol" => 2,
+        "ball" | "zeno" | "vanderpol" => 2,
         _ => 1,
     };
-    (states, usize::from(["ball", "relay", "ending", "zero"].contains(&model)))
+    (states, usize::from(["ball", "zeno", "relay", "ending", "zero"].contains(&model)))
 }
 
 fn description2(model: &str, attributes: &str) -> String {

@@ -95,8 +95,8 @@ fn the_fmu_ends_the_run() {
         assert_eq!(runs.errors, [(0, "ended by the FMU at t = 2 s".to_owned())]);
         assert_eq!(runs.notes, [(1, "ended by the FMU at t = 3 s".to_owned())]);
         assert_eq!(watch.ended(), [(0, 2.0, vec![2.0]), (1, 3.0, vec![3.0])]);
-        assert_eq!((runs.trajectories[7], runs.trajectories[13 + 12]), (1.0, 3.0));
-        assert!(runs.trajectories[8].is_nan(), "the end is between two communication points");
+        assert_eq!((runs.trajectories[8], runs.trajectories[13 + 12]), (2.0, 3.0));
+        assert!(runs.trajectories[9].is_nan());
         let watch = Watch::default();
         let runs = opened("ending", standard)
             .run(

@@ -1,7 +1,7 @@
 //! Models with faults end with an error that says what and when.
 
 use crate::{VERSIONS, close, opened, run, tight};
-use fmu_run::{Batch, Solver};
+use fmu_run::{Batch, Error, Integration, Solver, Start, Watch};
 
 fn why(model: &str, standard: fmu_run::Standard, solver: Solver) -> String {
     let runs = run(
@@ -19,15 +19,15 @@ fn errors_name_cause_and_time() {
         for solver in [Solver::Auto, Solver::Dopri5, Solver::Bdf, Solver::Rk4] {
             let of = |model| why(model, standard, solver);
             let nan = of("nan");
-            assert!(
-                nan.starts_with("at 0.25 s: Model Exchange: the derivative of state 1 is NaN at t = 0.5"),
-                "{nan}"
-            );
+            // A fixed step cannot be shortened: this is its middle.
+            let time = if solver == Solver::Rk4 { 1.625 } else { 0.5 };
+            let expected =
+                format!("at 0.25 s: Model Exchange: the derivative of state 1 is NaN at t = {time}");
+            assert!(nan.starts_with(&expected), "{nan}");
             let failing = of("failing");
-            assert!(
-                failing.starts_with("at 0.25 s: fmi") && failing.ends_with("the valve is stuck"),
-                "{failing}"
-            );
+            // A trial step of the solver may call the FMU beyond the next communication point.
+            let is_early = failing.starts_with("at 0 s: fmi") || failing.starts_with("at 0.25 s: fmi");
+            assert!(is_early && failing.ends_with("the valve is stuck"), "{failing}");
             let endless = of("endless");
             assert!(endless.ends_with("the event does not end within 10000 iterations"), "{endless}");
             let announce = of("announce");
@@ -41,10 +41,10 @@ fn errors_name_cause_and_time() {
                 "{relay}"
             );
         }
-        let ball = why("ball", standard, Solver::Auto);
+        let zeno = why("zeno", standard, Solver::Auto);
         assert!(
-            ball.contains("event indicator 1 changes its sign again and again: 1000 events from t = 2.55"),
-            "{ball}"
+            zeno.contains("event indicator 1 changes its sign again and again: 1000 events from t = 2.55"),
+            "{zeno}"
         );
     }
 }
@@ -61,5 +61,42 @@ fn a_discarded_state_shortens_the_step() {
             assert_eq!(runs.errors, []);
             close(runs.trajectories[2], 0.05 * 0.05, 1e-7);
         }
+    }
+}
+
+/// Without the cancellation, the stiff model would keep the explicit method busy for years.
+#[test]
+fn a_run_can_be_cancelled() {
+    for standard in VERSIONS {
+        let watch = Watch::pulsing(Watch::cancel);
+        let batch = Batch {
+            time: &[0.0, 1e12],
+            start: vec![("p", Start::Same(1000.0))],
+            outputs: vec!["y"],
+            every: Some(1),
+            integration: Integration { solver: Solver::Dopri5, ..Integration::default() },
+            ..Batch::default()
+        };
+        assert_eq!(opened("vanderpol", standard).run(&batch, &watch).unwrap_err(), Error::Cancelled);
+    }
+}
+
+#[test]
+fn messages_reach_a_listener() {
+    for standard in VERSIONS {
+        let watch = Watch::listening();
+        let batch = Batch {
+            time: &[0.0, 1.0],
+            start: vec![("p", Start::Each(&[1.0, 2.0]))],
+            outputs: vec!["y"],
+            every: Some(1),
+            ..Batch::default()
+        };
+        opened("failing", standard).run(&batch, &watch).unwrap();
+        let mut heard: Vec<_> =
+            watch.take_messages().into_iter().map(|of| (of.index, of.message.text)).collect();
+        heard.sort();
+        let text = "the valve is stuck".to_owned();
+        assert_eq!(heard, [(Some(0), text.clone()), (Some(1), text)]);
     }
 }

@@ -1,7 +1,7 @@
 //! Continuous inputs are functions of time.
 
 use crate::{VERSIONS, close, opened, tight, times};
-use fmu_run::{Batch, Solver, Trajectory, Watch};
+use fmu_run::{Batch, Integration, Solver, Start, Trajectory, Watch};
 
 /// x' = sin(w t) - x from 0.
 fn answer(w: f64, t: f64) -> f64 {
@@ -35,6 +35,32 @@ fn results_converge_with_the_interpolation() {
         let (lines, cubics) = (order(false, 100), order(true, 50));
         assert!((1.9..2.1).contains(&lines) && (3.8..4.2).contains(&cubics), "{lines} {cubics}");
         assert!(error(true, 800, standard) < 1e-9);
+    }
+}
+
+/// x' = sin(t) - p x, which is stiff. Each interval of the input begins with a new start of the solver.
+#[test]
+fn a_stiff_model_follows_a_moving_input() {
+    const P: f64 = 1e5;
+    let time = times(0.5, 500);
+    let u: Vec<_> = time.iter().map(|t| t.sin()).collect();
+    for standard in VERSIONS {
+        for solver in [Solver::Auto, Solver::Bdf] {
+            let batch = Batch {
+                time: &time,
+                inputs: vec![("u", Trajectory::Shared(&u))],
+                start: vec![("p", Start::Same(P))],
+                integration: Integration { solver, rtol: Some(1e-7), ..Integration::default() },
+                outputs: vec!["y"],
+                every: Some(1),
+                ..Batch::default()
+            };
+            let runs = opened("lag", standard).run(&batch, &Watch::default()).unwrap();
+            assert_eq!(runs.errors, []);
+            for (y, t) in runs.trajectories.iter().zip(&time) {
+                close(*y, (P * t.sin() - t.cos() + (-P * t).exp()) / (P * P + 1.0), 1e-9);
+            }
+        }
     }
 }
 

@@ -12,6 +12,7 @@
 
 #define MODELS(M) \
     M(ball)      /* x'' = -9.81 from x = 1; at x <= 0 the speed is reversed and multiplied by p. The height stays as it is. */ \
+    M(zeno)      /* The ball, whose height becomes 0 at a hit: it bounces without end before 2.56 s. */ \
     M(stair)     /* count = number of whole seconds; ends at p. It has no states. */ \
     M(vanderpol) /* x0' = x1, x1' = p (1 - x0^2) x1 - x0, from (2, 0). */ \
     M(dahlquist) /* x' = -p x, from x = 1. */ \
@@ -69,11 +70,11 @@ static int wrong(Model *m, const char *call) {
 }
 
 static int states(const Model *m) {
-    return m->model == stair_ ? 0 : m->model == ball_ || m->model == vanderpol_ ? 2 : 1;
+    return m->model == stair_ ? 0 : m->model == ball_ || m->model == zeno_ || m->model == vanderpol_ ? 2 : 1;
 }
 
 static void start(Model *m) {
-    double p = m->model == ball_ ? 0.7 : m->model == stair_ ? 10 : 1;
+    double p = m->model == ball_ || m->model == zeno_ ? 0.7 : m->model == stair_ ? 10 : 1;
     m->mode = START;
     m->time = m->u = m->w = m->x[1] = 0;
     m->n = m->hits = m->wants = 0;
@@ -94,7 +95,7 @@ static Model *made(const char *guid, const char *name) {
 
 static double indicator(const Model *m) {
     switch (m->model) {
-    case ball_: return m->x[0];
+    case ball_: case zeno_: return m->x[0];
     case relay_: return m->x[0];
     case ending_: return m->x[0] - 0.5;
     default: return 0;
@@ -105,7 +106,7 @@ static int derivatives(Model *m, double d[]) {
     const double *x = m->x;
     d[0] = 0;
     switch (m->model) {
-    case ball_: d[0] = x[1]; d[1] = -9.81; break;
+    case ball_: case zeno_: d[0] = x[1]; d[1] = -9.81; break;
     case vanderpol_: d[0] = x[1]; d[1] = m->p * (1 - x[0] * x[0]) * x[1] - x[0]; break;
     case dahlquist_: d[0] = -m->p * x[0]; break;
     case lag_: d[0] = m->u + m->n - m->p * x[0]; break;
@@ -129,8 +130,8 @@ static int derivatives(Model *m, double d[]) {
 static int update(Model *m, Update *u) {
     if (m->mode != EVENT) return wrong(m, "an update of discrete states");
     switch (m->model) {
-    case ball_:
-        if (m->x[0] <= 0 && m->x[1] < 0) { m->x[1] *= -m->p; m->hits++; u->states = 1; }
+    case ball_: case zeno_:
+        if (m->x[0] <= 0 && m->x[1] < 0) { m->x[1] *= -m->p; m->hits++; u->states = 1; if (m->model == zeno_) m->x[0] = 0; }
         break;
     case stair_:
         m->hits = (int32_t)floor(m->time + 1e-9);
