@@ -37,13 +37,15 @@ def test_the_validator_reports_nothing(name):
     assert fmpy.read_model_description(fmu, validate=True) and validate_fmu(fmu) == []
 
 
-@pytest.mark.parametrize("version", ["", "fmi3/"])
-def test_held_torques_cost_the_first_order(version):
+@pytest.mark.parametrize("version, order", [("", "dependencies"), ("fmi3/", "jacobi")])
+def test_held_torques_cost_the_first_order(version, order):
+    """Masters that exchange all values at the end of a step (Jacobi), such as FMPy and libcosim, pass torques on that are read before
+    the angles are set."""
     connections = {f"motors.{name}": f"wrist.{name}" for name in FROM_MOTORS}
     connections |= {f"wrist.{name}": f"motors.{name}" for name in FROM_WRIST}
     fmus = {"motors": built(f"{version}prw_motor.fmu"), "wrist": built(f"{version}prw_testbed.fmu")}
     outputs, errors = ["wrist.tau1", "wrist.tau2", "wrist.pitch", "wrist.roll", "motors.omega1"], []
-    with System(fmus, connections) as loop:
+    with System(fmus, connections, order=order) as loop:
         for h in (0.5e-3, 0.25e-3):
             time = h * np.arange(round(END / h) + 1)
             inputs = dict(zip(("motors.torque1", "motors.torque2"), np.array([torque(t) for t in time]).T))
@@ -54,9 +56,9 @@ def test_held_torques_cost_the_first_order(version):
             errors.append([np.abs(run[name][0] - y).max() / np.abs(y).max() for name, y in zip(outputs, expected)])
     coarse, fine = np.array(errors)
     assert np.all(fine < 0.01), fine
-    order = np.log2(coarse / fine)
+    rate = np.log2(coarse / fine)
     # In the angles, parts of second order are not yet negligible.
-    assert order[:2] == pytest.approx(1, abs=0.1) and np.all((order > 0.9) & (order < 2)), order
+    assert rate[:2] == pytest.approx(1, abs=0.15) and np.all((rate > 0.9) & (rate < 2)), rate
 
 
 def with_slopes(slope: str) -> float:

@@ -18,11 +18,6 @@ fn undone_steps_leave_no_trace() {
     fmu_test_kit::history::Histories::default().check::<Motors>();
 }
 
-#[test]
-fn steps_stay_cheap() {
-    fmu_test_kit::costs::steps_stay_cheap::<Motors>();
-}
-
 fn torques(t: f64) -> [f64; 4] {
     [0.4 - 2.0 * t, -0.3 + t, 0.1 + 0.5 * t, 0.2]
 }
