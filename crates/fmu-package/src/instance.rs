@@ -47,6 +47,16 @@ impl<'a> Instance<'a> {
         Ok(Self { model, client, interface, standard, event_mode, time: 0.0 })
     }
 
+    /// Returns the step size of the default experiment, s.
+    pub fn default_step_size(&self) -> f64 {
+        self.model.table.info.step_size
+    }
+
+    /// Returns whether steps may have any size.
+    pub fn has_variable_step_size(&self) -> bool {
+        self.model.table.co_simulation.as_ref().is_none_or(|offer| offer.variable_step_size)
+    }
+
     /// Returns the client for a call, which has this name in messages.
     fn client(&mut self, call: &'static str) -> &mut fmi_client::Instance {
         self.model.trials.begin(call);
