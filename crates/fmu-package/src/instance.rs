@@ -87,10 +87,30 @@ impl<'a> Instance<'a> {
 
     /// Iterates the event in Model Exchange, and enters Continuous-Time Mode.
     pub fn handle_event(&mut self) -> Outcome {
-        if self.client("event").event().map_err(message)?.terminate {
+        let before = self.states()?;
+        let event = self.client("event").event().map_err(message)?;
+        self.check_states(&before, event.states_changed)?;
+        if event.terminate {
             return Err("the model ends the simulation".to_owned());
         }
         self.client("enter_continuous_time_mode").enter_continuous_time_mode().map_err(message)
+    }
+
+    /// Records a fault if an event has changed states without saying so: importers then go on with the values before.
+    fn check_states(&mut self, before: &[f64], declared: bool) -> Outcome {
+        let after = self.states()?;
+        let table = &self.model.table;
+        let mut pairs = table.states.iter().zip(before.iter().zip(&after));
+        if let Some(((state, _), (before, after))) = pairs.find(|(_, (before, after))| before != after)
+            && !declared
+        {
+            self.model.trials.fail(format!(
+                "an event changes {} from {before} to {after}, but its result does not have `states_changed: true`, so importers go on \
+                 with the value before",
+                table.name(*state)
+            ));
+        }
+        Ok(())
     }
 
     pub fn enter_event_mode(&mut self) -> Outcome {

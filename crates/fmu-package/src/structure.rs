@@ -26,8 +26,8 @@ pub(crate) fn checked_starts(model: &LoadedModel) -> Result<&Starts> {
         return Ok(starts);
     }
     let starts = check(model)?;
-    memory::check(model, &starts)?;
     rates::check(model, &starts)?;
+    memory::check(model, &starts)?;
     Ok(model.starts.get_or_init(|| starts))
 }
 

@@ -117,7 +117,14 @@ impl CoSimulation for Cart {
     }
 }
 
-impl ModelExchange for Cart {}
+impl ModelExchange for Cart {
+    /// An impact.
+    fn event(&mut self, time: f64) -> Result<Event, Error> {
+        let is_hit = case().starts_with("hit") && time > 2e-3;
+        self.v *= if is_hit { -0.5 } else { 1.0 };
+        Ok(Event { states_changed: case() == "hit and said", ..Event::default() })
+    }
+}
 
 offer!(Cart: CoSimulation + ModelExchange);
 
@@ -160,6 +167,16 @@ fn reading_changes_nothing() {
     }
     // A model without Model Exchange.
     assert!(message("calculate", "modelExchange=null", Standard::Fmi3).starts_with("x is "));
+}
+
+#[test]
+fn events_declare_that_they_change_states() {
+    assert_eq!(message("hit and said", "", Standard::Fmi3), "");
+    let message = message("hit", "", Standard::Fmi3);
+    assert!(
+        message.starts_with("an event changes v from ") && message.contains("`states_changed: true`"),
+        "{message}"
+    );
 }
 
 #[test]
