@@ -17,7 +17,7 @@ pub struct Options {
     #[arg(long)]
     name: Option<String>,
     /// Model to start from: lag (the smallest), ball (state events, an early end), motor (time events),
-    /// house (a file, strings, units with an offset)
+    /// house (a file, strings, units with an offset), tank (the model of the guide: enumeration, array, events)
     #[arg(long, value_enum, value_name = "MODEL", default_value_t, hide_possible_values = true)]
     from: Begin,
     /// Take fmu-export from this git repository, a URL, so that others can build the model
@@ -33,6 +33,7 @@ enum Begin {
     Ball,
     Motor,
     House,
+    Tank,
 }
 
 /// The files of a model, except the files that every crate has.
@@ -48,6 +49,7 @@ impl Begin {
             Self::Lag => files!("lag": "src/lib.rs" "tests/lag.rs"),
             Self::Ball => files!("ball": "src/lib.rs" "src/ball.rs" "tests/ball.rs"),
             Self::Motor => files!("motor": "src/lib.rs" "src/motor.rs" "tests/motor.rs"),
+            Self::Tank => files!("tank": "src/lib.rs" "tests/tank.rs"),
             Self::House => {
                 files!("house": "src/lib.rs" "src/house.rs" "tests/house.rs" "modelDescription/resources/winter.csv")
             }

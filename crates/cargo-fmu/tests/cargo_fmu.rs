@@ -429,21 +429,87 @@ fn the_readme_shows_a_complete_fmu() {
     assert!(readme.contains(&format!("```rust,ignore\n{code}```")), "{readme}");
 }
 
+/// The fenced blocks of a page, in their order: the comment in the line before, the language, and the content.
+fn blocks(page: &str) -> Vec<(&str, &str, &str)> {
+    let mut found = Vec::new();
+    let mut rest = page;
+    while let Some((before, after)) = rest.split_once("\n```") {
+        let (language, after) = after.split_once('\n').unwrap();
+        let end = if after.starts_with("```") { 0 } else { after.find("\n```").unwrap() + 1 };
+        let note = before.lines().next_back().unwrap_or_default();
+        let note = note.strip_prefix("<!-- ").and_then(|note| note.strip_suffix(" -->")).unwrap_or_default();
+        found.push((note, language, &after[..end]));
+        rest = &after[end + 3..];
+    }
+    found
+}
+
+/// Compares a file with the content that it should have, or writes it if `UPDATE_EXPECTED` is set.
+fn is_up_to_date(path: &Path, content: &str) {
+    if std::env::var_os("UPDATE_EXPECTED").is_some() {
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, content).unwrap();
+    }
+    let found = fs::read_to_string(path).unwrap_or_default();
+    let mut lines = found.lines().zip(content.lines());
+    let difference = lines.find(|(found, expected)| found != expected);
+    assert!(found == content, "{}: {difference:?} (UPDATE_EXPECTED=1 writes it)", path.display());
+}
+
+/// The code in the guide for authors is written into the package, stage after stage. Its commands have the output in the guide; the
+/// last stage is also the model of `cargo fmu new --from tank`.
+fn follow_the_guide(directory: &Directory, guide: &Path) {
+    let page = fs::read_to_string(guide).unwrap().replace("\r\n", "\n");
+    let all = blocks(&page);
+    let mut updated = page.clone();
+    let mut stage = "1";
+    for &(note, language, content) in &all {
+        if let Some((number, path)) = note.split_once(": ") {
+            stage = number;
+            if number == "1" {
+                let written = directory.read(&format!("tank/{path}"));
+                updated =
+                    updated.replacen(&format!("```rust\n{content}```"), &format!("```rust\n{written}```"), 1);
+            }
+        }
+        let Some(command) = content.lines().next().and_then(|line| line.strip_prefix("$ cargo fmu ")) else {
+            continue;
+        };
+        for (note, ..) in &all {
+            let Some(path) = note.strip_prefix(stage).and_then(|note| note.strip_prefix(": ")) else {
+                continue;
+            };
+            let parts: Vec<_> = all.iter().filter(|(of, ..)| of == note).map(|(_, _, part)| *part).collect();
+            if stage != "1" {
+                fs::write(directory.path(&format!("tank/{path}")), parts.join("\n")).unwrap();
+            }
+        }
+        let output = directory.prints("tank", &command.split(' ').collect::<Vec<_>>());
+        // The sizes of the files and the guid differ between machines.
+        let is_kept = |line: &&str| !line.contains(".fmu: ") && !line.starts_with("guid ");
+        let output: String = output.lines().filter(is_kept).map(|line| format!("{line}\n")).collect();
+        updated = updated.replacen(
+            &format!("```{language}\n{content}```"),
+            &format!("```{language}\n$ cargo fmu {command}\n{output}```"),
+            1,
+        );
+        if stage == "1" {
+            is_up_to_date(&guide.with_extension("svg"), &directory.read("tank/target/fmu/tank.svg"));
+        }
+    }
+    is_up_to_date(guide, &updated);
+    for path in ["src/lib.rs", "tests/tank.rs"] {
+        let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/tank").join(path);
+        is_up_to_date(&model, &directory.read(&format!("tank/{path}")));
+    }
+}
+
 /// The code in the guide for authors is a model with tests, which is packed, run and checked.
 #[test]
 fn the_guide_leads_to_a_checked_fmu() {
-    let guide = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/author-guide.md");
-    let guide = fs::read_to_string(guide).unwrap();
     let directory = Directory::new();
     directory.prints("", &["new", "tank"]);
-    for path in ["src/lib.rs", "tests/tank.rs"] {
-        // Each block of code is introduced by the name of its file.
-        let begin = format!("<!-- {path} -->\n```rust\n");
-        let blocks = guide.split(&begin).skip(1);
-        let code: Vec<_> = blocks.map(|block| block.split("```").next().unwrap()).collect();
-        assert!(!code.is_empty(), "{path}");
-        fs::write(directory.path(&format!("tank/{path}")), code.join("\n")).unwrap();
-    }
+    follow_the_guide(&directory, &Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/author-guide.md"));
     let output = directory.run("tank", env!("CARGO"), &["test", "--quiet"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let output = directory.fmu("tank", &["build", "--no-page"]);

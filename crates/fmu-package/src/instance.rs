@@ -47,6 +47,16 @@ impl<'a> Instance<'a> {
         Ok(Self { model, client, interface, standard, event_mode, time: 0.0 })
     }
 
+    /// Returns the step size of the default experiment, s.
+    pub fn default_step_size(&self) -> f64 {
+        self.model.table.info.step_size
+    }
+
+    /// Returns whether steps may have any size.
+    pub fn has_variable_step_size(&self) -> bool {
+        self.model.table.co_simulation.as_ref().is_none_or(|offer| offer.variable_step_size)
+    }
+
     /// Returns the client for a call, which has this name in messages.
     fn client(&mut self, call: &'static str) -> &mut fmi_client::Instance {
         self.model.trials.begin(call);
@@ -77,10 +87,30 @@ impl<'a> Instance<'a> {
 
     /// Iterates the event in Model Exchange, and enters Continuous-Time Mode.
     pub fn handle_event(&mut self) -> Outcome {
-        if self.client("event").event().map_err(message)?.terminate {
+        let before = self.states()?;
+        let event = self.client("event").event().map_err(message)?;
+        self.check_states(&before, event.states_changed)?;
+        if event.terminate {
             return Err("the model ends the simulation".to_owned());
         }
         self.client("enter_continuous_time_mode").enter_continuous_time_mode().map_err(message)
+    }
+
+    /// Records a fault if an event has changed states without saying so: importers then go on with the values before.
+    fn check_states(&mut self, before: &[f64], declared: bool) -> Outcome {
+        let after = self.states()?;
+        let table = &self.model.table;
+        let mut pairs = table.states.iter().zip(before.iter().zip(&after));
+        if let Some(((state, _), (before, after))) = pairs.find(|(_, (before, after))| before != after)
+            && !declared
+        {
+            self.model.trials.fail(format!(
+                "an event changes {} from {before} to {after}, but its result does not have `states_changed: true`, so importers go on \
+                 with the value before",
+                table.name(*state)
+            ));
+        }
+        Ok(())
     }
 
     pub fn enter_event_mode(&mut self) -> Outcome {

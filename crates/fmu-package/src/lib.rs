@@ -14,7 +14,7 @@
 //! | the guid | `fingerprint`, `directory`, `content`, `packages`, `sources`, `variant` |
 //! | files | `xml`, `files` |
 //! | the model | `table`, `model`, `instance` |
-//! | the description | `check`, `sample`, `memory`, `derivatives`, `structure`, `definitions`, `describe` |
+//! | the description | `check`, `sample`, `memory`, `rates`, `derivatives`, `structure`, `definitions`, `describe` |
 //! | the FMU | `connectors`, `platform`, `pack` |
 //! | the command | `cross`, `c_sources`, `cargo`, `library`, `universal`, `live`, `terminal`, `command` |
 
@@ -39,6 +39,7 @@ mod model;
 mod pack;
 mod packages;
 mod platform;
+mod rates;
 mod sample;
 mod sources;
 pub mod structure;

@@ -9,6 +9,7 @@ use crate::check::{Starts, check};
 use crate::derivatives::check as check_derivatives;
 use crate::memory;
 use crate::model::LoadedModel;
+use crate::rates;
 use crate::sample::{Point, Sampler, is_finite};
 use crate::table::{Table, Variable};
 use anyhow::{Result, bail, ensure};
@@ -25,6 +26,7 @@ pub(crate) fn checked_starts(model: &LoadedModel) -> Result<&Starts> {
         return Ok(starts);
     }
     let starts = check(model)?;
+    rates::check(model, &starts)?;
     memory::check(model, &starts)?;
     Ok(model.starts.get_or_init(|| starts))
 }

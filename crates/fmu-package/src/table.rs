@@ -246,6 +246,14 @@ impl Variable {
 }
 
 impl Type {
+    /// The unit of a Real.
+    pub fn unit(&self) -> Option<&Unit> {
+        match &self.attributes {
+            Attributes::Real { unit, .. } => Some(unit),
+            _ => None,
+        }
+    }
+
     /// The nominal value of a Real, 1 if there is none.
     pub fn nominal_or_one(&self) -> f64 {
         match self.attributes {

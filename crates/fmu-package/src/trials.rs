@@ -6,7 +6,7 @@ use fmi_abi::c_types::c_void;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
-/// The call in progress and the first panic of a model.
+/// The call in progress, and the first panic or fault of a model.
 #[derive(Debug, Default)]
 pub(crate) struct Trials {
     call: Mutex<Option<(&'static str, Instant)>>,
@@ -49,12 +49,17 @@ impl Trials {
         });
     }
 
-    /// Returns the first panic as an error.
+    /// Returns the first panic or fault as an error.
     pub fn check(&self) -> Result<()> {
         match &*lock(&self.panic) {
             Some(panic) => bail!("{panic}"),
             None => Ok(()),
         }
+    }
+
+    /// Records a fault, unless there was one before.
+    pub fn fail(&self, fault: String) {
+        lock(&self.panic).get_or_insert(fault);
     }
 
     /// Receives the place and the message of a panic from the library.

@@ -6,6 +6,7 @@
 mod malformed;
 mod memory;
 mod models;
+mod rates;
 mod terminals;
 
 use fmi_abi::Category;

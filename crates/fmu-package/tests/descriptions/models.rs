@@ -3,12 +3,14 @@
 use fmu_export::*;
 use std::cell::RefCell;
 
-/// Models of Co-Simulation whose steps calculate nothing.
-macro_rules! no_step {
-    ($($fact:ident: $type:ty = $value:expr;)*) => {
+/// The steps of Co-Simulation, which change the states by the rule of Euler.
+macro_rules! step {
+    ($change:expr; $($fact:ident: $type:ty = $value:expr;)*) => {
         $(const $fact: $type = $value;)*
 
-        fn step(&mut self, _: Step) -> Result<Stepped, Error> {
+        fn step(&mut self, step: Step) -> Result<Stepped, Error> {
+            let change: fn(&mut Self, f64) = $change;
+            change(self, step.size);
             Ok(Stepped::Done)
         }
     };
@@ -150,7 +152,16 @@ pub mod room {
     }
 
     impl CoSimulation for Room {
-        no_step! { VARIABLE_STEP_SIZE: bool = false; EVENTS: Events = Events::StopIfHandled; }
+        step! {
+        |room, size| {
+            let rates = [
+                room.power * f64::from(room.heater.number()) - room.temperature + room.outside,
+                room.temperature - room.guess,
+            ];
+            room.temperature += size * rates[0];
+            room.guess += size * rates[1];
+        };
+        VARIABLE_STEP_SIZE: bool = false; EVENTS: Events = Events::StopIfHandled; }
     }
 
     impl InputDerivatives for Room {
@@ -265,7 +276,10 @@ pub mod types {
     }
 
     impl CoSimulation for Types {
-        no_step! { EVENTS: Events = Events::Stop; }
+        step! {
+            |model, size| [model.angle, model.speed] = [model.angle + size * model.speed, model.speed - size * model.angle];
+            EVENTS: Events = Events::Stop;
+        }
     }
 
     offer!(Types: ModelExchange + CoSimulation);
@@ -336,7 +350,7 @@ pub mod factors {
     }
 
     impl CoSimulation for Factors {
-        no_step! { ENDS_EARLY: bool = true; }
+        step! { |model, size| model.x += size * (3.0 * model.u - model.p * model.x); ENDS_EARLY: bool = true; }
     }
 
     impl ModelExchange for Factors {}
@@ -469,7 +483,7 @@ pub mod chain {
     }
 
     impl CoSimulation for Chain {
-        no_step! {}
+        step! { |c, size| c.x = [c.x[0] + size * c.u[0], c.x[1] + size * (c.p * c.x[0] + c.u[1].sin())]; }
     }
 
     offer!(Chain: ModelExchange + CoSimulation + Partials);
@@ -588,7 +602,7 @@ pub mod breakpoints {
     }
 
     impl CoSimulation for Breakpoints {
-        no_step! {}
+        step! { |_, _| {}; }
     }
 
     offer!(Breakpoints: CoSimulation);
@@ -650,7 +664,7 @@ pub mod faulty {
     }
 
     impl CoSimulation for Faulty {
-        no_step! {}
+        step! { |_, _| {}; }
     }
 
     impl ModelExchange for Faulty {
