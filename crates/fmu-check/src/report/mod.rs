@@ -5,7 +5,7 @@ mod sarif;
 
 use crate::baseline::Baseline;
 use crate::checker::{Checker, Unchecked};
-use crate::finding::{Finding, Severity};
+use crate::finding::{Finding, Proof, Severity};
 use crate::options::{FailOn, Options};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -62,7 +62,7 @@ impl Report {
             seconds: 0.0,
             seed: checker.seed,
             variables: [checker.description.variables.len(), checker.readable.len()],
-            unreached: checker.take_unchecked(),
+            unreached: checker.all_unchecked(),
             findings,
         }
     }
@@ -143,7 +143,11 @@ impl Report {
             };
             let calls = match finding.steps {
                 (0, 0) => String::new(),
-                (_, steps) => format!("; {steps} calls reproduce it"),
+                (_, steps) => match &finding.proof {
+                    Proof::NotShown(why) => format!("; not reproduced ({why}), so only a note"),
+                    Proof::NotRun(why) => format!("; {steps} calls, not reproduced ({why})"),
+                    Proof::Files | Proof::Shown => format!("; {steps} calls reproduce it"),
+                },
             };
             let section = if finding.section.is_empty() { "not in the standard" } else { &finding.section };
             let accepted =

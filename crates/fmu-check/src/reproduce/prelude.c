@@ -64,6 +64,10 @@ static __attribute__((unused)) char *result(const char *kind, int number) {
     return text;
 }
 
+static __attribute__((unused)) bool begins(const char *text, const char *with) {
+    return strncmp(text, with, strlen(with)) == 0;
+}
+
 static __attribute__((unused)) bool any_differ(const int (*pairs)[2], size_t count) {
     size_t i;
     bool found = false;
@@ -256,6 +260,16 @@ static __attribute__((unused)) void show(const void *array, size_t count, char k
     }
 }
 
+/* Returns the time of the next time event of an instance. */
+static double *next_event(void *instance) {
+    static struct { void *instance; double next; } known[64];
+    size_t i;
+    for (i = 0; i < 63 && known[i].instance && known[i].instance != instance; i++) {}
+    if (!known[i].instance) known[i].next = INFINITY;
+    known[i].instance = instance;
+    return &known[i].next;
+}
+
 /* Updates the discrete states until no further update is needed, as an importer must before it leaves Event Mode. A flag that
    reports a change remains set if any of the updates has set it. */
 #if FMI == 2
@@ -267,6 +281,7 @@ static __attribute__((unused)) int update_states(void *instance, void *info) {
         for (i = 1; i < 4; i++) seen[i] |= flags[i] != 0;
     } while (status < 2 && flags[0] && ++times < 100);
     for (i = 1; i < 4; i++) if (status < 2 && times && seen[i]) memset(&flags[i], 1, 1);
+    if (status < 2) *next_event(instance) = flags[4] ? *(double *)((char *)info + 24) : INFINITY;
     return status;
 }
 #else
@@ -278,6 +293,7 @@ static __attribute__((unused)) int update_states(void *instance, void *again, vo
         for (i = 1; i < 4; i++) seen[i] |= *flags[i] != 0;
     } while (status < 2 && *flags[0] && ++times < 100);
     for (i = 1; i < 4; i++) if (status < 2 && times && seen[i]) *flags[i] = 1;
+    if (status < 2) *next_event(instance) = *flags[4] ? *(double *)next : INFINITY;
     return status;
 }
 #endif

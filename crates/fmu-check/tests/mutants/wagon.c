@@ -107,7 +107,7 @@ static int no(Model *m, const char *text) { return report(m, 3, text); }
     if (!m) return 3;                                                                 \
     if (!(m->s.mode & (modes))) return no(m, "not allowed here");
 
-static double slope(const Model *m) { return (m->s.force - (IS(start_in_mode_ignored) ? m->s.first_spring : m->s.spring) * (m->s.x + 1e-3 * IS(start_in_mode_ignored)) - m->s.damper * m->s.v) / m->s.mass; }
+static double slope(const Model *m) { return (IS(slope_off) && !m->cs ? 1.1 : 1) * (m->s.force - (IS(start_in_mode_ignored) ? m->s.first_spring : m->s.spring) * (m->s.x + 1e-3 * IS(start_in_mode_ignored)) - m->s.damper * m->s.v) / m->s.mass; }
 
 __attribute__((destructor)) static void unloaded(void) {
     if (IS(unload_crashes)) abort();
@@ -306,7 +306,7 @@ static void integrate(Model *m, double end) {
             s->v = v + h / 6 * (kv[0] + 2 * kv[1] + 2 * kv[2] + kv[3]);
         }
         s->time = stop;
-        if (s->time >= s->next - 1e-12 && !(m->events && m->early)) { s->count++; s->next = 0.05 * (s->count + 1); }
+        if (s->time >= s->next - 1e-12 && !(m->events && m->early)) { s->count += 1 + IS(counts_twice); s->next = 0.05 * (s->count / (1 + IS(counts_twice)) + 1); }
     }
     s->time = end;
     /* As a solver with variable steps that starts again. */
