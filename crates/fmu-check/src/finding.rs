@@ -88,6 +88,8 @@ pub struct Finding {
     /// Criterion that a run violates if it reproduces the finding.
     #[serde(skip)]
     pub criterion: Option<SharedCriterion>,
+    /// Name of the finding from which this one may follow.
+    pub cause: Option<String>,
     /// Whether the finding fails the check.
     pub fails: bool,
     /// Reason in the baseline for which the finding is accepted.

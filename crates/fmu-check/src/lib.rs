@@ -109,6 +109,11 @@ const ALWAYS: [&str; 6] = [
     "life_cycle.simulation", "life_cycle.crash", "life_cycle.hang",
 ];
 
+/// Returns the reason for which a part was not checked. After an interrupt, processes and files are missing that a check needs.
+fn stop(error: &anyhow::Error) -> String {
+    if worker::interrupted() { Stop::Interrupted.to_string() } else { error.to_string() }
+}
+
 /// Finds a trajectory for each interface type that has a library.
 fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
     for (index, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
@@ -120,8 +125,8 @@ fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
             Err(error) if error.is::<NoTrajectory>() => {
                 checker.unchecked(INTERFACES[index], format!("no simulation succeeds: {error}"));
             }
-            Err(error) if error.is::<Stop>() => {
-                checker.unchecked(INTERFACES[index], error.to_string());
+            Err(error) if error.is::<Stop>() || worker::interrupted() => {
+                checker.unchecked(INTERFACES[index], stop(&error));
             }
             Err(error) => return Err(error),
         }
@@ -136,8 +141,52 @@ fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
 pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<Report> {
     let begin = Instant::now();
     let baseline = options.baseline.as_deref().map(baseline::Baseline::read).transpose()?.unwrap_or_default();
-    let scratch = fmi_abi::files::Scratch::new("fmu-check-")?;
     // The workers are dropped, and end, before the directory is removed.
+    let (scratch, mut checker) = opened(path, options, begin)?;
+    simulate(&mut checker)?;
+    let session = Session { path, options, baseline, begin };
+    // The report exists from the first check on, so that nothing is lost if the check is ended.
+    let written = || match &options.out {
+        Some(directory) => session.report(&checker, session.kept(&checker)).write(directory),
+        None => Ok(()),
+    };
+    attack(&checker, progress, &|topic| is_wanted(options, topic), &written)?;
+    let mut findings = session.kept(&checker);
+    if !worker::interrupted() {
+        prove(&checker, &mut findings, scratch.path(), options, progress);
+    }
+    Ok(session.report(&checker, findings))
+}
+
+/// Compares Co-Simulation with Model Exchange of an FMU that offers both, by simulations of at most 40 steps. Returns a description of
+/// the first difference that no error of a solver explains; `None` if there is none, or if the comparison is not possible.
+///
+/// The program must call [`work_if_asked`] first in `main`.
+///
+/// # Errors
+/// Fails if the file is not an FMU of FMI 2.0 or 3.0.
+pub fn compare_interfaces(path: &Path) -> anyhow::Result<Option<String>> {
+    let options = Options { time: 20.0, ..Options::default() };
+    let (_scratch, mut checker) = opened(path, &options, Instant::now())?;
+    if checker.setting.libraries[0].is_none() || checker.setting.libraries[1].is_none() {
+        return Ok(None);
+    }
+    simulate(&mut checker)?;
+    match checks::interfaces::compare(&checker) {
+        Err(error) if !error.is::<Stop>() => return Err(error),
+        _ => {}
+    }
+    let found = checker.findings().into_iter().find(|finding| finding.name == "results.interfaces");
+    Ok(found.map(|finding| finding.observed))
+}
+
+/// Unpacks an FMU; returns the directory and the state of the check with the findings in the files.
+fn opened(
+    path: &Path,
+    options: &Options,
+    begin: Instant,
+) -> anyhow::Result<(fmi_abi::files::Scratch, Checker)> {
+    let scratch = fmi_abi::files::Scratch::new("fmu-check-")?;
     let workers = run::Workers::new(scratch.path().to_owned())?;
     let directory = &scratch.path().join("fmu");
     let zip_observations = checks::package::unpack(path, directory, options.unpacked << 20)?;
@@ -166,22 +215,10 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
         observations.extend(description.wrong.iter().cloned());
     }
     let (setting, without) = setting(options, directory, &description);
-    let mut checker = Checker::new(description, setting, workers, options, begin);
+    let checker = Checker::new(description, setting, workers, options, begin);
     observations.into_iter().for_each(|(name, observed)| checker.add(checker.broken(name, observed)));
     without.into_iter().for_each(|(name, why)| checker.unchecked(name, why));
-    simulate(&mut checker)?;
-    let session = Session { path, options, baseline, begin };
-    // The report exists from the first check on, so that nothing is lost if the check is ended.
-    let written = || match &options.out {
-        Some(directory) => session.report(&checker, session.kept(&checker)).write(directory),
-        None => Ok(()),
-    };
-    attack(&checker, progress, &wanted, &written)?;
-    let mut findings = session.kept(&checker);
-    if !worker::interrupted() {
-        prove(&checker, &mut findings, scratch.path(), options, progress);
-    }
-    Ok(session.report(&checker, findings))
+    Ok((scratch, checker))
 }
 
 /// Returns whether the options include a topic.
@@ -373,8 +410,8 @@ fn attack(
     let (failure, writing) = (Mutex::new(None), Mutex::new(()));
     in_parallel(&jobs, progress, |(topic, check, trajectory), done| {
         let result = match attack_with(checker, *check, *trajectory) {
-            Err(error) if error.is::<Stop>() => {
-                checker.stopped(topic, error.to_string());
+            Err(error) if error.is::<Stop>() || worker::interrupted() => {
+                checker.stopped(topic, stop(&error));
                 Ok(())
             }
             result => result,

@@ -13,6 +13,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/time.h>
 #if defined(__linux__)
 #include <sys/prctl.h>
 #endif
@@ -306,6 +309,29 @@ static long entries(const char *path) {
     return count;
 }
 
+extern char **environ;
+
+/* Writes the mask for new files, limits, the periods of timers, the files of the working directory and the environment. */
+static void put_settings(FILE *file) {
+    int limits[] = {RLIMIT_NOFILE, RLIMIT_STACK, RLIMIT_CPU, RLIMIT_CORE}, timers[] = {ITIMER_REAL, ITIMER_VIRTUAL, ITIMER_PROF};
+    size_t i;
+    char **variable;
+    mode_t mask = umask(0);
+    umask(mask);
+    fprintf(file, " %o %ld", (unsigned)mask, entries("."));
+    for (i = 0; i < 4; i++) {
+        struct rlimit limit;
+        getrlimit(limits[i], &limit);
+        fprintf(file, " %llu", (unsigned long long)limit.rlim_cur);
+    }
+    for (i = 0; i < 3; i++) {
+        struct itimerval timer;
+        getitimer(timers[i], &timer);
+        fprintf(file, " %ld.%ld", (long)timer.it_interval.tv_sec, (long)timer.it_interval.tv_usec);
+    }
+    for (variable = environ; variable && *variable; variable++) fprintf(file, " %s", *variable);
+}
+
 /* Measures memory, threads and files, then settings of the process. */
 static __attribute__((unused)) void measure(int number) {
     long pages = 0, all = 0, memory;
@@ -321,6 +347,7 @@ static __attribute__((unused)) void measure(int number) {
     print("memory: %ld bytes, threads: %ld, files: %ld\n", memory, entries("/proc/self/task"), entries("/proc/self/fd"));
     file = results("r", number, "w");
     fprintf(file, "%ld %ld %ld ;%s %s", memory, entries("/proc/self/task"), entries("/proc/self/fd"), setlocale(LC_ALL, NULL), getcwd(here, sizeof here) ? here : "");
+    put_settings(file);
     for (i = 0; i < sizeof signals / sizeof *signals; i++) {
         struct sigaction action;
         sigaction(signals[i], NULL, &action);

@@ -11,6 +11,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #ifndef FMI
@@ -149,6 +151,10 @@ static void *make(const char *name, const char *token, int cs, int logging, Logg
     }
     m->scratch = malloc(sizeof *m->scratch);
     if (!IS(unwritten_memory)) *m->scratch = 0;
+    if (IS(environment_changed)) setenv("OMP_NUM_THREADS", "1", 1);
+    if (IS(mask_changed)) umask(0);
+    if (IS(limit_changed)) { struct rlimit none = {0, 0}; getrlimit(RLIMIT_NOFILE, &none); none.rlim_cur = 200; setrlimit(RLIMIT_NOFILE, &none); }
+    if (IS(log_file_left)) { FILE *file = fopen("wagon.log", "w"); if (file) fclose(file); }
     if (IS(leak_instance) && !malloc(24)) return NULL;
     if (IS(file_left)) (void)!open("/dev/null", O_RDONLY);
     if (IS(thread_left)) { pthread_t thread; if (!pthread_create(&thread, NULL, idle, NULL)) pthread_detach(thread); }
