@@ -35,8 +35,7 @@ pub fn explain(findings: &mut Vec<Finding>) {
             None => name.starts_with(*pattern),
         };
         let cause = CAUSES.iter().filter(|(cause, _)| found.iter().any(|other| other == cause));
-        let cause =
-            cause.take_while(|(cause, _)| cause != name).find(|(_, of)| of.iter().any(|of| fits(&of)));
+        let cause = cause.take_while(|(cause, _)| cause != name).find(|(_, of)| of.iter().any(fits));
         finding.cause = cause.map(|(cause, _)| (*cause).to_owned());
     }
     let (causes, consequences): (Vec<_>, Vec<_>) =
