@@ -41,7 +41,12 @@ pub fn build(
         settings: if purpose == Purpose::Trial { FAST.map(str::to_owned).to_vec() } else { Vec::new() },
         ..Builder::new(&project.name, &project.directory)
     };
+    let begin = std::time::SystemTime::now();
     builder.run(options)?;
+    if purpose == Purpose::Use {
+        let directory = options.out.clone().unwrap_or_else(|| project.workspace.join("target/fmu"));
+        crate::compare::warn(&directory, begin);
+    }
     Ok(true)
 }
 

@@ -6,6 +6,7 @@
 //! FMU with the `inputs` of a table, `results` writes its table, and `plot` draws it.
 
 mod builder;
+mod compare;
 mod inputs;
 mod new;
 mod plot;

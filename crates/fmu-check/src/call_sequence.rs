@@ -119,6 +119,21 @@ pub struct Make {
     pub early_return: bool,
 }
 
+/// Integration of Model Exchange.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Integration {
+    pub begin: f64,
+    pub end: f64,
+    /// Number of steps; events end some of them earlier.
+    pub steps: usize,
+    /// Whether the method is Euler's, not the classical Runge-Kutta method.
+    pub euler: bool,
+    /// Number of continuous states.
+    pub states: usize,
+    /// Number of event indicators.
+    pub indicators: usize,
+}
+
 /// Index that represents a NULL instance, which may be freed.
 pub const NULL_INSTANCE: usize = 999;
 
@@ -136,6 +151,8 @@ pub enum Step {
     },
     /// Calls a function without an instance, which returns a string: the version or the platform.
     Version(String),
+    /// Integrates an instance of Model Exchange, with events.
+    Integrate(usize, Integration),
     /// Repeats steps this many times, or until the time limit.
     Repeat(usize, Vec<Numbered>),
     /// Runs call sequences at the same time, each in a separate thread.

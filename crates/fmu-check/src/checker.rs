@@ -3,14 +3,17 @@
 use crate::always;
 use crate::call_sequence::{CallSequence, End, Numbered, Run, Setting, Step, step_of};
 use crate::description::Description;
-use crate::finding::{Criterion, Event, Finding, Severity, SharedCriterion, ending, event, step_name};
+use crate::finding::{Criterion, Event, Finding, Proof, Severity, SharedCriterion, ending, event, step_name};
 use crate::legal::first_illegal;
+use crate::reproduce::confirm::Proving;
 use crate::rules;
 use crate::run::{Stop, Workers};
 use crate::shrink::shrink;
+use crate::worker::interrupted;
 use crate::writer::{READ, Read, Trajectory, Writer, difference, sample};
 use fmi_abi::{Interface, Standard};
 use std::collections::HashSet;
+use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::{Duration, Instant};
 
@@ -25,8 +28,11 @@ pub struct Unchecked {
     pub allowed: bool,
 }
 
-/// Duration of a quick check in seconds, after which no call sequence is started.
-const QUICK: f64 = 24.0;
+/// Duration of a quick check in seconds.
+const QUICK: f64 = 30.0;
+
+/// Part of the duration for the checks. The rest is for shortening call sequences and for the programs that reproduce the findings.
+const CHECKS: f64 = 0.8;
 
 /// Functions for each topic whose calls are never removed from a call sequence. If one of two compared simulations lacked such
 /// a call, the results would differ for that reason.
@@ -82,8 +88,10 @@ pub struct Checker {
     pub seed: u64,
     /// Maximum duration of a call sequence in seconds.
     pub limit: f64,
-    /// Instant after which no call sequence is started.
+    /// Instant after which no check starts a call sequence.
     pub deadline: Instant,
+    /// Instant at which the check ends.
+    pub end: Instant,
     /// Whether fewer values and call sequences are tried.
     pub quick: bool,
     found: Mutex<Vec<Finding>>,
@@ -134,7 +142,7 @@ impl Checker {
         begin: Instant,
     ) -> Self {
         let time = if options.quick { QUICK } else { options.time.max(1.0) };
-        let limit = if options.quick { options.limit.min(QUICK / 10.0) } else { options.limit };
+        let limit = if options.quick { options.limit.min(2.4) } else { options.limit };
         Self {
             readable: sample(&description, READ),
             description: Arc::new(description),
@@ -143,7 +151,8 @@ impl Checker {
             trajectories: Vec::new(),
             seed: options.seed,
             limit,
-            deadline: begin + Duration::from_secs_f64(time),
+            deadline: begin + Duration::from_secs_f64(CHECKS * time),
+            end: begin + Duration::from_secs_f64(time),
             quick: options.quick,
             found: Mutex::default(),
             unchecked: Mutex::default(),
@@ -200,6 +209,9 @@ impl Checker {
     /// Executes a call sequence with a limit in seconds.
     pub fn execute_for(&self, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
         debug_assert_eq!(self.illegal(sequence), None);
+        if interrupted() {
+            return Err(Stop::Interrupted.into());
+        }
         if Instant::now() >= self.deadline {
             return Err(Stop::TimeOver.into());
         }
@@ -244,12 +256,14 @@ impl Checker {
         *locked(&self.executed)
     }
 
-    pub fn take(&self) -> Vec<Finding> {
-        std::mem::take(&mut locked(&self.found))
+    /// Returns the findings so far.
+    pub fn findings(&self) -> Vec<Finding> {
+        locked(&self.found).clone()
     }
 
-    pub fn take_unchecked(&self) -> Vec<Unchecked> {
-        std::mem::take(&mut locked(&self.unchecked))
+    /// Returns what was not checked so far.
+    pub fn all_unchecked(&self) -> Vec<Unchecked> {
+        locked(&self.unchecked).clone()
     }
 
     /// Records an interface or a topic that was not checked, with the first reason.
@@ -258,6 +272,19 @@ impl Checker {
         if !unchecked.iter().any(|known| known.name == name) {
             unchecked.push(Unchecked { name: name.to_owned(), why, allowed: false });
         }
+    }
+
+    /// Records the reason for which a topic that has begun was not finished.
+    pub fn stopped(&self, topic: &str, why: String) {
+        let mut unchecked = locked(&self.unchecked);
+        if let Some(known) = unchecked.iter_mut().find(|known| known.name == topic) {
+            known.why = why;
+        }
+    }
+
+    /// Records that all checks of a topic have ended, unless one of them was stopped.
+    pub fn finished(&self, topic: &str, unfinished: &str) {
+        locked(&self.unchecked).retain(|known| known.name != topic || known.why != unfinished);
     }
 
     pub fn add(&self, finding: Finding) {
@@ -420,20 +447,69 @@ impl Checker {
         Setting { soft: self.setting.soft && !ends, ..self.setting.clone() }
     }
 
-    /// Writes the program that reproduces a finding. The limit is ten times as long, except for a hang: the machine may be busy.
-    pub fn reproduce(&self, finding: &mut Finding) -> anyhow::Result<()> {
-        let late = Instant::now() > self.deadline && self.quick;
-        if finding.criterion.is_some() && !late {
-            let patience = if finding.name.ends_with("hang") { 1.0 } else { 10.0 };
-            let limit = patience * (self.limit + 3.0 * self.setting.repetitions);
-            let run = self.workers.execute(&self.hard(finding), &finding.sequence, limit)?;
-            crate::reproduce::program(finding, &run, &self.setting, &self.description);
+    /// Shortens the call sequence of a finding, writes the program that reproduces it, and runs the program. A finding that the program
+    /// does not show becomes a note. Ends at the instant `until`.
+    pub fn prove(&self, finding: &mut Finding, scratch: &Path, shortens: bool, until: Instant) {
+        if finding.criterion.is_none() {
+            return;
         }
-        Ok(())
+        let begin = Instant::now();
+        let (sequence, observed) = (finding.sequence.clone(), finding.observed.clone());
+        if shortens {
+            self.shorten(finding, begin + until.saturating_duration_since(begin) / 2);
+        }
+        let mut proof = self.proof(finding, scratch, until);
+        // A call that was removed may be necessary in another process.
+        if matches!(proof, Proof::NotShown(_)) && finding.sequence.len() < sequence.len() {
+            finding.steps.1 = sequence.len();
+            (finding.sequence, finding.observed) = (sequence, observed);
+            proof = self.proof(finding, scratch, until);
+        }
+        finding.judge(proof);
     }
 
-    /// Removes calls that the finding does not need, until the deadline or the maximum number of attempts.
-    pub fn shorten(&self, finding: &mut Finding) {
+    /// Writes the program of a finding, and runs it.
+    fn proof(&self, finding: &mut Finding, scratch: &Path, until: Instant) -> Proof {
+        let over =
+            |_| Proof::NotRun(if interrupted() { Stop::Interrupted } else { Stop::TimeOver }.to_string());
+        match self.reproduce(finding, until) {
+            Ok(true) => {}
+            Ok(false) => return Proof::NotShown("a repetition of its calls does not show it".to_owned()),
+            Err(error) => return over(error),
+        }
+        let directory = self.setting.resources.parent().unwrap_or(scratch);
+        let (memory, limit) = (self.setting.memory, self.limit);
+        let proving =
+            Proving { workers: &self.workers, fmu: directory, scratch, memory, limit, deadline: until };
+        proving.prove(finding)
+    }
+
+    /// Writes the program that reproduces a finding; returns whether a repetition of its calls shows it. The limit is ten times as long,
+    /// except for a hang: the machine may be busy.
+    fn reproduce(&self, finding: &mut Finding, until: Instant) -> anyhow::Result<bool> {
+        let Some(criterion) = finding.criterion.clone() else { return Ok(false) };
+        let patience = if finding.name.ends_with("hang") { 1.0 } else { 10.0 };
+        let limit = patience * (self.limit + 3.0 * self.setting.repetitions);
+        for _ in 0..3 {
+            let remaining = until.saturating_duration_since(Instant::now()).as_secs_f64();
+            if remaining <= 0.0 {
+                return Err(Stop::TimeOver.into());
+            }
+            let run = self.workers.execute(&self.hard(finding), &finding.sequence, limit.min(remaining))?;
+            let found = criterion(&run).is_some() || finding.name == "package.symbols";
+            if matches!(run.end, End::Hang(seconds) if seconds < limit && !finding.name.ends_with("hang")) {
+                return Err(Stop::TimeOver.into());
+            }
+            if found {
+                crate::reproduce::program(finding, &run, &self.setting, &self.description);
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Removes calls that the finding does not need, until the instant `until` or the maximum number of attempts.
+    fn shorten(&self, finding: &mut Finding, until: Instant) {
         finding.steps = (finding.sequence.len(), finding.sequence.len());
         let Some(criterion) = finding.criterion.clone() else { return };
         let setting = self.hard(finding);
@@ -453,7 +529,8 @@ impl Checker {
         // The observation of a shorter sequence may differ only in its numbers.
         let (same, mut observed) = (outline(&finding.observed), finding.observed.clone());
         let mut reproduces = |tried: &CallSequence| {
-            let run = self.workers.execute(&setting, tried, limit).ok();
+            let remaining = until.saturating_duration_since(Instant::now()).as_secs_f64();
+            let run = self.workers.execute(&setting, tried, limit.min(remaining)).ok();
             let now = run.and_then(|run| criterion(&run)).filter(|now| outline(now) == same);
             now.is_some_and(|now| {
                 observed = now;
@@ -462,7 +539,7 @@ impl Checker {
         };
         let mut short = shrink(&self.description, &finding.sequence, pinned, !removes_separately, |tried| {
             remaining -= 1;
-            remaining >= 0 && Instant::now() <= self.deadline && reproduces(tried)
+            remaining >= 0 && Instant::now() < until && !interrupted() && reproduces(tried)
         });
         // A finding that is not reproduced by every run is not shortened.
         if short.len() < finding.sequence.len() && !reproduces(&short) {

@@ -48,6 +48,21 @@ pub fn fails(sequence: &CallSequence, ids: Vec<u32>) -> Box<dyn Criterion> {
     Box::new(move |run: &Run| failure(&sequence, run, &ids))
 }
 
+/// Result of the program of a finding.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Proof {
+    /// The finding has no program: it is in the files of the FMU.
+    #[default]
+    Files,
+    /// The program shows the finding.
+    Shown,
+    /// The program does not show the finding, for this reason.
+    NotShown(String),
+    /// The program was not run, for this reason.
+    NotRun(String),
+}
+
 /// Violation of a rule by an FMU.
 #[derive(Clone, Default, Serialize)]
 pub struct Finding {
@@ -68,9 +83,13 @@ pub struct Finding {
     pub sequence: CallSequence,
     /// Program in C that reproduces the finding.
     pub c: String,
+    /// Whether the program shows the finding.
+    pub proof: Proof,
     /// Criterion that a run violates if it reproduces the finding.
     #[serde(skip)]
     pub criterion: Option<SharedCriterion>,
+    /// Name of the finding from which this one may follow.
+    pub cause: Option<String>,
     /// Whether the finding fails the check.
     pub fails: bool,
     /// Reason in the baseline for which the finding is accepted.
@@ -83,6 +102,14 @@ impl Finding {
     /// Adds the call sequence and the criterion that reproduce the finding.
     pub fn shown_by(self, sequence: CallSequence, criterion: SharedCriterion) -> Self {
         Self { sequence, criterion: Some(criterion), ..self }
+    }
+
+    /// Records whether the program shows the finding. A finding that its program does not show is a note.
+    pub fn judge(&mut self, proof: Proof) {
+        if matches!(proof, Proof::NotShown(_)) {
+            self.severity = Severity::Note;
+        }
+        self.proof = proof;
     }
 
     /// Returns the topic of the rule.
@@ -120,6 +147,7 @@ pub fn step_name(step: &Step) -> String {
             steps.first().map_or("nothing".to_owned(), |numbered| step_name(&numbered.step))
         ),
         Step::Parallel(sequences) => format!("a call on one of {} threads", sequences.len()),
+        Step::Integrate(..) => "an integration".to_owned(),
         Step::Measure => "a measurement".to_owned(),
         Step::FreshProcess => "a fresh process".to_owned(),
         Step::Unload => "unloading the library".to_owned(),

@@ -76,6 +76,11 @@ fn walk(description: &Description, sequence: &[Numbered], objects: &mut Objects)
                 objects.slots.clear();
                 true
             }
+            Step::Integrate(index, how) => objects.instances.get_mut(index).is_some_and(|state| {
+                let is_here = !is_other_time(how.begin, state.time);
+                state.time = how.end;
+                is_here && state.mode == Mode::ContinuousTime
+            }),
             Step::Unload | Step::Quit => objects.instances.is_empty(),
             Step::Version(_) | Step::Measure => true,
         };

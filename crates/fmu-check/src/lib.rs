@@ -30,7 +30,7 @@ mod worker;
 mod writer;
 
 pub use checker::Unchecked;
-pub use finding::{Finding, Severity};
+pub use finding::{Finding, Proof, Severity};
 pub use options::{FailOn, Options};
 pub use report::Report;
 pub use worker::work_if_asked;
@@ -49,6 +49,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 use trajectory::{NoTrajectory, find_trajectory};
+
+/// Reason for which a topic that has begun is in the report that is written meanwhile.
+const UNFINISHED: &str = "it is not finished";
 
 /// Topics that are not part of a quick check.
 const LONG: [&str; 2] = ["malformed", "resources"];
@@ -89,8 +92,9 @@ pub fn command(fmu: &Path, options: &Options) -> ExitCode {
         }
         Ok(report)
     }) {
-        Ok(report) => ExitCode::from(report.status),
-        Err(error) => {
+        Ok(report) if !worker::interrupted() => ExitCode::from(report.status),
+        result => {
+            let error = result.err().unwrap_or_else(|| Stop::Interrupted.into());
             eprintln!("error: {}", fmi_abi::one_line(&format!("{error:#}")));
             ExitCode::from(if worker::interrupted() { 130 } else { 2 })
         }
@@ -105,6 +109,11 @@ const ALWAYS: [&str; 6] = [
     "life_cycle.simulation", "life_cycle.crash", "life_cycle.hang",
 ];
 
+/// Returns the reason for which a part was not checked. After an interrupt, processes and files are missing that a check needs.
+fn stop(error: &anyhow::Error) -> String {
+    if worker::interrupted() { Stop::Interrupted.to_string() } else { error.to_string() }
+}
+
 /// Finds a trajectory for each interface type that has a library.
 fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
     for (index, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
@@ -116,8 +125,8 @@ fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
             Err(error) if error.is::<NoTrajectory>() => {
                 checker.unchecked(INTERFACES[index], format!("no simulation succeeds: {error}"));
             }
-            Err(error) if error.is::<Stop>() && !worker::interrupted() => {
-                checker.unchecked(INTERFACES[index], error.to_string());
+            Err(error) if error.is::<Stop>() || worker::interrupted() => {
+                checker.unchecked(INTERFACES[index], stop(&error));
             }
             Err(error) => return Err(error),
         }
@@ -132,8 +141,52 @@ fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
 pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<Report> {
     let begin = Instant::now();
     let baseline = options.baseline.as_deref().map(baseline::Baseline::read).transpose()?.unwrap_or_default();
-    let scratch = fmi_abi::files::Scratch::new("fmu-check-")?;
     // The workers are dropped, and end, before the directory is removed.
+    let (scratch, mut checker) = opened(path, options, begin)?;
+    simulate(&mut checker)?;
+    let session = Session { path, options, baseline, begin };
+    // The report exists from the first check on, so that nothing is lost if the check is ended.
+    let written = || match &options.out {
+        Some(directory) => session.report(&checker, session.kept(&checker)).write(directory),
+        None => Ok(()),
+    };
+    attack(&checker, progress, &|topic| is_wanted(options, topic), &written)?;
+    let mut findings = session.kept(&checker);
+    if !worker::interrupted() {
+        prove(&checker, &mut findings, scratch.path(), options, progress);
+    }
+    Ok(session.report(&checker, findings))
+}
+
+/// Compares Co-Simulation with Model Exchange of an FMU that offers both, by simulations of at most 40 steps. Returns a description of
+/// the first difference that no error of a solver explains; `None` if there is none, or if the comparison is not possible.
+///
+/// The program must call [`work_if_asked`] first in `main`.
+///
+/// # Errors
+/// Fails if the file is not an FMU of FMI 2.0 or 3.0.
+pub fn compare_interfaces(path: &Path) -> anyhow::Result<Option<String>> {
+    let options = Options { time: 20.0, ..Options::default() };
+    let (_scratch, mut checker) = opened(path, &options, Instant::now())?;
+    if checker.setting.libraries[0].is_none() || checker.setting.libraries[1].is_none() {
+        return Ok(None);
+    }
+    simulate(&mut checker)?;
+    match checks::interfaces::compare(&checker) {
+        Err(error) if !error.is::<Stop>() => return Err(error),
+        _ => {}
+    }
+    let found = checker.findings().into_iter().find(|finding| finding.name == "results.interfaces");
+    Ok(found.map(|finding| finding.observed))
+}
+
+/// Unpacks an FMU; returns the directory and the state of the check with the findings in the files.
+fn opened(
+    path: &Path,
+    options: &Options,
+    begin: Instant,
+) -> anyhow::Result<(fmi_abi::files::Scratch, Checker)> {
+    let scratch = fmi_abi::files::Scratch::new("fmu-check-")?;
     let workers = run::Workers::new(scratch.path().to_owned())?;
     let directory = &scratch.path().join("fmu");
     let zip_observations = checks::package::unpack(path, directory, options.unpacked << 20)?;
@@ -151,10 +204,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     };
     let text = text.trim_start_matches('\u{feff}');
     let description = Description::parse(text).map_err(|why| anyhow::anyhow!("{}: {why}", path.display()))?;
-    let wanted = |topic: &str| match options.only.is_empty() {
-        true => !options.quick || !LONG.contains(&topic),
-        false => options.only.iter().any(|only| only == topic),
-    };
+    let wanted = |topic: &str| is_wanted(options, topic);
     let mut observations = Vec::new();
     if wanted("package") {
         observations.extend(zip_observations);
@@ -165,34 +215,60 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
         observations.extend(description.wrong.iter().cloned());
     }
     let (setting, without) = setting(options, directory, &description);
-    let mut checker = Checker::new(description, setting, workers, options, begin);
+    let checker = Checker::new(description, setting, workers, options, begin);
     observations.into_iter().for_each(|(name, observed)| checker.add(checker.broken(name, observed)));
     without.into_iter().for_each(|(name, why)| checker.unchecked(name, why));
-    simulate(&mut checker)?;
-    attack(&checker, progress, &wanted)?;
-    let mut findings = checker.take();
-    let is_kept = |finding: &Finding| {
-        wanted(finding.topic())
-            || ["arrays", "logs"].contains(&finding.topic())
-            || ALWAYS.contains(&finding.name.as_str())
-    };
-    findings.retain(|finding| options.only.is_empty() || is_kept(finding));
-    findings.sort_by(|one, other| other.severity.cmp(&one.severity).then_with(|| one.name.cmp(&other.name)));
-    shorten(&checker, &mut findings, options, progress);
-    if worker::interrupted() {
-        return Err(Stop::Interrupted.into());
+    Ok((scratch, checker))
+}
+
+/// Returns whether the options include a topic.
+fn is_wanted(options: &Options, topic: &str) -> bool {
+    match options.only.is_empty() {
+        true => !options.quick || !LONG.contains(&topic),
+        false => options.only.iter().any(|only| only == topic),
     }
-    let mut report = Report::new(path, &checker, findings);
-    report.seconds = begin.elapsed().as_secs_f64();
-    let why = if options.only.is_empty() { "left out (--quick)" } else { "left out (--only)" };
-    let unwanted = rules::TOPICS.iter().filter(|topic| !wanted(topic));
-    report.unreached.extend(unwanted.map(|topic| Unchecked {
-        name: (*topic).to_owned(),
-        why: why.to_owned(),
-        allowed: true,
-    }));
-    report.evaluate(options, &baseline);
-    Ok(report)
+}
+
+/// Arguments of a check that the report contains.
+struct Session<'a> {
+    path: &'a Path,
+    options: &'a Options,
+    baseline: baseline::Baseline,
+    begin: Instant,
+}
+
+impl Session<'_> {
+    /// Returns the findings so far of the wanted topics, the most severe first.
+    fn kept(&self, checker: &Checker) -> Vec<Finding> {
+        let mut findings = checker.findings();
+        let is_kept = |finding: &Finding| {
+            is_wanted(self.options, finding.topic())
+                || ["arrays", "logs"].contains(&finding.topic())
+                || ALWAYS.contains(&finding.name.as_str())
+        };
+        findings.retain(|finding| self.options.only.is_empty() || is_kept(finding));
+        sort(&mut findings);
+        findings
+    }
+
+    fn report(&self, checker: &Checker, mut findings: Vec<Finding>) -> Report {
+        sort(&mut findings);
+        let mut report = Report::new(self.path, checker, findings);
+        report.seconds = self.begin.elapsed().as_secs_f64();
+        let why = if self.options.only.is_empty() { "left out (--quick)" } else { "left out (--only)" };
+        let unwanted = rules::TOPICS.iter().filter(|topic| !is_wanted(self.options, topic));
+        report.unreached.extend(unwanted.map(|topic| Unchecked {
+            name: (*topic).to_owned(),
+            why: why.to_owned(),
+            allowed: true,
+        }));
+        report.evaluate(self.options, &self.baseline);
+        report
+    }
+}
+
+fn sort(findings: &mut [Finding]) {
+    findings.sort_by(|one, other| other.severity.cmp(&one.severity).then_with(|| one.name.cmp(&other.name)));
 }
 
 /// Returns the error in the encoding of a model description, which its XML declaration or its bytes have.
@@ -266,11 +342,16 @@ fn setting(
     (setting, without)
 }
 
+/// Returns the number of threads.
+fn threads() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from).min(8)
+}
+
 /// Calls `each` with each item and the number of items so far, on several threads. With `progress`, prints the line that it returns.
 fn in_parallel<T: Sync>(items: &[T], progress: bool, each: impl Fn(&T, usize) -> String + Sync) {
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     std::thread::scope(|scope| {
-        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from).min(8) {
+        for _ in 0..threads() {
             scope.spawn(|| {
                 while let Some(item) = items.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let line = each(item, done.fetch_add(1, Ordering::Relaxed) + 1);
@@ -305,8 +386,13 @@ fn attack_with(
     }
 }
 
-/// Executes all checks of the wanted topics on several threads.
-fn attack(checker: &Checker, progress: bool, wanted: &(impl Fn(&str) -> bool + Sync)) -> anyhow::Result<()> {
+/// Executes all checks of the wanted topics on several threads, and calls `written` after each.
+fn attack(
+    checker: &Checker,
+    progress: bool,
+    wanted: &(impl Fn(&str) -> bool + Sync),
+    written: &(impl Fn() -> anyhow::Result<()> + Sync),
+) -> anyhow::Result<()> {
     let wanted_checks = checks::ALL.iter().filter(|(topic, _)| wanted(topic));
     let jobs: Vec<_> = wanted_checks
         .flat_map(|(topic, check)| {
@@ -314,15 +400,31 @@ fn attack(checker: &Checker, progress: bool, wanted: &(impl Fn(&str) -> bool + S
             std::iter::once(None).chain(each).map(move |trajectory| (*topic, *check, trajectory))
         })
         .collect();
-    let failure = Mutex::new(None);
+    // Topics that have begun are in the report as not checked until they are finished.
+    let remaining: Vec<(&str, AtomicUsize)> = rules::TOPICS
+        .into_iter()
+        .map(|topic| (topic, AtomicUsize::new(jobs.iter().filter(|(of, ..)| *of == topic).count())))
+        .filter(|(_, count)| count.load(Ordering::Relaxed) > 0)
+        .collect();
+    remaining.iter().for_each(|(topic, _)| checker.unchecked(topic, UNFINISHED.to_owned()));
+    let (failure, writing) = (Mutex::new(None), Mutex::new(()));
     in_parallel(&jobs, progress, |(topic, check, trajectory), done| {
-        match attack_with(checker, *check, *trajectory) {
-            Ok(()) => {}
-            Err(error) if error.is::<Stop>() && !worker::interrupted() => {
-                checker.unchecked(topic, error.to_string());
+        let result = match attack_with(checker, *check, *trajectory) {
+            Err(error) if error.is::<Stop>() || worker::interrupted() => {
+                checker.stopped(topic, stop(&error));
+                Ok(())
             }
-            Err(error) => *failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error),
+            result => result,
+        };
+        let counts = remaining.iter().filter(|(of, _)| of == topic);
+        if counts.map(|(_, count)| count.fetch_sub(1, Ordering::Relaxed)).any(|count| count == 1) {
+            checker.finished(topic, UNFINISHED);
         }
+        let one_at_a_time = writing.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Err(error) = result.and_then(|()| written()) {
+            *failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+        }
+        drop(one_at_a_time);
         let remaining = checker.deadline.saturating_duration_since(Instant::now()).as_secs();
         let (all, executed) = (jobs.len(), checker.executed());
         format!("{done} of {all} checks, {executed} call sequences run, {remaining} s remaining: {topic:20}")
@@ -330,16 +432,16 @@ fn attack(checker: &Checker, progress: bool, wanted: &(impl Fn(&str) -> bool + S
     failure.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
 }
 
-fn shorten(checker: &Checker, findings: &mut [Finding], options: &Options, progress: bool) {
+/// Shortens the call sequences of all findings and runs their programs. Each finding has the same part of the remaining time.
+fn prove(checker: &Checker, findings: &mut [Finding], scratch: &Path, options: &Options, progress: bool) {
     let count = findings.len();
     let slots: Vec<Mutex<&mut Finding>> = findings.iter_mut().map(Mutex::new).collect();
-    in_parallel(&slots, progress, |slot, _| {
+    in_parallel(&slots, progress, |slot, number| {
         let mut finding = slot.lock().unwrap_or_else(PoisonError::into_inner);
-        if !options.no_shrink {
-            checker.shorten(&mut finding);
-        }
-        // Without a successful run, the finding has no program.
-        let _ = checker.reproduce(&mut finding);
+        let rounds = (count + 1 - number).div_ceil(threads());
+        let share =
+            checker.end.saturating_duration_since(Instant::now()) / u32::try_from(rounds).unwrap_or(1);
+        checker.prove(&mut finding, scratch, !options.no_shrink, Instant::now() + share);
         format!("the shortest calls for {count} findings: {:40}", finding.name)
     });
 }

@@ -14,7 +14,7 @@ pub struct Options {
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(
         rules::TOPICS.iter().chain(&INTERFACES)))]
     pub allow_unchecked: Vec<String>,
-    /// Maximum duration of the check in seconds.
+    /// Maximum duration of the check in seconds, with everything that belongs to it.
     #[arg(long, default_value_t = 120.0)]
     pub time: f64,
     /// Maximum duration of a call sequence in seconds; a longer one is a hang.
@@ -56,6 +56,30 @@ pub struct Options {
     /// Runs an FMU that starts another program, which must be installed.
     #[arg(long)]
     pub execution_tool: bool,
+}
+
+/// The defaults of the command.
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            only: Vec::new(),
+            allow_unchecked: Vec::new(),
+            time: 120.0,
+            limit: 10.0,
+            memory: 8192,
+            unpacked: 1000,
+            seed: 1,
+            quick: false,
+            baseline: None,
+            explain: None,
+            out: None,
+            json: false,
+            fail_on: FailOn::Violation,
+            repeat: 1.5,
+            no_shrink: false,
+            execution_tool: false,
+        }
+    }
 }
 
 /// Lowest severity that fails the check.

@@ -1,6 +1,8 @@
 //! Executes call sequences in separate processes.
 
 use crate::call_sequence::{CallSequence, End, Numbered, Outcome, Run, Setting, Step};
+#[cfg(target_os = "linux")]
+use crate::worker::Program;
 use crate::worker::{EXECUTED, Ended, Job, Last, OWN_FAULT, SCRATCH, Unloadable, VARIABLE, interrupted};
 use anyhow::{Context as _, bail};
 use std::collections::HashMap;
@@ -87,9 +89,42 @@ impl Workers {
         Ok(run)
     }
 
+    /// Runs a program with the directory of the FMU as its argument, contained as a call sequence is. Returns its exit status, 1 if
+    /// the FMU ended it, and `None` after the limit.
+    pub fn program(
+        &self,
+        program: &Path,
+        fmu: &Path,
+        memory: u64,
+        limit: f64,
+    ) -> anyhow::Result<Option<i32>> {
+        #[cfg(target_os = "linux")]
+        {
+            let program = Program { program: program.to_owned(), fmu: fmu.to_owned(), memory };
+            let ended = self.process(&program, (0, false), limit)?;
+            // An FMU that starts too many processes or ends the program by a signal is at fault, too.
+            let is_attack = ended.flood.is_some() || ended.signal.is_some();
+            Ok(if is_attack { Some(1) } else { ended.code })
+        }
+        #[cfg(not(target_os = "linux"))]
+        {
+            let _ = memory;
+            let mut command = Command::new(program);
+            command.arg(fmu).env("TMPDIR", &self.scratch);
+            command.stdin(std::process::Stdio::null()).stdout(std::process::Stdio::null());
+            command.stderr(std::process::Stdio::null());
+            Ok(self.wait(&mut command, limit)?.and_then(|status| status.code()))
+        }
+    }
+
     /// Executes a job in a process that an idle server forks.
     #[cfg(target_os = "linux")]
-    fn process(&self, job: &Job, situation: Situation, limit: f64) -> anyhow::Result<Ended> {
+    fn process(
+        &self,
+        job: &impl serde::Serialize,
+        situation: Situation,
+        limit: f64,
+    ) -> anyhow::Result<Ended> {
         let idle = || self.idle.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let server = idle().get_mut(&situation).and_then(Vec::pop);
         let mut server = match server {
@@ -118,9 +153,20 @@ impl Workers {
         std::fs::create_dir(at("here"))?;
         let output = std::fs::File::create(at("output"))?;
         let mut command = worker(&at("job"), &self.scratch, situation)?;
-        #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(&mut command, 0);
         command.current_dir(at("here")).stdin(Stdio::null()).stdout(output.try_clone()?).stderr(output);
+        let ended = self.wait(&mut command, limit)?;
+        let read =
+            |name: &str| String::from_utf8_lossy(&std::fs::read(at(name)).unwrap_or_default()).into_owned();
+        let ended = ended.map(Ended::from).unwrap_or_default();
+        Ok(Ended { output: read("output"), outcomes: read("outcomes"), inside: true, ..ended })
+    }
+
+    /// Runs a command in a separate process group for at most `limit` seconds; returns its status, or `None` after the limit.
+    #[cfg(not(target_os = "linux"))]
+    #[allow(clippy::unused_self, reason = "the processes belong to the workers")]
+    fn wait(&self, command: &mut Command, limit: f64) -> anyhow::Result<Option<std::process::ExitStatus>> {
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(command, 0);
         let mut child = command.spawn().context("a process for the FMU cannot be started")?;
         let begin = std::time::Instant::now();
         let ended = loop {
@@ -138,10 +184,7 @@ impl Workers {
         if interrupted() {
             return Err(Stop::Interrupted.into());
         }
-        let read =
-            |name: &str| String::from_utf8_lossy(&std::fs::read(at(name)).unwrap_or_default()).into_owned();
-        let ended = ended.map(Ended::from).unwrap_or_default();
-        Ok(Ended { output: read("output"), outcomes: read("outcomes"), inside: true, ..ended })
+        Ok(ended)
     }
 }
 

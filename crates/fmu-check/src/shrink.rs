@@ -37,6 +37,7 @@ fn content(step: &Step) -> Option<String> {
             let reads = function[4..].starts_with("Get") && !function.to_lowercase().ends_with("fmustate");
             (!reads).then(|| format!("{function} {args:?}"))
         }
+        Step::Integrate(_, how) => Some(format!("{how:?}")),
         Step::Repeat(..) | Step::Parallel(_) | Step::Measure | Step::Version(_) => None,
         Step::Make(..) | Step::Free(_) | Step::FreshProcess | Step::Unload | Step::Quit => None,
     }

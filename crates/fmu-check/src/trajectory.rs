@@ -40,12 +40,12 @@ pub fn find_trajectory(checker: &Checker, interface: Interface) -> anyhow::Resul
 }
 
 /// Returns the duration of the default experiment; 1 s if it has no stop time.
-fn range(description: &Description) -> f64 {
+pub fn range(description: &Description) -> f64 {
     description.stop_time.map_or(1.0, |stop| stop - description.start_time).max(1e-6)
 }
 
 /// Returns the step size, a multiple of `fixedInternalStepSize` if there is one (section 4.4.1 of FMI 3.0).
-fn step_size(description: &Description) -> f64 {
+pub fn step_size(description: &Description) -> f64 {
     let size = description.step_size.unwrap_or(range(description) / 100.0);
     let internal = description.co_simulation.as_ref().and_then(|offer| offer.number("fixedInternalStepSize"));
     internal.map_or(size, |internal| internal * (size / internal).round().clamp(1.0, 100.0))

@@ -4,6 +4,7 @@ pub mod dependencies;
 pub mod derivatives;
 pub mod early_returns;
 pub mod functions;
+pub mod interfaces;
 pub mod life_cycle;
 pub mod logs;
 pub mod malformed;
@@ -87,6 +88,7 @@ pub const ALL: &[(&str, Check)] = &[
     ("dependencies", Each(Always, dependencies::missing)),
     ("dependencies", Each(Always, dependencies::initial)),
     ("rejections", Each(Always, rejections::change_nothing)),
+    ("results", Once(interfaces::compare)),
     ("results", Each(Several, results::instances)),
     ("results", Each(Always, results::reading)),
     ("results", Each(Always, results::name)),

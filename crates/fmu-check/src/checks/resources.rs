@@ -106,6 +106,11 @@ fn measured(
     Ok(())
 }
 
+/// Returns the first setting that is in only the first list.
+fn only_in<'a>(one: &'a [String], other: &[String]) -> Option<&'a String> {
+    one.iter().find(|setting| !other.contains(setting))
+}
+
 /// Checks that a simulation does not change settings of the process and prints nothing.
 fn settings(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
@@ -115,8 +120,14 @@ fn settings(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let last = writer.add(Step::Measure);
     let run = checker.evaluate("resources.settings", writer.sequence.clone(), move |run| {
         let (one, two) = (run.outcome(first)?.measured.as_ref()?, run.outcome(last)?.measured.as_ref()?);
-        let (was, is) = one.settings.iter().zip(&two.settings).find(|(was, is)| was != is)?;
-        Some(format!("{was} has become {is}"))
+        // The environment may have more or fewer variables than before.
+        let (gone, new) = (only_in(&one.settings, &two.settings), only_in(&two.settings, &one.settings));
+        match (gone, new) {
+            (None, None) => None,
+            (Some(was), Some(is)) => Some(format!("{was} has become {is}")),
+            (Some(was), None) => Some(format!("{was} is gone")),
+            (None, Some(is)) => Some(format!("{is} is new")),
+        }
     })?;
     checker.record("logs.printed", &run, &writer.sequence, |run| {
         let line = run.output.lines().find(|line| !line.trim().is_empty())?;

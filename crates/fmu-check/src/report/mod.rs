@@ -1,12 +1,14 @@
 //! Report for a terminal, as an HTML page, as JSON, as JUnit and as SARIF.
 
+mod causes;
 mod page;
 mod sarif;
 
 use crate::baseline::Baseline;
 use crate::checker::{Checker, Unchecked};
-use crate::finding::{Finding, Severity};
+use crate::finding::{Finding, Proof, Severity};
 use crate::options::{FailOn, Options};
+use crate::rules::TOPICS;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -21,8 +23,12 @@ pub struct Report {
     pub status: u8,
     /// Path of the FMU.
     pub fmu: String,
+    /// Day of the check (UTC).
+    pub date: String,
     /// Name of the model.
     pub model: String,
+    /// `guid` or `instantiationToken`.
+    pub token: String,
     /// FMI version.
     pub standard: String,
     /// Interface types that were checked.
@@ -35,6 +41,8 @@ pub struct Report {
     pub seed: u64,
     /// Number of variables, and of the variables that most checks read.
     pub variables: [usize; 2],
+    /// Topics that were checked and have no finding.
+    pub passed: Vec<String>,
     /// Interface types and topics that were not checked, with the reason for each.
     pub unreached: Vec<Unchecked>,
     /// Names in the baseline that match no finding and nothing unchecked.
@@ -51,7 +59,10 @@ impl Report {
             status: 0,
             unused: Vec::new(),
             fmu: path.display().to_string(),
+            date: today(),
             model: checker.description.model_name.clone(),
+            token: checker.description.token.clone(),
+            passed: Vec::new(),
             standard: checker.description.standard.to_string(),
             interfaces: checker
                 .trajectories
@@ -62,7 +73,7 @@ impl Report {
             seconds: 0.0,
             seed: checker.seed,
             variables: [checker.description.variables.len(), checker.readable.len()],
-            unreached: checker.take_unchecked(),
+            unreached: checker.all_unchecked(),
             findings,
         }
     }
@@ -87,6 +98,13 @@ impl Report {
             }
             unchecked.allowed = reason.is_some() || options.allow_unchecked.contains(&unchecked.name);
         }
+        let is_passed = |topic: &str| {
+            !self.unreached.iter().any(|unchecked| unchecked.name == topic)
+                && !self.findings.iter().any(|finding| finding.topic() == topic)
+        };
+        let passed = TOPICS.into_iter().filter(|topic| is_passed(topic));
+        self.passed = passed.map(str::to_owned).collect();
+        causes::explain(&mut self.findings);
         let fails = self.findings.iter().any(|finding| finding.fails);
         let unchecked = self.unreached.iter().any(|unchecked| !unchecked.allowed);
         self.status = if fails { 1 } else { 2 * u8::from(unchecked) };
@@ -143,12 +161,18 @@ impl Report {
             };
             let calls = match finding.steps {
                 (0, 0) => String::new(),
-                (_, steps) => format!("; {steps} calls reproduce it"),
+                (_, steps) => match &finding.proof {
+                    Proof::NotShown(why) => format!("; not reproduced ({why}), so only a note"),
+                    Proof::NotRun(why) => format!("; {steps} calls, not reproduced ({why})"),
+                    Proof::Files | Proof::Shown => format!("; {steps} calls reproduce it"),
+                },
             };
             let section = if finding.section.is_empty() { "not in the standard" } else { &finding.section };
             let accepted =
                 finding.accepted.as_ref().map_or(String::new(), |reason| format!("; accepted: {reason}"));
-            let _ = writeln!(text, "{:36} {section}{calls}{more}{accepted}", "");
+            let cause =
+                finding.cause.as_ref().map_or(String::new(), |cause| format!("; may follow from {cause}"));
+            let _ = writeln!(text, "{:36} {section}{calls}{more}{cause}{accepted}", "");
         }
         for Unchecked { name, why, allowed } in &self.unreached {
             let allowed = if *allowed { " (allowed)" } else { "" };
@@ -181,7 +205,7 @@ impl Report {
         };
         let finding_case = |finding: &Finding| {
             let Finding { observed, section, requirement, .. } = finding;
-            let body = format!("{observed}\n{section}: {requirement}\n{}", finding.more.join("\n"));
+            let body = format!("{observed}\n{requirement}\n{section}\n{}", finding.more.join("\n"));
             let accepted = finding.accepted.as_ref().map(|reason| format!("\nAccepted: {reason}"));
             let (severity, body) = (finding.severity.name(), escape(&(body + &accepted.unwrap_or_default())));
             let body = match finding.fails {
@@ -224,6 +248,19 @@ impl Report {
         }
         Ok(())
     }
+}
+
+/// Returns the day of today (UTC) as in 2030-12-31.
+fn today() -> String {
+    let seconds = std::time::UNIX_EPOCH.elapsed().map_or(0, |since| since.as_secs());
+    // Years of 365.2425 days that begin in March, so that the leap day is their last one.
+    let days = seconds / 86400 + 719_468;
+    let (era, day) = (days / 146_097, days % 146_097);
+    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
+    let day = day - (365 * year + year / 4 - year / 100);
+    let month = (5 * day + 2) / 153;
+    let (day, month) = (day - (153 * month + 2) / 5 + 1, if month < 10 { month + 3 } else { month - 9 });
+    format!("{:04}-{month:02}-{day:02}", era * 400 + year + u64::from(month < 3))
 }
 
 fn short(text: &str, max_length: usize) -> String {

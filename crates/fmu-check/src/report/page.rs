@@ -1,7 +1,7 @@
 //! Report as an HTML page that needs no other files.
 
 use super::Report;
-use crate::finding::Severity;
+use crate::finding::{Proof, Severity};
 use std::fmt::Write as _;
 
 /// Escapes a string for XML and HTML.
@@ -14,7 +14,10 @@ pub fn page(report: &Report) -> String {
     for (severity, what) in [
         (Severity::Violation, "Violation: the standard requires it."),
         (Severity::Fragile, "Fragile: no rule forbids it, but importers fail."),
-        (Severity::Note, "Note: information."),
+        (
+            Severity::Note,
+            "Note: importers work all the same, or the program of the finding does not show it.",
+        ),
     ] {
         let findings: Vec<_> =
             report.findings.iter().filter(|finding| finding.severity == severity).collect();
@@ -26,12 +29,18 @@ pub fn page(report: &Report) -> String {
             let name = severity.name();
             let _ = write!(
                 text,
-                "<section class=\"{name}\"><span class=\"severity\">{name}</span><h2>{}</h2>\n<p>{}</p>\n<p>{}: {}</p>\n",
+                "<section class=\"{name}\"><span class=\"severity\">{name}</span><h2>{}</h2>\n<p>{}</p>\n<p>Rule: {}</p>\n<p>{}</p>\n",
                 finding.name,
                 escape(&finding.observed),
-                if finding.section.is_empty() { "Not in the standard" } else { &finding.section },
-                escape(&finding.requirement)
+                escape(&finding.requirement),
+                if finding.section.is_empty() { "Not in the standard" } else { &finding.section }
             );
+            if let Some(cause) = &finding.cause {
+                let _ = writeln!(text, "<p>It may follow from {cause}, which should be repaired first.</p>");
+            }
+            if let Proof::NotShown(why) | Proof::NotRun(why) = &finding.proof {
+                let _ = writeln!(text, "<p>Not reproduced: {}.</p>", escape(why));
+            }
             if let Some(reason) = &finding.accepted {
                 let _ = writeln!(text, "<p>Accepted: {}</p>", escape(reason));
             }
@@ -56,6 +65,9 @@ pub fn page(report: &Report) -> String {
     if report.findings.is_empty() {
         text.push_str("<p>Nothing was found.</p>\n");
     }
+    if !report.passed.is_empty() {
+        let _ = writeln!(text, "<p>Checked without a finding: {}.</p>", report.passed.join(", "));
+    }
     if !report.unreached.is_empty() {
         text.push_str("<p>Not checked:</p><ul>\n");
         for unchecked in &report.unreached {
@@ -66,6 +78,9 @@ pub fn page(report: &Report) -> String {
     let values = [
         ("{model}", escape(&report.model)),
         ("{fmu}", escape(&report.fmu)),
+        ("{date}", report.date.clone()),
+        ("{version}", report.version.to_owned()),
+        ("{token}", escape(&report.token)),
         ("{standard}", report.standard.clone()),
         ("{interfaces}", report.offers()),
         ("{summary}", report.summary()),

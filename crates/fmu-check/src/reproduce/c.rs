@@ -1,7 +1,9 @@
 //! Writes a call sequence as a program in C.
 
 use super::evidence::{Evidence, Expected, Measure};
-use crate::call_sequence::{Arg, CallSequence, Kind, Make, NULL_INSTANCE, Numbered, Setting, Step};
+use crate::call_sequence::{
+    Arg, CallSequence, Integration, Kind, Make, NULL_INSTANCE, Numbered, Setting, Step,
+};
 use crate::description::Description;
 use crate::finding::Finding;
 use fmi_abi::calls::signature;
@@ -46,20 +48,26 @@ pub fn program(
     let save = each(bytes, &|slot| format!("    pass_on({slot}, b{slot}, *n{slot});\n"));
     let list: Vec<String> = (0..parts.len()).map(|number| format!("phase{number}")).collect();
     format!(
-        "/*\n{} * cc repro.c -o repro -ldl -lpthread -lm && ./repro DIRECTORY_OF_THE_UNPACKED_FMU\n *\n \
+        "/*\n{} * cc -ffp-contract=off repro.c -o repro -ldl -lpthread -lm && ./repro DIRECTORY_OF_THE_UNPACKED_FMU\n *\n \
          * Exit status: 1 if the finding is reproduced, 0 if it is not, 3 if that is not known.\n */\n\
          #define FMI {}\n{}{declared}\n{threads}{}static void (*const phases[])(void) = {{{}}};\n\
          static const char library_name[] = \"{}\";\n\nstatic void load(void) {{\n{load}}}\n\n\
          static void save(void) {{\n{save}}}\n\n{}{}",
         head(finding, description),
         if setting.fmi3 { 3 } else { 2 },
-        include_str!("prelude.c"),
+        prelude(sequence),
         parts.concat(),
         list.join(", "),
         library(setting, sequence),
         shows(evidence),
         include_str!("main.c")
     )
+}
+
+/// Returns the functions that the calls need.
+fn prelude(sequence: &CallSequence) -> String {
+    let integrates = sequence.iter().any(|numbered| matches!(numbered.step, Step::Integrate(..)));
+    [include_str!("prelude.c"), if integrates { include_str!("integrate.c") } else { "" }].concat()
 }
 
 /// Returns the lines of the comment at the top of a program.
@@ -97,11 +105,19 @@ fn shows(evidence: &Evidence) -> String {
             let list: Vec<String> = pairs.iter().map(|[one, other]| format!("{{{one}, {other}}}")).collect();
             Some(format!("any_differ((const int[][2]){{{}}}, {})", list.join(", "), pairs.len()))
         }
-        Evidence::Same(expected) => {
-            let same = |Expected { id, observed, .. }: &Expected| {
-                format!("strcmp(result(\"r\", {id}), {}) == 0", literal(observed.as_bytes()))
+        Evidence::Same(expected, pairs) => {
+            let same = |Expected { id, observed, .. }: &Expected| match is_paired(pairs, *id) {
+                // Only the status.
+                true => {
+                    let (status, _) = observed.split_once(';').unwrap_or_default();
+                    format!("begins(result(\"r\", {id}), \"{status};\")")
+                }
+                false => format!("strcmp(result(\"r\", {id}), {}) == 0", literal(observed.as_bytes())),
             };
-            Some(expected.iter().map(same).collect::<Vec<_>>().join("\n        && "))
+            let differ =
+                |[one, other]: &[u32; 2]| format!("any_differ((const int[][2]){{{{{one}, {other}}}}}, 1)");
+            let all: Vec<String> = expected.iter().map(same).chain(pairs.iter().map(differ)).collect();
+            Some(all.join("\n        && "))
         }
         Evidence::Grown(Measure::Settings, first, last, _) => {
             let [first, last] = [first, last].map(|id| format!("strchr(result(\"r\", {id}), ';')"));
@@ -120,6 +136,11 @@ fn shows(evidence: &Evidence) -> String {
     };
     let results = results.unwrap_or_else(|| "false".to_owned());
     format!("#define EVIDENCE {kind}\n\nstatic bool shows(void) {{\n    return {results};\n}}\n\n")
+}
+
+/// Returns whether a call belongs to a pair.
+fn is_paired(pairs: &[[u32; 2]], id: u32) -> bool {
+    pairs.iter().any(|pair| pair.contains(&id))
 }
 
 /// Writes calls, and collects the functions and variables that they need.
@@ -148,8 +169,10 @@ impl Writer<'_> {
     /// Returns whether the values and the messages of a call are compared; `None` if the call is not compared.
     fn matters(&self, id: u32) -> Option<[bool; 2]> {
         match self.evidence {
-            Evidence::Same(expected) => {
-                expected.iter().find(|result| result.id == id).map(|result| result.matters)
+            Evidence::Same(expected, pairs) => {
+                let result = expected.iter().find(|result| result.id == id)?;
+                let [values, messages] = result.matters;
+                Some([values, messages && !is_paired(pairs, id)])
             }
             Evidence::Differ(pairs) => pairs.iter().any(|pair| pair.contains(&id)).then_some([true, false]),
             _ => None,
@@ -190,6 +213,21 @@ impl Writer<'_> {
                     let _ = writeln!(joins, "pthread_join(t{number}, NULL);");
                 }
                 text + &joins
+            }
+            Step::Integrate(index, how) => {
+                let (euler, Integration { states, indicators, steps, .. }) = (u8::from(how.euler), how);
+                let (begin, end) = (how.begin, how.end);
+                let call = format!(
+                    "integrate(c{index}, {begin:?}, {end:?}, {steps}, {euler}, {states}, {indicators}, events)"
+                );
+                let result = match self.matters(*id) {
+                    None => String::new(),
+                    Some([written, _]) => {
+                        let events = if written { "put_numbers(file, events, 3, 8); " } else { "" };
+                        format!("FILE *file = begin({id}, status); {events}end(file, \"\"); ")
+                    }
+                };
+                format!("if (c{index}) {{ double events[3]; int status = {call}; {result}}}\n")
             }
             Step::FreshProcess => String::new(),
         }

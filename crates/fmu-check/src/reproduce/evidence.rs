@@ -1,7 +1,7 @@
 //! Results that are compared by the program that reproduces a finding: those without which the criterion is fulfilled.
 
-use crate::call_sequence::{Arg, CallSequence, End, Numbered, Outcome, Run, Step, Values, step_of};
-use crate::finding::{Finding, SharedCriterion, step_name};
+use crate::call_sequence::{CallSequence, End, Numbered, Outcome, Run, Step, Values};
+use crate::finding::{Finding, SharedCriterion};
 use std::fmt::Write as _;
 
 /// Comparison by which a program decides whether it reproduces the finding.
@@ -22,14 +22,17 @@ pub enum Evidence {
     Strays,
     /// Pairs of calls, at least one of which has different results.
     Differ(Vec<[u32; 2]>),
-    /// Calls that all have the expected results.
-    Same(Vec<Expected>),
+    /// Calls that all have the expected results, and pairs of calls that all have different values.
+    Same(Vec<Expected>, Vec<[u32; 2]>),
     /// Quantity that grows by more than a number between the measurements of two steps; settings only differ.
     Grown(Measure, u32, u32, u64),
 }
 
 /// Maximum number of repetitions in a program.
 const REPETITIONS: usize = 500;
+
+/// Maximum number of calls among which pairs are searched.
+const MOST_COMPARED: usize = 12;
 
 /// Quantity of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,14 +89,49 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     let mut ids: Vec<u32> = calls.map(|outcome| outcome.id).collect();
     ids.sort_unstable();
     let expected: Vec<Expected> = ids.iter().map(|id| expected_result(criterion, &needed, *id)).collect();
-    let calls: Vec<_> = expected.iter().filter_map(|result| function(&finding.sequence, result.id)).collect();
-    match &calls[..] {
-        [one, other] if one == other && expected[0].observed != expected[1].observed => {
-            Evidence::Differ(vec![[expected[0].id, expected[1].id]])
-        }
+    let unequal = unequal(criterion, &needed, &expected);
+    match &expected[..] {
         [] => Evidence::None,
-        _ => Evidence::Same(expected),
+        _ => Evidence::Same(expected, unequal),
     }
+}
+
+/// Returns the pairs of calls whose values only have to differ: with equal values, the criterion is fulfilled. The values of an FMU
+/// may be others in every run.
+fn unequal(criterion: &SharedCriterion, run: &Run, expected: &[Expected]) -> Vec<[u32; 2]> {
+    let compared: Vec<&Outcome> = expected
+        .iter()
+        .filter(|result| result.matters[0])
+        .filter_map(|result| run.outcome(result.id))
+        .collect();
+    let equalized = |from: &Outcome, to: &Outcome| {
+        let mut changed = run.clone();
+        changed.outcomes.entry(to.id).and_modify(|outcome| outcome.written.clone_from(&from.written));
+        criterion(&changed).is_none()
+    };
+    let mut pairs = Vec::new();
+    // A criterion with more calls compares more than pairs.
+    if compared.len() > MOST_COMPARED {
+        return pairs;
+    }
+    for (index, one) in compared.iter().enumerate() {
+        let others = compared[index + 1..].iter().filter(|other| alike(one, other));
+        let other = others.into_iter().find(|other| equalized(one, other) && equalized(other, one));
+        pairs.extend(other.map(|other| [one.id, other.id]));
+    }
+    pairs
+}
+
+/// Returns whether two calls wrote different values of the same number and types.
+fn alike(one: &Outcome, other: &Outcome) -> bool {
+    let shape = |outcome: &Outcome| -> Vec<_> {
+        let of = |values: &Values| match values {
+            Values::Numbers(kind, bits) => (Some(*kind), bits.len()),
+            Values::Strings(texts) => (None, texts.len()),
+        };
+        outcome.written.iter().map(of).collect()
+    };
+    one.written != other.written && shape(one) == shape(other)
 }
 
 /// Returns each read on a thread with the corresponding read of the simulation before the threads. The pairs that differ are
@@ -191,17 +229,6 @@ fn shown(outcome: &Outcome, [written, log]: [bool; 2]) -> String {
     text
 }
 
-/// Returns the function of a step and its arguments except saved states, to find calls that read the same values.
-fn function(sequence: &[Numbered], id: u32) -> Option<String> {
-    Some(match &step_of(sequence, id)?.step {
-        Step::Call { function, args, .. } => {
-            let outputs: Vec<_> = args.iter().filter(|arg| !matches!(arg, Arg::State(_))).collect();
-            format!("{function} {outputs:?}")
-        }
-        other => step_name(other),
-    })
-}
-
 /// Returns the comparison of two measurements.
 fn grown(finding: &Finding, needed: &Run) -> Evidence {
     let mut ids: Vec<(u32, bool)> = needed
@@ -280,14 +307,15 @@ mod tests {
             let (one, other) = (run.written(1)?, run.written(3)?);
             one.differ(other).map(|_| "they differ".to_owned())
         });
-        assert_eq!(evidence(&finding(criterion), &run()), Evidence::Differ(vec![[1, 3]]));
+        let Evidence::Same(_, pairs) = evidence(&finding(criterion), &run()) else { panic!("no calls") };
+        assert_eq!(pairs, [[1, 3]]);
     }
 
     #[test]
     fn a_call_that_fails_must_fail_again() {
         let criterion: SharedCriterion =
             Arc::new(|run| run.status(2).filter(|status| *status == 3).map(|_| "it fails".to_owned()));
-        let Evidence::Same(expected) = evidence(&finding(criterion), &run()) else { panic!("a call") };
+        let Evidence::Same(expected, _) = evidence(&finding(criterion), &run()) else { panic!("a call") };
         assert_eq!(expected.iter().map(|result| result.observed.as_str()).collect::<Vec<_>>(), ["3;"]);
     }
 
@@ -295,7 +323,7 @@ mod tests {
     fn messages_are_compared_where_they_matter() {
         let criterion: SharedCriterion =
             Arc::new(|run| run.outcome(2)?.log.first().map(|_| "a message".to_owned()));
-        let Evidence::Same(expected) = evidence(&finding(criterion), &run()) else { panic!("a call") };
+        let Evidence::Same(expected, _) = evidence(&finding(criterion), &run()) else { panic!("a call") };
         assert_eq!(expected[0].observed, "3;3 - 6e6f;");
     }
 

@@ -57,7 +57,8 @@ static void clear(void) {
 }
 
 int main(int count, char **arguments) {
-    char *full = realpath(count > 1 ? arguments[1] : ".", NULL), number[20], temporary[] = "/tmp/fmu-check-XXXXXX";
+    char *full = realpath(count > 1 ? arguments[1] : ".", NULL), number[20], temporary[5000];
+    const char *directory = getenv("TMPDIR");
     size_t i;
     int status;
     bool found;
@@ -66,6 +67,7 @@ int main(int count, char **arguments) {
     snprintf(resources, sizeof resources, FMI == 3 ? "%s/resources/" : "file://%s/resources", full);
     snprintf(library_path, sizeof library_path, "%s/%s", full, library_name);
     if (count > 3) { scratch = arguments[3]; phase(atoi(arguments[2])); }
+    snprintf(temporary, sizeof temporary, "%s/fmu-check-XXXXXX", directory && *directory ? directory : "/tmp");
     if (!mkdtemp(temporary)) { perror("mkdtemp"); return 3; }
     scratch = temporary;
 #if defined(__linux__)
@@ -90,7 +92,8 @@ int main(int count, char **arguments) {
         waitpid(child, &status, 0);
         if (WIFSIGNALED(status)) printf("the process was ended by signal %d (%s)\n", WTERMSIG(status), strsignal(WTERMSIG(status)));
         else if (WEXITSTATUS(status)) printf("the process ended with exit status %d\n", WEXITSTATUS(status));
-        if (status) { orphans(); clear(); return EVIDENCE == END ? 1 : 3; }
+        /* A crash or a hang shows that the FMU is broken, even if another end was expected. */
+        if (status) { orphans(); clear(); return EVIDENCE == END || WIFSIGNALED(status) ? 1 : 3; }
     }
     found = orphans();
     if (EVIDENCE != ORPHANS) found = EVIDENCE == RESULTS && shows();

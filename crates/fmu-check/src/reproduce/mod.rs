@@ -1,6 +1,7 @@
 //! Programs in C that reproduce a finding without fmu-check.
 
 mod c;
+pub mod confirm;
 mod evidence;
 
 use crate::call_sequence::{Run, Setting};

@@ -13,6 +13,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/time.h>
 #if defined(__linux__)
 #include <sys/prctl.h>
 #endif
@@ -62,6 +65,10 @@ static __attribute__((unused)) char *result(const char *kind, int number) {
     if (!fread(text, 1, (1 << 24) - 1, file)) *text = 0;
     fclose(file);
     return text;
+}
+
+static __attribute__((unused)) bool begins(const char *text, const char *with) {
+    return strncmp(text, with, strlen(with)) == 0;
 }
 
 static __attribute__((unused)) bool any_differ(const int (*pairs)[2], size_t count) {
@@ -256,6 +263,16 @@ static __attribute__((unused)) void show(const void *array, size_t count, char k
     }
 }
 
+/* Returns the time of the next time event of an instance. */
+static double *next_event(void *instance) {
+    static struct { void *instance; double next; } known[64];
+    size_t i;
+    for (i = 0; i < 63 && known[i].instance && known[i].instance != instance; i++) {}
+    if (!known[i].instance) known[i].next = INFINITY;
+    known[i].instance = instance;
+    return &known[i].next;
+}
+
 /* Updates the discrete states until no further update is needed, as an importer must before it leaves Event Mode. A flag that
    reports a change remains set if any of the updates has set it. */
 #if FMI == 2
@@ -267,6 +284,7 @@ static __attribute__((unused)) int update_states(void *instance, void *info) {
         for (i = 1; i < 4; i++) seen[i] |= flags[i] != 0;
     } while (status < 2 && flags[0] && ++times < 100);
     for (i = 1; i < 4; i++) if (status < 2 && times && seen[i]) memset(&flags[i], 1, 1);
+    if (status < 2) *next_event(instance) = flags[4] ? *(double *)((char *)info + 24) : INFINITY;
     return status;
 }
 #else
@@ -278,6 +296,7 @@ static __attribute__((unused)) int update_states(void *instance, void *again, vo
         for (i = 1; i < 4; i++) seen[i] |= *flags[i] != 0;
     } while (status < 2 && *flags[0] && ++times < 100);
     for (i = 1; i < 4; i++) if (status < 2 && times && seen[i]) *flags[i] = 1;
+    if (status < 2) *next_event(instance) = *flags[4] ? *(double *)next : INFINITY;
     return status;
 }
 #endif
@@ -288,6 +307,29 @@ static long entries(const char *path) {
     while (directory && readdir(directory)) count++;
     if (directory) closedir(directory);
     return count;
+}
+
+extern char **environ;
+
+/* Writes the mask for new files, limits, the periods of timers, the files of the working directory and the environment. */
+static void put_settings(FILE *file) {
+    int limits[] = {RLIMIT_NOFILE, RLIMIT_STACK, RLIMIT_CPU, RLIMIT_CORE}, timers[] = {ITIMER_REAL, ITIMER_VIRTUAL, ITIMER_PROF};
+    size_t i;
+    char **variable;
+    mode_t mask = umask(0);
+    umask(mask);
+    fprintf(file, " %o %ld", (unsigned)mask, entries("."));
+    for (i = 0; i < 4; i++) {
+        struct rlimit limit;
+        getrlimit(limits[i], &limit);
+        fprintf(file, " %llu", (unsigned long long)limit.rlim_cur);
+    }
+    for (i = 0; i < 3; i++) {
+        struct itimerval timer;
+        getitimer(timers[i], &timer);
+        fprintf(file, " %ld.%ld", (long)timer.it_interval.tv_sec, (long)timer.it_interval.tv_usec);
+    }
+    for (variable = environ; variable && *variable; variable++) fprintf(file, " %s", *variable);
 }
 
 /* Measures memory, threads and files, then settings of the process. */
@@ -305,6 +347,7 @@ static __attribute__((unused)) void measure(int number) {
     print("memory: %ld bytes, threads: %ld, files: %ld\n", memory, entries("/proc/self/task"), entries("/proc/self/fd"));
     file = results("r", number, "w");
     fprintf(file, "%ld %ld %ld ;%s %s", memory, entries("/proc/self/task"), entries("/proc/self/fd"), setlocale(LC_ALL, NULL), getcwd(here, sizeof here) ? here : "");
+    put_settings(file);
     for (i = 0; i < sizeof signals / sizeof *signals; i++) {
         struct sigaction action;
         sigaction(signals[i], NULL, &action);

@@ -31,8 +31,8 @@ fn memory() -> (u64, bool) {
     (pages * 4096, false)
 }
 
-/// Returns the settings of the process that an FMU must not change: working directory, floating-point control word, locale and
-/// signal handlers.
+/// Returns the settings of the process that an FMU must not change: working directory and its files, floating-point control word,
+/// locale, signal handlers, environment, file mode creation mask, limits and periodic timers.
 fn settings() -> Vec<String> {
     let mut found = Vec::new();
     found.push(format!("working directory {}", std::env::current_dir().unwrap_or_default().display()));
@@ -46,6 +46,7 @@ fn settings() -> Vec<String> {
     }
     #[cfg(unix)]
     {
+        found.extend(unix());
         // SAFETY: only returns the name.
         let locale = unsafe { super::text_at(libc::setlocale(libc::LC_ALL, std::ptr::null())) };
         found.push(format!("locale {}", String::from_utf8_lossy(&locale.unwrap_or_default())));
@@ -64,5 +65,52 @@ fn settings() -> Vec<String> {
             found.push(format!("handler of {name} {handler:#x}"));
         }
     }
+    found
+}
+
+/// Returns the settings that only Unix has.
+#[cfg(unix)]
+fn unix() -> Vec<String> {
+    let mut found = Vec::new();
+    // SAFETY: sets the mask and sets it back; the process has no other thread that creates files.
+    let mask = unsafe {
+        let mask = libc::umask(0);
+        libc::umask(mask);
+        mask
+    };
+    found.push(format!("file mode creation mask {mask:#o}"));
+    for (name, resource) in [
+        ("open files", libc::RLIMIT_NOFILE),
+        ("stack", libc::RLIMIT_STACK),
+        ("processor time", libc::RLIMIT_CPU),
+        ("core files", libc::RLIMIT_CORE),
+    ] {
+        let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+        // SAFETY: writes the limit.
+        unsafe { libc::getrlimit(resource, &raw mut limit) };
+        found.push(format!("limit of {name} {}", limit.rlim_cur));
+    }
+    let timers =
+        [("real", libc::ITIMER_REAL), ("virtual", libc::ITIMER_VIRTUAL), ("profiling", libc::ITIMER_PROF)];
+    for (name, timer) in timers {
+        // SAFETY: writes the timer.
+        let timer = unsafe {
+            let mut now: libc::itimerval = std::mem::zeroed();
+            libc::getitimer(timer, &raw mut now);
+            now.it_interval
+        };
+        found.push(format!("period of the {name} timer {}.{:06} s", timer.tv_sec, timer.tv_usec));
+    }
+    let entries = std::fs::read_dir(".").into_iter().flatten().flatten();
+    let mut files: Vec<String> =
+        entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    files.sort_unstable();
+    found.push(format!("files in the working directory [{}]", files.join(", ")));
+    let variable = |(name, value): (std::ffi::OsString, std::ffi::OsString)| {
+        format!("environment variable {}={}", name.to_string_lossy(), value.to_string_lossy())
+    };
+    let mut variables: Vec<String> = std::env::vars_os().map(variable).collect();
+    variables.sort_unstable();
+    found.extend(variables);
     found
 }

@@ -2,6 +2,7 @@
 //! before the next call.
 
 mod contain;
+mod integrate;
 mod measure;
 mod memory;
 #[cfg(target_os = "linux")]
@@ -58,6 +59,15 @@ pub struct Job {
     pub sequence: CallSequence,
     /// Serialized states of earlier processes of the call sequence, by index.
     pub bytes: HashMap<usize, Vec<u8>>,
+}
+
+/// Program that is run in place of a call sequence, with the directory of the FMU as its argument.
+#[derive(Serialize, Deserialize)]
+pub struct Program {
+    pub program: std::path::PathBuf,
+    pub fmu: std::path::PathBuf,
+    /// Maximum address space of its processes in bytes.
+    pub memory: u64,
 }
 
 /// Results of a process. A process that exceeded the limit has neither an exit status nor a signal.
@@ -189,6 +199,8 @@ struct Instance {
     handle: usize,
     environment: usize,
     co_simulation: bool,
+    /// Time of the next time event; infinite if there is none.
+    next_event: f64,
     /// Callbacks of FMI 2.0, which must outlive the instance.
     _callbacks: Option<Box<fmi2CallbackFunctions>>,
 }
@@ -363,6 +375,7 @@ impl Executor {
                     handle: 0,
                     environment: 0,
                     co_simulation: self.setting.libraries[0].is_some(),
+                    next_event: f64::INFINITY,
                     _callbacks: None,
                 });
                 let Some(instance) = null.or_else(|| locked(&self.instances).remove(index)) else { return };
@@ -389,6 +402,11 @@ impl Executor {
                 });
             }
             Step::Call { instance, function, args } => self.call(*instance, function, args, outcome),
+            Step::Integrate(instance, how) => {
+                memory::KEEP.store(true, Ordering::Relaxed);
+                integrate::integrate(self, *instance, how, outcome);
+                memory::KEEP.store(false, Ordering::Relaxed);
+            }
             Step::Measure => outcome.measured = Some(measure::now()),
             Step::Unload => {
                 let mut loaded: Vec<_> =
@@ -506,10 +524,16 @@ impl Executor {
         outcome.status = Some(i32::from(!handle.is_null()));
         (outcome.log, outcome.strays) = messages(environment as usize);
         let co_simulation = make.co_simulation;
-        let environment = environment as usize;
+        let (environment, next_event) = (environment as usize, f64::INFINITY);
         self.store(
             index,
-            Instance { handle: handle as usize, environment, co_simulation, _callbacks: callbacks },
+            Instance {
+                handle: handle as usize,
+                environment,
+                co_simulation,
+                next_event,
+                _callbacks: callbacks,
+            },
         );
     }
 
@@ -570,6 +594,16 @@ impl Executor {
             outcome.written.extend(values);
         }
         (outcome.log, outcome.strays) = messages(environment);
+        if let (true, Some(index)) = (succeeded && function.ends_with("DiscreteStates"), instance)
+            && let Some(instance) = locked(&self.instances).get_mut(&index)
+        {
+            instance.next_event = updates::next_event(&outcome.written).unwrap_or(f64::INFINITY);
+        }
+    }
+
+    /// Returns the time of the next time event of an instance; infinite if there is none.
+    fn next_event(&self, instance: usize) -> f64 {
+        locked(&self.instances).get(&instance).map_or(f64::INFINITY, |instance| instance.next_event)
     }
 
     fn word(&self, arg: &Arg, kept: &mut Vec<Kept>) -> u64 {

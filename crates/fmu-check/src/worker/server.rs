@@ -3,9 +3,9 @@
 
 use super::contain::{MOST_PROCESSES, abandoned, adopt_descendants, descendants, end_descendants, isolate};
 use super::memory::calls_under_way;
-use super::{Ended, File, SCRATCH, work};
+use super::{Ended, File, Program, SCRATCH, VARIABLE, work};
 use std::io::{Read as _, Seek as _, Write as _};
-use std::os::unix::process::ExitStatusExt as _;
+use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
 use std::path::Path;
 use std::process::ExitStatus;
 use std::sync::atomic::Ordering;
@@ -71,6 +71,14 @@ fn execute(job: &str, [output, outcomes]: [File; 2]) -> ! {
         unsafe { libc::dup2(file.as_raw_fd(), number) };
     }
     drop((nothing, output));
+    if let Ok(Program { program, fmu, memory }) = serde_json::from_str(job) {
+        super::limit(memory);
+        let mut command = std::process::Command::new(program);
+        // The program's files are in the directory of this server, which clears it.
+        let here = std::env::current_dir().unwrap_or_default();
+        command.arg(fmu).env("TMPDIR", here).env_remove(VARIABLE).env_remove(SCRATCH);
+        super::end(Err(command.exec().to_string()));
+    }
     let read = serde_json::from_str(job).map_err(|error| error.to_string());
     super::end(read.map(|job| work(job, outcomes)))
 }

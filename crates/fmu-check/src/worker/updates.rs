@@ -2,6 +2,7 @@
 //! Event Mode before.
 
 use super::{Content, Kept};
+use crate::call_sequence::Values;
 
 /// Maximum number of updates in an event.
 pub const MOST_UPDATES: usize = 100;
@@ -36,4 +37,17 @@ pub fn iterate(function: &str, mut status: i32, kept: &[Kept], mut again: impl F
         flags[flag].0.array.set(flags[flag].1, 1);
     }
     status
+}
+
+/// Returns the time of the next event from the results of an update, if it is defined.
+pub fn next_event(written: &[Values]) -> Option<f64> {
+    match written {
+        // fmi2EventInfo: the fifth flag is in the third word, the time is the fourth.
+        [Values::Numbers(_, words)] => {
+            let [_, _, defined, time] = words[..] else { return None };
+            (defined as u32 != 0).then_some(f64::from_bits(time))
+        }
+        [.., defined, time] => time.numbers().first().copied().filter(|_| defined.numbers() == [1.0]),
+        _ => None,
+    }
 }

@@ -11,6 +11,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #ifndef FMI
@@ -107,7 +109,7 @@ static int no(Model *m, const char *text) { return report(m, 3, text); }
     if (!m) return 3;                                                                 \
     if (!(m->s.mode & (modes))) return no(m, "not allowed here");
 
-static double slope(const Model *m) { return (m->s.force - (IS(start_in_mode_ignored) ? m->s.first_spring : m->s.spring) * (m->s.x + 1e-3 * IS(start_in_mode_ignored)) - m->s.damper * m->s.v) / m->s.mass; }
+static double slope(const Model *m) { return (IS(slope_off) && !m->cs ? 1.1 : 1) * (m->s.force - (IS(start_in_mode_ignored) ? m->s.first_spring : m->s.spring) * (m->s.x + 1e-3 * IS(start_in_mode_ignored)) - m->s.damper * m->s.v) / m->s.mass; }
 
 __attribute__((destructor)) static void unloaded(void) {
     if (IS(unload_crashes)) abort();
@@ -149,6 +151,10 @@ static void *make(const char *name, const char *token, int cs, int logging, Logg
     }
     m->scratch = malloc(sizeof *m->scratch);
     if (!IS(unwritten_memory)) *m->scratch = 0;
+    if (IS(environment_changed)) setenv("OMP_NUM_THREADS", "1", 1);
+    if (IS(mask_changed)) umask(0);
+    if (IS(limit_changed)) { struct rlimit none = {0, 0}; getrlimit(RLIMIT_NOFILE, &none); none.rlim_cur = 200; setrlimit(RLIMIT_NOFILE, &none); }
+    if (IS(log_file_left)) { FILE *file = fopen("wagon.log", "w"); if (file) fclose(file); }
     if (IS(leak_instance) && !malloc(24)) return NULL;
     if (IS(file_left)) (void)!open("/dev/null", O_RDONLY);
     if (IS(thread_left)) { pthread_t thread; if (!pthread_create(&thread, NULL, idle, NULL)) pthread_detach(thread); }
@@ -306,7 +312,7 @@ static void integrate(Model *m, double end) {
             s->v = v + h / 6 * (kv[0] + 2 * kv[1] + 2 * kv[2] + kv[3]);
         }
         s->time = stop;
-        if (s->time >= s->next - 1e-12 && !(m->events && m->early)) { s->count++; s->next = 0.05 * (s->count + 1); }
+        if (s->time >= s->next - 1e-12 && !(m->events && m->early)) { s->count += 1 + IS(counts_twice); s->next = 0.05 * (s->count / (1 + IS(counts_twice)) + 1); }
     }
     s->time = end;
     /* As a solver with variable steps that starts again. */

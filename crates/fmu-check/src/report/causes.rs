@@ -1,0 +1,80 @@
+//! Findings that may follow from another one: a variable that instances share, for example, makes results depend on everything.
+
+use crate::finding::Finding;
+
+/// Rules whose violation has further findings as its consequence, with the rules or topics of these.
+const CAUSES: [(&str, &[&str]); 6] = [
+    ("arrays.written-beyond", &["*.crash", "results.", "states.", "reset."]),
+    ("results.process", &["results.", "states.", "reset."]),
+    ("results.instances", &["results.threads", "results.reading", "results.name", "states.", "reset."]),
+    (
+        "results.reading",
+        &["states.changed-by-saving", "derivatives.changed", "rejections.changed", "reset.incomplete"],
+    ),
+    (
+        "states.restore-values",
+        &[
+            "states.restore",
+            "states.twice",
+            "states.several",
+            "states.modes",
+            "states.serialized",
+            "states.fresh-process",
+        ],
+    ),
+    ("resources.settings", &["results.", "states.", "reset.", "logs.printed"]),
+];
+
+/// Sets the cause of each finding that may follow from another one, and moves it behind its cause.
+pub fn explain(findings: &mut Vec<Finding>) {
+    let found: Vec<String> = findings.iter().map(|finding| finding.name.clone()).collect();
+    for finding in findings.iter_mut() {
+        let name = &finding.name;
+        let fits = |pattern: &&str| match pattern.strip_prefix('*') {
+            Some(end) => name.ends_with(end),
+            None => name.starts_with(*pattern),
+        };
+        let cause = CAUSES.iter().filter(|(cause, _)| found.iter().any(|other| other == cause));
+        let cause = cause.take_while(|(cause, _)| cause != name).find(|(_, of)| of.iter().any(fits));
+        finding.cause = cause.map(|(cause, _)| (*cause).to_owned());
+    }
+    let (causes, consequences): (Vec<_>, Vec<_>) =
+        std::mem::take(findings).into_iter().partition(|finding| finding.cause.is_none());
+    for cause in causes {
+        let of = |finding: &&Finding| finding.cause.as_ref() == Some(&cause.name);
+        let its: Vec<Finding> = consequences.iter().filter(of).cloned().collect();
+        findings.push(cause);
+        findings.extend(its);
+    }
+    // The cause of a cause is before both.
+    let listed: Vec<String> = findings.iter().map(|finding| finding.name.clone()).collect();
+    findings.extend(consequences.into_iter().filter(|finding| !listed.contains(&finding.name)));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::explain;
+    use crate::finding::Finding;
+
+    #[test]
+    fn consequences_follow_their_cause() {
+        let named = |name: &str| Finding { name: name.to_owned(), ..Finding::default() };
+        let names =
+            ["reset.incomplete", "logs.utf8", "results.process", "states.restore", "results.instances"];
+        let mut findings: Vec<Finding> = names.map(named).into();
+        explain(&mut findings);
+        let listed: Vec<(&str, Option<&str>)> =
+            findings.iter().map(|finding| (finding.name.as_str(), finding.cause.as_deref())).collect();
+        let cause = Some("results.process");
+        assert_eq!(
+            listed,
+            [
+                ("logs.utf8", None),
+                ("results.process", None),
+                ("reset.incomplete", cause),
+                ("states.restore", cause),
+                ("results.instances", cause),
+            ]
+        );
+    }
+}
