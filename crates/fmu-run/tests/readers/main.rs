@@ -16,7 +16,7 @@ use std::process::Command;
 use tempfile::TempDir;
 
 /// Megabytes of address space in which all files are read. The process itself needs about 20.
-const LIMITS: [u64; 6] = [48, 64, 96, 128, 256, 1024];
+const LIMITS: [u64; 4] = [48, 80, 128, 256];
 /// Environment variable with the directory in which the child process works.
 const DIRECTORY: &str = "READERS_DIRECTORY";
 /// Environment variable with the number of mutations of each kind.
