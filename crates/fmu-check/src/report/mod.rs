@@ -7,6 +7,7 @@ use crate::baseline::Baseline;
 use crate::checker::{Checker, Unchecked};
 use crate::finding::{Finding, Severity};
 use crate::options::{FailOn, Options};
+use fmi_abi::{one_line, shown, shown_to};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -127,7 +128,8 @@ impl Report {
 
     /// Formats the report for a terminal.
     pub fn terminal(&self, colours: bool) -> String {
-        let mut text = format!("{} ({}, {}): {}\n", self.fmu, self.standard, self.offers(), self.summary());
+        let mut text =
+            format!("{} ({}, {}): {}\n", one_line(&self.fmu), self.standard, self.offers(), self.summary());
         for finding in &self.findings {
             let on = match finding.severity {
                 Severity::Violation => "\u{1b}[31m",
@@ -135,7 +137,7 @@ impl Report {
                 Severity::Note => "\u{1b}[36m",
             };
             let (on, off) = if colours { (on, "\u{1b}[0m") } else { ("", "") };
-            let (severity, observed) = (finding.severity.name(), short(&finding.observed, 160));
+            let (severity, observed) = (finding.severity.name(), shown_to(&finding.observed, 160));
             let _ = writeln!(text, "{on}{severity:9}{off} {:26} {observed}", finding.name);
             let more = match finding.more.len() {
                 0 => String::new(),
@@ -152,7 +154,7 @@ impl Report {
         }
         for Unchecked { name, why, allowed } in &self.unreached {
             let allowed = if *allowed { " (allowed)" } else { "" };
-            let _ = writeln!(text, "not checked{allowed}: {name}: {why}");
+            let _ = writeln!(text, "not checked{allowed}: {name}: {}", shown(why));
         }
         let Self { sequences, seconds, seed, .. } = self;
         text + &format!("{sequences} call sequences, {seconds:.1} s, seed {seed}\n")
@@ -223,12 +225,5 @@ impl Report {
             std::fs::write(directory.join(format!("{}.c", finding.name)), &finding.c)?;
         }
         Ok(())
-    }
-}
-
-fn short(text: &str, max_length: usize) -> String {
-    match text.char_indices().nth(max_length) {
-        Some((index, _)) => format!("{}...", &text[..index]),
-        None => text.to_owned(),
     }
 }

@@ -71,13 +71,18 @@ def replacing(path: Path) -> Iterator[Path]:
 
     Creates missing directories. Raises UserError if the file cannot be written.
     """
-    temporary = path.parent / f".{path.stem}-{secrets.token_hex(4)}{path.suffix}"
-    descriptor = None
+    descriptor, temporary = None, path
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         _remove_abandoned(path)
-        descriptor = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
-        _lock(descriptor)
+        # Another process may lock and remove the file before this one locks it.
+        while descriptor is None or not temporary.exists():
+            if descriptor is not None:
+                os.close(descriptor)
+            temporary = path.parent / f".{path.stem}-{secrets.token_hex(4)}{path.suffix}"
+            descriptor = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
+            with contextlib.suppress(BlockingIOError):
+                _lock(descriptor)
         yield temporary
         # Otherwise the file may be empty after a power failure.
         os.fsync(descriptor)
@@ -89,8 +94,9 @@ def replacing(path: Path) -> Iterator[Path]:
     finally:
         if descriptor is not None:
             os.close(descriptor)
-        with contextlib.suppress(OSError):
-            temporary.unlink()
+        if temporary != path:
+            with contextlib.suppress(OSError):
+                temporary.unlink()
 
 
 def _lock(descriptor: int) -> None:
