@@ -46,7 +46,11 @@ def test_zizmor(path: Path) -> None:
 
 
 def test_the_linters_find_faults(tmp_path: Path) -> None:
-    faulty = WORKFLOWS[0].read_text(encoding="utf-8").replace("needs: release\n", "needs: relaese\n")
+    faulty = (
+        (ROOT / ".github" / "workflows" / "fmu.yml")
+        .read_text(encoding="utf-8")
+        .replace("needs: release\n", "needs: relaese\n")
+    )
     path = tmp_path / "fmu.yml"
     path.write_text(faulty.replace("contents: read", "contents: write"), encoding="utf-8")
     done = checked("actionlint", path)
@@ -81,7 +85,7 @@ def test_crates_come_from_one_registry_under_allowed_licences() -> None:
 @pytest.mark.parametrize("name", ["demo", "study", "tests", "importers", "examples", "release", "test-platforms", "uv"])
 def test_python_requirements_have_hashes(name: str) -> None:
     content = (ROOT / "dev" / "requirements" / f"{name}.txt").read_text(encoding="utf-8")
-    entries = re.findall(r"^[^#\s-].*(?:\\\n.*)*", content, re.M)
+    entries = re.findall(r"^[^#\s-][^\\\n]*(?:\\\n[^\\\n]*)*", content, re.M)
     assert entries and all("==" in entry and "--hash=sha256:" in entry for entry in entries)
 
 
