@@ -50,7 +50,10 @@ MAX_BYTES = 64 << 20
 
 def check_regular(path: Path) -> None:
     """Raise OSError unless it is a regular file: a pipe would wait for a writer, and a device may never end."""
-    if not stat.S_ISREG(path.stat().st_mode):
+    mode = path.stat().st_mode
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    if not stat.S_ISREG(mode):
         raise OSError(errno.EINVAL, "it is not a regular file")
 
 
