@@ -97,7 +97,8 @@ fn write_corpus() {
         let directory = outer.join(target);
         std::fs::create_dir_all(&directory).unwrap();
         for (name, bytes) in files.into_iter().filter(|(_, bytes)| bytes.len() < 20_000) {
-            std::fs::write(directory.join(format!("{name} {}", last.len())), [&bytes, last].concat()).unwrap();
+            std::fs::write(directory.join(format!("{name} {}", last.len())), [&bytes, last].concat())
+                .unwrap();
         }
     };
     write("description", corpus::descriptions(), &[]);
@@ -226,13 +227,16 @@ fn write_figures() {
     let outer = TempDir::new().unwrap();
     let system = system(outer.path());
     let times = [10_000, 100_000].map(|count| {
-        [corpus::chain(count, false), corpus::chain(count, true), corpus::unrelated(count)].map(|text| seconds(&system, &text))
+        [corpus::chain(count, false), corpus::chain(count, true), corpus::unrelated(count)]
+            .map(|text| seconds(&system, &text))
     });
     let kinds = [corpus::descriptions(), corpus::systems(), corpus::parameters(), corpus::archives()];
     let [descriptions, systems, parameters, archives] = kinds.map(|files| files.len());
     let [least, .., most] = LIMITS;
     let row = |count: &str, [chain, circle, unrelated]: [f64; 3]| {
-        format!("| a system of {count} connections in a chain, in a circle, and between unknown connectors | {chain:.2} s, {circle:.2} s, {unrelated:.2} s |\n")
+        format!(
+            "| a system of {count} connections in a chain, in a circle, and between unknown connectors | {chain:.2} s, {circle:.2} s, {unrelated:.2} s |\n"
+        )
     };
     let table = format!(
         "| test | result |\n|---|---|\n\
@@ -247,5 +251,6 @@ fn write_figures() {
     let text = std::fs::read_to_string(&page).unwrap();
     let (before, rest) = text.split_once("<!-- readers -->\n").unwrap();
     let (_, after) = rest.split_once("<!-- end of readers -->\n").unwrap();
-    std::fs::write(page, format!("{before}<!-- readers -->\n{table}<!-- end of readers -->\n{after}")).unwrap();
+    std::fs::write(page, format!("{before}<!-- readers -->\n{table}<!-- end of readers -->\n{after}"))
+        .unwrap();
 }
