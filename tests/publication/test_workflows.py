@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sysconfig
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -28,7 +30,7 @@ def unpinned(workflow: str) -> list[str]:
 
 
 def test_there_are_workflows() -> None:
-    assert [path.name for path in WORKFLOWS] == ["fmu.yml", "test.yml"]
+    assert [path.name for path in WORKFLOWS] == ["dependencies.yml", "fmu.yml", "test.yml"]
 
 
 @pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
@@ -44,7 +46,11 @@ def test_zizmor(path: Path) -> None:
 
 
 def test_the_linters_find_faults(tmp_path: Path) -> None:
-    faulty = WORKFLOWS[0].read_text(encoding="utf-8").replace("needs: release\n", "needs: relaese\n")
+    faulty = (
+        (ROOT / ".github" / "workflows" / "fmu.yml")
+        .read_text(encoding="utf-8")
+        .replace("needs: release\n", "needs: relaese\n")
+    )
     path = tmp_path / "fmu.yml"
     path.write_text(faulty.replace("contents: read", "contents: write"), encoding="utf-8")
     done = checked("actionlint", path)
@@ -61,6 +67,26 @@ def test_actions_are_commits(path: Path) -> None:
 @pytest.mark.parametrize("version", ["v7", "main", "3d3c42e # v7.0.1", "3d3c42e5aac5ba805825da76410c181273ba90b1"])
 def test_unpinned_actions_are_found(version: str) -> None:
     assert unpinned(f"      - uses: actions/checkout@{version}") == [f"- uses: actions/checkout@{version}"]
+
+
+def test_crates_come_from_one_registry_under_allowed_licences() -> None:
+    rules = tomllib.loads((ROOT / "deny.toml").read_text(encoding="utf-8"))
+    command = ["cargo", "metadata", "--locked", "--format-version", "1", "--all-features"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    allowed = set(rules["licenses"]["allow"])
+    for crate in json.loads(done.stdout)["packages"]:
+        assert crate["source"] in (None, f"registry+{rules['sources']['allow-registry'][0]}"), crate["name"]
+        # Old crates write OR as a slash. An AND needs all of its parts.
+        needed = crate["license"].replace("/", " OR ").replace("(", "").replace(")", "").split(" AND ")
+        assert all(allowed & {one.strip() for one in part.split(" OR ")} for part in needed), crate["license"]
+
+
+@pytest.mark.parametrize("name", ["demo", "study", "tests", "importers", "examples", "release", "test-platforms", "uv"])
+def test_python_requirements_have_hashes(name: str) -> None:
+    content = (ROOT / "dev" / "requirements" / f"{name}.txt").read_text(encoding="utf-8")
+    entries = re.findall(r"^[^#\s-][^\\\n]*(?:\\\n[^\\\n]*)*", content, re.M)
+    assert entries and all("==" in entry and "--hash=sha256:" in entry for entry in entries)
 
 
 def test_an_action_has_one_version() -> None:

@@ -98,6 +98,7 @@ fn the_old_fmu_remains_until_the_new_one_is_complete() {
     let begin = Instant::now();
     let output = build_fmu(&library, out).output().unwrap();
     assert!(output.status.success(), "{output:?}");
+    assert_eq!(names(), [""; 0], "what the killed process has left is removed");
     killed_at_any_time(|| build_fmu(&library, out), begin.elapsed(), &fmu);
 }
 

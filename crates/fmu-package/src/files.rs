@@ -45,6 +45,23 @@ pub fn unzip(zip: &[u8], name: &str) -> Result<Vec<u8>> {
     Ok(content)
 }
 
+/// Beginning of the names of temporary files.
+const UNFINISHED: &str = ".unfinished-";
+
+/// Removes the temporary files of killed processes, which no process has locked. Any failure only means that a file stays.
+fn remove_abandoned(directory: &Path) {
+    for entry in fs::read_dir(directory).into_iter().flatten().flatten() {
+        let is_temporary = entry.file_name().to_string_lossy().starts_with(UNFINISHED);
+        if !cfg!(unix) || !is_temporary || !entry.file_type().is_ok_and(|of| of.is_file()) {
+            continue;
+        }
+        let file = File::options().write(true).open(entry.path());
+        if file.is_ok_and(|file| file.try_lock().is_ok()) {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
 /// Writes a file under a temporary name next to `destination`, renames it when it is complete, and returns its size in bytes.
 ///
 /// # Errors
@@ -56,16 +73,28 @@ pub fn write_atomically(destination: &Path, write: impl FnOnce(&mut File) -> Res
     };
     fs::create_dir_all(directory)
         .with_context(|| format!("cannot make the directory {}", directory.display()))?;
+    remove_abandoned(directory);
     let mut builder = tempfile::Builder::new();
     // Temporary files are private by default; the result has the permissions of the user's umask.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder
-        .prefix(".unfinished-")
-        .tempfile_in(directory)
-        .with_context(|| format!("cannot write in the directory {}", directory.display()))?;
+    builder.prefix(UNFINISHED);
+    let create = || {
+        let file = builder.tempfile_in(directory)?;
+        #[cfg(unix)]
+        file.as_file().lock()?;
+        std::io::Result::Ok(file)
+    };
+    let failed = || format!("cannot write in the directory {}", directory.display());
+    let mut file = create().with_context(failed)?;
+    // Another process may have locked the file before, and removed it.
+    while !file.path().exists() {
+        file = create().with_context(failed)?;
+    }
     let failed = || format!("cannot write {}", destination.display());
     write(file.as_file_mut()).with_context(failed)?;
+    // Otherwise the file may be empty after a power failure.
+    file.as_file().sync_all().with_context(failed)?;
     let size = file.as_file().metadata().with_context(failed)?.len();
     file.persist(destination).with_context(failed)?;
     Ok(size)

@@ -118,6 +118,7 @@ impl Arrays {
         if self.elements.len() + length > MAX_ELEMENTS || bytes > MAX_BYTES {
             return None;
         }
+        self.elements.try_reserve(length).ok()?;
         self.bytes = bytes;
         let index = self.all.len();
         self.by_reference.insert(array.reference, index);

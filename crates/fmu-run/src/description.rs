@@ -161,12 +161,15 @@ impl Description {
         }
         let largest = written.variables.iter().map(|of| of.reference).max();
         let mut arrays = Arrays::after(largest.unwrap_or_default());
-        let mut variables = Vec::new();
-        let mut spans = Vec::new();
-        for of in &written.variables {
+        let elements: Vec<_> = written.variables.iter().map(|of| elements_of(of, &mut arrays)).collect();
+        let count = elements.iter().flatten().map(|elements| elements.len()).sum();
+        fmi_abi::xml::reserve(arrays.bytes())
+            .map_err(|why| format!("modelDescription.xml cannot be read: {why}"))?;
+        let mut variables = Vec::with_capacity(count);
+        let mut spans = Vec::with_capacity(elements.len());
+        for (of, elements) in written.variables.iter().zip(elements) {
             let begin = variables.len();
-            spread(of, &mut arrays, &mut variables)
-                .map_err(|why| format!("modelDescription.xml cannot be read: {why}"))?;
+            spread(of, elements, &arrays, &mut variables);
             spans.push(begin..variables.len());
         }
         relate(&written, &spans, &mut variables);
@@ -278,9 +281,19 @@ impl Variable {
     }
 }
 
-/// Adds a variable, or the elements of an array. Skips clocks, and arrays whose size is unknown or too large.
-fn spread(of: &Declared, arrays: &mut Arrays, variables: &mut Vec<Variable>) -> Result<(), String> {
-    let (Some(base), Some(sizes)) = (of.base, &of.dimensions) else { return Ok(()) };
+/// Returns the value references of a variable, or of the elements of an array. `None` for clocks, and for arrays whose size is unknown
+/// or too large.
+fn elements_of(of: &Declared, arrays: &mut Arrays) -> Option<Range<u32>> {
+    let (base, sizes) = (of.base?, of.dimensions.as_ref()?);
+    match sizes.is_empty() {
+        true => Some(0..1),
+        false => arrays.push(Array::new(of, base), &of.name),
+    }
+}
+
+/// Adds a variable, or the elements of an array.
+fn spread(of: &Declared, elements: Option<Range<u32>>, arrays: &Arrays, variables: &mut Vec<Variable>) {
+    let (Some(base), Some(sizes), Some(elements)) = (of.base, &of.dimensions, elements) else { return };
     let attributes = Arc::new(Attributes {
         base,
         causality: of.causality.clone(),
@@ -301,21 +314,15 @@ fn spread(of: &Declared, arrays: &mut Arrays, variables: &mut Vec<Variable>) -> 
         attributes: Arc::clone(&attributes),
     };
     if sizes.is_empty() {
-        variables.push(variable(
-            of.name.clone(),
-            of.reference,
-            of.start.first().map(|start| Arc::from(&**start)),
-        ));
-        return Ok(());
+        let start = of.start.first().map(|start| Arc::from(&**start));
+        return variables.push(variable(of.name.clone(), of.reference, start));
     }
-    let before = arrays.bytes();
-    let Some(references) = arrays.push(Array::new(of, base), &of.name) else { return Ok(()) };
-    fmi_abi::xml::reserve(arrays.bytes() - before)?;
-    let array = &arrays.all()[arrays.all().len() - 1];
-    variables.extend(references.enumerate().map(|(number, reference)| {
+    // Several arrays may have the same value reference, so the array is found by its elements.
+    let Some((index, _)) = arrays.find(elements.start) else { return };
+    let array = &arrays.all()[index];
+    variables.extend(elements.enumerate().map(|(number, reference)| {
         variable(array.name(&of.name, number), reference, array.start(number).cloned())
     }));
-    Ok(())
 }
 
 /// Sets the dependencies of outputs and the states of derivatives. `spans` contains the variables of each

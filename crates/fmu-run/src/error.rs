@@ -2,6 +2,9 @@
 
 use std::fmt;
 
+/// Number of characters of a message at most.
+const LONGEST: usize = 1000;
+
 /// Error that prevents all runs. The error of a single run is [part of the results](crate::Runs::errors).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Error {
@@ -33,8 +36,8 @@ impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Fmu(message) | Self::Request(message) | Self::Memory(message) => {
-                // Messages contain names of the FMU, which a terminal must not obey.
-                f.write_str(&fmi_abi::one_line(message))
+                // Messages contain names of the FMU, which may be long, and which a terminal must not obey.
+                f.write_str(&fmi_abi::shown_to(message, LONGEST))
             }
             Self::Cancelled => f.write_str("cancelled"),
         }

@@ -170,7 +170,41 @@ fn instead(start: &[u8]) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::instead;
+    use super::{Limits, instead, unpack};
+    use std::io::Write;
+
+    #[test]
+    fn archives_have_limits() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("archive");
+        let mut archive = zip::ZipWriter::new(std::fs::File::create(&path).unwrap());
+        for name in ["a", "b", "c"] {
+            archive.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
+            archive.write_all(&[0; 1 << 20]).unwrap();
+        }
+        archive.finish().unwrap();
+        let to = directory.path().join("to");
+        let unpacked = |bytes: u64, entries: usize| {
+            unpack(&path, "an FMU", &to, &mut Limits { bytes, entries }, &mut |_| Ok(true))
+        };
+        assert_eq!(
+            unpacked((3 << 20) - 1, 3).unwrap_err(),
+            "has more than 2 MB when it is unpacked, the limit for archives"
+        );
+        assert_eq!(unpacked(3 << 20, 2).unwrap_err(), "has 3 entries; the limit for archives is 2");
+        assert!(!to.exists(), "nothing is written");
+        assert_eq!(unpacked(3 << 20, 3), Ok(()));
+        // The archive declares smaller files.
+        let bytes = std::fs::read(&path).unwrap();
+        let size = (1_u32 << 20).to_le_bytes();
+        let mut changed = bytes.clone();
+        for at in (0..bytes.len() - 4).filter(|at| bytes[*at..at + 4] == size) {
+            changed[at..at + 4].copy_from_slice(&10_u32.to_le_bytes());
+        }
+        std::fs::write(&path, changed).unwrap();
+        assert!(unpacked(1000, 3).is_err());
+        assert!(std::fs::metadata(to.join("a")).unwrap().len() <= 1001);
+    }
 
     #[test]
     fn files_that_are_no_archive() {

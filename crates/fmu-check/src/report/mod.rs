@@ -9,6 +9,7 @@ use crate::checker::{Checker, Unchecked};
 use crate::finding::{Finding, Proof, Severity};
 use crate::options::{FailOn, Options};
 use crate::rules::TOPICS;
+use fmi_abi::{one_line, shown, shown_to};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -145,7 +146,8 @@ impl Report {
 
     /// Formats the report for a terminal.
     pub fn terminal(&self, colours: bool) -> String {
-        let mut text = format!("{} ({}, {}): {}\n", self.fmu, self.standard, self.offers(), self.summary());
+        let mut text =
+            format!("{} ({}, {}): {}\n", one_line(&self.fmu), self.standard, self.offers(), self.summary());
         for finding in &self.findings {
             let on = match finding.severity {
                 Severity::Violation => "\u{1b}[31m",
@@ -153,7 +155,7 @@ impl Report {
                 Severity::Note => "\u{1b}[36m",
             };
             let (on, off) = if colours { (on, "\u{1b}[0m") } else { ("", "") };
-            let (severity, observed) = (finding.severity.name(), short(&finding.observed, 160));
+            let (severity, observed) = (finding.severity.name(), shown_to(&finding.observed, 160));
             let _ = writeln!(text, "{on}{severity:9}{off} {:26} {observed}", finding.name);
             let more = match finding.more.len() {
                 0 => String::new(),
@@ -176,7 +178,7 @@ impl Report {
         }
         for Unchecked { name, why, allowed } in &self.unreached {
             let allowed = if *allowed { " (allowed)" } else { "" };
-            let _ = writeln!(text, "not checked{allowed}: {name}: {why}");
+            let _ = writeln!(text, "not checked{allowed}: {name}: {}", shown(why));
         }
         let Self { sequences, seconds, seed, .. } = self;
         text + &format!("{sequences} call sequences, {seconds:.1} s, seed {seed}\n")
@@ -261,11 +263,4 @@ fn today() -> String {
     let month = (5 * day + 2) / 153;
     let (day, month) = (day - (153 * month + 2) / 5 + 1, if month < 10 { month + 3 } else { month - 9 });
     format!("{:04}-{month:02}-{day:02}", era * 400 + year + u64::from(month < 3))
-}
-
-fn short(text: &str, max_length: usize) -> String {
-    match text.char_indices().nth(max_length) {
-        Some((index, _)) => format!("{}...", &text[..index]),
-        None => text.to_owned(),
-    }
 }

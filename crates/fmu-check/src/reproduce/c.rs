@@ -80,8 +80,13 @@ fn head(finding: &Finding, description: &Description) -> String {
         format!("Observed: {}", finding.observed),
         String::new(),
     ];
-    let plain = |line: &String| line.replace("*/", "* /").replace(['\n', '\r'], " ").replace('\\', "/");
-    lines.iter().map(|line| format!(" * {}\n", plain(line))).collect()
+    lines.iter().map(|line| format!(" * {}\n", in_comment(line))).collect()
+}
+
+/// Returns a string of a model description for a comment of a program: in one line, and without the characters that may end the
+/// comment, also as trigraphs and continued lines.
+fn in_comment(text: &str) -> String {
+    fmi_abi::one_line(&text.replace('\\', "/")).replace('\\', "/").replace("??", "? ?").replace("*/", "* /")
 }
 
 /// Returns the path of the library in the directory of the unpacked FMU.
@@ -392,7 +397,7 @@ fn comment(args: &[Arg], description: &Description) -> Option<String> {
         .map(|variable| variable.name.as_str())
         .collect();
     let more = if references.len() > 8 { ", ..." } else { "" };
-    (!names.is_empty()).then(|| format!("{}{more}", names.join(", ").replace("*/", "* /")))
+    (!names.is_empty()).then(|| format!("{}{more}", in_comment(&names.join(", "))))
 }
 
 fn type_of(name: &str) -> &'static str {

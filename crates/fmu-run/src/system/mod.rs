@@ -17,7 +17,7 @@ use crate::start::is_exact;
 pub use elements::Elements;
 use fmi_abi::description::Offer;
 use fmi_abi::files::Limits;
-use fmi_abi::{BaseType, Interface};
+use fmi_abi::{BaseType, Interface, shown};
 pub(crate) use order::Exchange;
 pub use order::Order;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -516,15 +516,21 @@ impl Definition {
         if let Some(why) = missing {
             return request(format!("{name} {why}"));
         }
-        let names = self.components.iter().flat_map(|component| {
-            component.fmu.description.variables.iter().map(|of| joined(&component.name, &of.name))
-        });
+        let names = || {
+            let variables = self.components.iter().flat_map(|component| {
+                component.fmu.description.variables.iter().map(|of| joined(&component.name, &of.name))
+            });
+            variables.chain(self.connectors.keys().cloned())
+        };
         let element = format!("{name}[");
-        let names: Vec<_> = names.chain(self.connectors.keys().cloned()).collect();
-        let of_array = names.iter().find(|known| known.starts_with(&element)).cloned();
-        let hint = of_array.or_else(|| nearest(name, names.into_iter()));
+        let of_array = names().find(|known| known.starts_with(&element));
+        // Long names take long to compare, and are hardly misspelled.
+        let is_short = name.len() <= fmi_abi::SHOWN;
+        let similar =
+            || is_short.then(|| nearest(name, names().filter(|known| known.len() <= fmi_abi::SHOWN)));
+        let hint = of_array.or_else(|| similar().flatten());
         let hint = hint.map_or(String::new(), |near| format!("; did you mean {near:?}?"));
-        request(format!("{} has no variable {name:?}{hint}", self.name))
+        request(format!("{} has no variable \"{}\"{hint}", shown(&self.name), shown(name)))
     }
 }
 

@@ -91,7 +91,7 @@ fn relative(name: &str) -> Option<PathBuf> {
         match part {
             Component::Normal(part) => path.push(part),
             Component::CurDir => {}
-            Component::ParentDir => _ = path.pop().then_some(())?,
+            Component::ParentDir => path.pop().then_some(())?,
             Component::RootDir | Component::Prefix(_) => return None,
         }
     }

@@ -28,11 +28,11 @@ fn fmi3(variables: &str, structure: &str) -> Vec<u8> {
     description(3, "", CS, &rest)
 }
 
-/// Returns arrays of a million elements.
+/// Returns arrays of 100,000 elements.
 fn arrays(count: usize, attributes: &str) -> String {
     let array = |number: usize| {
         format!(
-            "<Float64 name=\"a{number}\" valueReference=\"{number}\" {attributes}><Dimension start=\"1000000\"/></Float64>"
+            "<Float64 name=\"a{number}\" valueReference=\"{number}\" {attributes}><Dimension start=\"100000\"/></Float64>"
         )
     };
     (1..=count).map(array).collect()
@@ -68,12 +68,12 @@ pub fn descriptions() -> Files {
         ("description of each element", fmi3(&arrays(4, &format!("description=\"{long}\"")), "")),
         ("unit of each element", fmi3(&arrays(4, &format!("unit=\"{long}\" displayUnit=\"{long}\" declaredType=\"{long}\"")), "")),
         ("name of each element", fmi3(&arrays(4, "").replace("name=\"a", &format!("name=\"{long}")), "")),
-        ("start value of each element", fmi3(&arrays(60, &format!("start=\"1.{}\"", "0".repeat(1000))), "")),
-        ("strings of each element", fmi3(&arrays(60, "").replace("Float64", "String").replace("<Dimension", &format!("<Start value=\"{long}\"/><Dimension")), "")),
+        ("start value of each element", fmi3(&arrays(12, &format!("start=\"1.{}\"", "0".repeat(1000))), "")),
+        ("strings of each element", fmi3(&arrays(12, "").replace("Float64", "String").replace("<Dimension", &format!("<Start value=\"{long}\"/><Dimension")), "")),
         ("dependencies of each output", fmi3(&(arrays(1, "") + &scalars), &outputs)),
         ("dependencies of each element", fmi3(&arrays(2, "causality=\"output\""), "<Output valueReference=\"1\" dependencies=\"2 2 2 2\"/><Output valueReference=\"2\" dependencies=\"1 1 1\"/>")),
         ("dimensions that overflow", fmi3("<Float64 name=\"a\" valueReference=\"1\"><Dimension start=\"18446744073709551615\"/><Dimension start=\"18446744073709551615\"/></Float64>", "<EventIndicator valueReference=\"1\"/>")),
-        ("sizes that overflow", fmi3(&arrays(4, "").replace("1000000", "9223372036854775807"), &"<EventIndicator valueReference=\"1\"/><EventIndicator valueReference=\"2\"/><EventIndicator valueReference=\"3\"/>".repeat(2))),
+        ("sizes that overflow", fmi3(&arrays(4, "").replace("100000", "9223372036854775807"), &"<EventIndicator valueReference=\"1\"/><EventIndicator valueReference=\"2\"/><EventIndicator valueReference=\"3\"/>".repeat(2))),
         ("states", fmi3(&arrays(1, "derivative=\"1\""), &states(2000))),
         ("event indicators", description(2, "numberOfEventIndicators=\"18446744073709551615\"", "<ModelExchange modelIdentifier=\"m\"/>", "")),
         ("event indicators of arrays", fmi3(&arrays(1, ""), &"<EventIndicator valueReference=\"1\"/>".repeat(100))),
@@ -245,8 +245,9 @@ pub fn archives() -> Files {
         archive.add_symlink("modelDescription.xml", "/etc/passwd", SimpleFileOptions::default()).unwrap();
         archive.finish().unwrap().into_inner()
     };
-    // 1100 files of a megabyte.
-    let bomb = packed((0..1100).map(|number| (format!("f{number}"), vec![0; 1 << 20])));
+    // It declares 2 GB.
+    let bomb = packed([("modelDescription.xml".to_owned(), vec![b' '; 70_000])]);
+    let bomb = replaced(bomb, &70_000_u32.to_le_bytes(), &(2_u32 << 30).to_le_bytes());
     // Declares less than it has.
     let declared = |size: u32| [b"x\x9c".to_vec(), size.to_le_bytes().to_vec()].concat();
     let liar = packed([("modelDescription.xml".to_owned(), vec![b' '; 70_000])]);
@@ -258,7 +259,7 @@ pub fn archives() -> Files {
     vec![
         ("an FMU", packed([("modelDescription.xml".to_owned(), descriptions().remove(0).1)])),
         ("bomb", bomb),
-        ("entries", packed((0..50_001).map(|number| (format!("{number}/"), Vec::new())))),
+        ("entries", packed((0..2000).map(|number| (format!("{number}/"), Vec::new())))),
         ("declared size", liar),
         ("declared entries", counted),
         ("above", one("../outside")),

@@ -3,6 +3,9 @@
 use fmu_run::{Description, Fmu, Order, System};
 use std::path::Path;
 
+/// The orders in which a system is opened.
+pub const ORDERS: [Order; 2] = [Order::Dependencies, Order::Jacobi];
+
 /// Asserts that the message of an error is one line that a terminal shows as it is.
 fn check<T>(result: Result<T, String>) {
     if let Err(why) = result {
@@ -22,7 +25,7 @@ pub fn description(bytes: &[u8]) {
 /// Opens a directory as a system, after writing one of its files. The directory contains the other files of the system.
 pub fn file_of_system(directory: &Path, name: &str, bytes: &[u8]) {
     std::fs::write(directory.join(name), bytes).unwrap();
-    for order in [Order::Dependencies, Order::Jacobi] {
+    for order in ORDERS {
         // SAFETY: the only FMU in the directory is one of these tests.
         check(unsafe { System::open(directory, order) }.map_err(|error| error.to_string()));
     }

@@ -13,10 +13,11 @@ use fmu_run::Standard;
 use fmu_test_kit::Random;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Instant;
 use tempfile::TempDir;
 
 /// Megabytes of address space in which all files are read. The process itself needs about 20.
-const LIMITS: [u64; 6] = [48, 64, 96, 128, 256, 1024];
+const LIMITS: [u64; 4] = [48, 80, 128, 256];
 /// Environment variable with the directory in which the child process works.
 const DIRECTORY: &str = "READERS_DIRECTORY";
 /// Environment variable with the number of mutations of each kind.
@@ -60,6 +61,9 @@ fn run_limited(test: &str, megabytes: u64, mutations: usize) {
         .env(MUTATIONS, mutations.to_string())
         .env("TMPDIR", outer.path())
         .env("RUST_BACKTRACE", "0")
+        // Otherwise the thread of the test has an arena of its own, which needs more address space than some limits allow, and
+        // each allocation takes a page.
+        .env("MALLOC_ARENA_MAX", "1")
         .output()
         .unwrap();
     let text =
@@ -79,11 +83,29 @@ fn directory() -> PathBuf {
 /// Calls `read` with each file, and prints its name, so that the parent process knows which one was the last.
 fn each(kind: &str, files: &Files, mut read: impl FnMut(&[u8])) {
     for (name, bytes) in files {
-        let begin = std::time::Instant::now();
         println!("{kind}: {name}");
         read(bytes);
-        println!("{:.2} s", begin.elapsed().as_secs_f64());
     }
+}
+
+/// Writes the small files to a directory for each target of libFuzzer, which starts from them.
+#[test]
+#[ignore = "make fuzz starts it"]
+fn write_corpus() {
+    let outer = directory();
+    let write = |target: &str, files: Files, last: &[u8]| {
+        let directory = outer.join(target);
+        std::fs::create_dir_all(&directory).unwrap();
+        for (name, bytes) in files.into_iter().filter(|(_, bytes)| bytes.len() < 20_000) {
+            std::fs::write(directory.join(format!("{name} {}", last.len())), [&bytes, last].concat())
+                .unwrap();
+        }
+    };
+    write("description", corpus::descriptions(), &[]);
+    write("archive", corpus::archives(), &[]);
+    write("system", corpus::systems(), &[0]);
+    let parameters = corpus::parameters().into_iter();
+    write("system", parameters.map(|(name, bytes)| (name, [bytes, vec![1]].concat())).collect(), &[]);
 }
 
 #[test]
@@ -177,8 +199,58 @@ fn read_mutations() {
     mutate(&corpus::archives(), &|bytes| harness::archive(&alone, bytes));
 }
 
+/// Returns the number of mutations of each kind of files.
+fn mutations() -> usize {
+    std::env::var(MUTATIONS).map_or(150, |count| count.parse().unwrap())
+}
+
 #[test]
 fn mutations_of_malformed_files_are_errors() {
-    let count = std::env::var(MUTATIONS).map_or(150, |count| count.parse().unwrap());
-    run_limited("read_mutations", 256, count);
+    run_limited("read_mutations", 256, mutations());
+}
+
+/// Returns how many seconds it takes to open a system.
+fn seconds(directory: &Path, system: &[u8]) -> f64 {
+    let begin = Instant::now();
+    harness::file_of_system(directory, "SystemStructure.ssd", system);
+    begin.elapsed().as_secs_f64() / harness::ORDERS.len() as f64
+}
+
+/// Repeats the tests and writes their figures to the page about robustness.
+#[test]
+#[ignore = "writes a page; run it with --profile bench, and READERS_MUTATIONS=20000"]
+fn write_figures() {
+    for megabytes in LIMITS {
+        run_limited("read_all", megabytes, 0);
+    }
+    run_limited("read_mutations", 256, mutations());
+    let outer = TempDir::new().unwrap();
+    let system = system(outer.path());
+    let times = [10_000, 100_000].map(|count| {
+        [corpus::chain(count, false), corpus::chain(count, true), corpus::unrelated(count)]
+            .map(|text| seconds(&system, &text))
+    });
+    let kinds = [corpus::descriptions(), corpus::systems(), corpus::parameters(), corpus::archives()];
+    let [descriptions, systems, parameters, archives] = kinds.map(|files| files.len());
+    let [least, .., most] = LIMITS;
+    let row = |count: &str, [chain, circle, unrelated]: [f64; 3]| {
+        format!(
+            "| a system of {count} connections in a chain, in a circle, and between unknown connectors | {chain:.2} s, {circle:.2} s, {unrelated:.2} s |\n"
+        )
+    };
+    let table = format!(
+        "| test | result |\n|---|---|\n\
+        | {descriptions} model descriptions, {systems} systems, {parameters} parameter sets and {archives} archives that are malformed, \
+        in {least} to {most} MB of memory | read, or an error of one line; no file outside |\n\
+        | {} mutations of them in 256 MB | the same |\n{}{}",
+        4 * mutations(),
+        row("10,000", times[0]),
+        row("100,000", times[1]),
+    );
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/robustness.md");
+    let text = std::fs::read_to_string(&page).unwrap();
+    let (before, rest) = text.split_once("<!-- readers -->\n").unwrap();
+    let (_, after) = rest.split_once("<!-- end of readers -->\n").unwrap();
+    std::fs::write(page, format!("{before}<!-- readers -->\n{table}<!-- end of readers -->\n{after}"))
+        .unwrap();
 }

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from prw.errors import UserError
+from prw.files import read_text
 
 #: A larger relative standard deviation is a mistake: percent instead of a fraction.
 MAX_RELATIVE = 1.0
@@ -123,12 +124,12 @@ def values_of(given: Given, loaded: fmu_run.Fmu) -> dict[str, Any]:
         )
     path = Path(given)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_text(path))
         # The whole report has them among other things.
         entries = dict(content["parameters"] if isinstance(content.get("parameters"), dict) else content)
     except OSError as error:
         raise UserError(f"{path} cannot be read ({error.strerror or error})", argument="parameters") from None
-    except (ValueError, AttributeError):
+    except (ValueError, AttributeError, RecursionError):
         raise UserError(
             f"{path} is not a JSON file with values by name; an FMU is named by `fmu`", argument="parameters"
         ) from None

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
+import threading
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from types import ModuleType
+from typing import Any
 
 from prw import progress
 from prw.commands import check, excite, identify, linearize, simulate, sweep
 from prw.commands.options import Formatter
-from prw.errors import UserError
+from prw.errors import UserError, one_line
 
 #: The subcommands by name. Each module has a docstring that describes it, HELP in a line, run(arguments), and perhaps
 #: add_options(parser) and EXAMPLES.
@@ -40,6 +43,7 @@ def run(program: str, description: str, commands: Mapping[str, ModuleType], argv
         add_options(subparser)
         subparser.set_defaults(run=command.run)
     arguments = argparse.Namespace(options={})
+    before = _end_on_sigterm()
     try:
         parser.parse_args(argv, arguments)
         progress.show()
@@ -48,7 +52,7 @@ def run(program: str, description: str, commands: Mapping[str, ModuleType], argv
     except UserError as error:
         default = f"--{error.argument}" if hasattr(arguments, error.argument) else error.argument
         option = {**OPTIONS, **arguments.options}.get(error.argument, default)
-        print(f"{program} {arguments.command}: {option}{error.detail}", file=sys.stderr)
+        print(f"{program} {arguments.command}: {one_line(option)}{error.detail}", file=sys.stderr)
         return error.status
     except KeyboardInterrupt:
         print(f"\n{program} {arguments.command}: interrupted", file=sys.stderr)
@@ -56,4 +60,21 @@ def run(program: str, description: str, commands: Mapping[str, ModuleType], argv
     except BrokenPipeError:
         # The reader has closed the pipe (`prw ... | head`); a write at exit would raise again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    finally:
+        if before is not None:
+            signal.signal(signal.SIGTERM, before)
     return 0
+
+
+def _end_on_sigterm() -> Any:
+    """Let SIGTERM end the process as an exception, so that temporary files are removed. Returns the handler before, or None if
+    nothing has changed."""
+    if threading.current_thread() is not threading.main_thread():
+        return None
+    if signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
+        return None
+
+    def end(number: int, _: Any) -> None:
+        raise SystemExit(128 + number)
+
+    return signal.signal(signal.SIGTERM, end)

@@ -8,7 +8,7 @@ from math import pi
 from pathlib import Path
 from typing import NamedTuple
 
-from prw.errors import UserError
+from prw.errors import UserError, one_line
 
 #: Factor to SI of every unit a column may have, by quantity. The first is SI.
 UNITS: dict[str, dict[str, float]] = {
@@ -135,7 +135,9 @@ def columns(
 
 def shown(header: Sequence[str]) -> str:
     """The first names of the header, for an error message."""
-    return ", ".join(title or "(blank)" for title in header[:SHOWN]) + (", ..." if len(header) > SHOWN else "")
+    return ", ".join(one_line(title, 40) or "(blank)" for title in header[:SHOWN]) + (
+        ", ..." if len(header) > SHOWN else ""
+    )
 
 
 def column(title: str) -> tuple[str, str]:

@@ -3,7 +3,21 @@
 from __future__ import annotations
 
 import importlib.util
+import unicodedata
 from typing import Any
+
+#: Number of characters of a message at most.
+LONGEST = 1000
+
+
+def one_line(text: str, longest: int = LONGEST) -> str:
+    """The string without characters that a terminal would obey or cannot show, which become escapes, and cut to `longest`."""
+    cut = text if len(text) <= longest else text[:longest] + "..."
+    return "".join(c if c.isprintable() or unicodedata.category(c) == "Zs" else _escaped(c) for c in cut)
+
+
+def _escaped(character: str) -> str:
+    return character.encode("unicode_escape", "backslashreplace").decode("ascii")
 
 
 class UserError(ValueError):
@@ -23,7 +37,7 @@ class UserError(ValueError):
 
     def __init__(self, message: str, *, argument: str = "", given: Any = ""):
         self.argument = argument
-        self.detail = f"{f' {given}'.rstrip()}: {message}" if argument else message
+        self.detail = one_line(f"{f' {given}'.rstrip()}: {message}" if argument else message)
         super().__init__(argument + self.detail)
 
 

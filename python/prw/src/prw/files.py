@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
+import re
 import secrets
+import stat
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -14,6 +17,11 @@ from numpy.typing import NDArray
 
 from prw.errors import UserError
 from prw.progress import Progress
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 #: Rows that are written at once.
 BLOCK = 8192
@@ -36,23 +44,83 @@ def page_file(name: str) -> Path:
     return next((path for path in locations if path.is_file()), locations[0])
 
 
+#: Largest file that is read as a whole, in bytes.
+MAX_BYTES = 64 << 20
+
+
+def check_regular(path: Path) -> None:
+    """Raise OSError unless it is a regular file: a pipe would wait for a writer, and a device may never end."""
+    mode = path.stat().st_mode
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    if not stat.S_ISREG(mode):
+        raise OSError(errno.EINVAL, "it is not a regular file")
+
+
+def read_text(path: Path) -> str:
+    """The content of a small file, as UTF-8. Raises OSError and UnicodeError."""
+    check_regular(path)
+    with open(path, "rb") as file:
+        content = file.read(MAX_BYTES + 1)
+    if len(content) > MAX_BYTES:
+        raise OSError(errno.EFBIG, f"it has more than {MAX_BYTES >> 20} MB")
+    return content.decode("utf-8")
+
+
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a temporary path next to `path`. The file replaces `path` if the block succeeds, and is removed otherwise.
+    """Yield a temporary path next to `path`. The file replaces `path` if the block succeeds, and is removed otherwise. What killed
+    processes have left there is removed before.
 
     Creates missing directories. Raises UserError if the file cannot be written.
     """
-    temporary = path.parent / f".{path.stem}-{secrets.token_hex(4)}{path.suffix}"
+    descriptor, temporary = None, path
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.touch(exist_ok=False)
+        _remove_abandoned(path)
+        # Another process may lock and remove the file before this one locks it.
+        while descriptor is None or not temporary.exists():
+            if descriptor is not None:
+                os.close(descriptor)
+            temporary = path.parent / f".{path.stem}-{secrets.token_hex(4)}{path.suffix}"
+            descriptor = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
+            with contextlib.suppress(BlockingIOError):
+                _lock(descriptor)
         yield temporary
+        # Otherwise the file may be empty after a power failure.
+        os.fsync(descriptor)
+        os.close(descriptor)
+        descriptor = None
         os.replace(temporary, path)
     except OSError as error:
         raise UserError(f"{path}: cannot be written ({error.strerror or error})") from None
     finally:
+        if descriptor is not None:
+            os.close(descriptor)
+        if temporary != path:
+            with contextlib.suppress(OSError):
+                temporary.unlink()
+
+
+def _lock(descriptor: int) -> None:
+    """Lock a file until the process ends or closes it. Raises OSError if another process has locked it."""
+    if fcntl is not None:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _remove_abandoned(path: Path) -> None:
+    """Remove the temporary files for `path` that no process has locked. On Windows, files that are in use cannot be removed."""
+    name = re.compile(re.escape(f".{path.stem}-") + "[0-9a-f]{8}" + re.escape(path.suffix))
+    for entry in path.parent.iterdir():
+        if not name.fullmatch(entry.name) or entry.is_symlink() or not entry.is_file():
+            continue
         with contextlib.suppress(OSError):
-            temporary.unlink()
+            descriptor = os.open(entry, os.O_RDWR)
+            try:
+                _lock(descriptor)
+                entry.unlink()
+            finally:
+                os.close(descriptor)
 
 
 def write_text(path: str | os.PathLike[str] | None, text: str) -> str:

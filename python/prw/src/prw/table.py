@@ -8,19 +8,22 @@ import math
 import os
 import re
 from array import array
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 
 from prw.errors import UserError
+from prw.files import check_regular
 from prw.motion import Array
 from prw.progress import Progress
 
 DELIMITERS = (",", ";", "\t")
 #: Rows between two progress reports.
 REPORT_ROWS = 4096
+#: Characters of a line at most.
+LONGEST_LINE = 1 << 20
 
 #: The columns to read, (name, index), of a header in the line with this number.
 Choice = Callable[[Sequence[str], int], Sequence[tuple[str, int]]]
@@ -41,6 +44,7 @@ def read_table(
     Raises UserError naming file, line and column.
     """
     try:
+        check_regular(path)
         chosen = encoding or _encoding(path)
         with open(path, encoding=chosen, newline="") as file:
             return _parse(path, file, choose, may_be_empty, increasing, skip)
@@ -69,10 +73,13 @@ def _parse(
         raise UserError(f"{path}: the file is empty; a header and at least two rows are needed")
     delimiter = next((d for d in DELIMITERS if d in first), ",")
     file.seek(0)
-    table = csv.reader(file, delimiter=delimiter, skipinitialspace=True)
+    table = csv.reader(_lines(path, file), delimiter=delimiter, skipinitialspace=True)
     try:
         # The first row below `begin` lines.
-        header = [name.strip() for name in next(row for row in table if row and table.line_num > begin)]
+        top = next((row for row in table if row and table.line_num > begin), None)
+        if top is None:
+            raise UserError(f"{_where(path, table.line_num)}: there is no header")
+        header = [name.strip() for name in top]
         header[0] = header[0].lstrip("# ")
         columns = choose(header, table.line_num)
         values = _rows(path, table, len(header), columns, may_be_empty, increasing, os.fstat(file.fileno()).st_size)
@@ -84,14 +91,22 @@ def _parse(
     return values
 
 
+def _lines(path: Path, file: IO[str]) -> Iterator[str]:
+    """The lines of the file. Raises UserError for one that would fill the memory."""
+    while line := file.readline(LONGEST_LINE):
+        if len(line) == LONGEST_LINE:
+            raise UserError(f"{path}: a line has more than {LONGEST_LINE:,} characters; it is not a table")
+        yield line
+
+
 def _top(file: IO[str], skip: int) -> tuple[int, str]:
     """The number of lines above the header (`skip`, then blank lines or comments after `#`) and the header, "" if there is
     none. numpy also writes a `#` before the header: the header is then the last comment, directly above numbers."""
     for _ in range(skip):
-        file.readline()
-    count, comment, line = skip, "", file.readline()
+        file.readline(LONGEST_LINE)
+    count, comment, line = skip, "", file.readline(LONGEST_LINE)
     while line and (not line.strip() or line.lstrip().startswith("#")):
-        count, comment, line = count + 1, line.strip() and line, file.readline()
+        count, comment, line = count + 1, line.strip() and line, file.readline(LONGEST_LINE)
     if comment and line.strip() and re.match(r"[-+.\d]", line.lstrip()):
         return count - 1, comment
     return count, line

@@ -14,6 +14,7 @@ import numpy as np
 
 from prw.arguments import check_names
 from prw.errors import UserError
+from prw.files import MAX_BYTES
 from prw.motion import Array
 
 DIRECTORY = "extra/org.fmi-standard.fmi-ls-ref"
@@ -73,7 +74,11 @@ def find(known: Sequence[Experiment], name: str) -> Experiment:
 
 
 def _content(archive: zipfile.ZipFile, name: str) -> str:
-    return archive.read(f"{DIRECTORY}/{name}").decode("utf-8")
+    with archive.open(f"{DIRECTORY}/{name}") as file:
+        content = file.read(MAX_BYTES + 1)
+    if len(content) > MAX_BYTES:
+        raise zipfile.BadZipFile(f"{name} has more than {MAX_BYTES >> 20} MB")
+    return content.decode("utf-8")
 
 
 def _columns(table: str) -> dict[str, Array]:
