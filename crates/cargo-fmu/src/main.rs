@@ -61,7 +61,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    fmu_check::work_if_asked();
+    fmu_check::run_worker_if_requested();
     let Cargo::Fmu(command) = Cargo::parse();
     match carry_out(&command) {
         Ok(true) => ExitCode::SUCCESS,

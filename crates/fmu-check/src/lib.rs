@@ -33,7 +33,7 @@ pub use checker::Unchecked;
 pub use finding::{Finding, Proof, Severity};
 pub use options::{FailOn, Options};
 pub use report::Report;
-pub use worker::work_if_asked;
+pub use worker::run_worker_if_requested;
 
 use anyhow::Context as _;
 use checker::Checker;
@@ -59,7 +59,7 @@ const LONG: [&str; 2] = ["malformed", "resources"];
 /// Checks an FMU, prints the findings and writes the reports. The exit status is 1 for findings of a severity that fails the
 /// check, otherwise 2 if the FMU, one of its interfaces or a topic was not checked, otherwise 0.
 ///
-/// The program must call [`work_if_asked`] first in `main`, because it is started again to execute call sequences.
+/// The program must call [`run_worker_if_requested`] first in `main`, because it is started again to execute call sequences.
 pub fn command(fmu: &Path, options: &Options) -> ExitCode {
     if let Some(rule) = &options.explain {
         return match rules::explain(rule) {
@@ -161,7 +161,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
 /// Compares Co-Simulation with Model Exchange of an FMU that offers both, by simulations of at most 40 steps. Returns a description of
 /// the first difference that no error of a solver explains; `None` if there is none, or if the comparison is not possible.
 ///
-/// The program must call [`work_if_asked`] first in `main`.
+/// The program must call [`run_worker_if_requested`] first in `main`.
 ///
 /// # Errors
 /// Fails if the file is not an FMU of FMI 2.0 or 3.0.

@@ -14,7 +14,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    fmu_check::work_if_asked();
+    fmu_check::run_worker_if_requested();
     let Arguments { fmu, options } = Arguments::parse();
     fmu_check::command(&fmu.unwrap_or_default(), &options)
 }

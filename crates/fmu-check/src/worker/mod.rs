@@ -107,7 +107,7 @@ pub struct Last {
 
 /// Executes call sequences and ends the process if it was started as a worker. A program that offers checks must call this function
 /// first in `main`.
-pub fn work_if_asked() {
+pub fn run_worker_if_requested() {
     let Some(job) = std::env::var_os(VARIABLE) else { return };
     #[cfg(target_os = "linux")]
     if job.is_empty() {
