@@ -10,9 +10,9 @@ pub enum Evidence {
     /// No known comparison.
     #[default]
     None,
-    /// Crash, hang, exit or too many processes, or a library that cannot be loaded.
+    /// Crash, hang or exit, or a library that cannot be loaded.
     End,
-    /// Processes that are alive after the end of the call sequence.
+    /// Processes that are alive after the end of the call sequence, or too many of them before.
     Orphans,
     /// Output on the standard output or the standard error.
     Printed,
@@ -56,6 +56,9 @@ pub struct Expected {
 /// Returns the comparison for a finding, from a run of its call sequence.
 pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     let Some(criterion) = &finding.criterion else { return Evidence::None };
+    if matches!(run.end, End::Flood(_)) {
+        return Evidence::Orphans;
+    }
     if run.end != End::Done || finding.name == "package.symbols" {
         return Evidence::End;
     }
