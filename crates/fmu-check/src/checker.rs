@@ -399,7 +399,10 @@ impl Checker {
             Arc::new(move |run: &Run| {
                 // How many processes are alive at a time depends on the scheduler.
                 if floods && !run.orphans.is_empty() {
-                    return Some(format!("{} processes are alive after the call sequence", run.orphans.len()));
+                    return Some(format!(
+                        "{} processes are alive after the call sequence",
+                        run.orphans.len()
+                    ));
                 }
                 let same = std::mem::discriminant(&run.end) == kind && name_at(run, &sequence) == at;
                 same.then(|| ending(run, &sequence))?
