@@ -216,7 +216,7 @@ def test_an_ssp_is_the_same_system(order, tmp_path) -> None:
     "old, new, message",
     [
         ("</ssd:SystemStructureDescription>", "", "SystemStructure.ssd is not well-formed XML"),
-        ("resources/prw_testbed.fmu", "resources/other.fmu", "component testbed: resources/other.fmu: cannot be opened"),
+        ("resources/prw_testbed.fmu", "resources/other.fmu", "component testbed: there is no readable resources/other.fmu in it"),
         ("x-fmu-sharedlibrary\" source=\"resources/prw_t", "x-ssp\" source=\"resources/prw_t", "component testbed is no FMU"),
         ("resources/testbed.ssv", "resources/none.ssv", "there is no readable resources/none.ssv"),
         ("<ssd:Component name=\"testbed\"", "<ssd:Component", "a Component lacks name"),

@@ -61,9 +61,10 @@ impl Selection {
 
     /// Adds a name and all variables that it denotes.
     pub(crate) fn push(&mut self, name: &str, found: &[Found]) {
-        let known = self.groups.iter().enumerate();
-        let mut known = known.map(|(index, group)| ((group.component, group.base), index)).collect();
-        self.push_to(&mut known, name, found);
+        self.push_with(name, found, |groups, (component, base)| {
+            let of_type = |group: &Group| group.component == component && group.base == base;
+            groups.iter().position(of_type).unwrap_or(groups.len())
+        });
     }
 
     /// Adds a name and all variables that it denotes; `known` contains the indices of the groups.
@@ -73,15 +74,25 @@ impl Selection {
         name: &str,
         found: &[Found],
     ) {
+        self.push_with(name, found, |groups, of_type| *known.entry(of_type).or_insert(groups.len()));
+    }
+
+    /// Adds a name; `index_of` returns the index of the group of a component and a type, or the number of groups if it is new.
+    fn push_with(
+        &mut self,
+        name: &str,
+        found: &[Found],
+        mut index_of: impl FnMut(&[Group], (usize, BaseType)) -> usize,
+    ) {
         let row = self.names.len();
         self.names.push(name.to_owned());
         let read_only = found.iter().find_map(|found| found.check_settable(name).err());
         self.read_only = self.read_only.take().or(read_only.map(|error| error.to_string()));
         for Target { component, base, reference } in found.iter().copied().map(Target::of) {
-            let index = *known.entry((component, base)).or_insert_with(|| {
+            let index = index_of(&self.groups, (component, base));
+            if index == self.groups.len() {
                 self.groups.push(Group { component, base, references: Vec::new(), indices: Vec::new() });
-                self.groups.len() - 1
-            });
+            }
             self.groups[index].references.push(reference);
             self.groups[index].indices.push(row);
         }

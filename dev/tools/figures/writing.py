@@ -183,7 +183,12 @@ def _join_paths(root: Any) -> None:
             first.attrib["d"] += path.get("d")
             path.getparent().remove(path)
     for path in known.values():
-        path.attrib["d"] = _relative(path.get("d"))
+        path.attrib["d"] = _packed(_relative(path.get("d")))
+
+
+def _packed(path: str) -> str:
+    """Removes spaces before a minus and zeros before a decimal point, which SVG does not need."""
+    return re.sub(r"(?<![\d.])0(?=\.\d)", "", re.sub(r" (?=-)", "", path))
 
 
 def _relative(points: str) -> str:
