@@ -69,7 +69,7 @@ def text_table(table: Table) -> str:
     rows = []
     for row in table.rows:
         labels = ["", *(f' data-label="{html.escape(head)}:"' for head in table.heads[1:])]
-        cells = (f'<td class="meaning"{label if cell else ""}>{_inline(cell)}</td>' for label, cell in zip(labels, row))
+        cells = (f"<td{label if cell else ''}>{_inline(cell)}</td>" for label, cell in zip(labels, row))
         rows.append(f"<tr>{''.join(cells)}</tr>")
     return _table("", [html.escape(head) for head in table.heads], rows, kind="rows text")
 
