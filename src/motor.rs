@@ -223,7 +223,7 @@ impl Motors {
     }
 
     /// Returns the motions at the current communication point after three samples or more; see
-    /// [`sampled`](Self::sampled).
+    /// [`extrapolate`](Self::extrapolate).
     #[inline(always)]
     pub fn extrapolate_fast(&self) -> Motions {
         self.with_rates(self.parabolas())
