@@ -1,6 +1,6 @@
 //! Values of variables. Each type has its functions in FMI 2.0 and FMI 3.0.
 //!
-//! Numbers travel as `f64`, for speed; [`Value`]s are exact and have all types. A variable of FMI 3.0 that is an array has several
+//! Numbers are passed as `f64`, because one type is fast to copy; [`Value`]s are exact and have all types. A variable of FMI 3.0 that is an array has several
 //! values.
 
 use crate::instance::{Instance, call};

@@ -49,7 +49,7 @@ pub struct Attributes {
     pub description: String,
 }
 
-/// A variable has the attributes that it may share.
+/// Elements of an array share their attributes, so a variable reads them as its own fields.
 impl Deref for Variable {
     type Target = Attributes;
 

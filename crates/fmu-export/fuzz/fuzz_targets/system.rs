@@ -12,7 +12,7 @@ use libfuzzer_sys::fuzz_target;
 use std::sync::LazyLock;
 use tempfile::TempDir;
 
-/// The directory of a system. Its FMU has no library, so that only reading is tested.
+/// Directory of a system. Its FMU has no library, so opening it can only fail in a reader.
 static DIRECTORY: LazyLock<TempDir> = LazyLock::new(|| {
     let directory = TempDir::new().expect("a directory");
     std::fs::create_dir(directory.path().join("m")).expect("a directory");
