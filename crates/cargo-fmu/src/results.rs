@@ -43,8 +43,8 @@ impl<'a> Column<'a> {
         }
     }
 
-    /// Describes a variable whose values an `f64` cannot hold exactly: strings, bytes or 64-bit integers. For the plot, strings are numbered in
-    /// the order of their first occurrence.
+    /// Describes a variable whose values an `f64` cannot hold exactly: strings, bytes or 64-bit integers. For the
+    /// plot, strings are numbered in the order of their first occurrence.
     pub fn of_values(variable: &'a Variable, exact: Vec<Option<Value>>) -> Self {
         let mut labels: Vec<(f64, String)> = Vec::new();
         let mut number = |value: &Option<Value>| match value {
