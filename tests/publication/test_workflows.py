@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import subprocess
+import sys
 import sysconfig
 import tomllib
 from pathlib import Path
@@ -13,6 +14,11 @@ import pytest
 from built import ROOT
 
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
+#: Files of requirements that are installed with hashes.
+REQUIREMENTS = ["demo", "study", "tests", "importers", "examples", "release", "test-platforms", "uv"]
+#: A release is built on Linux and macOS.
+EVERYWHERE = [name for name in REQUIREMENTS if name not in ("release", "test-platforms")]
+OLDEST, NEWEST = "3.11", "3.14"
 #: An action pinned to a commit, with its version as a comment.
 PINNED = re.compile(r"uses: [\w./-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+$")
 
@@ -82,11 +88,26 @@ def test_crates_come_from_one_registry_under_allowed_licences() -> None:
         assert all(allowed & {one.strip() for one in part.split(" OR ")} for part in needed), crate["license"]
 
 
-@pytest.mark.parametrize("name", ["demo", "study", "tests", "importers", "examples", "release", "test-platforms", "uv"])
+@pytest.mark.parametrize("name", REQUIREMENTS)
 def test_python_requirements_have_hashes(name: str) -> None:
     content = (ROOT / "dev" / "requirements" / f"{name}.txt").read_text(encoding="utf-8")
     entries = re.findall(r"^[^#\s-][^\\\n]*(?:\\\n[^\\\n]*)*", content, re.M)
     assert entries and all("==" in entry and "--hash=sha256:" in entry for entry in entries)
+
+
+# An environment that another file has filled before hides what is missing in this one.
+@pytest.mark.parametrize(
+    "name, version, platform",
+    [(name, OLDEST, "linux") for name in REQUIREMENTS]
+    + [(name, NEWEST, "macos") for name in REQUIREMENTS]
+    + [(name, NEWEST, "windows") for name in EVERYWHERE],
+)
+def test_python_requirements_suffice_alone(name: str, version: str, platform: str, tmp_path: Path) -> None:
+    uv = [sys.executable, "-m", "uv", "pip", "install", "--dry-run", "--require-hashes"]
+    there = ["--python-version", version, "--python-platform", platform, "--target", str(tmp_path / "empty")]
+    command = [*uv, *there, "-r", str(ROOT / "dev" / "requirements" / f"{name}.txt")]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 def test_an_action_has_one_version() -> None:
