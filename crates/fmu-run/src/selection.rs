@@ -86,8 +86,10 @@ impl Selection {
     ) {
         let row = self.names.len();
         self.names.push(name.to_owned());
-        let read_only = found.iter().find_map(|found| found.check_settable(name).err());
-        self.read_only = self.read_only.take().or(read_only.map(|error| error.to_string()));
+        if self.read_only.is_none() {
+            let reason = found.iter().find_map(|found| found.check_settable(name).err());
+            self.read_only = reason.map(|error| error.to_string());
+        }
         for Target { component, base, reference } in found.iter().copied().map(Target::of) {
             let index = index_of(&self.groups, (component, base));
             if index == self.groups.len() {
