@@ -260,7 +260,7 @@ fn two_builds_give_the_same_fmu_with_the_committed_description() {
         let output = build_fmu(&[], &out);
         assert!(output.status.success(), "{output:?}");
         let text = String::from_utf8_lossy(&output.stdout).into_owned();
-        assert!(text.contains(&guid) && text.contains("parameters.json"), "{text}");
+        assert!(text.contains(&guid), "{text}");
         fs::read(out.join("prw_testbed.fmu")).unwrap()
     };
     let (one, other) = (build("one"), build("other"));
