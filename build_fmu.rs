@@ -7,12 +7,6 @@ use fmu_package::{BuildOptions, Builder, Companion, Page, Sources, Terminal};
 use std::path::{Path, PathBuf, absolute};
 use std::process::ExitCode;
 
-#[path = "src/parameter_file.rs"]
-mod parameter_file;
-#[allow(dead_code, reason = "the model needs the rest")]
-#[path = "src/parameters.rs"]
-mod parameters;
-
 /// Table 1.
 const PARAMETERS: &str = "modelDescription/parameters.json";
 
@@ -52,7 +46,7 @@ fn run(options: &Options) -> Result<()> {
     let builder = Builder {
         sources: sources(project),
         terminals: terminals(),
-        start: parameter_file::read(&file).map_err(Error::msg)?.start_values(),
+        start: prw_parameters::file::read(&file).map_err(Error::msg)?.start_values(),
         variant: other.as_deref().map(|file| format!("parameters from {}", short(file))),
         page: page(project),
         environment: vec![("PRW_PARAMETERS", other.map(Into::into))],

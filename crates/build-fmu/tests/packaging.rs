@@ -3,9 +3,8 @@
 use fmi_schema::fmi2::{Fmi2ModelDescription, Fmi2VariableDependency};
 use fmi_schema::traits::FmiModelDescription;
 use fmu_export::Variables;
-use prw_testbed::TestbedFmu;
-use prw_testbed::parameters::Parameters;
 use prw_testbed::state_space::{StateSpace, state_space};
+use prw_testbed::{BUILT_IN, TestbedFmu};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
@@ -126,7 +125,7 @@ fn dependencies_are_the_sparsity_of_the_matrices() {
     };
     let inputs = ["theta1", "theta2", "omega1", "omega2"];
     let states = ["theta3", "theta4", "theta5", "theta6", "omega5", "omega6"];
-    let StateSpace { A, B, C, D } = state_space(&Parameters::BUILT_IN);
+    let StateSpace { A, B, C, D } = state_space(&BUILT_IN);
     let owned = |set: BTreeSet<&str>| set.into_iter().map(str::to_owned).collect::<BTreeSet<_>>();
 
     let structure = &read.model_structure;
