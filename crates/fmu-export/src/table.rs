@@ -1,6 +1,6 @@
 //! The table of variables: [`variables!`](crate::variables) and the code that it generates.
 
-use crate::offsets::Filling;
+use crate::filling::Filling;
 use crate::saved::StateVisitor;
 use crate::variable::{Index, Read, Variable, reject};
 use std::fmt::Debug;

@@ -76,6 +76,11 @@ impl Found<'_> {
     }
 }
 
+/// Returns whether a type has values that `f64` has not.
+pub(crate) fn is_exact(base: BaseType) -> bool {
+    matches!(base, BaseType::String | BaseType::Binary | BaseType::Int64 | BaseType::UInt64)
+}
+
 pub(crate) fn article(word: &str) -> String {
     let vowel = word.starts_with(['a', 'e', 'i', 'o', 'u']);
     format!("{} {word}", if vowel { "an" } else { "a" })

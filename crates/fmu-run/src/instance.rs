@@ -2,11 +2,11 @@
 
 use crate::arrays::{Arrays, Expanded};
 use crate::description::{Description, Structural};
+use crate::early::EarlyValues;
 use crate::error::{Error, request};
 use crate::fmu::Loaded;
 use crate::library::Library;
 use crate::messages::Logging;
-use crate::values::EarlyValues;
 use fmi_abi::Interface;
 use fmi_abi::description::ModelDescription;
 use fmi_client::{Rejection, Settings};

@@ -2,11 +2,12 @@
 
 use crate::description::Description;
 use crate::error::{Error, request};
+use crate::found::is_exact;
 use crate::instance::{Experiment, Instance, Tolerance};
 use crate::messages::{Feed, Logged, Logging};
 use crate::running::{Running, Saved};
 use crate::selection::{Selection, Target};
-use crate::start::{Start, StartValues, exact, is_exact};
+use crate::start::{Start, StartValues, exact};
 use crate::system::System;
 use crate::threads::Threads;
 use fmi_abi::{BaseType, Interface, Value};

@@ -1,9 +1,10 @@
 //! Instances of the components of a system, which run together.
 
+use crate::found::is_exact;
 use crate::instance::{Experiment, Instance};
 use crate::messages::Logging;
 use crate::selection::{Selection, Target};
-use crate::start::{StartValues, is_exact};
+use crate::start::StartValues;
 use crate::system::{Exchange, Order, System};
 use fmi_abi::{BaseType, Interface, Value};
 use fmi_client::Rejection;

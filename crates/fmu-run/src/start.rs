@@ -1,7 +1,7 @@
 //! Start values: from names to value references.
 
 use crate::error::{Error, request};
-use crate::found::Found;
+use crate::found::{Found, is_exact};
 use crate::selection::{Target, fits};
 use crate::system::{StartValue, System};
 use fmi_abi::{BaseType, Value};
@@ -147,11 +147,6 @@ impl<'a> StartValues<'a> {
         }
         Ok(all)
     }
-}
-
-/// Returns whether a type has values that `f64` has not.
-pub(crate) fn is_exact(base: BaseType) -> bool {
-    matches!(base, BaseType::String | BaseType::Binary | BaseType::Int64 | BaseType::UInt64)
 }
 
 /// Converts a value to the type of a variable for which [`is_exact`] holds.

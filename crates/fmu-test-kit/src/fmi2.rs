@@ -1,11 +1,8 @@
 //! FMI 2.0: an instance as an importer uses it.
 
-use crate::either::Version;
-use crate::importer::{Log, importer, remember};
-use crate::{Arguments, Either, Message, library::functions_of};
+use crate::importer::{Arguments, Log, Message, importer, remember};
 pub use fmi_abi::fmi2::Functions;
 use fmi_abi::fmi2::types::*;
-use fmu_export::{Exported, Standard};
 use std::ffi::{CStr, c_int, c_void};
 use std::ptr::{null, null_mut};
 

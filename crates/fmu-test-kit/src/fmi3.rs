@@ -1,12 +1,8 @@
 //! FMI 3.0: an instance as an importer uses it.
 
-use crate::either::{Version, to_bool};
-use crate::importer::{Log, importer, remember};
-use crate::{Arguments, Either, Message};
+use crate::importer::{Arguments, Log, Message, importer, remember, to_bool};
 pub use fmi_abi::fmi3::Functions;
 use fmi_abi::fmi3::types::*;
-use fmu_export::fmi3::functions as functions_of;
-use fmu_export::{Exported, Standard};
 use std::ffi::{CStr, c_int, c_void};
 use std::ptr::{null, null_mut};
 
