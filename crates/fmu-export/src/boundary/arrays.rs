@@ -11,7 +11,7 @@ use std::mem::MaybeUninit;
 /// # Safety
 /// `pointer` is NULL or points to `length` values that do not change during `'a`.
 #[inline]
-pub(crate) unsafe fn array<'a, T>(pointer: *const T, length: usize, argument: &str) -> Outcome<&'a [T]> {
+pub(crate) unsafe fn in_slice<'a, T>(pointer: *const T, length: usize, argument: &str) -> Outcome<&'a [T]> {
     if length == 0 {
         return Ok(&[]);
     }
@@ -62,7 +62,7 @@ pub(crate) unsafe fn of_elements<M: Exported, R: Reference>(
     body: impl FnOnce(&mut Instance<M>, &[u32]) -> Outcome,
 ) -> Outcome {
     // SAFETY: the caller guarantees the array and its length.
-    let vr: &[R] = unsafe { array(R::cast(vr), count, R::REFERENCES) }?;
+    let vr: &[R] = unsafe { in_slice(R::cast(vr), count, R::REFERENCES) }?;
     same("values", instance.count_elements(vr)?, value_count)?;
     // Moved out so that `body` can borrow the instance; moved back to reuse the allocation.
     let mut elements = std::mem::take(&mut instance.elements);

@@ -3,7 +3,7 @@
 //! # Safety
 //! The importer guarantees the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
 
-use super::{array, named, output, target};
+use super::{in_slice, named, output, target};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome};
 
@@ -39,7 +39,7 @@ pub unsafe fn set_continuous_states<M: Exported>(
 ) -> Outcome {
     let name = named(instance, "x", "continuousStates");
     // SAFETY: by contract, an array of this length.
-    instance.set_continuous_states(unsafe { array(x, count, name) }?)
+    instance.set_continuous_states(unsafe { in_slice(x, count, name) }?)
 }
 
 pub unsafe fn get_derivatives<M: Exported>(

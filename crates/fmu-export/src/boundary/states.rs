@@ -3,7 +3,7 @@
 //! # Safety
 //! The importer guarantees the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
 
-use super::{array, output, target};
+use super::{in_slice, output, target};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, reject};
 use fmi_abi::c_types::c_void;
@@ -80,7 +80,7 @@ pub unsafe fn deserialize<M: Exported, Byte>(
 ) -> Outcome {
     // SAFETY: by contract, an array of this length, and NULL or a pointer to a handle, which is initialized.
     let (bytes, handle) = unsafe {
-        (array(bytes.cast::<u8>(), size, "serializedState")?, target(state, "FMUstate")?.assume_init_mut())
+        (in_slice(bytes.cast::<u8>(), size, "serializedState")?, target(state, "FMUstate")?.assume_init_mut())
     };
     check_memory(instance, std::ptr::null_mut())?;
     *handle = without_provenance_mut(instance.deserialize(bytes, handle.addr())?);

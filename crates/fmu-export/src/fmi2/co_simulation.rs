@@ -4,7 +4,7 @@
 //! The importer guarantees the contract of the [module above](super#safety).
 
 use super::types::*;
-use crate::boundary::{array, output_derivatives, target};
+use crate::boundary::{in_slice, output_derivatives, target};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, discard, reject};
 
@@ -16,8 +16,9 @@ pub unsafe fn fmi2SetRealInputDerivatives<M: Exported>(
     value: *const fmi2Real,
 ) -> Outcome {
     // SAFETY: by contract, arrays of this length.
-    let (vr, order, value) =
-        unsafe { (array(vr, count, "vr")?, array(order, count, "order")?, array(value, count, "value")?) };
+    let (vr, order, value) = unsafe {
+        (in_slice(vr, count, "vr")?, in_slice(order, count, "order")?, in_slice(value, count, "value")?)
+    };
     instance.set_input_derivatives(vr, order, value)
 }
 

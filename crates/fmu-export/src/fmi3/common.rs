@@ -6,7 +6,7 @@
 use super::types::*;
 use crate::boundary::life_cycle::experiment;
 use crate::boundary::values::*;
-use crate::boundary::{array, of_elements, output, partial_derivatives, target};
+use crate::boundary::{in_slice, of_elements, output, partial_derivatives, target};
 use crate::export::Exported;
 use crate::instance::{FromOne, Instance, Outcome, reject};
 use fmi_abi::BaseType::{self, *};
@@ -101,12 +101,12 @@ pub unsafe fn fmi3SetBinary<M: Exported>(
     // SAFETY: by contract, arrays of these lengths; each value is NULL or an array of its size.
     unsafe {
         of_elements::<M, FromOne>(instance, vr, count, value_count, |instance, vr| {
-            let values: &[fmi3Binary] = array(values, value_count, "values")?;
-            let sizes = array(sizes, value_count, "valueSizes")?;
+            let values: &[fmi3Binary] = in_slice(values, value_count, "values")?;
+            let sizes = in_slice(sizes, value_count, "valueSizes")?;
             let mut bytes = Vec::with_capacity(vr.len());
             for ((vr, size), value) in vr.iter().zip(sizes).zip(values) {
                 let name = instance.name(*vr, BaseType::Binary)?;
-                bytes.push(Value::Binary(array(*value, *size, name)?.to_vec()));
+                bytes.push(Value::Binary(in_slice(*value, *size, name)?.to_vec()));
             }
             instance.set(vr, &[BaseType::Binary], &|index| bytes[index].clone())
         })
