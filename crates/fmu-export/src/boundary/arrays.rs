@@ -26,7 +26,7 @@ pub(crate) unsafe fn in_slice<'a, T>(pointer: *const T, length: usize, argument:
 /// # Safety
 /// `pointer` is NULL or points to `length` values that no other code uses during `'a`.
 #[inline]
-pub(crate) unsafe fn output<'a, T>(
+pub(crate) unsafe fn out_slice<'a, T>(
     pointer: *mut T,
     length: usize,
     argument: &str,

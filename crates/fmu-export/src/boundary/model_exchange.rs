@@ -3,7 +3,7 @@
 //! # Safety
 //! The importer guarantees the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
 
-use super::{in_slice, named, output, target};
+use super::{in_slice, named, out_slice, target};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome};
 
@@ -48,7 +48,7 @@ pub unsafe fn get_derivatives<M: Exported>(
     count: usize,
 ) -> Outcome {
     // SAFETY: by contract, an array of this length.
-    instance.get_derivatives(unsafe { output(derivatives, count, "derivatives") }?)
+    instance.get_derivatives(unsafe { out_slice(derivatives, count, "derivatives") }?)
 }
 
 pub unsafe fn get_event_indicators<M: Exported>(
@@ -57,7 +57,7 @@ pub unsafe fn get_event_indicators<M: Exported>(
     count: usize,
 ) -> Outcome {
     // SAFETY: by contract, an array of this length.
-    instance.get_event_indicators(unsafe { output(indicators, count, "eventIndicators") }?)
+    instance.get_event_indicators(unsafe { out_slice(indicators, count, "eventIndicators") }?)
 }
 
 pub unsafe fn get_continuous_states<M: Exported>(
@@ -67,7 +67,7 @@ pub unsafe fn get_continuous_states<M: Exported>(
 ) -> Outcome {
     let name = named(instance, "x", "continuousStates");
     // SAFETY: by contract, an array of this length.
-    instance.get_continuous_states(unsafe { output(x, count, name) }?)
+    instance.get_continuous_states(unsafe { out_slice(x, count, name) }?)
 }
 
 pub unsafe fn get_nominals<M: Exported>(
@@ -77,5 +77,5 @@ pub unsafe fn get_nominals<M: Exported>(
 ) -> Outcome {
     let name = named(instance, "x_nominal", "nominals");
     // SAFETY: by contract, an array of this length.
-    instance.get_nominals(unsafe { output(nominals, count, name) }?)
+    instance.get_nominals(unsafe { out_slice(nominals, count, name) }?)
 }

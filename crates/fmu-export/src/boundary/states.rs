@@ -3,7 +3,7 @@
 //! # Safety
 //! The importer guarantees the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
 
-use super::{in_slice, output, target};
+use super::{in_slice, out_slice, target};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, reject};
 use fmi_abi::c_types::c_void;
@@ -55,7 +55,7 @@ pub unsafe fn serialize<M: Exported, Byte>(
     size: usize,
 ) -> Outcome {
     // SAFETY: by contract, an array of this length.
-    let bytes = unsafe { output(bytes.cast::<u8>(), size, "serializedState")? };
+    let bytes = unsafe { out_slice(bytes.cast::<u8>(), size, "serializedState")? };
     let needed = instance.serialized_size(state.addr())?;
     if size != needed {
         return reject(format!(

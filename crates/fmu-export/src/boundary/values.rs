@@ -36,19 +36,19 @@ macro_rules! getters_and_setters {
             values: *mut $type
             $(, $value_count: usize)?
         ) -> Outcome {
-            use crate::boundary::{in_slice, of_elements, output, same};
+            use crate::boundary::{in_slice, of_elements, out_slice, same};
             use crate::instance::Reference;
             let value_count = [$($value_count,)? count][0];
             // SAFETY: by contract, arrays of these lengths that do not overlap.
             unsafe {
                 if M::ARRAYS && <$reference>::ARRAYS {
                     return of_elements::<M, $reference>(instance, vr, count, value_count, |instance, vr| {
-                        $get_values(instance, vr, output(values, value_count, <$reference>::VALUES)?, &$bases)
+                        $get_values(instance, vr, out_slice(values, value_count, <$reference>::VALUES)?, &$bases)
                     });
                 }
                 same("values", count, value_count)?;
                 let vr: &[$reference] = in_slice(<$reference>::cast(vr), count, <$reference>::REFERENCES)?;
-                $get_values(instance, vr, output(values, value_count, <$reference>::VALUES)?, &$bases)
+                $get_values(instance, vr, out_slice(values, value_count, <$reference>::VALUES)?, &$bases)
             }
         }
 

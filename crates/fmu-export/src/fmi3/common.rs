@@ -6,7 +6,7 @@
 use super::types::*;
 use crate::boundary::life_cycle::experiment;
 use crate::boundary::values::*;
-use crate::boundary::{in_slice, of_elements, output, partial_derivatives, target};
+use crate::boundary::{in_slice, of_elements, out_slice, partial_derivatives, target};
 use crate::export::Exported;
 use crate::instance::{FromOne, Instance, Outcome, reject};
 use fmi_abi::BaseType::{self, *};
@@ -72,8 +72,8 @@ pub unsafe fn fmi3GetBinary<M: Exported>(
     // SAFETY: by contract, arrays of these lengths that do not overlap.
     unsafe {
         of_elements::<M, FromOne>(instance, vr, count, value_count, |instance, vr| {
-            let values = output(values, value_count, "values")?;
-            let sizes = output(sizes, value_count, "valueSizes")?;
+            let values = out_slice(values, value_count, "values")?;
+            let sizes = out_slice(sizes, value_count, "valueSizes")?;
             let mut found = Vec::with_capacity(vr.len());
             instance.get(vr, &[BaseType::Binary], &mut |_, value| {
                 if let Value::Binary(bytes) = value {
