@@ -77,7 +77,7 @@ pub(crate) unsafe fn of_elements<M: Exported, R: Reference>(
 ///
 /// # Safety
 /// `pointer` is NULL or points to a value that no other code uses during `'a`.
-pub(crate) unsafe fn target<'a, T>(pointer: *mut T, argument: &str) -> Outcome<&'a mut MaybeUninit<T>> {
+pub(crate) unsafe fn out_value<'a, T>(pointer: *mut T, argument: &str) -> Outcome<&'a mut MaybeUninit<T>> {
     if pointer.is_null() || !pointer.is_aligned() {
         return reject(format!("the pointer {argument} is NULL or not aligned"));
     }

@@ -3,7 +3,7 @@
 //! # Safety
 //! The importer guarantees the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
 
-use super::{in_slice, named, out_slice, target};
+use super::{in_slice, named, out_slice, out_value};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome};
 
@@ -20,7 +20,10 @@ pub unsafe fn completed_integrator_step<M: Exported, Boolean: From<bool>>(
 ) -> Outcome {
     // SAFETY: by contract, each is NULL or points to a value.
     let (enter_event_mode, terminate_simulation) = unsafe {
-        (target(enter_event_mode, "enterEventMode")?, target(terminate_simulation, "terminateSimulation")?)
+        (
+            out_value(enter_event_mode, "enterEventMode")?,
+            out_value(terminate_simulation, "terminateSimulation")?,
+        )
     };
     let wanted = instance.step_completed();
     enter_event_mode.write(wanted.event.into());

@@ -4,7 +4,7 @@
 //! The importer guarantees the contract of the [module above](super#safety).
 
 use super::types::*;
-use crate::boundary::{in_slice, output_derivatives, target};
+use crate::boundary::{in_slice, out_value, output_derivatives};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, discard, reject};
 
@@ -75,7 +75,7 @@ pub unsafe fn fmi2GetRealStatus<M: Exported>(
     match status_kind(kind)? {
         StatusKind::LastSuccessfulTime => {
             // SAFETY: by contract, NULL or a pointer to a value.
-            unsafe { target(value, "value") }?.write(instance.last_successful_time());
+            unsafe { out_value(value, "value") }?.write(instance.last_successful_time());
             Ok(())
         }
         other => no_status(other),
@@ -90,7 +90,7 @@ pub unsafe fn fmi2GetBooleanStatus<M: Exported>(
     match status_kind(kind)? {
         StatusKind::Terminated => {
             // SAFETY: by contract, NULL or a pointer to a value.
-            unsafe { target(value, "value") }?.write(instance.has_ended().into());
+            unsafe { out_value(value, "value") }?.write(instance.has_ended().into());
             Ok(())
         }
         other => no_status(other),

@@ -6,7 +6,7 @@
 use super::types::*;
 use crate::boundary::life_cycle::experiment;
 use crate::boundary::values::*;
-use crate::boundary::{partial_derivatives, target};
+use crate::boundary::{out_value, partial_derivatives};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome};
 use fmi_abi::BaseType::*;
@@ -67,7 +67,7 @@ pub unsafe fn fmi2NewDiscreteStates<M: Exported>(
     info: *mut fmi2EventInfo,
 ) -> Outcome {
     // SAFETY: by contract, NULL or a pointer to an event information.
-    let info = unsafe { target(info, "fmi2eventInfo") }?;
+    let info = unsafe { out_value(info, "fmi2eventInfo") }?;
     let event = instance.event()?;
     info.write(fmi2EventInfo {
         new_discrete_states_needed: event.again.into(),

@@ -6,7 +6,7 @@
 use super::types::*;
 use crate::boundary::life_cycle::experiment;
 use crate::boundary::values::*;
-use crate::boundary::{in_slice, of_elements, out_slice, partial_derivatives, target};
+use crate::boundary::{in_slice, of_elements, out_slice, out_value, partial_derivatives};
 use crate::export::Exported;
 use crate::instance::{FromOne, Instance, Outcome, reject};
 use fmi_abi::BaseType::{self, *};
@@ -165,12 +165,12 @@ pub unsafe fn fmi3UpdateDiscreteStates<M: Exported>(
     // SAFETY: by contract, each is NULL or points to a value.
     let (again, terminate, nominals_changed, states_changed, next_defined, next) = unsafe {
         (
-            target(again, "discreteStatesNeedUpdate")?,
-            target(terminate, "terminateSimulation")?,
-            target(nominals_changed, "nominalsOfContinuousStatesChanged")?,
-            target(states_changed, "valuesOfContinuousStatesChanged")?,
-            target(next_defined, "nextEventTimeDefined")?,
-            target(next, "nextEventTime")?,
+            out_value(again, "discreteStatesNeedUpdate")?,
+            out_value(terminate, "terminateSimulation")?,
+            out_value(nominals_changed, "nominalsOfContinuousStatesChanged")?,
+            out_value(states_changed, "valuesOfContinuousStatesChanged")?,
+            out_value(next_defined, "nextEventTimeDefined")?,
+            out_value(next, "nextEventTime")?,
         )
     };
     let event = instance.event()?;
@@ -185,7 +185,7 @@ pub unsafe fn fmi3UpdateDiscreteStates<M: Exported>(
 
 pub unsafe fn fmi3GetNumberOfEventIndicators<M: Exported>(_: &mut Instance<M>, count: *mut usize) -> Outcome {
     // SAFETY: by contract, NULL or a pointer to a value.
-    unsafe { target(count, "nEventIndicators") }?.write(Instance::<M>::INDICATORS);
+    unsafe { out_value(count, "nEventIndicators") }?.write(Instance::<M>::INDICATORS);
     Ok(())
 }
 
@@ -194,6 +194,6 @@ pub unsafe fn fmi3GetNumberOfContinuousStates<M: Exported>(
     count: *mut usize,
 ) -> Outcome {
     // SAFETY: by contract, NULL or a pointer to a value.
-    unsafe { target(count, "nContinuousStates") }?.write(M::STATES.len());
+    unsafe { out_value(count, "nContinuousStates") }?.write(M::STATES.len());
     Ok(())
 }
