@@ -24,7 +24,11 @@ use crate::instance::Instance;
 use fmi_abi::Standard;
 
 /// Returns the name of an argument in the FMI version of the instance.
-fn named<M: Exported>(instance: &Instance<M>, fmi2: &'static str, fmi3: &'static str) -> &'static str {
+fn argument_name<M: Exported>(
+    instance: &Instance<M>,
+    fmi2: &'static str,
+    fmi3: &'static str,
+) -> &'static str {
     match instance.standard() {
         Standard::Fmi2 => fmi2,
         Standard::Fmi3 => fmi3,

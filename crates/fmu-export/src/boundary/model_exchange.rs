@@ -3,7 +3,7 @@
 //! # Safety
 //! The importer guarantees the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
 
-use super::{in_slice, named, out_slice, out_value};
+use super::{argument_name, in_slice, out_slice, out_value};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome};
 
@@ -40,7 +40,7 @@ pub unsafe fn set_continuous_states<M: Exported>(
     x: *const f64,
     count: usize,
 ) -> Outcome {
-    let name = named(instance, "x", "continuousStates");
+    let name = argument_name(instance, "x", "continuousStates");
     // SAFETY: by contract, an array of this length.
     instance.set_continuous_states(unsafe { in_slice(x, count, name) }?)
 }
@@ -68,7 +68,7 @@ pub unsafe fn get_continuous_states<M: Exported>(
     x: *mut f64,
     count: usize,
 ) -> Outcome {
-    let name = named(instance, "x", "continuousStates");
+    let name = argument_name(instance, "x", "continuousStates");
     // SAFETY: by contract, an array of this length.
     instance.get_continuous_states(unsafe { out_slice(x, count, name) }?)
 }
@@ -78,7 +78,7 @@ pub unsafe fn get_nominals<M: Exported>(
     nominals: *mut f64,
     count: usize,
 ) -> Outcome {
-    let name = named(instance, "x_nominal", "nominals");
+    let name = argument_name(instance, "x_nominal", "nominals");
     // SAFETY: by contract, an array of this length.
     instance.get_nominals(unsafe { out_slice(nominals, count, name) }?)
 }
