@@ -25,9 +25,9 @@ pub unsafe fn completed_integrator_step<M: Exported, Boolean: From<bool>>(
             out_value(terminate_simulation, "terminateSimulation")?,
         )
     };
-    let wanted = instance.step_completed();
-    enter_event_mode.write(wanted.event.into());
-    terminate_simulation.write(wanted.terminate.into());
+    let requested = instance.step_completed();
+    enter_event_mode.write(requested.event.into());
+    terminate_simulation.write(requested.terminate.into());
     Ok(())
 }
 
