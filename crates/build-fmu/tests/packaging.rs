@@ -60,8 +60,8 @@ fn it_reads_back_as_the_model_that_was_compiled() {
     assert_eq!(names, table);
 }
 
-/// Returns the names of the non-zeros in the rows of a matrix over the states and a matrix over the inputs.
-fn knowns(names: [&[&'static str]; 2], rows: [Vec<f64>; 2]) -> BTreeSet<&'static str> {
+/// Returns the names of the states and inputs with a non-zero coefficient: a row of A or C, and the same row of B or D.
+fn nonzero_names(names: [&[&'static str]; 2], rows: [Vec<f64>; 2]) -> BTreeSet<&'static str> {
     let pairs = names.into_iter().zip(rows).flat_map(|(names, row)| names.iter().zip(row));
     pairs.filter(|(_, factor)| *factor != 0.0).map(|(name, _)| *name).collect()
 }
@@ -130,7 +130,7 @@ fn dependencies_are_the_sparsity_of_the_matrices() {
 
     let structure = &read.model_structure;
     for (row, state) in states.iter().enumerate() {
-        let expected = knowns(
+        let expected = nonzero_names(
             [&states, &inputs],
             [A.row(row).iter().copied().collect(), B.row(row).iter().copied().collect()],
         );
@@ -138,7 +138,7 @@ fn dependencies_are_the_sparsity_of_the_matrices() {
     }
     // y of eq. (11) is theta3, theta4, theta1, theta2, tau1, tau2.
     for (row, output) in [(0, "theta3"), (1, "theta4"), (4, "tau1"), (5, "tau2")] {
-        let expected = knowns(
+        let expected = nonzero_names(
             [&states, &inputs],
             [C.row(row).iter().copied().collect(), D.row(row).iter().copied().collect()],
         );
