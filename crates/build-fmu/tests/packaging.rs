@@ -66,9 +66,8 @@ fn nonzero_names(names: [&[&'static str]; 2], rows: [Vec<f64>; 2]) -> BTreeSet<&
     pairs.filter(|(_, factor)| *factor != 0.0).map(|(name, _)| *name).collect()
 }
 
-/// Unknowns and their dependencies in the initialization, in addition to `start_at_rest`: start values of states, then
-/// variables that depend on states.
-const INITIAL: [(&str, &[&str]); 11] = [
+/// Expected dependencies of the initial unknowns. Each also depends on `start_at_rest`, which is left out here.
+const INITIAL_DEPENDENCIES: [(&str, &[&str]); 11] = [
     ("theta3", &["theta1", "theta3_start"]),
     ("theta4", &["theta2", "theta4_start"]),
     ("theta5", &["theta1", "theta5_start"]),
@@ -152,7 +151,7 @@ fn dependencies_are_the_sparsity_of_the_matrices() {
     ] {
         assert_eq!(listed(&structure.outputs.unknowns, output), owned(expected.into()));
     }
-    for (unknown, expected) in INITIAL {
+    for (unknown, expected) in INITIAL_DEPENDENCIES {
         let expected: BTreeSet<&str> = expected.iter().copied().chain(["start_at_rest"]).collect();
         assert_eq!(listed(&structure.initial_unknowns.unknowns, unknown), owned(expected));
     }
