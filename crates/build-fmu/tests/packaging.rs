@@ -10,7 +10,8 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../modelDescription/modelDescription.xml");
+const COMMITTED_DESCRIPTION: &str =
+    concat!(env!("CARGO_MANIFEST_DIR"), "/../../modelDescription/modelDescription.xml");
 const TABLE_1: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../modelDescription/parameters.json");
 
 fn build_fmu(arguments: &[&str], out: &Path) -> Output {
@@ -42,7 +43,7 @@ fn parameter_file(directory: &Path, old: &str, new: &str) -> String {
 #[test]
 fn the_committed_description_is_up_to_date() {
     assert!(
-        fs::read_to_string(COMMITTED).unwrap_or_default() == description(&[]),
+        fs::read_to_string(COMMITTED_DESCRIPTION).unwrap_or_default() == description(&[]),
         "modelDescription/modelDescription.xml is out of date; update it with\n    \
          cargo run --bin build_fmu -- --describe"
     );
@@ -160,7 +161,7 @@ fn dependencies_are_the_sparsity_of_the_matrices() {
 
 #[test]
 fn tunable_parameters_make_another_fmu() {
-    // The description has this word only as a variability and as a kind of dependencies.
+    // `fixed` occurs in the description only as a value of `variability` and `dependenciesKind`.
     assert_eq!(description(&["--tunable"]), description(&[]).replace("fixed", "tunable"));
 }
 
