@@ -12,7 +12,7 @@ use std::process::{Command, Output};
 
 const COMMITTED_DESCRIPTION: &str =
     concat!(env!("CARGO_MANIFEST_DIR"), "/../../modelDescription/modelDescription.xml");
-const TABLE_1: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../modelDescription/parameters.json");
+const PARAMETERS_JSON: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../modelDescription/parameters.json");
 
 fn build_fmu(arguments: &[&str], out: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_build_fmu")).args(arguments).arg("--out").arg(out).output().unwrap()
@@ -33,7 +33,7 @@ fn description(arguments: &[&str]) -> String {
 
 /// Writes Table 1 with a string replaced.
 fn parameter_file(directory: &Path, old: &str, new: &str) -> String {
-    let table = fs::read_to_string(TABLE_1).unwrap();
+    let table = fs::read_to_string(PARAMETERS_JSON).unwrap();
     assert!(table.contains(old));
     let path = directory.join("mine.json");
     fs::write(&path, table.replace(old, new)).unwrap();
@@ -274,7 +274,7 @@ fn two_builds_give_the_same_fmu_with_the_committed_description() {
     }
 }
 
-/// The FMU names the licenses of exactly the packages that are compiled into its library.
+/// third-party.txt lists exactly the packages that are compiled into the library of the FMU.
 #[test]
 fn the_licenses_of_all_packages_are_listed() {
     let cargo = env!("CARGO");
