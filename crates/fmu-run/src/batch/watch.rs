@@ -57,10 +57,12 @@ impl Watch {
         self.feed.get().map(|feed| feed.take()).unwrap_or_default()
     }
 
-    /// Returns the runs that the FMU has ended, each with its end time in s and the outputs at this time, which
-    /// are NaN if they cannot be read.
+    /// Returns the runs that the FMU has ended, in the order of their numbers, each with its end time in s and the outputs at
+    /// this time, which are NaN if they cannot be read.
     pub fn ended(&self) -> Vec<(usize, f64, Vec<f64>)> {
-        lock(&self.ended).clone()
+        let mut ended = lock(&self.ended).clone();
+        ended.sort_unstable_by_key(|(run, ..)| *run);
+        ended
     }
 
     /// Returns the number of finished runs, including failed ones.
