@@ -259,7 +259,7 @@ impl Controller {
             let farthest = motor.angle + (p.max_torque + torque) / p.stiffness;
             let nearest = motor.angle - (p.max_torque - torque) / p.stiffness;
             let allowed = goal.min(farthest).max(nearest);
-            self.on_goal &= motor.turn_towards(allowed, &limits, p.sample_time) && allowed == goal;
+            self.on_goal &= motor.plan_acceleration(allowed, &limits, p.sample_time) && allowed == goal;
         }
     }
 }

@@ -42,7 +42,7 @@ impl MotorSetpoint {
     /// Within the limits the motor reaches the goal in the least number of samples. If the goal lies behind,
     /// or is nearer than the stopping distance, the motor passes it and returns. Returns whether the motor is
     /// at rest at its goal, or will be within two samples.
-    pub fn turn_towards(&mut self, goal: f64, limits: &Limits, period: f64) -> bool {
+    pub fn plan_acceleration(&mut self, goal: f64, limits: &Limits, period: f64) -> bool {
         let Limits { rate: max_rate, acceleration: max } = *limits;
         // Units: the rate a T that the motor gains in one period T at full acceleration a, and the angle a T^2 that it
         // travels in one period at that rate.
@@ -58,7 +58,7 @@ impl MotorSetpoint {
 }
 
 /// Returns the highest rate v, at most `limit`, for which the rest of this sample and braking from v cover
-/// the distance q: v/2 + D(v) = q, in the units of [`MotorSetpoint::turn_towards`].
+/// the distance q: v/2 + D(v) = q, in the units of [`MotorSetpoint::plan_acceleration`].
 ///
 /// Braking takes m = floor(v) whole samples and one more for the rest v - m. So D(v) = (m + 1/2) v - m (m +
 /// 1)/2, and q = (m + 1) v - m (m + 1)/2, which is m (m + 1)/2 at v = m.
@@ -86,7 +86,7 @@ mod tests {
             if motor.angle == goal && motor.rate == 0.0 {
                 return (samples, farthest, motor);
             }
-            motor.turn_towards(goal, limits, PERIOD);
+            motor.plan_acceleration(goal, limits, PERIOD);
             assert!(motor.acceleration.abs() <= limits.acceleration);
             motor = motor.after(PERIOD);
             assert!(motor.rate.abs() <= limits.rate * (1.0 + 1e-12), "{}", motor.rate);
@@ -130,10 +130,10 @@ mod tests {
             for goal in [1.1220, -0.5, 1e-3, 3.3e-5, 1e-5, -1e-7, 0.022_2, 6e-6, 1.7e-5] {
                 let mut motor = MotorSetpoint::default();
                 for _ in 0..400_000 {
-                    let is_near = motor.turn_towards(goal, &limits, PERIOD);
+                    let is_near = motor.plan_acceleration(goal, &limits, PERIOD);
                     if is_near {
                         let mut two_later = motor.after(PERIOD);
-                        two_later.turn_towards(goal, &limits, PERIOD);
+                        two_later.plan_acceleration(goal, &limits, PERIOD);
                         two_later = two_later.after(PERIOD);
                         assert!((two_later.angle - goal).abs() < 1e-12, "{goal} {limits:?} {two_later:?}");
                         assert!(two_later.rate.abs() < 1e-9, "{goal} {limits:?} {two_later:?}");
@@ -152,7 +152,7 @@ mod tests {
         let limits = Limits { rate: 3.0, acceleration: 30.0 };
         let (_, _, mut motor) = go(MotorSetpoint::default(), 0.7, &limits);
         for _ in 0..1000 {
-            motor.turn_towards(0.7, &limits, PERIOD);
+            motor.plan_acceleration(0.7, &limits, PERIOD);
             motor = motor.after(PERIOD);
             assert!((motor.angle - 0.7).abs() < 1e-12 && motor.rate.abs() < 1e-9, "{motor:?}");
         }
@@ -174,7 +174,7 @@ mod tests {
         for goal in [f64::INFINITY, f64::NEG_INFINITY, f64::MAX, -f64::MAX, 5e-324] {
             let mut motor = MotorSetpoint::default();
             for _ in 0..1000 {
-                motor.turn_towards(goal, &limits, PERIOD);
+                motor.plan_acceleration(goal, &limits, PERIOD);
                 motor = motor.after(PERIOD);
             }
             assert!(motor.angle.is_finite() && motor.rate.abs() <= 3.0, "{motor:?}");
