@@ -48,7 +48,7 @@ impl MotorSetpoint {
         // travels in one period at that rate.
         let (rate_unit, angle_unit) = (max * period, max * period * period);
         let distance = (goal - self.angle - 0.5 * self.rate * period) / angle_unit;
-        let wanted = rate_unit * fastest_rate(distance.abs(), max_rate / rate_unit).copysign(distance);
+        let wanted = rate_unit * max_stoppable_rate(distance.abs(), max_rate / rate_unit).copysign(distance);
         let rate = wanted.clamp(-max_rate, max_rate);
         let acceleration = (rate - self.rate) / period;
         self.acceleration = acceleration.clamp(-max, max);
@@ -62,7 +62,7 @@ impl MotorSetpoint {
 ///
 /// Braking takes m = floor(v) whole samples and one more for the rest v - m. So D(v) = (m + 1/2) v - m (m +
 /// 1)/2, and q = (m + 1) v - m (m + 1)/2, which is m (m + 1)/2 at v = m.
-fn fastest_rate(q: f64, limit: f64) -> f64 {
+fn max_stoppable_rate(q: f64, limit: f64) -> f64 {
     // v <= sqrt(2 q) always holds. For larger q, infinite q included, the limit applies.
     if q > 0.5 * (limit + 1.0) * (limit + 2.0) {
         return limit;
