@@ -28,7 +28,7 @@ BEHAVIOURS = {
     "error if logging": (6, "at 0.5 s: fmi2DoStep: the pump ran dry", None),
     "fatal if logging": (6, "at 0.5 s: fmi2DoStep: the pump ran dry", None),
 }
-BEHAVIOURS3 = {
+BEHAVIOURS_FMI3 = {
     "good": (11, None, None),
     "ends between": (6, "ended by the FMU at t = 0.525 s", None),
     "ends at point": (7, "ended by the FMU at t = 0.6 s", None),
@@ -39,7 +39,7 @@ BEHAVIOURS3 = {
 
 
 @pytest.mark.parametrize(
-    "behaviours, fixture, first", [(BEHAVIOURS, "unruly", 4.0), (BEHAVIOURS3, "unruly3", 0.0)], ids=["fmi2", "fmi3"]
+    "behaviours, fixture, first", [(BEHAVIOURS, "unruly", 4.0), (BEHAVIOURS_FMI3, "unruly3", 0.0)], ids=["fmi2", "fmi3"]
 )
 @pytest.mark.parametrize("read_before_set", [False, True])
 def test_behaviours(request, behaviours, fixture, first, read_before_set):
