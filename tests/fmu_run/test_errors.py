@@ -188,8 +188,8 @@ def test_a_closed_fmu(testbed):
 
 def test_units_of_declared_types(unruly, unruly3):
     by_name = {"slope": "m/s", "y": "m", "gap": "mm", "count": None}
-    of3 = {"y": "m", "gap": "mm", "number": None, "temper": None}
-    for path, units in ((unruly, by_name), (unruly3, of3)):
+    units_fmi3 = {"y": "m", "gap": "mm", "number": None, "temper": None}
+    for path, units in ((unruly, by_name), (unruly3, units_fmi3)):
         with fmu_run.Fmu(path) as fmu:
             assert {name: fmu.variables[name].unit for name in units} == units
 
