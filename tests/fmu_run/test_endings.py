@@ -45,9 +45,9 @@ BEHAVIOURS_FMI3 = {
 def test_behaviours(request, behaviours, fixture, first, read_before_set):
     number = np.repeat(np.arange(len(behaviours)), 3)
     with fmu_run.Fmu(request.getfixturevalue(fixture)) as fmu:
-        ask = {"start": {"behaviour": number}, "outputs": ["y"], "threads": 4, "read_before_set": read_before_set}
-        runs = fmu.run(TIME, every=1, measures=["end", "mean"], **ask)
-        thinned = fmu.run(TIME, every=2, **ask)
+        arguments = {"start": {"behaviour": number}, "outputs": ["y"], "threads": 4, "read_before_set": read_before_set}
+        runs = fmu.run(TIME, every=1, measures=["end", "mean"], **arguments)
+        thinned = fmu.run(TIME, every=2, **arguments)
     rows, errors, notes = (dict(enumerate(np.repeat(column, 3))) for column in zip(*behaviours.values()))
     assert runs.errors == thinned.errors == {run: why for run, why in errors.items() if why}
     assert runs.notes == thinned.notes == {run: why for run, why in notes.items() if why}
