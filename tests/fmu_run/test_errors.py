@@ -275,7 +275,7 @@ def test_other_types(unruly):
     np.testing.assert_allclose(runs["y"][0], 7 + 2 * TIME, atol=1e-15)
 
 
-LONG = """
+LONG_RUN_SCRIPT = """
 import signal, sys, numpy as np, fmu_run
 # Shells start commands in the background with Ctrl-C ignored.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -292,7 +292,7 @@ with fmu_run.Fmu(sys.argv[1]) as fmu:
 @pytest.mark.parametrize("times", [10_000, 100_000_000], ids=["short runs", "in a run"])
 def test_ctrl_c_stops_runs(testbed, times):
     """Ctrl-C stops runs that would take minutes."""
-    command = [sys.executable, "-c", LONG, testbed, str(times)]
+    command = [sys.executable, "-c", LONG_RUN_SCRIPT, testbed, str(times)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout.readline() == "begun\n"
