@@ -135,7 +135,7 @@ def test_no_library_for_this_platform(tmp_path, testbed):
 
 # FMPy contains libraries for other systems. The field e_machine of an ELF header names the processor.
 FMPY = Path(fmpy.__file__).parent
-FOREIGN = {
+FOREIGN_LIBRARIES = {
     "Windows on x86_64": lambda _: (FMPY / "logging/win64/logging.dll").read_bytes(),
     "Windows on x86": lambda _: (FMPY / "logging/win32/logging.dll").read_bytes(),
     "macOS on x86_64 and aarch64": lambda _: (FMPY / "logging/darwin64/logging.dylib").read_bytes(),
@@ -144,10 +144,10 @@ FOREIGN = {
 }
 
 
-@pytest.mark.parametrize("made_for", FOREIGN)
+@pytest.mark.parametrize("made_for", FOREIGN_LIBRARIES)
 def test_a_library_of_another_machine(tmp_path, testbed, made_for):
     def change(name, content):
-        return FOREIGN[made_for](content) if name.startswith("binaries/") else content
+        return FOREIGN_LIBRARIES[made_for](content) if name.startswith("binaries/") else content
 
     path = repacked(testbed, tmp_path / "foreign.fmu", change)
     this = f"{platform.system()} on {platform.machine()}"
