@@ -60,6 +60,6 @@ def unit_of(variable: Any) -> str:
     return "" if unit == "1" else unit
 
 
-def start_of(variable: Any) -> str:
+def format_start(variable: Any) -> str:
     """A variable's start value with eight digits."""
     return f"{float(variable.start):.8g}" if variable.type == "Real" else variable.start

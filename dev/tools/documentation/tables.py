@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from tools.documentation.sources import Table, start_of, unit_of
+from tools.documentation.sources import Table, format_start, unit_of
 
 #: Labels of the outputs in the table of orders.
 OUTPUT_NAMES = {
@@ -39,7 +39,7 @@ def parameter_table(description: Any, printed: dict[str, Any]) -> str:
             continue
         cells = [
             f"<td><code>{html.escape(variable.name)}</code></td>",
-            f'<td class="number">{start_of(variable)}</td>',
+            f'<td class="number">{format_start(variable)}</td>',
             f"<td>{_pretty(unit_of(variable))}</td>",
             f'<td class="meaning">{html.escape(variable.description)}</td>',
         ]
