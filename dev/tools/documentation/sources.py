@@ -54,7 +54,7 @@ def read_table(path: Path, heading: str) -> Table:
     return Table(heads, rows)
 
 
-def unit_of(variable: Any) -> str:
+def shown_unit(variable: Any) -> str:
     """A variable's unit as the model description writes it; empty for 1 and for none."""
     unit = variable.unit or getattr(variable.declaredType, "unit", None) or ""
     return "" if unit == "1" else unit

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from tools.documentation.sources import Table, format_start, unit_of
+from tools.documentation.sources import Table, format_start, shown_unit
 
 #: Labels of the outputs in the table of orders.
 OUTPUT_NAMES = {
@@ -25,7 +25,7 @@ def variable_table(description: Any, causality: str, title: str) -> str:
     for variable in description.modelVariables:
         if variable.causality == causality:
             rows.append(
-                f"<tr><td><code>{html.escape(variable.name)}</code></td><td>{_pretty(unit_of(variable))}</td>"
+                f"<tr><td><code>{html.escape(variable.name)}</code></td><td>{_pretty(shown_unit(variable))}</td>"
                 f'<td class="meaning">{html.escape(variable.description)}</td></tr>'
             )
     return _table(title, ("name", "unit", "meaning"), rows, kind="rows")
@@ -40,7 +40,7 @@ def parameter_table(description: Any, printed: dict[str, Any]) -> str:
         cells = [
             f"<td><code>{html.escape(variable.name)}</code></td>",
             f'<td class="number">{format_start(variable)}</td>',
-            f"<td>{_pretty(unit_of(variable))}</td>",
+            f"<td>{_pretty(shown_unit(variable))}</td>",
             f'<td class="meaning">{html.escape(variable.description)}</td>',
         ]
         if printed:
