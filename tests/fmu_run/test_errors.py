@@ -15,7 +15,7 @@ import fmpy
 import fmu_run
 import numpy as np
 import pytest
-from unruly import repacked
+from faulty_fmu import repacked
 
 TIME = np.linspace(0.0, 1.0, 11)
 
@@ -166,11 +166,11 @@ def test_a_damaged_library(tmp_path, testbed):
         fmu_run.Fmu(path)
 
 
-def test_an_execution_tool(tmp_path, unruly):
+def test_an_execution_tool(tmp_path, faulty_fmu):
     def change(name, content):
         return content.replace(b"<CoSimulation ", b'<CoSimulation needsExecutionTool="true" ')
 
-    path = repacked(unruly, tmp_path / "tool.fmu", change)
+    path = repacked(faulty_fmu, tmp_path / "tool.fmu", change)
     with pytest.raises(fmu_run.FmuError, match=r"needsExecutionTool.*execution_tool=True"):
         fmu_run.Fmu(path)
     with fmu_run.Fmu(path, execution_tool=True) as fmu:
@@ -186,19 +186,19 @@ def test_a_closed_fmu(testbed):
     assert repr(fmu).endswith("variables, closed>")
 
 
-def test_units_of_declared_types(unruly, unruly3):
+def test_units_of_declared_types(faulty_fmu, faulty_fmu3):
     by_name = {"slope": "m/s", "y": "m", "gap": "mm", "count": None}
     units_fmi3 = {"y": "m", "gap": "mm", "number": None, "temper": None}
-    for path, units in ((unruly, by_name), (unruly3, units_fmi3)):
+    for path, units in ((faulty_fmu, by_name), (faulty_fmu3, units_fmi3)):
         with fmu_run.Fmu(path) as fmu:
             assert {name: fmu.variables[name].unit for name in units} == units
 
 
-def test_an_undefined_declared_type(unruly, tmp_path):
+def test_an_undefined_declared_type(faulty_fmu, tmp_path):
     def change(name, content):
         return content.replace(b'<Real declaredType="Length"/>', b'<Real declaredType="Undefined"/>')
 
-    with fmu_run.Fmu(repacked(unruly, tmp_path / "undefined.fmu", change)) as fmu:
+    with fmu_run.Fmu(repacked(faulty_fmu, tmp_path / "undefined.fmu", change)) as fmu:
         assert fmu.variables["y"].unit is None and fmu.run(TIME, outputs=["y"]).ok.all()
 
 
@@ -237,8 +237,8 @@ def test_suggested_names(fmu):
             fmu.run(TIME, outputs=[wrong])
 
 
-def test_other_types(unruly):
-    with fmu_run.Fmu(unruly) as fmu:
+def test_other_types(faulty_fmu):
+    with fmu_run.Fmu(faulty_fmu) as fmu:
         assert fmu.variables["label"].type == "String" and fmu.variables["count"].start == "3"
         counts = np.arange(11) - 5
         runs = fmu.run(
@@ -327,11 +327,11 @@ def test_progress(testbed):
         assert fmu.run(TIME, outputs=["roll"]).count == 1
 
 
-def test_the_interface_type_must_exist(tmp_path, unruly):
+def test_the_interface_type_must_exist(tmp_path, faulty_fmu):
     def change(name, content):
         return content.replace(b"<CoSimulation", b"<ModelExchange")
 
-    with fmu_run.Fmu(repacked(unruly, tmp_path / "model_exchange.fmu", change)) as fmu:
+    with fmu_run.Fmu(repacked(faulty_fmu, tmp_path / "model_exchange.fmu", change)) as fmu:
         for call in (lambda: fmu.run([0.0, 1.0], outputs=["y"], interface="co_simulation"), fmu.instances):
             with pytest.raises(
                 fmu_run.FmuError, match="no Co-Simulation, only Model Exchange; `run` of this FMU integrates it"
@@ -339,7 +339,7 @@ def test_the_interface_type_must_exist(tmp_path, unruly):
                 call()
         # The guid belongs to the other description.
         assert list(fmu.run([0.0, 1.0], outputs=["y"]).errors) == [0]
-    with fmu_run.Fmu(unruly) as fmu, pytest.raises(fmu_run.FmuError, match="has no Model Exchange"):
+    with fmu_run.Fmu(faulty_fmu) as fmu, pytest.raises(fmu_run.FmuError, match="has no Model Exchange"):
         fmu.run([0.0, 1.0], outputs=["y"], interface="model_exchange")
 
 

@@ -177,10 +177,10 @@ def test_a_failure_ends_one_episode(task, mode, count) -> None:
         (0, np.inf, "an observation is no finite number"),
     ],
 )
-def test_termination_and_infinite_observations_end_the_episode(unruly, behaviour, slope, message) -> None:
+def test_termination_and_infinite_observations_end_the_episode(faulty_fmu, behaviour, slope, message) -> None:
     """The FMU allows one instance in a process, so each environment is closed before the next one is created."""
     task = Task(
-        fmu=unruly,
+        fmu=faulty_fmu,
         actions="slope",
         observations="y",
         reward=lambda before, action, after: after[:, 0],
