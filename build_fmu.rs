@@ -38,7 +38,7 @@ fn main() -> ExitCode {
 
 fn run(options: &Options) -> Result<()> {
     let other = match &options.parameters {
-        Some(file) => Some(absolute(file).with_context(|| format!("{} is no file", file.display()))?),
+        Some(file) => Some(absolute(file).with_context(|| format!("{} is not a file", file.display()))?),
         None => None,
     };
     let project = project();

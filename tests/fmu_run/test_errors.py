@@ -34,8 +34,8 @@ def fmu(testbed):
         ({"inputs": {"theta1": np.zeros(4)}}, "theta1 has the shape (4,); it must be (11,), (runs, 11) or a number"),
         ({"inputs": {"theta1": np.zeros((2, 2, 11))}}, "theta1 has the shape (2, 2, 11)"),
         ({"inputs": {"theta1": ["a"] * 11}}, "theta1: the values are not numbers"),
-        ({"inputs": {"k1": TIME}}, "k1 is no input but a fixed parameter; give it a start value"),
-        ({"inputs": {"roll": TIME}}, "roll is no input but a continuous output"),
+        ({"inputs": {"k1": TIME}}, "k1 is not an input but a fixed parameter; give it a start value"),
+        ({"inputs": {"roll": TIME}}, "roll is not an input but a continuous output"),
         (
             {"start": {"k1": [[1.0]]}},
             "the start value of k1 has the shape (1, 1); it must be one number for all, or (n,) with one value for each",
@@ -67,7 +67,7 @@ def test_invalid_arguments(fmu, arguments, message):
 def test_input_derivatives_of_fmi3(fmu):
     slopes = {"theta1": np.zeros(11)}
     if fmu.fmi_version == "2.0":
-        with pytest.raises(ValueError, match="k1 is no Real input"):
+        with pytest.raises(ValueError, match="k1 is not a Real input"):
             fmu.run(TIME, outputs=["roll"], input_derivatives={"k1": 1.0})
     else:
         with pytest.raises(ValueError, match="PitchRollWristTestbed takes no input derivatives"):
@@ -252,7 +252,7 @@ def test_other_types(faulty_fmu):
         one = fmu.instances(start={"label": "held", "behaviour": "Good", "flag": "true"})
         assert one.texts("label") == ["held"] and list(one.get(("behaviour", "flag"))[0]) == [0.0, 1.0]
         for call, message in [
-            (lambda: one.get(["label", "y"]), "label is no number"),
+            (lambda: one.get(["label", "y"]), "label is not a number"),
             (lambda: one.texts("y"), "y is a number, not a string"),
             (
                 lambda: fmu.run(TIME, outputs=["y"], start={"behaviour": "Glad"}),

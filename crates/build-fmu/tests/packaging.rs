@@ -219,9 +219,9 @@ fn wrong_requests_are_rejected_in_one_line() {
             "mine.json: the model cannot be made for Co-Simulation: the parameters are too far",
         ),
         (&["--parameters", "none.json"], "none.json: cannot be read"),
-        (&["--binary", "linux65=a.so"], "'linux65' is no platform of FMI 2.0"),
+        (&["--binary", "linux65=a.so"], "'linux65' is not a platform of FMI 2.0"),
         (&["--binary", "linux64=none.so"], "cannot read none.so, the library for linux64"),
-        (&["--binary", &format!("linux64={file}")], "it is no shared library"),
+        (&["--binary", &format!("linux64={file}")], "it is not a shared library"),
         (&["--binary", &format!("win64={library}")], "it is for darwin64, not for win64"),
         (&["--binary", &format!("aarch64-darwin={library}")], "add --any-processor"),
         (

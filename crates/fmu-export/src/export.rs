@@ -227,7 +227,7 @@ macro_rules! offer {
     };
     (@capability $other:ident) => {
         ::core::compile_error!(::core::concat!(
-            ::core::stringify!($other), " is no capability: there are CoSimulation, ModelExchange, Partials, \
+            ::core::stringify!($other), " is not a capability: there are CoSimulation, ModelExchange, Partials, \
              InputDerivatives and OutputDerivatives"
         ));
     };

@@ -129,7 +129,7 @@ impl Setup {
     /// `modelDescription/resources`.
     ///
     /// # Errors
-    /// Fails if there is no such directory, or if the name is no plain file name.
+    /// Fails if there is no such directory, or if the name is not a plain file name.
     pub fn resource(&self, name: &str) -> Result<PathBuf, Error> {
         if name.contains(['/', '\\', ':']) || name.starts_with('.') {
             return Err(Error::new(format!(

@@ -17,7 +17,7 @@ use std::mem::MaybeUninit;
 pub struct Index(#[doc(hidden)] pub u32);
 
 impl Index {
-    /// The time, even if it is no variable of the table; for [`depends_on`](Variable::depends_on).
+    /// The time, even if it is not a variable of the table; for [`depends_on`](Variable::depends_on).
     pub const TIME: Self = Self(u32::MAX);
 }
 

@@ -27,7 +27,7 @@ pub(crate) fn check(model: &LoadedModel) -> Result<Starts> {
         ensure!(is_line(&variable.description), "the description of {name} is more than one line");
         ensure!(
             !table.arrays || is_structured(name),
-            "the variable name '{}' is no name of the structured naming convention, which a model with arrays needs: \
+            "the variable name '{}' is not a name of the structured naming convention, which a model with arrays needs: \
              write names as in Modelica, such as motor.torque, der(x), or 'any text' (section 2.2.9 of FMI 2.0)",
             name.escape_debug()
         );

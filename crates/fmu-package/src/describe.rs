@@ -1,6 +1,6 @@
 //! The model description (section 2.2 of FMI 2.0, 2.4 of FMI 3.0).
 //!
-//! Variables that only FMI 3.0 needs follow the table: the time, if it is no variable of the model, and the event indicators.
+//! Variables that only FMI 3.0 needs follow the table: the time, if it is not a variable of the model, and the event indicators.
 //! Value references of FMI 3.0 count from 1 in this order, and an array takes as many as it has elements.
 
 use crate::definitions::{

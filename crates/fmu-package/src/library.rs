@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// The platforms of a library: one, or several if it is a universal library of macOS.
 fn platforms(library: &[u8]) -> Result<Vec<Platform>> {
-    const NONE: &str = "it is no shared library";
+    const NONE: &str = "it is not a shared library";
     match FileKind::parse(library).context(NONE)? {
         FileKind::MachOFat32 => {
             let parts = MachOFatFile32::parse(library).context(NONE)?;
@@ -143,7 +143,7 @@ mod tests {
     fn other_files_are_rejected() {
         for bytes in [&b""[..], b"\x7fELF", b"MZ", b"<html>", &[0xca, 0xfe, 0xba, 0xbe, 0, 0, 0, 9]] {
             let error = check(bytes, "linux64", false).unwrap_err();
-            assert_eq!(error, "it is no shared library", "{bytes:?}");
+            assert_eq!(error, "it is not a shared library", "{bytes:?}");
         }
     }
 }

@@ -172,12 +172,12 @@ impl Table {
         [co_simulation, model_exchange].into_iter().flatten()
     }
 
-    /// Returns `None` for a time or an event indicator that is no variable of the model.
+    /// Returns `None` for a time or an event indicator that is not a variable of the model.
     pub fn variable(&self, index: u32) -> Option<&Variable> {
         self.variables.get(index as usize)
     }
 
-    /// The index of the independent variable, which follows the list if it is no variable of the model.
+    /// The index of the independent variable, which follows the list if it is not a variable of the model.
     pub fn time(&self) -> u32 {
         let is_time = |variable: &Variable| variable.causality == Causality::Independent;
         self.variables.iter().position(is_time).unwrap_or(self.variables.len()) as u32

@@ -18,7 +18,7 @@ pub(crate) struct Found<'a> {
 impl Found<'_> {
     pub fn check_number(self, name: &str) -> Result<(), Error> {
         match self.variable.base {
-            BaseType::String | BaseType::Binary => request(format!("{name} is no number")),
+            BaseType::String | BaseType::Binary => request(format!("{name} is not a number")),
             _ => Ok(()),
         }
     }

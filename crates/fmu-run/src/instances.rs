@@ -802,7 +802,7 @@ fn rows<'v>(values: &'v [f64], length: usize, instances: usize) -> impl Fn(usize
     let each = values.len() == length * instances;
     assert!(
         each || values.len() == length,
-        "{} values are no row of {length} for one or {instances} instances",
+        "{} values are not a row of {length} for one or {instances} instances",
         values.len()
     );
     move |index| &values[if each { index * length } else { 0 }..][..length]

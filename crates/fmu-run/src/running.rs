@@ -387,7 +387,7 @@ impl Running {
             return self.keep(|_, instance| instance.deserialize(bytes));
         }
         let mut rest = bytes;
-        let short = || Rejection::without_fmu("deserialize", "the bytes are no state of this system");
+        let short = || Rejection::without_fmu("deserialize", "the bytes are not a state of this system");
         let components = self.components.iter().map(|_| {
             let (length, after) = rest.split_first_chunk()?;
             let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;

@@ -210,7 +210,7 @@ fn one<T>(values: &[T], of: usize) -> Option<&T> {
     if values.len() == 1 { values.first() } else { values.get(of) }
 }
 
-/// Returns the number for a string, for a variable that is no string.
+/// Returns the number for a string, for a variable that is not a string.
 fn number_of(found: Found, name: &str, text: &str) -> Result<f64, Error> {
     if found.variable.base == BaseType::Boolean
         && let Ok(boolean) = text.parse::<bool>()

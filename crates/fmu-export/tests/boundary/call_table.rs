@@ -115,7 +115,7 @@ fn standard_of_fmi2(function: &str, interface: Interface, mode: Mode) -> bool {
         (CoSimulation, Terminated) => (CO_SIMULATION, 6),
         (CoSimulation, Error) => (CO_SIMULATION, 7),
         (CoSimulation, Fatal) => (CO_SIMULATION, 8),
-        (CoSimulation, mode) => panic!("{mode} is no state of Co-Simulation"),
+        (CoSimulation, mode) => panic!("{mode} is not a state of Co-Simulation"),
     };
     let row = table
         .lines()

@@ -82,7 +82,7 @@ fn calculated_states<F: Either>() {
         let rows = [level, der_level]
             .map(|unknown| [plain, stiffness].map(|known| fmu.partial(unknown as u32, known as u32)));
         assert_eq!(rows, [[0.25, -0.375], [0.0, 0.0]]);
-        fmu.rejected_with(&["level is no known in initialization mode"], |fmu| {
+        fmu.rejected_with(&["level is not a known in initialization mode"], |fmu| {
             fmu.try_directional(&[der_level as u32], &[level as u32], &[1.0], &mut [0.0])
         });
         fmu.ok(fmu.exit_initialization_mode());

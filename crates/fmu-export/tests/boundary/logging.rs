@@ -96,7 +96,7 @@ fn logging_of_fmi3() {
     let fmu = fmi3::Importer::new::<Talker>(CoSimulation);
     let volume = Name::volume as u32;
     fmu.set(&[volume], &[10.5]);
-    assert_eq!(fmu.take_log(), [], "a warning is no error");
+    assert_eq!(fmu.take_log(), [], "a warning is not an error");
     fmu.ok(fmu.fmi3SetDebugLogging(1, 1, &c"logStatusWarning".as_ptr()));
     fmu.set(&[volume], &[10.6]);
     assert_eq!(fmu.take_log().len(), 1);

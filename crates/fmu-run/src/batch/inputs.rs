@@ -59,7 +59,7 @@ fn input<'s>(system: &'s System, name: &str) -> Result<Vec<Found<'s>>, Error> {
     let of = variables[0].variable;
     if !of.is_settable() || of.is_structural() || of.variability.as_deref() == Some("fixed") {
         return request(format!(
-            "{name} is no input but {} {}; give it a start value",
+            "{name} is not an input but {} {}; give it a start value",
             article(of.variability.as_deref().unwrap_or(&of.causality)),
             of.causality
         ));

@@ -21,7 +21,7 @@ pub(crate) trait Hooks {
     /// Observes the outputs before (`false`) and after (`true`) an event.
     fn event(&mut self, running: &mut Running, time: f64, is_after: bool) -> Result<(), Rejection>;
 
-    /// Returns whether an input that is set only at events changes at this communication point, and is no number.
+    /// Returns whether an input that is set only at events changes at this communication point, and is not a number.
     fn changes(&self, index: usize) -> bool;
 
     /// Sets these inputs, in Event Mode.
