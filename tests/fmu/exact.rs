@@ -48,7 +48,7 @@ pub const LINEAR: [u32; 14] = [
     vr(Name::theta4),
 ];
 
-/// Returns all variables that have partial derivatives after the initialization (section 2.1.9): Real outputs and the
+/// Returns all variables that have partial derivatives after the initialization (section 2.1.9 of FMI 2.0): Real outputs and the
 /// derivatives of the states.
 pub fn unknowns() -> Vec<u32> {
     let is_one = |v: &Variable<TestbedFmu>| {

@@ -1,4 +1,4 @@
-//! Model Exchange (section 3.2): eq. (11) for an importer's integrator.
+//! Model Exchange (section 3.2 of FMI 2.0): eq. (11) for an importer's integrator.
 
 use crate::exact::{INPUTS, LINEAR, STATES, distance, jacobian, parameters, set_parameters};
 use crate::{new, vr};

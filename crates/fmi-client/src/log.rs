@@ -156,7 +156,7 @@ unsafe extern "C" fn allocate(count: usize, size: usize) -> *mut c_void {
 }
 
 unsafe extern "C" fn free(memory: *mut c_void) {
-    // SAFETY: section 2.1.5 requires NULL, or memory of `allocate` that is freed once.
+    // SAFETY: section 2.1.5 of FMI 2.0 requires NULL, or memory of `allocate` that is freed once.
     unsafe { libc::free(memory) }
 }
 
@@ -188,7 +188,7 @@ unsafe extern "C" fn log_of_fmi2(
     x: f64,
     y: f64,
 ) {
-    // SAFETY: section 2.1.5 requires NULL or NUL-terminated strings.
+    // SAFETY: section 2.1.5 of FMI 2.0 requires NULL or NUL-terminated strings.
     let [category, format] = [category, message].map(|text| unsafe { string(text) });
     let arguments = Arguments::new([a, b, c, d, e, f, g, h], [r, s, t, u, v, w, x, y]);
     let message = Message { status: Status::from_c(status), category, text: arguments.expand(&format) };

@@ -152,7 +152,7 @@ pub trait ModelExchange: Model {
     fn nominals(&self, _nominals: &mut [f64]) {}
 }
 
-/// Result of an event (section 3.2.2).
+/// Result of an event (section 3.2.2 of FMI 2.0).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Event {
     /// Whether another event happens at the same time.
@@ -238,7 +238,7 @@ pub trait Partials: Model {
     }
 }
 
-/// A model that uses time derivatives of inputs in Co-Simulation (section 4.2.1).
+/// A model that uses time derivatives of inputs in Co-Simulation (section 4.2.1 of FMI 2.0).
 pub trait InputDerivatives: CoSimulation {
     /// Sets the time derivative of an input, of order 1 or higher, at the current communication point. The
     /// model ignores orders that it does not use.
@@ -253,7 +253,7 @@ pub trait InputDerivatives: CoSimulation {
     }
 }
 
-/// A model that provides time derivatives of its variables in Co-Simulation (section 4.2.1).
+/// A model that provides time derivatives of its variables in Co-Simulation (section 4.2.1 of FMI 2.0).
 pub trait OutputDerivatives: CoSimulation {
     /// Highest order (`maxOutputDerivativeOrder`); higher orders are errors.
     const HIGHEST: u32 = 1;

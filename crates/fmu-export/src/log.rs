@@ -26,7 +26,7 @@ impl Message {
         Category::of(self.status).name()
     }
 
-    /// Returns the message on one line, without characters that `printf`, FMI (section 2.1.5) or C strings
+    /// Returns the message on one line, without characters that `printf`, FMI (section 2.1.5 of FMI 2.0) or C strings
     /// interpret.
     pub fn printable(&self) -> CString {
         let special = |c: char| matches!(c, '%' | '#') || c.is_control();

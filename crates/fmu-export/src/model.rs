@@ -211,7 +211,7 @@ fn percent_decoded(text: &str) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// Data of the experiment from the importer (section 2.1.6).
+/// Data of the experiment from the importer (section 2.1.6 of FMI 2.0).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Experiment {
     /// Start time, s.

@@ -367,7 +367,7 @@ pub const fn check_line<M>(lines: &[Variable<M>], Index(line): Index) {
     if let Some(fault) = of.fault() {
         reject(of.name(), fault);
     }
-    // Section 2.2.7. The compiler checks only names that are identifiers, not names that are strings.
+    // Section 2.2.7 of FMI 2.0. The compiler checks only names that are identifiers, not names that are strings.
     let mut other = 0;
     while other < lines.len() {
         if other < line as usize && has_name(of, &lines[other]) || is_element(of, &lines[other]) {

@@ -19,7 +19,7 @@ unsafe extern "C" fn log_message(
     message: fmi2String,
     #[cfg(miri)] _: ...
 ) {
-    // SAFETY: section 2.1.5 requires NULL or NUL-terminated strings, and NULL or the log.
+    // SAFETY: section 2.1.5 of FMI 2.0 requires NULL or NUL-terminated strings, and NULL or the log.
     unsafe { remember(environment, instance_name, status, category, message) }
 }
 
@@ -67,7 +67,7 @@ fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi2Componen
 /// Functions that exist only in FMI 2.0.
 #[allow(clippy::missing_panics_doc, reason = "that is what they are for")]
 impl Importer {
-    /// Returns version and platform, which need no instance (section 2.1.4).
+    /// Returns version and platform, which need no instance (section 2.1.4 of FMI 2.0).
     pub fn version_and_platform(&self) -> [&CStr; 2] {
         let Functions { fmi2GetVersion, fmi2GetTypesPlatform, .. } = self.functions;
         // SAFETY: both functions return strings that the library keeps.

@@ -14,7 +14,7 @@ unsafe extern "C" fn log_message(
     category: fmi3String,
     message: fmi3String,
 ) {
-    // SAFETY: section 2.3.1 requires strings, and NULL or the log. FMI 3.0 passes no instance name.
+    // SAFETY: section 2.3.1 of FMI 3.0 requires strings, and NULL or the log. FMI 3.0 passes no instance name.
     unsafe { remember(environment, null(), status, category, message) }
 }
 
@@ -80,7 +80,7 @@ fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi3Instance
 
 /// Results of `fmi3DoStep`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs, reason = "as in the standard, section 4.2.1")]
+#[allow(missing_docs, reason = "as in the standard, section 4.2.1 of FMI 3.0")]
 pub struct Stepped {
     pub event_handling_needed: bool,
     pub terminate: bool,

@@ -41,7 +41,7 @@ pub type fmi2Type = c_int;
 /// `fmi2StatusKind` as a number: 0 to 3, see [`StatusKind`].
 pub type fmi2StatusKind = c_int;
 
-/// Information that the `fmi2Get...Status` functions return (section 4.2.3).
+/// Information that the `fmi2Get...Status` functions return (section 4.2.3 of FMI 2.0).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StatusKind {
     /// The result of an asynchronous step.
@@ -100,7 +100,7 @@ pub struct fmi2CallbackFunctions {
     pub component_environment: fmi2ComponentEnvironment,
 }
 
-/// Result of an event (section 3.2.2).
+/// Result of an event (section 3.2.2 of FMI 2.0).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct fmi2EventInfo {

@@ -50,7 +50,7 @@ pub(crate) fn same(what: &str, needed: usize, count: usize) -> Outcome {
 }
 
 /// Calls `body` with the elements of variables of FMI 3.0, in a model with arrays. The value reference of the
-/// first element denotes the whole array; its values are contiguous (section 2.2.7.2).
+/// first element denotes the whole array; its values are contiguous (section 2.2.7.2 of FMI 3.0).
 ///
 /// # Safety
 /// The value references are NULL or an array of this length, which does not change.

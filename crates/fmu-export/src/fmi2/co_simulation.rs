@@ -1,4 +1,4 @@
-//! Co-Simulation (section 4.2).
+//! Co-Simulation (section 4.2 of FMI 2.0).
 //!
 //! # Safety
 //! The importer guarantees the contract of the [module above](super#safety).

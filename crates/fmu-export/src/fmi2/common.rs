@@ -1,4 +1,4 @@
-//! Functions of both interface types (section 2.1), and events (section 3.2.2).
+//! Functions of both interface types (section 2.1 of FMI 2.0), and events (section 3.2.2).
 //!
 //! # Safety
 //! The importer guarantees the contract of the [module above](super#safety).
@@ -32,7 +32,7 @@ pub unsafe fn fmi2EnterInitializationMode<M: Exported>(instance: &mut Instance<M
     instance.enter_initialization_mode()
 }
 
-// Enumerations use the functions of Integers (section 2.2.7).
+// Enumerations use the functions of Integers (section 2.2.7 of FMI 2.0).
 getters_and_setters! { fmi2ValueReference, [];
     fmi2GetReal get_reals, fmi2SetReal set_reals, fmi2Real: [Real];
     fmi2GetInteger get_integers, fmi2SetInteger set_integers, fmi2Integer: [Integer, Enumeration];

@@ -1,4 +1,4 @@
-//! Functions of both interface types (sections 2.2 and 2.3), and the sizes for Model Exchange (section 3.2).
+//! Functions of both interface types (sections 2.2 and 2.3 of FMI 3.0), and the sizes for Model Exchange (section 3.2).
 //!
 //! # Safety
 //! The importer guarantees the contract of the [module above](super#safety).
@@ -44,7 +44,7 @@ pub unsafe fn fmi3ExitConfigurationMode<M: Exported>(_: &mut Instance<M>) -> Out
     Ok(())
 }
 
-// Enumerations use the functions of Int64 (section 2.2.7.2).
+// Enumerations use the functions of Int64 (section 2.2.7.2 of FMI 3.0).
 getters_and_setters! { FromOne, [value_count];
     fmi3GetFloat64 get_reals, fmi3SetFloat64 set_reals, fmi3Float64: [Real];
     fmi3GetFloat32 get_float32, fmi3SetFloat32 set_float32, fmi3Float32: [Float32];

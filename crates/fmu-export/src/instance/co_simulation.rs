@@ -1,4 +1,4 @@
-//! Co-Simulation (section 4.2).
+//! Co-Simulation (section 4.2 of both FMI versions).
 
 use super::{Importer, Instance, Outcome, Rejection, discard, reject, reject_with};
 use crate::capabilities::{Events, Step, Stepped};

@@ -1,4 +1,4 @@
-//! Content and times of log messages (sections 2.1.5 and 2.2.4).
+//! Content and times of log messages (sections 2.1.5 and 2.2.4 of FMI 2.0).
 
 use crate::models::grumbler::{self, Trouble};
 use crate::models::{Grumbler, Oscillator, Talker, talker::Name};
@@ -42,7 +42,7 @@ fn shown(fmu: &Importer) -> String {
     letters.into_iter().collect()
 }
 
-/// Checks that errors and warnings are always logged, other messages on demand: in section 2.1.3, fmi2Discard
+/// Checks that errors and warnings are always logged, other messages on demand: in section 2.1.3 of FMI 2.0, fmi2Discard
 /// is logged only in debug mode.
 #[test]
 fn logging_on_and_off() {

@@ -1,4 +1,4 @@
-//! Saved states (section 2.1.8): their content, and rejected states.
+//! Saved states (section 2.1.8 of FMI 2.0): their content, and rejected states.
 
 use crate::INTERFACES;
 use crate::models::*;
@@ -28,7 +28,7 @@ fn handles_are_reused() {
     assert_eq!(fmu.bytes(), bytes);
 }
 
-/// Checks that an instance frees its saved states (section 2.1.5). Handles of other instances, freed handles
+/// Checks that an instance frees its saved states (section 2.1.5 of FMI 2.0). Handles of other instances, freed handles
 /// and other addresses are rejected, not dereferenced.
 #[test]
 fn handles_that_are_none() {
