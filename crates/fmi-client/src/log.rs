@@ -1,7 +1,7 @@
 //! Log callbacks for FMUs, and the list of living instances.
 //!
 //! FMUs do not always hand the environment of the instance to the logger: some hand their own pointer, NULL, or the environment of
-//! another instance, and some log from their own threads. So the environment is a number that is looked up, never a pointer that is
+//! another instance, and some log from their own threads, so the environment is a number that is looked up, never a pointer that is
 //! followed.
 
 use crate::format::Arguments;

@@ -2,8 +2,8 @@
 
 use std::mem::MaybeUninit;
 
-/// An array that is filled from its beginning, at compile time. The compiler needs quadratic time to overwrite the elements
-/// of an array that contain references.
+/// An array that is filled from its beginning, at compile time, because the compiler needs quadratic time to overwrite the
+/// elements of an array that contain references.
 pub(crate) struct Filling<T, const N: usize> {
     items: [MaybeUninit<T>; N],
     count: usize,

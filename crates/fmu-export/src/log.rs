@@ -1,7 +1,7 @@
 //! Log messages that every importer shows unchanged.
 //!
 //! The callback is variadic and its message is a `printf` format. Some importers never expand the format, and
-//! others look for `#r1#` in it. So each message is complete, contains neither `%` nor `#`, and is passed
+//! others look for `#r1#` in it, so each message is complete, contains neither `%` nor `#`, and is passed
 //! without further arguments.
 
 use fmi_abi::{Category, Standard, Status};

@@ -160,7 +160,7 @@ pub const fn count_elements<M>(lines: &[Variable<M>]) -> usize {
     index_of(lines, lines.len())
 }
 
-// The compiler interprets the following functions, and a call of a generic function takes it a microsecond. So the code
+// The compiler interprets the following functions, and a call of a generic function takes it a microsecond, so the code
 // for each element of an array has few calls.
 
 /// Returns the total length in bytes of the names of all array elements.

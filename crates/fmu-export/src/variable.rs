@@ -280,8 +280,8 @@ impl<M> Variable<M> {
         self
     }
 
-    /// Makes an output or local variable the time derivative of another variable. An input cannot be one:
-    /// importers assume that a derivative belongs to a state.
+    /// Makes an output or local variable the time derivative of another variable. An input cannot be one,
+    /// because importers assume that a derivative belongs to a state.
     #[must_use]
     pub const fn derivative_of(mut self, of: Index) -> Self {
         self.derivative_of = Some(of);

@@ -76,12 +76,12 @@ pub type fmi2CallbackLogger = unsafe extern "C" fn(
     message: fmi2String,
     ...
 );
-/// The importer's `calloc`. Never called: instances are on Rust's heap
+/// The importer's `calloc`. Never called, because instances are on Rust's heap
 /// (`canNotUseMemoryManagementFunctions`).
 pub type fmi2CallbackAllocateMemory = unsafe extern "C" fn(count: usize, size: usize) -> *mut c_void;
 /// The importer's `free`. Never called.
 pub type fmi2CallbackFreeMemory = unsafe extern "C" fn(memory: *mut c_void);
-/// Callback for the end of an asynchronous step. Never called: no step is asynchronous.
+/// Callback for the end of an asynchronous step. Never called, because no step is asynchronous.
 pub type fmi2StepFinished = unsafe extern "C" fn(environment: fmi2ComponentEnvironment, status: fmi2Status);
 
 /// The importer's callbacks; each may be NULL.

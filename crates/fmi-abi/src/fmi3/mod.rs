@@ -12,7 +12,7 @@ use types::*;
 /// Mode, M Event Mode, K Continuous-Time Mode, T terminated. In fatal no call is allowed. For `fmi3Set...`,
 /// the list contains all states in which some variable can be set; fmu-export checks each variable.
 ///
-/// In fmu-export an error changes nothing. So the importer may continue although section 2.3.1 of FMI 3.0 moves the
+/// In fmu-export an error changes nothing, so the importer may continue although section 2.3.1 of FMI 3.0 moves the
 /// instance to terminated.
 ///
 /// No state allows fmi3ActivateModelPartition, because its state cannot be entered. Some functions are allowed but

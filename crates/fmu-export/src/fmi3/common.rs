@@ -29,8 +29,8 @@ pub unsafe fn fmi3EnterInitializationMode<M: Exported>(
     ))
 }
 
-/// Accepts the call before the initialization, where FMIKit makes it for every FMU with inputs. Section 2.3.2 of FMI 3.0
-/// requires structural parameters, which models of this crate do not have.
+/// Accepts the call before the initialization, where FMIKit makes it for every FMU with inputs. It changes nothing,
+/// because section 2.3.2 of FMI 3.0 requires structural parameters, which models of this crate do not have.
 pub unsafe fn fmi3EnterConfigurationMode<M: Exported>(instance: &mut Instance<M>) -> Outcome {
     if instance.mode() != Mode::Instantiated {
         return reject("this FMU has no structural parameters");
