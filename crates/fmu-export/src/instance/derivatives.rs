@@ -155,11 +155,11 @@ impl<M: Exported> Instance<M> {
             return Ok(());
         }
         let why = if variable.variability() == Variability::Constant {
-            "no known: it is constant"
+            "not a known: it is constant"
         } else if variable.is_state() {
-            "no known in initialization mode, where it is calculated"
+            "not a known in initialization mode, where it is calculated"
         } else {
-            "no known: neither input, parameter nor state"
+            "not a known: neither input, parameter nor state"
         };
         reject(format!("{} is {why}", variable.name()))
     }

@@ -299,7 +299,7 @@ fn messages_say_where_a_state_comes_from() {
         let other_version = with(bytes.clone(), VERSION..VERSION + 1, version);
         assert!(fmu.rejected_bytes(&other_version).contains("version"));
     }
-    assert!(fmu.rejected_bytes(b"something else").contains("no saved state"));
+    assert!(fmu.rejected_bytes(b"something else").contains("not a saved state"));
     let cut = &bytes[..bytes.len() - 30];
     assert!(fmu.rejected_bytes(cut).contains("length"));
 }
