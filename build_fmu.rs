@@ -2,15 +2,10 @@
 
 use anyhow::{Context, Error, Result};
 use clap::Parser;
-use fmu_package::{BuildOptions, Builder, Sources, Terminal};
+use fmu_package::terminal::{exit, short};
+use fmu_package::{BuildOptions, Builder, Companion, Page, Sources, Terminal};
 use std::path::{Path, PathBuf, absolute};
 use std::process::ExitCode;
-
-#[path = "src/parameter_file.rs"]
-mod parameter_file;
-#[allow(dead_code, reason = "the model needs the rest")]
-#[path = "src/parameters.rs"]
-mod parameters;
 
 /// Table 1.
 const PARAMETERS: &str = "modelDescription/parameters.json";
@@ -38,12 +33,12 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    fmu_package::terminal::exit(run(&Options::parse()))
+    exit(run(&Options::parse()))
 }
 
 fn run(options: &Options) -> Result<()> {
     let other = match &options.parameters {
-        Some(file) => Some(absolute(file).with_context(|| format!("{} is no file", file.display()))?),
+        Some(file) => Some(absolute(file).with_context(|| format!("{} is not a file", file.display()))?),
         None => None,
     };
     let project = project();
@@ -51,23 +46,9 @@ fn run(options: &Options) -> Result<()> {
     let builder = Builder {
         sources: sources(project),
         terminals: terminals(),
-        start: parameter_file::read(&file).map_err(Error::msg)?.start_values(),
-        is_default: other.is_none(),
-        start_from: Some(file),
-        page_scripts: vec![
-            include_str!("docs/fmu-page/wrist/wrist.js"),
-            concat!("WRIST = ", include_str!("docs/fmu-page/wrist/wrist.json"), ";\n"),
-            include_str!("docs/fmu-page/wrist/view.js"),
-            include_str!("docs/fmu-page/wrist/testbed.js"),
-            include_str!("docs/fmu-page/wrist/steps.js"),
-        ],
-        page_fmus: vec![(
-            "prw_controller",
-            Sources {
-                licenses: vec!["../../LICENSE-APACHE", "../../LICENSE-MIT"],
-                ..Sources::of_package(project.join("crates/prw-controller"))
-            },
-        )],
+        start: prw_parameters::file::read(&file).map_err(Error::msg)?.start_values(),
+        variant: other.as_deref().map(|file| format!("parameters from {}", short(file))),
+        page: page(project),
         environment: vec![("PRW_PARAMETERS", other.map(Into::into))],
         ..Builder::new("prw_testbed", project)
     };
@@ -88,6 +69,24 @@ fn sources(project: &Path) -> Sources {
         // The description is generated, and the parameters are compiled in.
         not_content: vec!["modelDescription.xml", "parameters.json"],
         licenses: vec!["LICENSE-APACHE", "LICENSE-MIT"],
+    }
+}
+
+/// The view of the wrist in the page, and the controller that closes the loop there.
+fn page(project: &Path) -> Page {
+    let controller = Sources {
+        licenses: vec!["../../LICENSE-APACHE", "../../LICENSE-MIT"],
+        ..Sources::of_package(project.join("crates/prw-controller"))
+    };
+    Page {
+        scripts: vec![
+            include_str!("docs/fmu-page/wrist/wrist.js"),
+            concat!("WRIST = ", include_str!("docs/fmu-page/wrist/wrist.json"), ";\n"),
+            include_str!("docs/fmu-page/wrist/view.js"),
+            include_str!("docs/fmu-page/wrist/testbed.js"),
+            include_str!("docs/fmu-page/wrist/steps.js"),
+        ],
+        companions: vec![Companion { package: "prw_controller", sources: controller }],
     }
 }
 

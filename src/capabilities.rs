@@ -24,10 +24,9 @@ impl Saved for Pair {
 
 saved!(for Motions { angle, rate, acceleration });
 
-impl From<InvalidParameter> for Error {
-    fn from(error: InvalidParameter) -> Self {
-        Self::new(error.to_string())
-    }
+/// Returns the error for the importer.
+fn rejected(error: InvalidParameter) -> Error {
+    Error::new(error.to_string())
 }
 
 impl Model for TestbedFmu {
@@ -46,7 +45,7 @@ impl Model for TestbedFmu {
     };
 
     fn new(setup: &Setup) -> Result<Self, Error> {
-        let testbed = Testbed::new(Parameters::BUILT_IN)?;
+        let testbed = Testbed::new(crate::BUILT_IN).map_err(rejected)?;
         let (interface, start, two) = (setup.interface, Start::default(), [0.0; 2]);
         let jacobian = [[0.0; _]; 10];
         let mut fmu = Self { testbed, interface, start, torques: two, angles: two, rates: two, jacobian };
@@ -56,7 +55,7 @@ impl Model for TestbedFmu {
 
     #[inline(never)]
     fn update(&mut self) -> Result<(), Error> {
-        self.testbed.parameters_changed()?;
+        self.testbed.parameters_changed().map_err(rejected)?;
         self.jacobian = self.jacobian();
         Ok(())
     }

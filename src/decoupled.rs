@@ -177,8 +177,8 @@ impl Decoupled {
         for subsystem in [&pitch, &roll] {
             let coefficients = subsystem.a.iter().chain(&subsystem.b_angle).chain(&subsystem.b_rate);
             if !coefficients.copied().all(f64::is_finite) {
-                return Err(InvalidParameter(
-                    "the parameters are too far apart: a coefficient of eq. (11) is no finite number".into(),
+                return Err(InvalidParameter::new(
+                    "the parameters are too far apart: a coefficient of eq. (11) is not a finite number",
                 ));
             }
         }

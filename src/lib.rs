@@ -32,10 +32,10 @@
 //! Some printed equations are wrong; the documentation of the corresponding function describes each correction.
 //!
 //! ```
-//! use prw_testbed::{Parameters, Testbed};
+//! use prw_testbed::{BUILT_IN, Testbed};
 //!
 //! // Both motors at 1 rad/s: the wrist pitches and does not roll.
-//! let mut testbed = Testbed::new(Parameters::BUILT_IN)?;
+//! let mut testbed = Testbed::new(BUILT_IN)?;
 //! for i in 0..2000 {
 //!     for motor in 0..2 {
 //!         testbed.motors.set_theta(motor, 1e-3 * f64::from(i));
@@ -58,9 +58,6 @@ pub mod instant;
 pub mod motor;
 pub mod number;
 pub mod pair;
-#[cfg(test)]
-mod parameter_file;
-pub mod parameters;
 pub mod propagator;
 pub mod start;
 pub mod state_space;
@@ -69,13 +66,12 @@ pub mod variables;
 
 pub use fmu::TestbedFmu;
 pub use parameters::Parameters;
+pub use prw_parameters as parameters;
 pub use testbed::Testbed;
 
-impl Parameters {
-    /// The built-in parameters: Table 1, or the file that replaced it when the library was built. The build
-    /// script reads Table 1 from `modelDescription/parameters.json`.
-    pub const BUILT_IN: Self = include!(concat!(env!("OUT_DIR"), "/table_1.rs"));
-}
+/// The built-in parameters: Table 1, or the file that replaced it when the library was built. The build script
+/// reads Table 1 from `modelDescription/parameters.json`.
+pub const BUILT_IN: Parameters = include!(concat!(env!("OUT_DIR"), "/table_1.rs"));
 
 fmu_export::export_fmu!(
     TestbedFmu: CoSimulation + ModelExchange + InputDerivatives + OutputDerivatives + Partials

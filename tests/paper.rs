@@ -2,14 +2,13 @@
 //! the printed version fails.
 
 use nalgebra::{Complex, Matrix2, Matrix4, Matrix6, Vector4};
-use prw_testbed::Parameters;
 use prw_testbed::energies::{Angles, dissipation, kinetic_energy, potential_energy, sect};
 use prw_testbed::state_space::{
     angle_transfer_matrix, damping_matrix, force, mass_matrix, state_space, stiffness_matrix, transfer_matrix,
 };
 use prw_testbed::testbed::Testbed;
+use prw_testbed::{BUILT_IN as TABLE_1, Parameters};
 
-const TABLE_1: Parameters = Parameters::BUILT_IN;
 const DEG_PER_RAD: f64 = 180.0 / std::f64::consts::PI;
 
 fn sorted_eigenvalues(a: Matrix6<f64>) -> Vec<Complex<f64>> {

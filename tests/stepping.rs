@@ -6,14 +6,14 @@ use proptest::prelude::*;
 use prw_testbed::pair::PitchRoll;
 use prw_testbed::propagator::{Propagator, StepMatrices};
 use prw_testbed::state_space::state_space;
-use prw_testbed::{Parameters, Testbed};
+use prw_testbed::{BUILT_IN, Parameters, Testbed};
 
 #[allow(non_snake_case, reason = "the paper's symbols")]
 fn parameters() -> impl Strategy<Value = Parameters> {
     // A factor of up to 5 around Table 1 for each parameter; the vector has more entries than needed.
     (prop::collection::vec(-1.6..1.6f64, 32), 1..9i32, 1..15i32).prop_map(|(exponents, M, N)| {
         let mut exponents = exponents.into_iter();
-        let near = Parameters::BUILT_IN.varied(|| exponents.next().unwrap());
+        let near = BUILT_IN.varied(|| exponents.next().unwrap());
         Parameters { M, N, ..near }
     })
 }
@@ -201,7 +201,7 @@ proptest! {
 #[test]
 fn opposite_motors_leave_pitch_at_zero_and_equal_motors_roll() {
     for sign in [-1.0, 1.0] {
-        let mut testbed = Testbed::new(Parameters::BUILT_IN).unwrap();
+        let mut testbed = Testbed::new(BUILT_IN).unwrap();
         for i in 0..2000 {
             let t = f64::from(i) * 1e-3;
             let angle = (1.0 - (31.4 * t).cos()) / 31.4;
@@ -217,7 +217,7 @@ fn opposite_motors_leave_pitch_at_zero_and_equal_motors_roll() {
 /// Checks that stored step matrices are used only for their parameters and their step size.
 #[test]
 fn the_past_does_not_matter() {
-    let p = Parameters::BUILT_IN;
+    let p = BUILT_IN;
     let other = Parameters { k1: 2.0 * p.k1, ..p };
     let step = |testbed: &mut Testbed, h: f64| {
         testbed.state = [0.1, -0.2, 0.15, 0.05, 1.0, -2.0];
@@ -253,7 +253,7 @@ fn a_testbed_that_turns_goes_on_turning() {
     let mut worst = 0.0_f64;
     for exponents in (0..4).flat_map(|k| (0..4).map(move |c| [k, c])) {
         let [k, c] = exponents.map(|exponent| 1e3_f64.powi(exponent));
-        let built_in = Parameters::BUILT_IN;
+        let built_in = BUILT_IN;
         let p = Parameters {
             k1: built_in.k1 * k,
             k2: built_in.k2 * k,
@@ -281,7 +281,7 @@ fn a_testbed_that_turns_goes_on_turning() {
 /// digits.
 #[test]
 fn decayed_velocities_have_all_digits() {
-    let built_in = Parameters::BUILT_IN;
+    let built_in = BUILT_IN;
     let p = Parameters { k1: 1e-20, k2: 1e-20, c3: 1.0, ..built_in };
     let mut testbed = Testbed::new(p).unwrap();
     let rate = (testbed.system().side.damping + 0.5 * p.c3) / (p.J2 + 0.5 * p.H3);
@@ -296,7 +296,7 @@ fn decayed_velocities_have_all_digits() {
 
 #[test]
 fn a_parameter_that_is_0_is_varied_too() {
-    let built_in = Parameters { c1: 0.0, ..Parameters::BUILT_IN };
+    let built_in = Parameters { c1: 0.0, ..BUILT_IN };
     let varied = built_in.varied(|| 0.5);
     assert_eq!(varied.k1, built_in.k1 * 0.5_f64.exp());
     assert_eq!(varied.c1, built_in.c2.max(built_in.c3) * 0.5_f64.exp());

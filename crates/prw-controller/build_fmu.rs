@@ -2,7 +2,7 @@
 
 use clap::Parser;
 use fmu_package::terminal::exit;
-use fmu_package::{BuildOptions, Builder, Sources, Terminal};
+use fmu_package::{BuildOptions, Builder, Companion, Page, Sources, Terminal};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -22,13 +22,15 @@ fn main() -> ExitCode {
             ..Sources::of_package(env!("CARGO_MANIFEST_DIR"))
         },
         terminals: terminals(),
-        page_scripts: vec![
-            include_str!("../../docs/fmu-page/wrist/wrist.js"),
-            concat!("WRIST = ", include_str!("../../docs/fmu-page/wrist/wrist.json"), ";\n"),
-            include_str!("../../docs/fmu-page/wrist/view.js"),
-            include_str!("../../docs/fmu-page/wrist/controller.js"),
-        ],
-        page_fmus: vec![("prw_testbed", testbed())],
+        page: Page {
+            scripts: vec![
+                include_str!("../../docs/fmu-page/wrist/wrist.js"),
+                concat!("WRIST = ", include_str!("../../docs/fmu-page/wrist/wrist.json"), ";\n"),
+                include_str!("../../docs/fmu-page/wrist/view.js"),
+                include_str!("../../docs/fmu-page/wrist/controller.js"),
+            ],
+            companions: vec![Companion { package: "prw_testbed", sources: testbed() }],
+        },
         ..Builder::new(env!("CARGO_PKG_NAME"), env!("CARGO_MANIFEST_DIR"))
     };
     exit(builder.run(&Options::parse().build))

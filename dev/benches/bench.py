@@ -28,7 +28,7 @@ from fmpy.simulation import instantiate_fmu
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "dev"), str(ROOT / "tests" / "fmu_run")]
-from unruly import build  # noqa: E402
+from faulty_fmu import build  # noqa: E402
 
 from tools.validation import masters  # noqa: E402
 from tools.validation.system import read  # noqa: E402

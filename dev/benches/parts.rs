@@ -2,15 +2,15 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use prw_testbed::propagator::{Propagator, StepMatrices};
-use prw_testbed::{Parameters, Testbed};
+use prw_testbed::{BUILT_IN, Testbed};
 use std::hint::black_box;
 
 fn parts(c: &mut Criterion) {
-    let mut testbed = Testbed::new(Parameters::BUILT_IN).expect("Table 1 is valid");
+    let mut testbed = Testbed::new(BUILT_IN).expect("Table 1 is valid");
     let system = *testbed.system();
 
     c.bench_function("equations from parameters", |b| {
-        b.iter(|| Testbed::new(black_box(Parameters::BUILT_IN)));
+        b.iter(|| Testbed::new(black_box(BUILT_IN)));
     });
     c.bench_function("propagator of one subsystem, 1 ms", |b| {
         b.iter(|| Propagator::new(black_box(&system.pitch), black_box(1e-3)));

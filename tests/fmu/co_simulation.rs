@@ -5,8 +5,8 @@ use crate::{in_mode, new, vr};
 use fmu_export::Interface::CoSimulation;
 use fmu_export::Mode::*;
 use fmu_test_kit::{Either, Importer as Fmu, Random};
-use prw_testbed::Parameters;
 use prw_testbed::variables::Name;
+use prw_testbed::{BUILT_IN, Parameters};
 
 const THETA: [u32; 2] = [vr(Name::theta1), vr(Name::theta2)];
 const OMEGA: [u32; 2] = [vr(Name::omega1), vr(Name::omega2)];
@@ -166,7 +166,7 @@ fn samples_are_differentiated() {
 /// Checks that the motors are at rest from the third step on if an importer sets an input only once.
 #[test]
 fn inputs_that_are_not_set_stay() {
-    let fmu = slave(&Parameters::BUILT_IN, false);
+    let fmu = slave(&BUILT_IN, false);
     fmu.set(&THETA, &[0.3, 0.3]);
     for i in 0..300 {
         fmu.step(f64::from(i) * 0.01, 0.01);
@@ -177,7 +177,7 @@ fn inputs_that_are_not_set_stay() {
 /// Checks that higher orders, and derivatives of omega, are accepted and have no effect.
 #[test]
 fn higher_orders_are_harmless() {
-    let [plain, rich] = [(); 2].map(|()| slave(&Parameters::BUILT_IN, false));
+    let [plain, rich] = [(); 2].map(|()| slave(&BUILT_IN, false));
     let outputs = |fmu: &Fmu| (fmu.get(STATES), fmu.get([vr(Name::tau1), vr(Name::tau2)]));
     let (of, orders) = ([THETA[0], THETA[1], OMEGA[0], THETA[0]], [2, 7, 1, i32::MAX]);
     for i in 0..20 {

@@ -1,4 +1,4 @@
-//! Derivatives with respect to variables (section 2.1.9) and to time (4.2.1).
+//! Derivatives with respect to variables (section 2.1.9 of FMI 2.0) and to time (section 4.2.1).
 
 use crate::exact::{
     INPUTS, LINEAR, STARTS, STATES, jacobian, parameters, real_parameters, set_parameters, start_at, unknowns,

@@ -7,10 +7,10 @@ use crate::{TABLE, vr};
 use fmu_export::{BaseType, Causality, Variable};
 use fmu_test_kit::{Either, Random};
 use nalgebra::SMatrix;
-use prw_testbed::Parameters;
 use prw_testbed::TestbedFmu;
 use prw_testbed::state_space::state_space;
 use prw_testbed::variables::Name;
+use prw_testbed::{BUILT_IN, Parameters};
 
 pub const INPUTS: [u32; 4] = [vr(Name::theta1), vr(Name::theta2), vr(Name::omega1), vr(Name::omega2)];
 pub const STATES: [u32; 6] = [
@@ -48,7 +48,7 @@ pub const LINEAR: [u32; 14] = [
     vr(Name::theta4),
 ];
 
-/// Returns all variables that have partial derivatives after the initialization (section 2.1.9): Real outputs and the
+/// Returns all variables that have partial derivatives after the initialization (section 2.1.9 of FMI 2.0): Real outputs and the
 /// derivatives of the states.
 pub fn unknowns() -> Vec<u32> {
     let is_one = |v: &Variable<TestbedFmu>| {
@@ -137,6 +137,6 @@ pub fn real_parameters() -> impl Iterator<Item = u32> {
 pub fn parameters(seed: u64) -> Parameters {
     let mut random = Random(seed);
     let [M, N] = [8.0, 14.0].map(|end| random.between(1.0, end) as i32);
-    let near = Parameters::BUILT_IN.varied(|| random.between(-1.5, 1.5));
+    let near = BUILT_IN.varied(|| random.between(-1.5, 1.5));
     Parameters { M, N, ..near }
 }

@@ -1,12 +1,12 @@
-//! Model Exchange (section 3.2): eq. (11) for an importer's integrator.
+//! Model Exchange (section 3.2 of FMI 2.0): eq. (11) for an importer's integrator.
 
 use crate::exact::{INPUTS, LINEAR, STATES, distance, jacobian, parameters, set_parameters};
 use crate::{new, vr};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_test_kit::{Either, Random};
 use nalgebra::SVector;
-use prw_testbed::Parameters;
 use prw_testbed::variables::Name;
+use prw_testbed::{BUILT_IN, Parameters};
 
 /// Checks derivatives and outputs at random points with random parameters; use_omega has no effect.
 #[test]
@@ -92,7 +92,7 @@ fn simulated(p: &Parameters, steps: i32, use_omega: bool) -> [f64; 14] {
 /// only in the next step; this error is of second order in h, like the others.
 #[test]
 fn same_motion_as_co_simulation() {
-    for p in [Parameters::BUILT_IN, parameters(4)] {
+    for p in [BUILT_IN, parameters(4)] {
         let reference = integrated(&p, 4000);
         let scale = 1.0 + distance(&reference, &[0.0; 14]);
         assert!(distance(&integrated(&p, 2000), &reference) < 1e-8 * scale, "the integrator has converged");

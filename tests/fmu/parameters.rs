@@ -6,7 +6,7 @@ use fmu_export::Interface::CoSimulation;
 use fmu_export::Mode::*;
 use fmu_export::{Attributes, Causality};
 use fmu_test_kit::Either;
-use prw_testbed::Parameters;
+use prw_testbed::BUILT_IN;
 use prw_testbed::variables::Name;
 
 /// Checks the declared limits: the smallest declared value is accepted and runs; values below it are
@@ -37,7 +37,7 @@ fn declared_limits_are_those() {
         assert!(torque != 0.0 && pitch != 0.0, "{}: {torque} {pitch}", variable.name());
         found += 1;
     }
-    assert_eq!(found, Parameters::BUILT_IN.start_values().len(), "every parameter of Table 1 has a limit");
+    assert_eq!(found, BUILT_IN.start_values().len(), "every parameter of Table 1 has a limit");
 }
 
 /// Checks that one of the dampings may be 0, in either order of setting them; and parameters whose coefficients

@@ -1,4 +1,4 @@
-//! Saved states (section 2.1.8): their content, and rejected states.
+//! Saved states (section 2.1.8 of FMI 2.0): their content, and rejected states.
 
 use crate::{TABLE, in_mode};
 use fmu_export::BaseType;

@@ -6,16 +6,16 @@ import platform
 from pathlib import Path
 
 import pytest
-from unruly import build
+from faulty_fmu import build
 
 
 @pytest.fixture(scope="session")
-def unruly(tmp_path_factory) -> Path:
-    """An FMU in C, compiled here, whose parameter `behaviour` selects how it misbehaves (unruly.c)."""
-    return build(tmp_path_factory.mktemp("unruly"))
+def faulty_fmu(tmp_path_factory) -> Path:
+    """An FMU in C, compiled here, whose parameter `behaviour` selects how it misbehaves (faulty_fmu.c)."""
+    return build(tmp_path_factory.mktemp("faulty_fmu"))
 
 
 @pytest.fixture(scope="session")
-def unruly3(tmp_path_factory) -> Path:
-    """The FMU in C for FMI 3.0, for functions that FMI 2.0 does not have (unruly3.c)."""
-    return build(tmp_path_factory.mktemp("unruly3"), name="unruly3", platform=f"{platform.machine()}-linux")
+def faulty_fmu3(tmp_path_factory) -> Path:
+    """The FMU in C for FMI 3.0, for functions that FMI 2.0 does not have (faulty_fmu3.c)."""
+    return build(tmp_path_factory.mktemp("faulty_fmu3"), name="faulty_fmu3", platform=f"{platform.machine()}-linux")

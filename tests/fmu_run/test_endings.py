@@ -7,7 +7,7 @@ import time as clock
 import fmu_run
 import numpy as np
 import pytest
-from unruly import repacked
+from faulty_fmu import repacked
 
 TIME = np.arange(11) / 10
 
@@ -28,7 +28,7 @@ BEHAVIOURS = {
     "error if logging": (6, "at 0.5 s: fmi2DoStep: the pump ran dry", None),
     "fatal if logging": (6, "at 0.5 s: fmi2DoStep: the pump ran dry", None),
 }
-BEHAVIOURS3 = {
+BEHAVIOURS_FMI3 = {
     "good": (11, None, None),
     "ends between": (6, "ended by the FMU at t = 0.525 s", None),
     "ends at point": (7, "ended by the FMU at t = 0.6 s", None),
@@ -39,15 +39,17 @@ BEHAVIOURS3 = {
 
 
 @pytest.mark.parametrize(
-    "behaviours, fixture, first", [(BEHAVIOURS, "unruly", 4.0), (BEHAVIOURS3, "unruly3", 0.0)], ids=["fmi2", "fmi3"]
+    "behaviours, fixture, first",
+    [(BEHAVIOURS, "faulty_fmu", 4.0), (BEHAVIOURS_FMI3, "faulty_fmu3", 0.0)],
+    ids=["fmi2", "fmi3"],
 )
 @pytest.mark.parametrize("read_before_set", [False, True])
 def test_behaviours(request, behaviours, fixture, first, read_before_set):
     number = np.repeat(np.arange(len(behaviours)), 3)
     with fmu_run.Fmu(request.getfixturevalue(fixture)) as fmu:
-        ask = {"start": {"behaviour": number}, "outputs": ["y"], "threads": 4, "read_before_set": read_before_set}
-        runs = fmu.run(TIME, every=1, measures=["end", "mean"], **ask)
-        thinned = fmu.run(TIME, every=2, **ask)
+        arguments = {"start": {"behaviour": number}, "outputs": ["y"], "threads": 4, "read_before_set": read_before_set}
+        runs = fmu.run(TIME, every=1, measures=["end", "mean"], **arguments)
+        thinned = fmu.run(TIME, every=2, **arguments)
     rows, errors, notes = (dict(enumerate(np.repeat(column, 3))) for column in zip(*behaviours.values()))
     assert runs.errors == thinned.errors == {run: why for run, why in errors.items() if why}
     assert runs.notes == thinned.notes == {run: why for run, why in notes.items() if why}
@@ -61,19 +63,19 @@ def test_behaviours(request, behaviours, fixture, first, read_before_set):
         np.testing.assert_allclose([runs["y", "end"][run], runs["y", "mean"][run]], measures, atol=1e-14)
 
 
-def test_an_end_at_the_last_time(unruly):
-    with fmu_run.Fmu(unruly) as fmu:
+def test_an_end_at_the_last_time(faulty_fmu):
+    with fmu_run.Fmu(faulty_fmu) as fmu:
         runs = fmu.run(TIME[:7], start={"behaviour": list(BEHAVIOURS).index("ends at point")}, outputs=["y"])
     assert runs.ok.all() and runs.notes == {0: "ended by the FMU at t = 0.6 s"}
     np.testing.assert_allclose(runs["y"][0], 4.0 + TIME[:7], atol=1e-15)
 
 
-def test_silent_runs_are_repeated_once_with_logging(unruly):
+def test_silent_runs_are_repeated_once_with_logging(faulty_fmu):
     behaviours = [
         list(BEHAVIOURS).index(name)
         for name in ("error if logging", "good", "silent error", "discard", "error if logging")
     ]
-    with fmu_run.Fmu(unruly) as fmu:
+    with fmu_run.Fmu(faulty_fmu) as fmu:
         runs = fmu.run(TIME, start={"behaviour": behaviours}, outputs=["y", "logged", "instances"])
         after = fmu.run(TIME, outputs=["logged", "instances"])
     assert runs.errors.keys() == {0, 2, 3, 4} and np.nanmax(runs["logged"]) == 0
@@ -81,8 +83,8 @@ def test_silent_runs_are_repeated_once_with_logging(unruly):
     assert after["logged"].max() == 3 * 6 and after["instances"].max() == 1
 
 
-def test_an_fmu_that_is_slow_with_logging(unruly):
-    with fmu_run.Fmu(unruly) as fmu:
+def test_an_fmu_that_is_slow_with_logging(faulty_fmu):
+    with fmu_run.Fmu(faulty_fmu) as fmu:
         begin = clock.monotonic()
         runs = fmu.run(np.linspace(0, 0.6, 101), start={"behaviour": len(BEHAVIOURS)}, outputs=["y"])
     # If all 76 steps were repeated, at 0.3 s each, this would take 23 s.
@@ -92,13 +94,16 @@ def test_an_fmu_that_is_slow_with_logging(unruly):
 
 @pytest.mark.parametrize(
     "guid, why",
-    [("strange", "the guid is of another FMU"), ("mute", "Unruly makes no instance, and logs no message")],
+    [
+        ("strange", "the guid is of another FMU"),
+        ("mute", "the instantiation of FaultyFmu returned NULL without a message"),
+    ],
 )
-def test_an_fmu_that_cannot_be_instantiated(tmp_path, unruly, guid, why):
+def test_an_fmu_that_cannot_be_instantiated(tmp_path, faulty_fmu, guid, why):
     def change(name, content):
-        return content.replace(b'guid="{unruly}"', f'guid="{{{guid}}}"'.encode())
+        return content.replace(b'guid="{faulty_fmu}"', f'guid="{{{guid}}}"'.encode())
 
-    with fmu_run.Fmu(repacked(unruly, tmp_path / "strange.fmu", change)) as fmu:
+    with fmu_run.Fmu(repacked(faulty_fmu, tmp_path / "strange.fmu", change)) as fmu:
         runs = fmu.run(TIME, start={"slope": [1.0, 2.0]}, outputs=["y"], every=1, measures=["peak"])
     assert runs.errors == dict.fromkeys((0, 1), why)
     assert np.isnan(runs["y"]).all() and np.isnan(runs["y", "peak"]).all()

@@ -15,7 +15,7 @@ import fmpy
 import fmu_run
 import numpy as np
 import pytest
-from unruly import repacked
+from faulty_fmu import repacked
 
 TIME = np.linspace(0.0, 1.0, 11)
 
@@ -34,8 +34,8 @@ def fmu(testbed):
         ({"inputs": {"theta1": np.zeros(4)}}, "theta1 has the shape (4,); it must be (11,), (runs, 11) or a number"),
         ({"inputs": {"theta1": np.zeros((2, 2, 11))}}, "theta1 has the shape (2, 2, 11)"),
         ({"inputs": {"theta1": ["a"] * 11}}, "theta1: the values are not numbers"),
-        ({"inputs": {"k1": TIME}}, "k1 is no input but a fixed parameter; give it a start value"),
-        ({"inputs": {"roll": TIME}}, "roll is no input but a continuous output"),
+        ({"inputs": {"k1": TIME}}, "k1 is not an input but a fixed parameter; give it a start value"),
+        ({"inputs": {"roll": TIME}}, "roll is not an input but a continuous output"),
         (
             {"start": {"k1": [[1.0]]}},
             "the start value of k1 has the shape (1, 1); it must be one number for all, or (n,) with one value for each",
@@ -67,7 +67,7 @@ def test_invalid_arguments(fmu, arguments, message):
 def test_input_derivatives_of_fmi3(fmu):
     slopes = {"theta1": np.zeros(11)}
     if fmu.fmi_version == "2.0":
-        with pytest.raises(ValueError, match="k1 is no Real input"):
+        with pytest.raises(ValueError, match="k1 is not a Real input"):
             fmu.run(TIME, outputs=["roll"], input_derivatives={"k1": 1.0})
     else:
         with pytest.raises(ValueError, match="PitchRollWristTestbed takes no input derivatives"):
@@ -135,7 +135,7 @@ def test_no_library_for_this_platform(tmp_path, testbed):
 
 # FMPy contains libraries for other systems. The field e_machine of an ELF header names the processor.
 FMPY = Path(fmpy.__file__).parent
-FOREIGN = {
+FOREIGN_LIBRARIES = {
     "Windows on x86_64": lambda _: (FMPY / "logging/win64/logging.dll").read_bytes(),
     "Windows on x86": lambda _: (FMPY / "logging/win32/logging.dll").read_bytes(),
     "macOS on x86_64 and aarch64": lambda _: (FMPY / "logging/darwin64/logging.dylib").read_bytes(),
@@ -144,10 +144,10 @@ FOREIGN = {
 }
 
 
-@pytest.mark.parametrize("made_for", FOREIGN)
+@pytest.mark.parametrize("made_for", FOREIGN_LIBRARIES)
 def test_a_library_of_another_machine(tmp_path, testbed, made_for):
     def change(name, content):
-        return FOREIGN[made_for](content) if name.startswith("binaries/") else content
+        return FOREIGN_LIBRARIES[made_for](content) if name.startswith("binaries/") else content
 
     path = repacked(testbed, tmp_path / "foreign.fmu", change)
     this = f"{platform.system()} on {platform.machine()}"
@@ -166,11 +166,11 @@ def test_a_damaged_library(tmp_path, testbed):
         fmu_run.Fmu(path)
 
 
-def test_an_execution_tool(tmp_path, unruly):
+def test_an_execution_tool(tmp_path, faulty_fmu):
     def change(name, content):
         return content.replace(b"<CoSimulation ", b'<CoSimulation needsExecutionTool="true" ')
 
-    path = repacked(unruly, tmp_path / "tool.fmu", change)
+    path = repacked(faulty_fmu, tmp_path / "tool.fmu", change)
     with pytest.raises(fmu_run.FmuError, match=r"needsExecutionTool.*execution_tool=True"):
         fmu_run.Fmu(path)
     with fmu_run.Fmu(path, execution_tool=True) as fmu:
@@ -186,19 +186,19 @@ def test_a_closed_fmu(testbed):
     assert repr(fmu).endswith("variables, closed>")
 
 
-def test_units_of_declared_types(unruly, unruly3):
+def test_units_of_declared_types(faulty_fmu, faulty_fmu3):
     by_name = {"slope": "m/s", "y": "m", "gap": "mm", "count": None}
-    of3 = {"y": "m", "gap": "mm", "number": None, "temper": None}
-    for path, units in ((unruly, by_name), (unruly3, of3)):
+    units_fmi3 = {"y": "m", "gap": "mm", "number": None, "temper": None}
+    for path, units in ((faulty_fmu, by_name), (faulty_fmu3, units_fmi3)):
         with fmu_run.Fmu(path) as fmu:
             assert {name: fmu.variables[name].unit for name in units} == units
 
 
-def test_an_undefined_declared_type(unruly, tmp_path):
+def test_an_undefined_declared_type(faulty_fmu, tmp_path):
     def change(name, content):
         return content.replace(b'<Real declaredType="Length"/>', b'<Real declaredType="Undefined"/>')
 
-    with fmu_run.Fmu(repacked(unruly, tmp_path / "undefined.fmu", change)) as fmu:
+    with fmu_run.Fmu(repacked(faulty_fmu, tmp_path / "undefined.fmu", change)) as fmu:
         assert fmu.variables["y"].unit is None and fmu.run(TIME, outputs=["y"]).ok.all()
 
 
@@ -237,8 +237,8 @@ def test_suggested_names(fmu):
             fmu.run(TIME, outputs=[wrong])
 
 
-def test_other_types(unruly):
-    with fmu_run.Fmu(unruly) as fmu:
+def test_other_types(faulty_fmu):
+    with fmu_run.Fmu(faulty_fmu) as fmu:
         assert fmu.variables["label"].type == "String" and fmu.variables["count"].start == "3"
         counts = np.arange(11) - 5
         runs = fmu.run(
@@ -252,7 +252,7 @@ def test_other_types(unruly):
         one = fmu.instances(start={"label": "held", "behaviour": "Good", "flag": "true"})
         assert one.texts("label") == ["held"] and list(one.get(("behaviour", "flag"))[0]) == [0.0, 1.0]
         for call, message in [
-            (lambda: one.get(["label", "y"]), "label is no number"),
+            (lambda: one.get(["label", "y"]), "label is not a number"),
             (lambda: one.texts("y"), "y is a number, not a string"),
             (
                 lambda: fmu.run(TIME, outputs=["y"], start={"behaviour": "Glad"}),
@@ -275,7 +275,7 @@ def test_other_types(unruly):
     np.testing.assert_allclose(runs["y"][0], 7 + 2 * TIME, atol=1e-15)
 
 
-LONG = """
+LONG_RUN_SCRIPT = """
 import signal, sys, numpy as np, fmu_run
 # Shells start commands in the background with Ctrl-C ignored.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -292,7 +292,7 @@ with fmu_run.Fmu(sys.argv[1]) as fmu:
 @pytest.mark.parametrize("times", [10_000, 100_000_000], ids=["short runs", "in a run"])
 def test_ctrl_c_stops_runs(testbed, times):
     """Ctrl-C stops runs that would take minutes."""
-    command = [sys.executable, "-c", LONG, testbed, str(times)]
+    command = [sys.executable, "-c", LONG_RUN_SCRIPT, testbed, str(times)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout.readline() == "begun\n"
@@ -327,11 +327,11 @@ def test_progress(testbed):
         assert fmu.run(TIME, outputs=["roll"]).count == 1
 
 
-def test_the_interface_type_must_exist(tmp_path, unruly):
+def test_the_interface_type_must_exist(tmp_path, faulty_fmu):
     def change(name, content):
         return content.replace(b"<CoSimulation", b"<ModelExchange")
 
-    with fmu_run.Fmu(repacked(unruly, tmp_path / "model_exchange.fmu", change)) as fmu:
+    with fmu_run.Fmu(repacked(faulty_fmu, tmp_path / "model_exchange.fmu", change)) as fmu:
         for call in (lambda: fmu.run([0.0, 1.0], outputs=["y"], interface="co_simulation"), fmu.instances):
             with pytest.raises(
                 fmu_run.FmuError, match="no Co-Simulation, only Model Exchange; `run` of this FMU integrates it"
@@ -339,7 +339,7 @@ def test_the_interface_type_must_exist(tmp_path, unruly):
                 call()
         # The guid belongs to the other description.
         assert list(fmu.run([0.0, 1.0], outputs=["y"]).errors) == [0]
-    with fmu_run.Fmu(unruly) as fmu, pytest.raises(fmu_run.FmuError, match="has no Model Exchange"):
+    with fmu_run.Fmu(faulty_fmu) as fmu, pytest.raises(fmu_run.FmuError, match="has no Model Exchange"):
         fmu.run([0.0, 1.0], outputs=["y"], interface="model_exchange")
 
 

@@ -174,13 +174,13 @@ def test_a_failure_ends_one_episode(task, mode, count) -> None:
     [
         (1, 1.0, "fmi2DoStep"),
         (8, 1.0, "ended by the FMU at t = 0.525 s"),
-        (0, np.inf, "an observation is no finite number"),
+        (0, np.inf, "an observation is not a finite number"),
     ],
 )
-def test_termination_and_infinite_observations_end_the_episode(unruly, behaviour, slope, message) -> None:
+def test_termination_and_infinite_observations_end_the_episode(faulty_fmu, behaviour, slope, message) -> None:
     """The FMU allows one instance in a process, so each environment is closed before the next one is created."""
     task = Task(
-        fmu=unruly,
+        fmu=faulty_fmu,
         actions="slope",
         observations="y",
         reward=lambda before, action, after: after[:, 0],
@@ -233,7 +233,7 @@ def test_inputs_from_actions(task) -> None:
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        ({"actions": {"pitch": (-1, 1)}}, "pitch is no input, its causality is output"),
+        ({"actions": {"pitch": (-1, 1)}}, "pitch is not an input, its causality is output"),
         ({"actions": "theta9"}, "theta9"),
         ({"observations": ("yaw",)}, "yaw"),
         ({"observations": ()}, "observations: name at least one"),

@@ -262,14 +262,14 @@ def test_invalid_arguments(testbed) -> None:
         assert wrists.errors == {}
 
 
-def test_missing_capabilities_fail_no_instance(unruly) -> None:
-    with fmu_run.Fmu(unruly) as fmu:
+def test_missing_capabilities_fail_no_instance(faulty_fmu) -> None:
+    with fmu_run.Fmu(faulty_fmu) as fmu:
         one = fmu.instances()
         for call, message in [
-            (one.save, "Unruly cannot save its state"),
-            (lambda: one.deserialize([b"12345678"]), "Unruly cannot deserialize a state"),
-            (lambda: one.directional_derivative("y", "slope", 1.0), "Unruly has no directional derivatives"),
-            (lambda: one.set_input_derivatives("slope", 1.0), "Unruly takes no input derivatives"),
+            (one.save, "FaultyFmu cannot save its state"),
+            (lambda: one.deserialize([b"12345678"]), "FaultyFmu cannot deserialize a state"),
+            (lambda: one.directional_derivative("y", "slope", 1.0), "FaultyFmu has no directional derivatives"),
+            (lambda: one.set_input_derivatives("slope", 1.0), "FaultyFmu takes no input derivatives"),
         ]:
             with pytest.raises(ValueError, match=message):
                 call()

@@ -190,7 +190,7 @@ def test_names_that_were_not_requested(testbed):
             runs[key]
 
 
-def test_results_that_are_not_a_number_are_reported(testbed, unruly):
+def test_results_that_are_not_a_number_are_reported(testbed, faulty_fmu):
     time = np.arange(11) / 10
     with fmu_run.Fmu(testbed) as fmu:
         arguments = {"inputs": {"theta1": np.zeros(11)}, "outputs": ["roll"], "measures": ["peak"], "every": 1}
@@ -198,7 +198,7 @@ def test_results_that_are_not_a_number_are_reported(testbed, unruly):
         every = fmu.run(time, start={"k1": -1.0}, **arguments)
         checked = fmu.run(time, start={"k1": -1.0}, **arguments)
     assert checked.errors
-    with fmu_run.Fmu(unruly) as fmu:
+    with fmu_run.Fmu(faulty_fmu) as fmu:
         endless = fmu.run(time, inputs={"slope": np.where(time < 0.35, 1.0, np.nan)}, outputs=["y"])
     with pytest.warns(RuntimeWarning, match=r"^1 of 3 runs failed, see Runs.errors; run 1: .*k1 must not be below"):
         some["roll"]
@@ -213,11 +213,11 @@ def test_results_that_are_not_a_number_are_reported(testbed, unruly):
         endless["y"]
 
 
-def test_statistics_of_outputs_that_are_not_a_number(unruly):
+def test_statistics_of_outputs_that_are_not_a_number(faulty_fmu):
     """Runs with NaN at the end, and everywhere, between runs without: no statistic of theirs is a number, and the others are right."""
     time, measures = np.arange(11) / 10, ["min", "max", "peak", "time_of_peak", "mean", "rms", "end"]
     slopes = np.array([np.ones(11), np.where(time < 0.35, -1.0, np.nan), np.full(11, np.nan), 2.0 * np.ones(11)])
-    with fmu_run.Fmu(unruly) as fmu:
+    with fmu_run.Fmu(faulty_fmu) as fmu:
         runs = fmu.run(time, inputs={"slope": slopes}, outputs=["y", "slope"], measures=measures, every=1).check()
     for measure in measures:
         with pytest.warns(RuntimeWarning, match="is not a number in 2 finished runs, run 1 among them"):

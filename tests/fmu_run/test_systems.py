@@ -93,7 +93,7 @@ def test_states_of_all_components_are_saved(fmus, order) -> None:
     pairs.reset()
     pairs.restore(pairs.deserialize(texts))
     assert np.array_equal(continued(), first)
-    with pytest.raises(fmu_run.FmuError, match=re.escape("the bytes are no state of this system")):
+    with pytest.raises(fmu_run.FmuError, match=re.escape("the bytes are not a state of this system")):
         pairs.deserialize([text[:-9] for text in texts])
     pairs.restore(saved, mask=[False, True, False])
     assert len(set(pairs.time)) == 2
@@ -146,9 +146,9 @@ def test_connected_inputs_cannot_be_set() -> None:
         assert list(runs.errors) == [0] and "testbed: " in runs.errors[0] and "k1" in runs.errors[0]
 
 
-def test_algebraic_loops(unruly) -> None:
+def test_algebraic_loops(faulty_fmu) -> None:
     """The model description permits that each output depends on every input."""
-    with fmu_run.Fmu(unruly) as fmu:
+    with fmu_run.Fmu(faulty_fmu) as fmu:
         with pytest.raises(ValueError, match="an algebraic loop: a.instances -> a.count; .* Order Jacobi"):
             fmu_run.System({"a": fmu}, {"a.instances": "a.count"})
         delayed = fmu_run.System({"a": fmu}, {"a.instances": "a.count"}, order="jacobi")
@@ -217,7 +217,7 @@ def test_an_ssp_is_the_same_system(order, tmp_path) -> None:
     [
         ("</ssd:SystemStructureDescription>", "", "SystemStructure.ssd is not well-formed XML"),
         ("resources/prw_testbed.fmu", "resources/other.fmu", "component testbed: there is no readable resources/other.fmu in it"),
-        ("x-fmu-sharedlibrary\" source=\"resources/prw_t", "x-ssp\" source=\"resources/prw_t", "component testbed is no FMU"),
+        ("x-fmu-sharedlibrary\" source=\"resources/prw_t", "x-ssp\" source=\"resources/prw_t", "component testbed is not an FMU"),
         ("resources/testbed.ssv", "resources/none.ssv", "there is no readable resources/none.ssv"),
         ("<ssd:Component name=\"testbed\"", "<ssd:Component", "a Component lacks name"),
         ("endConnector=\"roll\"/>", "endConnector=\"roll\"><ssc:LinearTransformation factor=\"2\"/></ssd:Connection>", "LinearTransformation"),

@@ -37,7 +37,7 @@ def run(*command: object, environment: dict[str, str] | None = None, directory: 
 
 @dataclass(frozen=True)
 class Installed:
-    """A virtual environment with the wheels, and a working directory that is no checkout."""
+    """A virtual environment with the wheels, and a working directory that is not a checkout."""
 
     environment: dict[str, str]
     scripts: Path

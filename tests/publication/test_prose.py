@@ -1,5 +1,6 @@
 """Checks the prose of the Markdown pages: words that only this project uses, and long sentences. Ordinary words are never forbidden,
-because authors would write around them. Pages that readers open first explain, so too few connecting words in them are a warning."""
+because authors would write around them. Pages that readers open first explain, so too few connecting words in them are a warning.
+In code, only one phrase is checked: “is no X”, where “is not an X” is meant."""
 
 from __future__ import annotations
 
@@ -13,10 +14,13 @@ from test_readmes import FILES
 #: The rules of fmu-check, whose names contain such words.
 NOT_COVERED = {"crates/fmu-check/RULES.md"}
 COVERED = [name for name in FILES if name.endswith(".md") and name not in NOT_COVERED]
+#: Code with comments and messages; the messages of fmu-check are written in its own directory, with its rules.
+CODE = [name for name in FILES if name.endswith((".c", ".h", ".js", ".py", ".rs")) and "fmu-check/" not in name]
+IS_NO = r"(?<!there )(?:is|are|was|were) no(?! longer| more)(?= )"
 #: Patterns of private words and phrases, each with the usual word.
 PRIVATE = {
     "that of|those of": "the noun again",
-    r"(?<!there )(?:is|are|was) no(?! longer| more)(?= )": "is not a, is not",
+    IS_NO: "is not a, is not",
     "situations?": "state, allowed states",
     "refus(?:e|es|ed|al|als|ing)": "reject, error",
     "to the bit": "bit-identical",
@@ -97,6 +101,26 @@ def test_front_pages_explain(name: str) -> None:
     found = 100 * len(re.findall(rf"\b(?:{CONNECTING})\b", text, re.IGNORECASE)) / len(words)
     if len(words) > 100 and found < LEAST:
         warnings.warn(f"{name}: {found:.1f} connecting words in 100; usual are {LEAST} or more", stacklevel=1)
+
+
+def in_one_line(code: str) -> str:
+    """Returns code with its comments and strings joined over the ends of lines."""
+    return re.sub(r"(?:\n\s*(?://[/!]?|#:?|\*)|\\\n|\s)+", " ", code)
+
+
+def test_code_states_what_something_is_not() -> None:
+    found = []
+    for name in CODE:
+        text = in_one_line((ROOT / name).read_text(encoding="utf-8"))
+        matches = re.finditer(rf"(?<![\w-]){IS_NO}", text, re.IGNORECASE)
+        found += [f"{name}: {text[max(0, match.start() - 40) : match.end() + 20]}" for match in matches]
+    # The phrase is quoted here.
+    assert [line for line in found if not line.startswith("tests/publication/test_prose.py")] == []
+
+
+def test_phrases_are_found_over_the_ends_of_lines() -> None:
+    code = '// It is\n    // no FMU.\n/// There\n/// is no way.\n    "there are \\\n     no others"\n#: That was\n#: no table.\n'
+    assert re.findall(IS_NO, in_one_line(code), re.IGNORECASE) == ["is no", "was no"]
 
 
 def test_uncovered_pages_exist() -> None:

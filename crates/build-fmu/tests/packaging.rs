@@ -3,16 +3,16 @@
 use fmi_schema::fmi2::{Fmi2ModelDescription, Fmi2VariableDependency};
 use fmi_schema::traits::FmiModelDescription;
 use fmu_export::Variables;
-use prw_testbed::TestbedFmu;
-use prw_testbed::parameters::Parameters;
 use prw_testbed::state_space::{StateSpace, state_space};
+use prw_testbed::{BUILT_IN, TestbedFmu};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../modelDescription/modelDescription.xml");
-const TABLE_1: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../modelDescription/parameters.json");
+const COMMITTED_DESCRIPTION: &str =
+    concat!(env!("CARGO_MANIFEST_DIR"), "/../../modelDescription/modelDescription.xml");
+const PARAMETERS_JSON: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../modelDescription/parameters.json");
 
 fn build_fmu(arguments: &[&str], out: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_build_fmu")).args(arguments).arg("--out").arg(out).output().unwrap()
@@ -33,7 +33,7 @@ fn description(arguments: &[&str]) -> String {
 
 /// Writes Table 1 with a string replaced.
 fn parameter_file(directory: &Path, old: &str, new: &str) -> String {
-    let table = fs::read_to_string(TABLE_1).unwrap();
+    let table = fs::read_to_string(PARAMETERS_JSON).unwrap();
     assert!(table.contains(old));
     let path = directory.join("mine.json");
     fs::write(&path, table.replace(old, new)).unwrap();
@@ -43,7 +43,7 @@ fn parameter_file(directory: &Path, old: &str, new: &str) -> String {
 #[test]
 fn the_committed_description_is_up_to_date() {
     assert!(
-        fs::read_to_string(COMMITTED).unwrap_or_default() == description(&[]),
+        fs::read_to_string(COMMITTED_DESCRIPTION).unwrap_or_default() == description(&[]),
         "modelDescription/modelDescription.xml is out of date; update it with\n    \
          cargo run --bin build_fmu -- --describe"
     );
@@ -61,15 +61,14 @@ fn it_reads_back_as_the_model_that_was_compiled() {
     assert_eq!(names, table);
 }
 
-/// Returns the names of the non-zeros in the rows of a matrix over the states and a matrix over the inputs.
-fn knowns(names: [&[&'static str]; 2], rows: [Vec<f64>; 2]) -> BTreeSet<&'static str> {
+/// Returns the names of the states and inputs with a non-zero coefficient: a row of A or C, and the same row of B or D.
+fn nonzero_names(names: [&[&'static str]; 2], rows: [Vec<f64>; 2]) -> BTreeSet<&'static str> {
     let pairs = names.into_iter().zip(rows).flat_map(|(names, row)| names.iter().zip(row));
     pairs.filter(|(_, factor)| *factor != 0.0).map(|(name, _)| *name).collect()
 }
 
-/// Unknowns and their dependencies in the initialization, in addition to `start_at_rest`: start values of states, then
-/// variables that depend on states.
-const INITIAL: [(&str, &[&str]); 11] = [
+/// Expected dependencies of the initial unknowns. Each also depends on `start_at_rest`, which is left out here.
+const INITIAL_DEPENDENCIES: [(&str, &[&str]); 11] = [
     ("theta3", &["theta1", "theta3_start"]),
     ("theta4", &["theta2", "theta4_start"]),
     ("theta5", &["theta1", "theta5_start"]),
@@ -126,12 +125,12 @@ fn dependencies_are_the_sparsity_of_the_matrices() {
     };
     let inputs = ["theta1", "theta2", "omega1", "omega2"];
     let states = ["theta3", "theta4", "theta5", "theta6", "omega5", "omega6"];
-    let StateSpace { A, B, C, D } = state_space(&Parameters::BUILT_IN);
+    let StateSpace { A, B, C, D } = state_space(&BUILT_IN);
     let owned = |set: BTreeSet<&str>| set.into_iter().map(str::to_owned).collect::<BTreeSet<_>>();
 
     let structure = &read.model_structure;
     for (row, state) in states.iter().enumerate() {
-        let expected = knowns(
+        let expected = nonzero_names(
             [&states, &inputs],
             [A.row(row).iter().copied().collect(), B.row(row).iter().copied().collect()],
         );
@@ -139,7 +138,7 @@ fn dependencies_are_the_sparsity_of_the_matrices() {
     }
     // y of eq. (11) is theta3, theta4, theta1, theta2, tau1, tau2.
     for (row, output) in [(0, "theta3"), (1, "theta4"), (4, "tau1"), (5, "tau2")] {
-        let expected = knowns(
+        let expected = nonzero_names(
             [&states, &inputs],
             [C.row(row).iter().copied().collect(), D.row(row).iter().copied().collect()],
         );
@@ -153,7 +152,7 @@ fn dependencies_are_the_sparsity_of_the_matrices() {
     ] {
         assert_eq!(listed(&structure.outputs.unknowns, output), owned(expected.into()));
     }
-    for (unknown, expected) in INITIAL {
+    for (unknown, expected) in INITIAL_DEPENDENCIES {
         let expected: BTreeSet<&str> = expected.iter().copied().chain(["start_at_rest"]).collect();
         assert_eq!(listed(&structure.initial_unknowns.unknowns, unknown), owned(expected));
     }
@@ -162,7 +161,7 @@ fn dependencies_are_the_sparsity_of_the_matrices() {
 
 #[test]
 fn tunable_parameters_make_another_fmu() {
-    // The description has this word only as a variability and as a kind of dependencies.
+    // `fixed` occurs in the description only as a value of `variability` and `dependenciesKind`.
     assert_eq!(description(&["--tunable"]), description(&[]).replace("fixed", "tunable"));
 }
 
@@ -220,9 +219,9 @@ fn wrong_requests_are_rejected_in_one_line() {
             "mine.json: the model cannot be made for Co-Simulation: the parameters are too far",
         ),
         (&["--parameters", "none.json"], "none.json: cannot be read"),
-        (&["--binary", "linux65=a.so"], "'linux65' is no platform of FMI 2.0"),
+        (&["--binary", "linux65=a.so"], "'linux65' is not a platform of FMI 2.0"),
         (&["--binary", "linux64=none.so"], "cannot read none.so, the library for linux64"),
-        (&["--binary", &format!("linux64={file}")], "it is no shared library"),
+        (&["--binary", &format!("linux64={file}")], "it is not a shared library"),
         (&["--binary", &format!("win64={library}")], "it is for darwin64, not for win64"),
         (&["--binary", &format!("aarch64-darwin={library}")], "add --any-processor"),
         (
@@ -260,7 +259,7 @@ fn two_builds_give_the_same_fmu_with_the_committed_description() {
         let output = build_fmu(&[], &out);
         assert!(output.status.success(), "{output:?}");
         let text = String::from_utf8_lossy(&output.stdout).into_owned();
-        assert!(text.contains(&guid) && text.contains("parameters.json"), "{text}");
+        assert!(text.contains(&guid), "{text}");
         fs::read(out.join("prw_testbed.fmu")).unwrap()
     };
     let (one, other) = (build("one"), build("other"));
@@ -275,7 +274,7 @@ fn two_builds_give_the_same_fmu_with_the_committed_description() {
     }
 }
 
-/// The FMU names the licenses of exactly the packages that are compiled into its library.
+/// third-party.txt lists exactly the packages that are compiled into the library of the FMU.
 #[test]
 fn the_licenses_of_all_packages_are_listed() {
     let cargo = env!("CARGO");

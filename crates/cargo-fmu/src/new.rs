@@ -147,7 +147,7 @@ impl Dependency {
         if let Some(url) = repository {
             let revision = git(&package, &["rev-parse", "HEAD"]);
             let revision = revision.with_context(|| {
-                format!("{} is in no git repository, so there is no revision to name", package.display())
+                format!("{} is not in a git repository, so there is no revision to name", package.display())
             })?;
             return Ok(Self::Git(url.to_owned(), revision));
         }

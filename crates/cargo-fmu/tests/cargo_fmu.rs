@@ -291,7 +291,7 @@ fn options_reach_the_program_that_packs(directory: &Directory) {
         (&["--binary", "linux64=a.so", "--any-processor"][..], "--any-processor goes with --fmi 2 only"),
         (&["--c-sources"], "wasm2c"),
         (&["--target", "x86_64-unknown-nonsense"], "no FMU platform is known for the target"),
-        (&["--fmi", "2", "--binary", "win64=Cargo.toml"], "it is no shared library"),
+        (&["--fmi", "2", "--binary", "win64=Cargo.toml"], "it is not a shared library"),
     ] {
         let output = directory.rejects("my-lag", &[&["build"], arguments].concat());
         assert!(output.contains(message) && output.contains("error: "), "{output}");

@@ -15,7 +15,7 @@ pub struct Argument {
 
 impl Argument {
     /// Returns the pointee's type without the prefix `fmi2` or `fmi3`, and whether it is only read; `None` if
-    /// it is no pointer.
+    /// it is not a pointer.
     pub fn pointee(&self) -> Option<(&'static str, bool)> {
         // Macro expansion may add a space after the asterisk.
         let (mutability, of) = self.of.strip_prefix('*')?.trim_start().split_once(' ')?;

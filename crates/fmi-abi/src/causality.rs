@@ -29,7 +29,7 @@ macro_rules! attribute {
 }
 
 attribute! {
-    /// Purpose of a variable: who sets it and who reads it (section 2.2.7).
+    /// Purpose of a variable: who sets it and who reads it (section 2.2.7 of FMI 2.0).
     Causality {
         /// Set by the user before the simulation.
         Parameter = "parameter",
@@ -47,7 +47,7 @@ attribute! {
 }
 
 attribute! {
-    /// Times at which a variable may change (section 2.2.7).
+    /// Times at which a variable may change (section 2.2.7 of FMI 2.0).
     Variability {
         /// The variable never changes.
         Constant = "constant",
@@ -63,7 +63,7 @@ attribute! {
 }
 
 attribute! {
-    /// Source of the first value of a variable (section 2.2.7).
+    /// Source of the first value of a variable (section 2.2.7 of FMI 2.0).
     Initial {
         /// The first value is the start value.
         Exact = "exact",

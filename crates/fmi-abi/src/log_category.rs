@@ -3,7 +3,7 @@
 use crate::status::Status;
 use std::ffi::CStr;
 
-/// Log category; the model description lists them as `LogCategories` (section 2.2.4).
+/// Log category; the model description lists them as `LogCategories` (section 2.2.4 of FMI 2.0).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Category {
     /// Progress of the simulation.
@@ -25,7 +25,7 @@ impl Category {
     pub const ALL: [Self; 6] =
         [Self::Events, Self::Warning, Self::Discard, Self::Error, Self::Fatal, Self::All];
 
-    /// Returns the name that section 2.2.4 proposes.
+    /// Returns the name that section 2.2.4 of FMI 2.0 proposes.
     pub const fn name(self) -> &'static CStr {
         match self {
             Self::Events => c"logEvents",

@@ -24,7 +24,7 @@ impl Value {
         if let Self::Real(value) = self { *value } else { f64::NAN }
     }
 
-    /// Parses a value in the format of [`Display`](fmt::Display); `None` if the string is no value of this
+    /// Parses a value in the format of [`Display`](fmt::Display); `None` if the string is not a value of this
     /// base type.
     pub fn read(base: BaseType, string: &str) -> Option<Self> {
         match base {

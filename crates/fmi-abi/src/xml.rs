@@ -4,8 +4,8 @@ use roxmltree::Document;
 
 /// Largest depth of nested elements.
 const MAX_DEPTH: usize = 250;
-/// Comparisons that reading a file may take, and those for each byte. The parser compares the attributes of an element with each
-/// other, and its namespaces with those of the elements around it.
+/// Comparisons that reading a file may take, and those for each byte. They are limited because the parser compares the
+/// attributes of an element with each other, and its namespaces with those of the elements around it.
 const COMPARISONS: usize = 1 << 22;
 const COMPARISONS_PER_BYTE: usize = 8;
 /// Largest number of bytes that a step of reading a file may take.

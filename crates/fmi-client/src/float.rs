@@ -1,7 +1,7 @@
 //! The floating-point environment: rounding and exceptions, which some FMUs change for the whole thread.
 
-/// Calls `body`, then sets the environment to what it was before. Results of the caller would otherwise be rounded differently, and
-/// a division by zero could end the process.
+/// Calls `body`, then restores the environment, because results of the caller would otherwise be rounded differently, and a
+/// division by zero could end the process.
 #[cfg(target_arch = "x86_64")]
 pub(crate) fn keeping_environment<T>(body: impl FnOnce() -> T) -> T {
     use std::arch::asm;

@@ -5,6 +5,7 @@ use crate::float::keeping_environment;
 use crate::library::{Functions, Library};
 use crate::log::{Listen, Log, callbacks, log_of_fmi3};
 use crate::rejection::{Message, Rejection};
+use crate::saved::States;
 use fmi_abi::c_types::{c_int, c_void};
 use fmi_abi::fmi2::types::*;
 use fmi_abi::fmi3::types::*;
@@ -63,7 +64,7 @@ pub struct Instance {
     /// Callbacks, which must live as long as the instance (section 2.1.5 of FMI 2.0).
     _callbacks: Box<fmi2CallbackFunctions>,
     pub(crate) library: Arc<Library>,
-    pub(crate) states: crate::states::States,
+    pub(crate) states: States,
     label: Box<str>,
     /// Whether a step may end early.
     early_return: bool,

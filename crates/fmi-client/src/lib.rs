@@ -3,7 +3,7 @@
 //! ## Structure of the crate
 //!
 //! [`Library`] contains the functions of an FMU. [`Instance`] calls them: `instance` the life cycle, `values` variables, `states`
-//! saved states. `log` receives messages and knows the living instances, because the pointer that an FMU hands to the logger
+//! and `saved` saved states. `log` receives messages and knows the living instances, because the pointer that an FMU hands to the logger
 //! cannot be trusted; `format` expands formats of `printf` without trusting their arguments.
 
 mod float;
@@ -12,6 +12,7 @@ mod instance;
 mod library;
 mod log;
 mod rejection;
+mod saved;
 mod states;
 mod values;
 
@@ -19,4 +20,4 @@ pub use instance::{Continuous, Event, Instance, Settings};
 pub use library::{Functions, Library};
 pub use log::{Listen, callbacks, log_of_fmi3};
 pub use rejection::{Message, Rejection, reason};
-pub use states::Saved;
+pub use saved::Saved;

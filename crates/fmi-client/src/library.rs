@@ -71,8 +71,8 @@ impl Library {
     }
 }
 
-/// Makes the symbols of libm, libdl and libpthread visible to all libraries. Many FMUs use them without naming the libraries that
-/// have them, and then depend on the importer to have loaded them.
+/// Makes the symbols of libm, libdl and libpthread visible to all libraries, because many FMUs use them without naming the
+/// libraries that have them, and then depend on the importer to have loaded them.
 #[cfg(target_os = "linux")]
 fn provide_symbols() {
     use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_LAZY};

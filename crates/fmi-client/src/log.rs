@@ -1,7 +1,7 @@
 //! Log callbacks for FMUs, and the list of living instances.
 //!
 //! FMUs do not always hand the environment of the instance to the logger: some hand their own pointer, NULL, or the environment of
-//! another instance, and some log from their own threads. So the environment is a number that is looked up, never a pointer that is
+//! another instance, and some log from their own threads, so the environment is a number that is looked up, never a pointer that is
 //! followed.
 
 use crate::format::Arguments;
@@ -156,7 +156,7 @@ unsafe extern "C" fn allocate(count: usize, size: usize) -> *mut c_void {
 }
 
 unsafe extern "C" fn free(memory: *mut c_void) {
-    // SAFETY: section 2.1.5 requires NULL, or memory of `allocate` that is freed once.
+    // SAFETY: section 2.1.5 of FMI 2.0 requires NULL, or memory of `allocate` that is freed once.
     unsafe { libc::free(memory) }
 }
 
@@ -188,7 +188,7 @@ unsafe extern "C" fn log_of_fmi2(
     x: f64,
     y: f64,
 ) {
-    // SAFETY: section 2.1.5 requires NULL or NUL-terminated strings.
+    // SAFETY: section 2.1.5 of FMI 2.0 requires NULL or NUL-terminated strings.
     let [category, format] = [category, message].map(|text| unsafe { string(text) });
     let arguments = Arguments::new([a, b, c, d, e, f, g, h], [r, s, t, u, v, w, x, y]);
     let message = Message { status: Status::from_c(status), category, text: arguments.expand(&format) };

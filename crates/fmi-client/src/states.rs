@@ -1,45 +1,12 @@
-//! Saved states of an instance. They are indices, so that no caller can pass a pointer that the FMU did not make.
+//! Saves, restores and serializes the state of an instance.
 
 use crate::instance::{Instance, call};
 use crate::library::Functions;
 use crate::rejection::Rejection;
+use crate::saved::Saved;
 use fmi_abi::c_types::{c_int, c_void};
 use std::alloc::{Layout, alloc_zeroed};
 use std::ptr::null_mut;
-
-/// Index of a state that an instance has saved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Saved(usize);
-
-impl Saved {
-    /// Returns the index, which is free again after [`Instance::forget`].
-    pub fn index(self) -> usize {
-        self.0
-    }
-}
-
-/// States that an instance has saved.
-#[derive(Debug, Default)]
-pub(crate) struct States {
-    /// Handles; NULL marks a free entry.
-    all: Vec<*mut c_void>,
-    /// Indices of the free entries.
-    free: Vec<usize>,
-}
-
-impl States {
-    #[inline]
-    pub fn is_empty(&self) -> bool {
-        self.all.len() == self.free.len()
-    }
-
-    fn keep(&mut self, state: *mut c_void) -> Saved {
-        let index = self.free.pop().unwrap_or(self.all.len());
-        self.all.resize(self.all.len().max(index + 1), null_mut());
-        self.all[index] = state;
-        Saved(index)
-    }
-}
 
 impl Instance {
     /// Saves the state.
@@ -56,13 +23,14 @@ impl Instance {
         if state.is_null() {
             return Err(self.own_rejection(function, "the FMU returned no state".to_owned()));
         }
-        Ok(self.states.keep(state))
+        Ok(self.states.insert(state))
     }
 
     /// Returns the saved state of an index.
     fn state(&self, saved: Saved, function: &'static str) -> Result<*mut c_void, Rejection> {
-        let state = self.states.all.get(saved.0).copied().filter(|state| !state.is_null());
-        state.ok_or_else(|| self.own_rejection(function, "there is no such saved state".to_owned()))
+        self.states
+            .get(saved)
+            .ok_or_else(|| self.own_rejection(function, "there is no such saved state".to_owned()))
     }
 
     /// Restores a saved state.
@@ -79,16 +47,14 @@ impl Instance {
     /// # Errors
     /// The FMU rejects the call.
     pub fn forget(&mut self, saved: Saved) -> Result<(), Rejection> {
-        let Ok(mut state) = self.state(saved, "forget") else { return Ok(()) };
-        self.states.all[saved.0] = null_mut();
-        self.states.free.push(saved.0);
+        let Some(mut state) = self.states.remove(saved) else { return Ok(()) };
         call!(self, fmi2FreeFMUstate(&mut state), fmi3FreeFMUState(&mut state))
     }
 
     /// Frees all saved states.
     pub(crate) fn forget_all(&mut self) {
-        for index in 0..self.states.all.len() {
-            _ = self.forget(Saved(index));
+        for saved in self.states.indices() {
+            _ = self.forget(saved);
         }
     }
 

@@ -132,7 +132,7 @@ pub trait ModelExchange: Model {
     /// events. This crate calls it again while its result has `again` set.
     ///
     /// # Errors
-    /// Fails if the model cannot continue. The model may have changed by then: this crate undoes the event.
+    /// Fails if the model cannot continue. The model may have changed by then, so this crate undoes the event.
     fn event(&mut self, _time: f64) -> Result<Event, Error> {
         Ok(Event::default())
     }
@@ -152,7 +152,7 @@ pub trait ModelExchange: Model {
     fn nominals(&self, _nominals: &mut [f64]) {}
 }
 
-/// Result of an event (section 3.2.2).
+/// Result of an event (section 3.2.2 of FMI 2.0).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Event {
     /// Whether another event happens at the same time.
@@ -161,8 +161,8 @@ pub struct Event {
     pub terminate: bool,
     /// Whether the nominal values of the states have changed.
     pub nominals_changed: bool,
-    /// Whether the event has changed states. Set it as well if derivatives jump: some importers, for example
-    /// FMPy, restart their integrator only then.
+    /// Whether the event has changed states. Set it as well if derivatives jump, because some importers, for
+    /// example FMPy, restart their integrator only then.
     pub states_changed: bool,
     /// Time of the next event, s.
     pub next: Option<f64>,
@@ -189,12 +189,12 @@ pub trait Partials: Model {
     fn partial(&self, unknown: Self::Name, known: Self::Name) -> Option<f64>;
 
     /// Returns the partial derivative in Initialization Mode. There,
-    /// [`calculated`](crate::Variable::calculated) states are unknowns too: they depend on inputs and
+    /// [`calculated`](crate::Variable::calculated) states are unknowns too, because they depend on inputs and
     /// parameters. By the chain rule, the variables calculated from these states depend on inputs and
     /// parameters as well. The knowns are the inputs and all variables with `initial` "exact" (section 2.2.8
     /// of FMI 2.0).
     ///
-    /// The default is [`partial`](Self::partial). The default is correct if no state is calculated and the
+    /// The default is [`partial`](Self::partial), which is correct if no state is calculated and the
     /// equations are the same as after initialization.
     fn initial_partial(&self, unknown: Self::Name, known: Self::Name) -> Option<f64> {
         self.partial(unknown, known)
@@ -238,7 +238,7 @@ pub trait Partials: Model {
     }
 }
 
-/// A model that uses time derivatives of inputs in Co-Simulation (section 4.2.1).
+/// A model that uses time derivatives of inputs in Co-Simulation (section 4.2.1 of FMI 2.0).
 pub trait InputDerivatives: CoSimulation {
     /// Sets the time derivative of an input, of order 1 or higher, at the current communication point. The
     /// model ignores orders that it does not use.
@@ -253,7 +253,7 @@ pub trait InputDerivatives: CoSimulation {
     }
 }
 
-/// A model that provides time derivatives of its variables in Co-Simulation (section 4.2.1).
+/// A model that provides time derivatives of its variables in Co-Simulation (section 4.2.1 of FMI 2.0).
 pub trait OutputDerivatives: CoSimulation {
     /// Highest order (`maxOutputDerivativeOrder`); higher orders are errors.
     const HIGHEST: u32 = 1;

@@ -1,7 +1,7 @@
 //! The description of the model in a library, as JSON, for `fmu-package`, which builds FMUs.
 //!
 //! Floating-point numbers and integers of types are strings, which keep all digits. The functions are not
-//! inlined and take trait objects: the description runs once, and its size counts in every library.
+//! inlined and take trait objects, because the description runs once, and its size counts in every library.
 
 use crate::boundary::{forget_panic, panic_message, string};
 use crate::capabilities::Events;

@@ -70,7 +70,8 @@ pub struct CoSimulationOffer {
     pub events: Events,
     /// Whether steps may end early, at events or at other times.
     pub ends_early: bool,
-    /// Whether a step checks everything that can fail before it changes the model. If so, no copy is made to undo it.
+    /// Whether a step checks everything that can fail before it changes the model, so that no copy is needed to undo
+    /// it.
     pub atomic_step: bool,
 }
 
@@ -227,7 +228,7 @@ macro_rules! offer {
     };
     (@capability $other:ident) => {
         ::core::compile_error!(::core::concat!(
-            ::core::stringify!($other), " is no capability: there are CoSimulation, ModelExchange, Partials, \
+            ::core::stringify!($other), " is not a capability: there are CoSimulation, ModelExchange, Partials, \
              InputDerivatives and OutputDerivatives"
         ));
     };

@@ -6,7 +6,8 @@
 //! [`export_fmu!`]. `instance` contains the checks and effects of each call, without pointers and independent
 //! of the FMI version. `boundary` contains the code that the C functions share. [`fmi2`] and [`fmi3`] contain
 //! the C functions; [`fmi_abi`] contains their types and the tables of allowed calls. `offsets` reads and writes
-//! fields of a model by their offsets. All `unsafe` code is in these four modules. [`describe`](describe())
+//! fields of a model by their offsets, and `filling` fills arrays at compile time. All `unsafe` code is in these five modules,
+//! in `describe`, and in the code that the macros generate. [`describe`](describe())
 //! returns the library's description of its model for the program that makes the FMU.
 
 mod boundary;
@@ -14,6 +15,7 @@ mod capabilities;
 mod describe;
 mod export;
 mod files;
+mod filling;
 pub mod fmi2;
 pub mod fmi3;
 mod info;

@@ -1,7 +1,7 @@
 //! Log messages that every importer shows unchanged.
 //!
 //! The callback is variadic and its message is a `printf` format. Some importers never expand the format, and
-//! others look for `#r1#` in it. So each message is complete, contains neither `%` nor `#`, and is passed
+//! others look for `#r1#` in it, so each message is complete, contains neither `%` nor `#`, and is passed
 //! without further arguments.
 
 use fmi_abi::{Category, Standard, Status};
@@ -26,7 +26,7 @@ impl Message {
         Category::of(self.status).name()
     }
 
-    /// Returns the message on one line, without characters that `printf`, FMI (section 2.1.5) or C strings
+    /// Returns the message on one line, without characters that `printf`, FMI (section 2.1.5 of FMI 2.0) or C strings
     /// interpret.
     pub fn printable(&self) -> CString {
         let special = |c: char| matches!(c, '%' | '#') || c.is_control();

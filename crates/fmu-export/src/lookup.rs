@@ -34,7 +34,7 @@ impl LookupTable {
     /// Reads a file; [`Setup::resource`](crate::Setup::resource) returns the path of a file in the FMU.
     ///
     /// # Errors
-    /// Fails if the file cannot be read or is no such table. The message contains the path, the line and the
+    /// Fails if the file cannot be read or is not such a table. The message contains the path, the line and the
     /// column.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let error = |reason: &dyn std::fmt::Display| Error::new(format!("{}{reason}", path.display()));
@@ -61,7 +61,7 @@ impl LookupTable {
             let number = |column: usize| {
                 let number = numbers[column].filter(|number| number.is_finite());
                 number.ok_or(format!(
-                    ", line {line}, column {}: {:?} is no number",
+                    ", line {line}, column {}: {:?} is not a number",
                     column + 1,
                     fields[column]
                 ))
@@ -120,10 +120,10 @@ mod tests {
         for (text, reason) in [
             ("", " contains no numbers"),
             ("x,y\n", " contains no numbers"),
-            ("x,y\n0,1\n1,l0\n", ", line 3, column 2: \"l0\" is no number"),
-            ("x,y\n\n,1\n", ", line 3, column 1: \"\" is no number"),
-            ("0,y\n", ", line 1, column 2: \"y\" is no number"),
-            ("0,inf\n", ", line 1, column 2: \"inf\" is no number"),
+            ("x,y\n0,1\n1,l0\n", ", line 3, column 2: \"l0\" is not a number"),
+            ("x,y\n\n,1\n", ", line 3, column 1: \"\" is not a number"),
+            ("0,y\n", ", line 1, column 2: \"y\" is not a number"),
+            ("0,inf\n", ", line 1, column 2: \"inf\" is not a number"),
             ("x;y\n0;1\n", ", line 2: 1 columns instead of 2, with a comma between them"),
             ("0,1,2\n", ", line 1: 3 columns instead of 2, with a comma between them"),
             ("0,1\n0,2\n", ", line 2, column 1: 0 must be above the value before, 0"),

@@ -49,7 +49,7 @@ pub trait Model: Variables + Clone + Send + Sync {
     /// calls it once after each call of the importer that changes parameters, and after a de-serialization.
     /// The ranges of single parameters have been checked before.
     ///
-    /// Many importers, for example FMPy, set one parameter per call. So there must be a path from one valid
+    /// Many importers, for example FMPy, set one parameter per call, so there must be a path from one valid
     /// pair of values to another over valid pairs.
     ///
     /// This crate does not call it after inputs, states or start values of outputs have been set.
@@ -60,8 +60,8 @@ pub trait Model: Variables + Clone + Send + Sync {
         Ok(())
     }
 
-    /// Checks the `memory` of the table after a de-serialization, and updates fields that depend on it. Only
-    /// the model knows the valid range of the memory. This crate then calls [`update`](Self::update).
+    /// Checks the `memory` of the table after a de-serialization, because only the model knows its valid
+    /// range, and updates fields that depend on it. This crate then calls [`update`](Self::update).
     ///
     /// # Errors
     /// Fails if the state is impossible for the model. The bytes are then rejected.
@@ -71,7 +71,7 @@ pub trait Model: Variables + Clone + Send + Sync {
 
     /// Calculates the states whose start is [`calculated`](crate::Variable::calculated). This crate calls it
     /// after each value that is set, until the first step or Continuous-Time Mode. It is also called after
-    /// the importer has set states, and between a de-serialization and the next step. So the model must
+    /// the importer has set states, and between a de-serialization and the next step, so the model must
     /// remember whether the states are still calculated.
     #[inline]
     fn calculate_start(&mut self) {}
@@ -129,7 +129,7 @@ impl Setup {
     /// `modelDescription/resources`.
     ///
     /// # Errors
-    /// Fails if there is no such directory, or if the name is no plain file name.
+    /// Fails if there is no such directory, or if the name is not a plain file name.
     pub fn resource(&self, name: &str) -> Result<PathBuf, Error> {
         if name.contains(['/', '\\', ':']) || name.starts_with('.') {
             return Err(Error::new(format!(
@@ -211,7 +211,7 @@ fn percent_decoded(text: &str) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// Data of the experiment from the importer (section 2.1.6).
+/// Data of the experiment from the importer (section 2.1.6 of FMI 2.0).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Experiment {
     /// Start time, s.

@@ -1,5 +1,4 @@
-//! The pointer arithmetic of this crate: access to Reals of a model by offsets, and arrays that are filled at compile
-//! time.
+//! The pointer arithmetic of this crate: access to Reals of a model by offsets.
 //!
 //! The functions that [`variables!`](crate::variables) implements take a reference to a field of the model
 //! and return its offset. For paths of fields and array elements the offsets are constants, and the compiler
@@ -8,7 +7,7 @@
 use crate::table::Variables;
 use crate::value::Place;
 use crate::variable::Index;
-use std::mem::{MaybeUninit, offset_of};
+use std::mem::offset_of;
 use std::ops::{Deref, DerefMut};
 
 /// A model, followed by dummy values for variables without a field in the model.
@@ -111,30 +110,4 @@ pub const fn both_offsets(value: usize, mark: usize) -> Option<u64> {
 pub fn offset_in<M, T>(model: *const M, field: *const T, otherwise: usize) -> usize {
     let offset = field.addr().wrapping_sub(model.addr());
     if offset < size_of::<M>() { offset } else { otherwise }
-}
-
-/// An array that is filled from its beginning, at compile time. The compiler needs quadratic time to overwrite the elements
-/// of an array that contain references.
-pub(crate) struct Filling<T, const N: usize> {
-    items: [MaybeUninit<T>; N],
-    count: usize,
-}
-
-impl<T: Copy, const N: usize> Filling<T, N> {
-    pub const fn new() -> Self {
-        Self { items: [const { MaybeUninit::uninit() }; N], count: 0 }
-    }
-
-    pub const fn push(&mut self, item: T) {
-        self.items[self.count] = MaybeUninit::new(item);
-        self.count += 1;
-    }
-
-    /// # Panics
-    /// Panics if an element is missing.
-    pub const fn filled(self) -> [T; N] {
-        assert!(self.count == N, "an element is missing");
-        // SAFETY: all elements are initialized, and `MaybeUninit<T>` has the layout of `T`.
-        unsafe { (&raw const self.items).cast::<[T; N]>().read() }
-    }
 }

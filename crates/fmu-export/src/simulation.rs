@@ -181,13 +181,13 @@ impl<M: Exported> Simulation<M> {
     /// Returns the value of a number; 0 or 1 for a Boolean.
     ///
     /// # Errors
-    /// Fails for the errors of [`value`](Self::value), and if the variable is no number.
+    /// Fails for the errors of [`value`](Self::value), and if the variable is not a number.
     pub fn get(&mut self, name: &str) -> Result<f64, Error> {
         match self.value(name)? {
             Value::Real(value) => Ok(value),
             Value::Integer(value) => Ok(value as f64),
             Value::Boolean(value) => Ok(f64::from(u8::from(value))),
-            other => Err(Error::new(format!("{name} is no number but {other:?}"))),
+            other => Err(Error::new(format!("{name} is not a number but {other:?}"))),
         }
     }
 
@@ -219,7 +219,7 @@ impl<M: Exported> Simulation<M> {
     /// Restores a state that this or another simulation has saved.
     ///
     /// # Errors
-    /// Fails if the bytes are no state of this model, or if the model rejects them.
+    /// Fails if the bytes are not a state of this model, or if the model rejects them.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<&mut Self, Error> {
         let handle = self.instance.deserialize(bytes, 0)?;
         self.instance.restore(handle)?;

@@ -1,6 +1,6 @@
 //! The table of variables: [`variables!`](crate::variables) and the code that it generates.
 
-use crate::offsets::Filling;
+use crate::filling::Filling;
 use crate::saved::StateVisitor;
 use crate::variable::{Index, Read, Variable, reject};
 use std::fmt::Debug;
@@ -160,7 +160,7 @@ pub const fn count_elements<M>(lines: &[Variable<M>]) -> usize {
     index_of(lines, lines.len())
 }
 
-// The compiler interprets the following functions, and a call of a generic function takes it a microsecond. So the code
+// The compiler interprets the following functions, and a call of a generic function takes it a microsecond, so the code
 // for each element of an array has few calls.
 
 /// Returns the total length in bytes of the names of all array elements.
@@ -367,7 +367,7 @@ pub const fn check_line<M>(lines: &[Variable<M>], Index(line): Index) {
     if let Some(fault) = of.fault() {
         reject(of.name(), fault);
     }
-    // Section 2.2.7. The compiler checks only names that are identifiers, not names that are strings.
+    // Section 2.2.7 of FMI 2.0. The compiler checks only names that are identifiers, not names that are strings.
     let mut other = 0;
     while other < lines.len() {
         if other < line as usize && has_name(of, &lines[other]) || is_element(of, &lines[other]) {

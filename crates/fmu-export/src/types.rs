@@ -113,7 +113,7 @@ impl Type {
     /// Creates an integer type of a certain base type, such as [`BaseType::UInt16`].
     #[track_caller]
     pub const fn whole(name: &'static str, base: BaseType) -> Self {
-        let Some((min, max)) = base.range() else { panic!("the base type is no integer type") };
+        let Some((min, max)) = base.range() else { panic!("the base type is not an integer type") };
         Self { name, attributes: Attributes::Integer { min, max }, base }
     }
 

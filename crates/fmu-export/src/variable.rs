@@ -17,7 +17,7 @@ use std::mem::MaybeUninit;
 pub struct Index(#[doc(hidden)] pub u32);
 
 impl Index {
-    /// The time, even if it is no variable of the table; for [`depends_on`](Variable::depends_on).
+    /// The time, even if it is not a variable of the table; for [`depends_on`](Variable::depends_on).
     pub const TIME: Self = Self(u32::MAX);
 }
 
@@ -280,8 +280,8 @@ impl<M> Variable<M> {
         self
     }
 
-    /// Makes an output or local variable the time derivative of another variable. An input cannot be one:
-    /// importers assume that a derivative belongs to a state.
+    /// Makes an output or local variable the time derivative of another variable. An input cannot be one,
+    /// because importers assume that a derivative belongs to a state.
     #[must_use]
     pub const fn derivative_of(mut self, of: Index) -> Self {
         self.derivative_of = Some(of);
@@ -292,7 +292,7 @@ impl<M> Variable<M> {
     /// depends. In the table, write `depends_on(u, x)` or `depends_on(&[u, x])`; for no dependencies,
     /// `depends_on(&[])`.
     ///
-    /// The list contains direct dependencies (section 2.2.8), at a communication point or instant and in
+    /// The list contains direct dependencies (section 2.2.8 of FMI 2.0), at a communication point or instant and in
     /// Initialization Mode. An output that reacts to an input only through a step or a state does not depend
     /// on that input. The time, a known in FMI 3.0, is [`Index::TIME`]. Without a list, the variable depends
     /// on all knowns; see [`Info::smooth`](crate::Info::smooth).
@@ -383,7 +383,7 @@ impl<M> Variable<M> {
             return Some("add a description: a comment (///) above the line");
         }
         if !legal {
-            return Some("this causality does not permit this variability (section 2.2.7)");
+            return Some("this causality does not permit this variability (section 2.2.7 of FMI 2.0)");
         }
         let legal = matches!(
             (self.causality, self.variability, self.initial),
@@ -394,11 +394,11 @@ impl<M> Variable<M> {
                 | (CalculatedParameter | Local, Fixed | Tunable, Some(Initial::Calculated | Initial::Approx))
         );
         if !legal {
-            return Some("this causality and variability do not permit this initial value (section 2.2.7)");
+            return Some("this causality and variability do not permit this initial value (section 2.2.7 of FMI 2.0)");
         }
         let is_real = matches!(self.of.base(), BaseType::Real);
         if matches!(self.variability, Continuous) && !self.of.base().is_float() {
-            return Some("only a Real or Float32 can be continuous (section 2.2.7)");
+            return Some("only a Real or Float32 can be continuous (section 2.2.7 of FMI 2.0)");
         }
         if self.state && !(matches!(self.variability, Continuous) && is_real) {
             return Some("only a continuous Real can be a state");
@@ -526,7 +526,7 @@ impl<M> Variable<M> {
     }
 
     /// Returns whether the variable has a start value: inputs, and variables with `initial` exact or approx
-    /// (section 2.2.7).
+    /// (section 2.2.7 of FMI 2.0).
     pub const fn has_start(&self) -> bool {
         matches!(
             (self.causality, self.initial),

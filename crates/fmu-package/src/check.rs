@@ -27,7 +27,7 @@ pub(crate) fn check(model: &LoadedModel) -> Result<Starts> {
         ensure!(is_line(&variable.description), "the description of {name} is more than one line");
         ensure!(
             !table.arrays || is_structured(name),
-            "the variable name '{}' is no name of the structured naming convention, which a model with arrays needs: \
+            "the variable name '{}' is not a name of the structured naming convention, which a model with arrays needs: \
              write names as in Modelica, such as motor.torque, der(x), or 'any text' (section 2.2.9 of FMI 2.0)",
             name.escape_debug()
         );
@@ -41,7 +41,7 @@ pub(crate) fn check(model: &LoadedModel) -> Result<Starts> {
         check_references(table, variable)?;
     }
     let is_time = |variable: &Variable| variable.causality == Causality::Independent;
-    ensure!(table.find(is_time).len() <= 1, "there are two independent variables (section 2.2.7)");
+    ensure!(table.find(is_time).len() <= 1, "there are two independent variables (section 2.2.7 of FMI 2.0)");
     check_derivatives(table)?;
     let starts = check_starts(table)?;
     check_model(model, &starts)?;
@@ -177,7 +177,7 @@ fn check_type(variable_type: &Type) -> Result<()> {
             Ok(())
         }
         Attributes::Enumeration(items) => {
-            ensure!(!variable_type.name.is_empty(), "an Enumeration needs a name (section 2.2.7)");
+            ensure!(!variable_type.name.is_empty(), "an Enumeration needs a name (section 2.2.7 of FMI 2.0)");
             ensure!(!items.is_empty(), "it has no items");
             let (mut names, mut values) = (HashSet::new(), HashSet::new());
             for item in items {

@@ -1,19 +1,18 @@
 //! The command `build_fmu`, which is the same for every model.
 
 use crate::c_sources::{COMPILED, CSources, LINKING, WEBASSEMBLY, c_sources, check_tools};
-use crate::cargo::{LibraryBuild, PROFILE};
+use crate::cargo::LibraryBuild;
 use crate::connectors::{Terminal, terminals};
-use crate::content::ContentFile;
-use crate::cross::{GLIBC, TARGETS, ZIGBUILD, check_targets, has_std};
+use crate::cross::{GLIBC, TARGETS, ZIGBUILD, check_targets};
 use crate::describe::{Changes, describe};
 use crate::files::write_atomically;
-use crate::library::{check_platform, needed_glibc};
-use crate::live::{self, Runnable};
+use crate::library::{check_guid, check_platform, needed_glibc};
 use crate::model::LoadedModel;
 use crate::pack::{Library, Parts, pack};
 use crate::packages::Neighbourhood;
+use crate::page::Page;
 use crate::platform::Platform;
-use crate::sources::Sources;
+use crate::sources::{DESCRIPTION, Sources};
 use crate::terminal::{exit, fmi_version, short};
 use crate::universal::join_for_macos;
 use crate::variant::{NO_GUID, Variant};
@@ -26,7 +25,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
-use tempfile::TempDir;
 use zip::ZipArchive;
 
 /// The options that every `build_fmu` has. A program with more options flattens these into its own.
@@ -109,21 +107,14 @@ pub struct Builder {
     pub settings: Vec<String>,
     /// Start values that the library reads from another file when it is compiled, see [`Variant::start`].
     pub start: Vec<(String, String)>,
-    /// The file with those start values, for messages.
-    pub start_from: Option<PathBuf>,
-    /// Whether the description that is kept with the sources has those start values.
-    pub is_default: bool,
-    /// Additional scripts for the page that runs the FMU (see the README in the directory `page`).
-    pub page_scripts: Vec<&'static str>,
-    /// The packages and sources of FMUs that these scripts run next to the model's FMU. Each has the description that is kept with
-    /// its sources.
-    pub page_fmus: Vec<(&'static str, Sources)>,
+    /// Label of a build with other values than the default ones, for messages. `None` stands for the default, whose
+    /// description is kept with the sources.
+    pub variant: Option<String>,
+    /// Additions to the page that runs the FMU.
+    pub page: Page,
     /// Environment variables for the compilation of the library; a variable without value is removed.
     pub environment: Vec<(&'static str, Option<OsString>)>,
 }
-
-/// The description of the default FMU, which is kept with the sources.
-const DESCRIPTION: &str = "modelDescription/modelDescription.xml";
 
 /// The files that the model reads.
 const RESOURCES: &str = "modelDescription/resources";
@@ -141,10 +132,8 @@ impl Builder {
             terminals: Vec::new(),
             settings: Vec::new(),
             start: Vec::new(),
-            start_from: None,
-            is_default: true,
-            page_scripts: Vec::new(),
-            page_fmus: Vec::new(),
+            variant: None,
+            page: Page::default(),
             environment: Vec::new(),
         }
     }
@@ -162,7 +151,7 @@ impl Builder {
             println!("{guid}");
             return Ok(());
         }
-        let is_default = self.is_default && !options.tunable;
+        let is_default = self.variant.is_none() && !options.tunable;
         let kept = self.sources.directory.join(DESCRIPTION);
         let described_in = match &options.out {
             _ if !options.describe => None,
@@ -205,7 +194,10 @@ impl Builder {
         let can_have_page = model.table.variables.iter().all(|variable| variable.base().is_in_fmi2());
         let with_page = match options.no_page || options.c_sources || !can_have_page {
             true => None,
-            false => self.live_page(&guid, &model, describe(Standard::Fmi2, &guid)?, &content)?,
+            false => {
+                let description = describe(Standard::Fmi2, &guid)?;
+                self.page.with_model(&self.build(&guid), &guid, &model.table.info, description, &content)?
+            }
         };
         let content = with_page.as_ref().map_or(&content, |(_, content)| content);
         let out = options.out.clone().unwrap_or_else(|| workspace.join("target/fmu"));
@@ -216,12 +208,9 @@ impl Builder {
             let parts = Parts { fmi: *fmi, identifier, description, terminals, libraries, sources, content };
             pack_in(&out, &parts)?;
         }
-        let start = match &self.start_from {
-            Some(file) => format!(", parameters from {}", short(file)),
-            None => String::new(),
-        };
+        let variant = self.variant.iter().map(|label| format!(", {label}")).collect::<String>();
         let tunable = if options.tunable { ", tunable" } else { "" };
-        println!("guid {guid}{start}{tunable}");
+        println!("guid {guid}{variant}{tunable}");
         self.warn_of_glibc(options, &libraries);
         if is_default && !options.c_sources {
             self.compare_with_kept(&kept, &descriptions, &guid);
@@ -230,10 +219,8 @@ impl Builder {
     }
 
     fn describe(&self, model: &LoadedModel, fmi: Standard, changes: &Changes) -> Result<String> {
-        describe(model, fmi, changes).with_context(|| match &self.start_from {
-            Some(file) if !self.is_default => short(file),
-            _ => model.identifier().to_owned(),
-        })
+        let label = self.variant.as_deref().unwrap_or(model.identifier());
+        describe(model, fmi, changes).with_context(|| label.to_owned())
     }
 
     /// Prints a note if the library for this machine needs a newer glibc than a library for a named target.
@@ -370,53 +357,6 @@ impl Builder {
         c_sources(&wasm2c(), &build.run()?, identifier)
     }
 
-    /// Returns the content with the page that runs the FMU, and the directory of that page. Returns `None`, with a note, if the
-    /// model cannot be compiled for WebAssembly.
-    fn live_page(
-        &self,
-        guid: &str,
-        model: &LoadedModel,
-        description: String,
-        content: &[ContentFile],
-    ) -> Result<Option<(TempDir, Vec<ContentFile>)>> {
-        if !has_std(WEBASSEMBLY) {
-            eprintln!("note: no page runs the FMU in a browser; that needs: rustup target add {WEBASSEMBLY}");
-            return Ok(None);
-        }
-        let mut settings = self.settings.clone();
-        settings.push(format!("profile.{PROFILE}.opt-level=\"z\""));
-        let build =
-            LibraryBuild { target: Some(WEBASSEMBLY), settings, arguments: &LINKING, ..self.build(guid) };
-        let runnable = |description, path: PathBuf, guid: &str| {
-            let module = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
-            check_guid(&module, guid, &path)?;
-            anyhow::Ok(Runnable { description, module })
-        };
-        let path = match build.run() {
-            Ok(path) => path,
-            Err(error) => {
-                eprintln!("note: no page runs the FMU in a browser (--no-page does not try that): {error:#}");
-                return Ok(None);
-            }
-        };
-        let mut runnables = vec![runnable(description, path, guid)?];
-        for (package, sources) in &self.page_fmus {
-            let guid = Variant { sources: sources.fingerprint()?, start: Vec::new(), tunable: false }.guid();
-            let kept = sources.directory.join(DESCRIPTION);
-            let kept =
-                fs::read_to_string(&kept).with_context(|| format!("cannot read {}", kept.display()))?;
-            let build = LibraryBuild {
-                directory: sources.directory.clone(),
-                package,
-                environment: vec![("FMU_GUID", Some(guid.clone().into()))],
-                ..build.clone()
-            };
-            runnables.push(runnable(kept.replace(NO_GUID, &guid), build.run()?, &guid)?);
-        }
-        let info = &model.table.info;
-        live::with_page(content, (&info.name, &info.description), &runnables, &self.page_scripts).map(Some)
-    }
-
     /// The build of the library for this machine. The library gets the guid.
     fn build(&self, guid: &str) -> LibraryBuild<'_> {
         let mut environment = self.environment.clone();
@@ -471,24 +411,6 @@ fn check_library(library: &Library, guid: &str, any_processor: bool) -> Result<(
         .with_context(|| format!("cannot read {}, the library for {platform}", path.display()))?;
     check_platform(&bytes, *platform, any_processor).with_context(|| path.display().to_string())?;
     check_guid(&bytes, guid, path)
-}
-
-fn check_guid(library: &[u8], guid: &str, path: &Path) -> Result<()> {
-    let has = |part: &str| library.windows(part.len()).any(|window| window == part.as_bytes());
-    let path = path.display();
-    ensure!(
-        has(guid) || has("fmi2Instantiate"),
-        "{path} has no functions of FMI; its crate needs `export_fmu!(...)` in src/lib.rs (`offer!` makes none)",
-    );
-    ensure!(
-        has(guid) || !has(NO_GUID),
-        "{path} has no guid: compile it with FMU_GUID={guid} in the environment, and let INFO begin with info!",
-    );
-    ensure!(
-        has(guid),
-        "{path} was not compiled from these sources and parameters (the guid {guid} is not in it); compile it again",
-    );
-    Ok(())
 }
 
 /// Writes a description, unless the file is up to date: cargo then sees no change.

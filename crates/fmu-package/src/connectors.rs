@@ -113,7 +113,7 @@ impl Terminal {
             ensure!(names.insert(name), "it has two members with the name {name}");
             let found = model.table.variables.iter().find(|known| known.name == *variable);
             let found =
-                found.with_context(|| format!("its member {name} is {variable}, which is no variable"))?;
+                found.with_context(|| format!("its member {name} is {variable}, which is not a variable"))?;
             ensure!(
                 found.dimensions.is_empty(),
                 "its member {name} is {variable}, an element of an array, which terminals cannot have"
@@ -122,7 +122,7 @@ impl Terminal {
             ensure!(
                 !["signal", "inflow", "outflow"].contains(kind)
                     || matches!(found.causality, Input | Output | Parameter | CalculatedParameter),
-                "its member {name} is {variable}, which is no input, output or parameter"
+                "its member {name} is {variable}, which is not an input, output or parameter"
             );
         }
         if let Some((icon, corners)) = self.icon {
@@ -168,7 +168,7 @@ fn is_name(text: &str) -> bool {
 /// Returns `terminalsAndIcons.xml` of a model with these terminals, in an FMU with these files; `None` if there are no terminals.
 ///
 /// # Errors
-/// When two terminals, or two members of one, share a name, a member is no variable that can be connected, or an icon is
+/// When two terminals, or two members of one, share a name, a member is not a variable that can be connected, or an icon is
 /// missing.
 pub fn terminals(
     model: &LoadedModel,

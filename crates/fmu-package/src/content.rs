@@ -4,7 +4,7 @@ use crate::directory::{files, names};
 use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
 
-/// The entries of a directory of content, and their paths in the FMU (section 2.3).
+/// The entries of a directory of content, and their paths in the FMU (section 2.3 of FMI 2.0).
 const LOCATIONS: [(&str, &str); 6] = [
     ("documentation", "documentation"),
     ("extra", "extra"),
@@ -24,7 +24,7 @@ pub struct ContentFile {
 }
 
 /// Returns the files in a directory that an FMU contains unchanged, sorted by name: `model.png`, the directories that section 2.3
-/// lists, and the directory `licenses` as `documentation/licenses`.
+/// of FMI 2.0 lists, and the directory `licenses` as `documentation/licenses`.
 ///
 /// Hidden files are left out, and so are the top-level entries named in `except`.
 ///

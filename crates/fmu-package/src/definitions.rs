@@ -54,7 +54,7 @@ pub(crate) fn type_definitions(
         let name = definition.name.as_str();
         ensure!(
             !variables.contains(&name),
-            "{name} is a variable and a type; rename one of them (section 2.2.3)"
+            "{name} is a variable and a type; rename one of them (section 2.2.3 of FMI 2.0)"
         );
         match named.iter().find(|known| known.name == name) {
             Some(known) => ensure!(known == definition, "there are two different types with the name {name}"),

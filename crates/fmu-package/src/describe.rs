@@ -1,6 +1,6 @@
 //! The model description (section 2.2 of FMI 2.0, 2.4 of FMI 3.0).
 //!
-//! Variables that only FMI 3.0 needs follow the table: the time, if it is no variable of the model, and the event indicators.
+//! Variables that only FMI 3.0 needs follow the table: the time, if it is not a variable of the model, and the event indicators.
 //! Value references of FMI 3.0 count from 1 in this order, and an array takes as many as it has elements.
 
 use crate::definitions::{
@@ -254,7 +254,7 @@ impl Description<'_> {
         let (children, list): (Vec<_>, Vec<_>) = starts.partition(|_| is_element);
         let element = with_value(with_facts(name), (!list.is_empty()).then(|| list.join(" ")));
         // Only the range of the type is repeated: fmi-sim 0.7 reads no FMU whose variables have a quantity, a unit or a nominal
-        // value, although they may (section 2.4.7.3).
+        // value, although they may (section 2.4.7.3 of FMI 3.0).
         let with = if variable.variable_type.name.is_empty() { with_attributes } else { with_range };
         with(element, &variable.variable_type)
             .containing(variable.dimensions.iter().map(|size| Element::new("Dimension").with("start", size)))
@@ -262,7 +262,7 @@ impl Description<'_> {
     }
 
     /// The variables of FMI 3.0 that are not in the table. Every FMU has a time (section 2.4.7.4), and every event indicator
-    /// is a variable (section 2.4.8).
+    /// is a variable (section 2.4.8 of FMI 3.0).
     fn generated(&self) -> Vec<Element> {
         let table = self.table;
         if self.fmi == Standard::Fmi2 {

@@ -37,7 +37,7 @@ pub fn zip(entries: &[(String, Vec<u8>)]) -> Result<Vec<u8>> {
 /// Returns the content of an entry of a zip file.
 ///
 /// # Errors
-/// When it is no zip file, or lacks the entry.
+/// When it is not a zip file, or lacks the entry.
 pub fn unzip(zip: &[u8], name: &str) -> Result<Vec<u8>> {
     let mut archive = ZipArchive::new(Cursor::new(zip))?;
     let mut content = Vec::new();

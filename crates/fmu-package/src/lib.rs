@@ -16,7 +16,7 @@
 //! | the model | `table`, `model`, `instance` |
 //! | the description | `check`, `sample`, `memory`, `rates`, `derivatives`, `structure`, `definitions`, `describe` |
 //! | the FMU | `connectors`, `platform`, `pack` |
-//! | the command | `cross`, `c_sources`, `cargo`, `library`, `universal`, `live`, `terminal`, `command` |
+//! | the command | `cross`, `c_sources`, `cargo`, `library`, `universal`, `live`, `page`, `terminal`, `command` |
 
 mod c_sources;
 mod cargo;
@@ -38,6 +38,7 @@ mod memory;
 mod model;
 mod pack;
 mod packages;
+mod page;
 mod platform;
 mod rates;
 mod sample;
@@ -62,6 +63,7 @@ pub use {
     model::LoadedModel,
     pack::{Library, Parts, pack},
     packages::{cargo, metadata},
+    page::{Companion, Page},
     platform::Platform,
     sources::Sources,
     variant::{NO_GUID, Variant},

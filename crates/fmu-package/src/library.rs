@@ -1,13 +1,15 @@
 //! The platforms of a compiled library, which its headers name.
 
 use crate::platform::Platform;
+use crate::variant::NO_GUID;
 use anyhow::{Context, Result, bail, ensure};
 use object::read::macho::{FatArch, MachOFatFile32};
 use object::{Architecture, BinaryFormat, File, FileKind, Object, ObjectKind, ObjectSection};
+use std::path::Path;
 
 /// The platforms of a library: one, or several if it is a universal library of macOS.
 fn platforms(library: &[u8]) -> Result<Vec<Platform>> {
-    const NONE: &str = "it is no shared library";
+    const NONE: &str = "it is not a shared library";
     match FileKind::parse(library).context(NONE)? {
         FileKind::MachOFat32 => {
             let parts = MachOFatFile32::parse(library).context(NONE)?;
@@ -53,6 +55,25 @@ pub fn check_platform(library: &[u8], wanted: Platform, any_processor: bool) -> 
         any_processor || found.contains(&wanted),
         "it is for {}, not for {wanted}; if importers on any processor are to load it from there, add --any-processor",
         names()
+    );
+    Ok(())
+}
+
+/// Checks that a library is an FMU's and was compiled with this guid.
+pub fn check_guid(library: &[u8], guid: &str, path: &Path) -> Result<()> {
+    let has = |part: &str| library.windows(part.len()).any(|window| window == part.as_bytes());
+    let path = path.display();
+    ensure!(
+        has(guid) || has("fmi2Instantiate"),
+        "{path} has no functions of FMI; its crate needs `export_fmu!(...)` in src/lib.rs (`offer!` makes none)",
+    );
+    ensure!(
+        has(guid) || !has(NO_GUID),
+        "{path} has no guid: compile it with FMU_GUID={guid} in the environment, and let INFO begin with info!",
+    );
+    ensure!(
+        has(guid),
+        "{path} was not compiled from these sources and parameters (the guid {guid} is not in it); compile it again",
     );
     Ok(())
 }
@@ -122,7 +143,7 @@ mod tests {
     fn other_files_are_rejected() {
         for bytes in [&b""[..], b"\x7fELF", b"MZ", b"<html>", &[0xca, 0xfe, 0xba, 0xbe, 0, 0, 0, 9]] {
             let error = check(bytes, "linux64", false).unwrap_err();
-            assert_eq!(error, "it is no shared library", "{bytes:?}");
+            assert_eq!(error, "it is not a shared library", "{bytes:?}");
         }
     }
 }

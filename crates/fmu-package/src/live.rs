@@ -1,4 +1,5 @@
-//! The page that runs the FMU: `documentation/index.html` with the library as WebAssembly, and the scripts in the directory `page`.
+//! The HTML of the page that runs the FMU: `documentation/index.html` with the library as WebAssembly, and the scripts in the
+//! directory `page`.
 
 use crate::content::ContentFile;
 use anyhow::{Context, Result};

@@ -56,7 +56,7 @@ fn find(known: &mut BTreeMap<PathBuf, LocalPackage>, directory: &Path) -> Result
         let packages = metadata.and_then(|metadata| packages(&metadata)).with_context(failed)?;
         known.extend(packages.into_iter().map(|package| (package.directory.clone(), package)));
     }
-    known.get(directory).cloned().with_context(|| format!("{} is no package", directory.display()))
+    known.get(directory).cloned().with_context(|| format!("{} is not a package", directory.display()))
 }
 
 /// Returns the cargo that has started this program, or the cargo of the system.

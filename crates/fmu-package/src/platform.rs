@@ -70,7 +70,7 @@ impl Platform {
             let [in_fmi2, in_fmi3] =
                 [0, 1].map(|fmi| PLATFORMS.map(|platform| platform.directories[fmi]).join(", "));
             anyhow::anyhow!(
-                "'{name}' is no platform of FMI 2.0 or FMI 3.0; platforms are {in_fmi2}, or {in_fmi3} in FMI 3.0"
+                "'{name}' is not a platform of FMI 2.0 or FMI 3.0; platforms are {in_fmi2}, or {in_fmi3} in FMI 3.0"
             )
         })
     }

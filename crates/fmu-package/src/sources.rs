@@ -8,6 +8,9 @@ use anyhow::{Context, Result};
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// The description of the default FMU, which is kept with the sources.
+pub(crate) const DESCRIPTION: &str = "modelDescription/modelDescription.xml";
+
 /// The files that an FMU is made from.
 ///
 /// In addition to the files that are named here, these always count: the `Cargo.lock` in force, the `Cargo.toml` of the

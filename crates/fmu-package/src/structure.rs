@@ -79,7 +79,7 @@ impl fmt::Display for DependencyKind {
 impl ModelStructure {
     /// The structure of a model, whose parameters are `tunable` or have the variability in its table.
     ///
-    /// In FMI 3.0, unknowns also depend on parameters, and on the time even if it is no variable of the model. An array is one
+    /// In FMI 3.0, unknowns also depend on parameters, and on the time even if it is not a variable of the model. An array is one
     /// unknown or known there, with the index of its first element, and has the dependencies of all its elements.
     ///
     /// # Errors

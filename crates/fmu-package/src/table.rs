@@ -28,7 +28,7 @@ pub(crate) struct Table {
     pub starts: Vec<(Interface, Start)>,
 }
 
-/// The facts about a model (section 2.2.1).
+/// The facts about a model (section 2.2.1 of FMI 2.0).
 #[derive(Debug)]
 pub(crate) struct Info {
     pub name: String,
@@ -172,12 +172,12 @@ impl Table {
         [co_simulation, model_exchange].into_iter().flatten()
     }
 
-    /// Returns `None` for a time or an event indicator that is no variable of the model.
+    /// Returns `None` for a time or an event indicator that is not a variable of the model.
     pub fn variable(&self, index: u32) -> Option<&Variable> {
         self.variables.get(index as usize)
     }
 
-    /// The index of the independent variable, which follows the list if it is no variable of the model.
+    /// The index of the independent variable, which follows the list if it is not a variable of the model.
     pub fn time(&self) -> u32 {
         let is_time = |variable: &Variable| variable.causality == Causality::Independent;
         self.variables.iter().position(is_time).unwrap_or(self.variables.len()) as u32
@@ -224,7 +224,7 @@ impl Variable {
         self.dimensions.iter().product()
     }
 
-    /// Whether it has a start value: inputs, and variables that are exact or approx (section 2.2.7).
+    /// Whether it has a start value: inputs, and variables that are exact or approx (section 2.2.7 of FMI 2.0).
     pub fn has_start(&self) -> bool {
         self.causality == Causality::Input || matches!(self.initial, Some(Initial::Exact | Initial::Approx))
     }
@@ -239,7 +239,8 @@ impl Variable {
         self.initial == Some(Initial::Exact) && self.variability != Variability::Constant
     }
 
-    /// Whether others may depend on it (section 2.2.8): inputs, states, the time, and variables with an exact start value.
+    /// Whether others may depend on it (section 2.2.8 of FMI 2.0): inputs, states, the time, and variables with an exact start
+    /// value.
     pub fn is_known(&self) -> bool {
         matches!(self.causality, Causality::Input | Causality::Independent) || self.state || self.is_exact()
     }

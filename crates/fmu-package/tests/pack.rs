@@ -82,7 +82,7 @@ fn it_is_the_zip_that_importers_want() {
         assert_eq!(file.compression(), CompressionMethod::Deflated);
         assert_eq!(file.last_modified(), Some(zip::DateTime::default()));
         assert_eq!(file.unix_mode(), Some(0o100_644));
-        // At most version 2.0, no flags, no extra fields and no zip64 (section 2.3).
+        // At most version 2.0, no flags, no extra fields and no zip64 (section 2.3 of FMI 2.0).
         let header = usize::try_from(file.header_start()).unwrap();
         assert_eq!(bytes[header + 4..header + 8], [20, 0, 0, 0]);
         assert_eq!(bytes[header + 28..header + 30], [0, 0]);

@@ -1,5 +1,5 @@
 //! Arrays of FMI 3.0. Each element is a variable here, but the FMU knows only the array, by one value
-//! reference. A call of the FMU gets or sets all values of an array (section 2.2.7.2).
+//! reference. A call of the FMU gets or sets all values of an array (section 2.2.7.2 of FMI 3.0).
 
 use fmi_abi::BaseType;
 use fmi_abi::description::Variable;

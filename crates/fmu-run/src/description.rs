@@ -13,7 +13,7 @@ use std::sync::Arc;
 pub struct Variable {
     /// Name.
     pub name: String,
-    /// Value reference; for an array element, a number that is no value reference of the FMU.
+    /// Value reference; for an array element, a number that is not a value reference of the FMU.
     pub reference: u32,
     /// Start value as written in the file, if given.
     pub start: Option<Arc<str>>,

@@ -8,7 +8,7 @@ const LONGEST: usize = 1000;
 /// Error that prevents all runs. The error of a single run is [part of the results](crate::Runs::errors).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Error {
-    /// The file is no FMU, or cannot be run on this machine.
+    /// The file is not an FMU, or cannot be run on this machine.
     Fmu(String),
     /// The request does not fit the FMU, or is inconsistent.
     Request(String),

@@ -18,7 +18,7 @@ pub(crate) struct Found<'a> {
 impl Found<'_> {
     pub fn check_number(self, name: &str) -> Result<(), Error> {
         match self.variable.base {
-            BaseType::String | BaseType::Binary => request(format!("{name} is no number")),
+            BaseType::String | BaseType::Binary => request(format!("{name} is not a number")),
             _ => Ok(()),
         }
     }
@@ -74,6 +74,11 @@ impl Found<'_> {
             std::iter::once(&**own).chain(others.iter().map(|(name, ..)| name.as_str())).collect();
         request(format!("{name} can be given in {}, not in {unit:?}", known.join(" or ")))
     }
+}
+
+/// Returns whether a type has values that `f64` has not.
+pub(crate) fn is_exact(base: BaseType) -> bool {
+    matches!(base, BaseType::String | BaseType::Binary | BaseType::Int64 | BaseType::UInt64)
 }
 
 pub(crate) fn article(word: &str) -> String {

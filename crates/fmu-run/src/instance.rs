@@ -2,11 +2,11 @@
 
 use crate::arrays::{Arrays, Expanded};
 use crate::description::{Description, Structural};
+use crate::early::EarlyValues;
 use crate::error::{Error, request};
 use crate::fmu::Loaded;
 use crate::library::Library;
 use crate::messages::Logging;
-use crate::values::EarlyValues;
 use fmi_abi::Interface;
 use fmi_abi::description::ModelDescription;
 use fmi_client::{Rejection, Settings};
@@ -86,8 +86,9 @@ impl Instance {
             ..Settings::new(interface)
         };
         let client = fmi_client::Instance::new(&library.client, &settings).map_err(|rejection| {
-            let no_message =
-                || format!("{} makes no instance, and logs no message", fmu.description.model_name);
+            let no_message = || {
+                format!("the instantiation of {} returned NULL without a message", fmu.description.model_name)
+            };
             let why = rejection.reason().map_or_else(no_message, |message| message.text.trim().to_owned());
             let prefix = if component.is_empty() { String::new() } else { format!("{component}: ") };
             (prefix + &why, rejection.is_silent())

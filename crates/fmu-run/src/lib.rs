@@ -11,6 +11,7 @@ mod arrays;
 mod batch;
 mod continuous;
 mod description;
+mod early;
 mod error;
 mod files;
 mod fmu;

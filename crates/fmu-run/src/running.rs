@@ -1,9 +1,10 @@
 //! Instances of the components of a system, which run together.
 
+use crate::found::is_exact;
 use crate::instance::{Experiment, Instance};
 use crate::messages::Logging;
 use crate::selection::{Selection, Target};
-use crate::start::{StartValues, is_exact};
+use crate::start::StartValues;
 use crate::system::{Exchange, Order, System};
 use fmi_abi::{BaseType, Interface, Value};
 use fmi_client::Rejection;
@@ -386,7 +387,7 @@ impl Running {
             return self.keep(|_, instance| instance.deserialize(bytes));
         }
         let mut rest = bytes;
-        let short = || Rejection::without_fmu("deserialize", "the bytes are no state of this system");
+        let short = || Rejection::without_fmu("deserialize", "the bytes are not a state of this system");
         let components = self.components.iter().map(|_| {
             let (length, after) = rest.split_first_chunk()?;
             let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;

@@ -1,7 +1,7 @@
 //! Start values: from names to value references.
 
 use crate::error::{Error, request};
-use crate::found::Found;
+use crate::found::{Found, is_exact};
 use crate::selection::{Target, fits};
 use crate::system::{StartValue, System};
 use fmi_abi::{BaseType, Value};
@@ -149,11 +149,6 @@ impl<'a> StartValues<'a> {
     }
 }
 
-/// Returns whether a type has values that `f64` has not.
-pub(crate) fn is_exact(base: BaseType) -> bool {
-    matches!(base, BaseType::String | BaseType::Binary | BaseType::Int64 | BaseType::UInt64)
-}
-
 /// Converts a value to the type of a variable for which [`is_exact`] holds.
 pub(crate) fn exact(found: Found, name: &str, value: Value) -> Result<Value, Error> {
     /// Integers up to this magnitude are exact in `f64`.
@@ -215,7 +210,7 @@ fn one<T>(values: &[T], of: usize) -> Option<&T> {
     if values.len() == 1 { values.first() } else { values.get(of) }
 }
 
-/// Returns the number for a string, for a variable that is no string.
+/// Returns the number for a string, for a variable that is not a string.
 fn number_of(found: Found, name: &str, text: &str) -> Result<f64, Error> {
     if found.variable.base == BaseType::Boolean
         && let Ok(boolean) = text.parse::<bool>()

@@ -4,15 +4,7 @@ use crate::arrays::Expanded;
 use crate::instance::Instance;
 use fmi_abi::{BaseType, Value};
 use fmi_client::Rejection;
-use std::collections::HashMap;
 use std::sync::Arc;
-
-/// Values of arrays that were set before the initialization, by array index. They cannot be read then.
-#[derive(Debug, Default)]
-pub(crate) struct EarlyValues {
-    numbers: HashMap<usize, Vec<f64>>,
-    values: HashMap<usize, Vec<Value>>,
-}
 
 impl Instance {
     /// Sets numeric variables of one type; 0 or 1 for a Boolean.

@@ -66,7 +66,7 @@ impl<'a> Own<'a> {
         Ok(())
     }
 
-    /// Fails if the string is no valid value: a number in the range, `true` or `false`, a string, or an item
+    /// Fails if the string is not a valid value: a number in the range, `true` or `false`, a string, or an item
     /// of the enumeration.
     pub fn check_start(self, name: &str, text: &str) -> Result<()> {
         let number: Option<f64> = match self.kind() {

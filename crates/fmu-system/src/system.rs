@@ -61,7 +61,7 @@ impl<'a> System<'a> {
                 before.iter().all(|(other, _)| other != component),
                 "two components are named {component}"
             );
-            checked.read(path).with_context(|| format!("{} is no usable FMU", path.display()))?;
+            checked.read(path).with_context(|| format!("{} is not a usable FMU", path.display()))?;
         }
         checked.check_files()?;
         let mut fed = Vec::new();

@@ -129,7 +129,7 @@ fn wrong_systems_are_rejected() {
             |s| s.connections.push(("plant.gear_now", "law.other_gear")),
             "plant.gear_now cannot feed law.other_gear: they have different items",
         ),
-        (|s| s.components[0].1 = "none.fmu".into(), "none.fmu is no usable FMU: it cannot be read"),
+        (|s| s.components[0].1 = "none.fmu".into(), "none.fmu is not a usable FMU: it cannot be read"),
         (|s| s.inputs[0].2 = "NaN".into(), "the start value of law.r must be a finite number, it is NaN"),
         (
             |s| s.start.push(("plant.u", "inf".into())),

@@ -1,8 +1,9 @@
 //! Operations on an instance of either FMI version, and assertions for tests.
 
+use crate::fmi2;
 use crate::fmi3::{self, Stepped};
-use crate::importer::{Log, lock};
-use crate::{Arguments, Hook, Importer, Message};
+use crate::importer::{Arguments, Hook, Log, Message, lock, to_bool};
+use crate::library::functions_of;
 use fmi_abi::calls;
 use fmi_abi::fmi2::types::fmi2EventInfo;
 use fmu_export::Mode::{self, *};
@@ -22,18 +23,11 @@ pub struct Updated {
     pub next: Option<f64>,
 }
 
-/// Returns the value of a Boolean of C.
-#[track_caller]
-pub(crate) fn to_bool(flag: i32) -> bool {
-    assert!([0, 1].contains(&flag), "{flag} is no Boolean");
-    flag == 1
-}
-
 /// Importer of either FMI version.
 #[derive(Debug)]
 pub enum Version<'a> {
     /// Importer of FMI 2.0.
-    Fmi2(&'a Importer),
+    Fmi2(&'a fmi2::Importer),
     /// Importer of FMI 3.0.
     Fmi3(&'a fmi3::Importer),
 }
@@ -737,3 +731,32 @@ pub trait Either: Send {
         rates
     }
 }
+
+/// Implements the operations for the importer of an FMI version.
+macro_rules! either {
+    ($standard:ident $module:ident $($functions_of:ident)::+) => {
+        impl Either for $module::Importer {
+            fn standard() -> Standard {
+                Standard::$standard
+            }
+
+            fn functions() -> &'static [&'static str] {
+                $module::FUNCTIONS
+            }
+
+            fn make<M: Exported>(arguments: &Arguments) -> Result<Self, Vec<Message>> {
+                Self::instantiate($($functions_of)::+::<M>(), arguments)
+            }
+
+            fn nothing<M: Exported>() -> Self {
+                Self::without_instance($($functions_of)::+::<M>())
+            }
+
+            fn version(&self) -> Version<'_> {
+                Version::$standard(self)
+            }
+        }
+    };
+}
+either!(Fmi2 fmi2 functions_of);
+either!(Fmi3 fmi3 fmu_export::fmi3::functions);

@@ -1,11 +1,8 @@
 //! FMI 2.0: an instance as an importer uses it.
 
-use crate::either::Version;
-use crate::importer::{Log, importer, remember};
-use crate::{Arguments, Either, Message, library::functions_of};
+use crate::importer::{Arguments, Log, Message, importer, remember};
 pub use fmi_abi::fmi2::Functions;
 use fmi_abi::fmi2::types::*;
-use fmu_export::{Exported, Standard};
 use std::ffi::{CStr, c_int, c_void};
 use std::ptr::{null, null_mut};
 
@@ -22,7 +19,7 @@ unsafe extern "C" fn log_message(
     message: fmi2String,
     #[cfg(miri)] _: ...
 ) {
-    // SAFETY: section 2.1.5 requires NULL or NUL-terminated strings, and NULL or the log.
+    // SAFETY: section 2.1.5 of FMI 2.0 requires NULL or NUL-terminated strings, and NULL or the log.
     unsafe { remember(environment, instance_name, status, category, message) }
 }
 
@@ -70,7 +67,7 @@ fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi2Componen
 /// Functions that exist only in FMI 2.0.
 #[allow(clippy::missing_panics_doc, reason = "that is what they are for")]
 impl Importer {
-    /// Returns version and platform, which need no instance (section 2.1.4).
+    /// Returns version and platform, which need no instance (section 2.1.4 of FMI 2.0).
     pub fn version_and_platform(&self) -> [&CStr; 2] {
         let Functions { fmi2GetVersion, fmi2GetTypesPlatform, .. } = self.functions;
         // SAFETY: both functions return strings that the library keeps.

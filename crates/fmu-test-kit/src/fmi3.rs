@@ -1,12 +1,8 @@
 //! FMI 3.0: an instance as an importer uses it.
 
-use crate::either::{Version, to_bool};
-use crate::importer::{Log, importer, remember};
-use crate::{Arguments, Either, Message};
+use crate::importer::{Arguments, Log, Message, importer, remember, to_bool};
 pub use fmi_abi::fmi3::Functions;
 use fmi_abi::fmi3::types::*;
-use fmu_export::fmi3::functions as functions_of;
-use fmu_export::{Exported, Standard};
 use std::ffi::{CStr, c_int, c_void};
 use std::ptr::{null, null_mut};
 
@@ -18,7 +14,7 @@ unsafe extern "C" fn log_message(
     category: fmi3String,
     message: fmi3String,
 ) {
-    // SAFETY: section 2.3.1 requires strings, and NULL or the log. FMI 3.0 passes no instance name.
+    // SAFETY: section 2.3.1 of FMI 3.0 requires strings, and NULL or the log. FMI 3.0 passes no instance name.
     unsafe { remember(environment, null(), status, category, message) }
 }
 
@@ -84,7 +80,7 @@ fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi3Instance
 
 /// Results of `fmi3DoStep`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs, reason = "as in the standard, section 4.2.1")]
+#[allow(missing_docs, reason = "as in the standard, section 4.2.1 of FMI 3.0")]
 pub struct Stepped {
     pub event_handling_needed: bool,
     pub terminate: bool,

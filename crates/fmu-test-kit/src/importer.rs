@@ -138,12 +138,19 @@ impl Arguments<'static> {
     }
 }
 
+/// Returns the value of a Boolean of C.
+#[track_caller]
+pub(crate) fn to_bool(flag: i32) -> bool {
+    assert!([0, 1].contains(&flag), "{flag} is not a Boolean");
+    flag == 1
+}
+
 /// Defines the importer of an FMI version. The calling module provides `make`, which calls the instantiation
-/// functions, and `functions_of` for models.
+/// functions.
 macro_rules! importer {
     (
         $free_instance:ident;
-        $standard:ident $handle:ident
+        $_standard:ident $handle:ident
         without an instance { $($free:ident($($free_argument:ident: $free_type:ty),*) -> $result:ty;)+ }
         with an instance {
             $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
@@ -177,6 +184,11 @@ macro_rules! importer {
                 let log = std::sync::Arc::<Log>::default();
                 let instance = make(&functions, arguments, &log);
                 if instance.is_null() { Err(log.take()) } else { Ok(Self { functions, instance, log }) }
+            }
+
+            /// Returns a handle without an instance (NULL).
+            pub(crate) fn without_instance(functions: Functions) -> Self {
+                Self { functions, instance: null_mut(), log: Default::default() }
             }
 
             /// Frees the instance, as an importer might do in a log callback.
@@ -226,28 +238,6 @@ macro_rules! importer {
 
         /// Names of the functions on an instance.
         pub const FUNCTIONS: &[&str] = &[$(stringify!($function)),+];
-
-        impl Either for Importer {
-            fn standard() -> Standard {
-                Standard::$standard
-            }
-
-            fn functions() -> &'static [&'static str] {
-                FUNCTIONS
-            }
-
-            fn make<M: Exported>(arguments: &Arguments) -> Result<Self, Vec<Message>> {
-                Self::instantiate(functions_of::<M>(), arguments)
-            }
-
-            fn nothing<M: Exported>() -> Self {
-                Self { functions: functions_of::<M>(), instance: null_mut(), log: Default::default() }
-            }
-
-            fn version(&self) -> Version<'_> {
-                Version::$standard(self)
-            }
-        }
     };
 }
 pub(crate) use importer;

@@ -25,7 +25,7 @@
 //! couplings would reach the torque limit. Beyond the torque limit, this goal lies behind the motor. The
 //! motor always moves so slowly that it can stop at its goal, so it does not exceed the limit by its motion.
 
-use crate::motor::{Limits, Motor};
+use crate::motor::{Limits, MotorSetpoint};
 use crate::parameters::{InvalidParameter, Parameters};
 use crate::wrist::{Kinematics, Motors, PitchRoll};
 use std::array::from_fn;
@@ -84,7 +84,7 @@ pub struct Controller {
     /// Slopes of the inputs, if the importer has set them since the last step; per s.
     pub slopes: Inputs,
     /// Motors 1 and 2 at the last sample.
-    pub motors: [Motor; 2],
+    pub motors: [MotorSetpoint; 2],
     /// I of pitch and roll, rad.
     pub integral: PitchRoll,
     /// D of pitch and roll, rad.
@@ -117,7 +117,7 @@ impl Controller {
             parameters,
             inputs: Inputs::default(),
             slopes: Inputs::default(),
-            motors: [Motor::default(); 2],
+            motors: [MotorSetpoint::default(); 2],
             integral: [0.0; 2],
             damping: [0.0; 2],
             correction: [0.0; 2],
@@ -154,7 +154,7 @@ impl Controller {
     /// Returns the current motion of the motors. It depends only on earlier samples: an input acts from the
     /// next sample after it has been set.
     #[inline]
-    pub fn motion(&self) -> [Motor; 2] {
+    pub fn motion(&self) -> [MotorSetpoint; 2] {
         self.motors.map(|motor| motor.after((self.now - self.sampled_at).max(0.0)))
     }
 
@@ -259,7 +259,7 @@ impl Controller {
             let farthest = motor.angle + (p.max_torque + torque) / p.stiffness;
             let nearest = motor.angle - (p.max_torque - torque) / p.stiffness;
             let allowed = goal.min(farthest).max(nearest);
-            self.on_goal &= motor.turn_towards(allowed, &limits, p.sample_time) && allowed == goal;
+            self.on_goal &= motor.plan_acceleration(allowed, &limits, p.sample_time) && allowed == goal;
         }
     }
 }

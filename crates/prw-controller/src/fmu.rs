@@ -1,7 +1,7 @@
 //! Capabilities of the controller FMU.
 
 use crate::controller::{Controller, Inputs, Schedule};
-use crate::motor::Motor;
+use crate::motor::MotorSetpoint;
 use crate::parameters::{InvalidParameter, Parameters};
 use crate::variables::Name;
 use fmu_export::{
@@ -10,7 +10,7 @@ use fmu_export::{
 };
 
 saved!(for Inputs { reference, angle, rate, torque });
-saved!(for Motor { angle, rate, acceleration });
+saved!(for MotorSetpoint { angle, rate, acceleration });
 saved!(for Schedule { epoch, period, next });
 
 impl From<InvalidParameter> for Error {

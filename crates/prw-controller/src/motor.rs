@@ -17,7 +17,7 @@ pub struct Limits {
 
 /// Angle and rate at a sample, and the acceleration until the next sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Motor {
+pub struct MotorSetpoint {
     /// Angle, rad.
     pub angle: f64,
     /// Rate, rad/s.
@@ -26,7 +26,7 @@ pub struct Motor {
     pub acceleration: f64,
 }
 
-impl Motor {
+impl MotorSetpoint {
     /// Returns the motion `time` s after the sample.
     #[inline]
     pub fn after(&self, time: f64) -> Self {
@@ -42,13 +42,13 @@ impl Motor {
     /// Within the limits the motor reaches the goal in the least number of samples. If the goal lies behind,
     /// or is nearer than the stopping distance, the motor passes it and returns. Returns whether the motor is
     /// at rest at its goal, or will be within two samples.
-    pub fn turn_towards(&mut self, goal: f64, limits: &Limits, period: f64) -> bool {
+    pub fn plan_acceleration(&mut self, goal: f64, limits: &Limits, period: f64) -> bool {
         let Limits { rate: max_rate, acceleration: max } = *limits;
         // Units: the rate a T that the motor gains in one period T at full acceleration a, and the angle a T^2 that it
         // travels in one period at that rate.
         let (rate_unit, angle_unit) = (max * period, max * period * period);
         let distance = (goal - self.angle - 0.5 * self.rate * period) / angle_unit;
-        let wanted = rate_unit * fastest_rate(distance.abs(), max_rate / rate_unit).copysign(distance);
+        let wanted = rate_unit * max_stoppable_rate(distance.abs(), max_rate / rate_unit).copysign(distance);
         let rate = wanted.clamp(-max_rate, max_rate);
         let acceleration = (rate - self.rate) / period;
         self.acceleration = acceleration.clamp(-max, max);
@@ -58,11 +58,11 @@ impl Motor {
 }
 
 /// Returns the highest rate v, at most `limit`, for which the rest of this sample and braking from v cover
-/// the distance q: v/2 + D(v) = q, in the units of [`Motor::turn_towards`].
+/// the distance q: v/2 + D(v) = q, in the units of [`MotorSetpoint::plan_acceleration`].
 ///
 /// Braking takes m = floor(v) whole samples and one more for the rest v - m. So D(v) = (m + 1/2) v - m (m +
 /// 1)/2, and q = (m + 1) v - m (m + 1)/2, which is m (m + 1)/2 at v = m.
-fn fastest_rate(q: f64, limit: f64) -> f64 {
+fn max_stoppable_rate(q: f64, limit: f64) -> f64 {
     // v <= sqrt(2 q) always holds. For larger q, infinite q included, the limit applies.
     if q > 0.5 * (limit + 1.0) * (limit + 2.0) {
         return limit;
@@ -73,20 +73,20 @@ fn fastest_rate(q: f64, limit: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Limits, Motor};
+    use super::{Limits, MotorSetpoint};
 
     const PERIOD: f64 = 1e-3;
 
     /// Moves to `goal`; returns the number of samples, the largest angle in the direction of the goal, and
     /// the motor.
-    fn go(mut motor: Motor, goal: f64, limits: &Limits) -> (usize, f64, Motor) {
+    fn go(mut motor: MotorSetpoint, goal: f64, limits: &Limits) -> (usize, f64, MotorSetpoint) {
         let direction = (goal - motor.angle).signum();
         let mut farthest = motor.angle;
         for samples in 0..100_000 {
             if motor.angle == goal && motor.rate == 0.0 {
                 return (samples, farthest, motor);
             }
-            motor.turn_towards(goal, limits, PERIOD);
+            motor.plan_acceleration(goal, limits, PERIOD);
             assert!(motor.acceleration.abs() <= limits.acceleration);
             motor = motor.after(PERIOD);
             assert!(motor.rate.abs() <= limits.rate * (1.0 + 1e-12), "{}", motor.rate);
@@ -106,7 +106,7 @@ mod tests {
         for (rate, acceleration) in [(3.0, 30.0), (2.345, 17.89), (0.5, 1e3), (100.0, 30.0), (0.02, 30.0)] {
             let limits = Limits { rate, acceleration };
             for goal in [1.1220, -0.5, 1e-3, 3.3e-5, 1e-5, -1e-7, 0.022_2] {
-                let (samples, farthest, _) = go(Motor::default(), goal, &limits);
+                let (samples, farthest, _) = go(MotorSetpoint::default(), goal, &limits);
                 assert!((farthest - goal) * f64::signum(goal) <= 1e-12, "{goal}: {farthest}");
                 // Time of bang-bang motion in continuous time; sampling may add up to three samples.
                 let distance = goal.abs();
@@ -128,12 +128,12 @@ mod tests {
         for (rate, acceleration) in [(3.0, 30.0), (2.345, 17.89), (0.5, 1e3), (0.02, 30.0), (0.004, 30.0)] {
             let limits = Limits { rate, acceleration };
             for goal in [1.1220, -0.5, 1e-3, 3.3e-5, 1e-5, -1e-7, 0.022_2, 6e-6, 1.7e-5] {
-                let mut motor = Motor::default();
+                let mut motor = MotorSetpoint::default();
                 for _ in 0..400_000 {
-                    let is_near = motor.turn_towards(goal, &limits, PERIOD);
+                    let is_near = motor.plan_acceleration(goal, &limits, PERIOD);
                     if is_near {
                         let mut two_later = motor.after(PERIOD);
-                        two_later.turn_towards(goal, &limits, PERIOD);
+                        two_later.plan_acceleration(goal, &limits, PERIOD);
                         two_later = two_later.after(PERIOD);
                         assert!((two_later.angle - goal).abs() < 1e-12, "{goal} {limits:?} {two_later:?}");
                         assert!(two_later.rate.abs() < 1e-9, "{goal} {limits:?} {two_later:?}");
@@ -150,9 +150,9 @@ mod tests {
     #[test]
     fn it_stays_where_it_has_arrived() {
         let limits = Limits { rate: 3.0, acceleration: 30.0 };
-        let (_, _, mut motor) = go(Motor::default(), 0.7, &limits);
+        let (_, _, mut motor) = go(MotorSetpoint::default(), 0.7, &limits);
         for _ in 0..1000 {
-            motor.turn_towards(0.7, &limits, PERIOD);
+            motor.plan_acceleration(0.7, &limits, PERIOD);
             motor = motor.after(PERIOD);
             assert!((motor.angle - 0.7).abs() < 1e-12 && motor.rate.abs() < 1e-9, "{motor:?}");
         }
@@ -161,7 +161,7 @@ mod tests {
     #[test]
     fn a_goal_that_comes_too_near_is_passed_once() {
         let limits = Limits { rate: 3.0, acceleration: 30.0 };
-        let fast = Motor { angle: 0.0, rate: 3.0, acceleration: 0.0 };
+        let fast = MotorSetpoint { angle: 0.0, rate: 3.0, acceleration: 0.0 };
         let (_, farthest, motor) = go(fast, 0.05, &limits);
         // The motor cannot stop before 3^2 / 60 = 0.15.
         assert!((farthest - 0.15).abs() < 1e-9, "{farthest}");
@@ -172,9 +172,9 @@ mod tests {
     fn extreme_goals_give_finite_motion() {
         let limits = Limits { rate: 3.0, acceleration: 30.0 };
         for goal in [f64::INFINITY, f64::NEG_INFINITY, f64::MAX, -f64::MAX, 5e-324] {
-            let mut motor = Motor::default();
+            let mut motor = MotorSetpoint::default();
             for _ in 0..1000 {
-                motor.turn_towards(goal, &limits, PERIOD);
+                motor.plan_acceleration(goal, &limits, PERIOD);
                 motor = motor.after(PERIOD);
             }
             assert!(motor.angle.is_finite() && motor.rate.abs() <= 3.0, "{motor:?}");

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use prw_controller::controller::{Controller, Inputs};
-use prw_controller::motor::Motor;
+use prw_controller::motor::MotorSetpoint;
 use prw_controller::parameters::Parameters;
 use prw_controller::wrist::{Kinematics, PitchRoll};
 
@@ -17,7 +17,11 @@ fn radians(degrees: PitchRoll) -> PitchRoll {
 }
 
 /// Runs for `duration` s in steps of 1 ms; `measure` computes the inputs from the motors' motion.
-fn run(c: &mut Controller, duration: f64, measure: impl Fn(f64, [Motor; 2]) -> Inputs) -> Vec<[Motor; 2]> {
+fn run(
+    c: &mut Controller,
+    duration: f64,
+    measure: impl Fn(f64, [MotorSetpoint; 2]) -> Inputs,
+) -> Vec<[MotorSetpoint; 2]> {
     let start = c.now;
     let mut motions = Vec::new();
     for k in 0..(duration * 1e3).round() as usize {
@@ -30,7 +34,7 @@ fn run(c: &mut Controller, duration: f64, measure: impl Fn(f64, [Motor; 2]) -> I
 }
 
 /// Returns the inputs of a wrist without couplings.
-fn rigid(reference: PitchRoll) -> impl Fn(f64, [Motor; 2]) -> Inputs {
+fn rigid(reference: PitchRoll) -> impl Fn(f64, [MotorSetpoint; 2]) -> Inputs {
     let kinematics = Kinematics::new(4, 7);
     move |_, motors| Inputs {
         reference,
@@ -79,7 +83,7 @@ fn stuck_sensors_keep_motors_and_correction_bounded() {
 fn motors_back_off_from_a_blocked_wrist() {
     let reference = radians([120.0, 0.0]);
     let p = Parameters::DEFAULT;
-    let blocked = |_, motors: [Motor; 2]| Inputs {
+    let blocked = |_, motors: [MotorSetpoint; 2]| Inputs {
         reference,
         torque: motors.map(|motor| -p.stiffness * motor.angle),
         ..Inputs::default()

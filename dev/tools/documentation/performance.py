@@ -21,13 +21,13 @@ def render(project: Path) -> str:
     environment = jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
     return environment.get_template(TEMPLATE).render(
         compiler=counted["compiler"],
-        table=lambda name, *heads: _table(heads, ratios[name].items()),
+        table=lambda name, *header: _table(header, ratios[name].items()),
         instructions=lambda: _table(("use", "instructions"), ((k, [v]) for k, v in counted["instructions"].items())),
     )
 
 
-def _table(heads: tuple[str, ...], rows: Iterable[tuple[str, list[Any]]]) -> str:
-    lines = [f"| {' | '.join(heads)} |", "|" + "---|" * len(heads)]
+def _table(header: tuple[str, ...], rows: Iterable[tuple[str, list[Any]]]) -> str:
+    lines = [f"| {' | '.join(header)} |", "|" + "---|" * len(header)]
     lines += [f"| {label} | {' | '.join(map(_number, figures))} |" for label, figures in rows]
     return "\n".join(lines)
 

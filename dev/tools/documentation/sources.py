@@ -8,15 +8,15 @@ from typing import Any, NamedTuple
 
 from prw.errors import UserError
 
-#: Within the project.
+#: Relative to the root of the repository.
 SOURCES = Path("docs/fmu-page")
 PROGRAMS = SOURCES / "programs"
 
 
 class Table(NamedTuple):
-    """The cells of a table as they are written."""
+    """The cells of a table as they are written; `header` has those of the first row."""
 
-    heads: list[str]
+    header: list[str]
     rows: list[list[str]]
 
 
@@ -47,19 +47,19 @@ def read_table(path: Path, heading: str) -> Table:
     table = section and re.search(r"^\|.*\|\n\|[-:| ]+\|\n(?:\|.*\|\n)+", section[2], flags=re.M)
     if not table:
         raise UserError(f"{path}: there is no table below a heading “{heading}”")
-    heads, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table[0].splitlines()]
+    header, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table[0].splitlines()]
     for row in rows:
-        if len(row) != len(heads):
-            raise UserError(f"{path}: below “{heading}” the row of “{row[0]}” has {len(row)} cells, not {len(heads)}")
-    return Table(heads, rows)
+        if len(row) != len(header):
+            raise UserError(f"{path}: below “{heading}” the row of “{row[0]}” has {len(row)} cells, not {len(header)}")
+    return Table(header, rows)
 
 
-def unit_of(variable: Any) -> str:
+def shown_unit(variable: Any) -> str:
     """A variable's unit as the model description writes it; empty for 1 and for none."""
     unit = variable.unit or getattr(variable.declaredType, "unit", None) or ""
     return "" if unit == "1" else unit
 
 
-def start_of(variable: Any) -> str:
-    """A variable's start value with eight digits."""
+def format_start(variable: Any) -> str:
+    """A variable's start value; eight digits of a Real."""
     return f"{float(variable.start):.8g}" if variable.type == "Real" else variable.start

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from tools.documentation.sources import Table, start_of, unit_of
+from tools.documentation.sources import Table, format_start, shown_unit
 
 #: Labels of the outputs in the table of orders.
 OUTPUT_NAMES = {
@@ -25,7 +25,7 @@ def variable_table(description: Any, causality: str, title: str) -> str:
     for variable in description.modelVariables:
         if variable.causality == causality:
             rows.append(
-                f"<tr><td><code>{html.escape(variable.name)}</code></td><td>{_pretty(unit_of(variable))}</td>"
+                f"<tr><td><code>{html.escape(variable.name)}</code></td><td>{_pretty(shown_unit(variable))}</td>"
                 f'<td class="meaning">{html.escape(variable.description)}</td></tr>'
             )
     return _table(title, ("name", "unit", "meaning"), rows, kind="rows")
@@ -39,8 +39,8 @@ def parameter_table(description: Any, printed: dict[str, Any]) -> str:
             continue
         cells = [
             f"<td><code>{html.escape(variable.name)}</code></td>",
-            f'<td class="number">{start_of(variable)}</td>',
-            f"<td>{_pretty(unit_of(variable))}</td>",
+            f'<td class="number">{format_start(variable)}</td>',
+            f"<td>{_pretty(shown_unit(variable))}</td>",
             f'<td class="meaning">{html.escape(variable.description)}</td>',
         ]
         if printed:
@@ -49,8 +49,8 @@ def parameter_table(description: Any, printed: dict[str, Any]) -> str:
             label = ' data-label="printed:"' if text else ""
             cells.insert(3, f'<td class="number"{label}>{text}</td>')
         rows.append(f"<tr>{''.join(cells)}</tr>")
-    heads = ("name", "start", "unit", *(("as printed",) if printed else ()), "meaning")
-    return _table("", heads, rows, numbers=(1, 3) if printed else (1,), kind="rows")
+    header = ("name", "start", "unit", *(("as printed",) if printed else ()), "meaning")
+    return _table("", header, rows, numbers=(1, 3) if printed else (1,), kind="rows")
 
 
 def order_table(numbers: dict[str, Any]) -> str:
@@ -60,18 +60,18 @@ def order_table(numbers: dict[str, Any]) -> str:
         orders = f"{numbers['order_angles'][name]:.2f}", f"{numbers['order_rates'][name]:.2f}"
         cells = (*orders, str(numbers["error_1ms_percent"][name]))
         rows.append(f"<tr><td>{label}</td>" + "".join(f'<td class="number">{cell}</td>' for cell in cells) + "</tr>")
-    heads = ("output", "order, angles only", "order, use_omega", "error at 1 ms (%)")
-    return _table("", heads, rows, numbers=(1, 2, 3))
+    header = ("output", "order, angles only", "order, use_omega", "error at 1 ms (%)")
+    return _table("", header, rows, numbers=(1, 2, 3))
 
 
 def text_table(table: Table) -> str:
     """A table from Markdown; formulas stay as they are."""
     rows = []
     for row in table.rows:
-        labels = ["", *(f' data-label="{html.escape(head)}:"' for head in table.heads[1:])]
+        labels = ["", *(f' data-label="{html.escape(head)}:"' for head in table.header[1:])]
         cells = (f"<td{label if cell else ''}>{_inline(cell)}</td>" for label, cell in zip(labels, row))
         rows.append(f"<tr>{''.join(cells)}</tr>")
-    return _table("", [html.escape(head) for head in table.heads], rows, kind="rows text")
+    return _table("", [html.escape(head) for head in table.header], rows, kind="rows text")
 
 
 def _inline(text: str) -> str:
@@ -79,10 +79,10 @@ def _inline(text: str) -> str:
     return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text, quote=False))
 
 
-def _table(title: str, heads: Sequence[str], rows: Iterable[str], numbers: Sequence[int] = (), kind: str = "") -> str:
+def _table(title: str, header: Sequence[str], rows: Iterable[str], numbers: Sequence[int] = (), kind: str = "") -> str:
     """numbers: indices of the columns with right-aligned numbers."""
-    attributes = (' class="number"' if column in numbers else "" for column in range(len(heads)))
-    head = "".join(f"<th{attribute}>{title}</th>" for attribute, title in zip(attributes, heads))
+    attributes = (' class="number"' if column in numbers else "" for column in range(len(header)))
+    head = "".join(f"<th{attribute}>{title}</th>" for attribute, title in zip(attributes, header))
     heading = f"<h3>{title}</h3>\n" if title else ""
     body = "\n".join(rows)
     attribute = f' class="{kind}"' if kind else ""

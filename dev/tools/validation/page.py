@@ -60,7 +60,7 @@ def experiments(found: Validation) -> str:
 
 def runs(found: Validation) -> str:
     """A table for each importer."""
-    heads = ["experiment", "FMI", "angles (rad)", "rates (rad/s)", "torques (N.m)", "of the tolerance", ""]
+    header = ["experiment", "FMI", "angles (rad)", "rates (rad/s)", "torques (N.m)", "of the tolerance", ""]
     text = "<p>Largest differences of any output of a kind, and the largest of all in terms of its tolerance.</p>"
     by_importer: dict[str, list[Row]] = {}
     for row in found.rows:
@@ -76,7 +76,7 @@ def runs(found: Validation) -> str:
             ]
             for row in rows
         ]
-        text += f"<h3>{html.escape(importer)}</h3>{text_table(Table(heads, cells))}"
+        text += f"<h3>{html.escape(importer)}</h3>{text_table(Table(header, cells))}"
     return text
 
 

@@ -14,7 +14,7 @@ pub use unpack::{Entry, Limits, unpack};
 /// Largest XML file, in bytes.
 pub const MAX_XML: u64 = 256 << 20;
 
-/// Opens a file. A pipe would wait for a writer, and a device may never end.
+/// Opens a regular file only, because a pipe would wait for a writer, and a device may never end.
 ///
 /// # Errors
 /// Fails if there is no such file, or it is not a regular file.

@@ -41,7 +41,8 @@ impl Scratch {
     }
 }
 
-/// Removes the directories whose lock no process holds. Any failure only means that a directory stays.
+/// Removes the directories whose lock no process holds. Failures are ignored, because they only mean that a
+/// directory stays.
 fn remove_abandoned(parent: &Path, prefix: &str) {
     for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
         let is_directory = entry.file_type().is_ok_and(|of| of.is_dir());

@@ -37,8 +37,8 @@ pub struct Entry<'a> {
 }
 
 /// Unpacks the ZIP file `path`, which is `what` for messages, to the directory `to`. `wanted` returns whether an entry is extracted;
-/// entries outside and links, which could lead outside, never are. What is unpacked is taken from the limits. Permissions are ignored, except that programs stay executable:
-/// some tools write entries that the owner could not read.
+/// entries outside and links, which could lead outside, never are. What is unpacked is taken from the limits. Permissions are ignored,
+/// because some tools write entries that the owner could not read, but programs stay executable.
 ///
 /// # Errors
 /// Fails if the file is not a ZIP file or exceeds the limits, if an entry cannot be extracted, and if `wanted` does.

@@ -8,7 +8,7 @@ use types::*;
 /// functions without an instance argument, with arguments and result. Functions on an instance follow as
 /// `name CS ME tolerated (arguments);`.
 ///
-/// The letters are the columns of the tables in sections 4.2.4 and 3.2.3: I instantiated, N initialization, C
+/// The letters are the columns of the tables in sections 4.2.4 and 3.2.3 of FMI 2.0: I instantiated, N initialization, C
 /// step complete, F step failed, M event, K continuous time, T terminated, E error. In fatal no call is
 /// allowed. For `fmi2Set...`, the list contains all columns in which some variable can be set; fmu-export
 /// checks each variable. `fmi2CancelStep` is for asynchronous steps, which do not exist here.

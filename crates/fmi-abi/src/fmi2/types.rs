@@ -41,7 +41,7 @@ pub type fmi2Type = c_int;
 /// `fmi2StatusKind` as a number: 0 to 3, see [`StatusKind`].
 pub type fmi2StatusKind = c_int;
 
-/// Information that the `fmi2Get...Status` functions return (section 4.2.3).
+/// Information that the `fmi2Get...Status` functions return (section 4.2.3 of FMI 2.0).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StatusKind {
     /// The result of an asynchronous step.
@@ -76,12 +76,12 @@ pub type fmi2CallbackLogger = unsafe extern "C" fn(
     message: fmi2String,
     ...
 );
-/// The importer's `calloc`. Never called: instances are on Rust's heap
+/// The importer's `calloc`. Never called, because instances are on Rust's heap
 /// (`canNotUseMemoryManagementFunctions`).
 pub type fmi2CallbackAllocateMemory = unsafe extern "C" fn(count: usize, size: usize) -> *mut c_void;
 /// The importer's `free`. Never called.
 pub type fmi2CallbackFreeMemory = unsafe extern "C" fn(memory: *mut c_void);
-/// Callback for the end of an asynchronous step. Never called: no step is asynchronous.
+/// Callback for the end of an asynchronous step. Never called, because no step is asynchronous.
 pub type fmi2StepFinished = unsafe extern "C" fn(environment: fmi2ComponentEnvironment, status: fmi2Status);
 
 /// The importer's callbacks; each may be NULL.
@@ -100,7 +100,7 @@ pub struct fmi2CallbackFunctions {
     pub component_environment: fmi2ComponentEnvironment,
 }
 
-/// Result of an event (section 3.2.2).
+/// Result of an event (section 3.2.2 of FMI 2.0).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct fmi2EventInfo {

@@ -8,11 +8,11 @@ use types::*;
 /// functions without an instance argument, with arguments and result. Functions on an instance follow as
 /// `name CS ME tolerated (arguments);`.
 ///
-/// The letters are the states of sections 2.3, 3.2 and 4.2: I instantiated, N Initialization Mode, C Step
+/// The letters are the states of sections 2.3, 3.2 and 4.2 of FMI 3.0: I instantiated, N Initialization Mode, C Step
 /// Mode, M Event Mode, K Continuous-Time Mode, T terminated. In fatal no call is allowed. For `fmi3Set...`,
 /// the list contains all states in which some variable can be set; fmu-export checks each variable.
 ///
-/// In fmu-export an error changes nothing. So the importer may continue although section 2.3.1 moves the
+/// In fmu-export an error changes nothing, so the importer may continue although section 2.3.1 of FMI 3.0 moves the
 /// instance to terminated.
 ///
 /// No state allows fmi3ActivateModelPartition, because its state cannot be entered. Some functions are allowed but

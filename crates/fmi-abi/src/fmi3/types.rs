@@ -68,9 +68,9 @@ pub type fmi3LogMessageCallback = unsafe extern "C" fn(
     category: fmi3String,
     message: fmi3String,
 );
-/// Never called: there are no clocks.
+/// Never called, because there are no clocks.
 pub type fmi3ClockUpdateCallback = unsafe extern "C" fn(environment: fmi3InstanceEnvironment);
-/// Never called: there is no intermediate update.
+/// Never called, because there is no intermediate update.
 pub type fmi3IntermediateUpdateCallback = unsafe extern "C" fn(
     environment: fmi3InstanceEnvironment,
     time: fmi3Float64,

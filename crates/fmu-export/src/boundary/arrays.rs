@@ -11,7 +11,7 @@ use std::mem::MaybeUninit;
 /// # Safety
 /// `pointer` is NULL or points to `length` values that do not change during `'a`.
 #[inline]
-pub(crate) unsafe fn array<'a, T>(pointer: *const T, length: usize, argument: &str) -> Outcome<&'a [T]> {
+pub(crate) unsafe fn in_slice<'a, T>(pointer: *const T, length: usize, argument: &str) -> Outcome<&'a [T]> {
     if length == 0 {
         return Ok(&[]);
     }
@@ -26,7 +26,7 @@ pub(crate) unsafe fn array<'a, T>(pointer: *const T, length: usize, argument: &s
 /// # Safety
 /// `pointer` is NULL or points to `length` values that no other code uses during `'a`.
 #[inline]
-pub(crate) unsafe fn output<'a, T>(
+pub(crate) unsafe fn out_slice<'a, T>(
     pointer: *mut T,
     length: usize,
     argument: &str,
@@ -50,7 +50,7 @@ pub(crate) fn same(what: &str, needed: usize, count: usize) -> Outcome {
 }
 
 /// Calls `body` with the elements of variables of FMI 3.0, in a model with arrays. The value reference of the
-/// first element denotes the whole array; its values are contiguous (section 2.2.7.2).
+/// first element denotes the whole array; its values are contiguous (section 2.2.7.2 of FMI 3.0).
 ///
 /// # Safety
 /// The value references are NULL or an array of this length, which does not change.
@@ -62,7 +62,7 @@ pub(crate) unsafe fn of_elements<M: Exported, R: Reference>(
     body: impl FnOnce(&mut Instance<M>, &[u32]) -> Outcome,
 ) -> Outcome {
     // SAFETY: the caller guarantees the array and its length.
-    let vr: &[R] = unsafe { array(R::cast(vr), count, R::REFERENCES) }?;
+    let vr: &[R] = unsafe { in_slice(R::cast(vr), count, R::REFERENCES) }?;
     same("values", instance.count_elements(vr)?, value_count)?;
     // Moved out so that `body` can borrow the instance; moved back to reuse the allocation.
     let mut elements = std::mem::take(&mut instance.elements);
@@ -77,7 +77,7 @@ pub(crate) unsafe fn of_elements<M: Exported, R: Reference>(
 ///
 /// # Safety
 /// `pointer` is NULL or points to a value that no other code uses during `'a`.
-pub(crate) unsafe fn target<'a, T>(pointer: *mut T, argument: &str) -> Outcome<&'a mut MaybeUninit<T>> {
+pub(crate) unsafe fn out_value<'a, T>(pointer: *mut T, argument: &str) -> Outcome<&'a mut MaybeUninit<T>> {
     if pointer.is_null() || !pointer.is_aligned() {
         return reject(format!("the pointer {argument} is NULL or not aligned"));
     }

@@ -1,6 +1,6 @@
 //! Derivatives in arrays of the importer.
 
-use super::{array, output, same};
+use super::{in_slice, out_slice, same};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, Reference, elements_of};
 use std::mem::MaybeUninit;
@@ -23,10 +23,10 @@ pub(crate) unsafe fn partial_derivatives<M: Exported, R: Reference, const ADJOIN
     // SAFETY: the caller guarantees the arrays and their lengths.
     let (unknown, known, seed, result) = unsafe {
         (
-            array(R::cast(unknown.0), unknown.1, names[0])?,
-            array(R::cast(known.0), known.1, names[1])?,
-            array(seed.0, seed.1, names[2])?,
-            output(result.0, result.1, names[3])?,
+            in_slice(R::cast(unknown.0), unknown.1, names[0])?,
+            in_slice(R::cast(known.0), known.1, names[1])?,
+            in_slice(seed.0, seed.1, names[2])?,
+            out_slice(result.0, result.1, names[3])?,
         )
     };
     let counts =
@@ -63,9 +63,9 @@ pub(crate) unsafe fn output_derivatives<M: Exported, R: Reference>(
     // SAFETY: the caller guarantees the arrays and their lengths.
     let (vr, order, value) = unsafe {
         (
-            array(R::cast(vr), count, R::REFERENCES)?,
-            array(order, count, order_name)?,
-            output(value, value_count, R::VALUES)?,
+            in_slice(R::cast(vr), count, R::REFERENCES)?,
+            in_slice(order, count, order_name)?,
+            out_slice(value, value_count, R::VALUES)?,
         )
     };
     same("values", instance.count_elements(vr)?, value_count)?;

@@ -4,7 +4,7 @@
 //! # Safety
 //! The importer guarantees the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
 
-use super::{array, string};
+use super::{in_slice, string};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, reject};
 use crate::log::Logger;
@@ -54,7 +54,7 @@ pub unsafe fn set_debug_logging<M: Exported, Boolean: Default + PartialEq>(
 ) -> Outcome {
     let on = on != Boolean::default();
     // SAFETY: by contract, an array of this length.
-    let names = unsafe { array(categories, count, "categories") }?;
+    let names = unsafe { in_slice(categories, count, "categories") }?;
     let mut found = 0;
     for name in names {
         // SAFETY: by contract, NULL or a string.

@@ -13,7 +13,7 @@ pub(crate) mod states;
 pub(crate) mod values;
 pub(crate) mod webassembly;
 
-pub(crate) use arrays::{array, of_elements, output, same, string, target};
+pub(crate) use arrays::{in_slice, of_elements, out_slice, out_value, same, string};
 pub(crate) use call::{Component, call, call_fast, forget_panic, panic_message};
 pub(crate) use derivatives::{output_derivatives, partial_derivatives};
 pub(crate) use importer_log::{Callback, ImporterLog};
@@ -24,7 +24,11 @@ use crate::instance::Instance;
 use fmi_abi::Standard;
 
 /// Returns the name of an argument in the FMI version of the instance.
-fn named<M: Exported>(instance: &Instance<M>, fmi2: &'static str, fmi3: &'static str) -> &'static str {
+fn argument_name<M: Exported>(
+    instance: &Instance<M>,
+    fmi2: &'static str,
+    fmi3: &'static str,
+) -> &'static str {
     match instance.standard() {
         Standard::Fmi2 => fmi2,
         Standard::Fmi3 => fmi3,

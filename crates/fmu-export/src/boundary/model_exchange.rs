@@ -3,7 +3,7 @@
 //! # Safety
 //! The importer guarantees the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
 
-use super::{array, named, output, target};
+use super::{argument_name, in_slice, out_slice, out_value};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome};
 
@@ -20,11 +20,14 @@ pub unsafe fn completed_integrator_step<M: Exported, Boolean: From<bool>>(
 ) -> Outcome {
     // SAFETY: by contract, each is NULL or points to a value.
     let (enter_event_mode, terminate_simulation) = unsafe {
-        (target(enter_event_mode, "enterEventMode")?, target(terminate_simulation, "terminateSimulation")?)
+        (
+            out_value(enter_event_mode, "enterEventMode")?,
+            out_value(terminate_simulation, "terminateSimulation")?,
+        )
     };
-    let wanted = instance.step_completed();
-    enter_event_mode.write(wanted.event.into());
-    terminate_simulation.write(wanted.terminate.into());
+    let requested = instance.step_completed();
+    enter_event_mode.write(requested.event.into());
+    terminate_simulation.write(requested.terminate.into());
     Ok(())
 }
 
@@ -37,9 +40,9 @@ pub unsafe fn set_continuous_states<M: Exported>(
     x: *const f64,
     count: usize,
 ) -> Outcome {
-    let name = named(instance, "x", "continuousStates");
+    let name = argument_name(instance, "x", "continuousStates");
     // SAFETY: by contract, an array of this length.
-    instance.set_continuous_states(unsafe { array(x, count, name) }?)
+    instance.set_continuous_states(unsafe { in_slice(x, count, name) }?)
 }
 
 pub unsafe fn get_derivatives<M: Exported>(
@@ -48,7 +51,7 @@ pub unsafe fn get_derivatives<M: Exported>(
     count: usize,
 ) -> Outcome {
     // SAFETY: by contract, an array of this length.
-    instance.get_derivatives(unsafe { output(derivatives, count, "derivatives") }?)
+    instance.get_derivatives(unsafe { out_slice(derivatives, count, "derivatives") }?)
 }
 
 pub unsafe fn get_event_indicators<M: Exported>(
@@ -57,7 +60,7 @@ pub unsafe fn get_event_indicators<M: Exported>(
     count: usize,
 ) -> Outcome {
     // SAFETY: by contract, an array of this length.
-    instance.get_event_indicators(unsafe { output(indicators, count, "eventIndicators") }?)
+    instance.get_event_indicators(unsafe { out_slice(indicators, count, "eventIndicators") }?)
 }
 
 pub unsafe fn get_continuous_states<M: Exported>(
@@ -65,9 +68,9 @@ pub unsafe fn get_continuous_states<M: Exported>(
     x: *mut f64,
     count: usize,
 ) -> Outcome {
-    let name = named(instance, "x", "continuousStates");
+    let name = argument_name(instance, "x", "continuousStates");
     // SAFETY: by contract, an array of this length.
-    instance.get_continuous_states(unsafe { output(x, count, name) }?)
+    instance.get_continuous_states(unsafe { out_slice(x, count, name) }?)
 }
 
 pub unsafe fn get_nominals<M: Exported>(
@@ -75,7 +78,7 @@ pub unsafe fn get_nominals<M: Exported>(
     nominals: *mut f64,
     count: usize,
 ) -> Outcome {
-    let name = named(instance, "x_nominal", "nominals");
+    let name = argument_name(instance, "x_nominal", "nominals");
     // SAFETY: by contract, an array of this length.
-    instance.get_nominals(unsafe { output(nominals, count, name) }?)
+    instance.get_nominals(unsafe { out_slice(nominals, count, name) }?)
 }

@@ -3,7 +3,7 @@
 //! # Safety
 //! The importer guarantees the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
 
-use super::{array, output, target};
+use super::{in_slice, out_slice, out_value};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, reject};
 use fmi_abi::c_types::c_void;
@@ -12,7 +12,7 @@ use std::ptr::without_provenance_mut;
 /// The instance owns the state until the importer frees the state or the instance.
 pub unsafe fn get_state<M: Exported>(instance: &mut Instance<M>, state: *mut *mut c_void) -> Outcome {
     // SAFETY: by contract, NULL or a pointer to a handle, which is initialized.
-    let handle = unsafe { target(state, "FMUstate")?.assume_init_mut() };
+    let handle = unsafe { out_value(state, "FMUstate")?.assume_init_mut() };
     check_memory(instance, *handle)?;
     *handle = without_provenance_mut(instance.save(handle.addr())?);
     Ok(())
@@ -28,7 +28,7 @@ pub unsafe fn free_state<M: Exported>(instance: &mut Instance<M>, state: *mut *m
         return Ok(());
     }
     // SAFETY: by contract, a pointer to a handle, which is initialized.
-    let handle = unsafe { target(state, "FMUstate")?.assume_init_mut() };
+    let handle = unsafe { out_value(state, "FMUstate")?.assume_init_mut() };
     if !handle.is_null() {
         let state = instance.remove(handle.addr())?;
         *handle = std::ptr::null_mut();
@@ -43,7 +43,7 @@ pub unsafe fn serialized_size<M: Exported>(
     size: *mut usize,
 ) -> Outcome {
     // SAFETY: by contract, NULL or a pointer to a size.
-    let size = unsafe { target(size, "size")? };
+    let size = unsafe { out_value(size, "size")? };
     size.write(instance.serialized_size(state.addr())?);
     Ok(())
 }
@@ -55,7 +55,7 @@ pub unsafe fn serialize<M: Exported, Byte>(
     size: usize,
 ) -> Outcome {
     // SAFETY: by contract, an array of this length.
-    let bytes = unsafe { output(bytes.cast::<u8>(), size, "serializedState")? };
+    let bytes = unsafe { out_slice(bytes.cast::<u8>(), size, "serializedState")? };
     let needed = instance.serialized_size(state.addr())?;
     if size != needed {
         return reject(format!(
@@ -80,7 +80,10 @@ pub unsafe fn deserialize<M: Exported, Byte>(
 ) -> Outcome {
     // SAFETY: by contract, an array of this length, and NULL or a pointer to a handle, which is initialized.
     let (bytes, handle) = unsafe {
-        (array(bytes.cast::<u8>(), size, "serializedState")?, target(state, "FMUstate")?.assume_init_mut())
+        (
+            in_slice(bytes.cast::<u8>(), size, "serializedState")?,
+            out_value(state, "FMUstate")?.assume_init_mut(),
+        )
     };
     check_memory(instance, std::ptr::null_mut())?;
     *handle = without_provenance_mut(instance.deserialize(bytes, handle.addr())?);

@@ -36,19 +36,19 @@ macro_rules! getters_and_setters {
             values: *mut $type
             $(, $value_count: usize)?
         ) -> Outcome {
-            use crate::boundary::{array, of_elements, output, same};
+            use crate::boundary::{in_slice, of_elements, out_slice, same};
             use crate::instance::Reference;
             let value_count = [$($value_count,)? count][0];
             // SAFETY: by contract, arrays of these lengths that do not overlap.
             unsafe {
                 if M::ARRAYS && <$reference>::ARRAYS {
                     return of_elements::<M, $reference>(instance, vr, count, value_count, |instance, vr| {
-                        $get_values(instance, vr, output(values, value_count, <$reference>::VALUES)?, &$bases)
+                        $get_values(instance, vr, out_slice(values, value_count, <$reference>::VALUES)?, &$bases)
                     });
                 }
                 same("values", count, value_count)?;
-                let vr: &[$reference] = array(<$reference>::cast(vr), count, <$reference>::REFERENCES)?;
-                $get_values(instance, vr, output(values, value_count, <$reference>::VALUES)?, &$bases)
+                let vr: &[$reference] = in_slice(<$reference>::cast(vr), count, <$reference>::REFERENCES)?;
+                $get_values(instance, vr, out_slice(values, value_count, <$reference>::VALUES)?, &$bases)
             }
         }
 
@@ -60,19 +60,19 @@ macro_rules! getters_and_setters {
             values: *const $type
             $(, $value_count: usize)?
         ) -> Outcome {
-            use crate::boundary::{array, of_elements, same};
+            use crate::boundary::{in_slice, of_elements, same};
             use crate::instance::Reference;
             let value_count = [$($value_count,)? count][0];
             // SAFETY: by contract, arrays of these lengths; `char` pointers are strings.
             unsafe {
                 if M::ARRAYS && <$reference>::ARRAYS {
                     return of_elements::<M, $reference>(instance, vr, count, value_count, |instance, vr| {
-                        $set_values(instance, vr, array(values, value_count, <$reference>::VALUES)?, &$bases)
+                        $set_values(instance, vr, in_slice(values, value_count, <$reference>::VALUES)?, &$bases)
                     });
                 }
                 same("values", count, value_count)?;
-                let vr: &[$reference] = array(<$reference>::cast(vr), count, <$reference>::REFERENCES)?;
-                $set_values(instance, vr, array(values, value_count, <$reference>::VALUES)?, &$bases)
+                let vr: &[$reference] = in_slice(<$reference>::cast(vr), count, <$reference>::REFERENCES)?;
+                $set_values(instance, vr, in_slice(values, value_count, <$reference>::VALUES)?, &$bases)
             }
         }
     };

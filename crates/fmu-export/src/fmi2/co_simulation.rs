@@ -1,10 +1,10 @@
-//! Co-Simulation (section 4.2).
+//! Co-Simulation (section 4.2 of FMI 2.0).
 //!
 //! # Safety
 //! The importer guarantees the contract of the [module above](super#safety).
 
 use super::types::*;
-use crate::boundary::{array, output_derivatives, target};
+use crate::boundary::{in_slice, out_value, output_derivatives};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, discard, reject};
 
@@ -16,8 +16,9 @@ pub unsafe fn fmi2SetRealInputDerivatives<M: Exported>(
     value: *const fmi2Real,
 ) -> Outcome {
     // SAFETY: by contract, arrays of this length.
-    let (vr, order, value) =
-        unsafe { (array(vr, count, "vr")?, array(order, count, "order")?, array(value, count, "value")?) };
+    let (vr, order, value) = unsafe {
+        (in_slice(vr, count, "vr")?, in_slice(order, count, "order")?, in_slice(value, count, "value")?)
+    };
     instance.set_input_derivatives(vr, order, value)
 }
 
@@ -74,7 +75,7 @@ pub unsafe fn fmi2GetRealStatus<M: Exported>(
     match status_kind(kind)? {
         StatusKind::LastSuccessfulTime => {
             // SAFETY: by contract, NULL or a pointer to a value.
-            unsafe { target(value, "value") }?.write(instance.last_successful_time());
+            unsafe { out_value(value, "value") }?.write(instance.last_successful_time());
             Ok(())
         }
         other => no_status(other),
@@ -89,7 +90,7 @@ pub unsafe fn fmi2GetBooleanStatus<M: Exported>(
     match status_kind(kind)? {
         StatusKind::Terminated => {
             // SAFETY: by contract, NULL or a pointer to a value.
-            unsafe { target(value, "value") }?.write(instance.has_ended().into());
+            unsafe { out_value(value, "value") }?.write(instance.has_ended().into());
             Ok(())
         }
         other => no_status(other),

@@ -1,4 +1,4 @@
-//! Functions of both interface types (section 2.1), and events (section 3.2.2).
+//! Functions of both interface types (section 2.1 of FMI 2.0), and events (section 3.2.2).
 //!
 //! # Safety
 //! The importer guarantees the contract of the [module above](super#safety).
@@ -6,7 +6,7 @@
 use super::types::*;
 use crate::boundary::life_cycle::experiment;
 use crate::boundary::values::*;
-use crate::boundary::{partial_derivatives, target};
+use crate::boundary::{out_value, partial_derivatives};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome};
 use fmi_abi::BaseType::*;
@@ -32,7 +32,7 @@ pub unsafe fn fmi2EnterInitializationMode<M: Exported>(instance: &mut Instance<M
     instance.enter_initialization_mode()
 }
 
-// Enumerations use the functions of Integers (section 2.2.7).
+// Enumerations use the functions of Integers (section 2.2.7 of FMI 2.0).
 getters_and_setters! { fmi2ValueReference, [];
     fmi2GetReal get_reals, fmi2SetReal set_reals, fmi2Real: [Real];
     fmi2GetInteger get_integers, fmi2SetInteger set_integers, fmi2Integer: [Integer, Enumeration];
@@ -67,7 +67,7 @@ pub unsafe fn fmi2NewDiscreteStates<M: Exported>(
     info: *mut fmi2EventInfo,
 ) -> Outcome {
     // SAFETY: by contract, NULL or a pointer to an event information.
-    let info = unsafe { target(info, "fmi2eventInfo") }?;
+    let info = unsafe { out_value(info, "fmi2eventInfo") }?;
     let event = instance.event()?;
     info.write(fmi2EventInfo {
         new_discrete_states_needed: event.again.into(),

@@ -1,10 +1,10 @@
-//! Co-Simulation (section 4.2).
+//! Co-Simulation (section 4.2 of FMI 3.0).
 //!
 //! # Safety
 //! The importer guarantees the contract of the [module above](super#safety).
 
 use super::types::*;
-use crate::boundary::{output_derivatives, target};
+use crate::boundary::{out_value, output_derivatives};
 use crate::export::Exported;
 use crate::instance::{FromOne, Instance, Outcome};
 
@@ -39,10 +39,10 @@ pub unsafe fn fmi3DoStep<M: Exported>(
     // SAFETY: by contract, each is NULL or points to a value.
     let (event_handling_needed, terminate_simulation, early_return, last_successful_time) = unsafe {
         (
-            target(event_handling_needed, "eventHandlingNeeded")?,
-            target(terminate_simulation, "terminateSimulation")?,
-            target(early_return, "earlyReturn")?,
-            target(last_successful_time, "lastSuccessfulTime")?,
+            out_value(event_handling_needed, "eventHandlingNeeded")?,
+            out_value(terminate_simulation, "terminateSimulation")?,
+            out_value(early_return, "earlyReturn")?,
+            out_value(last_successful_time, "lastSuccessfulTime")?,
         )
     };
     let reached = instance.do_step_to(current_communication_point, communication_step_size)?;

@@ -1,4 +1,4 @@
-//! Functions of both interface types (sections 2.2 and 2.3), and the sizes for Model Exchange (section 3.2).
+//! Functions of both interface types (sections 2.2 and 2.3 of FMI 3.0), and the sizes for Model Exchange (section 3.2).
 //!
 //! # Safety
 //! The importer guarantees the contract of the [module above](super#safety).
@@ -6,7 +6,7 @@
 use super::types::*;
 use crate::boundary::life_cycle::experiment;
 use crate::boundary::values::*;
-use crate::boundary::{array, of_elements, output, partial_derivatives, target};
+use crate::boundary::{in_slice, of_elements, out_slice, out_value, partial_derivatives};
 use crate::export::Exported;
 use crate::instance::{FromOne, Instance, Outcome, reject};
 use fmi_abi::BaseType::{self, *};
@@ -29,8 +29,8 @@ pub unsafe fn fmi3EnterInitializationMode<M: Exported>(
     ))
 }
 
-/// Accepts the call before the initialization, where FMIKit makes it for every FMU with inputs. Section 2.3.2 of FMI 3.0
-/// requires structural parameters, which models of this crate do not have.
+/// Accepts the call before the initialization, where FMIKit makes it for every FMU with inputs. It changes nothing,
+/// because section 2.3.2 of FMI 3.0 requires structural parameters, which models of this crate do not have.
 pub unsafe fn fmi3EnterConfigurationMode<M: Exported>(instance: &mut Instance<M>) -> Outcome {
     if instance.mode() != Mode::Instantiated {
         return reject("this FMU has no structural parameters");
@@ -44,7 +44,7 @@ pub unsafe fn fmi3ExitConfigurationMode<M: Exported>(_: &mut Instance<M>) -> Out
     Ok(())
 }
 
-// Enumerations use the functions of Int64 (section 2.2.7.2).
+// Enumerations use the functions of Int64 (section 2.2.7.2 of FMI 3.0).
 getters_and_setters! { FromOne, [value_count];
     fmi3GetFloat64 get_reals, fmi3SetFloat64 set_reals, fmi3Float64: [Real];
     fmi3GetFloat32 get_float32, fmi3SetFloat32 set_float32, fmi3Float32: [Float32];
@@ -72,8 +72,8 @@ pub unsafe fn fmi3GetBinary<M: Exported>(
     // SAFETY: by contract, arrays of these lengths that do not overlap.
     unsafe {
         of_elements::<M, FromOne>(instance, vr, count, value_count, |instance, vr| {
-            let values = output(values, value_count, "values")?;
-            let sizes = output(sizes, value_count, "valueSizes")?;
+            let values = out_slice(values, value_count, "values")?;
+            let sizes = out_slice(sizes, value_count, "valueSizes")?;
             let mut found = Vec::with_capacity(vr.len());
             instance.get(vr, &[BaseType::Binary], &mut |_, value| {
                 if let Value::Binary(bytes) = value {
@@ -101,12 +101,12 @@ pub unsafe fn fmi3SetBinary<M: Exported>(
     // SAFETY: by contract, arrays of these lengths; each value is NULL or an array of its size.
     unsafe {
         of_elements::<M, FromOne>(instance, vr, count, value_count, |instance, vr| {
-            let values: &[fmi3Binary] = array(values, value_count, "values")?;
-            let sizes = array(sizes, value_count, "valueSizes")?;
+            let values: &[fmi3Binary] = in_slice(values, value_count, "values")?;
+            let sizes = in_slice(sizes, value_count, "valueSizes")?;
             let mut bytes = Vec::with_capacity(vr.len());
             for ((vr, size), value) in vr.iter().zip(sizes).zip(values) {
                 let name = instance.name(*vr, BaseType::Binary)?;
-                bytes.push(Value::Binary(array(*value, *size, name)?.to_vec()));
+                bytes.push(Value::Binary(in_slice(*value, *size, name)?.to_vec()));
             }
             instance.set(vr, &[BaseType::Binary], &|index| bytes[index].clone())
         })
@@ -165,12 +165,12 @@ pub unsafe fn fmi3UpdateDiscreteStates<M: Exported>(
     // SAFETY: by contract, each is NULL or points to a value.
     let (again, terminate, nominals_changed, states_changed, next_defined, next) = unsafe {
         (
-            target(again, "discreteStatesNeedUpdate")?,
-            target(terminate, "terminateSimulation")?,
-            target(nominals_changed, "nominalsOfContinuousStatesChanged")?,
-            target(states_changed, "valuesOfContinuousStatesChanged")?,
-            target(next_defined, "nextEventTimeDefined")?,
-            target(next, "nextEventTime")?,
+            out_value(again, "discreteStatesNeedUpdate")?,
+            out_value(terminate, "terminateSimulation")?,
+            out_value(nominals_changed, "nominalsOfContinuousStatesChanged")?,
+            out_value(states_changed, "valuesOfContinuousStatesChanged")?,
+            out_value(next_defined, "nextEventTimeDefined")?,
+            out_value(next, "nextEventTime")?,
         )
     };
     let event = instance.event()?;
@@ -185,7 +185,7 @@ pub unsafe fn fmi3UpdateDiscreteStates<M: Exported>(
 
 pub unsafe fn fmi3GetNumberOfEventIndicators<M: Exported>(_: &mut Instance<M>, count: *mut usize) -> Outcome {
     // SAFETY: by contract, NULL or a pointer to a value.
-    unsafe { target(count, "nEventIndicators") }?.write(Instance::<M>::INDICATORS);
+    unsafe { out_value(count, "nEventIndicators") }?.write(Instance::<M>::INDICATORS);
     Ok(())
 }
 
@@ -194,6 +194,6 @@ pub unsafe fn fmi3GetNumberOfContinuousStates<M: Exported>(
     count: *mut usize,
 ) -> Outcome {
     // SAFETY: by contract, NULL or a pointer to a value.
-    unsafe { target(count, "nContinuousStates") }?.write(M::STATES.len());
+    unsafe { out_value(count, "nContinuousStates") }?.write(M::STATES.len());
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! Functions without an instance argument: version, creation and release (sections 2.2.5 and 2.3.1).
+//! Functions without an instance argument: version, creation and release (sections 2.2.5 and 2.3.1 of FMI 3.0).
 
 use super::types::*;
 use crate::boundary::{Arguments, Callback, ImporterLog, free, instantiate, string};

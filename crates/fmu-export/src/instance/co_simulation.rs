@@ -1,4 +1,4 @@
-//! Co-Simulation (section 4.2).
+//! Co-Simulation (section 4.2 of both FMI versions).
 
 use super::{Importer, Instance, Outcome, Rejection, discard, reject, reject_with};
 use crate::capabilities::{Events, Step, Stepped};
@@ -85,7 +85,7 @@ impl<M: Exported> Instance<M> {
 
     /// Restores the state at the start of the step, which then returns an error, or `fmi3Discard` if a
     /// shorter step may help. Section 4.2.1 of FMI 3.0 requires the state before the step and no early return
-    /// then. FMI 2.0 leaves the state open (section 2.1.3); this crate has one rule for both.
+    /// then. Although FMI 2.0 leaves the state open (section 2.1.3), this crate has one rule for both.
     #[cold]
     fn go_back<T>(&mut self, why: Outcome<T>) -> Outcome<T> {
         self.listen();
@@ -290,12 +290,12 @@ fn reject_step<T>(point: f64, step_size: f64) -> Outcome<T> {
     ))
 }
 
-/// Tolerance for the end of the last step after the stop time, relative to the simulated time. Importers that
-/// count in nanoseconds round a step of 1/60 s up, every time.
+/// Tolerance for the end of the last step after the stop time, relative to the simulated time, because
+/// importers that count in nanoseconds round a step of 1/60 s up, every time.
 const STOP_TIME_ROUNDING: f64 = 1e-7;
 
-/// Returns the tolerance for a communication point. Importers count in nanoseconds, add up step sizes or
-/// multiply them, with different rounding errors.
+/// Returns the tolerance for a communication point, because importers count in nanoseconds, add up step sizes
+/// or multiply them, with different rounding errors.
 #[inline]
 fn rounding(point: f64, step_size: f64) -> f64 {
     (0.01 * step_size).min(1e-9) + 8.0 * f64::EPSILON * point.abs()

@@ -122,7 +122,7 @@ impl<M: Exported> Instance<M> {
         if initial && calculated && is_initial {
             return Ok(());
         }
-        reject(format!("{} is no unknown: neither output nor state derivative", variable.name()))
+        reject(format!("{} is not an unknown: neither output nor state derivative", variable.name()))
     }
 
     /// Checks that a variable is a known: inputs, states and parameters; in Initialization Mode all exact
@@ -146,7 +146,7 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// Rejects a variable that is no known. Accepts the time of FMI 3.0, which may be outside of the table.
+    /// Rejects a variable that is not a known. Accepts the time of FMI 3.0, which may be outside of the table.
     #[cold]
     #[inline(never)]
     fn reject_known(&self, index: u32) -> Outcome {
@@ -155,11 +155,11 @@ impl<M: Exported> Instance<M> {
             return Ok(());
         }
         let why = if variable.variability() == Variability::Constant {
-            "no known: it is constant"
+            "not a known: it is constant"
         } else if variable.is_state() {
-            "no known in initialization mode, where it is calculated"
+            "not a known in initialization mode, where it is calculated"
         } else {
-            "no known: neither input, parameter nor state"
+            "not a known: neither input, parameter nor state"
         };
         reject(format!("{} is {why}", variable.name()))
     }
@@ -171,7 +171,7 @@ impl<M: Exported> Instance<M> {
         for ((vr, order), value) in vr.iter().zip(orders).zip(values) {
             let variable = self.variable(vr.index(), BaseType::Real)?;
             if variable.causality() != Causality::Input || variable.variability() != Variability::Continuous {
-                return reject(format!("{} is no continuous input", variable.name()));
+                return reject(format!("{} is not a continuous input", variable.name()));
             }
             check_order(variable, *order)?;
             if !value.is_finite() {

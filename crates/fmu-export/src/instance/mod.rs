@@ -1,6 +1,7 @@
-//! An instance of a model. Its methods check and carry out the calls of both FMI versions. They use Rust types, no pointers.
+//! An instance of a model. Its methods check and carry out the calls of both FMI versions, with Rust
+//! types instead of pointers.
 //!
-//! Every method checks all its arguments before it changes anything; an error leaves the instance unchanged.
+//! Every method checks all its arguments before it changes anything, so an error leaves the instance unchanged.
 
 mod co_simulation;
 mod derivatives;

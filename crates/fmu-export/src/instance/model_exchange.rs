@@ -1,4 +1,4 @@
-//! Model Exchange (section 3.2).
+//! Model Exchange (section 3.2 of both FMI versions).
 
 use super::{Instance, Outcome, finite, reject};
 use crate::capabilities::{Event, StepCompleted};

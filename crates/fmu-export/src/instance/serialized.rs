@@ -57,7 +57,7 @@ pub(super) fn write<M: Exported>(state: &mut State<M>, origin: Origin, bytes: &m
 pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<M>) -> Outcome {
     let version = MAGIC.len() - 1;
     if bytes.len() < MAGIC.len() || bytes[..version] != MAGIC[..version] {
-        return reject("the bytes are no saved state of an FMU of this kind");
+        return reject("the bytes are not a saved state of an FMU of this kind");
     }
     if bytes[version] != MAGIC[version] {
         return reject("the saved state has another version of the layout; save it again with this FMU");

@@ -1,4 +1,5 @@
-//! A map for few entries. Its code is a tenth of a `BTreeMap`, which counts in every library.
+//! A map for few entries, because the code of a `BTreeMap` is ten times as large, which counts in every
+//! library.
 
 /// Entries in the order of their keys.
 #[derive(Clone, Debug)]

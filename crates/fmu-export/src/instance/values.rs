@@ -184,8 +184,8 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// Sets values of any type, which `value` returns by index. Checks all, then sets all. One function for
-    /// all types keeps libraries small.
+    /// Sets values of any type, which `value` returns by index. Checks all, then sets all. One function
+    /// serves all types, because this keeps libraries small.
     #[inline(never)]
     pub fn set<R: Reference>(
         &mut self,
@@ -232,9 +232,9 @@ impl<M: Exported> Instance<M> {
         vr.iter().try_for_each(|vr| self.check_settable(self.variable_of(vr.index(), bases)?))
     }
 
-    /// Records rejected start values. Some importers continue after the error, and the simulation would then
-    /// use other start values than the user wants. So the initialization fails until the variables are set to
-    /// valid values. The record includes all variables of the call.
+    /// Records rejected start values, so that the initialization fails until the variables are set to valid
+    /// values: some importers continue after the error, and the simulation would then use other start values
+    /// than the user wants. The record includes all variables of the call.
     fn remember<R: Reference>(&mut self, vr: &[R], blamed: Option<u32>, set: Outcome) -> Outcome {
         if self.fmi_state().is_in(STARTING) {
             for vr in vr.iter().map(|vr| vr.index()) {
@@ -330,8 +330,8 @@ impl<M: Exported> Instance<M> {
     }
 }
 
-/// Returns whether a sum is finite, which requires that all its terms are. One check is faster than one for
-/// each term.
+/// Returns whether a sum is finite, which requires that all its terms are. The sum is checked because this is
+/// faster than a check of each term.
 #[inline(always)]
 pub(super) fn is_finite(sum: f64) -> bool {
     // Takes half as many instructions as `f64::is_finite`.

@@ -12,7 +12,7 @@ use fmu_test_kit::checks::modes_of_model;
 use fmu_test_kit::serialized::{MODE, with_mode};
 use fmu_test_kit::{Either, Importer, fmi3};
 
-/// Columns of the table in section 3.2.3: start/end, instantiated, Initialization Mode, Event Mode,
+/// Columns of the table in section 3.2.3 of FMI 2.0: start/end, instantiated, Initialization Mode, Event Mode,
 /// Continuous-Time Mode, terminated, error, fatal.
 const MODEL_EXCHANGE: &str = "
     fmi2GetTypesPlatform              |x |x |x |x |x |x |x |
@@ -51,7 +51,7 @@ const MODEL_EXCHANGE: &str = "
     fmi2GetDerivatives                |  |  |x |x |x |x |7 |
     fmi2GetNominalsOfContinuousStates |  |x |x |x |x |x |7 |";
 
-/// Columns of the table in section 4.2.4: start/end, instantiated, Initialization Mode, stepComplete,
+/// Columns of the table in section 4.2.4 of FMI 2.0: start/end, instantiated, Initialization Mode, stepComplete,
 /// stepInProgress, stepFailed, stepCanceled, terminated, error, fatal.
 const CO_SIMULATION: &str = "
     fmi2GetTypesPlatform         |x |x |x |x |x |x |x |x |x |
@@ -115,7 +115,7 @@ fn standard_of_fmi2(function: &str, interface: Interface, mode: Mode) -> bool {
         (CoSimulation, Terminated) => (CO_SIMULATION, 6),
         (CoSimulation, Error) => (CO_SIMULATION, 7),
         (CoSimulation, Fatal) => (CO_SIMULATION, 8),
-        (CoSimulation, mode) => panic!("{mode} is no state of Co-Simulation"),
+        (CoSimulation, mode) => panic!("{mode} is not a state of Co-Simulation"),
     };
     let row = table
         .lines()
@@ -131,7 +131,7 @@ fn standard_of_fmi2(function: &str, interface: Interface, mode: Mode) -> bool {
     }
 }
 
-/// Functions of the super state FMU State Settable, section 2.3.1.
+/// Functions of the super state FMU State Settable, section 2.3.1 of FMI 3.0.
 const EVERYWHERE: &str = "SetDebugLogging Reset GetFMUState SetFMUState FreeFMUState SerializedFMUStateSize \
     SerializeFMUState DeserializeFMUState";
 

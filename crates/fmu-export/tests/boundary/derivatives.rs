@@ -82,7 +82,7 @@ fn calculated_states<F: Either>() {
         let rows = [level, der_level]
             .map(|unknown| [plain, stiffness].map(|known| fmu.partial(unknown as u32, known as u32)));
         assert_eq!(rows, [[0.25, -0.375], [0.0, 0.0]]);
-        fmu.rejected_with(&["level is no known in initialization mode"], |fmu| {
+        fmu.rejected_with(&["level is not a known in initialization mode"], |fmu| {
             fmu.try_directional(&[der_level as u32], &[level as u32], &[1.0], &mut [0.0])
         });
         fmu.ok(fmu.exit_initialization_mode());
@@ -150,7 +150,7 @@ fn only_in_fmi3() {
     fmu.rejected("seeds", |fmu| fmu.fmi3GetDirectionalDerivative(&u, 1, &k, 1, &1.0, 0, &mut out, 1));
     fmu.rejected("results", |fmu| fmu.fmi3GetDirectionalDerivative(&u, 1, &k, 1, &1.0, 1, &mut out, 0));
     fmu.rejected("seeds", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &k, 0, &1.0, 0, &mut out, 0));
-    fmu.rejected("no known", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &u, 1, &1.0, 1, &mut out, 1));
+    fmu.rejected("not a known", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &u, 1, &1.0, 1, &mut out, 1));
     fmu.rejected("no seed", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &k, 1, &f64::NAN, 1, &mut out, 1));
     let fuse = fmi3::Importer::initialized_at::<Fuse>(0.0);
     fuse.rejected_with(&["providesAdjointDerivatives is false"], |fmu| {

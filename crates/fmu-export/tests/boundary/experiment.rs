@@ -1,4 +1,4 @@
-//! Data that the importer passes about itself and its experiment (sections 2.1.5 and 2.1.6), and their effect
+//! Data that the importer passes about itself and its experiment (sections 2.1.5 and 2.1.6 of FMI 2.0), and their effect
 //! on the model.
 
 use crate::models::{Talker, talker::Name};

@@ -1,4 +1,4 @@
-//! Content and times of log messages (sections 2.1.5 and 2.2.4).
+//! Content and times of log messages (sections 2.1.5 and 2.2.4 of FMI 2.0).
 
 use crate::models::grumbler::{self, Trouble};
 use crate::models::{Grumbler, Oscillator, Talker, talker::Name};
@@ -42,7 +42,7 @@ fn shown(fmu: &Importer) -> String {
     letters.into_iter().collect()
 }
 
-/// Checks that errors and warnings are always logged, other messages on demand: in section 2.1.3, fmi2Discard
+/// Checks that errors and warnings are always logged, other messages on demand: in section 2.1.3 of FMI 2.0, fmi2Discard
 /// is logged only in debug mode.
 #[test]
 fn logging_on_and_off() {
@@ -96,7 +96,7 @@ fn logging_of_fmi3() {
     let fmu = fmi3::Importer::new::<Talker>(CoSimulation);
     let volume = Name::volume as u32;
     fmu.set(&[volume], &[10.5]);
-    assert_eq!(fmu.take_log(), [], "a warning is no error");
+    assert_eq!(fmu.take_log(), [], "a warning is not an error");
     fmu.ok(fmu.fmi3SetDebugLogging(1, 1, &c"logStatusWarning".as_ptr()));
     fmu.set(&[volume], &[10.6]);
     assert_eq!(fmu.take_log().len(), 1);

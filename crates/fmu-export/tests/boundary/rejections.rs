@@ -176,8 +176,8 @@ fn derivatives_with_respect_to_time() {
         (FORCE, -1, 0.0, "it is -1"),
         (FORCE, 1, NAN, "the derivative of force must be a finite number"),
         (FORCE, 3, INF, "the derivative of force must be a finite number"),
-        (ENERGY, 1, 0.0, "energy is no continuous input"),
-        (MASS, 1, 0.0, "mass is no continuous input"),
+        (ENERGY, 1, 0.0, "energy is not a continuous input"),
+        (MASS, 1, 0.0, "mass is not a continuous input"),
         (SPRINGS, 1, 0.0, "springs is of type Integer"),
         (UNKNOWN, 1, 0.0, "value reference 12"),
     ] {
@@ -195,11 +195,11 @@ fn directional_derivatives() {
     for (interface, mode) in [(CoSimulation, StepComplete), (ModelExchange, ContinuousTime)] {
         let fmu = Importer::in_mode::<Oscillator>(interface, mode);
         for (unknown, known, seed, words) in [
-            (FORCE, FORCE, 1.0, "force is no unknown"),
-            (MASS, FORCE, 1.0, "mass is no unknown"),
-            (VELOCITY, FORCE, 1.0, "velocity is no unknown"),
-            (SPRING_FORCE, ENERGY, 1.0, "energy is no known"),
-            (ENERGY, ACCELERATION, 1.0, "der(velocity) is no known"),
+            (FORCE, FORCE, 1.0, "force is not an unknown"),
+            (MASS, FORCE, 1.0, "mass is not an unknown"),
+            (VELOCITY, FORCE, 1.0, "velocity is not an unknown"),
+            (SPRING_FORCE, ENERGY, 1.0, "energy is not a known"),
+            (ENERGY, ACCELERATION, 1.0, "der(velocity) is not a known"),
             (ENERGY, SPRINGS, 1.0, "springs is of type Integer"),
             (UNKNOWN, FORCE, 1.0, "value reference 12"),
             (ENERGY, UNKNOWN, 1.0, "value reference 12"),

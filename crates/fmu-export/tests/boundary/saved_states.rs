@@ -1,4 +1,4 @@
-//! Saved states (section 2.1.8): their content, and rejected states.
+//! Saved states (section 2.1.8 of FMI 2.0): their content, and rejected states.
 
 use crate::INTERFACES;
 use crate::models::*;
@@ -28,7 +28,7 @@ fn handles_are_reused() {
     assert_eq!(fmu.bytes(), bytes);
 }
 
-/// Checks that an instance frees its saved states (section 2.1.5). Handles of other instances, freed handles
+/// Checks that an instance frees its saved states (section 2.1.5 of FMI 2.0). Handles of other instances, freed handles
 /// and other addresses are rejected, not dereferenced.
 #[test]
 fn handles_that_are_none() {
@@ -299,7 +299,7 @@ fn messages_say_where_a_state_comes_from() {
         let other_version = with(bytes.clone(), VERSION..VERSION + 1, version);
         assert!(fmu.rejected_bytes(&other_version).contains("version"));
     }
-    assert!(fmu.rejected_bytes(b"something else").contains("no saved state"));
+    assert!(fmu.rejected_bytes(b"something else").contains("not a saved state"));
     let cut = &bytes[..bytes.len() - 30];
     assert!(fmu.rejected_bytes(cut).contains("length"));
 }

@@ -1,4 +1,4 @@
-//! Modes in which a variable can be set (footnotes 1, 3, 4, 5 and 6 of sections 3.2.3 and 4.2.4), for every
+//! Modes in which a variable can be set (footnotes 1, 3, 4, 5 and 6 of sections 3.2.3 and 4.2.4 of FMI 2.0), for every
 //! variable in every state.
 
 use crate::{INTERFACES, offers};

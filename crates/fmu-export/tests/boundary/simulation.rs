@@ -31,7 +31,7 @@ fn errors_name_the_mistake() {
     assert_eq!(rejected(rod.set("mean", 2.0)).split(" in state").next(), Some("mean cannot be set"));
     assert_eq!(
         rod.get("labels[1]").err().unwrap().to_string().split(" but").next(),
-        Some("labels[1] is no number")
+        Some("labels[1] is not a number")
     );
 }
 

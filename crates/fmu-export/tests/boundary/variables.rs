@@ -219,7 +219,7 @@ fn the_time_of_fmi3() {
         assert_eq!(fmu.get([index]), [2.0]);
         fmu.step(2.0, 0.5);
         assert_eq!(fmu.get([index]), [2.5]);
-        fmu.rejected("the time is no input", |fmu| fmu.try_set(&[index], &[1.0]));
+        fmu.rejected("the time is not an input", |fmu| fmu.try_set(&[index], &[1.0]));
         fmu.rejected("no variable", |fmu| fmu.try_set(&[M::TABLE.len() as u32 + 1], &[1.0]));
     }
     check::<Palette>();

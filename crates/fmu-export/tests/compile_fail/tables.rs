@@ -17,17 +17,17 @@ mod lines {
         clock = clock(&BOOLEAN);
         /// There are no structural parameters
         structural = structural_parameter(&INTEGER) in n;
-        /// A constant is exact (section 2.2.7)
+        /// A constant is exact (section 2.2.7 of FMI 2.0)
         constant_approx = output(&NUMBER).constant().approx() in x;
         /// Names differ from the names of array elements
         element_of_the_same_name as "T[3]" = input(&NUMBER) in u;
         /// The value of the time is the time of the instance
         independent_with_by = independent(&TIME) by |plant| plant.x;
-        /// An input is not constant (section 2.2.7)
+        /// An input is not constant (section 2.2.7 of FMI 2.0)
         input_constant = input(&NUMBER).constant() in u;
         /// An input has no dependencies
         input_depends_on = input(&NUMBER).depends_on(&[input_constant]) in u;
-        /// An input has no initial (section 2.2.7)
+        /// An input has no initial (section 2.2.7 of FMI 2.0)
         input_exact = input(&NUMBER).exact() in u;
         /// An input has a field
         input_with_by_only = input(&NUMBER) by |plant| plant.u;
@@ -35,17 +35,17 @@ mod lines {
         x = output(&NUMBER).state() in x;
         /// A derivative is a Real
         integer_derivative = local(&INTEGER).derivative_of(x) by |plant| plant.n;
-        /// A continuous variable is a Real (section 2.2.7)
+        /// A continuous variable is a Real (section 2.2.7 of FMI 2.0)
         integer_state = output(&INTEGER).state() in n;
         // A variable has a description.
         no_description = input(&NUMBER) in u;
         /// A variable has a field or a calculation
         nothing = output(&NUMBER);
-        /// An output is not tunable (section 2.2.7)
+        /// An output is not tunable (section 2.2.7 of FMI 2.0)
         output_tunable = output(&NUMBER).tunable() in x;
-        /// The value of a parameter is exact (section 2.2.7)
+        /// The value of a parameter is exact (section 2.2.7 of FMI 2.0)
         parameter_approx = parameter(&NUMBER).approx() in x;
-        /// A parameter is fixed or tunable (section 2.2.7)
+        /// A parameter is fixed or tunable (section 2.2.7 of FMI 2.0)
         parameter_discrete = parameter(&NUMBER).discrete() in x;
         /// A parameter has a field
         parameter_without_field = parameter(&NUMBER) by |plant| plant.x;

@@ -76,7 +76,7 @@ impl Model for Counter {
 }
 
 impl ModelExchange for Counter {
-    /// Does at most one thing; if more is due at the same time, the importer calls again (section 3.2.2).
+    /// Does at most one thing; if more is due at the same time, the importer calls again (section 3.2.2 of FMI 2.0).
     fn event(&mut self, time: f64) -> Result<Event, Error> {
         if self.count >= self.full {
             self.carry();

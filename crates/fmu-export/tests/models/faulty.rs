@@ -26,7 +26,7 @@ pub enum Fault {
     OutputDerivative,
     Memory,
     Drop,
-    /// With a payload that is no string.
+    /// With a payload that is not a string.
     NoMessage,
     /// With a payload whose drop panics with such a payload.
     Bomb,

@@ -419,7 +419,7 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     END
 }
 
-/* A saved state is in the module's memory. Any other pointer is no state of the module. */
+/* A saved state is in the module's memory. Any other pointer is not a state of the module. */
 
 static u32 to_module(const Instance *instance, fmi2FMUstate state) {
     uintptr_t place = (uintptr_t)state - (uintptr_t)instance->module.w2c_memory.data.bytes;

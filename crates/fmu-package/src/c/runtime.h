@@ -310,7 +310,7 @@ FMU_REINTERPRET(f64_reinterpret_i64, uint64_t, double)
 #define FMIN(x, y) ((x) != (x) || (y) != (y) ? NAN : (x) == (y) ? (signbit(x) ? (x) : (y)) : (x) < (y) ? (x) : (y))
 #define FMAX(x, y) ((x) != (x) || (y) != (y) ? NAN : (x) == (y) ? (signbit(x) ? (y) : (x)) : (x) > (y) ? (x) : (y))
 
-/* Conversions to integers. The range is open at both ends if its limits are no numbers of the type. */
+/* Conversions to integers. The range is open at both ends if its limits are not numbers of the type. */
 #define FMU_TRUNC(u, i, x, in_range) \
     ((x) != (x) ? (u)TRAP(INVALID_CONVERSION) : (in_range) ? (u)(i)(x) : (u)TRAP(INT_OVERFLOW))
 #define FMU_TRUNC_SAT(u, i, x, in_range, least, most) \

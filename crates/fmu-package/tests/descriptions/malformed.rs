@@ -81,7 +81,7 @@ fn derivatives_that_differ_from_the_values() {
         FAULT.set(fault);
         for (fmi, interface) in BOTH.into_iter().flat_map(|fmi| [(fmi, ""), (fmi, "modelExchange=null")]) {
             let text = message::<Faulty>(interface, fmi);
-            // Time is no variable of the model, so FMI 2.0 has no derivatives with respect to it.
+            // Time is not a variable of the model, so FMI 2.0 has no derivatives with respect to it.
             let is_accepted = fault == "partial_by_time" && fmi == Standard::Fmi2;
             let is_named =
                 text.starts_with(&format!("the derivative of {beginning}")) && text.contains(function);

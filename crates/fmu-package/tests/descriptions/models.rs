@@ -179,7 +179,7 @@ pub mod room {
     offer!(Room: ModelExchange + CoSimulation + InputDerivatives + OutputDerivatives);
 }
 
-/// The types that only FMI 3.0 has, a time that is no variable of the model, and a derivative that is a state.
+/// The types that only FMI 3.0 has, a time that is not a variable of the model, and a derivative that is a state.
 pub mod types {
     use super::*;
 

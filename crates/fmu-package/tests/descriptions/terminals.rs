@@ -37,10 +37,10 @@ fn terminals_that_cannot_be_are_rejected() {
             vec![door().signal("a", "power").signal("a", "outside")],
             "the terminal door: it has two members with the name a",
         ),
-        (vec![door().signal("a", "b")], "the terminal door: its member a is b, which is no variable"),
+        (vec![door().signal("a", "b")], "the terminal door: its member a is b, which is not a variable"),
         (
             vec![door().signal("a", "der(temperature)")],
-            "the terminal door: its member a is der(temperature), which is no input, output or parameter",
+            "the terminal door: its member a is der(temperature), which is not an input, output or parameter",
         ),
         (
             vec![door().icon("door", [0.0; 4])],

@@ -358,7 +358,7 @@ class System(_Model):
     ValueError
         For invalid connections.
     FmuError
-        If the file is no SSP or one of its FMUs cannot be loaded.
+        If the file is not an SSP or one of its FMUs cannot be loaded.
     """
 
     def __init__(

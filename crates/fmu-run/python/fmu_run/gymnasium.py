@@ -54,7 +54,7 @@ class Task:
     terminated
         As `reward` -> (n,) of bool: whether the episode terminates.
     inputs, to_inputs
-        If actions are no inputs: names of the inputs, and (actions, previous inputs (n, inputs)) -> (n, inputs).
+        If actions are not inputs: names of the inputs, and (actions, previous inputs (n, inputs)) -> (n, inputs).
         Actions may then have any names.
     start
         Start values for all episodes: numbers or strings.
@@ -129,7 +129,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
             self._inputs, self._observed = tuple(task.inputs or actions), tuple(observations)
             for name in self._inputs:
                 if name in fmu.variables and (found := fmu.variables[name].causality) != "input":
-                    raise ValueError(f"{name} is no input, its causality is {found}")
+                    raise ValueError(f"{name} is not an input, its causality is {found}")
             self._instances = fmu.instances(num_envs, start=task.start, threads=task.threads)
             for names in (self._inputs, self._observed):
                 self._instances.get(names)  # Raises for unknown names.
@@ -230,7 +230,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
             return after, {}
         after[failed], why = before[failed], self._instances.errors
         indices = np.flatnonzero(failed).tolist()
-        return after, {index: why.get(index, "an observation is no finite number") for index in indices}
+        return after, {index: why.get(index, "an observation is not a finite number") for index in indices}
 
     def _begin(self, which: _Bools, observation: _Array) -> None:
         """New episodes for some instances, and their observations."""

@@ -162,11 +162,3 @@ pub fn path(name: &str, value: &Bound<'_, PyAny>) -> PyResult<PathBuf> {
 pub fn text(name: &str, value: &Bound<'_, PyAny>) -> PyResult<String> {
     value.cast::<PyString>().map_err(|_| wrong(name, "a str", value))?.extract()
 }
-
-/// Writes a shape like NumPy.
-pub fn shape(sizes: &[usize]) -> String {
-    match sizes {
-        [one] => format!("({one},)"),
-        _ => format!("({})", sizes.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")),
-    }
-}

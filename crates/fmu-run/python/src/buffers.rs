@@ -102,7 +102,7 @@ impl Output {
         let wrong = || {
             PyValueError::new_err(format!(
                 "out must be a writable, contiguous array of float64 of the shape {}",
-                crate::arguments::shape(shape)
+                self::shape(shape)
             ))
         };
         let buffer = PyBuffer::<f64>::get(&array).map_err(|_| wrong())?;
@@ -127,5 +127,13 @@ impl Output {
             #[allow(unsafe_code)]
             count => unsafe { std::slice::from_raw_parts_mut(self.0.buf_ptr().cast(), count) },
         }
+    }
+}
+
+/// Writes a shape like NumPy.
+pub fn shape(sizes: &[usize]) -> String {
+    match sizes {
+        [one] => format!("({one},)"),
+        _ => format!("({})", sizes.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")),
     }
 }

@@ -1,6 +1,7 @@
 //! Values that float64 does not have: strings, bytes and integers of 64 bits.
 
-use crate::arguments::{shape, wrong};
+use crate::arguments::wrong;
+use crate::buffers::shape;
 use fmu_run::{BaseType, System, Value};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

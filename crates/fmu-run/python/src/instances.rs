@@ -1,7 +1,7 @@
 //! The class `fmu_run.Instances`.
 
-use crate::arguments::{self, shape, wrong};
-use crate::buffers::{Numbers, Output};
+use crate::arguments::{self, wrong};
+use crate::buffers::{Numbers, Output, shape};
 use crate::exact::{self, Exact, exact_type};
 use crate::log::Log;
 use crate::start::Start;

@@ -1,7 +1,7 @@
 //! Inputs of runs: numbers, time series and whole arrays.
 
-use crate::arguments::{in_own_unit, shape};
-use crate::buffers::Numbers;
+use crate::arguments::in_own_unit;
+use crate::buffers::{Numbers, shape};
 use crate::exact::{Exact, exact_type};
 use fmu_run::{System, Trajectory, Value};
 use pyo3::exceptions::PyValueError;

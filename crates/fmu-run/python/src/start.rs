@@ -1,7 +1,7 @@
 //! Start values that are given as a dict.
 
-use crate::arguments::{in_own_unit, items, shape};
-use crate::buffers::{Numbers, array_of};
+use crate::arguments::{in_own_unit, items};
+use crate::buffers::{Numbers, array_of, shape};
 use crate::exact::{Exact, exact_type};
 use fmu_run::{Elements, System};
 use pyo3::exceptions::PyValueError;

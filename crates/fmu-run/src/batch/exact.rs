@@ -32,7 +32,7 @@ impl Input {
             Trajectory::Constant(value) => (reals(&[value]), 0),
             Trajectory::Shared(values) | Trajectory::EachRun(values) => (reals(values), time.len()),
             Trajectory::RateOf(_) => {
-                return request(format!("{name} is no floating-point number and has no rate"));
+                return request(format!("{name} is not a floating-point number and has no rate"));
             }
             Trajectory::Value(value) => (vec![value.clone()], 0),
             Trajectory::Values(values) => (values.to_vec(), time.len()),

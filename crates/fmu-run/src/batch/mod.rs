@@ -1,16 +1,22 @@
 //! Many runs of an FMU or a system.
 
+mod choice;
 mod exact;
+mod exchange;
 mod grid;
+mod inputs;
 mod integrated;
 mod measure;
 mod plan;
 mod pulse;
 mod reuse;
 mod run;
+mod signals;
+mod watch;
+mod worker;
 
 pub use measure::Measure;
-pub use run::Watch;
+pub use watch::Watch;
 
 use crate::continuous::Integration;
 use crate::error::Error;

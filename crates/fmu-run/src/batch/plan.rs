@@ -1,16 +1,15 @@
 //! Checks a batch and looks up its names.
 
 use super::exact::Input;
-use super::grid::Grid;
+use super::inputs::{Inputs, Numbers, checked, each_input, is_held, once};
 use super::integrated::Integrated;
 use super::{Batch, Measure, Trajectory};
 use crate::continuous::Integration;
-use crate::description::Variable;
 use crate::error::{Error, request};
-use crate::found::{Found, article};
+use crate::found::is_exact;
 use crate::instance::Tolerance;
-use crate::selection::{Selection, Target, fits};
-use crate::start::{Start, StartValues, is_exact};
+use crate::selection::{Selection, Target};
+use crate::start::{Start, StartValues};
 use crate::system::System;
 use fmi_abi::{BaseType, Interface};
 use std::hash::{DefaultHasher, Hasher};
@@ -38,28 +37,6 @@ pub(super) struct Plan<'a> {
     pub interface: Interface,
     /// Inputs and settings of Model Exchange.
     pub integrated: Option<Integrated<'a>>,
-}
-
-/// Inputs and their values.
-#[derive(Default)]
-pub(super) struct Inputs<'a> {
-    pub variables: Selection,
-    pub values: Vec<Numbers<'a>>,
-}
-
-/// Numbers of an input.
-pub(super) enum Numbers<'a> {
-    Constant(f64),
-    Shared(&'a [f64]),
-    EachRun(&'a [f64]),
-    /// At times of the input; whether they are held, and whether each run has its own.
-    Sampled {
-        grid: Grid,
-        times: &'a [f64],
-        values: &'a [f64],
-        is_held: bool,
-        is_each: bool,
-    },
 }
 
 impl<'a> Plan<'a> {
@@ -102,7 +79,9 @@ impl<'a> Plan<'a> {
                 check_of_co_simulation(batch)?;
                 plan.find_inputs(system, batch)?;
             }
-            Interface::ModelExchange => plan.integrate(system, batch)?,
+            Interface::ModelExchange => {
+                plan.integrated = Integrated::of(system, batch, &mut plan.exact_inputs)?;
+            }
         }
         Ok(plan)
     }
@@ -113,23 +92,18 @@ impl<'a> Plan<'a> {
     }
 
     fn find_inputs(&mut self, system: &System, batch: &'a Batch) -> Result<(), Error> {
-        let mut names = Vec::new();
-        for (name, trajectory) in &batch.inputs {
-            let variables = input(system, name)?;
+        let inputs = &mut self.inputs;
+        each_input(system, batch, &mut self.exact_inputs, |name, trajectory, variables| {
             let of = variables[0].variable;
-            once(&mut names, name, "inputs")?;
-            if is_exact(of.base) {
-                self.exact_inputs.push(Input::of(name, &variables, *trajectory, self.time)?);
-                continue;
-            }
-            self.inputs.values.push(self.checked(name, of.base, *trajectory, is_held(of))?);
-            self.inputs.variables.push(name, &variables);
-        }
+            inputs.values.push(checked(name, of.base, trajectory, is_held(of), batch.time)?);
+            inputs.variables.push(name, &variables);
+            Ok(())
+        })?;
         let mut names = Vec::new();
         for (name, trajectory) in &batch.input_derivatives {
             let variables = system.takes_input_derivative(name)?;
             once(&mut names, name, "input derivatives")?;
-            self.derivatives.values.push(self.checked(name, BaseType::Real, *trajectory, true)?);
+            self.derivatives.values.push(checked(name, BaseType::Real, *trajectory, true, batch.time)?);
             self.derivatives.variables.push(name, &variables);
         }
         let derivatives = self.derivatives.variables.targets();
@@ -158,62 +132,6 @@ impl<'a> Plan<'a> {
         }
         hash.finish()
     }
-
-    /// Checks the values of an input.
-    pub fn checked(
-        &self,
-        name: &str,
-        base: BaseType,
-        trajectory: Trajectory<'a>,
-        is_held: bool,
-    ) -> Result<Numbers<'a>, Error> {
-        let numbers = match trajectory {
-            Trajectory::Constant(value) => Numbers::Constant(value),
-            Trajectory::Shared(values) => Numbers::Shared(values),
-            Trajectory::EachRun(values) => Numbers::EachRun(values),
-            Trajectory::Sampled { times, values } => {
-                let grid = Grid::of(name, times, self.time)?;
-                Numbers::Sampled { grid, times, values, is_held, is_each: values.len() > times.len() }
-            }
-            Trajectory::RateOf(other) => {
-                return request(format!(
-                    "{name} is the derivative of {other}; derivatives of other inputs are for continuous inputs in Model Exchange"
-                ));
-            }
-            Trajectory::Value(_) | Trajectory::Values(_) | Trajectory::SampledValues { .. } => {
-                return request(format!("{name} is a number; give its values as numbers"));
-            }
-        };
-        let values = match &numbers {
-            Numbers::Constant(value) => std::slice::from_ref(value),
-            Numbers::Shared(values) if values.len() != self.time.len() => {
-                return request(format!("{name} has {} values for {} times", values.len(), self.time.len()));
-            }
-            Numbers::Shared(values) | Numbers::EachRun(values) | Numbers::Sampled { values, .. } => values,
-        };
-        fits(name, base, values)?;
-        Ok(numbers)
-    }
-}
-
-/// Finds an input, or another variable that may change during a run.
-pub(super) fn input<'s>(system: &'s System, name: &str) -> Result<Vec<Found<'s>>, Error> {
-    let variables = system.find(name)?;
-    variables.iter().try_for_each(|found| found.check_own(name))?;
-    let of = variables[0].variable;
-    if !of.is_settable() || of.is_structural() || of.variability.as_deref() == Some("fixed") {
-        return request(format!(
-            "{name} is no input but {} {}; give it a start value",
-            article(of.variability.as_deref().unwrap_or(&of.causality)),
-            of.causality
-        ));
-    }
-    Ok(variables)
-}
-
-/// Returns whether a variable keeps its value between the times at which it is given.
-pub(super) fn is_held(of: &Variable) -> bool {
-    !of.base.is_float() || of.variability.as_deref().is_some_and(|of| of != "continuous")
 }
 
 /// Fails if settings of Model Exchange are given for Co-Simulation.
@@ -269,12 +187,4 @@ fn runs(batch: &Batch) -> Result<usize, Error> {
         }
     }
     Ok(found.map_or(1, |(_, runs)| runs))
-}
-
-pub(super) fn once<'a>(names: &mut Vec<&'a str>, name: &'a str, list: &str) -> Result<(), Error> {
-    if names.contains(&name) {
-        return request(format!("{name} is twice among the {list}"));
-    }
-    names.push(name);
-    Ok(())
 }

@@ -1,11 +1,15 @@
 //! Model Exchange: the states of an FMU are integrated here, from event to event.
 //!
-//! [`inputs`] describes inputs as functions of time, [`model`] evaluates the FMU for the solver, [`march`] takes the steps and handles
-//! the events. The solvers are in the crate `ivp`. They have one step, because every event starts them again.
+//! [`inputs`] describes inputs as functions of time, [`model`] evaluates the FMU for the solver, [`march`] goes from one smooth interval to
+//! the next and handles the events between them, [`solve`] integrates an interval, and [`stepping`] locates events in its steps.
+//! The solvers are in the crate `ivp`. They have one step, because every event starts them again.
 
+mod chatter;
 mod inputs;
 mod march;
 mod model;
+mod solve;
+mod stepping;
 
 pub(crate) use inputs::{Curve, Signals, Slopes};
 pub(crate) use march::{Hooks, March};

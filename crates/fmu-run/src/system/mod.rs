@@ -9,11 +9,10 @@ mod ssp;
 use crate::description::{Description, Variable};
 use crate::error::{Error, request};
 use crate::fmu::Loaded;
-use crate::found::Found;
+use crate::found::{Found, is_exact};
 use crate::kept::Kept;
 use crate::messages::Feed;
 use crate::selection::Selection;
-use crate::start::is_exact;
 pub use elements::Elements;
 use fmi_abi::description::Offer;
 use fmi_abi::files::Limits;
@@ -322,7 +321,7 @@ impl System {
         let variables = self.find_numbers(name)?;
         let of = variables[0].variable;
         if of.base != BaseType::Real || of.causality != "input" {
-            return request(format!("{name} is no Real input; only these have input derivatives"));
+            return request(format!("{name} is not a Real input; only these have input derivatives"));
         }
         Ok(variables)
     }
@@ -357,7 +356,7 @@ impl Fmu {
     /// loaded and called.
     ///
     /// # Errors
-    /// Returns [`Error::Fmu`] if the file is no FMU, has no library for this platform, or needs another
+    /// Returns [`Error::Fmu`] if the file is not an FMU, has no library for this platform, or needs another
     /// program.
     pub unsafe fn open(path: &Path) -> Result<Self, Error> {
         // SAFETY: the caller guarantees that the library is sound.

@@ -47,9 +47,9 @@ impl System {
     /// The requirement of [`Fmu::open`](crate::Fmu::open), for each FMU in the file.
     ///
     /// # Errors
-    /// Returns [`Error::Fmu`] if the file is no SSP file, or one of its FMUs cannot be loaded. Returns
+    /// Returns [`Error::Fmu`] if the file is not an SSP file, or one of its FMUs cannot be loaded. Returns
     /// [`Error::Request`] as [`connect`](Self::connect) does, and for unsupported content: components that
-    /// are no FMUs, parameter mappings, signal dictionaries, transformations of connections.
+    /// are not FMUs, parameter mappings, signal dictionaries, transformations of connections.
     pub unsafe fn open(path: &Path, order: Order) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
         let mut limits = Limits::default();
@@ -144,7 +144,7 @@ impl<'a> Read<'a> {
         let kind = element.attribute("type").unwrap_or("application/x-fmu-sharedlibrary");
         if kind != "application/x-fmu-sharedlibrary" {
             return Err(format!(
-                "component {} is no FMU but {}, which cannot be run",
+                "component {} is not an FMU but {}, which cannot be run",
                 shown(&name),
                 shown(kind)
             ));

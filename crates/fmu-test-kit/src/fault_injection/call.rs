@@ -267,7 +267,7 @@ const EVENT_INFO: usize = size_of::<fmu_export::fmi2::types::fmi2EventInfo>();
 
 /// Checks that a number is finite and returns its bits.
 fn finite(value: f64) -> u64 {
-    assert!(value.is_finite(), "{value} is no number to result");
+    assert!(value.is_finite(), "{value} is not finite");
     value.to_bits()
 }
 

@@ -79,7 +79,7 @@ pub type RunBytes = fn(&[u8], &mut Tally);
 /// at least `at_least` seeds, so that checks of the counts do not depend on the machine. Prints the counts.
 ///
 /// # Panics
-/// Panics if a sequence violates a guarantee, or if `ROBUSTNESS_SECONDS` is no number.
+/// Panics if a sequence violates a guarantee, or if `ROBUSTNESS_SECONDS` is not a number.
 pub fn run_seeds(at_least: u64, models: &[(&str, RunBytes)]) -> Tally {
     let seconds = std::env::var("ROBUSTNESS_SECONDS").map_or(3, |value| value.parse().expect("a number"));
     let end = Instant::now() + Duration::from_secs(seconds);
@@ -356,7 +356,7 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         }
         check_messages(messages);
         assert!([Status::Ok, Status::Error].contains(&status), "{function} returns {status:?}");
-        // Freeing through a NULL pointer is no error.
+        // Freeing through a NULL pointer is not an error.
         let rejected = status == Status::Error || function == free;
         assert!(!foreign || rejected && !state.is_null(), "{function} accepts a state of another instance");
         let content = &mut self.contents[index][which];

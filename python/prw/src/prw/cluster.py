@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from prw.batch import MEASURES, Statistics, statistics
 from prw.errors import UserError
 from prw.motion import Array, Motion
-from prw.sweeps import MEASURES, Statistics, statistics
 from prw.testbed import OUTPUTS, Testbed
 
 #: Timeout of a connection to the scheduler, s.

@@ -7,23 +7,23 @@ import itertools
 import math
 import os
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import fmu_run
 import numpy as np
 from numpy.typing import ArrayLike
 
 from prw.arguments import Given, Table, check_names, counted, in_own_unit, spread_of, values_of
+from prw.batch import statistics
 from prw.errors import UserError, need
 from prw.files import replacing
 from prw.motion import Array, Motion
 from prw.progress import Progress
 from prw.recording import Recording
 from prw.simulation import Run, motion_of
-from prw.testbed import OUTPUTS, Testbed, driven_by, existing_fmu, stopped
+from prw.testbed import Testbed, existing_fmu
 
 if TYPE_CHECKING:
     import pyarrow
@@ -31,12 +31,6 @@ if TYPE_CHECKING:
 MAX_RUNS = 10_000_000
 #: The distribution of a parameter, see `sweep`.
 Spread = float | tuple[float, float] | tuple[str, float, float]
-
-
-#: The statistics of each output in a result.
-MEASURES: tuple[fmu_run.Measure, ...] = ("peak", "rms", "end")
-#: Statistics of runs, (runs,) each, by the name of the column; and the messages of failed runs, by run.
-Statistics = tuple[dict[str, Array], dict[int, str]]
 
 
 def sweep(
@@ -137,21 +131,6 @@ def _run_all(
         **{name: pa.array(column, mask=failed) for name, column in measured.items()},
     }
     return pa.table(columns)
-
-
-def statistics(
-    testbed: Testbed,
-    motion: Motion,
-    start: Mapping[str, Any],
-    threads: int,
-    progress: Callable[[int, int], None] | None = None,
-) -> Statistics:
-    """The statistics of runs with the start values `start`, a value for all runs or one for each."""
-    runs = testbed.loaded.run(
-        motion.time, outputs=OUTPUTS, measures=MEASURES, threads=threads, progress=progress, **driven_by(motion, start)
-    )
-    errors = {run: stopped(message) for run, message in runs.errors.items()}
-    return {f"{name}_{measure}": runs[name, measure] for name in OUTPUTS for measure in MEASURES}, errors
 
 
 def layout(

@@ -97,7 +97,7 @@ impl Model for House {
         Ok(house)
     }
 
-    /// Rejects a file that is no table; the house then does not change.
+    /// Rejects a file that is not a table; the house then does not change.
     fn update(&mut self) -> Result<(), Error> {
         if self.weather != self.read {
             self.table = LookupTable::read(&self.setup.resource(&self.weather)?)?;

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import re
-from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
@@ -13,12 +12,10 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from prw.columns import si_unit
+from prw.identification.findings import ChannelFit, Findings
 from prw.identification.rounding import rounded
 from prw.motion import Array
 from prw.plots import BLUE, PAGE_STYLE, VERMILION, envelope
-
-if TYPE_CHECKING:
-    from prw.identification.results import ChannelFit, Identification
 
 #: Size of a figure, inches.
 SIZE = (6.7, 3.75)
@@ -38,7 +35,7 @@ CLOSE = 1.0
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def page(found: Identification) -> str:
+def page(found: Findings) -> str:
     """The page as HTML."""
     environment = Environment(
         loader=PackageLoader("prw.identification", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
@@ -56,7 +53,7 @@ def page(found: Identification) -> str:
     )
 
 
-def figures(found: Identification) -> list[dict[str, str]]:
+def figures(found: Findings) -> list[dict[str, str]]:
     """A figure for every channel of every experiment: a close-up of measured and modelled, and the residual."""
     drawn = []
     for i, (experiment, modelled) in enumerate(zip(found.experiments, found.solution.modelled)):

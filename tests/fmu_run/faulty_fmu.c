@@ -32,13 +32,13 @@ static void log_message(const Instance *i, fmi2Status status, const char *text) 
 #ifdef COMPLETE
     if (status == fmi2OK) return; /* FMPy prints it. */
 #endif
-    i->callbacks.logger(i->callbacks.componentEnvironment, "unruly", status, "logAll", text, "half");
+    i->callbacks.logger(i->callbacks.componentEnvironment, "faulty_fmu", status, "logAll", text, "half");
 }
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging) {
     (void)name, (void)resources, (void)visible;
-    if (type != fmi2CoSimulation || strcmp(guid, "{unruly}") != 0) {
+    if (type != fmi2CoSimulation || strcmp(guid, "{faulty_fmu}") != 0) {
         if (logging && guid[1] != 'm')
             callbacks->logger(callbacks->componentEnvironment, "x", fmi2Error, "e", "the guid is of another FMU");
         return NULL;

@@ -1,10 +1,9 @@
 //! Reads `modelDescription/parameters.json`, Table 1 of the paper as printed, or a file of the same format.
 //!
-//! The build script compiles the values into the library; `build_fmu` writes them into the model description.
-//! The FMU reads no file at run time. The module uses no derive macros, because every build of the library
-//! begins by compiling it, and the macros would take longer than everything else in the build script.
+//! This module uses no derive macros, because every build of the library begins by compiling it, and the macros would take longer
+//! than everything else in the build script.
 
-use crate::parameters::{Integer, Parameters, Real, table};
+use crate::{Integer, Parameters, Real};
 use serde_core::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
 use serde_json::Value;
 use std::f64::consts::PI;
@@ -47,7 +46,6 @@ macro_rules! file {
 
         /// Returns the parameters as a Rust expression with typed numbers, which the build script compiles into the
         /// library.
-        #[allow(dead_code, reason = "build_fmu does not need it")]
         pub fn rust_expression(parameters: &Parameters) -> String {
             let fields = [$(format!("{}: {:?}_{}", stringify!($name), parameters.$name, stringify!($kind))),+];
             let typed = fields.join(",\n    ").replace("_Real", "_f64").replace("_Integer", "_i32");
@@ -164,7 +162,7 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for Members<T> {
 mod tests {
     use super::{parse, read, rust_expression};
 
-    const TABLE_1: &str = include_str!("../modelDescription/parameters.json");
+    const TABLE_1: &str = include_str!("../../../modelDescription/parameters.json");
 
     /// Returns the line of Table 1 that contains this key.
     fn line(key: &str) -> &'static str {

@@ -1,4 +1,8 @@
 //! The parameters of the testbed (Table 1 of the paper), in SI units.
+//!
+//! They are in a separate package because three programs need them: the model, the build script that compiles the values into
+//! its library, and `build_fmu`, which writes them into the model description. The file with the values is read only while an FMU
+//! is built, by [`file`].
 
 use std::fmt;
 
@@ -34,8 +38,6 @@ macro_rules! table {
         }
     };
 }
-#[allow(unused_imports, reason = "only parameter_file.rs needs it")]
-pub(crate) use table;
 
 macro_rules! parameters {
     ($($(#[$meaning:meta])* $name:ident: $kind:ident $compare:tt $limit:literal, $unit:literal;)+) => {
@@ -123,7 +125,14 @@ impl Parameters {
 
 /// Reason for which a set of parameters is invalid.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct InvalidParameter(pub(crate) String);
+pub struct InvalidParameter(String);
+
+impl InvalidParameter {
+    /// Describes the reason, for the log of the FMU.
+    pub fn new(reason: impl Into<String>) -> Self {
+        Self(reason.into())
+    }
+}
 
 impl fmt::Display for InvalidParameter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -132,3 +141,6 @@ impl fmt::Display for InvalidParameter {
 }
 
 impl std::error::Error for InvalidParameter {}
+
+#[cfg(feature = "file")]
+pub mod file;

@@ -12,7 +12,7 @@ import fmpy
 HERE = Path(__file__).parent
 
 
-def build(folder: Path, *flags: str, name: str = "unruly", platform: str = "linux64") -> Path:
+def build(folder: Path, *flags: str, name: str = "faulty_fmu", platform: str = "linux64") -> Path:
     """Compiles `name` with `flags` and packs it in `folder` for `platform`; returns the FMU."""
     library, fmu = folder / f"{name}.so", folder / f"{name}.fmu"
     headers = Path(fmpy.__file__).parent / "c-code"

@@ -1,0 +1,117 @@
+//! Checks the inputs of a batch.
+
+use super::exact::Input;
+use super::grid::Grid;
+use super::{Batch, Trajectory};
+use crate::description::Variable;
+use crate::error::{Error, request};
+use crate::found::{Found, article, is_exact};
+use crate::selection::{Selection, fits};
+use crate::system::System;
+use fmi_abi::BaseType;
+
+/// Inputs and their values.
+#[derive(Default)]
+pub(super) struct Inputs<'a> {
+    pub variables: Selection,
+    pub values: Vec<Numbers<'a>>,
+}
+
+/// Numbers of an input.
+pub(super) enum Numbers<'a> {
+    Constant(f64),
+    Shared(&'a [f64]),
+    EachRun(&'a [f64]),
+    /// At times of the input; whether they are held, and whether each run has its own.
+    Sampled {
+        grid: Grid,
+        times: &'a [f64],
+        values: &'a [f64],
+        is_held: bool,
+        is_each: bool,
+    },
+}
+
+/// Passes the inputs that have numbers to `numeric`, in their order and with their variables. Adds all others to `exact`.
+pub(super) fn each_input<'a, 's>(
+    system: &'s System,
+    batch: &'a Batch,
+    exact: &mut Vec<Input>,
+    mut numeric: impl FnMut(&'a str, Trajectory<'a>, Vec<Found<'s>>) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let mut names = Vec::new();
+    for (name, trajectory) in &batch.inputs {
+        let variables = input(system, name)?;
+        once(&mut names, name, "inputs")?;
+        if is_exact(variables[0].variable.base) {
+            exact.push(Input::of(name, &variables, *trajectory, batch.time)?);
+        } else {
+            numeric(name, *trajectory, variables)?;
+        }
+    }
+    Ok(())
+}
+
+/// Finds an input, or another variable that may change during a run.
+fn input<'s>(system: &'s System, name: &str) -> Result<Vec<Found<'s>>, Error> {
+    let variables = system.find(name)?;
+    variables.iter().try_for_each(|found| found.check_own(name))?;
+    let of = variables[0].variable;
+    if !of.is_settable() || of.is_structural() || of.variability.as_deref() == Some("fixed") {
+        return request(format!(
+            "{name} is not an input but {} {}; give it a start value",
+            article(of.variability.as_deref().unwrap_or(&of.causality)),
+            of.causality
+        ));
+    }
+    Ok(variables)
+}
+
+/// Returns whether a variable keeps its value between the times at which it is given.
+pub(super) fn is_held(of: &Variable) -> bool {
+    !of.base.is_float() || of.variability.as_deref().is_some_and(|of| of != "continuous")
+}
+
+pub(super) fn once<'a>(names: &mut Vec<&'a str>, name: &'a str, list: &str) -> Result<(), Error> {
+    if names.contains(&name) {
+        return request(format!("{name} is twice among the {list}"));
+    }
+    names.push(name);
+    Ok(())
+}
+
+/// Checks the values of an input at these times of the runs.
+pub(super) fn checked<'a>(
+    name: &str,
+    base: BaseType,
+    trajectory: Trajectory<'a>,
+    is_held: bool,
+    time: &[f64],
+) -> Result<Numbers<'a>, Error> {
+    let numbers = match trajectory {
+        Trajectory::Constant(value) => Numbers::Constant(value),
+        Trajectory::Shared(values) => Numbers::Shared(values),
+        Trajectory::EachRun(values) => Numbers::EachRun(values),
+        Trajectory::Sampled { times, values } => {
+            let grid = Grid::of(name, times, time)?;
+            Numbers::Sampled { grid, times, values, is_held, is_each: values.len() > times.len() }
+        }
+        Trajectory::RateOf(other) => {
+            return request(format!(
+                "{name} is the derivative of {other}; derivatives of other inputs are for continuous inputs in Model Exchange"
+            ));
+        }
+        Trajectory::Value(_) | Trajectory::Values(_) | Trajectory::SampledValues { .. } => {
+            return request(format!("{name} is a number; give its values as numbers"));
+        }
+    };
+    let values = match &numbers {
+        Numbers::Constant(value) => std::slice::from_ref(value),
+        Numbers::Shared(values) if values.len() != time.len() => {
+            return request(format!("{name} has {} values for {} times", values.len(), time.len()));
+        }
+        Numbers::Shared(values) | Numbers::EachRun(values) | Numbers::Sampled { values, .. } => values,
+    };
+    fits(name, base, values)?;
+    Ok(numbers)
+}

@@ -1,0 +1,91 @@
+//! Progress of runs, for the caller.
+
+use crate::messages::{Feed, Logged};
+use std::fmt;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+/// Function that is called ten times per second.
+type OnPulse = Box<dyn Fn(&Watch) + Send + Sync>;
+
+/// Access to the progress of [`System::run`] for another thread, or for the thread that calls it.
+#[derive(Default)]
+pub struct Watch {
+    pulse: Option<OnPulse>,
+    pub(super) done: AtomicUsize,
+    cancelled: AtomicBool,
+    pub(super) ended: Mutex<Vec<(usize, f64, Vec<f64>)>>,
+    pub(super) listening: bool,
+    /// Collects all messages during the runs.
+    pub(super) feed: OnceLock<Arc<Feed>>,
+}
+
+impl fmt::Debug for Watch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Watch")
+            .field("done", &self.done)
+            .field("cancelled", &self.cancelled)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Watch {
+    /// Creates a watch whose function is called ten times per second, between steps, by the thread that called
+    /// [`System::run`]. It may [cancel](Self::cancel) the runs.
+    ///
+    /// ```
+    /// let watch = fmu_run::Watch::pulsing(|watch| eprintln!("{} runs are finished", watch.done()));
+    /// # assert_eq!(watch.done(), 0);
+    /// ```
+    pub fn pulsing(pulse: impl Fn(&Self) + Send + Sync + 'static) -> Self {
+        Self { pulse: Some(Box::new(pulse)), ..Self::default() }
+    }
+
+    /// Creates a watch that receives all messages of the FMU. Logging is switched on.
+    pub fn listening() -> Self {
+        Self { listening: true, ..Self::default() }
+    }
+
+    /// Receives all messages of the FMU, too. Logging is switched on.
+    #[must_use]
+    pub fn and_listening(self) -> Self {
+        Self { listening: true, ..self }
+    }
+
+    /// Removes and returns the messages so far.
+    pub fn take_messages(&self) -> Vec<Logged> {
+        self.feed.get().map(|feed| feed.take()).unwrap_or_default()
+    }
+
+    /// Returns the runs that the FMU has ended, in the order of their numbers, each with its end time in s and the outputs at
+    /// this time, which are NaN if they cannot be read.
+    pub fn ended(&self) -> Vec<(usize, f64, Vec<f64>)> {
+        let mut ended = lock(&self.ended).clone();
+        ended.sort_unstable_by_key(|(run, ..)| *run);
+        ended
+    }
+
+    /// Returns the number of finished runs, including failed ones.
+    pub fn done(&self) -> usize {
+        self.done.load(Ordering::Relaxed)
+    }
+
+    /// Cancels the runs: no further run begins, and current runs end after their step.
+    pub fn cancel(&self) {
+        self.cancelled.store(true, Ordering::Relaxed);
+    }
+
+    pub(super) fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn pulse(&self) {
+        if let Some(pulse) = &self.pulse {
+            pulse(self);
+        }
+    }
+}
+
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,391 @@
+//! A thread of a batch: performs one run after the other.
+
+use super::Occurrence;
+use super::measure::Measured;
+use super::plan::Plan;
+use super::pulse::Pulse;
+use super::reuse::{Choice, Reuse};
+use super::signals::Signals;
+use super::watch::{Watch, lock};
+use crate::instance::Experiment;
+use crate::messages::{Feed, Logging};
+use crate::running::Running;
+use crate::system::System;
+use fmi_abi::Value;
+use fmi_client::Rejection;
+use std::sync::Arc;
+use std::time;
+
+/// Failure of a run before its last time.
+#[derive(PartialEq)]
+pub(super) struct Failure {
+    /// Index of the time of the failure; `None` before the end of the initialization.
+    pub at: Option<usize>,
+    pub text: String,
+    /// Whether the FMU gave no reason.
+    pub is_silent: bool,
+}
+
+/// Values of a run at the kept times that it has reached, output by output at each time.
+pub(super) type Exact = (usize, Vec<Value>);
+
+/// Instance and buffers of a thread.
+pub(super) struct Worker<'a> {
+    pub system: &'a System,
+    pub plan: &'a Plan<'a>,
+    pub watch: &'a Watch,
+    /// Deadline of a run that is repeated with logging on.
+    deadline: Option<time::Instant>,
+    /// Collects all messages, and the number of the instance.
+    pub feed: Option<(Arc<Feed>, usize)>,
+    /// Whether this thread called the runs; then it calls the pulse.
+    is_caller: bool,
+    pulse: Pulse,
+    pub reuse: Reuse,
+    inputs: Signals<'a>,
+    derivatives: Signals<'a>,
+    /// Number of the run.
+    number: usize,
+    /// Values of the run that numbers do not have, and those of finished runs.
+    exact_of_run: Vec<Value>,
+    pub exact: Vec<Exact>,
+    /// Events in Model Exchange.
+    pub events: Vec<Occurrence>,
+    /// Orders of the input derivatives.
+    orders: Vec<i32>,
+    /// Outputs at a time, in their order.
+    pub row: Vec<f64>,
+    /// Number of times that the run has reached.
+    pub reached: usize,
+    measured: Measured,
+}
+
+/// Index of the next kept value in a trajectory, and number of times until then.
+#[derive(Default)]
+pub(super) struct Kept {
+    index: usize,
+    wait: usize,
+}
+
+/// Index of the time (`None` before the end of the initialization) and the error.
+pub(super) type Stopped = (Option<usize>, Rejection);
+
+impl<'a> Worker<'a> {
+    pub fn new(
+        system: &'a System,
+        plan: &'a Plan<'a>,
+        watch: &'a Watch,
+        number: usize,
+        deadline: Option<time::Instant>,
+    ) -> Self {
+        Self {
+            system,
+            plan,
+            watch,
+            deadline,
+            feed: None,
+            is_caller: number == 0,
+            pulse: Pulse::default(),
+            reuse: Reuse::default(),
+            inputs: Signals::new(&plan.inputs),
+            derivatives: Signals::new(&plan.derivatives),
+            number: 0,
+            exact_of_run: Vec::new(),
+            exact: Vec::new(),
+            events: Vec::new(),
+            orders: vec![1; plan.derivatives.values.len()],
+            row: vec![0.0; plan.outputs.len()],
+            reached: 0,
+            measured: Measured::new(plan.measures, plan.outputs.len()),
+        }
+    }
+
+    /// Returns whether the FMU logs its messages, and instances are new for each run, so that the messages are complete.
+    pub fn is_logging(&self) -> bool {
+        self.deadline.is_some() || self.feed.is_some()
+    }
+
+    pub fn logging(&self) -> Logging {
+        Logging { on: self.is_logging(), feed: self.feed.clone() }
+    }
+
+    /// Performs a run over these times. May return a note if the run reaches the last time.
+    pub fn run(
+        &mut self,
+        run: usize,
+        times: &[f64],
+        trajectories: &mut [f64],
+        measures: &mut [f64],
+    ) -> Result<Option<String>, Failure> {
+        self.report_time(run, self.plan.time[0]);
+        match self.choose(run) {
+            Choice::Reset(instance) => self.perform(instance, run, times, trajectories, measures),
+            Choice::New => self.run_new(run, times, trajectories, measures),
+            Choice::Check(used, changes) => self.check((used, changes), run, times, trajectories, measures),
+        }
+    }
+
+    /// Performs a run in a new instance.
+    pub fn run_new(
+        &mut self,
+        run: usize,
+        times: &[f64],
+        trajectories: &mut [f64],
+        measures: &mut [f64],
+    ) -> Result<Option<String>, Failure> {
+        match self.create() {
+            Ok(instance) => self.perform(instance, run, times, trajectories, measures),
+            Err((text, is_silent)) => {
+                trajectories.fill(f64::NAN);
+                measures.fill(f64::NAN);
+                Err(Failure { at: None, text, is_silent })
+            }
+        }
+    }
+
+    /// Performs a run in this instance, which can be used again if the run is complete.
+    pub fn perform(
+        &mut self,
+        mut instance: Running,
+        run: usize,
+        times: &[f64],
+        trajectories: &mut [f64],
+        measures: &mut [f64],
+    ) -> Result<Option<String>, Failure> {
+        let plan = self.plan;
+        let begin = self.system.kept().trust().may_keep().then(time::Instant::now);
+        instance.forget_log();
+        self.inputs.begin(&plan.inputs, run, plan.time.len());
+        self.derivatives.begin(&plan.derivatives, run, plan.time.len());
+        (self.reached, self.number) = (0, run);
+        self.exact_of_run.clear();
+        self.measured.begin();
+        let stopped = match &plan.integrated {
+            None => self.follow(times, &mut instance, run, trajectories).err(),
+            Some(integrated) => self.integrate(integrated, times, &mut instance, run, trajectories).err(),
+        };
+        if !self.is_repeated() && !plan.exact_outputs.is_empty() {
+            self.exact.push((run, std::mem::take(&mut self.exact_of_run)));
+        }
+        if !self.is_repeated() {
+            let at = stopped.as_ref().and_then(|(at, _)| *at).map_or(0, |at| at.min(times.len() - 1));
+            self.report_time(run, plan.time[at]);
+            let ended = stopped.as_ref().and_then(|(_, rejection)| rejection.ended());
+            lock(&self.watch.ended).extend(ended.map(|time| (run, time, self.row.clone())));
+        }
+        let filled = plan.every.map_or(0, |every| self.reached.div_ceil(every));
+        for trajectory in trajectories.chunks_mut(plan.kept().max(1)) {
+            trajectory[filled..].fill(f64::NAN);
+        }
+        let rejected = stopped.as_ref().is_some_and(|(_, rejection)| rejection.ended().is_none());
+        for (output, row) in measures.chunks_mut(plan.measures.len().max(1)).enumerate() {
+            for (value, measure) in row.iter_mut().zip(plan.measures) {
+                *value = if rejected { f64::NAN } else { self.measured.measure(*measure, output) };
+            }
+        }
+        let is_complete = stopped.is_none() && self.reached == plan.time.len();
+        let is_usable = is_complete && self.reuse.observe(&mut instance);
+        let mut terminated = if rejected { Ok(()) } else { instance.terminate() };
+        if is_complete && !is_usable {
+            // The error comes from the comparison, not from the run.
+            terminated = Ok(());
+        } else if is_complete && terminated.is_ok() {
+            self.keep(instance, run, begin.map(|begin| begin.elapsed()));
+        }
+        let Some((at, rejection)) = stopped else {
+            return Ok(terminated.err().map(|rejection| format!("finished; then {rejection}")));
+        };
+        if !rejected && self.reached == plan.time.len() {
+            return Ok(Some(rejection.to_string()));
+        }
+        let text = match at {
+            Some(at) if rejected => format!("at {} s: {rejection}", times[at]),
+            _ => rejection.to_string(),
+        };
+        Err(Failure { at, text, is_silent: rejection.is_silent() })
+    }
+
+    /// Returns the values of a check that numbers do not have.
+    pub fn take_exact(&mut self) -> Vec<Value> {
+        std::mem::take(&mut self.exact_of_run)
+    }
+
+    /// Returns whether a run had the same values.
+    pub fn has_exact(&self, run: usize, values: &[Value]) -> bool {
+        let last = self.exact.last().filter(|(number, _)| *number == run);
+        last.map_or(values.is_empty(), |(_, found)| found == values)
+    }
+
+    /// Returns whether the caller does not observe the run.
+    pub fn is_repeated(&self) -> bool {
+        self.deadline.is_some() || self.reuse.is_check
+    }
+
+    /// Records the run and its time, so that messages of the FMU can be logged with both.
+    #[inline(always)]
+    pub fn report_time(&self, run: usize, time: f64) {
+        if let Some((feed, instance)) = &self.feed {
+            feed.at(*instance, run, time);
+        }
+    }
+
+    /// Runs an instance from the start values to the last time, or until the caller cancels or the deadline
+    /// passes.
+    fn follow(
+        &mut self,
+        times: &[f64],
+        instance: &mut Running,
+        run: usize,
+        trajectories: &mut [f64],
+    ) -> Result<(), Stopped> {
+        let plan = self.plan;
+        self.start(instance, run).map_err(|rejection| (None, rejection))?;
+        instance.forget_log();
+        let measures = !plan.measures.is_empty();
+        // Index of the next kept value in a trajectory, and number of times until then.
+        let (kept, mut index, mut wait) = (plan.kept(), 0, 0);
+        let mut ended: Option<Rejection> = None;
+        for (k, &time) in times.iter().enumerate() {
+            let at = |rejection| (Some(k), rejection);
+            if self.is_caller && self.pulse.is_due() {
+                self.watch.pulse();
+            }
+            if self.watch.is_cancelled() {
+                return Ok(());
+            }
+            self.report_time(run, time);
+            if let Some(deadline) = self.deadline {
+                // Messages about earlier steps are not the reason of a later error.
+                instance.forget_log();
+                if time::Instant::now() > deadline {
+                    return Ok(());
+                }
+            }
+            if !plan.read_before_set && ended.is_none() {
+                self.set_inputs(instance, k).map_err(at)?;
+            }
+            let keep = wait == 0 && index < kept;
+            if (keep || measures)
+                && let Err(rejection) = instance.get(&plan.outputs, &mut self.row)
+            {
+                return Err(at(ended.unwrap_or(rejection)));
+            }
+            if keep {
+                // Avoids `chunks`, which would calculate the number of chunks each time.
+                for (output, value) in self.row.iter().enumerate() {
+                    trajectories[output * kept + index] = *value;
+                }
+                for (_, target) in &plan.exact_outputs {
+                    let value = instance.get_value(*target);
+                    self.exact_of_run.push(value.map_err(|rejection| at(ended.take().unwrap_or(rejection)))?);
+                }
+                index += 1;
+                wait = plan.every.unwrap_or(1);
+            }
+            wait = wait.saturating_sub(1);
+            if measures {
+                self.measured.add(time, &self.row);
+            }
+            self.reached = k + 1;
+            if let Some(ended) = ended {
+                return Err(at(ended));
+            }
+            if plan.read_before_set {
+                self.set_inputs(instance, k).map_err(at)?;
+            }
+            if let Some(next) = times.get(k + 1) {
+                let size = next - time;
+                if let Err(rejection) = instance.step(time, size) {
+                    let Some(end) = rejection.ended() else { return Err(at(rejection)) };
+                    // Outputs can be read, but inputs no longer set (section 4.2.4 of FMI 2.0).
+                    if instance.get(&plan.outputs, &mut self.row).is_err() {
+                        self.row.fill(f64::NAN);
+                    }
+                    if next - end > 1e-9 * size {
+                        return Err(at(rejection));
+                    }
+                    ended = Some(rejection);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Calls the pulse if it is due, and returns whether the run goes on after a step in Model Exchange.
+    pub fn proceeds(&mut self) -> bool {
+        if self.is_caller && self.pulse.is_due() {
+            self.watch.pulse();
+        }
+        !self.watch.is_cancelled() && self.deadline.is_none_or(|deadline| time::Instant::now() <= deadline)
+    }
+
+    /// Reads the outputs at a communication point in Model Exchange.
+    pub fn record(
+        &mut self,
+        instance: &mut Running,
+        kept: &mut Kept,
+        time: f64,
+        trajectories: &mut [f64],
+    ) -> Result<(), Rejection> {
+        let plan = self.plan;
+        instance.get(&plan.outputs, &mut self.row)?;
+        if self.keep_row(kept, time, trajectories) {
+            for (_, target) in &plan.exact_outputs {
+                self.exact_of_run.push(instance.get_value(*target)?);
+            }
+        }
+        Ok(())
+    }
+
+    /// Keeps the outputs of a time. Returns whether they belong to a trajectory.
+    pub fn keep_row(&mut self, kept: &mut Kept, time: f64, trajectories: &mut [f64]) -> bool {
+        let (plan, length) = (self.plan, self.plan.kept());
+        let keeps = kept.wait == 0 && kept.index < length;
+        if keeps {
+            for (output, value) in self.row.iter().enumerate() {
+                trajectories[output * length + kept.index] = *value;
+            }
+            kept.index += 1;
+            kept.wait = plan.every.unwrap_or(1);
+        }
+        kept.wait = kept.wait.saturating_sub(1);
+        if !plan.measures.is_empty() {
+            self.measured.add(time, &self.row);
+        }
+        keeps
+    }
+
+    pub fn experiment(&self) -> Experiment {
+        let (start_time, stop_time) = (self.plan.time[0], self.plan.time.last().copied());
+        Experiment { start_time, stop_time, tolerance: self.plan.tolerance }
+    }
+
+    /// Sets start values before Initialization Mode and inputs in it.
+    fn start(&mut self, instance: &mut Running, run: usize) -> Result<(), Rejection> {
+        let plan = self.plan;
+        instance.begin(self.experiment(), &plan.start, run)?;
+        self.set_values(instance, 0)?;
+        instance.exit_initialization_mode()
+    }
+
+    #[inline(always)]
+    fn set_inputs(&mut self, instance: &mut Running, time: usize) -> Result<(), Rejection> {
+        self.set_values(instance, time)?;
+        if self.derivatives.is_empty() {
+            return Ok(());
+        }
+        let references = self.plan.derivatives.variables.references().unwrap_or_default();
+        instance.sole().set_input_derivatives(references, &self.orders, self.derivatives.at(time))
+    }
+
+    #[inline(always)]
+    fn set_values(&mut self, instance: &mut Running, time: usize) -> Result<(), Rejection> {
+        for input in &self.plan.exact_inputs {
+            input.set(instance, self.number, time)?;
+        }
+        if self.inputs.is_empty() {
+            return Ok(());
+        }
+        instance.set(&self.plan.inputs.variables, self.inputs.at(time))
+    }
+}

@@ -1,0 +1,184 @@
+//! Completed steps of the solver: locates events in them, reads outputs and informs the FMU.
+
+use super::march::{Arrival, Hooks, March};
+use super::model::Model;
+use fmi_client::Rejection;
+use ivp::dense::StepInterpolant;
+use ivp::solout::{ControlFlag, SolOut};
+
+/// Parts of the first step after an event at which event indicators are evaluated, too: one may return to the side from which it came.
+const PROBES: [f64; 4] = [1e-6, 1e-3, 0.1, 0.5];
+
+/// Observes the steps of the solver.
+pub(super) struct Stepping<'s, 'a, 'm, H> {
+    march: &'s mut March<'a>,
+    model: &'s Model<'m>,
+    hooks: &'s mut H,
+    stop: f64,
+    pub arrival: Option<Arrival>,
+    pub failure: Option<Rejection>,
+}
+
+/// Time, states and event indicators.
+#[derive(Clone, Debug, Default)]
+struct Point {
+    time: f64,
+    x: Vec<f64>,
+    z: Vec<f64>,
+}
+
+impl<'s, 'a, 'm, H: Hooks> Stepping<'s, 'a, 'm, H> {
+    pub fn of(march: &'s mut March<'a>, model: &'s Model<'m>, hooks: &'s mut H, stop: f64) -> Self {
+        Self { march, model, hooks, stop, arrival: None, failure: None }
+    }
+
+    /// Goes to the end of the interval, if the FMU has no states.
+    pub fn without_states(mut self) -> Result<Arrival, Rejection> {
+        let (begin, stop) = (self.march.time, self.stop);
+        self.step([begin, stop], &[], &|_, _| ())?;
+        Ok(self.arrival.unwrap_or(Arrival::Stop))
+    }
+
+    /// Completes a step: locates an event in it, reads outputs at the communication points and reports the step to the FMU.
+    fn step(
+        &mut self,
+        [begin, end]: [f64; 2],
+        x: &[f64],
+        at: &dyn Fn(f64, &mut [f64]),
+    ) -> Result<(), Rejection> {
+        let mut end = Point { time: end, x: x.to_vec(), z: Vec::new() };
+        let mut indicator = None;
+        if !self.march.z.is_empty() {
+            (end, indicator) = self.first_event(begin, end, at)?;
+        }
+        let mut between = vec![0.0; x.len()];
+        while self.march.times[self.march.next] < end.time.min(self.stop) {
+            let time = self.march.times[self.march.next];
+            at(time, &mut between);
+            let mut parts = self.model.parts();
+            parts.set(time, &between)?;
+            self.hooks.record(parts.running, self.march.next)?;
+            self.march.next += 1;
+        }
+        let mut parts = self.model.parts();
+        let mut requested = [false; 2];
+        if self.march.settings.reports_steps {
+            parts.set(end.time, &end.x)?;
+            requested = parts.running.sole().completed_integrator_step()?;
+        }
+        parts.accepted();
+        let march = &mut *self.march;
+        (march.taken, march.time, march.is_fresh) = (end.time - begin, end.time, false);
+        march.x.copy_from_slice(&end.x);
+        if !march.z.is_empty() {
+            march.z.copy_from_slice(&end.z);
+        }
+        self.arrival = match requested {
+            _ if !self.hooks.proceed(march.time) => Some(Arrival::Cancel),
+            [_, true] => Some(Arrival::Terminate),
+            [true, _] => Some(Arrival::Event(indicator)),
+            _ => indicator.map(|indicator| Arrival::Event(Some(indicator))),
+        };
+        Ok(())
+    }
+
+    /// Returns the first point after an event indicator has changed its sign, and the indicator; else the end of the step.
+    fn first_event(
+        &mut self,
+        begin: f64,
+        end: Point,
+        at: &dyn Fn(f64, &mut [f64]),
+    ) -> Result<(Point, Option<usize>), Rejection> {
+        let march = &*self.march;
+        let probes = PROBES.iter().filter(|_| march.is_fresh).map(|part| begin + part * (end.time - begin));
+        let points = march.times[march.next..].iter().copied().take_while(|time| *time < end.time);
+        let mut between: Vec<_> =
+            probes.chain(points).filter(|time| *time > begin && *time < end.time).collect();
+        between.sort_unstable_by(f64::total_cmp);
+        let mut before = Point { time: begin, x: march.x.clone(), z: march.z.clone() };
+        for time in between.into_iter().chain([end.time]) {
+            let after = if time == end.time {
+                let mut after = end.clone();
+                after.z.resize(march.z.len(), 0.0);
+                self.model.parts().indicators(time, &after.x, &mut after.z)?;
+                after
+            } else {
+                self.point(time, at)?
+            };
+            if march.changed(&after.z).next().is_some() {
+                let found = self.locate(before, after, at)?;
+                let indicator = march.changed(&found.z).next();
+                return Ok((found, indicator));
+            }
+            before = after;
+        }
+        Ok((before, None))
+    }
+
+    fn point(&self, time: f64, at: &dyn Fn(f64, &mut [f64])) -> Result<Point, Rejection> {
+        let mut point = Point { time, x: vec![0.0; self.march.x.len()], z: vec![0.0; self.march.z.len()] };
+        at(time, &mut point.x);
+        self.model.parts().indicators(time, &point.x, &mut point.z)?;
+        Ok(point)
+    }
+
+    /// Narrows the interval in which the first event indicator changes its sign, and returns its end, where the sign has changed.
+    /// The Illinois method, with a bisection now and then.
+    fn locate(
+        &self,
+        mut before: Point,
+        mut after: Point,
+        at: &dyn Fn(f64, &mut [f64]),
+    ) -> Result<Point, Rejection> {
+        const MOST: usize = 200;
+        let mut weights = [1.0, 1.0];
+        for iteration in 0..MOST {
+            let (a, b) = (before.time, after.time);
+            let middle = a + 0.5 * (b - a);
+            if b - a <= 2.0 * f64::EPSILON * a.abs().max(b.abs()) || middle <= a || middle >= b {
+                break;
+            }
+            let zeros = self.march.changed(&after.z).map(|index| {
+                let (low, high) = (weights[0] * before.z[index], weights[1] * after.z[index]);
+                a + (b - a) * low / (low - high)
+            });
+            let zero = zeros.fold(f64::INFINITY, f64::min);
+            let time = if iteration % 4 != 3 && zero > a && zero < b { zero } else { middle };
+            let point = self.point(time, at)?;
+            if self.march.changed(&point.z).next().is_some() {
+                (after, weights) = (point, [0.5 * weights[0], 1.0]);
+            } else {
+                (before, weights) = (point, [1.0, 0.5 * weights[1]]);
+            }
+        }
+        Ok(after)
+    }
+}
+
+impl<H: Hooks> SolOut for Stepping<'_, '_, '_, H> {
+    fn solout(
+        &mut self,
+        begin: f64,
+        end: &mut f64,
+        x: &mut [f64],
+        interpolant: Option<&StepInterpolant<'_>>,
+    ) -> ControlFlag {
+        if *end <= self.march.time {
+            // The call before the first step.
+            return ControlFlag::Continue;
+        }
+        if self.model.parts().has_failed() {
+            return ControlFlag::Interrupt;
+        }
+        let at = |time: f64, x: &mut [f64]| {
+            if let Some(interpolant) = interpolant {
+                interpolant.interpolate(time, x);
+            }
+        };
+        self.failure = self.step([begin, *end], x, &at).err();
+        match (&self.failure, self.arrival) {
+            (None, None) => ControlFlag::Continue,
+            _ => ControlFlag::Interrupt,
+        }
+    }
+}

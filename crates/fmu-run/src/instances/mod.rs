@@ -1,0 +1,383 @@
+//! Instances of an FMU, controlled call by call: set, step, get, save and restore, all instances in parallel.
+
+mod derivatives;
+mod exact;
+mod exchange;
+mod one;
+mod states;
+
+pub use states::States;
+
+use crate::description::Description;
+use crate::error::{Error, request};
+use crate::instance::{Experiment, Tolerance};
+use crate::messages::{Feed, Logged, Logging};
+use crate::running::Running;
+use crate::selection::Selection;
+use crate::start::{Start, StartValues};
+use crate::system::System;
+use crate::threads::Threads;
+use fmi_abi::Interface;
+use fmi_client::{Event, Rejection};
+use one::{One, Own, each, empty, in_parts, rows};
+use std::sync::Arc;
+
+/// Settings for new instances.
+#[derive(Clone, Debug)]
+pub struct Setup<'a> {
+    /// Interface type: Co-Simulation or Model Exchange.
+    pub interface: Interface,
+    /// Number of instances.
+    pub count: usize,
+    /// Start values by variable.
+    pub start: Vec<(&'a str, Start<'a>)>,
+    /// Start time, s.
+    pub start_time: f64,
+    /// Stop time, s, if known; the FMU may reject steps beyond it.
+    pub stop_time: Option<f64>,
+    /// Relative tolerance for solvers inside the FMU.
+    pub tolerance: Tolerance,
+    /// Whether all messages of the FMU are collected, with its logging switched on; see [`Instances::take_messages`].
+    pub listening: bool,
+    /// Number of threads; `None` uses one thread for each processor.
+    pub threads: Option<usize>,
+}
+
+impl Default for Setup<'_> {
+    /// Returns settings for one instance for Co-Simulation that starts at 0 s.
+    fn default() -> Self {
+        Self {
+            interface: Interface::CoSimulation,
+            count: 1,
+            start: Vec::new(),
+            start_time: 0.0,
+            stop_time: None,
+            tolerance: Tolerance::Default,
+            listening: false,
+            threads: Some(1),
+        }
+    }
+}
+
+/// Instances of one FMU, each with its own time. Every method acts on all of them, in several threads. Values
+/// are stored in rows, one for each instance: instances times variables, the last index varies fastest.
+///
+/// If a call returns an error for an instance, the instance fails, and the others continue.
+/// [`errors`](Self::errors) contains the reason; values read from a failed instance are NaN.
+/// [`reset`](Self::reset) and [`restore`](Self::restore) make it usable again.
+#[derive(Debug)]
+pub struct Instances {
+    system: System,
+    interface: Interface,
+    all: Vec<One>,
+    begin: Begin,
+    /// Collects all messages, if the caller wants them.
+    feed: Option<Arc<Feed>>,
+    /// Threads in addition to the caller's.
+    threads: Option<Threads>,
+}
+
+#[derive(Debug)]
+struct Begin {
+    start: StartValues<'static>,
+    experiment: Experiment,
+}
+
+/// Selection of the instances for a call: all, or those with true.
+pub type Mask<'a> = Option<&'a [bool]>;
+
+impl System {
+    /// Makes instances, sets their start values and initializes them. Instances for Model Exchange have
+    /// handled the events at the start and are in Continuous-Time Mode.
+    ///
+    /// # Errors
+    /// Returns [`Error::Request`] if the settings do not fit the FMU. Returns [`Error::Fmu`] if the FMU does
+    /// not support the interface type or makes no instances.
+    pub fn instances(&self, setup: &Setup) -> Result<Instances, Error> {
+        let (system, start) = self.configured(&setup.start)?;
+        system.instances_of(setup, &start, setup.listening.then(|| self.feed()))
+    }
+
+    /// Makes instances as [`instances`](Self::instances) does, and returns the messages so far also if there is an error.
+    ///
+    /// # Errors
+    /// Same errors as [`instances`](Self::instances).
+    pub fn instances_with(&self, setup: &Setup, messages: &mut Vec<Logged>) -> Result<Instances, Error> {
+        let (system, start) = self.configured(&setup.start)?;
+        let feed = setup.listening.then(|| self.feed());
+        let made = system.instances_of(setup, &start, feed.clone());
+        messages.extend(feed.iter().flat_map(|feed| feed.take()));
+        made
+    }
+
+    /// Makes instances, whose structural parameters have their values.
+    fn instances_of(
+        &self,
+        setup: &Setup,
+        given: &[(&str, Start)],
+        feed: Option<Arc<Feed>>,
+    ) -> Result<Instances, Error> {
+        self.check_interface(setup.interface)?;
+        if setup.count == 0 {
+            return request("count must be at least 1".to_owned());
+        }
+        if setup.count > 1 && self.once_per_process(setup.interface) {
+            return request(format!(
+                "{} can have only one instance per process (canBeInstantiatedOnlyOncePerProcess)",
+                self.name()
+            ));
+        }
+        setup.tolerance.check()?;
+        let start = StartValues::of(self, &[])?;
+        let Setup { start_time, stop_time, tolerance, .. } = *setup;
+        let all = empty(setup.count, self.components().len())?;
+        let threads = self.threads(setup.interface, setup.threads, setup.count)?;
+        let mut instances = Instances {
+            system: self.clone(),
+            interface: setup.interface,
+            all,
+            begin: Begin { start, experiment: Experiment { start_time, stop_time, tolerance } },
+            feed,
+            threads: (threads > 1).then(|| Threads::new(threads - 1)).transpose()?,
+        };
+        instances.start_from(given)?;
+        instances.reset(None);
+        match instances.none_left() {
+            Some(why) => Err(Error::Fmu(why.to_owned())),
+            None => Ok(instances),
+        }
+    }
+}
+
+impl Instances {
+    /// Returns the number of instances.
+    pub fn len(&self) -> usize {
+        self.all.len()
+    }
+
+    /// Returns whether there are no instances.
+    pub fn is_empty(&self) -> bool {
+        self.all.is_empty()
+    }
+
+    /// Returns the interface type.
+    pub fn interface(&self) -> Interface {
+        self.interface
+    }
+
+    /// Returns the system to which the instances belong.
+    pub fn system(&self) -> &System {
+        &self.system
+    }
+
+    /// Returns the time of each instance, s.
+    pub fn times(&self) -> impl Iterator<Item = f64> {
+        self.all.iter().map(|one| one.own.time)
+    }
+
+    /// Returns the indices of the failed instances, each with the reason.
+    pub fn errors(&self) -> impl Iterator<Item = (usize, &str)> {
+        self.all.iter().enumerate().filter_map(|(index, one)| Some((index, one.error.as_deref()?)))
+    }
+
+    /// Returns the error of the first instance if all instances have failed.
+    pub fn none_left(&self) -> Option<&str> {
+        let all = self.all.iter().all(|one| one.error.is_some());
+        self.all.first().filter(|_| all).and_then(|one| one.error.as_deref())
+    }
+
+    /// Returns the result of the last event of each instance.
+    pub fn events(&self) -> impl Iterator<Item = Event> {
+        self.all.iter().map(|one| one.own.event)
+    }
+
+    /// Replaces start values for the next [`reset`](Self::reset); start values of other variables stay.
+    ///
+    /// # Errors
+    /// Returns [`Error::Request`] if a variable is unknown, or if the values do not fit it or the number of
+    /// instances.
+    pub fn start_from(&mut self, start: &[(&str, Start)]) -> Result<(), Error> {
+        for (name, values) in start {
+            if self.system.is_structural(name) {
+                return request(format!(
+                    "{name} is a structural parameter; give its value when the instances are made"
+                ));
+            }
+            if let Some(count) = values.count()
+                && count != 1
+                && count != self.len()
+            {
+                return request(format!("{name} has {count} start values for {} instances", self.len()));
+            }
+        }
+        self.begin.start.put(StartValues::given(&self.system, start)?.into_owned());
+        Ok(())
+    }
+
+    /// Resets the instances to their start values and initializes them.
+    pub fn reset(&mut self, mask: Mask) {
+        let (system, interface, begin, feed) = (&self.system, self.interface, &self.begin, &self.feed);
+        let reset = |index: usize, one: &mut One| {
+            one.error = None;
+            (one.own.time, one.own.event) = (begin.experiment.start_time, Event::default());
+            let feed = feed.as_ref().map(|feed| (Arc::clone(feed), index));
+            let logging = Logging { on: feed.is_some(), feed };
+            match Running::renewed(one.instance.take(), system, interface, &logging) {
+                Ok(instance) => {
+                    let instance = one.instance.insert(instance);
+                    match initialize(instance, begin, index, interface) {
+                        Ok(event) => one.own.event = event,
+                        Err(rejection) => one.error = Some(rejection.to_string()),
+                    }
+                }
+                Err((text, _)) => one.error = Some(text),
+            }
+        };
+        each(&mut self.threads, &mut self.all, mask, reset);
+    }
+
+    /// Sets variables, from a row for each instance or from one row for all.
+    ///
+    /// # Errors
+    /// Returns [`Error::Request`] if a variable is read-only, an integer or a Boolean cannot have its value,
+    /// or an output feeds a variable.
+    ///
+    /// # Panics
+    /// Panics if the number of values is wrong.
+    pub fn set(&mut self, variables: &Selection, values: &[f64], mask: Mask) -> Result<(), Error> {
+        variables.check(values)?;
+        let row = rows(values, variables.len(), self.len());
+        self.alive(mask, |index, _, instance| instance.set(variables, row(index)));
+        Ok(())
+    }
+
+    /// Reads variables into a row for each instance.
+    ///
+    /// # Panics
+    /// Panics if the length of `values` is wrong.
+    pub fn get(&mut self, variables: &Selection, values: &mut [f64]) {
+        self.fill(variables.len(), values, |_, _, instance, row| instance.get(variables, row));
+    }
+
+    /// Performs Co-Simulation steps of this size, s.
+    ///
+    /// # Errors
+    /// Returns [`Error::Request`] if the size is not above 0 and finite.
+    pub fn step(&mut self, size: f64, mask: Mask) -> Result<(), Error> {
+        check_size(size)?;
+        self.alive(mask, |_, own, instance| {
+            instance.step(own.time, size)?;
+            own.time += size;
+            Ok(())
+        });
+        Ok(())
+    }
+
+    /// Performs Co-Simulation steps to this time, s.
+    ///
+    /// # Errors
+    /// Returns [`Error::Request`] if the time is not finite, or not after the time of an instance.
+    pub fn step_to(&mut self, time: f64, mask: Mask) -> Result<(), Error> {
+        let steps = |index: usize, one: &One| one.error.is_none() && mask.is_none_or(|mask| mask[index]);
+        let mut ahead = self.all.iter().enumerate().filter(|(index, one)| steps(*index, one));
+        if let Some((index, one)) = ahead.find(|(_, one)| !(time.is_finite() && time > one.own.time)) {
+            return request(format!(
+                "to is {time} s; it must be after the time of each instance, and instance {index} is at {} s",
+                one.own.time
+            ));
+        }
+        self.alive(mask, |_, own, instance| {
+            instance.step(own.time, time - own.time)?;
+            own.time = time;
+            Ok(())
+        });
+        Ok(())
+    }
+
+    /// Sets variables, performs a step and reads other variables. Equals [`set`](Self::set),
+    /// [`step`](Self::step) and [`get`](Self::get), but starts the threads only once.
+    ///
+    /// # Errors
+    /// Same errors as [`set`](Self::set) and [`step`](Self::step).
+    ///
+    /// # Panics
+    /// Panics if the number of values is wrong.
+    pub fn advance(
+        &mut self,
+        (set, values): (&Selection, &[f64]),
+        size: f64,
+        (get, read): (&Selection, &mut [f64]),
+    ) -> Result<(), Error> {
+        set.check(values)?;
+        check_size(size)?;
+        let inputs = rows(values, set.len(), self.len());
+        self.fill(get.len(), read, |index, own, instance, row| {
+            instance.set(set, inputs(index))?;
+            instance.step(own.time, size)?;
+            own.time += size;
+            instance.get(get, row)
+        });
+        Ok(())
+    }
+
+    /// Returns the model description of a single FMU.
+    fn description(&self) -> Option<&Description> {
+        self.system.sole().map(|fmu| &*fmu.description)
+    }
+
+    /// Removes and returns the messages of the FMU since the last call, if the instances [listen](Setup::listening).
+    pub fn take_messages(&self) -> Vec<Logged> {
+        self.feed.as_ref().map(|feed| feed.take()).unwrap_or_default()
+    }
+
+    /// Calls `body` for each instance that has not failed. An error makes the instance fail.
+    fn alive(
+        &mut self,
+        mask: Mask,
+        body: impl Fn(usize, &mut Own, &mut Running) -> Result<(), Rejection> + Sync,
+    ) {
+        each(&mut self.threads, &mut self.all, mask, |index, one| {
+            one.with(|own, instance| body(index, own, instance));
+        });
+    }
+
+    /// Fills a row of values for each instance, with NaN for a failed instance.
+    fn fill(
+        &mut self,
+        length: usize,
+        values: &mut [f64],
+        body: impl Fn(usize, &mut Own, &mut Running, &mut [f64]) -> Result<(), Rejection> + Sync,
+    ) {
+        assert_eq!(values.len(), length * self.all.len(), "a row of {length} values for each instance");
+        let body = |index: usize, one: &mut One, row: &mut [f64]| {
+            if !one.with(|own, instance| body(index, own, instance, row)) {
+                row.fill(f64::NAN);
+            }
+        };
+        in_parts(&mut self.threads, &mut self.all, length, values, body);
+    }
+}
+
+fn check_size(size: f64) -> Result<(), Error> {
+    if size.is_finite() && size > 0.0 {
+        return Ok(());
+    }
+    request(format!("the size of a step is {size} s; it must be above 0 and finite"))
+}
+
+/// Initializes an instance: from the start values to the first step.
+fn initialize(
+    instance: &mut Running,
+    begin: &Begin,
+    index: usize,
+    interface: Interface,
+) -> Result<Event, Rejection> {
+    instance.begin(begin.experiment, &begin.start, index)?;
+    instance.exit_initialization_mode()?;
+    let mut event = Event::default();
+    if interface == Interface::ModelExchange {
+        event = instance.sole().event()?;
+        instance.sole().enter_continuous_time_mode()?;
+    }
+    Ok(event)
+}

@@ -1,0 +1,112 @@
+//! An instance among others, and the work on all of them in several threads.
+
+use super::Mask;
+use crate::error::Error;
+use crate::instance::Instance;
+use crate::running::Running;
+use crate::threads::Threads;
+use fmi_client::{Event, Rejection};
+
+#[derive(Debug)]
+pub(super) struct One {
+    /// The instance; `None` if it could not be made again.
+    pub instance: Option<Running>,
+    /// Reason why the instance failed, if it did.
+    pub error: Option<String>,
+    pub own: Own,
+}
+
+/// Time and last event of an instance.
+#[derive(Debug, Default)]
+pub(super) struct Own {
+    pub time: f64,
+    pub event: Event,
+}
+
+impl One {
+    /// Calls `body` if the instance has not failed. Returns whether the instance is still usable.
+    #[inline]
+    pub fn with(&mut self, body: impl FnOnce(&mut Own, &mut Running) -> Result<(), Rejection>) -> bool {
+        let Self { instance: Some(instance), error: error @ None, own } = self else { return false };
+        if let Err(rejection) = body(own, instance) {
+            *error = Some(format!("at {} s: {rejection}", own.time));
+            return false;
+        }
+        true
+    }
+}
+
+/// Allocates entries for the instances of a system, if there is enough memory for them and for their data.
+pub(super) fn empty(count: usize, components: usize) -> Result<Vec<One>, Error> {
+    /// Minimum of further memory per component: allocations of its FMU and of its log.
+    const COMPONENT: usize = 256;
+    let too_many = || Error::Memory(format!("{count} instances need more memory than there is"));
+    let mut all = Vec::new();
+    all.try_reserve_exact(count).map_err(|_| too_many())?;
+    let each = size_of::<Running>() + components * (size_of::<Instance>() + COMPONENT);
+    let needed = count.checked_mul(each).ok_or_else(too_many)?;
+    // Freed immediately; it only tests whether so much memory is available.
+    Vec::<u8>::new().try_reserve_exact(needed).map_err(|_| too_many())?;
+    all.resize_with(count, || One { instance: None, error: None, own: Own::default() });
+    Ok(all)
+}
+
+/// Calls `body` for each instance in the mask.
+pub(super) fn each(
+    threads: &mut Option<Threads>,
+    all: &mut [One],
+    mask: Mask,
+    body: impl Fn(usize, &mut One) + Sync,
+) {
+    if let Some(mask) = mask {
+        assert_eq!(mask.len(), all.len(), "a Boolean for each instance");
+    }
+    in_parts(threads, all, 0, &mut [], |index, one, _| {
+        if mask.is_none_or(|mask| mask[index]) {
+            body(index, one);
+        }
+    });
+}
+
+/// Calls `body` for each instance and its row of `length` values. This thread and each thread of the pool get
+/// a part of the instances.
+pub(super) fn in_parts(
+    threads: &mut Option<Threads>,
+    all: &mut [One],
+    length: usize,
+    values: &mut [f64],
+    body: impl Fn(usize, &mut One, &mut [f64]) + Sync,
+) {
+    let work = |first: usize, all: &mut [One], values: &mut [f64]| {
+        let mut rows = values.chunks_exact_mut(length.max(1));
+        for (k, one) in all.iter_mut().enumerate() {
+            body(first + k, one, rows.next().unwrap_or_default());
+        }
+    };
+    if let Some(of_parent) = threads.take_if(|threads| !threads.are_here()) {
+        // Without threads, this one does all the work.
+        *threads = Threads::new(of_parent.count()).ok();
+    }
+    let Some(threads) = threads else { return work(0, all, values) };
+    let part = all.len().div_ceil(threads.count() + 1);
+    let (own, others) = all.split_at_mut(part);
+    let (own_values, mut rest) = values.split_at_mut(part * length);
+    let others = others.chunks_mut(part).enumerate().map(|(number, others)| {
+        let (now, after) = std::mem::take(&mut rest).split_at_mut(others.len() * length);
+        rest = after;
+        let work = &work;
+        move || work((number + 1) * part, others, now)
+    });
+    threads.share(|| work(0, own, own_values), others);
+}
+
+/// Returns the row of an instance, from a row for each instance or one row for all.
+pub(super) fn rows<'v>(values: &'v [f64], length: usize, instances: usize) -> impl Fn(usize) -> &'v [f64] {
+    let each = values.len() == length * instances;
+    assert!(
+        each || values.len() == length,
+        "{} values are not a row of {length} for one or {instances} instances",
+        values.len()
+    );
+    move |index| &values[if each { index * length } else { 0 }..][..length]
+}

@@ -1,0 +1,217 @@
+"""The findings of `prw.identify`: estimates, standard errors and doubts, as numbers and sentences."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from prw.columns import si_unit
+from prw.identification.experiment import Experiment
+from prw.identification.fit import Prior, Solution
+from prw.identification.model import Parameters
+from prw.identification.rounding import rounded
+from prw.identification.statistics import Certainty
+from prw.identification.verdict import Verdict
+from prw.motion import Array
+
+#: Factor between residuals and given noise that causes a note.
+UNLIKE = 1.5
+#: An estimate that is off its prior by this many standard deviations contradicts it.
+CONTRADICTION = 3.0
+#: Relative standard error above which a parameter is reported as not determined.
+HOPELESS = 1.0
+
+
+class Estimate(NamedTuple):
+    """A parameter that was estimated. value, standard_error: in `unit` (SI), as are both ends of the 95 % `interval`.
+    relative: standard error as a fraction. shown, factor: the display unit of the FMU, and the factor from that unit to SI.
+    prior: its prior or None."""
+
+    value: float
+    standard_error: float
+    interval: tuple[float, float]
+    relative: float
+    unit: str
+    shown: str
+    factor: float
+    prior: Prior | None
+
+    @property
+    def hopeless(self) -> bool:
+        """Whether the data hardly determine the parameter."""
+        return self.relative > HOPELESS
+
+    def rounded(self, factor: float = 1.0) -> list[str]:
+        """Value, standard error and both ends of the interval, with the digits that the error justifies, in the unit that
+        `factor` converts to SI."""
+        return rounded(*(number / factor for number in (self.value, self.standard_error, *self.interval)))
+
+
+class ChannelFit(NamedTuple):
+    """Result of one channel of one experiment. samples: number of values. noise: in the band, without encoders' errors;
+    residual: rms over all frequencies; offset: of the sensor; all SI. explained: share of its motion, or None if the
+    motors do not move the channel."""
+
+    experiment: str
+    channel: str
+    unit: str
+    samples: int
+    noise: float
+    residual: float
+    offset: float
+    explained: float | None
+
+
+@dataclass(frozen=True, repr=False)
+class Findings:
+    """Estimates and doubts about one FMU; `prw.identification.results.Identification` has the attributes and writes them."""
+
+    fmu: Path
+    known: Parameters
+    files: tuple[str, ...]
+    experiments: tuple[Experiment, ...]
+    solution: Solution
+    sure: Certainty
+    verdict: Verdict
+    diagnosis: tuple[str, ...]
+    advice: tuple[str, ...]
+
+    @property
+    def parameters(self) -> dict[str, Estimate]:
+        """The estimates by name."""
+        task, sure, found = self.solution.task, self.sure, {}
+        for i, name in enumerate(task.names):
+            parameter, value, relative = self.known.real[name], self.values[name], float(sure.relative[i])
+            interval = float(sure.low[i]), float(sure.high[i])
+            unit = parameter.unit, parameter.shown, parameter.factor
+            found[name] = Estimate(value, value * relative, interval, relative, *unit, task.priors.get(name))
+        return found
+
+    @property
+    def values(self) -> dict[str, float]:
+        """All Real parameters of the FMU in SI by name, fixed ones included."""
+        return self.solution.values
+
+    @property
+    def distortions(self) -> dict[str, tuple[float, float]]:
+        """Estimated delays and lags (s) and gains with their standard errors, by name."""
+        task, found = self.solution.task, {}
+        for i, distortion in enumerate(task.distortions, len(task.names)):
+            value = distortion.value(float(self.solution.logarithms[i]))
+            unit = value if distortion.kind == "gain" else distortion.value(1.0)
+            found[str(distortion)] = value, float(self.sure.relative[i]) * unit
+        return found
+
+    @property
+    def fits(self) -> bool:
+        """Whether the model explains the data. If not, they are not the testbed's parameters."""
+        return self.verdict.fits
+
+    @property
+    def misfits(self) -> list[str]:
+        """Descriptions of unexplained residuals by channel, with their frequencies; empty if the model fits."""
+        several = len(self.experiments) > 1
+        return [f"{misfit.experiment}: {misfit}" if several else str(misfit) for misfit in self.verdict.misfits]
+
+    @property
+    def correlation(self) -> Array:
+        """Correlation of the estimates, (p, p), in the order of `parameters`; distortions follow."""
+        return self.sure.correlation
+
+    @property
+    def undetermined(self) -> list[str]:
+        """Combinations of parameters that the data leave open; empty if all are determined."""
+        return [str(combination) for combination in self.sure.undetermined]
+
+    def residual(self, i: int) -> Array:
+        """Measured minus modelled of experiment i, (n, c), SI, NaN if missing."""
+        values = self.experiments[i].values
+        assert values is not None
+        return values - self.solution.modelled[i]
+
+    @property
+    def channels(self) -> list[ChannelFit]:
+        """Results of every channel of every experiment."""
+        found = []
+        for i, experiment in enumerate(self.experiments):
+            residual = self.residual(i)
+            measured = residual + self.solution.modelled[i]
+            for j, name in enumerate(experiment.channels):
+                spread, rms = np.nanstd(measured[:, j]), float(np.sqrt(np.nanmean(residual[:, j] ** 2)))
+                count = int(np.isfinite(residual[:, j]).sum())
+                offset = float(self.solution.comparisons[i].offsets[j])
+                noise = self.solution.noise[name]
+                still = max(float(np.nanstd(self.solution.modelled[i][:, j])), float(spread) - rms) < rms / 2
+                explained = None if still else float(1 - rms / spread) if spread > 0 else 0.0
+                found.append(ChannelFit(experiment.name, name, si_unit(name), count, noise, rms, offset, explained))
+        return found
+
+    @property
+    def notes(self) -> list[str]:
+        """Notes and doubts for the user, one line each, in SI."""
+        return self.notes_in(shown=False)
+
+    def notes_in(self, *, shown: bool) -> list[str]:
+        """Notes and doubts for the user, one line each; with `shown` parameters in display units."""
+        solution, sure = self.solution, self.sure
+        lines = [f"{file}: {note}" for file, e in zip(self.files, self.experiments) for note in e.notes]
+        for name in solution.task.names:
+            low, high = solution.task.bounds[name]
+            if min(self.values[name] / low, high / self.values[name]) < 1.001:
+                lines.append(f"{name} ended at its bound; give wider bounds, or doubt the data")
+        for point, _ in solution.rivals:
+            values = ", ".join(
+                f"{name} {value / factor:.4g} {unit}"
+                for name, value in zip(solution.task.names, np.exp(point))
+                for factor, unit in [self._unit(name, shown)]
+            )
+            swapped = " (the couplings exchanged)" if self._exchanged(point) else ""
+            lines.append(
+                f"the data fit as well with {values}{swapped}; the result is the one nearest to the start values. "
+                "theta3 and theta4 would distinguish them"
+            )
+        first = self.verdict.suggested
+        if self.fits and first is not None and not sure.undetermined:
+            lines.append(
+                f"intervals allow for a {first.name} of {' +- '.join(rounded(first.size, first.error))} {first.unit}".rstrip()
+                + ", which the data suggest but do not prove"
+            )
+        for name in solution.task.noise:
+            times = self._times_its_noise(name)
+            if not 1 / UNLIKE < times < UNLIKE:
+                lines.append(f"{name}: its residuals are {float(f'{times:.2g}'):g} times the noise that was given")
+        for name, estimate in self.parameters.items():
+            if estimate.prior is not None:
+                off = abs(np.log(estimate.value / estimate.prior.value)) / estimate.prior.relative
+                if off > CONTRADICTION:
+                    lines.append(
+                        f"{name} came out {off:.1f} standard deviations off its prior; data and prior disagree"
+                    )
+        if (sure.whiteness > UNLIKE).any() and not sure.undetermined:
+            lines.append("the noise is not white (quantised angles do that); the standard errors take it into account")
+        return list(dict.fromkeys(lines))
+
+    def _unit(self, name: str, shown: bool) -> tuple[float, str]:
+        """Factor and unit of a parameter: the display unit or SI."""
+        parameter = self.known.real[name]
+        return (parameter.factor, parameter.shown) if shown else (1.0, parameter.unit)
+
+    def _times_its_noise(self, name: str) -> float:
+        """Ratio of a channel's residuals in the band to the expectation from noise and encoders."""
+        columns = [
+            comparison.residual[..., experiment.channels.index(name)].ravel()
+            for experiment, comparison in zip(self.experiments, self.solution.comparisons)
+            if name in experiment.channels
+        ]
+        return float(np.sqrt(np.mean(np.concatenate(columns) ** 2)))
+
+    def _exchanged(self, point: Array) -> bool:
+        index = {name: i for i, name in enumerate(self.solution.task.names)}
+        return all(
+            abs(point[index[a]] - self.solution.logarithms[index[b]]) < 0.05
+            for a, b in (("k1", "k2"), ("k2", "k1"), ("c1", "c2"), ("c2", "c1"))
+            if a in index and b in index
+        )
