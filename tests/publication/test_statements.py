@@ -114,7 +114,9 @@ def test_dependencies_are_as_stated() -> None:
         for package, table in tables.items()
     }
     assert needs["fmu-export"] == {"fmi-abi"} and needs["fmi-abi"] == {"libc"}
-    assert "only dependency is `fmi-abi`, whose only one is `libc`" in " ".join(text("crates/fmu-export/README.md").split())
+    assert "only dependency is `fmi-abi`, whose only one is `libc`" in " ".join(
+        text("crates/fmu-export/README.md").split()
+    )
     for name, own in {
         "fmi-client": {"fmi-abi"},
         "fmu-export": {"fmi-abi"},
