@@ -1,7 +1,7 @@
 """The controller's gains tuned over 10,000 wrists with tolerances, in a closed loop
 
-You learn to run controller and testbed as one system (fmu_run.System), with parameters of both, and to choose gains that
-suit nearly every wrist instead of the nominal one.
+You learn to run controller and testbed as one system (fmu_run.System), with different parameters in each run. Gains
+that suit the nominal wrist may be bad for others, so the example chooses gains that suit nearly every wrist.
 
     make examples; .venv/bin/python examples/gains.py
 """

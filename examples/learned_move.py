@@ -1,7 +1,7 @@
 """A move without vibration, learned on 1,024 wrists at a time
 
-You learn to create Gymnasium environments from an FMU (`fmu_run.gymnasium`), each with other stiffness and load. The
-cross-entropy method finds a motor trajectory and feedback gains. The result is tested on 1,000 other wrists
+You learn to create Gymnasium environments from an FMU (`fmu_run.gymnasium`), each with a different stiffness and
+load. The cross-entropy method finds a motor trajectory and feedback gains. The result is tested on 1,000 other wrists
 with noisy sensors, and compared with input shapers (ZV, ZVD), which need no sensors.
 
     make examples; .venv/bin/python examples/learned_move.py

@@ -1,7 +1,8 @@
 """The quietest motion from rest to rest, found with CasADi
 
-You learn to load the FMU into CasADi and to take the matrices of an optimal control problem from the FMU's derivatives.
-The motion is then replayed on the FMU: nothing vibrates at the end.
+You learn to load the FMU into CasADi and to take the matrices of an optimal control problem from the FMU's
+derivatives. The motion is then replayed on the FMU: nothing vibrates at the end, and little if the stiffness was not
+known exactly.
 
     make examples; .venv/bin/python examples/quiet_motion.py
 """

@@ -30,8 +30,8 @@ HEAD = """# Examples
 
 <!-- written by make docs -->
 
-These short programs use the FMU and the package prw. `make examples` installs their packages and builds the FMUs. To run one from
-the root of the repository: `.venv/bin/python examples/lqr.py`."""
+These short programs show what you can do with the FMU and the package prw, and are meant to be changed. `make examples` installs the
+packages that they need and builds the FMUs. Then run one of them in the root of the repository: `.venv/bin/python examples/lqr.py`."""
 
 HELP = f"run the examples and write {PAGE}"
 

@@ -63,6 +63,29 @@ def test_the_smallest_example_works(interface):
     )
 
 
+def test_the_errors_of_held_inputs_in_the_document():
+    """x' = u - x with u = sin(w t), from x = 0."""
+    fmu, w, names = str(built("lag.fmu")), 2 * np.pi, [("time", float), ("u", float)]
+    for label, *stated in read_table(ROOT / "docs/importers-known-faults.md", "Inputs that FMPy holds").rows:
+        options = {"relative_tolerance": 1e-8} if "1e-8" in label else {}
+        found = []
+        for interval in (1e-2, 1e-3):
+            time = np.linspace(0, 2, round(2 / interval) + 1)
+            result = fmpy.simulate_fmu(
+                fmu,
+                fmi_type="ModelExchange" if "Model Exchange" in label else "CoSimulation",
+                stop_time=2,
+                output_interval=interval,
+                input=np.array(list(zip(time, np.sin(w * time))), dtype=names),
+                output=["x"],
+                **options,
+            )
+            at = w * result["time"]
+            exact = (np.sin(at) - w * np.cos(at) + w * np.exp(-result["time"])) / (1 + w**2)
+            found.append(f"{100 * np.abs(result['x'] - exact).max() / np.abs(exact).max():.1g} %")
+        assert found == stated, label
+
+
 @pytest.fixture
 def validate(monkeypatch, tmp_path, fmu):
     """Runs the command with one importer and one master; returns its status and both files."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import warnings
@@ -11,7 +12,7 @@ import fmu_run
 import gymnasium
 import numpy as np
 import pytest
-from built import built
+from built import ROOT, built
 from fmu_run.gymnasium import AutoresetMode, Env, Task, VectorEnv
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import SyncVectorEnv
@@ -266,3 +267,22 @@ def test_invalid_results_of_functions(task) -> None:
         envs = VectorEnv(replace(task, drawn={"k1": lambda rng, n: np.linspace(100, -1, n + 1)[1:]}), count)
         with pytest.raises(fmu_run.FmuError, match=rf"instance {count - 1} cannot begin .* k1 = -1: .*k1"):
             envs.reset()
+
+
+def test_the_program_in_the_document(fmu, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both motors follow the action, which is their rate; no episode costs more than a failure."""
+    monkeypatch.chdir(ROOT)
+    page = (ROOT / "docs/learning.md").read_text(encoding="utf-8")
+    names: dict = {}
+    exec(re.findall(r"^```python\n(.*?)^```", page, flags=re.M | re.S)[0], names)
+    task, envs = names["task"], names["envs"]
+    assert names["rewards"].shape == (1024,) and not names["terminated"].any()
+    assert np.allclose(names["rewards"], -1.0), "the wrist is at rest, 20 degrees from the goal"
+    envs.reset(seed=1)
+    cost = np.zeros(1024)
+    for step in range(1, task.length + 1):
+        observations, rewards, _, truncated, _ = envs.step(np.ones((1024, 1)))
+        cost += rewards
+        assert truncated.all() == (step == task.length)
+    assert np.allclose(observations[:, 0], names["RATE"] * names["STEP"] * (task.length - 1), rtol=1e-6)
+    assert task.failed_reward < cost.min()

@@ -255,3 +255,7 @@ def test_the_programs_run(fmu, monkeypatch):
     assert len({*names["wrists"].time}) == 2, "some instances were restored"
     assert names["peaks"]["tau1", "peak"].max() == abs(runs["tau1"]).max()
     assert names["rewards"].shape == (1024,) and (names["envs"].steps == 100).all()
+    shapes = re.findall(r"^(?:([^\s#=][^#=]*?)|\s*(\w+) = .*?) +# (\([\d, ]+\))", text, flags=re.M)
+    assert len(shapes) == 6
+    for expression, name, shape in shapes:
+        assert str(np.shape(eval(expression or name, names))) == shape, expression or name

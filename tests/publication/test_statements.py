@@ -114,7 +114,9 @@ def test_dependencies_are_as_stated() -> None:
         for package, table in tables.items()
     }
     assert needs["fmu-export"] == {"fmi-abi"} and needs["fmi-abi"] == {"libc"}
-    assert "only dependency is `fmi-abi`, whose only one is `libc`" in text("crates/fmu-export/README.md")
+    assert "only dependency is `fmi-abi`, whose only one is `libc`" in " ".join(
+        text("crates/fmu-export/README.md").split()
+    )
     for name, own in {
         "fmi-client": {"fmi-abi"},
         "fmu-export": {"fmi-abi"},
@@ -146,3 +148,23 @@ def test_docstrings_make_a_reference_without_warnings(tmp_path: Path) -> None:
     finished = subprocess.run(command, capture_output=True, text=True)
     assert finished.returncode == 0 and not finished.stderr, finished.stderr
     assert "Estimate parameters of the testbed" in (tmp_path / "html/prw.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("page", "message", "sources"),
+    [
+        ("python/prw/tutorial.md", r"(?<![*\w])\*([^*\s][^*\n]*)\*(?!\*)", r"python/prw/src/.*\.(?:py|j2)"),
+        ("docs/author-guide.md", r"^\| `([^`]+)` \|", r"crates/fmu-(?:package|export)/src/.*\.rs"),
+    ],
+)
+def test_messages_in_pages_are_in_the_sources(page: str, message: str, sources: str) -> None:
+    """At least two consecutive words of each message, or the whole message, are in the sources, which insert names and numbers."""
+    code = " ".join(text(name) for name in FILES if re.fullmatch(sources, name))
+    # A string may continue on the next line.
+    code = re.sub(r"\\\n\s*|\"\s*\n\s*f?\"|`", "", code)
+    messages = re.findall(message, text(page), re.MULTILINE)
+    assert len(messages) > 9
+    for words in (found.split() for found in messages):
+        count = min(2, len(words))
+        runs = [" ".join(words[start : start + count]) for start in range(len(words) - count + 1)]
+        assert any(run in code for run in runs), words
