@@ -120,6 +120,36 @@ pub struct Unknown {
     pub variable: usize,
     /// Indices of the variables on which it depends; `None` if the attribute is missing.
     pub dependencies: Option<Vec<usize>>,
+    /// `dependenciesKind`, in the order of the dependencies; empty if the attribute is missing or the lists do not have the same length.
+    pub kinds: Vec<DependencyKind>,
+}
+
+/// How a known enters the equation of an unknown (`dependenciesKind`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DependencyKind {
+    /// In any way.
+    Dependent,
+    /// With a factor that never changes.
+    Constant,
+    /// With a factor that is fixed after the initialization.
+    Fixed,
+    /// With a factor that changes only with tunable parameters.
+    Tunable,
+    /// With a factor that changes only at events, in Co-Simulation at communication points.
+    Discrete,
+}
+
+impl DependencyKind {
+    /// Returns the kind of this name; `Dependent` for an unknown name, which claims least.
+    fn named(name: &str) -> Self {
+        match name {
+            "constant" => Self::Constant,
+            "fixed" => Self::Fixed,
+            "tunable" => Self::Tunable,
+            "discrete" => Self::Discrete,
+            _ => Self::Dependent,
+        }
+    }
 }
 
 /// Capabilities of an FMU for one interface type.
@@ -347,8 +377,14 @@ impl ModelDescription {
         let mut unknown = |node: Node| {
             let variable = find(node.attribute(attribute)?.trim())?;
             let list = node.attribute("dependencies");
-            let dependencies = list.map(|list| list.split_whitespace().filter_map(&mut find).collect());
-            Some(Unknown { variable, dependencies })
+            let dependencies: Option<Vec<usize>> =
+                list.map(|list| list.split_whitespace().filter_map(&mut find).collect());
+            let kinds = node.attribute("dependenciesKind").unwrap_or_default().split_whitespace();
+            let mut kinds: Vec<DependencyKind> = kinds.map(DependencyKind::named).collect();
+            if dependencies.as_ref().is_none_or(|list| list.len() != kinds.len()) {
+                kinds.clear();
+            }
+            Some(Unknown { variable, dependencies, kinds })
         };
         let mut list = |group: &str, of_fmi3: &str| -> Vec<Unknown> {
             let Some(structure) = child(root, "ModelStructure") else { return Vec::new() };
@@ -387,8 +423,9 @@ fn variables(
         .filter_map(|node| Some((node.attribute("name")?, Declared::read(node))))
         .collect();
     let nodes: Vec<Node> = elements(root, "ModelVariables").collect();
-    let lists =
-        root.descendants().flat_map(|node| ["start", "dependencies"].map(|name| node.attribute(name)));
+    let lists = root
+        .descendants()
+        .flat_map(|node| ["start", "dependencies", "dependenciesKind"].map(|name| node.attribute(name)));
     let values: usize = lists.flatten().map(|list| list.split_ascii_whitespace().count()).sum();
     crate::xml::reserve(VARIABLE * nodes.len() + VALUE * values)
         .map_err(|why| format!("modelDescription.xml cannot be read: {why}"))?;

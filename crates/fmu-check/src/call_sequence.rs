@@ -161,6 +161,8 @@ pub enum Step {
     Measure,
     /// Continues in a new process, which receives only the serialized states.
     FreshProcess,
+    /// The FMU of this process is in a directory of this name. This is the first step of a process.
+    Elsewhere(String),
     Unload,
     /// Exits the process, which runs the destructors of its libraries. This is the last step of a sequence.
     Quit,

@@ -150,6 +150,7 @@ pub fn step_name(step: &Step) -> String {
         Step::Integrate(..) => "an integration".to_owned(),
         Step::Measure => "a measurement".to_owned(),
         Step::FreshProcess => "a fresh process".to_owned(),
+        Step::Elsewhere(_) => "another directory".to_owned(),
         Step::Unload => "unloading the library".to_owned(),
         Step::Quit => "the exit of the process".to_owned(),
     }

@@ -39,7 +39,8 @@ fn content(step: &Step) -> Option<String> {
         }
         Step::Integrate(_, how) => Some(format!("{how:?}")),
         Step::Repeat(..) | Step::Parallel(_) | Step::Measure | Step::Version(_) => None,
-        Step::Make(..) | Step::Free(_) | Step::FreshProcess | Step::Unload | Step::Quit => None,
+        Step::Make(..) | Step::Free(_) | Step::FreshProcess | Step::Elsewhere(_) => None,
+        Step::Unload | Step::Quit => None,
     }
 }
 
@@ -95,7 +96,7 @@ pub fn shrink(
             Step::Call { function, .. } => {
                 numbered.id == *id && pinned.iter().any(|name| function[4..].eq_ignore_ascii_case(name))
             }
-            Step::FreshProcess => numbered.id == *id && !pinned.is_empty(),
+            Step::FreshProcess | Step::Elsewhere(_) => numbered.id == *id && !pinned.is_empty(),
             _ => false,
         })
     };

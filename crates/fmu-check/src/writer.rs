@@ -263,7 +263,14 @@ impl<'a> Writer<'a> {
 
     /// Writes an event: enters Event Mode, updates the discrete states and returns to the mode before.
     pub fn event(&mut self, instance: usize) -> Vec<u32> {
-        vec![self.call(instance, "EnterEventMode", vec![]), self.update(instance), self.resume(instance)]
+        let mut ids = vec![self.call(instance, "EnterEventMode", vec![])];
+        ids.extend(self.leave_event(instance));
+        ids
+    }
+
+    /// Updates the discrete states and leaves Event Mode.
+    pub fn leave_event(&mut self, instance: usize) -> Vec<u32> {
+        vec![self.update(instance), self.resume(instance)]
     }
 
     /// Leaves Event Mode for the mode in which time advances.
@@ -478,12 +485,13 @@ pub fn step_args(standard: Standard, time: f64, size: f64) -> Vec<Arg> {
 /// Maximum number of variables that most checks read.
 pub const READ: usize = 1000;
 
-/// Returns the indices of at most `max_count` variables that can be read: no clocks, none of unknown size. If there are more, at most
+/// Returns the indices of at most `max_count` variables that can be read: no clocks, no clocked variables, which can only be read while
+/// their clock is active (section 2.2.7 of FMI 3.0.2), and none of unknown size. If there are more, at most
 /// half are inputs, outputs, derivatives and the independent variable. All are taken at equal distances.
 pub fn sample(description: &Description, max_count: usize) -> Vec<usize> {
     let known = |index: &usize| {
         let variable = &description.variables[*index];
-        variable.base.is_some() && variable.size.is_some()
+        variable.base.is_some() && variable.size.is_some() && !variable.clocked
     };
     let all: Vec<usize> = (0..description.variables.len()).filter(known).collect();
     if all.len() <= max_count {

@@ -123,7 +123,9 @@ fn extract(
     if !wanted(&Entry { name: &name, is_inside, compression })? || !is_inside || entry.is_symlink() {
         return Ok(0);
     }
-    let to = directory.join(path);
+    // Some tools write an entry `./`, which the system does not create.
+    let mut to = directory.to_owned();
+    to.extend(path.components().filter(|part| matches!(part, Component::Normal(_))));
     let message = |error: std::io::Error| format!("{}: {error}", shown(&name));
     if relative.ends_with('/') {
         return std::fs::create_dir_all(&to).map_err(message).map(|()| 0);
@@ -172,6 +174,18 @@ fn instead(start: &[u8]) -> Option<String> {
 mod tests {
     use super::{Limits, instead, unpack};
     use std::io::Write;
+
+    #[test]
+    fn entries_may_begin_with_a_dot() {
+        let directory = tempfile::tempdir().unwrap();
+        let (path, to) = (directory.path().join("archive"), directory.path().join("new"));
+        let mut archive = zip::ZipWriter::new(std::fs::File::create(&path).unwrap());
+        archive.add_directory("./", zip::write::SimpleFileOptions::default()).unwrap();
+        archive.start_file("./a/b", zip::write::SimpleFileOptions::default()).unwrap();
+        archive.finish().unwrap();
+        unpack(&path, "an archive", &to, &mut Limits::default(), &mut |_| Ok(true)).unwrap();
+        assert!(to.join("a/b").is_file());
+    }
 
     #[test]
     fn archives_have_limits() {

@@ -1,10 +1,11 @@
-//! Checks that ModelStructure lists the dependencies that the FMU has.
+//! Checks that ModelStructure lists the dependencies that the FMU has, and that their kinds are true.
 
-use super::derivatives::{middle_values, set_known, to_middle};
+use super::derivatives::{middle_values, set_known};
+use crate::call_sequence::{Run, Values};
 use crate::checker::Checker;
-use crate::description::Unknown;
-use crate::values::near;
-use crate::writer::Part::{Enter, Make};
+use crate::description::{DependencyKind, Description, Unknown};
+use crate::values::{near, other_values};
+use crate::writer::Part::{Begin, Enter, Make};
 use crate::writer::{Read, Trajectory, Writer, value_of};
 use std::collections::HashSet;
 
@@ -23,44 +24,103 @@ fn undeclared<'a>(
     silent.filter(|index| !aliases.contains(index)).collect()
 }
 
-/// Checks that no unknown depends on the known. The known is set to `value`, to another value and to `value` again. An unknown
-/// that changes and has its first value at the end depends on the known.
-fn moved(
-    checker: &Checker,
-    rule: &str,
-    mut writer: Writer,
-    known: usize,
-    value: &[f64],
-    unknowns: Vec<usize>,
-    set: impl Fn(&mut Writer, &[f64]),
-) -> anyhow::Result<()> {
-    let variable = &checker.description.variables[known];
-    let other: Vec<f64> = value.iter().map(|value| near(variable, *value, 1.0 / 16.0)).collect();
-    let [before, after, back]: [Vec<Read>; 3] = [value, &other[..], value].map(|value| {
-        set(&mut writer, value);
-        writer.read_these(0, &unknowns)
-    });
-    let description = checker.description.clone();
-    checker.check(rule, writer.sequence, move |run| {
+/// Reads of unknowns with a value of a known, with another value and with the first value again.
+struct Moved([Vec<Read>; 3]);
+
+impl Moved {
+    fn new(writer: &mut Writer, unknowns: &[usize], mut set: impl FnMut(&mut Writer, usize)) -> Self {
+        Self([0, 1, 0].map(|which| {
+            set(writer, which);
+            writer.read_these(0, unknowns)
+        }))
+    }
+
+    /// Describes the first unknown that changes and has its first value at the end, which shows that it depends on the known.
+    fn depends(
+        &self,
+        run: &Run,
+        description: &Description,
+        unknowns: &[usize],
+        known: usize,
+    ) -> Option<String> {
         unknowns.iter().find_map(|unknown| {
-            let [one, other, again] = [&before, &after, &back].map(|reads| value_of(run, reads, *unknown));
+            let [one, other, again] = [0, 1, 2].map(|which| value_of(run, &self.0[which], *unknown));
             let (one, other, again) = (one?, other?, again?);
             let at = one.differ(&other)?;
-            let (name, of) = (&description.variables[*unknown].name, &description.variables[known].name);
+            let [name, of] = [*unknown, known].map(|index| &description.variables[index].name);
             let (is, becomes) = (one.show(at), other.show(at));
             let message =
                 || format!("{name} goes from {is} to {becomes} when {of} changes, and does not list it");
             one.differ(&again).is_none().then(message)
         })
-    })
+    }
 }
 
-/// Checks the dependencies of outputs and derivatives on continuous inputs and, in Model Exchange, on states.
+/// Returns the indices of points at which dependencies are tried: the second, the middle and the last. Before the first step, the
+/// initialization may still follow the inputs.
+fn places(checker: &Checker, trajectory: &Trajectory) -> Vec<usize> {
+    let count = trajectory.points.len();
+    let mut places = vec![1.min(count), count / 2, count.saturating_sub(1)];
+    places.sort_unstable();
+    places.dedup();
+    if checker.quick {
+        places = vec![count / 2];
+    }
+    places
+}
+
+/// Writes a simulation that stops at some points.
+fn visit(writer: &mut Writer, trajectory: &Trajectory, places: &[usize], mut at: impl FnMut(&mut Writer)) {
+    writer.write(0, &[Begin]);
+    let mut next = 0;
+    for place in places {
+        trajectory.points[next..*place].iter().for_each(|point| drop(writer.point(0, point)));
+        next = *place;
+        at(writer);
+    }
+}
+
+/// Returns the outputs and, in Model Exchange, the derivatives.
+fn unknowns<'a>(checker: &'a Checker, trajectory: &Trajectory) -> impl Iterator<Item = &'a Unknown> {
+    let derivatives = if trajectory.is_stepped() { &[][..] } else { &checker.description.derivatives };
+    checker.description.outputs.iter().chain(derivatives)
+}
+
+/// Checks the dependencies of outputs and derivatives on inputs and, in Model Exchange, on states.
 pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let (knowns, states) = continuous_knowns(checker, trajectory);
+    let (values, vector) = middle_values(checker, trajectory, &knowns, &states)?;
+    for (known, value) in knowns.into_iter().zip(values) {
+        let unknowns = undeclared(checker, unknowns(checker, trajectory), known);
+        if unknowns.is_empty() || value.is_empty() {
+            continue;
+        }
+        let variable = &checker.description.variables[known];
+        let other: Vec<f64> = value.iter().map(|value| near(variable, *value, 1.0 / 16.0)).collect();
+        // Only a state is part of a vector, whose other elements are those of the middle.
+        let places = if states.contains(&known) {
+            vec![trajectory.points.len() / 2]
+        } else {
+            places(checker, trajectory)
+        };
+        let (mut writer, mut moved) = (checker.writer(trajectory), Vec::new());
+        visit(&mut writer, trajectory, &places, |writer| {
+            moved.push(Moved::new(writer, &unknowns, |writer, which| {
+                set_known(writer, &states, &vector, known, [&value, &other][which]);
+            }));
+        });
+        let description = checker.description.clone();
+        checker.check("dependencies.missing", writer.sequence, move |run| {
+            moved.iter().find_map(|moved| moved.depends(run, &description, &unknowns, known))
+        })?;
+    }
+    discrete(checker, trajectory)
+}
+
+/// Returns the continuous inputs and, in Model Exchange, the states, and the list of the states.
+fn continuous_knowns(checker: &Checker, trajectory: &Trajectory) -> (Vec<usize>, Vec<usize>) {
     let description = &checker.description;
-    let stepped = trajectory.is_stepped();
-    let derivatives = if stepped { &[][..] } else { &description.derivatives };
-    let scalar = !stepped && description.states_count() == Some(description.states().len());
+    let scalar = !trajectory.is_stepped() && description.states_count() == Some(description.states().len());
     let states = if scalar { description.states() } else { Vec::new() };
     let inputs = (0..description.variables.len()).filter(|index| {
         let variable = &description.variables[*index];
@@ -70,46 +130,184 @@ pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
             && !variable.once_per_instant
             && !variable.clocked
     });
-    let knowns: Vec<usize> = inputs.chain(states.iter().copied()).take(checker.at_most(60)).collect();
-    let (values, vector) = middle_values(checker, trajectory, &knowns, &states)?;
-    for (known, value) in knowns.into_iter().zip(values) {
-        let unknowns = undeclared(checker, description.outputs.iter().chain(derivatives), known);
-        if unknowns.is_empty() || value.is_empty() {
-            continue;
-        }
-        let mut writer = checker.writer(trajectory);
-        writer.write(0, &to_middle(trajectory));
-        moved(checker, "dependencies.missing", writer, known, &value, unknowns, |writer, numbers| {
-            set_known(writer, &states, &vector, known, numbers);
+    (inputs.chain(states.iter().copied()).take(checker.at_most(60)).collect(), states)
+}
+
+/// Checks the dependencies of outputs on discrete inputs of any type. In Model Exchange they are set in Event Mode.
+fn discrete(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let description = &checker.description;
+    let inputs = (0..description.variables.len()).filter(|index| {
+        let variable = &description.variables[*index];
+        let continuous = variable.is_float() && variable.variability == "continuous";
+        let excluded = continuous || variable.once_per_instant || variable.clocked;
+        variable.causality == "input" && !excluded && description.aliases(*index).count() == 1
+    });
+    for known in inputs.take(checker.at_most(60)) {
+        let unknowns = undeclared(checker, unknowns(checker, trajectory), known);
+        let Some(values) = both_values(description, known).filter(|_| !unknowns.is_empty()) else { continue };
+        let (mut writer, mut moved) = (checker.writer(trajectory), Vec::new());
+        let events = !trajectory.is_stepped() || description.event_mode();
+        visit(&mut writer, trajectory, &places(checker, trajectory), |writer| {
+            if events {
+                writer.call(0, "EnterEventMode", vec![]);
+            }
+            moved.push(Moved::new(writer, &unknowns, |writer, which| {
+                writer.set(0, &[(known, values[which].clone())]);
+            }));
+            if events {
+                writer.leave_event(0);
+            }
+        });
+        let description = checker.description.clone();
+        checker.check("dependencies.missing", writer.sequence, move |run| {
+            moved.iter().find_map(|moved| moved.depends(run, &description, &unknowns, known))
         })?;
     }
     Ok(())
 }
 
-/// Checks the dependencies of initial unknowns on inputs and exact start values, except parameters, in Initialization Mode.
+/// Returns the start values of a variable and other values.
+fn both_values(description: &Description, index: usize) -> Option<[Values; 2]> {
+    let variable = &description.variables[index];
+    let other = other_values(description, index)?;
+    let start = match &other {
+        Values::Strings(_) => {
+            let texts =
+                (0..variable.starts_count()).map(|at| Some(variable.start_of(at)?.as_bytes().to_owned()));
+            Values::Strings(texts.collect())
+        }
+        Values::Numbers(kind, _) => Values::new(*kind, variable.starts()),
+    };
+    Some([start, other])
+}
+
+/// Checks the dependencies of initial unknowns on inputs and exact start values, such as parameters, in Initialization Mode.
 pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let knowns = (0..description.variables.len()).filter(|index| {
         let variable = &description.variables[*index];
         let known = variable.causality == "input"
             || variable.initial == "exact" && variable.variability != "constant";
-        known
-            && variable.is_float()
-            && variable.causality != "parameter"
-            && !variable.starts().is_empty()
-            && !variable.clocked
+        known && !variable.starts().is_empty() && !variable.clocked && variable.is_number()
     });
-    for known in knowns.take(checker.at_most(60)) {
+    for known in knowns.take(checker.at_most(100)) {
         let unknowns = undeclared(checker, &description.initial_unknowns, known);
-        if unknowns.is_empty() {
+        let Some([value, other]) = both_values(description, known).filter(|_| !unknowns.is_empty()) else {
             continue;
-        }
+        };
+        let other = match &value {
+            Values::Numbers(kind, _) if kind.is_float() => {
+                let variable = &description.variables[known];
+                let starts = variable.starts().into_iter();
+                Values::new(*kind, starts.map(|start| near(variable, start, 1.0 / 16.0)))
+            }
+            _ => other,
+        };
         let mut writer = checker.writer(trajectory);
         writer.write(0, &[Make, Enter]);
-        let value = description.variables[known].starts();
-        moved(checker, "dependencies.initial", writer, known, &value, unknowns, |writer, numbers| {
-            writer.set_numbers(0, known, numbers);
+        let moved = Moved::new(&mut writer, &unknowns, |writer, which| {
+            writer.set(0, &[(known, [&value, &other][which].clone())]);
+        });
+        let description = checker.description.clone();
+        checker.check("dependencies.initial", writer.sequence, move |run| {
+            moved.depends(run, &description, &unknowns, known)
         })?;
     }
     Ok(())
+}
+
+/// Values of an unknown for three equidistant values of a known, at one point.
+struct Line {
+    reads: [Vec<Read>; 3],
+    distance: f64,
+}
+
+impl Line {
+    /// Returns the factors of both parts of the line, and the size of their rounding errors.
+    fn factors(&self, run: &Run, unknown: usize) -> Option<([f64; 2], f64)> {
+        let value = |which: usize| value_of(run, &self.reads[which], unknown)?.numbers().first().copied();
+        let values = [value(0)?, value(1)?, value(2)?];
+        let size = values.iter().fold(0.0_f64, |size, value| size.max(value.abs()));
+        let factors = [values[1] - values[0], values[2] - values[1]].map(|change| change / self.distance);
+        values.iter().all(|value| value.is_finite()).then_some((factors, 1e-4 * size / self.distance.abs()))
+    }
+}
+
+/// Checks that a known enters an unknown with a factor that does not change, if `dependenciesKind` declares it as constant, fixed or
+/// tunable: along a line at one point, and from point to point while no tunable parameter changes. A factor that is declared as discrete
+/// may change at events and communication points, so that only the line of Model Exchange is straight.
+pub fn kinds(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let description = &checker.description;
+    let (mut knowns, states) = continuous_knowns(checker, trajectory);
+    let of = |unknown: &Unknown, known: usize| {
+        let list = unknown.dependencies.as_ref()?;
+        let kind = *unknown.kinds.get(list.iter().position(|index| *index == known)?)?;
+        let scalar = description.variables[unknown.variable].size == Some(1);
+        let real = description.variables[unknown.variable].is_float();
+        (scalar && real && kind != DependencyKind::Dependent).then_some((unknown.variable, kind))
+    };
+    let declared = |known: usize| -> Vec<(usize, DependencyKind)> {
+        unknowns(checker, trajectory).filter_map(|unknown| of(unknown, known)).collect()
+    };
+    knowns.retain(|known| description.variables[*known].size == Some(1) && !declared(*known).is_empty());
+    let (values, vector) = middle_values(checker, trajectory, &knowns, &states)?;
+    for (known, value) in knowns.into_iter().zip(values) {
+        let variable = &description.variables[known];
+        let Some(value) = value.first().copied().filter(|value| value.is_finite()) else { continue };
+        let distance = (near(variable, value, 1.0 / 16.0) - value) / 2.0;
+        if distance == 0.0 {
+            continue;
+        }
+        let declared = declared(known);
+        let indices: Vec<usize> = declared.iter().map(|(index, _)| *index).collect();
+        let places = if states.contains(&known) {
+            vec![trajectory.points.len() / 2]
+        } else {
+            places(checker, trajectory)
+        };
+        let (mut writer, mut lines) = (checker.writer(trajectory), Vec::new());
+        visit(&mut writer, trajectory, &places, |writer| {
+            let reads = [0.0, 1.0, 2.0].map(|times| {
+                set_known(writer, &states, &vector, known, &[value + times * distance]);
+                writer.read_these(0, &indices)
+            });
+            set_known(writer, &states, &vector, known, &[value]);
+            lines.push(Line { reads, distance });
+        });
+        let (description, stepped) = (checker.description.clone(), trajectory.is_stepped());
+        checker.check("dependencies.kind", writer.sequence, move |run| {
+            declared.iter().find_map(|(unknown, kind)| {
+                let [name, of] = [*unknown, known].map(|index| &description.variables[index].name);
+                let [is, becomes] = other_factors(run, &lines, *unknown, *kind, stepped)?;
+                let kind = format!("{kind:?}").to_lowercase();
+                Some(format!(
+                    "{of} enters {name} with a factor of {is:?} and of {becomes:?}, which is declared as {kind}"
+                ))
+            })
+        })?;
+    }
+    Ok(())
+}
+
+/// Returns two factors that should be equal and are not.
+fn other_factors(
+    run: &Run,
+    lines: &[Line],
+    unknown: usize,
+    kind: DependencyKind,
+    stepped: bool,
+) -> Option<[f64; 2]> {
+    let differ =
+        |one: f64, other: f64, error: f64| (one - other).abs() > 1e-2 * one.abs().max(other.abs()) + error;
+    let found: Vec<_> = lines.iter().filter_map(|line| line.factors(run, unknown)).collect();
+    let is_discrete = kind == DependencyKind::Discrete;
+    if !(is_discrete && stepped) {
+        let bent = found.iter().find(|([one, other], error)| differ(*one, *other, *error));
+        if let Some((factors, _)) = bent {
+            return Some(*factors);
+        }
+    }
+    let ([first, _], error) = found.first()?;
+    let other = found.iter().find(|([one, _], other)| differ(*first, *one, error.max(*other)));
+    other.filter(|_| !is_discrete).map(|([one, _], _)| [*first, *one])
 }

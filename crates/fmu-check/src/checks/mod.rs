@@ -6,6 +6,7 @@ pub mod early_returns;
 pub mod functions;
 pub mod interfaces;
 pub mod life_cycle;
+pub mod location;
 pub mod logs;
 pub mod malformed;
 pub mod package;
@@ -13,8 +14,12 @@ pub mod rejections;
 pub mod reset;
 pub mod resources;
 pub mod results;
+pub mod several;
 pub mod start_values;
+pub mod state_values;
 pub mod states;
+pub mod status;
+pub mod strings;
 
 use crate::call_sequence::CallSequence;
 use crate::checker::Checker;
@@ -82,18 +87,25 @@ pub const ALL: &[(&str, Check)] = &[
     ("start_values", Each(Always, start_values::starts)),
     ("start_values", Each(Always, start_values::set)),
     ("states", Each(Serializes, states::serialized)),
+    ("states", Each(Saves, state_values::restore)),
     ("reset", Each(Always, reset::reset)),
     ("derivatives", Each(Always, derivatives::directional)),
     ("derivatives", Each(Integrated, derivatives::vectors)),
     ("dependencies", Each(Always, dependencies::missing)),
     ("dependencies", Each(Always, dependencies::initial)),
+    ("dependencies", Each(Always, dependencies::kinds)),
     ("rejections", Each(Always, rejections::change_nothing)),
     ("results", Once(interfaces::compare)),
     ("results", Each(Several, results::instances)),
+    ("results", Each(Several, strings::instances)),
+    ("results", Each(Several, several::freed)),
+    ("results", Each(Stepped, status::status)),
+    ("results", Each(Always, location::location)),
     ("results", Each(Always, results::reading)),
     ("results", Each(Always, results::name)),
     ("results", Each(Stepped3, early_returns::steps)),
     ("results", Each(Several, results::threads)),
+    ("results", Each(Several, strings::threads)),
     ("results", Each(Stepped, results::cut)),
     ("results", Each(Always, results::time)),
     ("results", Each(Stepped3, results::last_successful)),

@@ -106,28 +106,41 @@ fn measured(
     Ok(())
 }
 
-/// Returns the first setting that is in only the first list.
-fn only_in<'a>(one: &'a [String], other: &[String]) -> Option<&'a String> {
-    one.iter().find(|setting| !other.contains(setting))
+/// Files of the working directory, which an FMU may have there until its instance is freed.
+const FILES: &str = "files in the working directory";
+
+/// Describes the first setting that is not in both measurements.
+fn changed(before: &Measured, after: &Measured, ignored: &str) -> Option<String> {
+    let only_in = |one: &Measured, other: &Measured| {
+        let is_other = |setting: &&String| {
+            !other.settings.contains(setting) && (ignored.is_empty() || !setting.starts_with(ignored))
+        };
+        one.settings.iter().find(is_other).cloned()
+    };
+    // The environment may have more or fewer variables than before.
+    match (only_in(before, after), only_in(after, before)) {
+        (None, None) => None,
+        (Some(was), Some(is)) => Some(format!("{was} has become {is}")),
+        (Some(was), None) => Some(format!("{was} is gone")),
+        (None, Some(is)) => Some(format!("{is} is new")),
+    }
 }
 
-/// Checks that a simulation does not change settings of the process and prints nothing.
+/// Checks that a simulation does not change settings of the process and prints nothing, until the library is unloaded.
 fn settings(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.add(checker.version());
     let first = writer.add(Step::Measure);
     writer.write(0, &[Begin, Points(usize::MAX), ReadAll]);
-    let last = writer.add(Step::Measure);
+    let alive = writer.add(Step::Measure);
+    writer.write(0, &[Call("Terminate"), Free]);
+    let freed = writer.add(Step::Measure);
+    writer.add(Step::Unload);
     let run = checker.evaluate("resources.settings", writer.sequence.clone(), move |run| {
-        let (one, two) = (run.outcome(first)?.measured.as_ref()?, run.outcome(last)?.measured.as_ref()?);
-        // The environment may have more or fewer variables than before.
-        let (gone, new) = (only_in(&one.settings, &two.settings), only_in(&two.settings, &one.settings));
-        match (gone, new) {
-            (None, None) => None,
-            (Some(was), Some(is)) => Some(format!("{was} has become {is}")),
-            (Some(was), None) => Some(format!("{was} is gone")),
-            (None, Some(is)) => Some(format!("{is} is new")),
-        }
+        let measured = |id| run.outcome(id)?.measured.as_ref();
+        let before = measured(first)?;
+        let meanwhile = measured(alive).and_then(|alive| changed(before, alive, FILES));
+        meanwhile.or_else(|| changed(before, measured(freed)?, ""))
     })?;
     checker.record("logs.printed", &run, &writer.sequence, |run| {
         let line = run.output.lines().find(|line| !line.trim().is_empty())?;

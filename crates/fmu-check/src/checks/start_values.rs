@@ -146,16 +146,23 @@ fn constants(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     checker.check("start_values.fixed", writer.sequence, criterion)
 }
 
+/// Returns the variables that can be set before the initialization, without those that have aliases.
+pub fn settable(checker: &Checker) -> Vec<usize> {
+    let description = &checker.description;
+    let mut indices = checker.readable.clone();
+    indices.retain(|index| {
+        let of = &description.variables[*index];
+        let settable = of.causality == "input" || of.initial == "exact" && of.variability != "constant";
+        settable && !of.clocked && !of.start.is_empty() && description.aliases(*index).count() == 1
+    });
+    indices
+}
+
 /// Checks that getters return the values that were set in Initialization Mode, before it, and at a communication point.
 pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let variable = |index: &usize| &description.variables[*index];
-    let mut indices = checker.readable.clone();
-    indices.retain(|index| {
-        let of = variable(index);
-        let settable = of.causality == "input" || of.initial == "exact" && of.variability != "constant";
-        settable && !of.clocked && !of.start.is_empty() && description.aliases(*index).count() == 1
-    });
+    let indices = settable(checker);
     let with_other = |index: &usize| Some((*index, other_values(description, *index)?));
     let (floats, others): (Vec<usize>, Vec<usize>) =
         indices.iter().partition(|index| variable(index).is_float());
@@ -209,7 +216,7 @@ fn when(checker: &Checker, trajectory: &Trajectory, values: &[(usize, Values)]) 
 }
 
 /// Returns the criterion that getters return the values that were set.
-fn values_are_kept(
+pub fn values_are_kept(
     checker: &Checker,
     ids: Vec<u32>,
     reads: Vec<Read>,
@@ -220,7 +227,9 @@ fn values_are_kept(
     Box::new(move |run: &Run| {
         let succeeded = ids.iter().all(|id| run.succeeds(*id));
         values.iter().filter(|_| succeeded).find_map(|(index, value)| {
-            let read = value_of(run, &reads, *index).filter(|read| read.differ(value).is_some())?;
+            // Models that convert units round the last digit.
+            let read = value_of(run, &reads, *index)?;
+            read.differ_beyond(value, 1e-13, |_| 0.0)?;
             let name = &description.variables[*index].name;
             Some(format!("{name} was set to {} and {has} {}", value.show(0), read.show(0)))
         })

@@ -60,7 +60,7 @@ impl Report {
             status: 0,
             unused: Vec::new(),
             fmu: path.display().to_string(),
-            date: today(),
+            date: chrono::Utc::now().date_naive().to_string(),
             model: checker.description.model_name.clone(),
             token: checker.description.token.clone(),
             passed: Vec::new(),
@@ -250,17 +250,4 @@ impl Report {
         }
         Ok(())
     }
-}
-
-/// Returns the day of today (UTC) as in 2030-12-31.
-fn today() -> String {
-    let seconds = std::time::UNIX_EPOCH.elapsed().map_or(0, |since| since.as_secs());
-    // Years of 365.2425 days that begin in March, so that the leap day is their last one.
-    let days = seconds / 86400 + 719_468;
-    let (era, day) = (days / 146_097, days % 146_097);
-    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
-    let day = day - (365 * year + year / 4 - year / 100);
-    let month = (5 * day + 2) / 153;
-    let (day, month) = (day - (153 * month + 2) / 5 + 1, if month < 10 { month + 3 } else { month - 9 });
-    format!("{:04}-{month:02}-{day:02}", era * 400 + year + u64::from(month < 3))
 }

@@ -47,10 +47,13 @@ pub fn program(
     });
     let save = each(bytes, &|slot| format!("    pass_on({slot}, b{slot}, *n{slot});\n"));
     let list: Vec<String> = (0..parts.len()).map(|number| format!("phase{number}")).collect();
+    let places: Vec<String> =
+        sequence.split(|numbered| numbered.step == Step::FreshProcess).map(place).collect();
     format!(
         "/*\n{} * cc -ffp-contract=off repro.c -o repro -ldl -lpthread -lm && ./repro DIRECTORY_OF_THE_UNPACKED_FMU\n *\n \
          * Exit status: 1 if the finding is reproduced, 0 if it is not, 3 if that is not known.\n */\n\
          #define FMI {}\n{}{declared}\n{threads}{}static void (*const phases[])(void) = {{{}}};\n\
+         static const char *const places[] = {{{}}};\n\
          static const char library_name[] = \"{}\";\n\nstatic void load(void) {{\n{load}}}\n\n\
          static void save(void) {{\n{save}}}\n\n{}{}",
         head(finding, description),
@@ -58,10 +61,19 @@ pub fn program(
         prelude(sequence),
         parts.concat(),
         list.join(", "),
+        places.join(", "),
         library(setting, sequence),
         shows(evidence),
         include_str!("main.c")
     )
+}
+
+/// Returns the name of the directory in which a process has the FMU, or NULL for the directory of the argument.
+fn place(part: &[Numbered]) -> String {
+    match part.first().map(|numbered| &numbered.step) {
+        Some(Step::Elsewhere(name)) => literal(name.as_bytes()),
+        _ => "NULL".to_owned(),
+    }
 }
 
 /// Returns the functions that the calls need.
@@ -103,7 +115,7 @@ fn library(setting: &Setting, sequence: &CallSequence) -> String {
 fn shows(evidence: &Evidence) -> String {
     let results = match evidence {
         Evidence::None | Evidence::End | Evidence::Orphans => None,
-        Evidence::Printed => Some("*result(\"printed\", 0) != 0".to_owned()),
+        Evidence::Printed => Some("has_words(result(\"printed\", 0))".to_owned()),
         Evidence::Damage => Some("noted(\"damage\")".to_owned()),
         Evidence::Strays => Some("noted(\"stray\")".to_owned()),
         Evidence::Differ(pairs) => {
@@ -195,7 +207,7 @@ impl Writer<'_> {
                 format!("((void (*)(void *))function(\"{name}\"))({instance});\n")
             }
             Step::Measure => format!("measure({id});\n"),
-            Step::Unload => "dlclose(library);\nopen_library();\n".to_owned(),
+            Step::Unload => "close_library();\nopen_library();\n".to_owned(),
             Step::Quit => "exit(0);\n".to_owned(),
             Step::Repeat(times, steps) => {
                 let (body, i) = (self.block(steps, "    "), self.number());
@@ -217,7 +229,7 @@ impl Writer<'_> {
                     );
                     let _ = writeln!(joins, "pthread_join(t{number}, NULL);");
                 }
-                text + &joins
+                format!("threads = true;\n{text}{joins}threads = false;\n")
             }
             Step::Integrate(index, how) => {
                 let (euler, Integration { states, indicators, steps, .. }) = (u8::from(how.euler), how);
@@ -234,7 +246,7 @@ impl Writer<'_> {
                 };
                 format!("if (c{index}) {{ double events[3]; int status = {call}; {result}}}\n")
             }
-            Step::FreshProcess => String::new(),
+            Step::FreshProcess | Step::Elsewhere(_) => String::new(),
         }
     }
 
@@ -282,8 +294,10 @@ impl Writer<'_> {
         format!(
             "{guard}{{{comment}\n    size_t before = arrays;\n{}    *messages = 0;\n\
              \x20   int status = {call}({handle}{passed});\n\
-             \x20   print(\"{name}: %d\", status);\n{}    print(\"\\n\"); release(before);\n}}\n",
+             {}\x20   print(\"{name}: %d\", status);\n{}    print(\"\\n\"); release(before);\n}}\n",
             lines(parts.before),
+            // Another thread may run before this one copies the strings.
+            if name.ends_with("GetString") { "    if (threads) usleep(20);\n" } else { "" },
             lines(after)
         )
     }

@@ -137,23 +137,31 @@ fn alike(one: &Outcome, other: &Outcome) -> bool {
     one.written != other.written && shape(one) == shape(other)
 }
 
-/// Returns each read on a thread with the corresponding read of the simulation before the threads. The pairs that differ are
-/// not the same in every run.
+/// Returns each read on a thread with the corresponding read of the simulation before the threads: of its instance if that one was
+/// simulated before, otherwise of any. The pairs that differ are not the same in every run.
 fn pairs(sequence: &CallSequence) -> Vec<[u32; 2]> {
-    let queries = |sequence: &[Numbered]| -> Vec<u32> {
-        let query = |numbered: &&Numbered| matches!(&numbered.step, Step::Call { function, .. } if function[4..].starts_with("Get"));
-        sequence.iter().filter(query).map(|numbered| numbered.id).collect()
+    let queries = |sequence: &[Numbered]| -> Vec<(Option<usize>, u32)> {
+        let query = |numbered: &Numbered| match &numbered.step {
+            Step::Call { function, instance, .. } if function[4..].starts_with("Get") => {
+                Some((*instance, numbered.id))
+            }
+            _ => None,
+        };
+        sequence.iter().filter_map(query).collect()
     };
     let single = queries(sequence);
-    let threads = sequence.iter().flat_map(|numbered| match &numbered.step {
-        Step::Parallel(sequences) => sequences.iter().map(|sequence| queries(sequence)).collect(),
-        _ => Vec::new(),
-    });
-    threads
-        .flat_map(|ids| {
-            ids.into_iter().zip(single.iter().cycle()).map(|(id, one)| [*one, id]).collect::<Vec<_>>()
-        })
-        .collect()
+    let mut pairs = Vec::new();
+    for numbered in sequence {
+        let Step::Parallel(sequences) = &numbered.step else { continue };
+        for reads in sequences.iter().map(|sequence| queries(sequence)) {
+            let own =
+                single.iter().filter(|(of, _)| reads.first().is_some_and(|(instance, _)| of == instance));
+            let own: Vec<_> = own.collect();
+            let all: Vec<_> = if own.is_empty() { single.iter().collect() } else { own };
+            pairs.extend(reads.iter().zip(all.into_iter().cycle()).map(|((_, id), (_, one))| [*one, *id]));
+        }
+    }
+    pairs
 }
 
 /// Returns the run without the outcomes that the criterion does not need.

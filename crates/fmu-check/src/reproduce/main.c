@@ -3,14 +3,35 @@
 #define PATIENCE 20
 #endif
 
+/* Sets the paths for an FMU in this directory: in FMI 2.0, the location of the resources is a URI, in which bytes are percent-encoded. */
+static void locate(const char *directory) {
+    char *to = resources;
+    const char *at;
+    snprintf(library_path, sizeof library_path, "%s/%s", directory, library_name);
+    if (FMI == 3) { snprintf(resources, sizeof resources, "%s/resources/", directory); return; }
+    to += sprintf(to, "file://");
+    for (at = directory; *at && to < resources + sizeof resources - 20; at++) {
+        bool plain = isalnum((unsigned char)*at) || strchr("/:-._~", *at);
+        to += sprintf(to, plain ? "%c" : "%%%02X", (unsigned char)*at);
+    }
+    strcpy(to, "/resources");
+}
+
 /* Each phase runs in a separate process, so that a crash does not end this one. */
-static void phase(int number) {
+static void phase(int number, const char *directory) {
     char path[5100];
+    locate(directory);
+    if (places[number]) {
+        snprintf(path, sizeof path, "%s/%s", scratch, places[number]);
+        if (symlink(directory, path)) _exit(3);
+        locate(path);
+    }
     out = fdopen(dup(1), "w");
     setvbuf(out, NULL, _IOLBF, 0);
     snprintf(path, sizeof path, "%s/printed0", scratch);
     if (!freopen(path, "a", stdout)) _exit(3);
     alarm(PATIENCE);
+    alarm_ends = (double)time(NULL) + PATIENCE;
     open_library();
     load();
     phases[number]();
@@ -64,9 +85,7 @@ int main(int count, char **arguments) {
     bool found;
     if (!full) { perror("the directory of the unpacked FMU"); return 3; }
     at_once = EVIDENCE == END;
-    snprintf(resources, sizeof resources, FMI == 3 ? "%s/resources/" : "file://%s/resources", full);
-    snprintf(library_path, sizeof library_path, "%s/%s", full, library_name);
-    if (count > 3) { scratch = arguments[3]; phase(atoi(arguments[2])); }
+    if (count > 3) { scratch = arguments[3]; phase(atoi(arguments[2]), full); }
     snprintf(temporary, sizeof temporary, "%s/fmu-check-XXXXXX", directory && *directory ? directory : "/tmp");
     if (!mkdtemp(temporary)) { perror("mkdtemp"); return 3; }
     scratch = temporary;

@@ -1,4 +1,5 @@
 #define _GNU_SOURCE
+#include <ctype.h>
 #include <dlfcn.h>
 #include <pthread.h>
 #include <stdarg.h>
@@ -9,6 +10,8 @@
 #include <locale.h>
 #include <math.h>
 #include <dirent.h>
+#include <fcntl.h>
+#include <sched.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,6 +23,7 @@
 #include <sys/prctl.h>
 #endif
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 #if defined(__GLIBC__)
 #include <malloc.h>
@@ -42,7 +46,9 @@ static void *library;
 static char library_path[5000];
 /* Output of this program; the standard output belongs to the library. */
 static FILE *out;
-static bool quiet, at_once;
+static bool quiet, at_once, threads;
+/* Time at which the alarm of this program is due. */
+static double alarm_ends;
 /* Directory for the results of calls, which other processes read. */
 static const char *scratch = ".";
 /* Messages that were logged since the last call. */
@@ -69,6 +75,10 @@ static __attribute__((unused)) char *result(const char *kind, int number) {
 
 static __attribute__((unused)) bool begins(const char *text, const char *with) {
     return strncmp(text, with, strlen(with)) == 0;
+}
+
+static __attribute__((unused)) bool has_words(const char *text) {
+    return text[strspn(text, " \t\r\n")] != 0;
 }
 
 static __attribute__((unused)) bool any_differ(const int (*pairs)[2], size_t count) {
@@ -116,6 +126,13 @@ static __attribute__((unused)) void put_strings(FILE *file, const char *const *a
 static void open_library(void) {
     library = dlopen(library_path, (at_once ? RTLD_NOW : RTLD_LAZY) | RTLD_LOCAL);
     if (!library) { print("%s\n", dlerror()); fflush(out); _exit(4); }
+}
+
+/* Unloads the library, after which the standard output must still be usable. */
+static __attribute__((unused)) void close_library(void) {
+    dlclose(library);
+    putchar('\n');
+    fflush(stdout);
 }
 
 static void *function(const char *name) {
@@ -311,24 +328,67 @@ static long entries(const char *path) {
 
 extern char **environ;
 
-/* Writes the mask for new files, limits, the periods of timers, the files of the working directory and the environment. */
+/* Returns whether the next random numbers still are those of the seed that the first call sets, however many the FMU has used. */
+static bool seed_is_kept(void) {
+    static char own[128] __attribute__((aligned(16))), reference[128] __attribute__((aligned(16)));
+    static bool seeded;
+    long next[3], last[3], remaining = 20000000;
+    char *current;
+    int i;
+    if (!seeded) { initstate(4711, own, sizeof own); return seeded = true; }
+    current = initstate(4711, reference, sizeof reference);
+    setstate(current);
+    if (current != own) return false;
+    for (i = 0; i < 3; i++) next[i] = random();
+    setstate(reference);
+    for (i = 0; i < 3; i++) last[i] = random();
+    while (memcmp(next, last, sizeof last) && --remaining) { last[0] = last[1]; last[1] = last[2]; last[2] = random(); }
+    setstate(own);
+    return remaining > 0;
+}
+
+/* Writes the files of the working directory, limits, timers, standard streams, scheduling, seeds and the environment. */
 static void put_settings(FILE *file) {
-    int limits[] = {RLIMIT_NOFILE, RLIMIT_STACK, RLIMIT_CPU, RLIMIT_CORE}, timers[] = {ITIMER_REAL, ITIMER_VIRTUAL, ITIMER_PROF};
+    int limits[] = {RLIMIT_NOFILE, RLIMIT_STACK, RLIMIT_CPU, RLIMIT_CORE, RLIMIT_AS, RLIMIT_DATA, RLIMIT_FSIZE, RLIMIT_NPROC, RLIMIT_MEMLOCK};
+    int timers[] = {ITIMER_REAL, ITIMER_VIRTUAL, ITIMER_PROF};
     size_t i;
     char **variable;
     mode_t mask = umask(0);
     umask(mask);
-    fprintf(file, " %o %ld", (unsigned)mask, entries("."));
-    for (i = 0; i < 4; i++) {
+    fprintf(file, " %o %ld %d %d %p", (unsigned)mask, entries("."), getpriority(PRIO_PROCESS, 0), seed_is_kept(), (void *)uselocale((locale_t)0));
+    for (i = 0; i < sizeof limits / sizeof *limits; i++) {
         struct rlimit limit;
         getrlimit(limits[i], &limit);
-        fprintf(file, " %llu", (unsigned long long)limit.rlim_cur);
+        fprintf(file, " %llu %llu", (unsigned long long)limit.rlim_cur, (unsigned long long)limit.rlim_max);
     }
     for (i = 0; i < 3; i++) {
         struct itimerval timer;
+        /* The real timer of this program ends hangs. */
+        double rest, off;
         getitimer(timers[i], &timer);
-        fprintf(file, " %ld.%ld", (long)timer.it_interval.tv_sec, (long)timer.it_interval.tv_usec);
+        rest = (double)timer.it_value.tv_sec + 1e-6 * (double)timer.it_value.tv_usec;
+        off = i ? rest : fabs(rest - (alarm_ends - (double)time(NULL)));
+        fprintf(file, " %d %ld.%ld", i ? rest != 0 : off > 3, (long)timer.it_interval.tv_sec, (long)timer.it_interval.tv_usec);
     }
+    for (i = 0; i < 3; i++) {
+        struct stat stream;
+        fstat((int)i, &stream);
+        fprintf(file, " %llu %x", (unsigned long long)stream.st_ino, (unsigned)fcntl((int)i, F_GETFL));
+    }
+#if defined(__linux__)
+    {
+        char name[20] = "";
+        cpu_set_t cores;
+        int timers_of_posix = 0, c;
+        FILE *list = fopen("/proc/self/timers", "r");
+        while (list && (c = fgetc(list)) != EOF) timers_of_posix += c == 'I';
+        if (list) fclose(list);
+        CPU_ZERO(&cores);
+        sched_getaffinity(0, sizeof cores, &cores);
+        prctl(PR_GET_NAME, name);
+        fprintf(file, " %d %d %d %s", timers_of_posix, sched_getscheduler(0), CPU_COUNT(&cores), name);
+    }
+#endif
     for (variable = environ; variable && *variable; variable++) fprintf(file, " %s", *variable);
 }
 
@@ -336,8 +396,9 @@ static void put_settings(FILE *file) {
 static __attribute__((unused)) void measure(int number) {
     long pages = 0, all = 0, memory;
     char here[5000] = "";
-    int signals[] = {SIGSEGV, SIGFPE, SIGINT, SIGABRT};
+    int signals[] = {SIGSEGV, SIGFPE, SIGINT, SIGABRT, SIGTERM, SIGHUP, SIGQUIT, SIGILL, SIGBUS, SIGPIPE, SIGALRM, SIGCHLD, SIGUSR1, SIGUSR2, SIGXCPU, SIGVTALRM, SIGPROF};
     size_t i;
+    sigset_t blocked;
     FILE *file = fopen("/proc/self/statm", "r");
     if (file) { if (fscanf(file, "%ld %ld", &all, &pages) != 2) pages = 0; fclose(file); }
     memory = pages * sysconf(_SC_PAGESIZE);
@@ -353,8 +414,21 @@ static __attribute__((unused)) void measure(int number) {
         sigaction(signals[i], NULL, &action);
         fprintf(file, " %p", (void *)action.sa_handler);
     }
+    sigemptyset(&blocked);
+    pthread_sigmask(SIG_BLOCK, NULL, &blocked);
+    for (i = 1; i < 32; i++) fprintf(file, "%d", sigismember(&blocked, (int)i));
 #if defined(__x86_64__)
-    fprintf(file, " %x", __builtin_ia32_stmxcsr() & ~0x3fu);
+    {
+        unsigned short word;
+        __asm__ volatile("fnstcw %0" : "=m"(word));
+        fprintf(file, " %x %x", __builtin_ia32_stmxcsr() & ~0x3fu, word);
+    }
+#elif defined(__aarch64__)
+    {
+        unsigned long word;
+        __asm__ volatile("mrs %0, fpcr" : "=r"(word));
+        fprintf(file, " %lx", word);
+    }
 #endif
     fclose(file);
 }

@@ -7,6 +7,7 @@ mod measure;
 mod memory;
 #[cfg(target_os = "linux")]
 mod server;
+mod settings;
 mod updates;
 
 use crate::call_sequence::{
@@ -32,7 +33,7 @@ use std::fs::File;
 use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitStatus;
-use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 pub use updates::MOST_UPDATES;
@@ -151,8 +152,12 @@ fn work(job: Job, file: File) {
     if job.setting.soft {
         memory::AFTER.store(4096, std::sync::atomic::Ordering::Relaxed);
     }
+    let setting = match job.sequence.first().map(|numbered| &numbered.step) {
+        Some(Step::Elsewhere(name)) => elsewhere(&job.setting, name),
+        _ => job.setting,
+    };
     let executor = Executor {
-        setting: job.setting,
+        setting,
         libraries: Mutex::default(),
         instances: Mutex::default(),
         states: Mutex::default(),
@@ -162,6 +167,23 @@ fn work(job: Job, file: File) {
     };
     executor.execute(&job.sequence, true);
     executor.write(&Last { bytes: std::mem::take(&mut locked(&executor.bytes)) });
+}
+
+/// Returns the setting with the FMU in a directory of this name, which is a link in the working directory.
+fn elsewhere(setting: &Setting, name: &str) -> Setting {
+    let directory = setting.resources.parent().unwrap_or(&setting.resources);
+    let there = std::env::current_dir().unwrap_or_default().join(name);
+    #[cfg(unix)]
+    if let Err(error) = std::os::unix::fs::symlink(directory, &there) {
+        eprintln!("{}: {error}", there.display());
+        std::process::exit(OWN_FAULT);
+    }
+    let moved = |path: &Path| there.join(path.strip_prefix(directory).unwrap_or(path));
+    Setting {
+        libraries: setting.libraries.clone().map(|library| library.map(|library| moved(&library))),
+        resources: moved(&setting.resources),
+        ..setting.clone()
+    }
 }
 
 fn limit(memory: u64) {
@@ -190,6 +212,9 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// Messages, each with the environment pointer that the FMU passed to the logger.
 static MESSAGES: Mutex<Vec<(usize, Message)>> = Mutex::new(Vec::new());
+
+/// Whether several threads are running.
+static THREADS: AtomicBool = AtomicBool::new(false);
 
 /// Identifier of the process that executes the call sequence.
 static PROCESS: AtomicU32 = AtomicU32::new(0);
@@ -349,11 +374,13 @@ impl Executor {
                 }
                 Step::Parallel(sequences) => {
                     memory::KEEP.store(true, Ordering::Relaxed);
+                    THREADS.store(true, Ordering::Relaxed);
                     std::thread::scope(|scope| {
                         for sequence in sequences {
                             scope.spawn(|| self.execute(sequence, report));
                         }
                     });
+                    THREADS.store(false, Ordering::Relaxed);
                     memory::KEEP.store(false, Ordering::Relaxed);
                 }
                 step => self.one(step, &mut outcome),
@@ -416,12 +443,19 @@ impl Executor {
                     // SAFETY: made by Box::leak, and nothing else refers to it.
                     in_fmu(|| drop(unsafe { Box::from_raw(std::ptr::from_ref(library).cast_mut()) }));
                 }
+                // The standard output must not use memory of the library.
+                #[cfg(unix)]
+                // SAFETY: writes an empty line, and the buffers of the C library.
+                in_fmu(|| unsafe {
+                    libc::puts(c"".as_ptr());
+                    libc::fflush(std::ptr::null_mut());
+                });
             }
             Step::Quit => {
                 self.write(&Last { bytes: HashMap::new() });
                 in_fmu(|| std::process::exit(EXECUTED))
             }
-            Step::Repeat(..) | Step::Parallel(_) | Step::FreshProcess => {}
+            Step::Repeat(..) | Step::Parallel(_) | Step::FreshProcess | Step::Elsewhere(_) => {}
         }
     }
 
@@ -565,6 +599,11 @@ impl Executor {
         let call = || in_fmu(|| unsafe { calls::call(address, function, handle as *mut c_void, &words) });
         let status = updates::iterate(function, call(), &kept, call);
         outcome.status = Some(status);
+        let is_string = |kept: &Kept| matches!(kept.content, Content::Output(Kind::Pointer, _));
+        if THREADS.load(Ordering::Relaxed) && kept.iter().any(is_string) {
+            // Another thread may run before this one copies the strings.
+            std::thread::sleep(std::time::Duration::from_micros(20));
+        }
         let succeeded = status == 0 || status == 1;
         for Kept { array, content } in &kept {
             outcome.damage.extend(array.damage(matches!(content, Content::Input)));

@@ -1,0 +1,37 @@
+//! Checks that an FMU runs in directories of any name.
+
+use crate::call_sequence::{Run, Step};
+use crate::checker::Checker;
+use crate::finding::failure;
+use crate::writer::Part::{Begin, ReadAll, Run as RunFrom};
+use crate::writer::Trajectory;
+
+/// Names of directories: a space, then characters that a URI encodes and a literal `%`, which a path of FMI 3.0 does not encode.
+const NAMES: [&str; 2] = ["two words", "Größe+#%41"];
+
+/// Checks that a simulation in a directory of another name has the results of the same simulation in the usual one. FMI 2.0 passes a
+/// URI to the FMU, in which bytes are percent-encoded, and FMI 3.0 a path.
+pub fn location(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    for name in NAMES {
+        let mut writer = checker.writer(trajectory);
+        let mut usual = writer.write(0, &[Begin, ReadAll, RunFrom(0)]);
+        writer.add(Step::FreshProcess);
+        writer.add(Step::Elsewhere(name.to_owned()));
+        let mut moved = writer.write(0, &[Begin, ReadAll, RunFrom(0)]);
+        // Strings may contain the path.
+        let is_number = |(index, _): &(usize, usize)| checker.description.variables[*index].is_number();
+        for reads in [&mut usual.reads, &mut moved.reads] {
+            reads.retain(|read| read.variables.iter().all(is_number));
+        }
+        let sequence = writer.sequence.clone();
+        let differs = checker.differ(&usual.reads, &moved.reads, "{} is {}, in this directory {}");
+        checker.check("results.location", writer.sequence, move |run: &Run| {
+            if failure(&sequence, run, &usual.ids).is_some() {
+                return None;
+            }
+            let why = failure(&sequence, run, &moved.ids).or_else(|| differs(run))?;
+            Some(format!("in a directory called {name:?}: {why}"))
+        })?;
+    }
+    Ok(())
+}

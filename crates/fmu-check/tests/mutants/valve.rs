@@ -1,0 +1,152 @@
+//! A second FMU with seeded faults, [valve.c](valve.c): several at a time, each of which is found under the name of its rule.
+
+use super::{UNLIMITED, check, reproduced, unpack};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use tempfile::TempDir;
+use zip::write::SimpleFileOptions;
+
+/// Compiles the library.
+fn library(directory: &Path, fmi: u32) -> PathBuf {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mutants/valve.c");
+    let library = directory.join("valve.so");
+    let mut command = Command::new(std::env::var_os("CC").unwrap_or_else(|| "cc".into()));
+    command.args(["-O1", "-shared", "-fPIC", &format!("-DFMI={fmi}"), "-o"]).args([&library, &source]);
+    assert!(command.arg("-lm").status().expect("a C compiler").success(), "valve.c does not compile");
+    library
+}
+
+/// Packs the FMU, with a string of its description replaced by another one.
+fn fmu(directory: &Path, fmi: u32, [before, after]: [&str; 2]) -> PathBuf {
+    let path = directory.join("valve.fmu");
+    let mut zip = zip::ZipWriter::new(std::fs::File::create(&path).expect("a file"));
+    let mut add = |name: &str, bytes: &[u8]| {
+        zip.start_file(name, SimpleFileOptions::default()).expect("an entry");
+        zip.write_all(bytes).expect("an entry");
+    };
+    let text = if fmi == 2 { include_str!("valve2.xml") } else { include_str!("valve3.xml") };
+    assert!(text.contains(before), "{before}");
+    add("modelDescription.xml", text.replacen(before, after, 1).as_bytes());
+    add("resources/curve.txt", b"7");
+    let system = if cfg!(target_os = "macos") { "darwin" } else { "linux" };
+    let binaries = match fmi {
+        2 => format!("{system}64"),
+        _ => format!("{}-{system}", std::env::consts::ARCH),
+    };
+    let name = format!("binaries/{binaries}/valve{}", std::env::consts::DLL_SUFFIX);
+    add(&name, &std::fs::read(library(directory, fmi)).expect("the library"));
+    zip.finish().expect("a ZIP");
+    path
+}
+
+/// Checks topics of the FMU with faults; returns the findings, except that the FMU logs no messages and counts its steps.
+fn found(directory: &Path, path: &Path, faults: &str, topics: &str) -> Vec<serde_json::Value> {
+    let out = directory.join("out");
+    let mut command = check(path);
+    command.args(["--only", topics, "--no-shrink", "--repeat", "0.1", "--json", "--out"]).arg(out);
+    let output = command.args(UNLIMITED).env("VALVE_FAULT", faults).output().expect("runs");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|error| panic!("{error}: {}", String::from_utf8_lossy(&output.stderr)));
+    let mut findings = report["findings"].as_array().expect("a list").clone();
+    findings.retain(|finding| finding["name"] != "logs.silent" && finding["name"] != "results.cut");
+    findings
+}
+
+/// Asserts that faults are found under these names, that the program of each finding shows it, and that it does not show it in
+/// the FMU without faults.
+fn caught(fmi: u32, faults: &str, topic: &str, names: &[&str]) {
+    let directory = TempDir::new().expect("a directory");
+    let path = fmu(directory.path(), fmi, ["", ""]);
+    let findings = found(directory.path(), &path, faults, topic);
+    let unpacked = directory.path().join("unpacked");
+    unpack(&path, &unpacked);
+    for name in names {
+        let finding = findings.iter().find(|finding| finding["name"] == *name);
+        let finding = finding.unwrap_or_else(|| panic!("{faults}: no {name} in {findings:#?}"));
+        assert_eq!(finding["proof"], "shown", "{faults}: {name}");
+        reproduced(&directory.path().join("out"), name, &unpacked, faults);
+    }
+}
+
+#[test]
+fn strings_are_part_of_saved_states() {
+    let names = ["states.restore-values", "states.serialized", "states.fresh-process"];
+    caught(2, "text_shared_with_states", "states", &names[..1]);
+    caught(3, "text_not_in_bytes", "states", &names[1..]);
+}
+
+#[test]
+fn instances_are_independent_in_any_directory() {
+    caught(
+        2,
+        "buffer_of_all+uri_not_decoded+last_time_of_begin",
+        "results",
+        &["results.threads", "results.location", "results.status"],
+    );
+    caught(
+        3,
+        "buffer_of_both+path_decoded+unload_after_two",
+        "results",
+        &["results.instances", "results.location", "results.crash"],
+    );
+}
+
+#[test]
+fn settings_of_the_process_stay() {
+    caught(2, "seed_set", "resources", &["resources.settings"]);
+    caught(3, "stdout_buffered", "resources", &["resources.crash"]);
+}
+
+#[test]
+fn factors_are_of_the_declared_kind() {
+    caught(2, "factor_varies", "dependencies", &["dependencies.kind"]);
+    caught(3, "late", "dependencies", &["dependencies.missing"]);
+}
+
+/// Asserts that dependencies on Booleans, on integers and, in Initialization Mode, on parameters are found.
+#[test]
+fn dependencies_on_values_of_any_type() {
+    for (fmi, before, after, name) in [
+        (
+            2,
+            r#"dependencies="4 5 6" dependenciesKind="dependent dependent"#,
+            r#"dependencies="5 6" dependenciesKind="dependent"#,
+            "dependencies.missing",
+        ),
+        (
+            3,
+            r#"dependencies="4 5 6" dependenciesKind="dependent dependent"#,
+            r#"dependencies="4 6" dependenciesKind="dependent"#,
+            "dependencies.missing",
+        ),
+        (2, r#"dependencies="1 4 5 6""#, r#"dependencies="4 5 6""#, "dependencies.initial"),
+    ] {
+        let directory = TempDir::new().expect("a directory");
+        let path = fmu(directory.path(), fmi, [before, after]);
+        let findings = found(directory.path(), &path, "none", "dependencies");
+        let names: Vec<_> = findings.iter().map(|finding| (&finding["name"], &finding["proof"])).collect();
+        assert_eq!(names, [(&name.into(), &"shown".into())], "{after}");
+    }
+}
+
+/// Asserts that the FMU is not accused of what the standard allows: strings in a buffer that the next call overwrites, the use of random
+/// numbers, settings that are restored, a file that exists until the instance is freed, a factor that switches with its input, and
+/// the end of the simulation by the model.
+#[test]
+fn allowed_manners() {
+    for fmi in [2, 3] {
+        let directory = TempDir::new().expect("a directory");
+        let path = fmu(directory.path(), fmi, ["", ""]);
+        let topics = "results,states,dependencies,resources,start_values";
+        assert_eq!(found(directory.path(), &path, "manners", topics), Vec::<serde_json::Value>::new());
+    }
+}
+
+#[test]
+fn no_fault_of_the_valve_is_forgotten() {
+    let (source, tests) = (include_str!("valve.c"), include_str!("valve.rs"));
+    let faults = source.split("IS(").skip(2).filter_map(|rest| rest.split_once(')')).map(|(name, _)| name);
+    let forgotten: Vec<&str> = faults.filter(|name| !tests.contains(name)).collect();
+    assert_eq!(forgotten, Vec::<&str>::new());
+}
