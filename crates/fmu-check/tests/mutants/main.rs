@@ -2,6 +2,8 @@
 
 #![cfg(unix)]
 
+mod dynamics;
+
 use std::hash::{Hash as _, Hasher as _};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
