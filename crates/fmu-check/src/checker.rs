@@ -42,6 +42,12 @@ const PINNED: &[(&str, &[&str])] = &[
     ("derivatives", &["SetReal", "SetFloat64", "SetContinuousStates"]),
     ("results", STEPS),
     ("life_cycle", STEPS),
+    ("dynamics", DYNAMICS),
+];
+#[rustfmt::skip]
+const DYNAMICS: &[&str] = &[
+    "SetTime", "DoStep", "CompletedIntegratorStep", "SetContinuousStates", "SetReal", "SetFloat64", "SetFloat32", "EnterEventMode",
+    "EnterInitializationMode",
 ];
 #[rustfmt::skip]
 const STATES: &[&str] = &[

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, clap::Args)]
 pub struct Options {
     /// Checks only these topics, with commas between: description, package, functions, start_values, life_cycle,
-    /// states, derivatives, dependencies, results, reset, rejections, logs, resources, malformed.
+    /// states, derivatives, dependencies, dynamics, results, reset, rejections, logs, resources, malformed.
     #[arg(long, value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(rules::TOPICS))]
     pub only: Vec<String>,
     /// Succeeds without these topics and interfaces (co-simulation, model-exchange, scheduled-execution), with commas between.

@@ -5,7 +5,7 @@ use crate::finding::{Finding, Severity};
 use fmi_abi::Standard;
 
 /// Topics of the rules.
-pub const TOPICS: [&str; 14] = [
+pub const TOPICS: [&str; 15] = [
     "description",
     "package",
     "functions",
@@ -14,6 +14,7 @@ pub const TOPICS: [&str; 14] = [
     "states",
     "derivatives",
     "dependencies",
+    "dynamics",
     "results",
     "reset",
     "rejections",

@@ -62,6 +62,24 @@ pub fn input_values(description: &Description, phase: usize, discrete: bool) -> 
     values
 }
 
+/// Returns values for at most 1000 continuous inputs that differ from their start values by this part of their range or nominal value.
+pub fn inputs_by(description: &Description, by: f64) -> Vec<(usize, Values)> {
+    let is_continuous = |(_, variable): &(usize, &Variable)| {
+        variable.causality == "input"
+            && variable.is_float()
+            && variable.variability == "continuous"
+            && !variable.clocked
+            && !variable.once_per_instant
+            && variable.size == Some(variable.starts_count())
+    };
+    let inputs = description.variables.iter().enumerate().filter(is_continuous).take(1000);
+    let value = |(index, variable): (usize, &Variable)| {
+        let numbers = variable.starts().into_iter().map(|start| near(variable, start, by));
+        (index, Values::new(description.kind(index), numbers))
+    };
+    inputs.map(value).collect()
+}
+
 /// Returns a number within the range that differs from the start value by at most `by` times the range or the nominal value.
 pub fn near(variable: &Variable, start: f64, by: f64) -> f64 {
     let range = variable.min.zip(variable.max).map(|(min, max)| max - min).filter(|range| range.is_finite());

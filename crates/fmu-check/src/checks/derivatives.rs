@@ -1,5 +1,6 @@
 //! Checks partial derivatives against differences, adjoint derivatives against directional ones, and vectors against variables.
 
+use super::excited::{Excited, excited};
 use crate::call_sequence::{Arg, Kind, Run, Values};
 use crate::checker::Checker;
 use crate::description::Description;
@@ -358,6 +359,16 @@ impl Differences {
         }
         None
     }
+}
+
+/// Checks derivatives, as `directional` does, after the first event of an integration, which is a state event if it has one.
+pub fn after_events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let Excited { trajectory: mut after, chosen } = excited(checker, trajectory)?;
+    let Some(event) = chosen.into_iter().find(|index| after.points[*index].event) else { return Ok(()) };
+    // The middle of the simulation is after the event.
+    let last = after.points[event].clone();
+    after.points.resize(2 * (event + 1), last);
+    directional(checker, &after)
 }
 
 /// Checks that the vectors of states and derivatives equal their variables, in the order of ModelStructure, and that nominal

@@ -170,12 +170,38 @@ impl Compared<'_> {
 
     /// Returns the point and the values of an element of a discrete variable where they differ.
     fn discrete(&self, variable: usize) -> Option<(usize, String, String)> {
-        (0..self.count).filter(|point| self.is_quiet(*point)).find_map(|point| {
+        let quiet = (0..self.count).filter(|point| self.is_quiet(*point)).find_map(|point| {
             let [stepped, _, fine, finer, euler] = self.values(point, variable)?;
             let certain = fine == finer && euler == finer;
             let index = stepped.differ_beyond(&finer, 1e-6, |_| 0.0).filter(|_| certain)?;
             Some((point, stepped.show(index), finer.show(index)))
-        })
+        });
+        quiet.or_else(|| self.amid_events(variable))
+    }
+
+    /// Returns the point and the values of an element of a discrete variable that differs from its values at this and the adjacent
+    /// points in Model Exchange, if that holds at three points at least. Co-Simulation may handle an event earlier or later than Model
+    /// Exchange, but by no more than a step.
+    fn amid_events(&self, variable: usize) -> Option<(usize, String, String)> {
+        let single = |point: usize| {
+            let numbers = self.run.written(*self.simulations[3].integrations.get(point)?)?.numbers();
+            Some(numbers[0] == *numbers.get(1)? || numbers[0].is_infinite())
+        };
+        let elsewhere = (2..self.count.saturating_sub(1)).filter_map(|point| {
+            let near = point - 2..=point + 1;
+            let is_single = near.clone().all(|point| single(point) == Some(true));
+            let near: Vec<[Values; 5]> =
+                near.map(|point| self.values(point, variable)).collect::<Option<_>>()?;
+            let certain =
+                is_single && near.iter().all(|[_, _, fine, finer, euler]| fine == finer && euler == finer);
+            let stepped = &near[2][0];
+            let index = stepped.differ_beyond(&near[2][3], 1e-6, |_| 0.0).filter(|_| certain)?;
+            let is_known =
+                near.iter().any(|values| stepped.differ_beyond(&values[3], 1e-6, |_| 0.0).is_none());
+            (!is_known).then(|| (point, stepped.show(index), near[2][3].show(index)))
+        });
+        let found: Vec<_> = elsewhere.collect();
+        if found.len() < 3 { None } else { found.into_iter().next() }
     }
 
     /// Returns the point and the values of an element of a continuous variable where they differ by more than a solver's error.

@@ -3,8 +3,12 @@
 pub mod dependencies;
 pub mod derivatives;
 pub mod early_returns;
+pub mod event_modes;
+pub mod excited;
 pub mod functions;
+pub mod hidden_events;
 pub mod interfaces;
+pub mod late_outputs;
 pub mod life_cycle;
 pub mod location;
 pub mod logs;
@@ -15,6 +19,9 @@ pub mod reset;
 pub mod resources;
 pub mod results;
 pub mod several;
+pub mod single_precision;
+pub mod small_steps;
+pub mod start_times;
 pub mod start_values;
 pub mod state_values;
 pub mod states;
@@ -86,10 +93,12 @@ pub const ALL: &[(&str, Check)] = &[
     ("functions", Each(Always, functions::capabilities)),
     ("start_values", Each(Always, start_values::starts)),
     ("start_values", Each(Always, start_values::set)),
+    ("start_values", Each(Always, single_precision::set)),
     ("states", Each(Serializes, states::serialized)),
     ("states", Each(Saves, state_values::restore)),
     ("reset", Each(Always, reset::reset)),
     ("derivatives", Each(Always, derivatives::directional)),
+    ("derivatives", Each(Integrated, derivatives::after_events)),
     ("derivatives", Each(Integrated, derivatives::vectors)),
     ("dependencies", Each(Always, dependencies::missing)),
     ("dependencies", Each(Always, dependencies::initial)),
@@ -109,6 +118,14 @@ pub const ALL: &[(&str, Check)] = &[
     ("results", Each(Stepped, results::cut)),
     ("results", Each(Always, results::time)),
     ("results", Each(Stepped3, results::last_successful)),
+    ("dynamics", Each(Stepped, small_steps::small_steps)),
+    ("dynamics", Each(Stepped, late_outputs::late)),
+    ("dynamics", Each(Integrated, event_modes::stale)),
+    ("dynamics", Each(Integrated, event_modes::inputs)),
+    ("dynamics", Each(Fits::EventMode, event_modes::stepped_inputs)),
+    ("dynamics", Each(Integrated, hidden_events::unannounced)),
+    ("dynamics", Each(Integrated, hidden_events::repeated)),
+    ("dynamics", Each(Always, start_times::starts)),
     ("life_cycle", Each(Always, life_cycle::random)),
     ("life_cycle", Each(Integrated, life_cycle::events)),
     ("logs", Each(Always, logs::switches)),

@@ -2,6 +2,7 @@
 
 #![cfg(unix)]
 
+mod dynamics;
 mod valve;
 
 use std::hash::{Hash as _, Hasher as _};

@@ -1,0 +1,98 @@
+//! An integration of Model Exchange with larger inputs and more events than the usual simulation.
+
+use crate::call_sequence::{Integration, Step, Values};
+use crate::checker::Checker;
+use crate::trajectory::step_size;
+use crate::values::inputs_by;
+use crate::writer::Part::{Enter, Leave, Make};
+use crate::writer::{Point, Trajectory};
+
+/// An integration and the indices of its points, at most `POINTS`, at which something happens.
+pub struct Excited {
+    pub trajectory: Trajectory,
+    /// Points with state events first, then with time events and without events.
+    pub chosen: Vec<usize>,
+}
+
+/// Maximum number of points of an integration at which checks compare values.
+const POINTS: usize = 4;
+
+/// Number of intervals of the integration.
+const INTERVALS: usize = 40;
+
+/// Integrates Model Exchange from the start of the default experiment, and returns the states at the ends of intervals and at time events.
+/// A point has an event if the integration has handled one since the point before; a state event is then somewhat late, as with an
+/// importer that does not locate it. Returns the usual simulation if the integration fails.
+pub fn excited(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<Excited> {
+    let description = &checker.description;
+    let size = step_size(description);
+    // The ends of the intervals are at no likely event.
+    let at = |number: usize| description.start_time + (number as f64 + 0.381_966) * size;
+    let grid: Vec<f64> = (0..INTERVALS).map(at).collect();
+    let first = integrate(checker, trajectory, &grid)?;
+    let time_events = first.iter().filter(|reached| reached.event.is_some() && !reached.is_state_event);
+    let mut times: Vec<f64> =
+        grid.into_iter().take(first.len()).chain(time_events.filter_map(|of| of.event)).collect();
+    times.sort_by(f64::total_cmp);
+    let second = integrate(checker, trajectory, &times)?;
+    if second.len() < 2 {
+        let chosen = (0..trajectory.points.len()).take(POINTS).collect();
+        return Ok(Excited { trajectory: trajectory.clone(), chosen });
+    }
+    let kinds = second.iter().map(|reached| (reached.event.is_some(), reached.is_state_event));
+    let kinds: Vec<(bool, bool)> = kinds.collect();
+    let of_kind = |kind: (bool, bool), count: usize| {
+        kinds.iter().enumerate().filter(move |(_, of)| **of == kind).map(|(index, _)| index).take(count)
+    };
+    let mut chosen: Vec<usize> =
+        of_kind((true, true), 2).chain(of_kind((true, false), 1)).chain(of_kind((false, false), 3)).collect();
+    chosen.truncate(POINTS);
+    let inputs = inputs_by(description, 0.5);
+    let mut points: Vec<Point> = Vec::new();
+    for (reached, time) in second.into_iter().zip(times) {
+        let event = reached.event.is_some();
+        let size = time - points.last().map_or(description.start_time, |point| point.time);
+        points.push(Point { time, size, inputs: inputs.clone(), states: reached.states, event });
+    }
+    let end = points.last().map_or(trajectory.end, |point| point.time);
+    Ok(Excited { trajectory: Trajectory { interface: trajectory.interface, points, end }, chosen })
+}
+
+/// Result of an integration over an interval.
+struct Reached {
+    states: Vec<f64>,
+    /// Time of the first event, if there is one.
+    event: Option<f64>,
+    is_state_event: bool,
+}
+
+/// Integrates up to each of these times; returns the results of the intervals before the first that fails.
+fn integrate(checker: &Checker, trajectory: &Trajectory, times: &[f64]) -> anyhow::Result<Vec<Reached>> {
+    let description = &checker.description;
+    let states = description.states_count().unwrap_or(0);
+    let indicators = description.event_indicators.unwrap_or(0);
+    let mut writer = checker.writer(trajectory);
+    writer.write(0, &[Make]);
+    writer.set(0, &inputs_by(description, 0.5));
+    writer.write(0, &[Enter, Leave]);
+    let mut begin = description.start_time;
+    let mut calls = Vec::new();
+    for end in times {
+        let how = Integration { begin, end: *end, steps: 4, euler: states == 0, states, indicators };
+        let id = writer.add(Step::Integrate(0, how));
+        calls.push((id, (states > 0).then(|| writer.vector(0, "GetContinuousStates", states))));
+        begin = *end;
+    }
+    let run = checker.execute(&writer.sequence)?;
+    let reached = |(id, vector): (u32, Option<u32>)| {
+        let numbers = run.written(id).filter(|_| run.status(id) == Some(0))?.numbers();
+        let states = match vector {
+            Some(id) => run.written(id).filter(|_| run.succeeds(id)).map(Values::numbers)?,
+            None => Vec::new(),
+        };
+        let is_finite = states.iter().all(|state| state.is_finite());
+        let event = numbers.first().copied().filter(|time| time.is_finite());
+        is_finite.then_some(Reached { states, event, is_state_event: numbers.get(2) != Some(&0.0) })
+    };
+    Ok(calls.into_iter().map_while(reached).collect())
+}

@@ -1,0 +1,133 @@
+//! Checks that small steps advance the state of Co-Simulation, also if their size is not a multiple of the solver's step size.
+
+use super::late_outputs::{accepts_any_size, is_continuous};
+use crate::call_sequence::Run;
+use crate::checker::Checker;
+use crate::description::Description;
+use crate::values::inputs_by;
+use crate::writer::Part::{Enter, Free, Leave, Make};
+use crate::writer::{Read, Trajectory, Writer, value_of};
+
+/// Number of small steps that are compared with one step.
+const STEPS: usize = 8;
+
+/// Number of usual steps before, after which the state moves.
+const BEFORE: usize = 4;
+
+/// Small step sizes, relative to the usual one. They are multiples of no likely step size of a solver, and the factor between them is
+/// less than `STEPS`: for each step size of a solver that is not smaller than all of them, `STEPS` times one of them is at least as long.
+fn sizes(usual: f64) -> impl Iterator<Item = f64> {
+    (1..=6).map(move |number| 0.618_033_988_749_895 * usual * 10_f64.powf(-0.5 * f64::from(number)))
+}
+
+/// Reads before, after small steps, and after one step of the same duration.
+struct Compared {
+    size: f64,
+    before: Vec<Read>,
+    small: Vec<Read>,
+    one: Vec<Read>,
+}
+
+/// Compares small steps with one step of the same duration, for several sizes. A solver with variable steps may differ in digits, so only
+/// two observations count: small steps leave all variables as they were, to the bit, or each of them advances as far as a longer one.
+pub fn small_steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let description = &checker.description;
+    if !accepts_any_size(checker, trajectory) {
+        return Ok(());
+    }
+    let variables: Vec<usize> =
+        checker.readable.iter().copied().filter(|index| is_continuous(description, *index)).collect();
+    let usual = trajectory.points[0].size;
+    let mut writer = Writer::new(description, trajectory, &variables);
+    let mut all = Vec::new();
+    for size in sizes(usual) {
+        let mut after = |steps: usize, size: f64| {
+            writer.write(0, &[Make]);
+            writer.set(0, &inputs_by(description, 0.5));
+            writer.write(0, &[Enter, Leave]);
+            let mut time = description.start_time;
+            for _ in 0..BEFORE {
+                writer.step(0, time, usual);
+                time += usual;
+            }
+            let before = writer.read(0);
+            for _ in 0..steps {
+                writer.step(0, time, size);
+                time += size;
+            }
+            let after = writer.read(0);
+            writer.write(0, &[Free]);
+            (before, after)
+        };
+        let (before, small) = after(STEPS, size);
+        let (_, one) = after(1, STEPS as f64 * size);
+        all.push(Compared { size, before, small, one });
+    }
+    let description = description.clone();
+    checker.check("dynamics.small-steps", writer.sequence, move |run| {
+        let moved: Vec<(f64, Vec<Moved>)> =
+            all.iter().filter_map(|of| Some((of.size, of.moved(run, &variables)?))).collect();
+        stands(&description, &moved).or_else(|| runs_away(&description, &moved))
+    })
+}
+
+/// Numbers of an element of a variable that one step changes.
+struct Moved {
+    variable: usize,
+    before: f64,
+    small: f64,
+    one: f64,
+}
+
+impl Compared {
+    /// Returns the elements that one step changes; `None` if a variable could not be read.
+    fn moved(&self, run: &Run, variables: &[usize]) -> Option<Vec<Moved>> {
+        let mut moved = Vec::new();
+        for variable in variables {
+            let numbers = |reads: &[Read]| value_of(run, reads, *variable).map(|value| value.numbers());
+            let [before, small, one] = [numbers(&self.before)?, numbers(&self.small)?, numbers(&self.one)?];
+            for (element, before) in before.into_iter().enumerate() {
+                let (small, one) = (*small.get(element)?, *one.get(element)?);
+                if ![before, small, one].iter().all(|number| number.is_finite()) {
+                    return None;
+                }
+                if (one - before).abs() > 1e-12 * before.abs().max(one.abs()) {
+                    moved.push(Moved { variable: *variable, before, small, one });
+                }
+            }
+        }
+        (!moved.is_empty()).then_some(moved)
+    }
+}
+
+/// Returns a description of small steps after which no variable has changed, although one step changes some.
+fn stands(description: &Description, sizes: &[(f64, Vec<Moved>)]) -> Option<String> {
+    let stand = |moved: &[Moved]| moved.iter().all(|of| of.small == of.before);
+    let (size, moved) = sizes.iter().find(|(_, moved)| stand(moved))?;
+    let of = &moved[0];
+    Some(format!(
+        "{} is {:?} before and after {STEPS} steps of {size:?}, after one step of the same duration {:?}",
+        description.variables[of.variable].name, of.before, of.one
+    ))
+}
+
+/// Returns a description of small steps of two sizes, all of which advance the variables equally far and about `STEPS` times as far as
+/// one step of the same duration.
+fn runs_away(description: &Description, sizes: &[(f64, Vec<Moved>)]) -> Option<String> {
+    sizes.windows(2).find_map(|pair| {
+        let [(_, larger), (size, smaller)] = pair else { return None };
+        let alike = |one: f64, other: f64| (one - other).abs() < 0.01 * one.abs();
+        let overshoots = |(one, other): (&Moved, &Moved)| {
+            let [far, further] = [one, other].map(|of| of.small - of.before);
+            let ratio = |of: &Moved| (of.small - of.before) / (of.one - of.before);
+            let repeats = [one, other].iter().all(|of| (0.75..1.25).contains(&(ratio(of) / STEPS as f64)));
+            one.variable == other.variable && alike(far, further) && repeats
+        };
+        let all = larger.len() == smaller.len() && larger.iter().zip(smaller).all(overshoots);
+        let of = smaller.first().filter(|_| all)?;
+        Some(format!(
+            "{} is {:?}, after {STEPS} steps of {size:?} {:?}, after one step of the same duration {:?}",
+            description.variables[of.variable].name, of.before, of.small, of.one
+        ))
+    })
+}

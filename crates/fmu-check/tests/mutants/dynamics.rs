@@ -1,0 +1,146 @@
+//! Faults in the behaviour in time, several at a time, because a check takes longer than their findings.
+
+use super::{UNLIMITED, check};
+use serde_json::Value;
+use std::hash::{Hash as _, Hasher as _};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use tempfile::TempDir;
+use zip::write::SimpleFileOptions;
+
+/// Packs the FMU of `spring.c`.
+fn spring(directory: &Path, fmi: u32) -> PathBuf {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mutants/spring.c");
+    let mut hasher = std::hash::DefaultHasher::new();
+    std::fs::read(&source).expect("the source").hash(&mut hasher);
+    let suffix = std::env::consts::DLL_SUFFIX;
+    let library =
+        Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("spring-{fmi}-{:x}{suffix}", hasher.finish()));
+    if !library.exists() {
+        let new = tempfile::NamedTempFile::new_in(env!("CARGO_TARGET_TMPDIR")).expect("a file");
+        let mut compiler = Command::new(std::env::var_os("CC").unwrap_or_else(|| "cc".into()));
+        let compiler = compiler.args(["-O1", "-shared", "-fPIC", &format!("-DFMI={fmi}"), "-o"]);
+        let status = compiler.args([new.path(), &source]).arg("-lm").status();
+        assert!(status.expect("a C compiler").success(), "spring.c does not compile");
+        // Another test may have been first.
+        new.persist(&library).expect("a file");
+    }
+    let path = directory.join("spring.fmu");
+    let mut zip = zip::ZipWriter::new(std::fs::File::create(&path).expect("a file"));
+    let mut add = |name: &str, bytes: &[u8]| {
+        zip.start_file(name, SimpleFileOptions::default()).expect("an entry");
+        zip.write_all(bytes).expect("an entry");
+    };
+    let description = if fmi == 2 { include_str!("spring2.xml") } else { include_str!("spring3.xml") };
+    add("modelDescription.xml", description.as_bytes());
+    let system = if cfg!(target_os = "macos") { "darwin" } else { "linux" };
+    let binaries = match fmi {
+        2 => format!("{system}64"),
+        _ => format!("{}-{system}", std::env::consts::ARCH),
+    };
+    add(&format!("binaries/{binaries}/spring{suffix}"), &std::fs::read(&library).expect("the library"));
+    zip.finish().expect("a ZIP");
+    path
+}
+
+/// Returns the findings in the FMU with faults, except notes on the system.
+fn findings(fmi: u32, faults: &str, topics: &str) -> Vec<Value> {
+    let directory = TempDir::new().expect("a directory");
+    let mut command = check(&spring(directory.path(), fmi));
+    command.args(UNLIMITED).args(["--only", topics, "--no-shrink", "--json"]).env("SPRING_FAULTS", faults);
+    let output = command.output().expect("runs");
+    let report: Value = serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|error| panic!("{error}: {}", String::from_utf8_lossy(&output.stderr)));
+    assert_eq!(report["interfaces"].as_array().map(Vec::len), Some(2));
+    let mut findings = report["findings"].as_array().expect("a list").clone();
+    // The FMU logs nothing.
+    findings.retain(|finding| finding["name"] != "package.glibc" && finding["name"] != "logs.silent");
+    // The programs are long.
+    findings.iter_mut().for_each(|finding| finding["c"] = Value::Null);
+    findings
+}
+
+/// Asserts that each of the faults is found under its name, with the name of what it changes in the observation, and that its program
+/// shows it.
+fn found(fmi: u32, topics: &str, expected: &[(&str, &str, &str)]) {
+    let faults: Vec<&str> = expected.iter().map(|(fault, ..)| *fault).collect();
+    let findings = findings(fmi, &faults.join(","), topics);
+    for (fault, name, what) in expected {
+        let finding = findings.iter().find(|finding| finding["name"] == *name);
+        let finding = finding.unwrap_or_else(|| panic!("{fault} is not found as {name}: {findings:#?}"));
+        let observed = finding["observed"].as_str().unwrap_or_default();
+        assert!(observed.contains(what), "{fault}: {observed}");
+        assert_eq!(finding["proof"], "shown", "{fault}: {finding:#}");
+    }
+}
+
+#[test]
+fn steps_and_modes() {
+    let faults = [
+        ("remainder_dropped", "dynamics.small-steps", "before and after 8 steps"),
+        ("count_late", "dynamics.late-output", "count is"),
+        ("derivative_of_old_mode", "dynamics.stale", "state derivative 2"),
+        ("event_input_lost", "dynamics.event-inputs", "y is"),
+        ("late_is_nan", "dynamics.start-time", "v is NaN at 1000000"),
+        ("setup_rejects_negative", "dynamics.start-rejected", "fmi2SetupExperiment returns Error"),
+    ];
+    found(2, "dynamics", &faults);
+}
+
+#[test]
+fn outputs_and_clocks() {
+    let faults = [
+        ("remainder_repeated", "dynamics.small-steps", "after 8 steps"),
+        ("feedthrough_late", "dynamics.late-output", "changes y by"),
+        ("input_unseen", "dynamics.stale", "after inputs were set"),
+        ("indicator_constant", "dynamics.unannounced", "touches changes from 0 to 1"),
+        ("clock_truncates", "dynamics.start-time", "10 steps apart across it"),
+        ("event_counts_again", "dynamics.repeated-event", "count"),
+    ];
+    found(2, "dynamics", &faults);
+}
+
+#[test]
+fn events_and_indicators() {
+    let faults = [
+        ("step_rounded", "dynamics.small-steps", "before and after 8 steps"),
+        ("event_mode_reads_old", "dynamics.event-mode", "state derivative 2"),
+        ("event_input_latched", "dynamics.event-inputs", "state derivative 2"),
+        ("negative_rejected", "dynamics.start-time", "started at -5"),
+    ];
+    found(3, "dynamics", &faults);
+}
+
+#[test]
+fn digits_and_partial_derivatives() {
+    let faults = [
+        ("parameter_single", "start_values.single", "k was set to"),
+        ("output_single", "start_values.single-output", "all values of y"),
+        ("partial_of_old_mode", "derivatives.directional", "with respect to x"),
+    ];
+    found(2, "start_values,derivatives", &faults);
+    found(3, "start_values", &[("state_single", "start_values.single", "state 1 was set to")]);
+}
+
+#[test]
+fn indicators() {
+    let squared = ("indicator_squared", "dynamics.unannounced", "touches");
+    found(2, "dynamics", &[squared, ("output_late", "dynamics.late-output", "y is")]);
+    found(3, "dynamics", &[("indicator_late", "dynamics.stale", "event indicator 1")]);
+}
+
+/// Asserts that an FMU without faults has no finding, nor has one that converts units, counts how often Event Mode is entered, has an
+/// indicator that never changes, and whose solver carries the remainder of a step to the next one, or takes one step of Euler's method,
+/// or has an error within its tolerance.
+#[test]
+fn sound() {
+    for (fmi, variants) in [
+        (2, "harmless_carry,harmless_entries,harmless_source,harmless_units"),
+        (3, "harmless_euler,harmless_noise"),
+        (2, ""),
+    ] {
+        let findings = findings(fmi, variants, "dynamics,start_values,derivatives");
+        assert!(findings.is_empty(), "{variants}: {findings:#?}");
+    }
+}
