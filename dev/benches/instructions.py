@@ -22,12 +22,13 @@ ROOT = Path(__file__).resolve().parents[2]
 TABLE = Path(__file__).with_name("instructions.json")
 #: Counts may differ from the table by this much: small changes of the compiler's decisions far away.
 TOLERANCE = 0.03
-#: Uses of crates/fmu-run/examples/count_runs.rs: the name in the table, the repetitions, and the units in each.
+#: Uses of crates/fmu-run/examples/count_runs.rs: the name in the table, the repetitions, and the units in each. Repetitions are many,
+#: because the first runs on a busy machine are repeated if a new instance seems to take long.
 RUNS = {
     "load": ("fmu-run: open the FMU", 1, 1),
-    "one step": ("fmu-run: a run of one step", 20, 1),
-    "outputs": ("fmu-run: a step in a batch on np.arange(n) * 1e-3, outputs stored", 20, 200),
-    "statistics": ("fmu-run: a step in a batch on np.arange(n) * 1e-3, statistics", 20, 200),
+    "one step": ("fmu-run: a run of one step", 200, 1),
+    "outputs": ("fmu-run: a step in a batch on np.arange(n) * 1e-3, outputs stored", 100, 200),
+    "statistics": ("fmu-run: a step in a batch on np.arange(n) * 1e-3, statistics", 100, 200),
     "instances": ("fmu-run: an instance of 64, set, step and get in one call", 20, 64),
 }
 

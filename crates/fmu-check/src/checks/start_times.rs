@@ -118,7 +118,7 @@ pub fn starts(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     let variables: Vec<usize> = checker.readable.clone();
     for (start, limited) in cases {
         let tolerance = limited.then(|| description.tolerance());
-        let stop = limited.then(|| start + (STEPS as f64 + 0.5) * size);
+        let stop = limited.then_some(start + (STEPS as f64 + 0.5) * size);
         let mut writer = Writer::new(description, trajectory, &variables);
         let usual = Simulation::write(&mut writer, (description.start_time, size, STEPS), None, None);
         let shifted = Simulation::write(&mut writer, (start, size, STEPS), tolerance, stop);
