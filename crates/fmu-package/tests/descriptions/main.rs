@@ -152,7 +152,7 @@ fn structures() {
     add("Factors without derivatives: found from values", &changed::<Factors>("partials=false"));
     add("Factors, not smooth: nothing is ruled out", &changed::<Factors>("smooth=false"));
     let steps = changed::<Factors>("partials=false; modelExchange=null");
-    add("Factors of Co-Simulation: nothing about states (section 2.2.8 of FMI 2.0)", &steps);
+    add("Factors of Co-Simulation: nothing about states (section 2.2.8)", &steps);
     add("Branches: nothing is ruled out but by declarations", &model::<Branches>());
     let even = std::array::from_fn(|i| i as f64);
     for (name, change, start, equal) in [
