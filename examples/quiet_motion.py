@@ -1,7 +1,7 @@
 """The quietest motion from rest to rest, found with CasADi
 
-You learn to load the FMU into CasADi and to take the matrices of an optimal control problem from the FMU's
-derivatives. The motion is then replayed on the FMU: nothing vibrates at the end, and little if the stiffness was not
+You learn to load the FMU into CasADi, and to set up an optimal control problem with the derivatives that the FMU
+returns. The motion is then replayed on the FMU: nothing vibrates at the end, and little if the stiffness was not
 known exactly.
 
     make examples; .venv/bin/python examples/quiet_motion.py
