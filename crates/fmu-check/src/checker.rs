@@ -366,11 +366,11 @@ impl Checker {
         })
     }
 
-    /// Returns the criterion that reads are equal within ten times the tolerance of the default experiment, as those of a solver with
-    /// variable steps are that continues from a restored state: the tolerance limits the error of one of its steps, and errors of
-    /// several steps add up.
+    /// Returns the criterion that reads are equal within 20 times the tolerance of the default experiment, as those of a solver with
+    /// variable steps are that continues from a restored state: the tolerance limits the error of one of its steps, errors of
+    /// several steps add up, and derivatives amplify them.
     pub fn continued(&self, one: &[Read], other: &[Read], message: &'static str) -> Box<dyn Criterion> {
-        self.differ_by(10.0 * self.description.tolerance(), one, other, message)
+        self.differ_by(20.0 * self.description.tolerance(), one, other, message)
     }
 
     /// Returns the reason for which this machine cannot load the library, if other machines can: a shared library that the FMU does

@@ -482,6 +482,9 @@ pub fn step_args(standard: Standard, time: f64, size: f64) -> Vec<Arg> {
     args
 }
 
+/// Name of an instance with spaces, characters beyond ASCII and a conversion of printf, which an FMU may repeat in its messages.
+pub const LONG_NAME: &str = "a long name, with Gödel in it %s #1#";
+
 /// Maximum number of variables that most checks read.
 pub const READ: usize = 1000;
 

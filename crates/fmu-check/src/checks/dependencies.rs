@@ -57,7 +57,7 @@ impl Moved {
 }
 
 /// Returns the indices of points at which dependencies are tried: the second, the middle and the last. Before the first step, the
-/// initialization may still follow the inputs.
+/// initialization may still follow the inputs. States of Model Exchange are those of the middle at each of these times.
 fn places(checker: &Checker, trajectory: &Trajectory) -> Vec<usize> {
     let count = trajectory.points.len();
     let mut places = vec![1.min(count), count / 2, count.saturating_sub(1)];
@@ -97,14 +97,8 @@ pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
         }
         let variable = &checker.description.variables[known];
         let other: Vec<f64> = value.iter().map(|value| near(variable, *value, 1.0 / 16.0)).collect();
-        // Only a state is part of a vector, whose other elements are those of the middle.
-        let places = if states.contains(&known) {
-            vec![trajectory.points.len() / 2]
-        } else {
-            places(checker, trajectory)
-        };
         let (mut writer, mut moved) = (checker.writer(trajectory), Vec::new());
-        visit(&mut writer, trajectory, &places, |writer| {
+        visit(&mut writer, trajectory, &places(checker, trajectory), |writer| {
             moved.push(Moved::new(writer, &unknowns, |writer, which| {
                 set_known(writer, &states, &vector, known, [&value, &other][which]);
             }));
@@ -260,13 +254,8 @@ pub fn kinds(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         }
         let declared = declared(known);
         let indices: Vec<usize> = declared.iter().map(|(index, _)| *index).collect();
-        let places = if states.contains(&known) {
-            vec![trajectory.points.len() / 2]
-        } else {
-            places(checker, trajectory)
-        };
         let (mut writer, mut lines) = (checker.writer(trajectory), Vec::new());
-        visit(&mut writer, trajectory, &places, |writer| {
+        visit(&mut writer, trajectory, &places(checker, trajectory), |writer| {
             let reads = [0.0, 1.0, 2.0].map(|times| {
                 set_known(writer, &states, &vector, known, &[value + times * distance]);
                 writer.read_these(0, &indices)

@@ -8,7 +8,7 @@ use crate::worker::MOST_UPDATES;
 use crate::writer::Part::{
     self, Begin, Call, Drop, Enter, Free, Leave, Make, Points, ReadAll, Restore, Save,
 };
-use crate::writer::{Point, Trajectory, Writer};
+use crate::writer::{LONG_NAME, Point, Trajectory, Writer};
 
 fn check_sequence(checker: &Checker, writer: Writer) -> anyhow::Result<()> {
     let copy = writer.sequence.clone();
@@ -55,7 +55,7 @@ fn many(writer: &mut Writer, _: &Trajectory) {
 
 /// Runs an instance whose name has spaces and characters beyond ASCII, with a stop time and a tolerance.
 fn long_name(writer: &mut Writer, trajectory: &Trajectory) {
-    writer.make_with(0, |how| how.name = "a long name, with Gödel in it %s #1#".to_owned());
+    writer.make_with(0, |how| how.name = LONG_NAME.to_owned());
     let stop = trajectory.end + 1.0 + trajectory.end.abs();
     writer.enter_with(0, Some(1e-6), writer.description.start_time, Some(stop));
     writer.write(0, &[Leave, Points(3), Free]);

@@ -94,6 +94,8 @@ fn while_initializing(
         "{} was {} when the state was saved, after other values were set and it was restored it is {}";
     let criterion = any([checker.differ(&first, &second, message), checker.differ(&first, &third, message)]);
     let (copy, all) = (sequence.clone(), ids.clone());
+    // A model may reject the values only when it calculates with them.
+    ids.extend(first.iter().map(|read| read.id));
     let run = checker.evaluate("states.restore-values", sequence, move |run| {
         failure(&copy, run, &ids).is_none().then(|| criterion(run))?
     })?;
@@ -108,6 +110,7 @@ fn after_reset(checker: &Checker, trajectory: &Trajectory, values: &Assigned) ->
     let [before, first] = writer.groups(0, &[Enter, Leave, Points(1), ReadAll, Save(0), Run(1)]);
     ids.extend(writer.write(0, &[Call("Reset"), Enter, Leave, Restore(0)]).ids);
     let [after, second] = writer.groups(0, &[ReadAll, Run(1)]);
+    ids.extend(before.iter().map(|read| read.id));
     let message = "{} was {}, from the state that was restored after a reset it is {}";
     let criterion =
         any([checker.differ(&before, &after, message), checker.continued(&first, &second, message)]);
@@ -136,6 +139,7 @@ fn in_fresh_process(checker: &Checker, trajectory: &Trajectory, values: &Assigne
         ids.push(writer.deserialize(1, 0, 1));
         ids.extend(writer.write(1, &[Restore(1)]).ids);
         let [after, second] = writer.groups(1, &[ReadAll, Run(1)]);
+        ids.extend(before.iter().map(|read| read.id));
         let message = "{} was {}, from the bytes it is {}";
         let criterion =
             any([checker.differ(&before, &after, message), checker.continued(&first, &second, message)]);

@@ -23,14 +23,18 @@ pub fn restore(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
         let mut writer = checker.writer(trajectory);
         let [before, after, first] =
             writer.groups(0, &[Begin, Points(index), ReadAll, Save(0), ReadAll, Run(index)]);
-        let [at_once, second, third] =
-            writer.groups(0, &[Restore(0), ReadAll, Run(index), Restore(0), Run(index)]);
+        let [at_once, second, again, third] =
+            writer.groups(0, &[Restore(0), ReadAll, Run(index), Restore(0), ReadAll, Run(index)]);
         let sequence = writer.sequence;
         let saving = checker.differ(&before, &after, "{} was {}, after the state was saved it is {}");
         let run = checker.evaluate("states.changed-by-saving", sequence.clone(), saving)?;
         let values = "{} was {}, after the state was restored it is {}";
         let values = checker.differ(&before, &at_once, values);
         if checker.record("states.restore-values", &run, &sequence, values) {
+            continue;
+        }
+        let values = "{} was {}, after the state was restored a second time it is {}";
+        if checker.record("states.twice", &run, &sequence, checker.differ(&before, &again, values)) {
             continue;
         }
         let pairs = [

@@ -10,7 +10,7 @@ use crate::writer::{Part, Trajectory, Writer};
 use fmi_abi::BaseType;
 
 /// Number of reads on each thread, so that reads overlap.
-const READS: usize = 200;
+const READS: usize = 40;
 
 /// Returns different strings for the variables of an instance, longer than usual buffers in structures.
 fn strings(checker: &Checker, instance: usize) -> Vec<(usize, Values)> {

@@ -332,7 +332,7 @@ extern char **environ;
 static bool seed_is_kept(void) {
     static char own[128] __attribute__((aligned(16))), reference[128] __attribute__((aligned(16)));
     static bool seeded;
-    long next[3], last[3], remaining = 20000000;
+    long next[3], last[3], remaining = 5000000;
     char *current;
     int i;
     if (!seeded) { initstate(4711, own, sizeof own); return seeded = true; }

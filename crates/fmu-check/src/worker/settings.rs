@@ -207,7 +207,7 @@ mod unix {
     const SEED: c_uint = 4711;
 
     /// Maximum number of random numbers of the importer's seed among which the next ones are searched: an FMU may use the generator.
-    const SEARCHED: usize = 20_000_000;
+    const SEARCHED: usize = 5_000_000;
 
     /// State of the generator after the first measurement, which sets the importer's seed.
     static OWN: AtomicPtr<c_char> = AtomicPtr::new(std::ptr::null_mut());
@@ -243,5 +243,55 @@ mod unix {
             setstate(own);
             if remaining > 0 { importers } else { fmus }
         }
+    }
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::settings;
+
+    /// Makes a change, and returns the settings that it has changed.
+    fn changed(change: fn()) -> String {
+        let before = settings();
+        change();
+        let new = settings().into_iter().filter(|setting| !before.contains(setting));
+        new.collect::<Vec<_>>().join("; ")
+    }
+
+    /// Blocks a signal.
+    fn block() {
+        // SAFETY: the set is initialized; the process ends after the test.
+        unsafe {
+            let mut set: libc::sigset_t = std::mem::zeroed();
+            libc::sigaddset(&raw mut set, libc::SIGUSR1);
+            libc::pthread_sigmask(libc::SIG_BLOCK, &raw const set, std::ptr::null_mut());
+        }
+    }
+
+    /// Changes settings of other kinds, which the standard does not allow.
+    fn others() {
+        // SAFETY: these functions change settings of this process, which ends after the test.
+        unsafe {
+            libc::signal(libc::SIGTERM, libc::SIG_IGN);
+            libc::alarm(3600);
+            libc::dup2(2, 0);
+            libc::nice(1);
+        }
+    }
+
+    /// Checks that the settings are equal twice and after the use of random numbers, and that each change is in them.
+    #[test]
+    fn changes_are_in_the_settings() {
+        settings();
+        // SAFETY: returns a number.
+        let used = || drop(unsafe { libc::rand() }.to_string());
+        assert_eq!(changed(used), "");
+        // SAFETY: sets the seed.
+        let seeded = || unsafe { libc::srand(1) };
+        assert_eq!(changed(seeded), "seed of random numbers of the FMU");
+        assert_eq!(changed(block), format!("blocked signals [{}]", libc::SIGUSR1));
+        let found = changed(others);
+        let expected = ["SIGTERM 0x1", "real timer running", "standard input", "priority"];
+        assert!(expected.iter().all(|part| found.contains(part)), "{found}");
     }
 }

@@ -68,7 +68,7 @@ static void start(State *s) {
 static double read_curve(const char *location) {
     char path[5000] = "", *to = path;
     const char *at = location ? location : "";
-    bool decodes = FMI == 2 ? !IS(uri_not_decoded) : IS(path_decoded);
+    bool decodes = FMI == 2 && !IS(uri_not_decoded);
     if (strncmp(at, "file://", 7) == 0) at += 7;
     for (; *at && to < path + 4900; at++) {
         if (decodes && *at == '%' && isxdigit((unsigned char)at[1]) && isxdigit((unsigned char)at[2])) {
