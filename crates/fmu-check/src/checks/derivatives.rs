@@ -5,6 +5,7 @@ use crate::call_sequence::{Arg, Kind, Run, Values};
 use crate::checker::Checker;
 use crate::description::Description;
 use crate::finding::Criterion;
+use crate::values::inputs_by;
 use crate::writer::{Part, Read, Trajectory, Writer, value_of};
 use fmi_abi::{BaseType, Interface};
 use std::sync::Arc;
@@ -294,6 +295,50 @@ fn differences(
         if !checker.has("derivatives.directional") {
             checker.record("derivatives.precision", &run, &sequence, move |run| precise.evaluate(run, 2e-7));
         }
+    }
+    Ok(())
+}
+
+/// Checks the derivatives of initial unknowns with respect to inputs in Initialization Mode, where a getter may return other values than
+/// later, for example because states follow from inputs.
+pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let description = &checker.description;
+    let [by_column, by_row] = offers(checker, trajectory.interface);
+    let listed = description.initial_unknowns.iter().map(|unknown| unknown.variable);
+    let mut unknowns: Vec<usize> = listed.filter(|index| continuous(description, *index)).take(200).collect();
+    unknowns.dedup();
+    if !by_column && !by_row || unknowns.is_empty() {
+        return Ok(());
+    }
+    let inputs = inputs_by(description, 0.1).into_iter().filter(|(index, _)| continuous(description, *index));
+    for (known, value) in inputs.take(checker.at_most(8)) {
+        let variable = &description.variables[known];
+        let (value, step) = (value.numbers()[0], 1e-4 * variable.nominal.max(1e-3));
+        let parts = [Part::Make, Part::Enter];
+        let mut writer = checker.writer(trajectory);
+        writer.write(0, &parts);
+        writer.set_numbers(0, known, &[value]);
+        let analytic =
+            column(&mut writer, &references(description, &unknowns), variable.reference, by_column);
+        let reads = [step, -step, step / 2.0, -step / 2.0, 0.0].map(|by| {
+            writer.set_numbers(0, known, &[value + by]);
+            writer.read_these(0, &unknowns)
+        });
+        let differences = Differences {
+            unknowns: unknowns.clone(),
+            itself: description.aliases(known).collect(),
+            names: names(description, &unknowns)
+                .into_iter()
+                .map(|name| format!("{name} in Initialization Mode"))
+                .collect(),
+            known: variable.name.clone(),
+            is_stepped: true,
+            step,
+            analytic,
+            reads,
+        };
+        let criterion = move |run: &Run| differences.evaluate(run, 1e-4);
+        checker.check("derivatives.directional", writer.sequence, criterion)?;
     }
     Ok(())
 }

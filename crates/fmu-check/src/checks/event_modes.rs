@@ -157,12 +157,28 @@ fn states_after(checker: &Checker, trajectory: &Trajectory, at: &[usize]) -> any
 /// Checks that unknowns depend on time, states, inputs and discrete states only: after an event and after inputs were set they have the
 /// values that they have after all of these were set again, and in Event Mode after the last update, too.
 pub fn stale(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let description = &checker.description;
     let Excited { trajectory, chosen: mut at } = excited(checker, trajectory)?;
-    let trajectory = &trajectory;
     at.sort_unstable();
-    let states = states_after(checker, trajectory, &at)?;
-    let unknowns = Unknowns::new(checker, trajectory);
+    let states = states_after(checker, &trajectory, &at)?;
+    let mut unknowns = Unknowns::new(checker, &trajectory);
+    // An FMU that computes partial derivatives by differences may change what is read afterwards, so they are read separately.
+    if let Some(lists) = unknowns.partial.take() {
+        let partial = Some(lists);
+        let only = Unknowns { variables: Vec::new(), states: 0, indicators: 0, partial };
+        depend_on_arguments(checker, &trajectory, &at, &states, only)?;
+    }
+    depend_on_arguments(checker, &trajectory, &at, &states, unknowns)
+}
+
+/// Compares the unknowns at these points of a simulation, at which the states after an event are known.
+fn depend_on_arguments(
+    checker: &Checker,
+    trajectory: &Trajectory,
+    at: &[usize],
+    states: &[Vec<f64>],
+    unknowns: Unknowns,
+) -> anyhow::Result<()> {
+    let description = &checker.description;
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
     let mut all = Vec::new();
@@ -208,7 +224,7 @@ fn here(writer: &mut Writer, unknowns: &Unknowns, point: &Point, states: &[f64])
     let set = |writer: &mut Writer, by: f64| {
         writer.call(0, "SetTime", vec![Arg::real(point.time)]);
         if !states.is_empty() {
-            let states: Vec<f64> = states.iter().map(|state| state + by * state.abs().max(1.0)).collect();
+            let states: Vec<f64> = states.iter().map(|state| state + by * state.abs().max(1e-3)).collect();
             writer.set_states(0, &states);
         }
     };

@@ -1,9 +1,9 @@
 //! Checks that outputs after a step have the values at its end, not those at its beginning.
 
-use crate::call_sequence::Run;
+use crate::call_sequence::{Integration, Run, Step};
 use crate::checker::Checker;
 use crate::description::Description;
-use crate::trajectory::range;
+use crate::trajectory::{range, step_size};
 use crate::values::inputs_by;
 use crate::writer::Part::{Enter, Free, Leave, Make};
 use crate::writer::{Read, Trajectory, Writer, value_of};
@@ -39,13 +39,9 @@ struct Series {
     changed: Vec<Vec<Read>>,
 }
 
-/// Compares steps with steps of half the size. If an output is late by one step, it is late by another time with other steps, so its
-/// values equal those of the half steps one step earlier. No error of a solver has this pattern.
-pub fn late(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+/// Returns the numbers among the outputs and the continuous states.
+fn outputs(checker: &Checker) -> Vec<usize> {
     let description = &checker.description;
-    if !accepts_any_size(checker, trajectory) {
-        return Ok(());
-    }
     let states: HashSet<usize> = description.states().into_iter().collect();
     let mut outputs = checker.readable.clone();
     outputs.retain(|index| {
@@ -54,6 +50,82 @@ pub fn late(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
             && !variable.clocked
             && (variable.causality == "output" || states.contains(index))
     });
+    outputs
+}
+
+/// Compares steps of an FMU that allows one size only with an integration of Model Exchange, if the FMU offers it: outputs that are late
+/// by a step equal those of the integration one step earlier.
+fn integrated(checker: &Checker, stepped: &Trajectory, outputs: Vec<usize>) -> anyhow::Result<()> {
+    let description = &checker.description;
+    let Some(integrated) = checker.trajectories.iter().find(|trajectory| !trajectory.is_stepped()) else {
+        return Ok(());
+    };
+    // The program that shows a finding loads one library.
+    if checker.setting.libraries[0] != checker.setting.libraries[1] || description.event_mode() {
+        return Ok(());
+    }
+    let size = step_size(description);
+    let states = description.states_count().unwrap_or(0);
+    let indicators = description.event_indicators.unwrap_or(0);
+    let mut writer = Writer::new(description, stepped, &outputs);
+    let [steps, integrations] = [stepped, integrated].map(|trajectory| {
+        let begin = (std::mem::take(&mut writer.sequence), writer.next);
+        let mut each =
+            Writer { sequence: begin.0, next: begin.1, ..Writer::new(description, trajectory, &outputs) };
+        each.write(0, &[Make]);
+        each.set(0, &inputs_by(description, 0.5));
+        each.write(0, &[Enter, Leave]);
+        let mut reads = vec![each.read(0)];
+        for number in 0..STEPS[1] {
+            let at = |number: usize| description.start_time + number as f64 * size;
+            if trajectory.is_stepped() {
+                each.step(0, at(number), size);
+            } else {
+                let (begin, end) = (at(number), at(number + 1));
+                each.add(Step::Integrate(
+                    0,
+                    Integration { begin, end, steps: 4, euler: states == 0, states, indicators },
+                ));
+            }
+            reads.push(each.read(0));
+        }
+        each.write(0, &[Free]);
+        (writer.sequence, writer.next) = (each.sequence, each.next);
+        reads
+    });
+    let description = description.clone();
+    checker.check("dynamics.late-output", writer.sequence, move |run| {
+        outputs.iter().find_map(|output| {
+            let (steps, integrations) = (numbers(run, &steps, *output)?, numbers(run, &integrations, *output)?);
+            let variable = &description.variables[*output];
+            (0..steps.first()?.len()).find_map(|element| {
+                let of = |series: &[Vec<f64>]| -> Option<Vec<f64>> {
+                    series.iter().map(|numbers| numbers.get(element).copied()).collect()
+                };
+                let (whole, points) = (of(&steps)?, of(&integrations)?);
+                // As half steps would have it that end one step earlier and at the same time.
+                let pairs = points.windows(2).flatten().copied();
+                let half: Vec<f64> = points.first().copied().into_iter().chain(pairs).collect();
+                let step = is_late(&whole, &half, variable.is_float())?;
+                let (late, earlier, now) = (whole[step], points[step - 1], points[step]);
+                Some(format!(
+                    "{} is {late:?} after {step} steps; integrated in Model Exchange it is {now:?}, and {earlier:?} one step before: it \
+                     is late by a step",
+                    variable.name
+                ))
+            })
+        })
+    })
+}
+
+/// Compares steps with steps of half the size. If an output is late by one step, it is late by another time with other steps, so its
+/// values equal those of the half steps one step earlier. No error of a solver has this pattern.
+pub fn late(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let description = &checker.description;
+    let outputs = outputs(checker);
+    if !accepts_any_size(checker, trajectory) {
+        return integrated(checker, trajectory, outputs);
+    }
     let size = SIZE * trajectory.points[0].size;
     let steps = (range(description) / size / 2.0) as usize * 2;
     let steps = steps.clamp(STEPS[0], STEPS[1]);

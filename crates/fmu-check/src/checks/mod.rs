@@ -99,6 +99,7 @@ pub const ALL: &[(&str, Check)] = &[
     ("reset", Each(Always, reset::reset)),
     ("derivatives", Each(Always, derivatives::directional)),
     ("derivatives", Each(Integrated, derivatives::after_events)),
+    ("derivatives", Each(Always, derivatives::initial)),
     ("derivatives", Each(Integrated, derivatives::vectors)),
     ("dependencies", Each(Always, dependencies::missing)),
     ("dependencies", Each(Always, dependencies::initial)),

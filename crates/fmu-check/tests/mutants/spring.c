@@ -41,7 +41,7 @@ enum { STARTED, INITIALIZATION, EVENT, RUNNING };
 typedef struct {
     double time, k, u, x, v, start, debt;
     /* Values of an earlier moment, which faults show. */
-    double old_y, old_der, old_u, latched, old_z;
+    double old_y, old_der, old_u, latched;
     int ticks, count, touches, entries, mode, cs, dirty, seen, event_used, stale, handled, count_before;
 } Model;
 
@@ -58,7 +58,6 @@ static double output(const Model *m) {
 }
 
 static double slewed(const Model *m) {
-    if (IS(tables_underflow)) { static const double table[64]; return m->x + table[(int)floor(m->time / 100) & 63] / (m->time < 0 ? 0 : 1); }
     return m->x + m->v;
 }
 
@@ -76,7 +75,7 @@ static int ticks_until(const Model *m, double time) {
 /* Handles what happens at this time in the discrete states. */
 static void discrete(Model *m) {
     int ticks = ticks_until(m, m->time);
-    m->count += (ticks != m->ticks) * (IS(model_exchange_counts_twice) && !m->cs ? 2 : 1);
+    m->count += ticks != m->ticks;
     m->ticks = ticks;
     m->touches = m->x > CONTACT;
 }
@@ -84,7 +83,7 @@ static void discrete(Model *m) {
 static double value(Model *m, uint32_t vr) {
     switch (vr) {
     case K: return IS(parameter_single) ? (float)m->k : m->k;
-    case U: return IS(input_single) ? (float)m->u : IS(harmless_units) ? m->u / 0.3048 * 0.3048 : m->u;
+    case U: return IS(harmless_units) ? m->u / 0.3048 * 0.3048 : m->u;
     case X: return m->x;
     case V: return m->v;
     case DER_X: return m->v;
@@ -106,7 +105,6 @@ static double value(Model *m, uint32_t vr) {
 static double indicator(const Model *m) {
     if (IS(indicator_constant)) return 1;
     if (IS(indicator_squared)) return (m->x - CONTACT) * (m->x - CONTACT) + 1e-3;
-    if (IS(indicator_late)) return m->old_z;
     return m->x - CONTACT;
 }
 
@@ -122,7 +120,8 @@ static int set_real(void *c, const uint32_t *vr, size_t n, const double *from SI
     for (size_t i = 0; i < n; i++) {
         if (vr[i] == K && m->mode < EVENT) m->k = from[i];
         else if (vr[i] == U) {
-            if (IS(event_input_lost) && m->mode == EVENT) continue;
+            if (IS(event_input_lost) && m->mode == EVENT && !m->cs) continue;
+            if (IS(event_input_lost_stepped) && m->mode == EVENT && m->cs) continue;
             if (!m->seen) m->old_u = m->u;
             m->seen = 1;
             m->u = from[i];
@@ -173,13 +172,6 @@ static void integrate(Model *m, double end) {
         discrete(m);
         return;
     }
-    if (IS(time_single)) {
-        float time = (float)m->time;
-        for (; time + 0.5f * (float)inner < (float)end && time + (float)inner != time; time += (float)inner) advance(m, inner, false), discrete(m);
-        m->time = end;
-        discrete(m);
-        return;
-    }
     while (m->time < end - 1e-12) {
         double tick = m->start + (floor((m->time - m->start) / PERIOD + 1e-9) + 1) * PERIOD;
         double stop = fmin(fmin(end, m->time + inner), tick);
@@ -196,7 +188,6 @@ static int step(void *c, double point, double size) {
     Model *m = c;
     if (m->mode != RUNNING || !(size > 0)) return 3;
     if (IS(negative_rejected) && point < 0) return 3;
-    if (IS(far_hangs)) { volatile float next = 0; while (next < (float)point) next += 1e-3f; }
     m->old_y = output(m);
     m->count_before = m->count;
     integrate(m, point + size);
@@ -285,6 +276,7 @@ EXPORT(NewDiscreteStates)(void *c, Event *event) {
 EXPORT(GetDirectionalDerivative)(void *c, const uint32_t *u, size_t nu, const uint32_t *k, size_t nk, const double *seed, double *to) {
 #endif
     const Model *m = c;
+    double feedthrough = IS(partial_without_input_initially) && m->mode == INITIALIZATION ? 0 : 2;
     int touches = IS(partial_of_old_mode) ? 0 : m->touches;
     for (size_t i = 0; i < nu; i++) {
         to[i] = 0;
@@ -292,7 +284,7 @@ EXPORT(GetDirectionalDerivative)(void *c, const uint32_t *u, size_t nu, const ui
             double d = 0;
             if (u[i] == DER_X) d = k[j] == V;
             if (u[i] == DER_V) d = k[j] == X ? -m->k * (touches ? 4 : 1) / 0.1 : k[j] == V ? -10 : k[j] == U ? 10 : 0;
-            if (u[i] == Y) d = k[j] == X ? 1 : k[j] == U ? 2 : 0;
+            if (u[i] == Y) d = k[j] == X ? 1 : k[j] == U ? feedthrough : 0;
             if (u[i] == SLEWED) d = k[j] == X || k[j] == V;
             to[i] += d * seed[j];
         }
@@ -348,9 +340,8 @@ EXPORT(EnterContinuousTimeMode)(void *c) {
     return 0;
 }
 EXPORT(CompletedIntegratorStep)(void *c, Flag no_set, Flag *event, Flag *terminate) {
-    Model *m = c;
+    (void)c;
     (void)no_set;
-    m->old_z = m->x - CONTACT;
     *event = *terminate = 0;
     return 0;
 }
