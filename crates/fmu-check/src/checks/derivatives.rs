@@ -406,14 +406,21 @@ impl Differences {
     }
 }
 
-/// Checks derivatives, as `directional` does, after the first event of an integration, which is a state event if it has one.
+/// Checks derivatives against differences after the first event of an integration, which is a state event if it has one.
 pub fn after_events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let Excited { trajectory: mut after, chosen } = excited(checker, trajectory)?;
     let Some(event) = chosen.into_iter().find(|index| after.points[*index].event) else { return Ok(()) };
     // The middle of the simulation is after the event.
     let last = after.points[event].clone();
     after.points.resize(2 * (event + 1), last);
-    directional(checker, &after)
+    let [by_column, by_row] = offers(checker, after.interface);
+    let unknowns = unknowns(&checker.description, after.interface);
+    let mut knowns = knowns(&checker.description, after.interface);
+    knowns.truncate(checker.at_most(40));
+    if !by_column && !by_row || unknowns.is_empty() {
+        return Ok(());
+    }
+    differences(checker, &after, &unknowns, &knowns, by_column)
 }
 
 /// Checks that the vectors of states and derivatives equal their variables, in the order of ModelStructure, and that nominal

@@ -77,12 +77,12 @@ fn found(fmi: u32, topics: &str, expected: &[(&str, &str, &str)]) {
 }
 
 #[test]
-fn steps_and_modes() {
+fn steps_and_indicators() {
     let faults = [
         ("remainder_dropped", "dynamics.small-steps", "before and after 8 steps"),
         ("count_late", "dynamics.late-output", "count is"),
-        ("derivative_of_old_mode", "dynamics.stale", "state derivative 2"),
-        ("event_input_lost", "dynamics.event-inputs", "y is"),
+        ("indicator_squared", "dynamics.unannounced", "touches"),
+        ("event_input_latched", "dynamics.event-inputs", "state derivative 2"),
         ("late_is_nan", "dynamics.start-time", "v is NaN at 1000000"),
         ("setup_rejects_negative", "dynamics.start-rejected", "fmi2SetupExperiment returns Error"),
     ];
@@ -95,6 +95,7 @@ fn inputs_and_clocks() {
         ("remainder_repeated", "dynamics.small-steps", "after 8 steps"),
         ("feedthrough_late", "dynamics.late-output", "changes y by"),
         ("input_unseen", "dynamics.stale", "after inputs were set"),
+        ("event_input_lost", "dynamics.event-inputs", "y is"),
         ("indicator_constant", "dynamics.unannounced", "touches changes from 0 to 1"),
         ("clock_truncates", "dynamics.start-time", "10 steps apart across it"),
         ("event_counts_again", "dynamics.repeated-event", "count"),
@@ -103,22 +104,13 @@ fn inputs_and_clocks() {
 }
 
 #[test]
-fn event_modes() {
+fn event_modes_and_outputs() {
     let faults = [
-        ("step_rounded", "dynamics.small-steps", "before and after 8 steps"),
+        ("output_late", "dynamics.late-output", "y is"),
+        ("derivative_of_old_mode", "dynamics.stale", "state derivative 2"),
         ("event_mode_reads_old", "dynamics.event-mode", "state derivative 2"),
         ("event_input_lost_stepped", "dynamics.event-inputs", "der_x is"),
         ("negative_rejected", "dynamics.start-time", "started at -5"),
-    ];
-    found(3, "dynamics", &faults);
-}
-
-#[test]
-fn outputs_and_states() {
-    let faults = [
-        ("output_late", "dynamics.late-output", "y is"),
-        ("indicator_squared", "dynamics.unannounced", "touches"),
-        ("event_input_latched", "dynamics.event-inputs", "state derivative 2"),
         ("state_single", "start_values.single", "state 1 was set to"),
     ];
     found(3, "dynamics,start_values", &faults);

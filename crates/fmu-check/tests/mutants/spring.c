@@ -163,9 +163,9 @@ static void advance(Model *m, double h, bool euler) {
 static void integrate(Model *m, double end) {
     double size = end - m->time, inner = 1e-3;
     if (IS(harmless_euler)) { advance(m, size, true); m->time = end; discrete(m); return; }
-    if (IS(remainder_dropped) || IS(remainder_repeated) || IS(step_rounded) || IS(harmless_carry)) {
+    if (IS(remainder_dropped) || IS(remainder_repeated) || IS(harmless_carry)) {
         double exact = (size + m->debt) / inner;
-        long count = IS(step_rounded) ? lround(exact) : IS(remainder_repeated) ? (long)ceil(exact - 1e-6) : (long)(exact + 1e-6);
+        long count = IS(remainder_repeated) ? (long)ceil(exact - 1e-6) : (long)(exact + 1e-6);
         m->debt = IS(harmless_carry) ? (exact - (double)count) * inner : 0;
         for (long i = 0; i < count; i++) advance(m, inner, false), discrete(m);
         m->time = end;
