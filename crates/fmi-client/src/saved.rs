@@ -8,7 +8,7 @@ use std::ptr::null_mut;
 pub struct Saved(usize);
 
 impl Saved {
-    /// Returns the index, which is free again after [`Instance::forget`].
+    /// Returns the index, which is free again after [`Instance::forget`](crate::Instance::forget).
     pub fn index(self) -> usize {
         self.0
     }

@@ -394,7 +394,9 @@ impl<M> Variable<M> {
                 | (CalculatedParameter | Local, Fixed | Tunable, Some(Initial::Calculated | Initial::Approx))
         );
         if !legal {
-            return Some("this causality and variability do not permit this initial value (section 2.2.7 of FMI 2.0)");
+            return Some(
+                "this causality and variability do not permit this initial value (section 2.2.7 of FMI 2.0)",
+            );
         }
         let is_real = matches!(self.of.base(), BaseType::Real);
         if matches!(self.variability, Continuous) && !self.of.base().is_float() {

@@ -2,7 +2,7 @@
 //!
 //! They are in a separate package because three programs need them: the model, the build script that compiles the values into
 //! its library, and `build_fmu`, which writes them into the model description. The file with the values is read only while an FMU
-//! is built, by [`file`].
+//! is built, by the module `file`.
 
 use std::fmt;
 

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 /// Function that is called ten times per second.
 type OnPulse = Box<dyn Fn(&Watch) + Send + Sync>;
 
-/// Access to the progress of [`System::run`] for another thread, or for the thread that calls it.
+/// Access to the progress of [`System::run`](crate::System::run) for another thread, or for the thread that calls it.
 #[derive(Default)]
 pub struct Watch {
     pulse: Option<OnPulse>,
@@ -31,7 +31,7 @@ impl fmt::Debug for Watch {
 
 impl Watch {
     /// Creates a watch whose function is called ten times per second, between steps, by the thread that called
-    /// [`System::run`]. It may [cancel](Self::cancel) the runs.
+    /// [`System::run`](crate::System::run). It may [cancel](Self::cancel) the runs.
     ///
     /// ```
     /// let watch = fmu_run::Watch::pulsing(|watch| eprintln!("{} runs are finished", watch.done()));
