@@ -165,7 +165,7 @@ fn silence(sequence: &CallSequence, numbered: &Numbered) -> Option<Broken> {
         matches!(&numbered.step, Step::Make(_, make) if !make.logging)
             || matches!(&numbered.step, Step::Call { function, .. } if function.ends_with("SetDebugLogging"))
     });
-    // Section 4.2.3 of FMI 2.0.5: a status that the FMU does not have is answered with Discard, which is no failure.
+    // Section 4.2.3 of FMI 2.0.5: a status that the FMU does not have is answered with Discard, which is not a failure.
     let asks = |function: &str| function.starts_with("fmi2Get") && function.ends_with("Status");
     if off || !matches!(&numbered.step, Step::Call { instance: Some(_), function, .. } if !asks(function)) {
         return None;

@@ -35,7 +35,7 @@ impl Description {
     /// Parses a `modelDescription.xml`.
     ///
     /// # Errors
-    /// Fails if the string is no XML or has another FMI version.
+    /// Fails if the string is not XML or has another FMI version.
     pub fn parse(text: &str) -> Result<Self, String> {
         let written = ModelDescription::parse(text)?;
         if written.standard == Standard::Fmi3 && written.version.contains('-') {
@@ -101,11 +101,11 @@ impl Description {
                 add("description.structure", why);
             }
             if !output && listed {
-                let why = format!("{name} is no output, and is among those of ModelStructure");
+                let why = format!("{name} is not an output, and is among those of ModelStructure");
                 add("description.structure", why);
             }
             if let Some(unit) = variable.unit.as_ref().filter(|unit| !self.units.contains_key(&***unit)) {
-                let why = format!("{name} is in {unit:?}, which is no unit of UnitDefinitions");
+                let why = format!("{name} is in {unit:?}, which is not a unit of UnitDefinitions");
                 add("description.units", why);
             }
             let declared = variable.declared_type.as_ref();
@@ -246,7 +246,7 @@ fn faults(variable: &Variable) -> Vec<Observation> {
     let number =
         |text: &String| text.parse::<f64>().is_ok() || ["INF", "-INF", "NaN"].contains(&text.as_str());
     if variable.base.is_some_and(|base| !texts.contains(&base)) && !variable.start.iter().all(number) {
-        let why = format!("the start value of {name}, {:?}, is no number", variable.start.join(" "));
+        let why = format!("the start value of {name}, {:?}, is not a number", variable.start.join(" "));
         add("description.start", why);
     }
     wrong

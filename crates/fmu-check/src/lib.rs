@@ -137,7 +137,7 @@ fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
 /// Checks an FMU. With `progress`, a line on the standard error shows the progress.
 ///
 /// # Errors
-/// Fails if the file is no FMU of FMI 2.0 or 3.0.
+/// Fails if the file is not an FMU of FMI 2.0 or 3.0.
 pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<Report> {
     let begin = Instant::now();
     let baseline = options.baseline.as_deref().map(baseline::Baseline::read).transpose()?.unwrap_or_default();

@@ -361,7 +361,7 @@ impl<'a> Writer<'a> {
     }
 
     /// Reads the variables at these indices with a call for each type. FMI 2.0 allows an FMU to reject some of the calls in Initialization
-    /// Mode, which is no finding.
+    /// Mode, which is not a finding.
     pub fn read_anyway(&mut self, instance: usize, indices: &[usize]) -> Vec<Read> {
         let mut reads = Vec::new();
         for (name, kind, positions) in self.by_type(indices) {

@@ -16,7 +16,7 @@ const POINTS: usize = 40;
 /// Number of Runge-Kutta steps between two communication points; a second integration with twice as many shows their error.
 const STEPS: usize = 4;
 
-/// Difference that is no finding, relative to the change of an output.
+/// Difference that is not a finding, relative to the change of an output.
 const TOLERANCE: f64 = 5e-3;
 
 /// Values after each step of a simulation, and the results of the integrations.

@@ -147,7 +147,7 @@ fn call_attacks(checker: &Checker, interface: Interface, time: f64) -> Vec<Attac
     if checker.serializes(interface) {
         let bytes = Arg::In(Kind::U8, (0..64).map(|byte| byte * 37 % 256).collect());
         let bytes = vec![bytes, Arg::Integer(64), Arg::StateOut(90)];
-        attacks.push(attack("DeserializeFMUState", bytes, "bytes that are no state", TOLERATED));
+        attacks.push(attack("DeserializeFMUState", bytes, "bytes that are not a state", TOLERATED));
     }
     attacks
 }

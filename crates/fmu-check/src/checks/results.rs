@@ -262,7 +262,7 @@ pub fn time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let Some(index) = (0..description.variables.len()).find(is_time) else { return Ok(()) };
     let mut runs = vec![(0.0, trajectory.points.clone())];
     if let (true, Some(first)) = (trajectory.is_stepped(), trajectory.points.first()) {
-        // From another start time, which an FMU may reject, and with a step size that is no multiple of the solver's.
+        // From another start time, which an FMU may reject, and with a step size that is not a multiple of the solver's.
         runs.push((trajectory.end - description.start_time, trajectory.points.clone()));
         let offer = description.co_simulation.as_ref();
         if offer.is_some_and(|offer| {

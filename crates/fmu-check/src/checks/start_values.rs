@@ -20,7 +20,7 @@ pub fn starts(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     for parts in situations.into_iter().take(if checker.fmi3() { 2 } else { 1 }) {
         let (model, mut writer) = (Arc::clone(&model), checker.writer(trajectory));
         writer.write(0, parts);
-        // A value that cannot be read here is no finding.
+        // A value that cannot be read here is not a finding.
         let (first, others) = sample(&model, 10_000)
             .into_iter()
             .partition::<Vec<_>, _>(|index| model.is_readable_while_initializing(*index));

@@ -1,5 +1,5 @@
 //! Checks the status that Co-Simulation of FMI 2.0 returns on request (section 4.2.3): values that are returned with OK are right. A
-//! status that the FMU does not have is rejected, which is no finding.
+//! status that the FMU does not have is rejected, which is not a finding.
 
 use crate::call_sequence::{Arg, Kind, Run, Values};
 use crate::checker::Checker;
@@ -119,7 +119,7 @@ fn wrong(run: &Run, asked: &Asked, later: &[Asked]) -> Option<String> {
     }
     let terminated = answer(run, asked.terminated)?;
     if terminated != 0.0 && terminated != 1.0 {
-        return Some(format!("fmi2Terminated is {terminated}, which is no Boolean"));
+        return Some(format!("fmi2Terminated is {terminated}, which is not a Boolean"));
     }
     // A model that ends its simulation does not continue it.
     let continues = later.iter().any(|later| run.status(later.step) == Some(0));

@@ -46,7 +46,7 @@ fn jobs() -> std::io::Result<()> {
             }
             child => {
                 let (ended, flood) = wait(child, limit.parse().unwrap_or_default());
-                // Orphans that end within 300 ms are no finding. After three call sequences with orphans, the server does not wait.
+                // Orphans that end within 300 ms are not a finding. After three call sequences with orphans, the server does not wait.
                 let patient = ended.is_some() && sequences_with_orphans < 3;
                 let orphans = end_descendants(child, Duration::from_millis(if patient { 300 } else { 0 }));
                 sequences_with_orphans += usize::from(ended.is_some() && !orphans.is_empty());
