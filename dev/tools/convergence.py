@@ -15,8 +15,10 @@ from prw.testbed import OUTPUTS, Testbed
 
 #: The motion: theta_i = AMPLITUDE_i sin(RATE_i t + PHASE_i), rad; wrist moves of some hertz.
 AMPLITUDE, RATE, PHASE = np.array([0.3, 0.2]), np.array([14.0, 23.0]), np.array([0.4, 1.9])
-#: Duration, and time from which errors count, s: with angles only, the rates are unknown in the first two steps.
-DURATION, FROM = 1.0, 0.3
+#: Duration, s.
+DURATION = 1.0
+#: Time, s, from which errors count, because with angles only, the rates are unknown in the first two steps.
+FROM = 0.3
 STEPS_PER_SECOND = (125, 250, 500, 1000, 2000)
 #: Number of steps of the reference run in each step of the piecewise linear motion.
 CUTS = 16
