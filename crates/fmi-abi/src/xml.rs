@@ -1,4 +1,4 @@
-//! XML of files that nobody has checked: the memory and the time to read it are limited before it is read.
+//! XML of untrusted files: before it is parsed, the memory and the time that parsing may take are limited.
 
 use roxmltree::Document;
 
