@@ -2,7 +2,7 @@
 
 You learn to plan with any FMU as its own model (MPPI: model predictive path integral control). The state of the plant
 is serialized and passed to 1,024 instances (`serialize`, `deserialize`). Each of them tries a different motion of the
-motors, and the plant follows a mean of these motions in which the good ones have most of the weight.
+motors, and the plant follows a weighted mean of these motions, in which better ones have more weight.
 
     make examples; .venv/bin/python examples/predictive_control.py
 """

@@ -1,8 +1,8 @@
 """The quietest motion from rest to rest, found with CasADi
 
 You learn to load the FMU into CasADi, and to set up an optimal control problem with the derivatives that the FMU
-returns. The motion is then replayed on the FMU: nothing vibrates at the end, and little if the stiffness was not
-known exactly.
+returns. The motion is then replayed on the FMU: the wrist does not vibrate at the end, and vibrates little if the
+assumed stiffness was wrong.
 
     make examples; .venv/bin/python examples/quiet_motion.py
 """

@@ -31,7 +31,7 @@ Motion = Callable[[float], tuple[np.ndarray, np.ndarray]]
 
 
 def jump(time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Angles (2,) rad and rates (2,) rad/s that the motors should have: at once those after the step."""
+    """Angles (2,) rad and rates (2,) rad/s that the motors should have: the goal of a jump at time 0, at rest."""
     return STEP, np.zeros(2)
 
 

@@ -104,7 +104,7 @@ impl Motions {
 ///
 /// An importer sets one number at a time, and reading 16 bytes right after 8 of them were written stalls the
 /// processor. The compiler reads two numbers at once if they are neighbours, or if the first of them is aligned to
-/// 16 bytes. So the flag stands before each angle.
+/// 16 bytes. So the flag is stored before each angle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct Sample {
@@ -173,7 +173,7 @@ impl Motors {
         self.samples[motor].is_new = true;
     }
 
-    /// Makes a new omega effective at once, if the rate of motor 0 or 1 comes from omega. Call this after
+    /// Makes a new omega effective immediately, if the rate of motor 0 or 1 comes from omega. Call this after
     /// omega has been set.
     #[inline]
     pub fn omega_changed(&mut self, motor: usize) {

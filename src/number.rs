@@ -60,7 +60,7 @@ impl Number for f64 {
 
 /// The unevaluated sum of two `f64`: the nearest `f64`, and the remainder.
 ///
-/// The algorithms are those of Joldes, Muller and Popescu, *Tight and rigorous error bounds for basic building
+/// The algorithms are from Joldes, Muller and Popescu, *Tight and rigorous error bounds for basic building
 /// blocks of double-word arithmetic*, ACM Transactions on Mathematical Software 44 (2017).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TwoFloat {

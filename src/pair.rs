@@ -8,7 +8,7 @@ use safe_arch::{
 };
 use std::ops::{Add, AddAssign, Div, DivAssign, Index, IndexMut, Mul, MulAssign, Neg, Sub, SubAssign};
 
-/// A quantity of side 1 and the same quantity of side 2 (or pitch and roll). The alignment is that of a
+/// A quantity of side 1 and the same quantity of side 2 (or pitch and roll). It is aligned like a
 /// vector register.
 ///
 /// The operators use vector instructions explicitly, because the compiler would handle the two numbers

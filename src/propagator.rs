@@ -143,7 +143,7 @@ impl Rounded {
             b_angle: pitch.b_angle.zip_map(&roll.b_angle, Pair::new),
             b_rate: pitch.b_rate.zip_map(&roll.b_rate, Pair::new),
         };
-        // Propagates both at once; usually they need equal numbers of doublings.
+        // Propagates pitch and roll together; usually they need equal numbers of doublings.
         let of_pitch = pairs.propagate(h, doublings[0]);
         let of_roll = if doublings[0] == doublings[1] { of_pitch } else { pairs.propagate(h, doublings[1]) };
         let propagated = [(of_pitch, 0), (of_roll, 1)].map(|(Propagator { growth, ramp }, i)| Propagator {

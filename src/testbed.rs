@@ -100,7 +100,7 @@ impl Testbed {
         Some(state)
     }
 
-    /// Does the same [step](Self::step) with fewer checks, if the size is that of the last two steps. Returns the
+    /// Does the same [step](Self::step) with fewer checks, if the size equals the size of the last two steps. Returns the
     /// state after it, or nothing if the size differs or the state would overflow.
     #[inline(always)]
     pub fn step_fast(&mut self, h: f64) -> Option<StateBySide> {

@@ -42,15 +42,15 @@ def controller(version: str) -> Path:
 @pytest.fixture(scope="session")
 def unpack() -> Iterator[Callable[[Path], str]]:
     """Unpacks an FMU into a directory that is removed after the tests."""
-    folders: list[str] = []
+    directories: list[str] = []
 
     def unpack(fmu: Path) -> str:
-        folders.append(str(fmpy.extract(str(fmu))))
-        return folders[-1]
+        directories.append(str(fmpy.extract(str(fmu))))
+        return directories[-1]
 
     yield unpack
-    for folder in folders:
-        shutil.rmtree(folder, ignore_errors=True)
+    for directory in directories:
+        shutil.rmtree(directory, ignore_errors=True)
 
 
 @pytest.fixture

@@ -142,7 +142,7 @@ proptest! {
     }
 
     /// Checks on grids like `np.arange(n) * 1e-3`, whose differences vary in their last digits, that matrices are
-    /// computed once for each difference, whatever happens in between, and that each step uses those of its own size.
+    /// computed once for each difference, regardless of the calls in between, and that each step uses the matrices of its size.
     #[test]
     fn matrices_are_computed_once_for_each_size(p in parameters(), dt in 1e-5..1e-2f64, first in 1..5000_i32) {
         let size = |k: i32| f64::from(k + 1) * dt - f64::from(k) * dt;

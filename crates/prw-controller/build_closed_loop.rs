@@ -10,7 +10,7 @@ use std::process::ExitCode;
 
 const DIRECTORY: &str = env!("CARGO_MANIFEST_DIR");
 
-/// Connects the FMUs of controller and testbed to a closed loop: prw_closed_loop.ssp, and the folder
+/// Connects the FMUs of controller and testbed to a closed loop: prw_closed_loop.ssp, and the directory
 /// prw_closed_loop with OspSystemStructure.xml.
 #[derive(Parser)]
 #[command(override_usage = "cargo run -p prw_controller --bin build_closed_loop [-- OPTIONS]")]
@@ -50,8 +50,8 @@ fn run(options: &Options) -> Result<()> {
     }
     let workspace =
         Path::new(DIRECTORY).ancestors().nth(2).context("this program was moved out of its workspace")?;
-    let folder = workspace.join("target/fmu");
-    let fmu = |option: &Option<PathBuf>, name: &str| option.clone().unwrap_or_else(|| folder.join(name));
+    let directory = workspace.join("target/fmu");
+    let fmu = |option: &Option<PathBuf>, name: &str| option.clone().unwrap_or_else(|| directory.join(name));
     let [pitch, roll] = [0, 1].map(|axis| options.go_to[axis] * PI / 180.0);
     let system = System {
         name: "prw_closed_loop",
@@ -83,7 +83,7 @@ fn run(options: &Options) -> Result<()> {
         step_size: options.step_size,
     };
     let checked = system.check()?;
-    let out = options.out.clone().unwrap_or(folder);
+    let out = options.out.clone().unwrap_or(directory);
     let ssp = out.join("prw_closed_loop.ssp");
     let size = checked.write_ssp(&ssp)?;
     println!("{}: {} kB", short(&ssp), size.div_ceil(1000));

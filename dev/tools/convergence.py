@@ -15,31 +15,36 @@ from prw.testbed import OUTPUTS, Testbed
 
 #: The motion: theta_i = AMPLITUDE_i sin(RATE_i t + PHASE_i), rad; wrist moves of some hertz.
 AMPLITUDE, RATE, PHASE = np.array([0.3, 0.2]), np.array([14.0, 23.0]), np.array([0.4, 1.9])
-#: Duration, and time from which errors count, s: with angles only, the rates are unknown in the first two steps.
-DURATION, FROM = 1.0, 0.3
+#: Duration, s.
+DURATION = 1.0
+#: Time, s, from which errors count, because with angles only, the rates are unknown in the first two steps.
+FROM = 0.3
 STEPS_PER_SECOND = (125, 250, 500, 1000, 2000)
-#: Number of parts of each step of the broken line in the reference run.
+#: Number of steps of the reference run in each step of the piecewise linear motion.
 CUTS = 16
 
 
 class Convergence(NamedTuple):
     """Errors over the step. step: (k,) s. Errors by output name, (k,) each, as a fraction of the output's largest value: with
-    `angles` only, with `rates` as well (use_omega), and for motors on a `broken_line` whose slope is given."""
+    `angles` only, with `rates` as well (use_omega), and for motors that turn at a constant, given rate in each step
+    (`piecewise_linear`), where the FMU is exact."""
 
     step: np.ndarray
     angles: dict[str, np.ndarray]
     rates: dict[str, np.ndarray]
-    broken_line: dict[str, np.ndarray]
+    piecewise_linear: dict[str, np.ndarray]
 
 
 def convergence(fmu: Path, model: StateSpace) -> Convergence:
     """Run the FMU with ever smaller steps against the exact response of its linear model (outputs: OUTPUTS)."""
     errors = [
-        (_error(fmu, model, n, False), _error(fmu, model, n, True), _broken_line_error(fmu, n))
+        (_error(fmu, model, n, False), _error(fmu, model, n, True), _piecewise_linear_error(fmu, n))
         for n in STEPS_PER_SECOND
     ]
-    angles, rates, broken = ({name: np.array([e[way][name] for e in errors]) for name in OUTPUTS} for way in range(3))
-    return Convergence(1 / np.array(STEPS_PER_SECOND, dtype=float), angles, rates, broken)
+    angles, rates, piecewise_linear = (
+        {name: np.array([e[way][name] for e in errors]) for name in OUTPUTS} for way in range(3)
+    )
+    return Convergence(1 / np.array(STEPS_PER_SECOND, dtype=float), angles, rates, piecewise_linear)
 
 
 def order(step: np.ndarray, errors: dict[str, np.ndarray]) -> dict[str, float]:
@@ -82,7 +87,7 @@ def _error(fmu: Path, model: StateSpace, n: int, rates: bool) -> dict[str, float
     return _largest(found, exact_response(model, motion.time), motion.time >= FROM)
 
 
-def _broken_line_error(fmu: Path, n: int) -> dict[str, float]:
+def _piecewise_linear_error(fmu: Path, n: int) -> dict[str, float]:
     corners = _sines(n)
     slope = np.diff(corners.theta, axis=0) * n
     # Each line consists of a corner and CUTS - 1 further points. The rate at a corner is the rate of the next line.

@@ -40,7 +40,7 @@ def example() -> Any:
 
 
 def errors(example: Any, h: float, extrapolated: bool) -> np.ndarray:
-    """Largest errors of tau1, tau2, pitch and roll at the begin of the move, in the units of the FMU."""
+    """Largest errors of tau1, tau2, pitch and roll at the start of the move, in the units of the FMU."""
     built("prw_testbed.fmu")
     time, found = example.simulate(h, extrapolated, example.move, 0.25)
     exact = machine.simulate(time, table_1())

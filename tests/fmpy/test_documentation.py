@@ -99,9 +99,9 @@ def program(page: str, name: str) -> str:
     return html.unescape(text)
 
 
-def run(text: str, fmu: Path, folder: Path) -> np.ndarray:
-    (folder / "prw_testbed.fmu").write_bytes(fmu.read_bytes())
-    result = subprocess.run([sys.executable, "-c", text], cwd=folder, capture_output=True, text=True, timeout=120)
+def run(text: str, fmu: Path, directory: Path) -> np.ndarray:
+    (directory / "prw_testbed.fmu").write_bytes(fmu.read_bytes())
+    result = subprocess.run([sys.executable, "-c", text], cwd=directory, capture_output=True, text=True, timeout=120)
     assert result.returncode == 0, result.stderr
     return np.array([float(number) for number in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", result.stdout)])
 
@@ -176,15 +176,15 @@ def test_numbers_are_up_to_date(found):
     compare(committed, fresh, "numbers.json")
 
 
-def write(folder: Path, found) -> dict[str, bytes]:
+def write(directory: Path, found) -> dict[str, bytes]:
     """Writes the files that `make figures` commits. Returns their content by name."""
-    (folder / "numbers.json").write_text(numbers(found), encoding="utf-8")
+    (directory / "numbers.json").write_text(numbers(found), encoding="utf-8")
     for name, drawn in figures(found).items():
         if drawn.for_page:
-            write_for_page(folder / f"{name}.svg", drawn.figure)
+            write_for_page(directory / f"{name}.svg", drawn.figure)
         if drawn.for_readme:
-            write_small_png(folder / f"{name}.png", drawn.figure)
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
+            write_small_png(directory / f"{name}.png", drawn.figure)
+    return {path.name: path.read_bytes() for path in directory.iterdir()}
 
 
 @pytest.fixture(scope="module")

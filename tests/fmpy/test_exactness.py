@@ -81,7 +81,7 @@ def test_rates_from_omega(instance, model):
 
 
 def test_rates_from_angles(instance, model):
-    """By default the slope is that of the parabola through the last three samples, uneven or not."""
+    """By default the slope is the slope of the parabola through the last three samples, whether they are evenly spaced or not."""
     rng = np.random.default_rng(4)
     t = np.cumsum(rng.uniform(0.002, 0.02, 100))
     theta = np.cumsum(rng.normal(0, 0.02, (100, 2)), axis=0)

@@ -40,9 +40,9 @@ class Exact:
         """Returns the states and outputs (14,) after a step, and their scales (14,), to which errors are compared.
 
         The arguments are the states x (6,), the motor angles theta (2,), their slopes (2,) and their jump (2,) at the
-        begin of the step. An argument with a relative error of 1e-16 changes a result by at most 1e-16 of its scale.
+        start of the step. An argument with a relative error of 1e-16 changes a result by at most 1e-16 of its scale.
         The two sides have the same scale, because the FMU steps their sum and difference. The scale of an angle is at
-        least the angle at the begin, to which its change is added.
+        least the angle at the start, to which its change is added.
         """
         x, theta, slope = many(x), many(theta), many(slope)
         model, size = self.model, np.abs(x)

@@ -22,7 +22,8 @@ from prw.checking.experiments import read_experiments
 from tools.documentation.pages import CONTROLLER, TESTBED
 
 PAGE = "documentation/index.html"
-#: The parts of the page that build_fmu adds: policy, space with a note for browsers without scripts, styles and scripts.
+#: The parts of the page that build_fmu adds: the content security policy, the element in which the FMU is drawn (with a note for
+#: browsers without scripts), the styles and the scripts.
 LIVE = re.compile(
     r'<meta http-equiv="Content-Security-Policy"[^>]*>\n|<div id="live".*?</noscript></div>|<style>\n\.live,.*</script>\n?',
     re.S,
@@ -46,7 +47,7 @@ def page(testbed) -> str:
 
 @pytest.fixture(scope="module")
 def packed(page) -> list[bytes]:
-    """The descriptions and the modules in the page: the testbed's, the controller's."""
+    """Returns the description and the module of the testbed, then those of the controller, as the page contains them."""
     pairs = PACKED.findall(script_of(page))
     return [zlib.decompress(base64.b64decode(part), wbits=-15) for pair in pairs for part in pair]
 
@@ -58,7 +59,7 @@ class WebAssembly:
         engine = Engine()
         self.store, self.messages = Store(engine), []
         linker, number = Linker(engine), ValType.i32()
-        linker.define_func("fmu", "fmu_log", FuncType([number] * 3, []), lambda *_: self.messages.append(_))
+        linker.define_func("fmu", "fmu_log", FuncType([number] * 3, []), lambda *message: self.messages.append(message))
         self.functions = linker.instantiate(self.store, Module(engine, module)).exports(self.store)
         self.buffer = self.call("fmu_room", 4096)
         self.write(0, b"page\0", guid.encode() + b"\0")
@@ -71,30 +72,30 @@ class WebAssembly:
     def write(self, offset: int, *parts: bytes) -> None:
         self.functions["memory"].write(self.store, b"".join(parts), self.buffer + offset)
 
-    def does(self, name: str, *values: float) -> None:
+    def succeed(self, name: str, *values: float) -> None:
         assert self.call(name, self.component, *values) == 0, name
 
     def set(self, kind: str, letter: str, values: dict[int, float]) -> None:
         self.write(
             0, struct.pack(f"<{len(values)}I", *values), struct.pack(f"<{len(values)}{letter}", *values.values())
         )
-        self.does(f"fmi2Set{kind}", self.buffer, len(values), self.buffer + 4 * len(values))
+        self.succeed(f"fmi2Set{kind}", self.buffer, len(values), self.buffer + 4 * len(values))
 
     def get(self, references: list[int]) -> bytes:
         self.write(0, struct.pack(f"<{len(references)}I", *references))
-        self.does("fmi2GetReal", self.buffer, len(references), self.buffer + 1024)
+        self.succeed("fmi2GetReal", self.buffer, len(references), self.buffer + 1024)
         start = self.buffer + 1024
         return bytes(self.functions["memory"].read(self.store, start, start + 8 * len(references)))
 
 
 def test_the_page_equals_sources_and_fmus(testbed, page, packed):
-    """The page in the FMU is the page in the sources with scripts. In the FMU for FMI 3.0, it runs the module for FMI 2.0."""
+    """Except for the added parts, the page in the FMU is the page in the sources. It runs the module for FMI 2.0, also in the FMU for FMI 3.0."""
     assert LIVE.sub("", page) == (ROOT / TESTBED.path).read_text(encoding="utf-8")
-    folder = testbed.parents[testbed.parent.name == "fmi3"]
+    directory = testbed.parents[testbed.parent.name == "fmi3"]
     for offset, name in enumerate([testbed.name, "prw_controller.fmu"]):
-        with zipfile.ZipFile(folder / name) as archive:
+        with zipfile.ZipFile(directory / name) as archive:
             assert archive.read("modelDescription.xml") == packed[2 * offset]
-        guid = read_model_description(str(folder / name)).guid
+        guid = read_model_description(str(directory / name)).guid
         assert guid.encode() in packed[2 * offset + 1]
 
 
@@ -131,12 +132,12 @@ def test_the_module_is_bit_identical_to_the_library(fmu, packed, name):
     description = read_model_description(str(fmu))
     variables = {one.name: one for one in description.modelVariables}
     module = WebAssembly(packed[1], description.guid)
-    module.does("fmi2SetupExperiment", 0, 0.0, 0.0, 0, 0.0)
+    module.succeed("fmi2SetupExperiment", 0, 0.0, 0.0, 0, 0.0)
     for kind, letter in (("Real", "d"), ("Integer", "i"), ("Boolean", "i")):
         of_kind = {k: v for k, v in experiment.parameters.items() if variables[k].type == kind}
         module.set(kind, letter, {variables[k].valueReference: v for k, v in of_kind.items()})
-    module.does("fmi2EnterInitializationMode")
-    module.does("fmi2ExitInitializationMode")
+    module.succeed("fmi2EnterInitializationMode")
+    module.succeed("fmi2ExitInitializationMode")
     inputs = ("theta1", "theta2", "omega1", "omega2")
     times = 1e-3 * np.arange(round(experiment.stop_time / 1e-3) + 1)
     signals = np.column_stack([np.interp(times, experiment.inputs["time"], experiment.inputs[name]) for name in inputs])
@@ -148,5 +149,5 @@ def test_the_module_is_bit_identical_to_the_library(fmu, packed, name):
             there = module.get([variables[name].valueReference for name in OUTPUTS])
             assert there == library.get(OUTPUTS)[0].astype("<f8").tobytes(), f"at {times[k]} s"
             if k + 1 < len(times):
-                module.does("fmi2DoStep", times[k], times[k + 1] - times[k], 1)
+                module.succeed("fmi2DoStep", times[k], times[k + 1] - times[k], 1)
                 library.step(to=times[k + 1])

@@ -60,13 +60,13 @@ def test_the_directories_for_the_cross_check(fmu, tmp_path):
         archive.extractall(tmp_path)
     description = fmpy.read_model_description(str(fmu))
     for name in NAMES:
-        folder = tmp_path / name
+        directory = tmp_path / name
         ends = ".fmu", "_in.csv", "_ref.csv", "_ref.opt", ".ssv"
-        assert {path.name for path in folder.iterdir()} == {*(f"{name}{end}" for end in ends), "README.md"}
-        assert (folder / f"{name}.fmu").read_bytes() == fmu.read_bytes()
-        options = dict(line.split(", ") for line in (folder / f"{name}_ref.opt").read_text().splitlines())
+        assert {path.name for path in directory.iterdir()} == {*(f"{name}{end}" for end in ends), "README.md"}
+        assert (directory / f"{name}.fmu").read_bytes() == fmu.read_bytes()
+        options = dict(line.split(", ") for line in (directory / f"{name}_ref.opt").read_text().splitlines())
         for kind, causality in (("in", "input"), ("ref", "output")):
-            with open(folder / f"{name}_{kind}.csv", newline="") as file:
+            with open(directory / f"{name}_{kind}.csv", newline="") as file:
                 header, *rows = csv.reader(file)
             variables = {v.name for v in description.modelVariables if v.causality == causality}
             assert header[0] == "time" and set(header[1:]) == variables

@@ -12,9 +12,9 @@ import fmpy
 HERE = Path(__file__).parent
 
 
-def build(folder: Path, *flags: str, name: str = "faulty_fmu", platform: str = "linux64") -> Path:
-    """Compiles `name` with `flags` and packs it in `folder` for `platform`; returns the FMU."""
-    library, fmu = folder / f"{name}.so", folder / f"{name}.fmu"
+def build(directory: Path, *flags: str, name: str = "faulty_fmu", platform: str = "linux64") -> Path:
+    """Compiles `name` with `flags` and packs it in `directory` for `platform`; returns the FMU."""
+    library, fmu = directory / f"{name}.so", directory / f"{name}.fmu"
     headers = Path(fmpy.__file__).parent / "c-code"
     common = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", "-I", headers]
     subprocess.run(["cc", *common, *flags, HERE / f"{name}.c", "-o", library], check=True)

@@ -17,16 +17,16 @@ SOURCE = Path(__file__).parents[2] / "crates" / "fmu-run" / "tests" / "foreign"
 def library() -> bytes:
     """The library, compiled once."""
     headers = Path(fmpy.__file__).parent / "c-code"
-    with tempfile.TemporaryDirectory() as folder:
-        to = Path(folder) / "foreign.so"
+    with tempfile.TemporaryDirectory() as directory:
+        to = Path(directory) / "foreign.so"
         flags = ["-std=gnu99", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", "-I", headers]
         subprocess.run(["cc", *flags, SOURCE / "foreign.c", "-o", to], check=True)
         return to.read_bytes()
 
 
-def foreign(folder: Path, manner: str, version: str = "2.0") -> Path:
+def foreign(directory: Path, manner: str, version: str = "2.0") -> Path:
     """Returns the FMU with this manner, for this FMI version."""
-    fmu = folder / f"{manner}{version[0]}.fmu"
+    fmu = directory / f"{manner}{version[0]}.fmu"
     platform = "linux64" if version == "2.0" else "x86_64-linux"
     with zipfile.ZipFile(fmu, "w") as archive:
         description = (SOURCE / f"foreign{version[0]}.xml").read_text(encoding="utf-8")

@@ -32,13 +32,13 @@ OUTPUTS = [
 @pytest.fixture(scope="session")
 def rods(tmp_path_factory) -> tuple[Path, Path]:
     """The FMUs of crates/fmu-export/tests/models/rod.rs, for FMI 2.0 and FMI 3.0."""
-    folder = tmp_path_factory.mktemp("rods")
+    directory = tmp_path_factory.mktemp("rods")
     # Built in the whole workspace, like the Rust tests. With --package, cargo would compile crates again with other features.
     build = ["cargo", "build", "--quiet", "--locked", "--workspace", "--example", "rod"]
     subprocess.run(build, cwd=ROOT, check=True)
     examples = ROOT / "target/debug/examples"
-    subprocess.run([examples / "rod", examples / "librod.so", folder], cwd=ROOT, check=True)
-    return folder / "rod2.fmu", folder / "rod3.fmu"
+    subprocess.run([examples / "rod", examples / "librod.so", directory], cwd=ROOT, check=True)
+    return directory / "rod2.fmu", directory / "rod3.fmu"
 
 
 def both(rods, run):

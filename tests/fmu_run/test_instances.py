@@ -155,8 +155,8 @@ def test_model_exchange_equals_fmpy(testbed) -> None:
     """Integrates by Euler's method, call by call."""
     description = fmpy.read_model_description(str(testbed))
     by_name = {variable.name: variable for variable in description.modelVariables}
-    folder = fmpy.extract(str(testbed))
-    theirs = instantiate_fmu(folder, description, fmi_type="ModelExchange")
+    directory = fmpy.extract(str(testbed))
+    theirs = instantiate_fmu(directory, description, fmi_type="ModelExchange")
     real = "Float64" if isinstance(theirs, FMU3Model) else "Real"
     if isinstance(theirs, FMU2Model):
         theirs.setupExperiment(startTime=0.0)

@@ -30,8 +30,8 @@ def by_fmpy(path, time, inputs, start, outputs, slopes=None, read_before_set=Fal
     """Simulates with direct calls of the C functions, by the classes of FMPy."""
     description = fmpy.read_model_description(str(path))
     by_name = {v.name: v for v in description.modelVariables}
-    folder = fmpy.extract(str(path))
-    slave = instantiate_fmu(folder, description, fmi_type="CoSimulation")
+    directory = fmpy.extract(str(path))
+    slave = instantiate_fmu(directory, description, fmi_type="CoSimulation")
     is_fmi2 = description.fmiVersion == "2.0"
     getters = {"Real": "getReal", "Integer": "getInteger", "Boolean": "getBoolean"}
     getters |= {"Float64": "getFloat64", "Int32": "getInt32", "Enumeration": "getInteger" if is_fmi2 else "getInt64"}
@@ -62,7 +62,7 @@ def by_fmpy(path, time, inputs, start, outputs, slopes=None, read_before_set=Fal
             slave.doStep(currentCommunicationPoint=t, communicationStepSize=time[k + 1] - t)
     slave.terminate()
     slave.freeInstance()
-    shutil.rmtree(folder)
+    shutil.rmtree(directory)
     return dict(zip(outputs, np.array(rows, dtype=float).T))
 
 

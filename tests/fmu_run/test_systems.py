@@ -24,7 +24,8 @@ ORDERS = ("dependencies", "jacobi")
 def fmus(request):
     """Controller and testbed, for equal or different FMI versions."""
     names = [
-        f"{folder}/{name}".strip("/") for folder, name in zip(request.param, ("prw_controller.fmu", "prw_testbed.fmu"))
+        f"{directory}/{name}".strip("/")
+        for directory, name in zip(request.param, ("prw_controller.fmu", "prw_testbed.fmu"))
     ]
     with fmu_run.Fmu(built(names[0])) as controller, fmu_run.Fmu(built(names[1])) as testbed:
         yield {"controller": controller, "testbed": testbed}
@@ -157,9 +158,9 @@ def test_algebraic_loops(faulty_fmu) -> None:
             fmu_run.System({"a": fmu, "b": fmu})
 
 
-def rewritten(folder, change) -> str:
+def rewritten(directory, change) -> str:
     """Returns a copy of the closed loop's SSP with a changed system structure."""
-    source, to = built("prw_closed_loop.ssp"), folder / "changed.ssp"
+    source, to = built("prw_closed_loop.ssp"), directory / "changed.ssp"
     with zipfile.ZipFile(source) as old, zipfile.ZipFile(to, "w") as new:
         for name in old.namelist():
             text = old.read(name)

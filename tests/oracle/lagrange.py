@@ -35,7 +35,7 @@ REAL = tuple(name for name in TABLE_1 if name not in ("M", "N"))
 
 def varied(factors) -> dict[str, Any]:
     """Other parameters: Table 1 in SI units, each measured value times the next of `factors`. The value 0 would stay 0, so
-    the largest value of its kind takes its place. M and N are those of Table 1."""
+    the largest value of its kind takes its place. M and N have the values of Table 1."""
     table = table_1()
     largest = {name: max(table[other] for other in REAL if other[0] == name[0]) for name in REAL}
     return {

@@ -68,7 +68,7 @@ class Mechanics:
         return np.concatenate([rate, self.inverse_mass @ force[list(self.HEAVY)]])
 
     def torques(self, x: np.ndarray) -> np.ndarray:
-        """The wrist's torques (2,) N.m on the motors: the generalized forces on them without those of the motors themselves."""
+        """The wrist's torques (2,) N.m on the motors: the generalized forces on them, without the forces of the motors themselves."""
         return -(self.stiff @ x[:6] + self.damp @ self.rates(x))[MOTOR]
 
 

@@ -93,7 +93,7 @@ def integrate(model: LinearModel, t, theta, rate, x0=None, breaks=()):
 def backward_slope(t, theta) -> np.ndarray:
     """Returns slopes (n, 2) that follow from samples: at t[k], the slope of the parabola through the last three samples.
 
-    The slope is 0 at the first sample, and that of a straight line at the second. Uses Lagrange polynomials.
+    The slope at the first sample is 0; at the second sample it is the slope of a straight line. Uses Lagrange polynomials.
     """
     slope = np.zeros_like(theta)
     for k in range(1, len(t)):

@@ -81,11 +81,11 @@ def reports() -> Iterator[tuple[str, queue.Queue[Any]]]:
 @pytest.fixture(scope="module", params=BROWSERS)
 def report(request: pytest.FixtureRequest, fmu: Path, reports: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Returns the report of a browser that has opened the page."""
-    folder = tmp_path_factory.mktemp(request.param)
-    command = BROWSERS[request.param](folder / "home", WIDTHS[request.param])
+    directory = tmp_path_factory.mktemp(request.param)
+    command = BROWSERS[request.param](directory / "home", WIDTHS[request.param])
     toolchain.need(command[0], *([WEBKIT] if WEBKIT in command else []))
-    (folder / "home").mkdir()
-    page = folder / "index.html"
+    (directory / "home").mkdir()
+    page = directory / "index.html"
     page.write_text(with_visitor(fmu, reports[0]), encoding="utf-8")
     # A separate process group, so that the browser ends with all processes that it starts.
     quiet: Any = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}

@@ -1,4 +1,4 @@
-"""The FMU as C sources: every compiler accepts them, and the results are bit-identical to the library."""
+"""The FMU as C sources: every compiler accepts them, and the results are bit-identical to the results of the library."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fmpy.fmi2 import FMU2Slave
 HERE = Path(__file__).parent
 OUTPUTS = ("tau1", "tau2", "pitch", "roll")
 STRICT = ("-std=c99", "-pedantic-errors", "-Wall", "-Wextra", "-Werror")
-#: In units of 64 KiB, of which the testbed has two more than it begins with.
+#: Default of FMU_MEMORY_PAGES, the memory of an instance in units of 64 KiB: the testbed begins with two, and two are for saved states.
 MEMORY = 4
 
 
@@ -37,7 +37,7 @@ def references(description: fmpy.model_description.ModelDescription) -> list[int
 
 @pytest.fixture(scope="module")
 def library_hash(description: fmpy.model_description.ModelDescription) -> str:
-    """The hash of the outputs that steps.c prints, of the FMU with the library."""
+    """Returns the hash that steps.c must print: the hash of the same outputs, computed with the FMU that contains the library."""
     unpacked = fmpy.extract(str(FMU))
     slave = FMU2Slave(
         guid=description.guid, unzipDirectory=unpacked, modelIdentifier="prw_testbed", instanceName="library"
@@ -124,7 +124,7 @@ def test_every_processor_equals_the_library(
         line for line in printed["log"] if "free one, or compile the FMU with a larger FMU_MEMORY_PAGES" in line
     ]
     assert len(rejected) == 4
-    # 4 is fmi2Fatal, which such an instance returns from then on.
+    # 4 is fmi2Fatal, which an instance with damaged memory returns from then on.
     assert printed["damaged"] == ["4", "4"]
     rest = [line for line in printed["log"] if line not in rejected]
     assert rest and all("free this instance" in line for line in rest)
@@ -133,7 +133,7 @@ def test_every_processor_equals_the_library(
 def test_fused_products_and_sums_are_rejected(
     sources: Path, tmp_path: Path, run: Callable[..., dict[str, list[str]]]
 ) -> None:
-    """clang follows the option despite the sources; gcc would follow it without their pragma."""
+    """The sources cannot switch off -ffp-contract=fast for clang. For gcc they can, by a pragma, which is removed here."""
     changed = tmp_path / "changed"
     shutil.copytree(sources, changed)
     runtime = changed / "prw_testbed_runtime.h"
@@ -184,7 +184,7 @@ def test_other_arithmetic_is_rejected(sources: Path, tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def prefixing(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """The option for the header of the standard; FMPy's header omits the prefix."""
+    """Returns the option for a header that prefixes the names of functions, as the standard's does; FMPy's header omits the prefix."""
     headers = tmp_path_factory.mktemp("headers")
     text = (HEADERS / "fmi2Functions.h").read_text()
     paste = "#define P_(a, b) a##b\n#define P(a, b) P_(a, b)\n#define fmi2FullName(name) P(FMI2_FUNCTION_PREFIX, name)"
@@ -202,7 +202,7 @@ def test_no_symbol_clashes_and_nothing_is_global(sources: Path, tmp_path: Path, 
         names = subprocess.run(["nm", "--defined-only", str(output)], check=True, capture_output=True, text=True).stdout
         symbols += [line.split()[1:] for line in names.splitlines()]
     kinds = {kind for kind, _ in symbols}
-    # t, T: functions; r: constants; d: constants that have addresses in them.
+    # t, T: functions; r: constants; d: constants that contain addresses, which the loader writes.
     assert kinds <= {"t", "T", "r", "R", "d"}
     assert all("elem_segment_exprs" in name for kind, name in symbols if kind == "d")
     public = [name for kind, name in symbols if kind.isupper()]
@@ -214,8 +214,8 @@ def test_no_symbol_clashes_and_nothing_is_global(sources: Path, tmp_path: Path, 
 
 def test_two_fmus_are_linked_into_one_program(sources: Path, tmp_path: Path, prefixing: str) -> None:
     controller = unpack(CONTROLLER, tmp_path / "controller")
-    files = [str(folder / f"{name}{end}.c")
-             for folder, name in ((sources, "prw_testbed"), (controller, "prw_controller")) for end in ("", "_fmi2")]  # fmt: skip
+    files = [str(directory / f"{name}{end}.c")
+             for directory, name in ((sources, "prw_testbed"), (controller, "prw_controller")) for end in ("", "_fmi2")]  # fmt: skip
     program = tmp_path / "two"
     options = (prefixing, f"-I{controller}", "-O1", str(HERE / "two.c"))
     COMPILERS["gcc"].compile(sources, program, *options, *files, "-lm")
@@ -240,7 +240,7 @@ def test_fmpy_compiles_and_runs_it(tmp_path: Path) -> None:
 
 
 def cargo_test(library: Path, *arguments: str, **environment: str) -> str:
-    """Runs Rust tests on compiled sources, whose model has the same guid; returns their output."""
+    """Runs Rust tests on a library compiled from the C sources, which must have the guid of the source FMU; returns their output."""
     command = ["cargo", "test", "--locked", "--release", *arguments]
     guid = fmpy.read_model_description(str(SOURCE_FMU)).guid
     environment = {**os.environ, "FMU_LIBRARY": str(library), "FMU_GUID": guid, **environment}
@@ -253,7 +253,7 @@ def test_the_tests_of_the_library_pass(sources: Path, tmp_path: Path) -> None:
     """Compares all results of random sessions, and runs the tests of the C interface, on the compiled sources."""
     library = tmp_path / "compiled.so"
     files = [str(sources / name) for name in ("prw_testbed.c", "prw_testbed_fmi2.c")]
-    # Arrays of 5000 values are among the arguments.
+    # The sessions pass arrays of 5000 values, for which the default memory is too small.
     COMPILERS["gcc"].compile(sources, library, "-O2", "-fPIC", "-shared", "-DFMU_MEMORY_PAGES=64", *files, "-lm")
     output = cargo_test(library, "--test", "c_sources", "--test", "fmu", "--", "--include-ignored", "--nocapture")
     assert f"in {os.environ.get('SESSIONS', '300')} sessions" in output
@@ -275,7 +275,7 @@ def test_random_sessions_with_sanitizers(sources: Path, tmp_path: Path) -> None:
 
 
 def test_a_panic_ends_its_instance_only(tmp_path: Path) -> None:
-    """A model panics in any called function, on several threads."""
+    """Runs the tests of a model that panics in each function that is called, on several threads."""
     file = ROOT / "crates" / "fmu-export" / "tests" / "panics" / "library.rs"
     command = ["cargo", "run", "--locked", "--release", "--package", "fmu-package", "--example", "c_sources"]
     environment = {"WASM2C": str(ROOT / ".venv" / "bin" / "wasm2c"), **os.environ}

@@ -6,8 +6,8 @@ use fmu_run::{BaseType, Description, Trajectory, Value, Variable, nearest};
 use std::fs;
 use std::path::Path;
 
-/// Inputs over time. The runner interprets the times: a continuous input follows the line between two rows, any other is held, and
-/// two rows of the same time are a step.
+/// Inputs over time. The runner interprets the times: a continuous input is interpolated linearly between two rows, any
+/// other is held, and two rows with the same time are a step.
 pub struct Table {
     pub time: Vec<f64>,
     /// The inputs; all elements of an array have the same values.

@@ -90,7 +90,7 @@ fn changes(mut open: Vec<PathBuf>) -> BTreeMap<PathBuf, Option<SystemTime>> {
     found
 }
 
-/// Checks the given FMUs, or builds and checks those of the project. Returns false if a check failed.
+/// Checks the given FMUs, or builds the FMUs of the project and checks them. Returns false if a check failed.
 pub fn check(package: &Package, given: &[PathBuf], options: &fmu_check::Options) -> Result<bool> {
     let mut fmus = given.to_vec();
     if fmus.is_empty() {

@@ -31,7 +31,7 @@ pub struct Variable {
     pub has_variability: bool,
     /// `exact`, `approx` or `calculated`, with the default of the standard; empty if there is no default.
     pub initial: String,
-    /// Start values as strings, as many as are written. A single one of an array is that of each element.
+    /// Start values as strings, as many as the description contains. If an array has only one, it is the start value of each element.
     pub start: Vec<String>,
     /// Sizes of the dimensions of an array; `None` if a size is unknown or too large.
     pub dimensions: Option<Vec<usize>>,
@@ -62,7 +62,7 @@ pub struct Variable {
 }
 
 impl Variable {
-    /// Returns the start value of an element; a single start value of an array is that of each element.
+    /// Returns the start value of an element. If an array has only one start value, each element has it.
     pub fn start_of(&self, element: usize) -> Option<&str> {
         let is_repeated = self.start.len() == 1 && self.size.is_some_and(|size| element < size);
         self.start.get(if is_repeated { 0 } else { element }).map(String::as_str)

@@ -1,11 +1,11 @@
-//! XML of files that nobody has checked: the memory and the time to read it are limited before it is read.
+//! XML of untrusted files: before it is parsed, the memory and the time that parsing may take are limited.
 
 use roxmltree::Document;
 
 /// Largest depth of nested elements.
 const MAX_DEPTH: usize = 250;
-/// Comparisons that reading a file may take, and those for each byte. They are limited because the parser compares the
-/// attributes of an element with each other, and its namespaces with those of the elements around it.
+/// Maximum number of comparisons while a file is read, and the additional number for each byte. They are limited because the parser
+/// compares the attributes of an element with each other, and its namespaces with the namespaces of the elements around it.
 const COMPARISONS: usize = 1 << 22;
 const COMPARISONS_PER_BYTE: usize = 8;
 /// Largest number of bytes that a step of reading a file may take.

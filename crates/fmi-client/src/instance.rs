@@ -35,7 +35,7 @@ pub struct Settings<'a> {
     pub event_mode: bool,
     /// Whether a step may end early (FMI 3.0).
     pub early_return: bool,
-    /// Receiver of all messages, and the number that it gets with those of this instance.
+    /// Receiver of all messages, and the number that identifies this instance to it.
     pub listener: Option<(Arc<dyn Listen>, usize)>,
 }
 
@@ -127,7 +127,7 @@ impl Drop for Instance {
             });
         }
         // After the last message.
-        self.log.end();
+        self.log.unregister();
     }
 }
 
@@ -169,7 +169,7 @@ impl Instance {
     /// Returns the FMU's messages if it makes none.
     pub fn new(library: &Arc<Library>, settings: &Settings) -> Result<Self, Rejection> {
         let Settings { interface, logging_on, event_mode, early_return, .. } = *settings;
-        let log = Log::living(settings.listener.clone());
+        let log = Log::register(settings.listener.clone());
         let environment = log.environment();
         let [own_name, token] =
             [settings.name, settings.token].map(|text| CString::new(text).unwrap_or_default());
@@ -221,7 +221,7 @@ impl Instance {
         });
         if handle.is_null() {
             let messages = log.take();
-            log.end();
+            log.unregister();
             return Err(Rejection::new(settings.label, function, Status::Error, messages));
         }
         let (library, label) = (Arc::clone(library), settings.label.into());

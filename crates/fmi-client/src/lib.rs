@@ -3,7 +3,7 @@
 //! ## Structure of the crate
 //!
 //! [`Library`] contains the functions of an FMU. [`Instance`] calls them: `instance` the life cycle, `values` variables, `states`
-//! and `saved` saved states. `log` receives messages and knows the living instances, because the pointer that an FMU hands to the logger
+//! and `saved` saved states. `log` receives messages and knows the living instances, because the pointer that an FMU passes to the logger
 //! cannot be trusted; `format` expands formats of `printf` without trusting their arguments.
 
 mod float;

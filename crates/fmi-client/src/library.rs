@@ -56,7 +56,7 @@ impl Library {
     /// Uses functions that are already in this process.
     ///
     /// # Safety
-    /// The functions are those of an FMU. They stay loaded as long as the value and its instances exist, and are sound when they
+    /// The functions belong to an FMU. They stay loaded as long as the value and its instances exist, and are sound when they
     /// are called.
     pub unsafe fn of(functions: Functions) -> Self {
         Self { functions, _loaded: None }

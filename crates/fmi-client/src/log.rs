@@ -1,8 +1,8 @@
 //! Log callbacks for FMUs, and the list of living instances.
 //!
-//! FMUs do not always hand the environment of the instance to the logger: some hand their own pointer, NULL, or the environment of
-//! another instance, and some log from their own threads, so the environment is a number that is looked up, never a pointer that is
-//! followed.
+//! FMUs do not always pass the environment of the instance to the logger: some pass their own pointer, NULL, or the environment of
+//! another instance, and some log from their own threads. So the environment is a number that is looked up, never a pointer that is
+//! dereferenced.
 
 use crate::format::Arguments;
 use crate::rejection::Message;
@@ -24,14 +24,14 @@ pub trait Listen: Send + Sync {
     fn hear(&self, number: Option<usize>, message: &Message);
 }
 
-/// Maximum number of messages that are kept for the reason of a later error.
-const KEPT: usize = 64;
+/// Maximum number of stored messages. A later error quotes them as its reason; older ones are dropped.
+const MOST_MESSAGES: usize = 64;
 
 /// The log of an instance.
 pub(crate) struct Log {
     /// Environment of the instance: a number that is used once in a process.
     environment: usize,
-    /// Messages since the last failed call.
+    /// Messages since the last [`take`](Self::take), which follows each call that does not return OK.
     new: Mutex<VecDeque<Message>>,
     listener: Option<(Arc<dyn Listen>, usize)>,
 }
@@ -45,8 +45,8 @@ impl fmt::Debug for Log {
 /// Logs of the living instances by environment.
 static LIVING: RwLock<BTreeMap<usize, Arc<Log>>> = RwLock::new(BTreeMap::new());
 
-/// Messages with an unknown environment, each with the thread that logged it. Most FMUs log during a call, so that the thread leads
-/// to the instance.
+/// Messages with an unknown environment, each with the thread that logged it. Most FMUs log during a call and on its thread, so the next
+/// failed call on this thread takes the message.
 static STRAY: Mutex<VecDeque<(ThreadId, Message)>> = Mutex::new(VecDeque::new());
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -54,19 +54,19 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Log {
-    /// Creates a log and enters it in the list of living instances.
-    pub fn living(listener: Option<(Arc<dyn Listen>, usize)>) -> Arc<Self> {
-        /// Distance of environments, as of pointers that `malloc` returns.
-        const APART: usize = 16;
+    /// Creates a log and registers it in the list of living instances.
+    pub fn register(listener: Option<(Arc<dyn Listen>, usize)>) -> Arc<Self> {
+        /// Distance between two environments. They are aligned like the pointers of `malloc`, in case an FMU checks that.
+        const SPACING: usize = 16;
         static NEXT: AtomicUsize = AtomicUsize::new(0x1000);
-        let environment = NEXT.fetch_add(APART, Ordering::Relaxed);
+        let environment = NEXT.fetch_add(SPACING, Ordering::Relaxed);
         let log = Arc::new(Self { environment, new: Mutex::default(), listener });
         LIVING.write().unwrap_or_else(PoisonError::into_inner).insert(environment, Arc::clone(&log));
         log
     }
 
-    /// Removes the log from the list, when its instance is freed.
-    pub fn end(&self) {
+    /// Removes the log from the list; called when its instance is freed.
+    pub fn unregister(&self) {
         LIVING.write().unwrap_or_else(PoisonError::into_inner).remove(&self.environment);
     }
 
@@ -74,7 +74,8 @@ impl Log {
         std::ptr::without_provenance_mut(self.environment)
     }
 
-    /// Removes and returns the messages since the last failed call, with those of this thread that name no instance.
+    /// Removes and returns the messages since the last call of this function, and the messages from this thread whose environment is
+    /// unknown.
     pub fn take(&self) -> Vec<Message> {
         let mut messages = Vec::from(std::mem::take(&mut *lock(&self.new)));
         let mut stray = lock(&STRAY);
@@ -92,20 +93,21 @@ impl Log {
         if let Some((listener, number)) = &self.listener {
             listener.hear(Some(*number), &message);
         }
-        keep(&mut lock(&self.new), message);
+        push_limited(&mut lock(&self.new), message);
     }
 }
 
-/// Adds an item; removes the oldest one if there are many.
-fn keep<T>(items: &mut VecDeque<T>, item: T) {
-    if items.len() >= KEPT {
+/// Adds an item; removes the oldest one if there are `MOST_MESSAGES`.
+fn push_limited<T>(items: &mut VecDeque<T>, item: T) {
+    if items.len() >= MOST_MESSAGES {
         items.pop_front();
     }
     items.push_back(item);
 }
 
-/// Stores a message with the instance whose environment it has; if there is only one, with that one.
-fn remember(environment: usize, message: Message) {
+/// Stores a message in the log of the instance that has this environment. If the environment is unknown but only one instance is alive,
+/// the message must be from that instance.
+fn store(environment: usize, message: Message) {
     let living = LIVING.read().unwrap_or_else(PoisonError::into_inner);
     let only = || living.values().next().filter(|_| living.len() == 1);
     if let Some(log) = living.get(&environment).or_else(only) {
@@ -113,21 +115,21 @@ fn remember(environment: usize, message: Message) {
         drop(living);
         return log.add(message);
     }
-    let mut told: Vec<Arc<dyn Listen>> = Vec::new();
+    let mut listeners: Vec<Arc<dyn Listen>> = Vec::new();
     for (listener, _) in living.values().filter_map(|log| log.listener.as_ref()) {
-        if !told.iter().any(|other| Arc::ptr_eq(other, listener)) {
-            told.push(Arc::clone(listener));
+        if !listeners.iter().any(|other| Arc::ptr_eq(other, listener)) {
+            listeners.push(Arc::clone(listener));
         }
     }
     drop(living);
-    told.iter().for_each(|listener| listener.hear(None, &message));
-    keep(&mut lock(&STRAY), (std::thread::current().id(), message));
+    listeners.iter().for_each(|listener| listener.hear(None, &message));
+    push_limited(&mut lock(&STRAY), (std::thread::current().id(), message));
 }
 
-/// Returns a string; empty for NULL.
+/// Copies a C string; returns an empty string for a null pointer.
 ///
 /// # Safety
-/// NULL, or a string that ends with NUL.
+/// `pointer` is null or points to a NUL-terminated string.
 unsafe fn string(pointer: *const c_char) -> String {
     if pointer.is_null() {
         return String::new();
@@ -136,8 +138,9 @@ unsafe fn string(pointer: *const c_char) -> String {
     unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned()
 }
 
-/// Returns the callbacks of FMI 2.0 (section 2.1.5 of FMI 2.0.5). They must live as long as the instance. The memory functions are
-/// those of C; an FMU may do without them only if `canNotUseMemoryManagementFunctions` is true.
+/// Returns the callbacks of FMI 2.0 (section 2.1.5 of FMI 2.0.5). The returned value must live as long as the
+/// instance. The memory functions call `calloc` and `free` of C. They must be present, because only an FMU with
+/// `canNotUseMemoryManagementFunctions` ignores them.
 pub fn callbacks(environment: *mut c_void) -> fmi2CallbackFunctions {
     let logger = log_of_fmi2 as *const ();
     fmi2CallbackFunctions {
@@ -160,9 +163,10 @@ unsafe extern "C" fn free(memory: *mut c_void) {
     unsafe { libc::free(memory) }
 }
 
-/// Logger of FMI 2.0. Stable Rust cannot define variadic functions, so it has named arguments: integers and pointers, then
-/// floating-point numbers, which have separate registers. On Linux, and on macOS with Intel processors, variadic functions receive
-/// their arguments in these registers and then on the stack; more are read than there may be, which is harmless there.
+/// Logger of FMI 2.0. Stable Rust cannot define variadic functions, so this one has a fixed number of arguments: integers and pointers, then
+/// floating-point numbers, which are passed in separate registers. On Linux, and on macOS with Intel processors, variadic functions
+/// receive their arguments in these registers and then on the stack. If the caller passes fewer arguments, the others have arbitrary
+/// values; reading them is harmless there, and a correct format does not use them.
 #[cfg(any(all(unix, target_arch = "x86_64"), all(target_os = "linux", target_arch = "aarch64")))]
 #[allow(clippy::too_many_arguments, reason = "the values of the message")]
 unsafe extern "C" fn log_of_fmi2(
@@ -192,11 +196,11 @@ unsafe extern "C" fn log_of_fmi2(
     let [category, format] = [category, message].map(|text| unsafe { string(text) });
     let arguments = Arguments::new([a, b, c, d, e, f, g, h], [r, s, t, u, v, w, x, y]);
     let message = Message { status: Status::from_c(status), category, text: arguments.expand(&format) };
-    remember(environment.addr(), message);
+    store(environment.addr(), message);
 }
 
-/// Logger of FMI 2.0 without its `...`. Named arguments are passed as in plain calls on every platform of this project; the values
-/// of formats are not read here.
+/// Logger of FMI 2.0 that ignores the values for the format. On every platform of this project, the arguments before the `...` are passed
+/// as they are to a function without `...`.
 #[cfg(not(any(all(unix, target_arch = "x86_64"), all(target_os = "linux", target_arch = "aarch64"))))]
 unsafe extern "C" fn log_of_fmi2(
     environment: fmi2ComponentEnvironment,
@@ -205,7 +209,7 @@ unsafe extern "C" fn log_of_fmi2(
     category: fmi2String,
     message: fmi2String,
 ) {
-    // SAFETY: the requirements are those of FMI 3.0.
+    // SAFETY: both FMI versions require NULL or NUL-terminated strings.
     unsafe { log_of_fmi3(environment, status, category, message) }
 }
 
@@ -221,5 +225,5 @@ pub unsafe extern "C" fn log_of_fmi3(
 ) {
     // SAFETY: the caller's requirement.
     let [category, text] = [category, message].map(|text| unsafe { string(text) });
-    remember(environment.addr(), Message { status: Status::from_c(status), category, text });
+    store(environment.addr(), Message { status: Status::from_c(status), category, text });
 }

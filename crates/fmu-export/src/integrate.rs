@@ -149,7 +149,7 @@ fn is_after(falls: bool, value: f64) -> bool {
     if falls { value <= 0.0 } else { value >= 0.0 }
 }
 
-/// Returns the part of a step up to a change of sign. The indicator has these values at the begin and the end of the step.
+/// Returns the part of a step up to a change of sign. The indicator has these values at the start and at the end of the step.
 fn locate(
     step: Step,
     [begin, end]: [f64; 2],

@@ -15,7 +15,7 @@ const fn both(co_simulation: &str, model_exchange: &str) -> AllowedStates {
 
 /// Returns the modes in which an importer may set a variable, in both FMI versions.
 ///
-/// The modes of the standard are those of the tables in sections 3.2.3 and 4.2.4 of FMI 2.0, footnotes 1, 3, 4,
+/// The modes of the standard are taken from the tables in sections 3.2.3 and 4.2.4 of FMI 2.0, with footnotes 1, 3, 4,
 /// 5 and 6. Sections 2.3.2, 2.3.3, 2.3.5, 3.2.1 and 4.2.1 of FMI 3.0 give equal rules. FMI 3.0 also allows inputs
 /// before the initialization, and has an Event Mode in Co-Simulation.
 ///

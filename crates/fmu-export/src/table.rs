@@ -440,8 +440,8 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 ///
 /// A kind is a function of [`Variable`]: `input`, `output`, `local`, `parameter`, `calculated_parameter`,
 /// `independent`. A refinement is one of its methods; its arguments name other variables by their names in
-/// the table. A PLACE is a path of fields, such as `motors[0].theta`. Start values are those of the model
-/// that [`Model::new`](crate::Model::new) makes.
+/// the table. A PLACE is a path of fields, such as `motors[0].theta`. Start values are the values in
+/// the model that [`Model::new`](crate::Model::new) returns.
 ///
 /// Both `names` and `memory` are optional. Access to a Real needs no function call if its place is an `f64`
 /// in a path of fields and array elements, without a block after `then`. A path through a `Box`, a `Vec` or

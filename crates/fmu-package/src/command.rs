@@ -233,7 +233,7 @@ impl Builder {
         {
             let target = format!("{}-unknown-linux-gnu", std::env::consts::ARCH);
             eprintln!(
-                "note: the library needs glibc {major}.{minor}, the version on this system; for glibc {GLIBC}, add --target {target} \
+                "note: the library needs glibc {major}.{minor} or later, so it does not load on older systems; for glibc {GLIBC}, add --target {target} \
                  (with {ZIGBUILD}: pip install {ZIGBUILD})"
             );
         }

@@ -13,12 +13,12 @@ use crate::xml::Element;
 use anyhow::{Result, bail, ensure};
 use fmi_abi::{BaseType, Category, Causality, Standard, Value, Variability};
 
-/// Differences between the description and the model as it was compiled.
+/// Values of the description that differ from the compiled model.
 #[derive(Clone, Debug, Default)]
 pub struct Changes {
-    /// Another guid.
+    /// The guid, if it is not the compiled one.
     pub guid: Option<String>,
-    /// Parameters are `tunable` instead of `fixed`.
+    /// Whether parameters are `tunable` instead of `fixed`.
     pub tunable_parameters: bool,
     /// The files in the directory `sources` that an importer compiles (FMI 2.0).
     pub source_files: Vec<String>,
@@ -27,9 +27,9 @@ pub struct Changes {
 /// Returns `modelDescription.xml` of the model's FMU for this version of FMI.
 ///
 /// # Errors
-/// When the model contradicts itself (two variables of one name, an empty range, a start value outside its range or other
-/// than through the other interface type, a dependency that it has not declared), has a variable of a type that FMI 2.0
-/// lacks, or has a variable with a name that FMI 3.0 needs.
+/// When the model contradicts itself: two variables have one name, a range is empty, a start value is outside its range or differs
+/// between Co-Simulation and Model Exchange, or a dependency is not declared. Also when FMI 2.0 does not have the type of a variable,
+/// or when a variable has a name that FMI 3.0 reserves for a generated one.
 pub fn describe(model: &LoadedModel, fmi: Standard, changes: &Changes) -> Result<String> {
     let table = &model.table;
     let lacking = table.variables.iter().find(|variable| !variable.base().is_in_fmi2());
@@ -40,19 +40,19 @@ pub fn describe(model: &LoadedModel, fmi: Standard, changes: &Changes) -> Result
             variable.base()
         );
     }
-    let tried = || {
+    let try_model = || {
         let starts = checked_starts(model)?;
         Ok((starts, ModelStructure::of(model, fmi, changes.tunable_parameters)?))
     };
-    let tried: Result<_> = tried();
+    let tried: Result<_> = try_model();
     model.trials.end();
-    // A panic is the cause of all that follows it.
+    // A panic is checked first, because later errors may only be its consequences.
     model.trials.check()?;
     let (starts, structure) = tried?;
     Description { table, fmi, changes }.document(starts, &structure)
 }
 
-/// Returns the position, counted from 1: an index in FMI 2.0, a value reference in FMI 3.0.
+/// Counts from 1 instead of 0, as the indices of FMI 2.0 and the value references of FMI 3.0 do.
 fn position(index: u32) -> u32 {
     index + 1
 }
@@ -157,7 +157,7 @@ impl Description<'_> {
         Element::new(name).with("modelIdentifier", &self.table.info.identifier)
     }
 
-    /// The element of an interface type with the capabilities that both types have.
+    /// Adds the capabilities that both interface types have to the element of one.
     fn with_capabilities(&self, element: Element) -> Element {
         let file = |name: &String| Element::new("File").with("name", name);
         match self.fmi {
@@ -195,15 +195,15 @@ impl Description<'_> {
             }
             Standard::Fmi3 => {
                 let element = Element::new(format!("{element}Type")).with("name", name);
-                // FMPy 0.3 does not read a BinaryType with more attributes; the variables have them.
-                let is_read = definition.base != BaseType::Binary;
-                let element = if is_read { with_attributes(element, definition) } else { element };
+                // FMPy 0.3 rejects a BinaryType with more attributes, so the variables have them instead.
+                let has_attributes = definition.base != BaseType::Binary;
+                let element = if has_attributes { with_attributes(element, definition) } else { element };
                 element.containing(items(definition))
             }
         }
     }
 
-    /// The name of a variable, which is an array in FMI 3.0.
+    /// The name of a variable: of an element in FMI 2.0, of the whole array in FMI 3.0.
     fn name<'v>(&self, variable: &'v Variable) -> &'v str {
         if self.fmi == Standard::Fmi2 { &variable.name } else { &variable.name_of_array }
     }
@@ -218,7 +218,7 @@ impl Description<'_> {
             }
             _ => variable.variability,
         };
-        let with_facts = |name: String| {
+        let with_common_attributes = |name: String| {
             Element::new(name)
                 .with("name", self.name(variable))
                 .with("valueReference", fmi.reference(index))
@@ -242,7 +242,7 @@ impl Description<'_> {
         if *fmi == Standard::Fmi2 {
             // Many importers do not look types up, so the attributes of the type are repeated.
             let value = with_value(Element::new(name), starts.map(Value::to_string).next());
-            return with_facts("ScalarVariable".to_owned())
+            return with_common_attributes("ScalarVariable".to_owned())
                 .containing([with_attributes(value, &variable.variable_type)]);
         }
         let starts = starts.map(|start| match start {
@@ -252,9 +252,9 @@ impl Description<'_> {
         });
         let is_element = matches!(variable.base(), BaseType::String | BaseType::Binary);
         let (children, list): (Vec<_>, Vec<_>) = starts.partition(|_| is_element);
-        let element = with_value(with_facts(name), (!list.is_empty()).then(|| list.join(" ")));
-        // Only the range of the type is repeated: fmi-sim 0.7 reads no FMU whose variables have a quantity, a unit or a nominal
-        // value, although they may (section 2.4.7.3 of FMI 3.0).
+        let element = with_value(with_common_attributes(name), (!list.is_empty()).then(|| list.join(" ")));
+        // Only the range of the type is repeated: fmi-sim 0.7 rejects an FMU in which a variable with a declared type also has
+        // a quantity, a unit or a nominal value, although section 2.4.7.3 of FMI 3.0 allows that.
         let with = if variable.variable_type.name.is_empty() { with_attributes } else { with_range };
         with(element, &variable.variable_type)
             .containing(variable.dimensions.iter().map(|size| Element::new("Dimension").with("start", size)))

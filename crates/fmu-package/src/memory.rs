@@ -194,8 +194,8 @@ impl<'a> Rehearsal<'a> {
                 return None;
             }
             let names: Vec<_> = numbers.into_iter().map(|number| self.name(number)).collect();
-            let when = if steps == 0 { "at once".to_owned() } else { format!("after {steps} more") };
-            Some(format!("there are other values {when}: {}", names.join(", ")))
+            let when = if steps == 0 { "immediately".to_owned() } else { format!("after {steps} more") };
+            Some(format!("values differ {when}: {}", names.join(", ")))
         })
     }
 

@@ -128,7 +128,7 @@ impl LoadedModel {
             (fmi2, fmi3)
         };
         let description = std::str::from_utf8(&description)?;
-        // SAFETY: the functions are those of the library, which describes itself.
+        // SAFETY: the functions belong to the library, and so does the description.
         unsafe { Self::with(description, fmi2, fmi3, resources, Some(library), trials) }.with_context(path_of)
     }
 

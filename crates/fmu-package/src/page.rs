@@ -27,7 +27,7 @@ use tempfile::TempDir;
 /// The README in the directory `page` of this crate describes the scripts.
 #[derive(Clone, Debug, Default)]
 pub struct Page {
-    /// Scripts that run after those of every page. One of them registers an add-on under the model's identifier.
+    /// Scripts that run after the scripts that every page has. One of them registers an add-on under the model's identifier.
     pub scripts: Vec<&'static str>,
     /// Other FMUs that the page contains, so that these scripts can run them together with the model.
     pub companions: Vec<Companion>,

@@ -162,7 +162,7 @@ impl Instance {
     }
 }
 
-/// All other functions are those of the client.
+/// All other functions come from the instance of fmi-client.
 impl Deref for Instance {
     type Target = fmi_client::Instance;
 

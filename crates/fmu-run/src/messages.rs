@@ -7,8 +7,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// A message of an FMU.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Logged {
-    /// Index of the run or the instance; `None` if the FMU does not tell, because it logs from its own thread and hands an unknown
-    /// environment to the logger.
+    /// Index of the run or the instance; `None` if the FMU logs from its own thread and passes an unknown environment to the
+    /// logger, so that the message cannot be attributed.
     pub index: Option<usize>,
     /// Name of the component in a system; empty for a single FMU.
     pub component: String,

@@ -1,4 +1,4 @@
-//! Values of variables, where the elements of an array are variables; the FMU gets and sets arrays at once.
+//! Values of variables, where the elements of an array are variables; an array of the FMU is read or set with one call.
 
 use crate::arrays::Expanded;
 use crate::instance::Instance;

@@ -94,8 +94,8 @@ fn events<F: Either, M: Exported>(check: &mut dyn FnMut(Happens<'_, F>)) {
 /// nothing where instructions cannot be counted.
 ///
 /// # Panics
-/// Panics if steps of alternating sizes cost more than 1.3 times those of the model, in addition to what calls cost in
-/// steady steps.
+/// Panics if steps of alternating sizes cost more than 1.3 times as much as the same steps of the model without FMI, after
+/// the cost of the calls in steps of one size is added.
 pub fn steps_stay_cheap<M: Exported>() {
     if let Some([steady, alternating]) = costs_of_model::<M>() {
         of_instances::<Importer, M>(steady, alternating, usize::MAX);

@@ -1,4 +1,4 @@
-//! Random histories of an instance: whatever was undone leaves no trace.
+//! Random histories of an instance: calls that were undone do not change any later result.
 //!
 //! A history consists of random calls, many of which fail, of saved, restored and serialized states, resets and copies
 //! that continue in another instance. The calls that remain are the *path*: calls that failed are not in it, and a

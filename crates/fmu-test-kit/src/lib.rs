@@ -5,7 +5,7 @@
 //! assertions. [`serialized`] describes the bytes of saved states; [`c_programs`] supports tests with C
 //! programs. [`fault_injection`] is a fault-injecting importer that makes any calls in any order. [`realtime`]
 //! checks that code may run in a control loop. [`checks`] contains checks that hold for every FMU,
-//! [`history`] and [`costs`] those of instances with a past.
+//! [`history`] and [`costs`] check instances that have already run for a while.
 
 // Under Miri, the logger is variadic as in C.
 #![cfg_attr(miri, feature(c_variadic))]

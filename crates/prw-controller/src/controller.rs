@@ -18,7 +18,7 @@
 //! to correct afterwards.
 //!
 //! D damps the vibration of the couplings, because of which the wrist lags behind its motors. A stiff wrist
-//! follows at once. Without the filter, the motors' own rate would be fed back with the gain Kd /
+//! follows immediately. Without the filter, the motors' own rate would be fed back with the gain Kd /
 //! sample_time, far above 1, and cause a limit cycle. With the filter, the gain at high frequencies is 1/2.
 //!
 //! Torque limiting: The goal of a motor is limited to the angle at which, with a blocked wrist, the

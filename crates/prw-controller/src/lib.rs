@@ -11,7 +11,7 @@
 //! use prw_controller::{Controller, Parameters};
 //!
 //! let mut controller = Controller::new(Parameters { Kp: 0.2, ..Parameters::DEFAULT })?;
-//! // A rigid wrist: pitch and roll follow from the motors at once.
+//! // A rigid wrist: pitch and roll follow the motors without delay.
 //! let wrist = Kinematics::new(4, 7);
 //! for sample in 0..2000 {
 //!     let motors = controller.motion();

@@ -124,7 +124,7 @@ fn samples_do_not_depend_on_the_communication_step() {
         let mut c = controller(|_| ());
         let mut time = 0.0_f64;
         for h in steps {
-            // The inputs are those of the last sample, so that all runs sample equal values.
+            // The inputs are held since the last sample, so that all runs sample equal values.
             c.inputs = wrist((time * 1e3 + 1e-6).floor() / 1e3);
             assert!(c.step(time, h));
             time += h;

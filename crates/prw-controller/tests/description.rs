@@ -9,13 +9,13 @@ const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/modelDescription/m
 /// Checks that the description is up to date, because the tables of the documentation come from it.
 #[test]
 fn the_committed_description_is_up_to_date() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("controller");
+    let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).join("controller");
     let mut build = Command::new(env!("CARGO_BIN_EXE_build_controller"));
-    let output = build.args(["--describe", "--out"]).arg(&folder).output().unwrap();
+    let output = build.args(["--describe", "--out"]).arg(&directory).output().unwrap();
     assert!(output.status.success(), "{output:?}");
     assert!(
         fs::read_to_string(COMMITTED).unwrap_or_default()
-            == fs::read_to_string(folder.join("modelDescription.xml")).unwrap(),
+            == fs::read_to_string(directory.join("modelDescription.xml")).unwrap(),
         "modelDescription/modelDescription.xml of the controller is out of date; write it again with\n    \
          cargo run -p prw_controller --bin build_controller -- --describe"
     );

@@ -14,7 +14,7 @@ PROGRAMS = SOURCES / "programs"
 
 
 class Table(NamedTuple):
-    """The cells of a table as they are written; `header` has those of the first row."""
+    """The cells of a table as they are written; `header` has the cells of the first row."""
 
     header: list[str]
     rows: list[list[str]]

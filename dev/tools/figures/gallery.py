@@ -1,4 +1,4 @@
-"""The figures by name: one column wide for the page, and whole plates for the README and for print."""
+"""Draws the figures: single plots one column wide for the documentation's page, and pages of several plots for the README and for print."""
 
 from __future__ import annotations
 
@@ -13,17 +13,18 @@ from prw.plots import BLUE, GREEN, PAGE_STYLE, PURPLE, VERMILION, draw_into, mot
 from tools.figures.bode import draw_bode, transfers
 from tools.figures.results import Results, Run
 
-COLUMN = 4.5  # inches
-#: The Bode plots of motor 1. By symmetry, the plots of motor 2 are equal.
-OF_MOTOR_1 = "abcdij"
-#: Relative errors up to this value are rounding errors.
+#: Width of a column of the page, inches.
+COLUMN = 4.5
+#: Keys of the Bode plots of motor 1. The page omits those for motor 2, which are equal by symmetry.
+PLOTS_OF_MOTOR_1 = "abcdij"
+#: Relative errors up to this value are rounding errors. They differ between machines, so this value is drawn instead.
 ROUNDING = 1e-13
-#: Duration, s, of the part of Fig. 4 that is drawn.
+#: Time, s, up to which Fig. 4 is drawn.
 SHOWN = 1.0
 
 
 class Drawn(NamedTuple):
-    """A figure, and whether a copy of it is kept for the documentation's page or for the README."""
+    """A figure, and whether it is stored in the repository for the documentation's page or for the README."""
 
     figure: Figure
     for_page: bool = True
@@ -31,7 +32,7 @@ class Drawn(NamedTuple):
 
 
 def figures(found: Results) -> dict[str, Drawn]:
-    """All figures by the name of their files."""
+    """Draws all figures; the keys are file names without suffix."""
     with matplotlib.rc_context(PAGE_STYLE):
         drawn = {
             "fig4_pair": Drawn(_fig4_plate(found), for_page=False, for_readme=True),
@@ -46,7 +47,7 @@ def figures(found: Results) -> dict[str, Drawn]:
                 draw_bode(subfigure, panel)
                 single = Figure(figsize=(COLUMN, 2.9), layout="constrained")
                 draw_bode(single, panel)
-                drawn[f"{plate}_{panel.key}"] = Drawn(single, for_page=panel.key in OF_MOTOR_1)
+                drawn[f"{plate}_{panel.key}"] = Drawn(single, for_page=panel.key in PLOTS_OF_MOTOR_1)
             drawn[plate] = Drawn(whole, for_page=False)
         drawn["poles"] = Drawn(_poles(found))
         drawn["steps"] = Drawn(_steps(found))
@@ -71,7 +72,7 @@ def _draw_velocities(figure: Any, run: Run) -> None:
 
 
 def _fig4_plate(found: Results) -> Figure:
-    """Fig. 4 next to its counterpart."""
+    """Draws Fig. 4, with opposite motors, next to the same plots with equal motors."""
     figure = Figure(figsize=(2 * COLUMN, 4.8), layout="constrained")
     left, right = np.asarray(figure.subfigures(1, 2, wspace=0.04))
     for subfigure, title, run in (
@@ -123,20 +124,19 @@ def _steps(found: Results) -> Figure:
 
 
 def _power_of_ten(value: float) -> str:
-    """Powers of ten such as 10⁻³ in plain characters, which scale with the text around them."""
+    """Formats a power of ten with superscript characters: 10⁻³. Unlike matplotlib's mathtext, they scale with the other text."""
     exponent = round(float(np.log10(value)))
     return "1" if exponent == 0 else "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def _convergence(found: Results) -> Figure:
-    step, angles, _, broken = found.convergence
+    step, angles, _, piecewise_linear = found.convergence
     figure = Figure(figsize=(COLUMN, 3.4), layout="constrained")
     axis = figure.subplots()
     milliseconds = 1e3 * step
     for label, marker, name in (("torque", "s", "tau1"), ("roll rate", "^", "roll_rate"), ("roll", "o", "roll")):
         axis.loglog(milliseconds, angles[name], f"{marker}-", color=BLUE, markersize=4, label=f"{label}, angles only")
-    # Values below ROUNDING are rounding errors, which differ between machines.
-    rounding = np.maximum(np.max(list(broken.values()), axis=0), ROUNDING)
+    rounding = np.maximum(np.max(list(piecewise_linear.values()), axis=0), ROUNDING)
     label = f"all, broken line with its slopes (below {ROUNDING:g})"
     axis.loglog(milliseconds, rounding, "D:", color=VERMILION, markersize=4, label=label)
     axis.set_xticks(milliseconds, [f"{value:g}" for value in milliseconds])

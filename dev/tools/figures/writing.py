@@ -15,7 +15,7 @@ from PIL import Image
 from prw.files import replacing
 from prw.plots import BLUE, GREEN, PAGE_STYLE, PURPLE, VERMILION
 
-#: The page's colour by matplotlib's colour, with a default for files without a page.
+#: CSS colour for each colour that matplotlib writes, with a fallback for SVG files outside of the page.
 COLOURS = {
     "#000000": "currentColor",
     BLUE.lower(): f"var(--curve-1, {BLUE})",

@@ -1,4 +1,4 @@
-//! Files that nobody has checked: archives of FMUs and systems, and the XML files in them. Only regular files are read, and never
+//! Untrusted files: archives of FMUs and systems, and the XML files in them. Only regular files are read, and never
 //! more than a limit.
 
 mod scratch;

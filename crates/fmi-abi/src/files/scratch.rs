@@ -66,7 +66,7 @@ mod tests {
     fn directories_of_ended_processes_are_removed() {
         let prefix = format!("fmi-abi-test-{}-", std::process::id());
         let in_use = Scratch::new(&prefix).unwrap();
-        // As a killed process leaves it: with a file that nobody has locked.
+        // As a killed process leaves it: with a file that no process has locked.
         let abandoned = tempfile::Builder::new().prefix(&prefix).tempdir().unwrap().keep();
         fs::write(abandoned.join(LOCK), "").unwrap();
         // As it is before the process locks it.

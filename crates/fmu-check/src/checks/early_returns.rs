@@ -31,7 +31,7 @@ pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
                 let now = *value_of(run, &step.values, time?)?.numbers().first()?;
                 let end = step.end;
                 is_other_time(reached, now).then(|| {
-                    format!("lastSuccessfulTime is {reached:?} of a step to {end:?}, and the time is {now:?}")
+                    format!("a step to {end:?} returned the lastSuccessfulTime {reached:?}, but the independent variable is {now:?}")
                 })
             })
         })?;

@@ -51,7 +51,8 @@ fn groups(checker: &Checker) -> Vec<(Assigned, Assigned)> {
     sets.into_iter().map(assigned).filter(|(values, _)| !values.is_empty()).collect()
 }
 
-/// Checks states of instances with other values than the start values. The first group that the model accepts is enough.
+/// Checks states of instances with other values than the start values. If the model accepts all variables together, the
+/// smaller groups are left out.
 pub fn restore(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     if trajectory.points.is_empty() {
         return Ok(());
@@ -90,8 +91,7 @@ fn while_initializing(
     ids.extend(writer.write(0, &[Restore(0)]).ids);
     let third = writer.read_anyway(0, &indices);
     let sequence = writer.sequence.clone();
-    let message =
-        "{} was {} when the state was saved, after other values were set and it was restored it is {}";
+    let message = "{} was {} when the state was saved; after other values were set and the state was restored, it is {}";
     let criterion = any([checker.differ(&first, &second, message), checker.differ(&first, &third, message)]);
     let (copy, all) = (sequence.clone(), ids.clone());
     // A model may reject the values only when it calculates with them.

@@ -79,7 +79,7 @@ pub(crate) unsafe fn call_fast<M: Exported>(
     if !unsafe { &*instance }.fmi_state().is_in(rule.accepted()) {
         return None;
     }
-    // The fast path takes a pointer. With a reference, the compiler may read several values at once. The
+    // The fast path takes a pointer. With a reference, the compiler may read several values with one instruction. The
     // processor stalls if one of them was written just before.
     //
     // SAFETY: as in `call`.

@@ -10,7 +10,7 @@
 //!
 //! All functions share one contract with the importer, which is the contract of the FMI standard:
 //! * A component is NULL or comes from `fmi2Instantiate` of this library, with the same model, and has not
-//!   been freed. Two threads do not use it at once. (A call from the log callback is rejected.)
+//!   been freed. Two threads do not use it at the same time. (A call from the log callback is rejected.)
 //! * `fmi2GetFMUstate`, `fmi2DeSerializeFMUstate` and `fmi2FreeFMUstate` get a pointer to an initialized
 //!   handle, which is NULL before its first use (section 2.1.8 of FMI 2.0). Any value of the handle is safe: a handle
 //!   that belongs to no state of this instance is rejected and not dereferenced.

@@ -283,7 +283,9 @@ impl<M: Exported> Instance<M> {
 #[inline(never)]
 fn reject_step<T>(point: f64, step_size: f64) -> Outcome<T> {
     if point.is_finite() && step_size > 0.0 && step_size.is_finite() && (point + step_size).is_finite() {
-        return reject(format!("the step size {step_size} vanishes beside the communication point {point}"));
+        return reject(format!(
+            "the step size {step_size} is too small to change the communication point {point}"
+        ));
     }
     reject(format!(
         "the communication point must be finite and the step size finite and > 0, they are {point} and {step_size}"

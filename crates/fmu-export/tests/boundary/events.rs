@@ -137,7 +137,7 @@ fn event_iteration<F: Either>() {
         let Updated { again, next, .. } = fmu.update();
         (again, next.unwrap(), fmu.integer(counter::Name::count as u32))
     };
-    assert_eq!(round(), (false, 0.25, 0), "nothing is due at the begin");
+    assert_eq!(round(), (false, 0.25, 0), "nothing is due at the start");
     // After two periods, both counts are due, and the second one fills the count.
     fmu.ok(fmu.enter_continuous_time_mode());
     fmu.ok(fmu.set_time(0.5));
@@ -214,7 +214,7 @@ fn the_importer_handles_them() {
 #[test]
 fn the_library_handles_them() {
     fn check(fmu: &impl Either) {
-        assert_eq!(fmu.get([SUM]), [1.0], "the tick at the begin");
+        assert_eq!(fmu.get([SUM]), [1.0], "the tick at the start");
         fmu.step(0.0, 0.6);
         assert_eq!(fmu.get([SUM]), [3.0]);
     }

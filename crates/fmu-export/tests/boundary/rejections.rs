@@ -128,7 +128,7 @@ fn steps() {
         (1.25, -0.25, "step size"),
         (1.25, NAN, "step size"),
         (1.25, INF, "step size"),
-        (1.25, 1e-17, "vanishes"),
+        (1.25, 1e-17, "too small"),
         (NAN, 0.25, "point"),
         (INF, 0.25, "point"),
         (1.0, 0.25, "1.25"),

@@ -40,7 +40,7 @@ const SWITCH: Type = Type::enumeration("Switch", <Switch as Enumeration>::ITEMS)
 const COUNT: Type = Type::integer("Count").min_integer(0).max_integer(9);
 
 variables! { for Rod;
-    /// Temperature of the wall at the begin of the rod
+    /// Temperature of the wall at the start of the rod
     wall = input(&TEMPERATURE) in wall;
     /// Temperatures of the pieces
     T = output(&TEMPERATURE).state() in temperatures;

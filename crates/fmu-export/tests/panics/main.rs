@@ -75,7 +75,7 @@ fn contained<F: Special>() {
     assert!(message.starts_with(&named::<F>("EnterContinuousTimeMode")), "{message}");
     check_that_all_is_over(&fmu);
 
-    // A panic while an instance is freed ends with it; so do those of its states.
+    // A panic while an instance or one of its states is dropped does not reach the caller.
     let fmu = F::new::<Faulty>(CoSimulation);
     fmu.ok(set_fault(&fmu, Fault::Drop));
     (0..3).for_each(|_| _ = fmu.save());

@@ -96,11 +96,11 @@ fn rejected<M: Exported>(consequence: &str) {
 #[test]
 fn missing_fields_are_found() {
     described(&model::<whole::Memory>(), BOTH[0]);
-    rejected::<without_last::Memory>("Co-Simulation, there are other values after 1 more: y");
-    rejected::<without_sum::Memory>("Co-Simulation, there are other values after 1 more: y");
-    rejected::<without_shown::Memory>("Co-Simulation, there are other values at once: y");
+    rejected::<without_last::Memory>("Co-Simulation, values differ after 1 more: y");
+    rejected::<without_sum::Memory>("Co-Simulation, values differ after 1 more: y");
+    rejected::<without_shown::Memory>("Co-Simulation, values differ immediately: y");
     rejected::<without_size::Memory>("Co-Simulation, it is rejected: there is no step size");
-    rejected::<without_ticks::Memory>("Model Exchange, there are other values at once: n");
+    rejected::<without_ticks::Memory>("Model Exchange, values differ immediately: n");
 }
 
 /// A model that differs from itself: each throw of the dice is random, which proves nothing about saved states.

@@ -12,7 +12,7 @@
     loop = fmu_run.System({"law": law, "plant": fmu}, {"law.u": "plant.u", "plant.y": "law.y"})
     loop.run(time, start={"law.gain": gains}, outputs=["plant.y"])
 
-Values are in the FMU's units, see `Fmu.variables`. FMI 2.0 and 3.0.
+Values are in the FMU's units, which `Fmu.variables` lists. Both FMI 2.0 and FMI 3.0 are supported.
 """
 
 from __future__ import annotations
@@ -40,10 +40,11 @@ Interface = Literal["co-simulation", "model-exchange", "co_simulation", "model_e
 Solver = Literal["auto", "dopri5", "dop853", "bdf", "rk4"]
 _Array = NDArray[np.float64]
 
-#: A start value: one for all runs or instances, or one for each. Strings are values of strings or names of enumeration items; a
-#: number or array with a unit is in that unit, which the FMU must have among its display units.
+#: A start value: one for all runs or instances, or one for each. A string is the value of a String variable, or the name of an item of an
+#: enumeration. A pair of a number or an array and a unit is converted from that unit, which must be a display unit of the variable.
 Start = ArrayLike | str | Sequence[str] | tuple[ArrayLike, str]
-#: Values of an input over time, with a unit or without, as for `Start`; at its own times as (times, values) or (times, values, unit).
+#: Values of an input at the communication points, with a unit or without, as for `Start`; or at other times: (times, values) or
+#: (times, values, unit).
 Trajectory = ArrayLike | tuple[ArrayLike, str] | tuple[ArrayLike, ArrayLike] | tuple[ArrayLike, ArrayLike, str]
 #: Receiver of messages of the FMU: a logger, or a function that is called with the index of the run or instance, the status, the
 #: category and the message.
@@ -121,27 +122,28 @@ class _Model:
         max_step: float | None = None,
         events: bool = False,
     ) -> Runs:
-        """Run the FMU, once for each run that has values, or once if all values are for all runs.
+        """Run the FMU once, or as many times as an argument has values for separate runs.
 
-        A run that the FMU rejects or ends does not stop the others, see `Runs.errors` and `Runs.check`. A run that fails
-        without a message is repeated with logging on, after all others, only to get the message. Ctrl-C stops all runs
-        after the step that each is in.
+        If the FMU rejects a call or ends a run early, the other runs continue; `Runs.errors` has the errors, and
+        `Runs.check` raises them. A run that fails without a message is repeated with logging on, after all others, only to
+        get the message. After Ctrl-C, each run completes its current step and stops.
 
         Parameters
         ----------
         time
-            (times,), the communication points, s. At each the inputs are set, the outputs read, and the step to the next
-            is taken.
+            (times,), the communication points, s. At each of them the inputs are set, the outputs are read, and a step to
+            the next one is made.
         outputs
-            The variables to read, of any type but clocks. The name of an array means all of its elements: (runs, times, ...) in the
+            The variables to read, of any type except Clock. The name of an array means all of its elements: (runs, times, ...) in the
             results, with the dimensions of the array last. In FMI 2.0, y[1], y[2] and so on are the array y.
         inputs
             By name: (times,) for all runs, (runs, times) for each run, or a constant number; with a unit or without,
             {"theta1": (angles, "deg")}. Inputs that are not named keep their start values. An input with its own times is
             {"u": (times, values)}, values of the shape (times,) or (runs, times): between its times, a continuous variable follows the
-            line, and any other keeps the earlier value; equal times are a step; before the first and after the last time the
-            value is constant. Strings and bytes are given in the same shapes. Values of a whole array have its dimensions after
-            these; a constant array has only its own. In Model Exchange, "der(u)" is the derivative of the input u.
+            line, and any other keeps the earlier value; two equal times are a step; before the first and after the last time the
+            value is constant. Strings and bytes are given in the same shapes. For a whole array, the
+            dimensions of the array follow these; the shape of a constant array is only its dimensions.
+            In Model Exchange, "der(u)" is the derivative of the input u.
         input_derivatives
             d/dt of inputs, in the same shapes: in Co-Simulation for FMUs of FMI 2.0 that can interpolate inputs, in Model Exchange for
             any continuous input, which then follows a cubic between its times instead of a line.
@@ -151,37 +153,39 @@ class _Model:
             runs, {"A": np.eye(3)}, or (runs, ...). A structural parameter has one
             value for all runs, and determines the sizes of arrays.
         every
-            Keep the outputs at the first time and each `every` times after it. Default: all, or none if there are
-            measures.
+            Store the outputs only at every `every`-th time, beginning with the first. Default: at all times, or at none if
+            there are measures.
         measures
             Statistics of each output over all times: min, max, peak (of the magnitude), time_of_peak, mean and rms (of
             the samples), end. If a value is NaN, all of them except end, the last value, are NaN.
         threads
-            Default: one for each processor. FMUs with at most one instance per process get one.
+            Number of threads. Default: one for each processor, or one if the FMU allows only one instance per process.
         read_before_set
             Read outputs before the inputs of their time are set, as FMPy does.
         progress
             Called with the numbers of finished runs and of all runs, ten times per second.
         tolerance
-            Relative tolerance for a solver inside the FMU, and the default of rtol. Default: that of the default experiment in the model
-            description, as in FMPy; None leaves it to the FMU.
+            Relative tolerance for a solver inside the FMU, and the default of rtol. Default: the tolerance of the default experiment
+            in the model description, as in FMPy. With None, the FMU chooses.
         log
             Receives the messages of the FMU, whose logging is then switched on: a function that is called with the index of the
-            run, status, category and message, or a `logging.Logger`. The index is None if the FMU does not tell.
+            run, status, category and message, or a `logging.Logger`. The index is None if the message cannot be
+            attributed to a run, because the FMU logs from another thread with an unknown environment.
         interface
-            "co-simulation" or "model-exchange". Default: Co-Simulation, or Model Exchange if the FMU has nothing else. In Model
-            Exchange the states are integrated here, from event to event. Continuous inputs are functions of time: the line between
-            two values, also between the values at two communication points, so that results converge with the tolerance of the solver.
+            "co-simulation" or "model-exchange". Default: Co-Simulation, or Model Exchange if that is the only one. In Model
+            Exchange fmu_run integrates the states, from event to event. Continuous inputs are interpolated linearly between two values,
+            also between two communication points, so that results converge as the tolerance of the solver decreases.
             All other inputs change in Event Mode. Systems run in Co-Simulation only.
         solver
             In Model Exchange: "dop853" and "dopri5" (Runge-Kutta of order 8 and 5), "bdf" (for stiff models), "auto" (dop853, and bdf
-            once the model proves stiff), or "rk4": fixed steps from one communication point to the next, or shorter than `max_step`.
+            once the model proves stiff), or "rk4": one fixed step between two communication points, or several equal steps if
+            `max_step` is shorter.
         rtol, atol
             Tolerances of the solver, in Model Exchange. Default of rtol: `tolerance`, or 1e-6 if there is none; of atol: a hundredth of
-            rtol. atol is for a state whose nominal value is 1; other states have a multiple of it.
+            rtol. atol is multiplied by the nominal value of each state.
         max_step
-            The largest step of the solver, s. An event indicator that changes its sign twice within a step, and between two
-            communication points, remains unnoticed.
+            The largest step of the solver, s. Choose it so that no event indicator changes its sign twice within one step and
+            between the same two communication points, because such a pair of events is not detected.
         events
             Keep the outputs before and after each event, in `Runs.events`.
 
@@ -244,7 +248,7 @@ class _Model:
         Raises
         ------
         ValueError
-            If the FMU has no such variable, or the variable no such unit.
+            If the FMU does not have the variable, or the variable does not have the unit.
         """
         factor, offset = self._loaded.display_unit(name, unit)
         array: _Array = _numbers("values", values)
@@ -263,7 +267,7 @@ class _Model:
         tolerance: float | Literal["default"] | None = "default",
         log: Log | None = None,
     ) -> Instances:
-        """Make instances, set their start values and initialize them.
+        """Create instances, set their start values and initialize them.
 
         Parameters
         ----------
@@ -277,9 +281,10 @@ class _Model:
             Start time, s, and stop time, if it is known.
         threads
             More than one is faster if a call takes much longer than waking a thread, about 0.01 ms: with hundreds of instances,
-            or for slow models. The threads look for work for 0.05 ms after a call before they sleep. None takes one for each processor.
+            or for slow models. The threads look for work for 0.05 ms after a call before they sleep. With None, there is one
+            for each processor.
         tolerance, log
-            As in `run`; the index of a message is that of the instance. Messages are passed on at the end of a call.
+            As in `run`, but the index of a message is the index of the instance. Messages are passed on at the end of a call.
 
         Returns
         -------
@@ -318,10 +323,10 @@ class Fmu(_Model):
 
     def __init__(self, path: str | os.PathLike[str], *, execution_tool: bool = False):
         super().__init__(_Loaded(path, execution_tool))
-        #: "2.0" or "3.0"; the name of the model; guid or instantiation token.
+        #: "2.0" or "3.0"; the name of the model; the guid (FMI 2.0) or the instantiation token (FMI 3.0).
         self.fmi_version, self.model_name, self.token, derivatives, outputs, directional, units = self._loaded.about()
-        #: Name of each continuous state's derivative by state; names of the continuous outputs; both in the order of the
-        #: model structure.
+        #: Name of the derivative of each continuous state, by the name of the state; names of the continuous outputs. Both are in the
+        #: order of the model structure.
         self.derivatives, self.outputs = dict(derivatives), tuple(outputs)
         #: By interface type, whether the FMU has directional derivatives.
         self.directional = dict(directional)
@@ -336,21 +341,21 @@ class Fmu(_Model):
 class System(_Model):
     """Connected FMUs that run as one FMU.
 
-    Variables are named `component.variable`; connectors of an SSP's system keep their names. In every communication step
-    all components use the input values from its start.
+    Variables are named `component.variable`; connectors of an SSP's system keep their names. During a communication step,
+    all components keep the input values from the start of the step.
 
     Parameters
     ----------
     source
-        An SSP file, or the components by name: FMUs of FMI 2.0 or 3.0 with Co-Simulation, open ones or their paths. An FMU may occur
-        more than once.
+        An SSP file, or the components by name: FMUs of FMI 2.0 or 3.0 with Co-Simulation, either open `Fmu` objects or paths.
+        An FMU may occur more than once.
     connections
-        Outputs and the inputs they feed, `{"law.u": "plant.u"}` or pairs; several inputs of one output as a list. Only without an
-        SSP, which defines its connections.
+        The input that each output is connected to, `{"law.u": "plant.u"}` or as pairs; a list if there are several inputs. Not
+        allowed with an SSP file, which defines its connections.
     order
         The order of data exchange. "dependencies": at each communication point every output is read after the inputs on which it
         depends directly; for an algebraic loop, ValueError names the loop. "jacobi": all
-        outputs are read at the end of a step and all inputs set at the begin of the next, as in FMPy and libcosim; outputs that
+        outputs are read at the end of a step and all inputs set at the start of the next, as in FMPy and libcosim; outputs that
         depend directly on inputs lag one step.
 
     Raises
@@ -396,12 +401,12 @@ def _component(name: str, fmu: Fmu | str | os.PathLike[str]) -> Fmu:
 def _pairs(
     connections: Mapping[str, str | Sequence[str]] | Iterable[tuple[str, str | Sequence[str]]] | None,
 ) -> list[tuple[str, str]]:
-    """Connections from an output to an input, (output, input) each."""
+    """Returns the connections as pairs of one output and one input."""
     try:
         given = connections.items() if isinstance(connections, Mapping) else () if connections is None else connections
         found = [(output, to) for output, ends in given for to in ([ends] if isinstance(ends, str) else ends)]
     except (TypeError, ValueError):
-        found = [("", None)]
+        found = [("", None)]  # Causes the error below.
     for output, to in found:
         if not isinstance(output, str) or not isinstance(to, str):
             raise ValueError(

@@ -61,8 +61,8 @@ class Task:
     drawn
         Start values that are drawn for each episode: (low, high), or (generator, count) -> (count,).
     failed_reward
-        The reward for a step that the FMU rejects, which also ends the episode. It should be lower than the sum of the remaining
-        rewards; otherwise failures are rewarded.
+        The reward for a step that the FMU rejects, which also ends the episode. It should be worse than anything that the rest of
+        the episode can cost, or the agent learns to provoke failures.
     threads
         See `Fmu.instances`.
     """
@@ -98,7 +98,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         Number of instances.
     autoreset_mode
         When a new episode replaces a finished one: NEXT_STEP, in the next step, whose action is ignored and whose reward
-        is 0; SAME_STEP, at once, with `infos["final_obs"]` and `infos["final_info"]`; DISABLED, by
+        is 0; SAME_STEP, in the same step, with `infos["final_obs"]` and `infos["final_info"]`; DISABLED, by
         `reset(options={"reset_mask": ...})`.
 
     Raises

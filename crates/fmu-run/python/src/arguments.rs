@@ -39,7 +39,7 @@ pub fn number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
     value.extract().ok().filter(|_| is_number).ok_or_else(|| wrong(name, "a number", value))
 }
 
-/// Returns a tolerance: that of the default experiment, none or a number.
+/// Returns a tolerance: the tolerance of the default experiment, none or a number.
 pub fn tolerance(value: &Bound<'_, PyAny>) -> PyResult<Tolerance> {
     if value.is_none() {
         return Ok(Tolerance::None);

@@ -46,7 +46,7 @@ pub(super) struct Worker<'a> {
     derivatives: Signals<'a>,
     /// Number of the run.
     number: usize,
-    /// Values of the run that numbers do not have, and those of finished runs.
+    /// Values of the current run that are not numbers, and such values of finished runs.
     exact_of_run: Vec<Value>,
     pub exact: Vec<Exact>,
     /// Events in Model Exchange.

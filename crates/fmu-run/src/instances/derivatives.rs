@@ -1,4 +1,4 @@
-//! Derivatives: directional ones, and those of inputs and outputs with respect to time.
+//! Directional derivatives, and derivatives of inputs and outputs with respect to time.
 
 use super::one::rows;
 use super::{Instances, Mask};

@@ -1,4 +1,4 @@
-//! Runs do not depend on earlier runs, on their order, or on the number of threads, whatever a reset of the FMU forgets.
+//! Runs do not depend on earlier runs, on their order, or on the number of threads, even if the FMU does not reset everything.
 #![allow(unsafe_code, reason = "FMUs are opened")]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 

@@ -148,7 +148,7 @@ const STRINGS: [Option<&CStr>; 8] = [
     Some(c""),
     Some(c"G\xc3\xb6del"),
     Some(c"%s%n#r1#\n"),
-    Some(c"rather a long text, longer than what fits beside a pointer in a structure of a few words"),
+    Some(c"rather a long text, longer than what fits next to a pointer in a structure of a few words"),
     Some(c"no UTF-8: \xff\xfe"),
     Some(c"\xf0\x9f\x99\x82"),
     None,

@@ -19,8 +19,10 @@ from prw.testbed import OUTPUTS, Testbed
 
 #: Timeout of a connection to the scheduler, s.
 PATIENCE = 15
-#: Number of tasks, each with at least and at most so many runs.
-TASKS, SHORTEST, LONGEST = 16, 16, 256
+#: Number of tasks, unless the limits of their lengths require another number.
+TASKS = 16
+#: Minimum and maximum number of runs in a task.
+SHORTEST, LONGEST = 16, 256
 
 
 def on_cluster(

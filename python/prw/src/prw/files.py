@@ -23,7 +23,7 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-#: Rows that are written at once.
+#: Number of rows that are written with one call.
 BLOCK = 8192
 
 #: The package, and the clone around it or from which it was installed.

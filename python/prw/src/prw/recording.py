@@ -17,7 +17,7 @@ from prw.errors import UserError
 from prw.motion import Array, Motion
 from prw.table import Choice, read_table
 
-#: Motor speed in rad/s that no wrist move reaches. Degrees that are taken for radians exceed it.
+#: Motor speed in rad/s that no wrist move reaches. It is exceeded if the file is in degrees but is read as radians.
 PLAUSIBLE_SPEED = 30.0
 #: Motor angle in rad that no wrist move reaches.
 PLAUSIBLE_ANGLE = 4 * np.pi
@@ -25,14 +25,17 @@ PLAUSIBLE_ANGLE = 4 * np.pi
 SMALL_MOVE = 0.02
 #: Rate in rad/s below which a motor counts as at rest.
 SLOW = 0.1
-#: Time between two samples in s that is probably a mistake. Milliseconds that are taken for seconds exceed it.
+#: Time between two samples in s that is probably a mistake. It is exceeded if the file is in milliseconds but is read as seconds.
 SLOW_SAMPLING = 0.5
-#: Rows are missing if two are more than this many usual steps apart. The motion of a motor is unknown in gaps longer than
-#: this, in s, unless the motor rests in this many rows before and after.
-MISSING, UNKNOWN, REST = 5.0, 0.04, 5
+#: Rows are missing if the time between two rows is more than this multiple of the median.
+MISSING = 5.0
+#: Gap in s above which the motion of a moving motor cannot be interpolated, so that the recording is rejected.
+LONGEST_GAP = 0.04
+#: Number of rows before and after a gap in which a motor must be at rest, so that it is assumed to rest in the gap, too.
+REST = 5
 #: Change of a motor angle between two samples in rad that is probably a jump by a turn.
 JUMP = 0.9 * np.pi
-#: Name of a recording that comes from no file.
+#: Name of a recording that is not read from a file.
 IN_MEMORY = Path("recording")
 
 
@@ -45,9 +48,9 @@ class Recording:
     motion
         The motion of the motors.
     measured
-        (n,) by name of the output; NaN if a cell is empty.
+        The measured values, (n,), of each recorded output; NaN where a cell is empty.
     units
-        The unit in the file, by column.
+        The unit of each column in the file.
     source
         The file, or "recording" if there is none.
     """
@@ -79,7 +82,7 @@ class Recording:
 
     @property
     def notes(self) -> list[str]:
-        """Lines for the user about probable mistakes."""
+        """Notes for the user about probable mistakes in the recording."""
         return self.motion.notes
 
     def __getitem__(self, column: str) -> Array:
@@ -106,9 +109,9 @@ def read(
 
     Its columns: time (s), theta1, theta2 (rad) and, if present, omega1, omega2 (rad/s) and any of tau1, tau2
     (N.m), theta3, theta4, pitch, roll (rad), pitch_rate, roll_rate (rad/s), in any order; others are ignored. The file is
-    UTF-8 text (or UTF-16 with its mark) with a header line, perhaps below comments after `#`, separated by commas,
-    semicolons or tabs (with semicolons, a decimal comma is understood). Time may be uneven but must increase; if
-    rows are missing, a note reports it, and if they are missing for too long, the recording is rejected. A measured column
+    UTF-8 text (or UTF-16 with a byte order mark) and has a header line, which may follow comments that begin with `#`. Columns are separated
+    by commas, semicolons or tabs; with semicolons, numbers may have a decimal comma. Time may be uneven but must increase. If rows are
+    missing, a note reports it; if they are missing for too long while the motors move, the recording is rejected. A measured column
     may have empty cells.
 
     Parameters
@@ -116,8 +119,8 @@ def read(
     path
         The file or table.
     units
-        Unit by column, if the header has none (`pitch [deg]` has one). Default: SI. An encoder's counts are
-        `rev/10000`.
+        Unit by column, if the header has none (`pitch [deg]` has one). Default: SI. If an encoder has 10000
+        counts per revolution, the unit of its counts is `rev/10000`.
     degrees
         Columns without a unit are in degrees and degrees per second.
     names
@@ -125,7 +128,7 @@ def read(
     skip
         Number of lines above the header; dSPACE writes such lines.
     encoding
-        Encoding of the file, as in Python (default: UTF-8, or UTF-16 if the file begins with its mark).
+        Encoding of the file, as in Python. Default: UTF-8, or UTF-16 if the file begins with the byte order mark of UTF-16.
 
     Raises
     ------
@@ -185,13 +188,14 @@ def _read(
     time = table.pop("time")
     theta = np.column_stack([table.pop(name) for name in ANGLES])
     omega = np.column_stack([table.pop(name) for name in RATES]) if RATES[0] in table else None
-    with np.errstate(all="ignore"):  # The FMU rejects angles near the largest number.
+    # Angles near the largest float overflow without a warning, because the FMU rejects them.
+    with np.errstate(all="ignore"):
         notes = found.notes + _gaps(path, time, theta) + doubts(time, theta, omega, found.units)
     return Recording(path, Motion(time, theta, omega, path.stem, notes), table, found.units)
 
 
 def _gathered(table: Any, choose: Choice, may_be_empty: Container[str]) -> Array:
-    """The result of `read_table` for columns in memory."""
+    """Reads and checks columns in memory, as `read_table` does for a file."""
     columns = columns_of(table)
     taken = choose(list(columns), 0)
     found: list[Array] = []
@@ -218,11 +222,11 @@ def _renamed(title: str, names: Mapping[str, str]) -> str:
 
 
 def _gaps(path: Path, time: Array, theta: Array) -> list[str]:
-    """A note on missing rows. Raises UserError if the motion of the motors is unknown in between."""
+    """Returns a note on missing rows. Raises UserError if rows are missing for too long while the motors move."""
     steps = np.diff(time)
     usual = float(np.median(steps))
     gaps = np.flatnonzero(steps > MISSING * usual)
-    long = [int(k) for k in gaps if steps[k] > UNKNOWN and _moves(theta, int(k))]
+    long = [int(k) for k in gaps if steps[k] > LONGEST_GAP and _moves(theta, int(k))]
     if long:
         worst = int(max(long, key=lambda k: float(steps[k])))
         raise UserError(
@@ -237,13 +241,13 @@ def _gaps(path: Path, time: Array, theta: Array) -> list[str]:
 
 
 def _moves(theta: Array, k: int) -> bool:
-    """Whether the motors move about the rows k and k + 1."""
+    """Returns whether the motors move in the rows near k and k + 1, between which rows are missing."""
     near = theta[max(k - REST, 0) : k + 2 + REST]
     return bool(np.ptp(near, axis=0).max() > max(SMALL_MOVE / 10, 0.002 * float(np.ptp(theta, axis=0).max())))
 
 
 def doubts(time: Array, theta: Array, omega: Array | None, units: Mapping[str, str]) -> list[str]:
-    """Notes on values that are legal but look like mistakes. units: of the columns in the file."""
+    """Returns notes on values that are possible but are probably mistakes. units: the unit of each column in the file."""
     notes = []
     if len(time) > 1 and (step := (time[-1] - time[0]) / (len(time) - 1)) > SLOW_SAMPLING:
         notes.append(f"a sample every {step:.3g} s; if time is in ms, call its column time [ms]")
@@ -255,8 +259,8 @@ def doubts(time: Array, theta: Array, omega: Array | None, units: Mapping[str, s
         steps = np.abs(np.diff(theta[:, side]))
         if len(steps) and (jump := steps.max()) > JUMP:
             notes.append(
-                f"{name} jumps by {jump:.3g} rad after {time[steps.argmax()]:.6g} s; angles must run on past a full turn "
-                "(numpy.unwrap makes them)"
+                f"{name} jumps by {jump:.3g} rad after {time[steps.argmax()]:.6g} s; angles must continue past a full turn and "
+                "not restart (numpy.unwrap removes such jumps)"
             )
         if speed > PLAUSIBLE_SPEED:
             notes.append(f"{name} turns at {speed:.0f} rad/s ({speed * 30 / np.pi:.0f} rpm); {hint}")
@@ -264,8 +268,8 @@ def doubts(time: Array, theta: Array, omega: Array | None, units: Mapping[str, s
             notes.append(f"{name} reaches {reach:.0f} rad ({reach / (2 * np.pi):.1f} turns); {hint}")
     if omega is None:
         notes.append(
-            "no omega1, omega2: the rates come from the angles, and where these are quantised or noisy so are the "
-            "torques; record omega1 and omega2 too if you can"
+            "no omega1, omega2: the rates come from the angles, so if the angles are quantised or noisy, the torques "
+            "are noisy, too; record omega1 and omega2 if you can"
         )
         return notes
     if np.abs(omega[0]).max() > SLOW:
@@ -275,7 +279,7 @@ def doubts(time: Array, theta: Array, omega: Array | None, units: Mapping[str, s
 
 
 def _mismatch(time: Array, theta: Array, omega: Array, side: int) -> str:
-    """A note if the integral of the rate omega (n,) is not the angle theta (n,), else nothing."""
+    """Returns a note if the integral of the rate omega (n,) differs from the motion of the angle theta (n,), else an empty string."""
     turned = theta - theta.mean()
     if np.ptp(theta) < SMALL_MOVE:
         return ""

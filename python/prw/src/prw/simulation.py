@@ -19,9 +19,12 @@ from prw.motion import Array, Motion, fig4
 from prw.recording import Recording, read_motion
 from prw.testbed import OUTPUTS, Testbed
 
-#: Sampling error, as a fraction of the peak, above which there is a warning; minimum number of times for its estimate; peak below
-#: which an output is a rounding error.
-DOUBTFUL, MIN_TIMES, ROUNDING = 0.01, 8, 1e-12
+#: Sampling error, as a fraction of the peak, above which there is a warning.
+DOUBTFUL = 0.01
+#: Minimum number of times from which the sampling error is estimated.
+MIN_TIMES = 8
+#: Peak below which an output is a rounding error.
+ROUNDING = 1e-12
 
 if TYPE_CHECKING:
     import pandas

@@ -40,7 +40,7 @@ def read_table(
     """Read the columns (rows, columns) that `choose` selects from the header, in the format that `prw.read` describes.
 
     An empty cell in a column of `may_be_empty` becomes NaN. increasing: whether the first column, the time, must
-    increase. skip: lines above the header. encoding: of the file (default: UTF-8, or UTF-16 if the file begins with its mark).
+    increase. skip: lines above the header. encoding: of the file (default: UTF-8, or UTF-16 if the file begins with its byte order mark).
     Raises UserError naming file, line and column.
     """
     try:

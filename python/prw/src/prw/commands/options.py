@@ -96,7 +96,9 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
         help="lines above the header, as dSPACE writes them",
     )
     parser.add_argument(
-        "--encoding", default="", help="of the file (default: UTF-8, or UTF-16 if the file begins with its mark)"
+        "--encoding",
+        default="",
+        help="of the file (default: UTF-8, or UTF-16 if the file begins with its byte order mark)",
     )
 
 

@@ -19,19 +19,20 @@ from prw.plots import BLUE, PAGE_STYLE, VERMILION, envelope
 
 #: Size of a figure, inches.
 SIZE = (6.7, 3.75)
-#: The page's colours by matplotlib's.
+#: CSS colour of the page for each colour that matplotlib writes.
 COLOURS = {
     "#000000": "currentColor",
     BLUE.lower(): "var(--blue)",
     VERMILION.lower(): "var(--red)",
     "#e6e6e6": "var(--line)",
 }
-#: Time intervals in which a curve is drawn by its extremes; about one per screen pixel.
+#: Number of intervals of a curve, about one per screen pixel. Only the extremes in each are drawn, which keeps the page small.
 INTERVALS = 500
-#: Units of the figures.
+#: Unit that the page shows, and the factor to it, for each SI unit that it does not show.
 SHOWN = {"rad": ("deg", np.degrees(1.0)), "rad/s": ("deg/s", np.degrees(1.0))}
-#: Seconds of the close-up.
+#: Duration of the close-up, s.
 CLOSE = 1.0
+#: Superscript characters, for exponents.
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -54,7 +55,7 @@ def page(found: Findings) -> str:
 
 
 def figures(found: Findings) -> list[dict[str, str]]:
-    """A figure for every channel of every experiment: a close-up of measured and modelled, and the residual."""
+    """Draws each channel of each experiment: a close-up of the measured and the modelled values, and the whole residual."""
     drawn = []
     for i, (experiment, modelled) in enumerate(zip(found.experiments, found.solution.modelled)):
         residual = found.residual(i)
@@ -68,9 +69,9 @@ def figures(found: Findings) -> list[dict[str, str]]:
 
 
 def _curves(time: Array, modelled: Array, residual: Array, unit: str) -> str:
-    """Measured and modelled (n,), close by, and the residual (n,) at the times (n,) s, as SVG with the page's colours."""
+    """Draws one second of the measured and the modelled values and the whole residual, (n,) each at the times (n,) s, as SVG."""
     measured, unit = modelled + residual, unit.replace("N.m", "N m")
-    # The second with the largest values shows the difference of measured and modelled best.
+    # The curves differ most where the values are largest.
     centre = time[np.argmax(np.abs(measured - measured.mean()))]
     part = (time >= centre - CLOSE / 2) & (time <= centre + CLOSE / 2)
     with matplotlib.rc_context({**PAGE_STYLE, "font.family": "sans-serif"}):
@@ -80,7 +81,10 @@ def _curves(time: Array, modelled: Array, residual: Array, unit: str) -> str:
         close.plot(*envelope(time[part], modelled[part], INTERVALS), color=VERMILION, dashes=(4, 2), label="FMU")
         close.legend(loc="lower right", bbox_to_anchor=(1, 0.97), ncols=2, borderaxespad=0)
         whole.plot(*envelope(time, residual, INTERVALS), color=BLUE)
-        for axis, title in ((close, "measured and modelled, the liveliest second"), (whole, "residual, all of it")):
+        for axis, title in (
+            (close, "measured and modelled, the second with the largest values"),
+            (whole, "residual, whole recording"),
+        ):
             axis.set(title=title, ylabel=unit)
             axis.margins(x=0)
         whole.set_xlabel("time (s)")
@@ -107,13 +111,13 @@ def _digits(value: float, count: int = 4) -> str:
 
 
 def _prose(text: str) -> Markup:
-    """A message of the command line: code in backticks as code, and signs and units as printed."""
+    """Converts a message of the command line to HTML: backticks become code, `+-` and `N.m` become ± and N·m."""
     parts = text.replace("+-", "±").replace("N.m", "N·m").split("`")
     return Markup("").join(Markup("<code>{}</code>").format(part) if k % 2 else part for k, part in enumerate(parts))
 
 
 def _raised(number: str) -> str:
-    """A number with a true minus sign, and its exponent raised."""
+    """Formats a number with a minus sign instead of a hyphen, and with its exponent as a superscript."""
     if "e" in number:
         mantissa, exponent = number.split("e")
         return f"{mantissa}·10{str(int(exponent)).translate(RAISED)}"
@@ -121,6 +125,7 @@ def _raised(number: str) -> str:
 
 
 def _percent(value: float | None) -> str:
+    """Formats a fraction as a percentage; None is the share of a channel that did not move."""
     if value is None:
         return "at rest"
     if not np.isfinite(value) or abs(value) > 10:
@@ -129,6 +134,6 @@ def _percent(value: float | None) -> str:
 
 
 def _shade(value: float) -> str:
-    """Background of a correlation: blue for positive, vermilion for negative, opaque by its magnitude."""
+    """Background colour of a correlation: blue if positive, vermilion if negative; the larger the magnitude, the more opaque."""
     colour = "0 114 178" if value > 0 else "213 94 0"
     return f"rgb({colour} / {0.75 * abs(value):.2f})"
