@@ -195,6 +195,18 @@ impl Checker {
         self.description.offer(interface).is_some_and(|offer| offer.can(names))
     }
 
+    /// Returns the indices of the readable outputs and continuous states that are numbers.
+    pub fn outputs_and_states(&self) -> Vec<usize> {
+        let states: HashSet<usize> = self.description.states().into_iter().collect();
+        let is_one = |index: &usize| {
+            let variable = &self.description.variables[*index];
+            variable.is_number()
+                && !variable.clocked
+                && (variable.causality == "output" || states.contains(index))
+        };
+        self.readable.iter().copied().filter(is_one).collect()
+    }
+
     pub fn saves(&self, interface: Interface) -> bool {
         self.can(interface, &["canGetAndSetFMUstate", "canGetAndSetFMUState"])
     }

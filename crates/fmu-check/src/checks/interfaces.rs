@@ -8,7 +8,6 @@ use crate::trajectory::{range, step_size};
 use crate::values::near;
 use crate::writer::Part::{Enter, Free, Leave, Make};
 use crate::writer::{Read, Trajectory, Writer, value_of};
-use std::collections::HashSet;
 
 /// Number of communication points that are compared.
 const POINTS: usize = 40;
@@ -60,7 +59,8 @@ fn with_input(
     input: Option<usize>,
 ) -> anyhow::Result<()> {
     let description = &checker.description;
-    let outputs = compared(checker);
+    let mut outputs = checker.outputs_and_states();
+    outputs.truncate(200);
     let size = step_size(description);
     let count = (range(description) / size + 1e-9).floor().clamp(1.0, POINTS as f64) as usize;
     let times: Vec<f64> = (0..=count).map(|index| description.start_time + index as f64 * size).collect();
@@ -99,21 +99,6 @@ fn with_input(
         all.sequence,
         differs(description.clone(), simulations, outputs, times, input),
     )
-}
-
-/// Returns the numbers among the outputs and the continuous states.
-fn compared(checker: &Checker) -> Vec<usize> {
-    let description = &checker.description;
-    let states: HashSet<usize> = description.states().into_iter().collect();
-    let mut indices = checker.readable.clone();
-    indices.retain(|index| {
-        let variable = &description.variables[*index];
-        variable.is_number()
-            && !variable.clocked
-            && (variable.causality == "output" || states.contains(index))
-    });
-    indices.truncate(200);
-    indices
 }
 
 fn in_steps(writer: &mut Writer, instance: usize, times: &[f64], size: f64) -> Simulation {

@@ -7,7 +7,6 @@ use crate::trajectory::{range, step_size};
 use crate::values::inputs_by;
 use crate::writer::Part::{Enter, Free, Leave, Make};
 use crate::writer::{Read, Trajectory, Writer, value_of};
-use std::collections::HashSet;
 
 /// Minimum and maximum number of steps; the inputs change in the middle.
 const STEPS: [usize; 2] = [8, 24];
@@ -37,20 +36,6 @@ pub fn accepts_any_size(checker: &Checker, trajectory: &Trajectory) -> bool {
 struct Series {
     constant: Vec<Vec<Read>>,
     changed: Vec<Vec<Read>>,
-}
-
-/// Returns the numbers among the outputs and the continuous states.
-fn outputs(checker: &Checker) -> Vec<usize> {
-    let description = &checker.description;
-    let states: HashSet<usize> = description.states().into_iter().collect();
-    let mut outputs = checker.readable.clone();
-    outputs.retain(|index| {
-        let variable = &description.variables[*index];
-        variable.is_number()
-            && !variable.clocked
-            && (variable.causality == "output" || states.contains(index))
-    });
-    outputs
 }
 
 /// Compares steps of an FMU that allows one size only with an integration of Model Exchange, if the FMU offers it: outputs that are late
@@ -122,7 +107,7 @@ fn integrated(checker: &Checker, stepped: &Trajectory, outputs: Vec<usize>) -> a
 /// values equal those of the half steps one step earlier. No error of a solver has this pattern.
 pub fn late(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
-    let outputs = outputs(checker);
+    let outputs = checker.outputs_and_states();
     if !accepts_any_size(checker, trajectory) {
         return integrated(checker, trajectory, outputs);
     }

@@ -1,47 +1,15 @@
 //! Faults in the behaviour in time, several at a time, because a check takes longer than their findings.
 
+use super::packing::{library, pack};
 use super::{UNLIMITED, check};
 use serde_json::Value;
-use std::hash::{Hash as _, Hasher as _};
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use tempfile::TempDir;
-use zip::write::SimpleFileOptions;
 
 /// Packs the FMU of `spring.c`.
 fn spring(directory: &Path, fmi: u32) -> PathBuf {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mutants/spring.c");
-    let mut hasher = std::hash::DefaultHasher::new();
-    std::fs::read(&source).expect("the source").hash(&mut hasher);
-    let suffix = std::env::consts::DLL_SUFFIX;
-    let library =
-        Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("spring-{fmi}-{:x}{suffix}", hasher.finish()));
-    if !library.exists() {
-        let new = tempfile::NamedTempFile::new_in(env!("CARGO_TARGET_TMPDIR")).expect("a file");
-        let mut compiler = Command::new(std::env::var_os("CC").unwrap_or_else(|| "cc".into()));
-        let compiler = compiler.args(["-O1", "-shared", "-fPIC", &format!("-DFMI={fmi}"), "-o"]);
-        let status = compiler.args([new.path(), &source]).arg("-lm").status();
-        assert!(status.expect("a C compiler").success(), "spring.c does not compile");
-        // Another test may have been first.
-        new.persist(&library).expect("a file");
-    }
-    let path = directory.join("spring.fmu");
-    let mut zip = zip::ZipWriter::new(std::fs::File::create(&path).expect("a file"));
-    let mut add = |name: &str, bytes: &[u8]| {
-        zip.start_file(name, SimpleFileOptions::default()).expect("an entry");
-        zip.write_all(bytes).expect("an entry");
-    };
     let description = if fmi == 2 { include_str!("spring2.xml") } else { include_str!("spring3.xml") };
-    add("modelDescription.xml", description.as_bytes());
-    let system = if cfg!(target_os = "macos") { "darwin" } else { "linux" };
-    let binaries = match fmi {
-        2 => format!("{system}64"),
-        _ => format!("{}-{system}", std::env::consts::ARCH),
-    };
-    add(&format!("binaries/{binaries}/spring{suffix}"), &std::fs::read(&library).expect("the library"));
-    zip.finish().expect("a ZIP");
-    path
+    pack(directory, ("spring", fmi), description, &library("spring", fmi, ""), &[])
 }
 
 /// Returns the findings in the FMU with faults, except notes on the system.

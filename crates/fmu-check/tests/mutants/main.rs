@@ -3,65 +3,26 @@
 #![cfg(unix)]
 
 mod dynamics;
+mod packing;
 mod valve;
 
-use std::hash::{Hash as _, Hasher as _};
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use tempfile::TempDir;
-use zip::write::SimpleFileOptions;
 
 /// Returns the model description without a fault.
 fn description(fmi: u32) -> String {
     if fmi == 2 { include_str!("wagon2.xml") } else { include_str!("wagon3.xml") }.to_owned()
 }
 
-/// Returns the path of the compiled library, which the tests share. The environment variable `WAGON_FAULT` chooses the fault when
-/// the library is loaded. Each fault in linking has a separate library.
+/// Returns the path of the compiled library. The environment variable `WAGON_FAULT` chooses the fault.
 fn library(fmi: u32, macro_name: &str) -> PathBuf {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mutants/wagon.c");
-    let text = std::fs::read(&source).expect("the source");
-    let mut hasher = std::hash::DefaultHasher::new();
-    text.hash(&mut hasher);
-    let name = format!("wagon-{fmi}{macro_name}-{:x}{}", hasher.finish(), std::env::consts::DLL_SUFFIX);
-    let library = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    if library.exists() {
-        return library;
-    }
-    let new = tempfile::NamedTempFile::new_in(env!("CARGO_TARGET_TMPDIR")).expect("a file");
-    let status = Command::new(std::env::var_os("CC").unwrap_or_else(|| "cc".into()))
-        .args(["-O1", "-shared", "-fPIC", &format!("-DFMI={fmi}")])
-        .args((!macro_name.is_empty()).then(|| format!("-D{macro_name}")))
-        .arg("-o")
-        .args([new.path(), &source])
-        .args(["-lm", "-lpthread"])
-        .status()
-        .expect("a C compiler");
-    assert!(status.success(), "wagon.c does not compile");
-    // Another test may have been first.
-    new.persist(&library).expect("a file");
-    library
+    packing::library("wagon", fmi, macro_name)
 }
 
 /// Packs the FMU with a changed description.
 fn fmu(directory: &Path, fmi: u32, library: &Path, change: impl Fn(String) -> String) -> PathBuf {
-    let path = directory.join("wagon.fmu");
-    let mut zip = zip::ZipWriter::new(std::fs::File::create(&path).expect("a file"));
-    let mut add = |name: &str, bytes: &[u8]| {
-        zip.start_file(name, SimpleFileOptions::default()).expect("an entry");
-        zip.write_all(bytes).expect("an entry");
-    };
-    add("modelDescription.xml", change(description(fmi)).as_bytes());
-    let system = if cfg!(target_os = "macos") { "darwin" } else { "linux" };
-    let binaries = match fmi {
-        2 => format!("{system}64"),
-        _ => format!("{}-{system}", std::env::consts::ARCH),
-    };
-    let name = format!("binaries/{binaries}/wagon{}", std::env::consts::DLL_SUFFIX);
-    add(&name, &std::fs::read(library).expect("the library"));
-    zip.finish().expect("a ZIP");
-    path
+    packing::pack(directory, ("wagon", fmi), &change(description(fmi)), library, &[])
 }
 
 /// Maximum duration of a check, which no check reaches: the machine may be busy.

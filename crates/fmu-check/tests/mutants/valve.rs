@@ -1,43 +1,16 @@
 //! A second FMU with seeded faults, [valve.c](valve.c): several at a time, each of which is found under the name of its rule.
 
+use super::packing::{library, pack};
 use super::{UNLIMITED, check, reproduced, unpack};
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use tempfile::TempDir;
-use zip::write::SimpleFileOptions;
-
-/// Compiles the library.
-fn library(directory: &Path, fmi: u32) -> PathBuf {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mutants/valve.c");
-    let library = directory.join("valve.so");
-    let mut command = Command::new(std::env::var_os("CC").unwrap_or_else(|| "cc".into()));
-    command.args(["-O1", "-shared", "-fPIC", &format!("-DFMI={fmi}"), "-o"]).args([&library, &source]);
-    assert!(command.arg("-lm").status().expect("a C compiler").success(), "valve.c does not compile");
-    library
-}
 
 /// Packs the FMU, with a string of its description replaced by another one.
 fn fmu(directory: &Path, fmi: u32, [before, after]: [&str; 2]) -> PathBuf {
-    let path = directory.join("valve.fmu");
-    let mut zip = zip::ZipWriter::new(std::fs::File::create(&path).expect("a file"));
-    let mut add = |name: &str, bytes: &[u8]| {
-        zip.start_file(name, SimpleFileOptions::default()).expect("an entry");
-        zip.write_all(bytes).expect("an entry");
-    };
     let text = if fmi == 2 { include_str!("valve2.xml") } else { include_str!("valve3.xml") };
     assert!(text.contains(before), "{before}");
-    add("modelDescription.xml", text.replacen(before, after, 1).as_bytes());
-    add("resources/curve.txt", b"7");
-    let system = if cfg!(target_os = "macos") { "darwin" } else { "linux" };
-    let binaries = match fmi {
-        2 => format!("{system}64"),
-        _ => format!("{}-{system}", std::env::consts::ARCH),
-    };
-    let name = format!("binaries/{binaries}/valve{}", std::env::consts::DLL_SUFFIX);
-    add(&name, &std::fs::read(library(directory, fmi)).expect("the library"));
-    zip.finish().expect("a ZIP");
-    path
+    let files: &[(&str, &[u8])] = &[("resources/curve.txt", b"7")];
+    pack(directory, ("valve", fmi), &text.replacen(before, after, 1), &library("valve", fmi, ""), files)
 }
 
 /// Checks topics of the FMU with faults; returns the findings, except that the FMU logs no messages and counts its steps.
