@@ -78,8 +78,8 @@ def test_the_page_of_a_crate_is_complete(home: Path) -> None:
     # The page of the documentation is the README.
     code = next(path for path in (home / "src/lib.rs", home / "src/main.rs") if path.exists())
     assert code.read_text(encoding="utf-8").startswith('#![doc = include_str!("../README.md")]')
-    assert ("in no registry yet" in readme.read_text(encoding="utf-8")) != released(), (
-        f"{readme.relative_to(ROOT)}: state that the crate is in no registry only until it is released"
+    assert ("not published yet" in readme.read_text(encoding="utf-8")) != released(), (
+        f"{readme.relative_to(ROOT)}: state that the crate is not published only until it is released"
     )
 
 

@@ -90,7 +90,8 @@ fn changes(mut open: Vec<PathBuf>) -> BTreeMap<PathBuf, Option<SystemTime>> {
     found
 }
 
-/// Checks the given FMUs, or builds the FMUs of the project and checks them. Returns false if a check failed.
+/// Checks FMUs with fmu-check: the given ones or, if none are given, those of the project, which are built first. Returns false if the
+/// build or a check fails.
 pub fn check(package: &Package, given: &[PathBuf], options: &fmu_check::Options) -> Result<bool> {
     let mut fmus = given.to_vec();
     if fmus.is_empty() {

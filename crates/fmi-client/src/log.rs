@@ -74,8 +74,8 @@ impl Log {
         std::ptr::without_provenance_mut(self.environment)
     }
 
-    /// Removes and returns the messages since the last call of this function, and the messages from this thread whose environment is
-    /// unknown.
+    /// Returns the messages since the last call of this function. They include messages that this thread received with an environment of
+    /// no instance, because the call that this thread has just made is their likely cause.
     pub fn take(&self) -> Vec<Message> {
         let mut messages = Vec::from(std::mem::take(&mut *lock(&self.new)));
         let mut stray = lock(&STRAY);

@@ -43,7 +43,7 @@ impl Feed {
         lock(&self.runs).insert(instance, (run, time));
     }
 
-    /// Removes and returns the messages so far.
+    /// Returns the messages that were logged since the last call of this function.
     pub fn take(&self) -> Vec<Logged> {
         std::mem::take(&mut *lock(&self.logged))
     }

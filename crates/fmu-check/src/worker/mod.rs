@@ -737,7 +737,8 @@ fn blobs(pointers: &Guarded, sizes: &Values) -> Values {
     Values::Strings(pointers.into_iter().zip(sizes).map(blob).collect())
 }
 
-/// Removes and returns the messages that were logged with this environment pointer, and those whose pointer no instance has received.
+/// Returns the new messages with this environment pointer, and separately those with a pointer that no instance has received, which are a
+/// fault of the FMU.
 fn messages(environment: usize) -> (Vec<Message>, Vec<Message>) {
     let mut messages = locked(&MESSAGES);
     let (mut own, mut strays) = (Vec::new(), Vec::new());

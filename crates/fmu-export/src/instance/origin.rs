@@ -4,8 +4,8 @@ use super::{Outcome, reject};
 use fmi_abi::{Interface, Standard};
 use std::fmt;
 
-/// FMI version and interface type of a serialized state. The state is valid only for this origin, because the
-/// rules for the next calls differ, and some modes exist only in one version or interface type.
+/// FMI version and interface type of the instance that serialized a state. An instance with another origin rejects the state, because it
+/// may be in a mode that does not exist there, and because other calls are allowed after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Origin(pub Standard, pub Interface);
 

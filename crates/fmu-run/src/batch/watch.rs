@@ -52,7 +52,7 @@ impl Watch {
         Self { listening: true, ..self }
     }
 
-    /// Removes and returns the messages so far.
+    /// Returns the messages that were logged since the last call of this function.
     pub fn take_messages(&self) -> Vec<Logged> {
         self.feed.get().map(|feed| feed.take()).unwrap_or_default()
     }

@@ -325,7 +325,8 @@ impl Instances {
         self.system.sole().map(|fmu| &*fmu.description)
     }
 
-    /// Removes and returns the messages of the FMU since the last call, if the instances [listen](Setup::listening).
+    /// Returns the messages that the FMU has logged since the last call of this function. There are none unless [`Setup::listening`] is
+    /// set, because logging costs time.
     pub fn take_messages(&self) -> Vec<Logged> {
         self.feed.as_ref().map(|feed| feed.take()).unwrap_or_default()
     }
