@@ -161,7 +161,7 @@ pub enum Step {
     Measure,
     /// Continues in a new process, which receives only the serialized states.
     FreshProcess,
-    /// The FMU of this process is in a directory of this name. This is the first step of a process.
+    /// Places the FMU in a directory with this name. It can only be the first step of a process, because the library is loaded from there.
     Elsewhere(String),
     Unload,
     /// Exits the process, which runs the destructors of its libraries. This is the last step of a sequence.

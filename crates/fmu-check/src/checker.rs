@@ -378,9 +378,9 @@ impl Checker {
         })
     }
 
-    /// Returns the criterion that reads are equal within 20 times the tolerance of the default experiment, as those of a solver with
-    /// variable steps are that continues from a restored state: the tolerance limits the error of one of its steps, errors of
-    /// several steps add up, and derivatives amplify them.
+    /// Returns the criterion that reads are equal within 20 times the tolerance of the default experiment. A solver with variable steps
+    /// that continues from a restored state may differ by more than the tolerance, because the tolerance limits the error of a single step,
+    /// while the errors of several steps add up and derivatives amplify them.
     pub fn continued(&self, one: &[Read], other: &[Read], message: &'static str) -> Box<dyn Criterion> {
         self.differ_by(20.0 * self.description.tolerance(), one, other, message)
     }

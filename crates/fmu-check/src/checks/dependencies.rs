@@ -35,7 +35,8 @@ impl Moved {
         }))
     }
 
-    /// Describes the first unknown that changes and has its first value at the end, which shows that it depends on the known.
+    /// Describes the first unknown that changes with the known and returns to its first value when the known does. So the known is the
+    /// cause of the change, not the passing of time.
     fn depends(
         &self,
         run: &Run,

@@ -406,7 +406,7 @@ impl Differences {
     }
 }
 
-/// Checks derivatives against differences after the first event of an integration, which is a state event if it has one.
+/// Checks derivatives against differences after the first state event of an integration or, if there is none, after its first event.
 pub fn after_events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let Excited { trajectory: mut after, chosen } = excited(checker, trajectory)?;
     let Some(event) = chosen.into_iter().find(|index| after.points[*index].event) else { return Ok(()) };

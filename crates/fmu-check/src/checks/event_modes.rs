@@ -10,7 +10,8 @@ use crate::writer::Part::Begin;
 use crate::writer::{Point, Read, Trajectory, Writer, value_of};
 use std::collections::BTreeSet;
 
-/// Difference that counts, relative to the largest magnitude of a number in the simulation: algebraic loops are solved by iteration.
+/// Smallest difference that counts, relative to the largest magnitude of a number in the simulation. Smaller ones are normal, because FMUs
+/// solve algebraic loops by iteration.
 const TOLERANCE: f64 = 1e-3;
 
 /// Numbers that are a function of time, states, inputs and discrete states.
@@ -336,7 +337,7 @@ pub fn inputs(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     Ok(())
 }
 
-/// Checks that inputs that change an unknown if they are set after Event Mode change it if they are set in Event Mode, too. The snapshots
+/// If an unknown changes when inputs are set after Event Mode, checks that it also changes when they are set in Event Mode. The snapshots
 /// are those of `VARIANTS`.
 fn has_effect(
     checker: &Checker,

@@ -38,8 +38,8 @@ struct Entry {
     reads: [Vec<Read>; 2],
 }
 
-/// Checks that discrete variables change only in events that the FMU announces: by an event indicator that changes its sign, by the time
-/// of the next event, or after an integrator step. The importer enters Event Mode after each interval, which it may.
+/// Checks that discrete variables change only in events that the FMU announces: by an event indicator that changes its sign, by the time of
+/// the next event, or after an integrator step. The check enters Event Mode after each interval, because an importer may do so at any time.
 pub fn unannounced(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let states = description.states_count().unwrap_or(0);

@@ -11,7 +11,7 @@ use crate::writer::{Read, Trajectory, Writer, value_of};
 /// Minimum and maximum number of steps; the inputs change in the middle.
 const STEPS: [usize; 2] = [8, 24];
 
-/// Size of a step, relative to the usual one, so that its end is at no likely tick of a clock.
+/// Size of a step, relative to the usual one. It is an unusual number, so that steps are unlikely to end when a clock ticks.
 const SIZE: f64 = 0.93;
 
 /// Returns whether a variable is continuous and changes with the state: an output or a local variable.
@@ -38,8 +38,8 @@ struct Series {
     changed: Vec<Vec<Read>>,
 }
 
-/// Compares steps of an FMU that allows one size only with an integration of Model Exchange, if the FMU offers it: outputs that are late
-/// by a step equal those of the integration one step earlier.
+/// If an FMU allows only one step size, compares its steps with an integration of its Model Exchange: outputs that are late by a step equal
+/// those of the integration one step earlier.
 fn integrated(checker: &Checker, stepped: &Trajectory, outputs: Vec<usize>) -> anyhow::Result<()> {
     let description = &checker.description;
     let Some(integrated) = checker.trajectories.iter().find(|trajectory| !trajectory.is_stepped()) else {
@@ -103,8 +103,8 @@ fn integrated(checker: &Checker, stepped: &Trajectory, outputs: Vec<usize>) -> a
     })
 }
 
-/// Compares steps with steps of half the size. If an output is late by one step, it is late by another time with other steps, so its
-/// values equal those of the half steps one step earlier. No error of a solver has this pattern.
+/// Compares steps with steps of half the size. If an output is late by one step, half the step size halves the delay, so the output equals
+/// the one of the half steps one step earlier. No error of a solver has this pattern.
 pub fn late(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let outputs = checker.outputs_and_states();

@@ -8,15 +8,15 @@ use crate::writer::Part::{Begin, Enter, Free, Make, Points};
 use crate::writer::{Part, Read, Trajectory, value_of};
 use fmi_abi::BaseType;
 
-/// Minimum number of different values of an output that are evidence.
+/// Minimum number of different values of an output: with fewer, single precision may be a coincidence.
 const VALUES: usize = 8;
 
 fn single(number: f64) -> f64 {
     f64::from(number as f32)
 }
 
-/// Checks values that are set: if a getter returns two values of a variable exactly as rounded to single precision, they are stored so.
-/// A conversion of units does not round so.
+/// Checks values that are set: if a getter returns two values of a variable exactly as rounded to single precision, they are stored so. A
+/// conversion of units changes only the last digits of double precision, so it is not mistaken for that.
 pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let mut indices = checker.readable.clone();
@@ -69,7 +69,7 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     outputs(checker, trajectory)
 }
 
-/// Returns a number that was set, and the one that was read, if that is the first rounded to single precision.
+/// Returns the number that was set and the number that was read, if the latter is the former, rounded to single precision.
 fn is_rounded(set: &[f64], read: &[f64]) -> Option<(f64, f64)> {
     let rounded = |(set, read): &(f64, f64)| *read == single(*set) && read != set;
     set.iter().copied().zip(read.iter().copied()).find(rounded)
@@ -112,7 +112,7 @@ fn states(
     }))
 }
 
-/// Returns whether a number has more digits than one that people choose, and few enough for single precision.
+/// Returns whether a number is exact in single precision, although it has more digits than a number that people choose.
 fn is_long_single(number: f64) -> bool {
     number.is_finite() && single(number) == number && number.to_bits().trailing_zeros() < 40
 }

@@ -11,11 +11,12 @@ use crate::writer::{Read, Trajectory, Writer, value_of};
 /// Number of small steps that are compared with one step.
 const STEPS: usize = 8;
 
-/// Number of usual steps before, after which the state moves.
+/// Number of usual steps before the small ones, so that the state is moving by then.
 const BEFORE: usize = 4;
 
-/// Small step sizes, relative to the usual one. They are multiples of no likely step size of a solver, and the factor between them is
-/// less than `STEPS`: for each step size of a solver that is not smaller than all of them, `STEPS` times one of them is at least as long.
+/// Small step sizes, relative to the usual one. They are irrational, so that they are not multiples of the step size of a solver. Because
+/// the factor between them is less than `STEPS`, one of them is shorter than the step size of the solver, while `STEPS` of its steps are at
+/// least as long, unless the solver's steps are shorter than all of them.
 fn sizes(usual: f64) -> impl Iterator<Item = f64> {
     (1..=6).map(move |number| 0.618_033_988_749_895 * usual * 10_f64.powf(-0.5 * f64::from(number)))
 }
@@ -28,8 +29,9 @@ struct Compared {
     one: Vec<Read>,
 }
 
-/// Compares small steps with one step of the same duration, for several sizes. A solver with variable steps may differ in digits, so only
-/// two observations count: small steps leave all variables as they were, to the bit, or each of them advances as far as a longer one.
+/// Compares small steps with one step of the same duration, for several sizes. The results of a solver with variable steps may differ
+/// slightly, so only two observations count: small steps do not change a single bit of any variable, or each of them advances as far as a
+/// longer one.
 pub fn small_steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     if !accepts_any_size(checker, trajectory) {
@@ -71,7 +73,7 @@ pub fn small_steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
     })
 }
 
-/// Numbers of an element of a variable that one step changes.
+/// Values of an element of a variable that one step changes: before, after small steps and after one step.
 struct Moved {
     variable: usize,
     before: f64,

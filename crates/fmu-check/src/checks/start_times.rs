@@ -17,7 +17,7 @@ const STEPS: usize = 12;
 /// Number of steps before and after zero in which a clock is observed.
 const CLOCK: usize = 30;
 
-/// Part of a step by which communication points are shifted, so that they are at no likely tick of a clock.
+/// Fraction of a step by which communication points are shifted, so that they are unlikely to coincide with ticks of a clock.
 const SHIFT: f64 = 0.381_966;
 
 /// A simulation from a start time.

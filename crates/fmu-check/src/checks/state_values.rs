@@ -10,7 +10,7 @@ use crate::writer::Part::{Begin, Call, Enter, Free, Leave, Make, Points, ReadAll
 use crate::writer::Trajectory;
 use fmi_abi::BaseType;
 
-/// Values of variables.
+/// Variables, by index, with their values.
 type Assigned = Vec<(usize, Values)>;
 
 /// Returns the start values of a variable.

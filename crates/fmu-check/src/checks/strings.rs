@@ -67,7 +67,7 @@ pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<(
     })
 }
 
-/// Checks that two instances on different threads have their strings, which importers copy at once.
+/// Checks that two instances on different threads return their own strings, if each string is copied immediately, as importers do.
 pub fn threads(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let of = [1, 2].map(|instance| strings(checker, instance));
     let Some((index, _)) = of[0].first().cloned() else { return Ok(()) };
