@@ -122,7 +122,7 @@ def exact(time: np.ndarray, parts: list[tuple[float, float, list[float]]]) -> np
 
 def test_discrete_inputs_that_fmpy_sets_in_continuous_time_mode(rods) -> None:
     """While CVode looks for roots of the indicators, FMPy sets all inputs, also the discrete ones."""
-    result = heated(rods[0], [(0.0, 3, 0), (2.0, 3, 0)], solver="CVode", output_interval=0.1, relative_tolerance=1e-8)
+    result = heated(rods[0], [(0.0, 3, 0), (2.0, 3, 0)], solver="CVode", output_interval=0.1, relative_tolerance=1e-9)
     found = np.array([result[name] for name in TEMPERATURES])
     np.testing.assert_allclose(found, exact(result["time"], [(0.0, 2.0, [10.0, 0.0])]), rtol=1e-6)
     assert len(np.unique(result["hot[4]"])) == 2, "an indicator changes its sign"

@@ -419,17 +419,21 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     END
 }
 
-/* A saved state is in the module's memory. Any other pointer is not a state of the module. */
-
+/* The module's handles of saved states are numbers, and equal numbers in different instances are different states. So the importer's
+   handle is the sum of the number and the instance's address; it is never dereferenced. */
 static u32 to_module(const Instance *instance, fmi2FMUstate state) {
-    uintptr_t place = (uintptr_t)state - (uintptr_t)instance->module.w2c_memory.data.bytes;
+    uintptr_t handle = (uintptr_t)state - (uintptr_t)instance;
     if (state == NULL) {
         return 0;
     }
-    return place != 0 && place < FMU_MEMORY ? (u32)place : UINT32_MAX;
+    return handle != 0 && (u32)handle == handle ? (u32)handle : UINT32_MAX;
 }
 
-/* Copies a pointer to a state, if the argument is a valid pointer. */
+static fmi2FMUstate to_importer(const Instance *instance, u32 handle) {
+    return handle == 0 ? NULL : (fmi2FMUstate)((uintptr_t)instance + handle);
+}
+
+/* Copies the handle of a state, if the argument is a valid pointer. */
 #define STATE_IN(name, place, n)                                         \
     u32 in_place;                                                           \
     ROOM(name, n, 1, 64)                                                    \
@@ -443,7 +447,7 @@ static u32 to_module(const Instance *instance, fmi2FMUstate state) {
     if (status == fmi2OK && (place) != NULL) {                     \
         u32 in_it;                                                 \
         memcpy(&in_it, at(&call, in_place), sizeof in_it);         \
-        *(place) = in_it == 0 ? NULL : (fmi2FMUstate)at(&call, in_it); \
+        *(place) = to_importer(instance, in_it);                   \
     }
 
 #define STATE_HANDLE(name)                                   \
