@@ -1,4 +1,4 @@
-"""`prw.check` and `prw check` on files as other tools write them; the numbers in them are the tests' own solution."""
+"""`prw.check` and `prw check` on files as other tools write them; their numbers are a solution of the tests, not of the FMU."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DEGREES = ("pitch", "roll", "theta3", "theta4")
 
 
 def fig4(**change: float) -> dict[str, np.ndarray]:
-    """Time, motors and outputs of Fig. 4 with opposite motors, every millisecond for a second."""
+    """Returns time, motors and outputs of Fig. 4 with opposite motors, every millisecond for a second. change: parameters."""
     t = np.arange(1001) * STEP
     theta = np.outer(2 * np.sin(5 * np.pi * t) ** 2 / (10 * np.pi), [1, -1])
     omega = np.outer(np.sin(10 * np.pi * t), [1, -1])
@@ -49,7 +49,7 @@ def write_csv(path, columns, titles=None, delimiter=","):
 
 
 def character_matrix(strings, across):
-    """Strings as a matrix of characters, one in each row, or one in each column."""
+    """Returns strings as a matrix of characters, one string in each row or, if `across`, in each column."""
     width = max(map(len, strings), default=1)
     rows = [string.ljust(width) for string in strings]
     return np.array(["".join(column) for column in zip(*rows)] if across else rows)

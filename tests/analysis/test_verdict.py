@@ -76,7 +76,7 @@ def test_two_faults_are_both_named(experiment, fmu):
 
 
 def test_a_common_fault_is_found_if_parameters_compensate_for_each_single_one(fmu):
-    # Torques 0.7 ms late, without encoders on the shafts: c1 is off by half, and the residuals look like noise.
+    # Without encoders on the shafts, torques that are 0.7 ms late change c1 by half, and the residuals look like noise.
     simulated = rig.late(rig.experiment(400004, 6, pattern="slow"), 7e-4)
     found = prw.identify(recording(simulated, ("tau1", "tau2", "pitch", "roll")), starts=1, fmu=fmu)
     assert {misfit.channel for misfit in found.verdict.misfits} == {"tau1", "tau2"}, found.misfits
@@ -139,13 +139,13 @@ def test_intervals_allow_for_friction_that_is_too_small_to_be_found(fmu, frictio
     for name, estimate in found.parameters.items():
         low, high = estimate.interval
         assert low < simulated.parameters[name] < high, name
-        # c3 cannot be told from friction as well as without it, but better than a few per cent.
+        # Possible friction makes c3 less certain, because both damp the motion, but the error must stay small.
         assert estimate.relative < 0.02, name
 
 
 def test_an_equal_gain_of_the_torques_is_found_if_inertias_are_known(experiment, fmu):
-    """It looks like stiffer couplings with more inertia. If all inertias are estimated, nothing shows it, and neither does a
-    rig without a gain look faulty."""
+    """An equal gain looks like stiffer couplings with more inertia. If all inertias are estimated, it cannot be detected, so no fault
+    is reported with or without a gain."""
     columns = recording(experiment)
     gained = {**columns, **{name: 1.01 * columns[name] for name in ("tau1", "tau2")}}
     found = prw.identify(gained, starts=1, fmu=fmu)

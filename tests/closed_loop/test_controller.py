@@ -92,7 +92,7 @@ def test_a_jumping_reference_is_followed_within_limits(closed_loop):
         assert np.max(np.abs(np.rad2deg(wrist[end] - goal))) < 0.1
     assert np.max(np.abs(motors[:, 2:])) <= 3 + 1e-9
     assert np.max(np.abs(np.diff(motors[:, 2:], axis=0))) <= 30 * STEP * (1 + 1e-6)
-    # omega is the derivative of theta: exactly, between two samples, whose distance is one step.
+    # Between two samples, one step apart, theta is a parabola and omega its derivative, so this rule is exact.
     moved, mean = np.diff(motors[:, :2], axis=0), STEP * (motors[1:, 2:] + motors[:-1, 2:]) / 2
     np.testing.assert_allclose(moved, mean, atol=1e-14)
 

@@ -38,7 +38,7 @@ def test_the_programs(closed_loop, tmp_path, master, package):
 
 
 def test_the_script_for_omsimulator(closed_loop):
-    """A mock of OMSimulator records the calls of the script, which must equal the content of the SSP."""
+    """A mock of OMSimulator records the calls of the script, which must build the same system as the SSP."""
     page = (ROOT / TESTBED.path).read_text(encoding="utf-8")
     (script,) = re.findall(r'<pre data-script="oms" tabindex="0"><code>(.*?)</code></pre>', page, flags=re.S)
     library = Mock(CRef=lambda system, *names: ".".join(names))

@@ -1,5 +1,5 @@
-"""A step of the FMU is exact within 1e-11 for any parameters and step sizes. If only the angles are set, every output converges with
-the second order of the step size."""
+"""A step of the FMU is exact within 1e-11 for any parameters and step sizes. If only the angles are set, the error of
+every output is second order in the step size."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def check(instance, parameters, t, theta, slope, expected):
 
 @pytest.mark.parametrize("seed", range(12))
 def test_random_parameters_paths_and_steps(instance, seed):
-    # Further from Table 1, an oracle with doubles loses digits. test_extremes.py calculates with more digits there.
+    # Further from Table 1, an oracle with doubles loses digits, so test_extremes.py calculates with more digits.
     parameters, t, theta, slope = random_case(seed, points=200, decades=0.3)
     model = linear_model({name: float(value) for name, value in parameters.items()})
     check(instance, parameters, t, theta, slope, follow(model, t, theta, slope))
@@ -81,7 +81,7 @@ def test_rates_from_omega(instance, model):
 
 
 def test_rates_from_angles(instance, model):
-    """By default the slope is the slope of the parabola through the last three samples, whether they are evenly spaced or not."""
+    """By default the rate is the slope of the parabola through the last three samples, whether they are evenly spaced or not."""
     rng = np.random.default_rng(4)
     t = np.cumsum(rng.uniform(0.002, 0.02, 100))
     theta = np.cumsum(rng.normal(0, 0.02, (100, 2)), axis=0)
@@ -89,7 +89,7 @@ def test_rates_from_angles(instance, model):
     at, after = instance.run(t, theta)
     expected_at, expected_after = follow(model, t, theta, backward_slope(t, theta))
     assert_close(at, expected_at, 1e-11)
-    # After a step, the torques use the rate that the parabola predicts. The tests of second order below check them.
+    # Right after a step, torques use the rate that the parabola predicts. The tests of second order below check them instead.
     assert_close({**after, "tau1": expected_after["tau1"], "tau2": expected_after["tau2"]}, expected_after, 1e-11)
 
 

@@ -37,7 +37,7 @@ class Exact:
         self.step_matrix = exponential(augmented(self.model) * self.h)[:6]
 
     def step(self, x, theta, slope, jump=None):
-        """Returns the states and outputs (14,) after a step, and their scales (14,), to which errors are compared.
+        """Returns the states and outputs (14,) after a step, and their scales (14,), with which errors are compared.
 
         The arguments are the states x (6,), the motor angles theta (2,), their slopes (2,) and their jump (2,) at the
         start of the step. An argument with a relative error of 1e-16 changes a result by at most 1e-16 of its scale.
@@ -67,7 +67,8 @@ class Exact:
 
 
 def check(instance, parameters, h, seed, steps=3):
-    """Returns the largest error of the states and outputs after `steps` steps, with jumps of the motor angles in between."""
+    """Makes `steps` steps with jumps of the motor angles between them. Returns the largest error of the states and outputs,
+    relative to their scales."""
     rng = np.random.default_rng(seed)
     instance.fmi.setupExperiment(startTime=0.0)
     instance.set(**{name: int(value) if name in "MN" else float(value) for name, value in parameters.items()})
@@ -91,7 +92,7 @@ def check(instance, parameters, h, seed, steps=3):
 
 
 def random_parameters(rng):
-    """Scales each parameter of Table 1 separately by 1e-9 to 1e9. A third of the cases has only the extreme scales."""
+    """Scales each parameter of Table 1 separately by 1e-9 to 1e9. A third of the cases only has the scales 1e-9, 1 and 1e9."""
     ends = rng.uniform() < 1 / 3
     decades = rng.choice([-9, 0, 9], len(REAL)) if ends else rng.uniform(-9, 9, len(REAL))
     lobes, rollers = rng.choice([1, 4, 7, 1000, 2**31 - 1], 2)
@@ -113,7 +114,7 @@ def test_far_from_table_1(instance, seed):
     [
         {},
         {"k1": 1e9, "k2": 1e-9, "J2": 1e9, "c2": 1e9},
-        # Almost no damping: rounding errors of all steps remain until the end.
+        # With almost no damping, rounding errors of all steps remain until the end.
         {"c1": 1e-9, "c2": 1e-9, "c3": 1e-9},
     ],
 )
