@@ -58,11 +58,15 @@ def test_outputs_that_are_read_before_inputs_are_set(fmu, exact):
             found[use_omega] = shares(exact, run["tau1"][0], run["roll"][0])
     with_rates, without = (f"{found[use_omega][0]:.1f} %" for use_omega in (True, False))
     assert max(roll for _, roll in found.values()) < 0.01
-    check_stated("docs/compatibility.md", f"torques are off by {with_rates} of their peak", f"by {without} with angles only")
+    check_stated(
+        "docs/compatibility.md", f"torques are off by {with_rates} of their peak", f"by {without} with angles only"
+    )
     check_stated("docs/fmu-page/text/testbed/3_loading.html", f"off by {with_rates}", f"{without} with angles only")
 
 
-def in_model_exchange(fmu, nodes, weights, rate_factor: float = 1.0, held: bool = False) -> tuple[np.ndarray, np.ndarray]:
+def in_model_exchange(
+    fmu, nodes, weights, rate_factor: float = 1.0, held: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
     """Integrates with an explicit Runge-Kutta method in which each stage needs the slope of the stage before. Returns torque and roll.
     rate_factor: multiplies the rates. held: sets inputs once for each step, after the outputs are read."""
     with Fmu(fmu) as testbed:
@@ -97,7 +101,9 @@ def test_fixed_steps_in_model_exchange(fmu, exact):
     """Explicit Euler in OpenModelica, and Simulink's ode4 with FMIKit."""
     torque, roll = shares(exact, *in_model_exchange(fmu, (0,), (1,)))
     check_stated("docs/compatibility.md", f"off by {roll:.1f} % in roll and", f"{torque:.1f} % in torque")
-    check_stated("docs/fmu-page/text/testbed/3_loading.html", f"is {roll:.1f} % off in roll", f"{torque:.1f} % in torque")
+    check_stated(
+        "docs/fmu-page/text/testbed/3_loading.html", f"is {roll:.1f} % off in roll", f"{torque:.1f} % in torque"
+    )
     torque, roll = shares(exact, *in_model_exchange(fmu, *ODE4))
     assert roll < torque
     for name in ("docs/compatibility.md", "docs/fmu-page/text/testbed/3_loading.html"):
@@ -107,7 +113,9 @@ def test_fixed_steps_in_model_exchange(fmu, exact):
 def test_inputs_that_are_held_over_a_step(fmu, exact):
     """In Model Exchange of FMI 3.0, FMIKit ignores dependencies and sets the inputs once for each step."""
     torque, roll = shares(exact, *in_model_exchange(fmu, *ODE4, held=True))
-    check_stated("docs/compatibility.md", "with ode4 at 1 ms", f"torques are off by {torque:.1f} % and roll by {roll:.1f} %")
+    check_stated(
+        "docs/compatibility.md", "with ode4 at 1 ms", f"torques are off by {torque:.1f} % and roll by {roll:.1f} %"
+    )
     check_stated("docs/importers-known-faults.md", "holds the inputs over a step", f"torques are {torque:.1f} % off")
 
 

@@ -1,4 +1,4 @@
-"""The steps of the page: each number in a sentence is the FMU's, as FMPy calculates it, at all values that a visitor can set."""
+"""Each number in the sentences of the page's steps equals the result of the FMU in FMPy, at several values that a visitor can set."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ from playwright.sync_api import Page, expect
 from visiting import button, clock, drawn, field, saved, until
 
 STEPS = ["1. One motor", "2. Both motors", "3. Resonance", "4. Stop dead", "5. Controller"]
-#: Resolution of the frequency, Hz.
-RESOLUTION = 0.05
 
 
 def step(page: Page, number: int) -> None:
@@ -23,7 +21,7 @@ def step(page: Page, number: int) -> None:
 
 
 def text(page: Page, part: str = "what") -> str:
-    """The paragraph that explains the step, or the paragraph with the reason, after the run is calculated."""
+    """Returns the paragraph that explains the step ("what") or gives the reason ("why"), after the run is calculated."""
     for _ in range(5):
         drawn(page)
     return str(page.locator(f".live-{part} p.live-chosen").inner_text()).replace("\u00a0", " ").replace("\u2212", "-")
@@ -65,7 +63,7 @@ def replayed(fmu: Path, csv: str, **start: float) -> Any:
 
 
 def gain(fmu: Path, frequency: float, **start: float) -> float:
-    """How far the wrist swings, as a multiple of the swing of both motors, in FMPy."""
+    """Returns how far the wrist swings in FMPy, as a multiple of the swing of both motors."""
     turn = 2 * np.pi * frequency
     time = np.arange(0, 3 + 4 / frequency, 1e-3)
     theta, omega = 0.02 * (1 - np.cos(turn * time)), 0.02 * turn * np.sin(turn * time)
@@ -74,7 +72,7 @@ def gain(fmu: Path, frequency: float, **start: float) -> float:
 
 
 def test_one_motor_does_both(visit: Any, fmu: Path) -> None:
-    """The page opens with the surprise, and says by which angles the wrist pitches and rolls."""
+    """The page opens with this step, and says by which angles the wrist pitches and rolls."""
     page = visit()
     expect(page.locator(".lead")).to_have_text(
         "Two motors turn one shaft: together they pitch it, against each other they roll it."
@@ -108,7 +106,7 @@ def test_mean_and_difference(visit: Any, fmu: Path) -> None:
         assert np.abs(found["roll"][together]).max() < 1e-9 and np.abs(found["pitch"][~together]).max() < 1e-2
         roll = float(re.findall(r"by ([\d.]+)°\.$", text(page))[0])
         assert roll == pytest.approx(angle * 7 / lobes, abs=0.06)
-        # A slow motion follows the ratio of the rigid wrist.
+        # The motion is slow, so the wrist turns like a rigid one.
         assert np.rad2deg(np.abs(found["roll"]).max()) == pytest.approx(roll, rel=0.05)
         assert f"7 rollers each, which push the {lobes} lobes" in text(page, "why")
 
@@ -141,7 +139,7 @@ def test_resonance(visit: Any, fmu: Path) -> None:
 
 
 def test_stop_dead(visit: Any, fmu: Path) -> None:
-    """The vibrating move first, then the move in two parts of 14.1 and 5.9 degrees; both overshoots are FMPy's."""
+    """The move in one go comes first, then the move in two parts of 14.1 and 5.9 degrees. Both overshoots equal FMPy's."""
     page = visit(reduced_motion="reduce")
     step(page, 4)
     assert "two parts, 14.1° and, half a swing later, 5.9°" in text(page)
@@ -165,7 +163,7 @@ def test_stop_dead(visit: Any, fmu: Path) -> None:
 
 
 def test_the_comparison_stays_while_a_number_is_dragged(visit: Any) -> None:
-    """The grey curve is always the other motion with the same parameters, and its label is at the curve."""
+    """In this step the grey curve is always the other motion with the same parameters. In others it is the run before the change."""
     page = visit("#try&motion=shaped", reduced_motion="reduce")
     page.wait_for_timeout(300)
     labels = (

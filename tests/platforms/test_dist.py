@@ -30,7 +30,7 @@ CRATE = ROOT / "crates" / "fmu-run"
 
 
 def others(name: str) -> dict[str, bytes]:
-    """The files of an FMU except binaries and sources."""
+    """Returns the files of an FMU except binaries and sources."""
     with zipfile.ZipFile(DIST / name) as archive:
         kept = (file for file in archive.namelist() if not file.startswith(("binaries/", "sources/")))
         return {file: archive.read(file) for file in kept}
@@ -75,7 +75,7 @@ def test_fmus_for_fmi_3_have_the_same_libraries_and_documents(model: str) -> Non
     in_fmi2 = {targets: directory for directory, targets in DIRECTORIES.items()}
     for directory, targets in FMI3_DIRECTORIES.items():
         if directory == "x86_64-darwin":
-            # The Intel half of the universal library.
+            # This library is the Intel half of the universal library.
             assert three[directory] in two["darwin64"]
         else:
             assert three[directory] == two[in_fmi2[targets]], directory

@@ -41,7 +41,7 @@ def test_import_loads_nothing(tmp_path: Path) -> None:
 
 
 def test_all_names_are_there(tmp_path: Path) -> None:
-    """After any imports, no module of the package replaces a function."""
+    """Importing all modules replaces no function of the package by a module with the same name."""
     program = (
         "import prw, pkgutil, importlib\n"
         "for module in pkgutil.walk_packages(prw.__path__, 'prw.'):\n"
@@ -105,7 +105,7 @@ def test_a_run_is_written_converted_and_drawn(testbed: Path, tmp_path: Path) -> 
 
 
 def test_numbers_are_read_back_unchanged(tmp_path: Path) -> None:
-    """Short and long ones, neighbours of powers of ten and two, and numbers with an exponent."""
+    """Tests short and long numbers, neighbours of powers of ten and two, and numbers with an exponent."""
     draws, path = np.random.default_rng(2), tmp_path / "motion.csv"
     powers = np.concatenate([10.0 ** np.arange(-6, 20), 2.0 ** np.arange(-16, 60)])
     near = np.concatenate(
@@ -121,7 +121,7 @@ def test_numbers_are_read_back_unchanged(tmp_path: Path) -> None:
 
 
 def test_where_the_fmu_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """PRW_FMU first, then the FMU in an installed package, then the clone's; the working directory does not matter."""
+    """PRW_FMU comes first, then the FMU in an installed package, then the FMU in the clone. The working directory does not matter."""
     own, here = tmp_path / "site" / "prw", tmp_path / "work" / "target" / "fmu"
     shutil.copytree(Path(prw.__path__[0]), own, ignore=shutil.ignore_patterns("__pycache__"))
     here.mkdir(parents=True)
@@ -157,7 +157,7 @@ def test_where_the_fmu_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 @pytest.mark.parametrize("rates", [False, True])
 def test_coarse_sampling_is_reported(testbed: Path, rates: bool) -> None:
-    """A sine of 3 Hz, compared with its samples at 20 kHz."""
+    """The reported error of a coarsely sampled sine of 3 Hz agrees with its difference from the same sine sampled at 20 kHz."""
 
     def motion(rate: int, with_rates: bool) -> prw.Motion:
         time = np.arange(rate + 1) / rate
@@ -188,7 +188,7 @@ def test_the_rates_of_coarse_sampling() -> None:
 
 
 def test_two_times(testbed: Path) -> None:
-    """Two rows are enough, as the error for a single row says. They are too few for an estimate of the sampling error."""
+    """Two rows are enough for a simulation, but too few for an estimate of the sampling error."""
     run = prw.simulate({"time": [0.0, 1e-3], "theta1": [0.0, 1e-4], "theta2": [0.0, -1e-4]}, fmu=testbed)
     assert len(run["roll"]) == 2 and run.sampling_errors == {} and run.doubt == ""
     assert (
