@@ -85,7 +85,7 @@ def spoilt(simulated: rig.Rig, fault: str, size: float) -> rig.Rig:
     return simulated._replace(outputs=outputs)
 
 
-#: Friction of both input shafts, N.m.
+#: Friction of each input shaft, N.m, that --friction simulates.
 FRICTIONS = (0.0, 0.0005, 0.001, 0.002, 0.003, 0.005, 0.01, 0.02)
 
 
@@ -104,7 +104,8 @@ def identified(fmu: str, simulated: rig.Rig, seed: int, channels, counts: int) -
     """Identifies the parameters NAMES from simulated measurements of a rig.
 
     Returns five values each of log(estimate / true value), its standard error, and whether the 95 % interval contains the true value.
-    Then follow the seconds, whether the verdict is "fits", and by how many of its widths the worst interval misses the true value."""
+    Then follow the seconds, whether the verdict is "fits", and the largest distance of a true value from its interval, in widths of
+    the interval; it is negative if all intervals contain the true values."""
     columns = rig.measure(simulated, seed + 1_000_000, channels, counts)
     with Model(fmu) as model, threadpool_limits(1):
         begin = time.perf_counter()
@@ -119,12 +120,12 @@ def identified(fmu: str, simulated: rig.Rig, seed: int, channels, counts: int) -
     return (solution.logarithms - true).tolist(), sure.relative.tolist(), inside.tolist(), seconds, verdict.fits, missed
 
 
-#: Files that results depend on.
+#: Directories on which the results depend.
 SOURCES = ("python/prw/src", "tests/analysis", "tests/oracle", "src", "modelDescription")
 
 
 def commit() -> str:
-    """Short hash of the commit, with "-dirty" if SOURCES differ from it."""
+    """Returns the short hash of the commit, with "-dirty" if SOURCES differ from it."""
 
     def git(*arguments: str) -> str:
         command = ["git", "-C", str(Path(__file__).resolve().parents[2]), *arguments]
@@ -263,7 +264,7 @@ def main() -> int:
     print(f"  the verdict is that it fits in {fits.mean():.1%}")
     whole = {"commit": commit(), "fits": float(fits.mean()), "repetitions": options.repetitions, "parameters": rows}
     write(whole, options.out)
-    print("unbiased, intervals honest" if good else "BIASED, intervals too narrow, or false alarms")
+    print("unbiased, intervals have the stated coverage" if good else "BIASED, intervals too narrow, or false alarms")
     return 0 if good else 1
 
 

@@ -1,6 +1,6 @@
 """A testbed with friction in its input shafts, integrated by SciPy: it uses neither the FMU, nor `prw`, nor the oracle's equations.
 
-The balances of torques follow from eqs. (1), (5), (6) and (7) of the paper by hand. Errors of the paper are corrected: the last
+The torque balances were derived by hand from eqs. (1), (5), (6) and (7) of the paper. Errors of the paper are corrected: the last
 spring of eq. (6) is k2, theta7 is pitch and theta8 is roll, and the values of Table 1 are per degree.
 """
 

@@ -47,7 +47,7 @@ def test_there_are_at_least_two_masters():
 
 
 def test_the_wrist_reaches_the_reference(response, closed_loop):
-    """Pitch stays within 0.1 degrees of 30 degrees, and roll of 60 degrees, after less than 0.6 s."""
+    """After less than 0.6 s, pitch stays within 0.1 degrees of 30 degrees, and roll within 0.1 degrees of 60 degrees."""
     for axis in ("pitch", "roll"):
         goal = closed_loop.inputs[f"{axis}_ref"][1]
         assert settling_time(response["time"], response[f"testbed.{axis}"], goal) < 0.6

@@ -57,7 +57,7 @@ def test_the_script_for_omsimulator(closed_loop):
 
 
 def test_the_model_for_openmodelica_has_the_connections_of_the_ssp(closed_loop):
-    """Compares names and values with the SSP, because no Modelica compiler is installed here."""
+    """Compares names and values with the SSP, because OpenModelica, which would import the FMUs, is not installed here."""
     model = (ROOT / "examples/openmodelica/ClosedLoop.mo").read_text(encoding="utf-8")
     connections = re.findall(r"^  connect\(([\w.]+), ([\w.]+)\);$", model, flags=re.M)
     # These signals are sampled, not connected. Without `pre`, OpenModelica assumes an algebraic loop.

@@ -88,7 +88,7 @@ def test_the_errors_of_held_inputs_in_the_document():
 
 @pytest.fixture
 def validate(monkeypatch, tmp_path, fmu):
-    """Runs the command with one importer and one master; returns its status and both files."""
+    """Returns a function that runs the command with one importer and one master, and returns its status and both files."""
     monkeypatch.chdir(ROOT)
     monkeypatch.setattr(runs, "IMPORTERS", [i for i in runs.IMPORTERS if i.name == "fmu_run"])
     monkeypatch.setattr(runs.masters, "MASTERS", runs.masters.MASTERS[:1])

@@ -193,7 +193,7 @@ def written(found, tmp_path_factory):
 
 
 def test_figures_are_up_to_date(written):
-    """Coordinates in the committed figures differ by at most a fiftieth of a point from figures of the present FMU."""
+    """Coordinates in the committed figures differ by at most a fiftieth of a point from figures drawn with the current FMU."""
     made_with = json.loads((ROOT / COMMITTED / "numbers.json").read_text(encoding="utf-8"))["made_with"]
     if made_with != f"matplotlib {matplotlib.__version__}":
         pytest.skip(f"the figures were drawn by {made_with}")

@@ -151,7 +151,7 @@ def order_error(make_instance, model, spacing, steps, reading):
 @pytest.mark.parametrize("spacing", SPACING)
 @pytest.mark.parametrize("reading", ["at", "after"])
 def test_second_order_with_angles_only(make_instance, model, spacing, reading):
-    """Outputs read with the new angles set ("at") and right after the step, as most importers do ("after")."""
+    """Outputs are read after the new angles are set ("at"), and right after the step, as most importers do ("after")."""
     errors = [order_error(make_instance, model, SPACING[spacing], steps, reading) for steps in (200, 400, 800)]
     orders = {
         name: [float(np.log2(coarse[name] / fine[name])) for coarse, fine in zip(errors, errors[1:])]

@@ -46,7 +46,7 @@ def check_stated(name: str, *parts: str) -> None:
 
 
 def test_outputs_that_are_read_before_inputs_are_set(fmu, exact):
-    """FMIKit in Co-Simulation."""
+    """FMIKit calls the FMU in this order in Co-Simulation."""
     known = dict(zip(MOTORS, np.array([[*angles(t), *rates(t)] for t in TIME]).T))
     found = {}
     with Fmu(fmu) as testbed:
@@ -98,7 +98,7 @@ ODE4 = (0, 0.5, 0.5, 1), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 
 
 def test_fixed_steps_in_model_exchange(fmu, exact):
-    """Explicit Euler in OpenModelica, and Simulink's ode4 with FMIKit."""
+    """Integrates with explicit Euler as OpenModelica, and with ode4 as Simulink with FMIKit."""
     torque, roll = shares(exact, *in_model_exchange(fmu, (0,), (1,)))
     check_stated("docs/compatibility.md", f"off by {roll:.1f} % in roll and", f"{torque:.1f} % in torque")
     check_stated(

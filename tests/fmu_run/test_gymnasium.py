@@ -39,7 +39,7 @@ def task(testbed) -> Task:
 
 
 def played(envs, steps, seed=5):
-    """Returns all results of random actions."""
+    """Plays random actions, and returns the observations, rewards and ends of episodes."""
     envs.action_space.seed(seed)
     found = [envs.reset(seed=seed)[0]]
     for _ in range(steps):
@@ -128,7 +128,7 @@ def test_environments_equal_instances(task, mode) -> None:
                 observed, _ = envs.reset(options={"reset_mask": np.ones(count, dtype=bool)})
                 expected, k = begun(), 0
             assert np.array_equal(observed, expected) and not terminated.any()
-            observed[:] = np.nan  # The caller owns the array.
+            observed[:] = np.nan  # The caller owns the array, so overwriting it must not affect the environments.
     envs.close()
     with pytest.raises(fmu_run.FmuError, match="closed"):
         envs._own.instances()

@@ -74,7 +74,7 @@ def test_cvodes(testbed, version, unpack, model, record):
 
 
 def test_derivatives_with_respect_to_parameters(tunable, version, unpack, record):
-    """CasADi treats `fixed` parameters as constants. The parameters of the FMU built with `--tunable` are its `p`."""
+    """CasADi treats `fixed` parameters as constants. For the FMU built with `--tunable`, they are the input `p` of its functions."""
     dae = casadi.DaeBuilder("testbed", unpack(tunable))
     physical = np.array([name in REAL for name in dae.p()])
     assert {name for name, real in zip(dae.p(), physical) if real} == set(REAL)

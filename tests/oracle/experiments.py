@@ -122,7 +122,7 @@ def fig4(name: str, description: str, sign: int) -> Experiment:
 
 
 def point_to_point(start: Any, end: Any, duration: float) -> tuple[Function, Function]:
-    """Returns functions for the angles and rates (2,) of a move of `duration` s with continuous acceleration, of degree 5."""
+    """Returns functions for the angles and rates (2,) of a move of `duration` s: a polynomial of degree 5 with continuous acceleration."""
 
     def angle(t: float) -> Any:
         s = min(t / duration, 1.0)

@@ -448,7 +448,7 @@ WebAssembly.Instance = function (...all) {
 
 
 def test_a_run_that_the_fmu_ends(visit: Any) -> None:
-    """An end of the run by the FMU is not an error, and the time stays at the last result."""
+    """If the FMU ends the run, this is not an error, and the time stays at the last result."""
     page = visit("#try&motion=tour&speed=2", script=ENDING)
     expect(page.locator(".live-status")).to_have_text("The FMU has ended the run at 0.5 s.")
     expect(page.locator(".live-error")).to_have_count(0)

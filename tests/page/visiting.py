@@ -67,7 +67,7 @@ def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> No
 
 
 def find_part(page: Page, cursor: str = "ns-resize") -> tuple[float, float]:
-    """Returns the position in the image at which the mouse has this cursor, and leaves the mouse there. Motor 1 has the cursor
+    """Returns a position in the image at which the mouse cursor has this shape, and leaves the mouse there. Motor 1 has the cursor
     "ns-resize", the gripper "move"."""
     scene = page.locator(".live-scene")
     box = scene.bounding_box()

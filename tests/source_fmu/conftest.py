@@ -1,4 +1,4 @@
-"""Fixtures: the FMUs of C sources, unpacked, and compilers for them."""
+"""Fixtures: the unpacked FMUs that contain C sources, and compilers for them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 @dataclass(frozen=True)
 class Compiler:
-    """A C compiler, and the start of the command that runs its programs here, or None if they cannot run here."""
+    """A C compiler. `start` begins the command that runs its programs here; it is None if they cannot run here."""
 
     command: tuple[str, ...]
     start: tuple[str, ...] | None = ()
