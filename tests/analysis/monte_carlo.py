@@ -17,8 +17,8 @@ With --faulty, the rigs have faults. The exit status is 1 if, of the rigs with a
 two of its widths, more than 1 % have the verdict "fits".
 
 With --friction, the rigs are simulated by plant.py, which has other equations and friction in the input shafts, from none to gross.
-The exit status is 1 if, at any friction, less than 92 % of the 95 % intervals of rigs with the verdict "fits" contain the true
-value, or if less than 97 % of the rigs without friction fit.
+The exit status is 1 if less than 97 % of the rigs without friction have the verdict "fits". It is also 1 if, at any friction,
+less than 92 % of the 95 % intervals of rigs with this verdict contain the true value.
 """
 
 from __future__ import annotations
@@ -135,8 +135,8 @@ def commit() -> str:
 
 
 def campaign(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[dict, bool]:
-    """Returns the verdicts on rigs with faults, by fault and size, and whether gross errors are noticed: of the rigs with an interval
-    that misses by more than two of its widths, at most 1 % have the verdict "fits"."""
+    """Returns the verdicts on rigs with faults, by fault and size, and whether gross errors are noticed. They are noticed if, of the
+    rigs with an interval that misses by more than two of its widths, at most 1 % have the verdict "fits"."""
     rows, rigs = {}, options.faulty
     print(
         f"{rigs} rigs for each fault and size, all sensors: share that does not fit (worst miss where it fits, in widths)"

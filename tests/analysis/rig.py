@@ -198,9 +198,10 @@ def measure(
     log_rates: bool = False,
     noise: float = 0.02,
 ):
-    """Returns the columns that the sensors record, in SI: quantised angles of motors and shafts, for shafts with an unknown zero;
-    torques with `noise` N.m, quantised to a quarter of the noise, with an offset; pitch and roll of an inertial sensor with
-    1 mrad of noise and an offset."""
+    """Returns the columns that the sensors record, in SI.
+
+    Angles of motors and shafts are quantised, and the zeros of shafts are unknown. Torques have `noise` N.m of noise, an offset, and
+    steps of a quarter of the noise. Pitch and roll have 1 mrad of noise and an offset, as from an inertial sensor."""
     random = np.random.default_rng(seed)
     quantum = 2 * np.pi / counts
 

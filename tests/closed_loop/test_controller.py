@@ -38,7 +38,8 @@ def test_the_validator_reports_nothing(controller):
 
 
 def moved_by_fmpy(fmu, **options) -> np.ndarray:
-    """Returns the motors' motion (samples, 4) at each sample. All inputs are linear in time, so every importer interpolates them exactly."""
+    """Returns the motion of the motors (samples, 4) at each sample. All inputs are linear in time, so importers interpolate them
+    exactly."""
     time = np.arange(0.0, 1.0 + STEP / 2, STEP)
     slopes = {
         "pitch_ref": 0.5,

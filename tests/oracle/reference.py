@@ -1,6 +1,6 @@
 """Exact and independently integrated responses of the testbed, with which the FMU is compared.
 
-`follow` is exact for motor angles that are linear between communication points, with jumps allowed at the points; it
+`follow` is exact for motor angles that are linear between communication points, with jumps allowed at the points. It
 exponentiates the system augmented by the motion of the motors, in doubles (scipy) or to any precision (mpmath).
 `integrate` takes any smooth motion of the motors and uses scipy's DOP853. The two functions share only the linear model.
 """
