@@ -37,7 +37,7 @@ class Instance:
         """Frees the instance and unloads the library."""
         self.fmi.freeInstance()
 
-    def complaints(self) -> list:
+    def unexpected_messages(self) -> list:
         """Returns the messages that are warnings or errors, or whose category is not logEvents."""
         return [message for message in self.messages if message[0] > 0 or message[1] != "logEvents"]
 

@@ -65,7 +65,7 @@ FAULTS = {
 }
 
 
-def spoilt(simulated: rig.Rig, fault: str, size: float) -> rig.Rig:
+def with_fault(simulated: rig.Rig, fault: str, size: float) -> rig.Rig:
     """Returns the rig with a fault of FAULTS. size: in the unit of the fault."""
     if fault == "late":
         return rig.late(simulated, 1e-3 * size)
@@ -92,7 +92,7 @@ FRICTIONS = (0.0, 0.0005, 0.001, 0.002, 0.003, 0.005, 0.01, 0.02)
 def repetition(fmu: str, seed: int, channels, counts: int, motion: str, fault: str = "", size: float = 0.0) -> tuple:
     """Identifies a rig of `rig.experiment`, with a fault if one is named."""
     simulated = rig.experiment(seed, 6.0 if fault else 10.0, pattern=motion)
-    return identified(fmu, spoilt(simulated, fault, size) if fault else simulated, seed, channels, counts)
+    return identified(fmu, with_fault(simulated, fault, size) if fault else simulated, seed, channels, counts)
 
 
 def braked(fmu: str, seed: int, motion: str, friction: float) -> tuple:

@@ -189,7 +189,7 @@ def test_two_components_with_one_name(right, soft, fmu, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "spoil, note",
+    "change, note",
     [
         (lambda c: {**c, "roll": -c["roll"], "pitch": c["pitch"]}, "roll has the other sign"),
         (lambda c: {n: v[:501] for n, v in c.items()}, "the result has only 0 to 0.5 s of the experiment's 0 to 1 s"),
@@ -206,8 +206,8 @@ def test_two_components_with_one_name(right, soft, fmu, tmp_path):
         ),
     ],
 )
-def test_possible_causes(right, fmu, tmp_path, spoil, note):
-    found = prw.check(write_csv(tmp_path / "run.csv", spoil(right)), "fig4_opposite", fmu=fmu)
+def test_possible_causes(right, fmu, tmp_path, change, note):
+    found = prw.check(write_csv(tmp_path / "run.csv", change(right)), "fig4_opposite", fmu=fmu)
     assert any(note in line for line in found.notes), found.notes
 
 

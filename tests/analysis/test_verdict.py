@@ -6,7 +6,7 @@ import numpy as np
 import plant
 import pytest
 import rig
-from monte_carlo import spoilt
+from monte_carlo import with_fault
 
 import prw
 
@@ -46,7 +46,7 @@ FAULTY_COLUMNS = {
 @pytest.mark.parametrize("fault", FAULTY_RIGS, ids=lambda fault: f"{fault[0]} {fault[1]:g}")
 def test_a_rig_with_a_fault_does_not_fit(experiment, fmu, fault):
     channels, reported = FAULTY_RIGS[fault]
-    found = prw.identify(recording(spoilt(experiment, *fault)), starts=1, fmu=fmu)
+    found = prw.identify(recording(with_fault(experiment, *fault)), starts=1, fmu=fmu)
     assert not found.fits
     assert set(channels) <= {misfit.channel for misfit in found.verdict.misfits}, found.misfits
     assert any(reported in cause for cause in found.diagnosis), found.diagnosis
@@ -109,7 +109,7 @@ def test_coarse_encoders_on_the_motors_are_not_a_fault(fmu):
     ],
 )
 def test_faults_are_estimated_along(experiment, fmu, fault, option, channels, size):
-    found = prw.identify(recording(spoilt(experiment, *fault)), starts=1, fmu=fmu, **{option: channels})
+    found = prw.identify(recording(with_fault(experiment, *fault)), starts=1, fmu=fmu, **{option: channels})
     assert found.fits, found.misfits
     for name in channels:
         value, error = found.distortions[f"{option} of {name}"]

@@ -66,7 +66,7 @@ def test_the_document_has_the_errors_that_the_example_prints(example, monkeypatc
     assert rows == [[f"{1e3 * h:g} ms", *shares] for h, shares in stated.items()]
     assert len(figure.axes) == 2
     fine = example.FINEST * np.arange(round(0.4 / example.FINEST) + 1)
-    exact = machine.simulate(fine, table_1(), moved=example.jump, breaks=()).tau[:, 0]
+    exact = machine.simulate(fine, table_1(), references=example.jump, breaks=()).tau[:, 0]
     for h in (2e-3, 0.25e-3):
         for extrapolated, share in zip((False, True), found[h]):
             _, coupled = example.simulate(h, extrapolated, example.jump, 0.1)

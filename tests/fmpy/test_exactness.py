@@ -37,7 +37,7 @@ def check(instance, parameters, t, theta, slope, expected):
     found = instance.run(t, theta, derivative=slope)
     for values, true_values in zip(found, expected):
         assert_close(values, true_values, 1e-11)
-    assert not instance.complaints()
+    assert not instance.unexpected_messages()
 
 
 @pytest.mark.parametrize("seed", range(12))

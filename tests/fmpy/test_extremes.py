@@ -22,7 +22,7 @@ DIGITS = 120
 many = np.vectorize(mpmath.mpf, otypes=[object])
 
 
-def either_side(values):
+def larger_of_pair(values):
     """Replaces both values of each pair (theta3 and theta4, ...) by the larger one."""
     pairs = np.asarray(values).reshape(-1, 2)
     return np.repeat(pairs.max(axis=1), 2)
@@ -53,11 +53,11 @@ class Exact:
         end = self.step_matrix @ np.concatenate([x, theta, slope])
         size = abs(self.step_matrix) @ np.concatenate([size, abs(theta), abs(slope)])
         size[:4] += abs(x[:4])
-        size = either_side(size)
+        size = larger_of_pair(size)
         theta = theta + slope * self.h
         outputs = model.outputs(end, theta, slope)
         ratio = model.parameters["N"] / (2 * model.parameters["M"])
-        torque = either_side(abs(model.c) @ size + abs(model.d_angle) @ abs(theta) + abs(model.d_rate) @ abs(slope))
+        torque = larger_of_pair(abs(model.c) @ size + abs(model.d_angle) @ abs(theta) + abs(model.d_rate) @ abs(slope))
         sizes = {
             "tau1": torque[0], "tau2": torque[0],
             "pitch": size[2], "roll": 2 * ratio * size[2], "pitch_rate": size[4], "roll_rate": 2 * ratio * size[4],
@@ -87,7 +87,7 @@ def check(instance, parameters, h, seed, steps=3):
         found = instance.get(*STATES, *OUTPUTS)
         assert np.all(np.isfinite(found))
         worst = max(worst, float(max(abs(many(found) - true_values) / size)))
-    assert not instance.complaints()
+    assert not instance.unexpected_messages()
     return worst
 
 
@@ -134,7 +134,7 @@ def test_a_million_steps(instance, factors):
         set_real(component, references, 2, theta)
         do_step(component, t, h, 1)
     found = instance.get(*STATES, *OUTPUTS)
-    assert not instance.complaints()
+    assert not instance.unexpected_messages()
     with mpmath.workdps(DIGITS):
         exact = Exact(parameters, steps * h)
         true_values, size = exact.step(np.zeros(6), np.zeros(2), slope)

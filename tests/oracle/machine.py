@@ -97,17 +97,18 @@ def simulate(
     parameters: Mapping[str, float],
     motor: Mapping[str, float] = MOTOR_DATA,
     gains: Mapping[str, float] = GAINS,
-    moved: Callable[[float], tuple[np.ndarray, np.ndarray]] = reference,
+    references: Callable[[float], tuple[np.ndarray, np.ndarray]] = reference,
     breaks: tuple[float, ...] = (DURATION,),
 ) -> Trajectory:
-    """Integrates the machine from rest at zero angles to the times (n,) s. The references `moved` are smooth between `breaks`.
+    """Integrates the machine from rest at zero angles to the times (n,) s. The angles and rates of `references` are smooth between
+    `breaks`.
 
     The state is (theta1..theta6, theta1', theta2', theta5', theta6', both currents, both integral parts)."""
     mechanics = Mechanics(parameters, motor["J1"])
 
     def slope(t: float, x: np.ndarray) -> np.ndarray:
         theta, rate, current, integral = x[MOTOR], x[6:8], x[10:12], x[12:14]
-        theta_ref, omega_ref = moved(t)
+        theta_ref, omega_ref = references(t)
         wanted = gains["stiffness"] * (theta_ref - theta) + gains["damping"] * (omega_ref - rate)
         error = wanted / motor["k"] - current
         voltage = gains["proportional"] * error + integral

@@ -22,7 +22,7 @@ def address(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 @pytest.fixture(scope="session")
-def controllers(tmp_path_factory: pytest.TempPathFactory) -> str:
+def controller_address(tmp_path_factory: pytest.TempPathFactory) -> str:
     """The address of the controller's page."""
     return page_of(built("prw_controller.fmu"), tmp_path_factory.mktemp("controllers"))
 

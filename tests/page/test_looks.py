@@ -25,11 +25,13 @@ def box(page: Page, selector: str) -> dict[str, float]:
 @pytest.mark.parametrize(("width", "height"), SIZES)
 @pytest.mark.parametrize("which", ["testbed", "controller"])
 def test_the_machine_comes_first(
-    visit: Any, address: str, controllers: str, which: str, width: int, height: int
+    visit: Any, address: str, controller_address: str, which: str, width: int, height: int
 ) -> None:
     """The machine is visible without scrolling, its plots are next to it or below, and nothing shifts or is wider than the window."""
     page = visit(
-        at=address if which == "testbed" else controllers, script=SHIFTS, viewport={"width": width, "height": height}
+        at=address if which == "testbed" else controller_address,
+        script=SHIFTS,
+        viewport={"width": width, "height": height},
     )
     button(page, "Pause").wait_for()
     page.wait_for_timeout(1200)

@@ -27,7 +27,7 @@ def text(page: Page, part: str = "what") -> str:
     return str(page.locator(f".live-{part} p.live-chosen").inner_text()).replace("\u00a0", " ").replace("\u2212", "-")
 
 
-def dial(page: Page, name: str, value: float) -> None:
+def set_number(page: Page, name: str, value: float) -> None:
     """Sets a number of the paragraph with the keyboard."""
     number = page.locator(".live-what p.live-chosen").get_by_role("slider", name=name)
     for _ in range(400):
@@ -83,7 +83,7 @@ def test_one_motor_does_both(visit: Any, fmu: Path) -> None:
             page.locator(".live-parameters").evaluate("e => e.open = true")
             field(page, name).fill(str(count))
             field(page, name).press("Enter")
-        dial(page, "Angle of motor 1", angle)
+        set_number(page, "Angle of motor 1", angle)
         found, rows = replayed(fmu, saved(page), **counts)
         numbers = [float(one) for one in re.findall(r"(-?[\d.]+)°", text(page))]
         assert numbers[0] == angle and not rows["theta2"].any()
@@ -99,7 +99,7 @@ def test_mean_and_difference(visit: Any, fmu: Path) -> None:
         page.locator(".live-parameters").evaluate("e => e.open = true")
         field(page, "M").fill(str(lobes))
         field(page, "M").press("Enter")
-        dial(page, "Angle of the motors", angle)
+        set_number(page, "Angle of the motors", angle)
         assert f"roll is {ratio} times their difference" in text(page)
         found, rows = replayed(fmu, saved(page), M=lobes)
         together = rows["time"] < 2.5
@@ -118,7 +118,7 @@ def test_resonance(visit: Any, fmu: Path) -> None:
     expect(field(page, "k2")).to_have_value("0.76")
     assert "at 1.00 Hz" in text(page)
     for softness, peak in [(0.76, (5.35, 2.04)), (0.3, (3.31, 1.375)), (1.5, (6.85, 2.70))]:
-        dial(page, "Stiffness k2", softness)
+        set_number(page, "Stiffness k2", softness)
         height, place = map(float, re.findall(r"([\d.]+) times as far, at ([\d.]+) Hz", text(page))[0])
         k2 = np.rad2deg(softness)
         assert (place, height) == pytest.approx(peak, abs=0.06)
@@ -128,7 +128,7 @@ def test_resonance(visit: Any, fmu: Path) -> None:
         assert ("the peak is lower" in text(page, "why")) == (softness < 0.76)
         assert ("the peak is higher" in text(page, "why")) == (softness > 0.76)
     for frequency in (5.0, 6.85):
-        dial(page, "Frequency", frequency)
+        set_number(page, "Frequency", frequency)
         says = float(re.findall(r"The wrist swings ([\d.]+) times", text(page))[0])
         assert says == pytest.approx(gain(fmu, frequency, k2=np.rad2deg(1.5)), abs=0.006)
         assert ("This is the peak" in text(page)) == (frequency == 6.85)
@@ -144,7 +144,7 @@ def test_stop_dead(visit: Any, fmu: Path) -> None:
     step(page, 4)
     assert "two parts, 14.1° and, half a swing later, 5.9°" in text(page)
     for softness in (0.76, 0.4, 2.0, 0.1):
-        dial(page, "Stiffness k2", softness)
+        set_number(page, "Stiffness k2", softness)
         found, rows = replayed(fmu, saved(page), k2=np.rad2deg(softness))
         first = np.searchsorted(rows["time"], 1.9 + 0.095)
         assert np.rad2deg(rows["theta1"][first]) == pytest.approx(14.1, abs=0.2)
@@ -191,8 +191,8 @@ def test_the_controller(visit: Any) -> None:
     page = visit(reduced_motion="reduce")
     step(page, 5)
     for pitch, roll in [(25, 50), (-10, 50), (-10, -7)]:
-        dial(page, "Pitch wanted", pitch)
-        dial(page, "Roll wanted", roll)
+        set_number(page, "Pitch wanted", pitch)
+        set_number(page, "Roll wanted", roll)
         rows = np.genfromtxt(io.StringIO(saved(page)), delimiter=",", names=True, skip_header=2)
         late = np.searchsorted(rows["time"], 1.65 - 1e-9)
         numbers = [float(one) for one in re.findall(r"(-?[\d.]+)°", text(page))]

@@ -372,9 +372,9 @@ def test_the_address_and_back(visit: Any) -> None:
     expect(frequency).to_have_text("1.05\u00a0Hz")
 
 
-def test_the_controllers_page_runs_the_loop(visit: Any, controllers: str) -> None:
+def test_the_controllers_page_runs_the_loop(visit: Any, controller_address: str) -> None:
     """The testbed runs next to the controller, and the wrist reaches its goals, also goals that are set by hand."""
-    page = visit(at=controllers)
+    page = visit(at=controller_address)
     button(page, "Pause").click()
     rows = np.genfromtxt(io.StringIO(saved(page)), delimiter=",", names=True, skip_header=2)
     late = np.searchsorted(rows["time"], 1.85)

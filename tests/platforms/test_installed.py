@@ -82,7 +82,7 @@ def test_the_experiment_of_fig_4(installed: Installed) -> None:
 
 
 @pytest.fixture(scope="session")
-def student(installed: Installed) -> Installed:
+def study(installed: Installed) -> Installed:
     """The packages of identification and sweeps, and the examples of the documentation."""
     installed.install(f"{prw_wheel()}[study]")
     shutil.copytree(ROOT / "examples", installed.directory / "examples", ignore=shutil.ignore_patterns("*-fmu"))
@@ -92,28 +92,28 @@ def student(installed: Installed) -> Installed:
 
 
 @pytest.mark.parametrize("page", ["README.md", "python/prw/README.md"])
-def test_the_programs_in_the_readmes(student: Installed, page: str) -> None:
+def test_the_programs_in_the_readmes(study: Installed, page: str) -> None:
     programs = [text for language, text in BLOCK.findall((ROOT / page).read_text()) if language == "python"]
     assert programs
     for program in programs:
-        student.run("python", "-c", program)
+        study.run("python", "-c", program)
 
 
-def test_the_tutorial(student: Installed) -> None:
+def test_the_tutorial(study: Installed) -> None:
     """Runs all commands except those that need the sources. If the tutorial builds an FMU, the FMU in the wheel replaces it."""
     done = []
     for language, block in BLOCK.findall((ROOT / "python" / "prw" / "tutorial.md").read_text()):
         if language == "python":
-            student.run("python", "-c", block)
+            study.run("python", "-c", block)
             continue
         for line in block.splitlines():
             program, *arguments = re.sub(r" --fmu \S+", "", line).split()
             if program not in ("make", "cargo"):
-                student.run(program, *arguments)
+                study.run(program, *arguments)
                 done.append(f"{program} {arguments[0]}")
     assert {"prw excite", "prw identify", "prw simulate", "prw sweep"} <= set(done)
     for made in ("identified/report.html", "identified/identified.ssv", "sweep/runs.parquet"):
-        assert (student.directory / "out" / made).is_file()
+        assert (study.directory / "out" / made).is_file()
 
 
 @dataclass(frozen=True)

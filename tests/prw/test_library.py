@@ -203,7 +203,7 @@ def test_two_times(testbed: Path) -> None:
 
 def test_wrong_motions() -> None:
     time, theta = [0.0, 1.0], [[0.0, 0.0], [1.0, 1.0]]
-    for arguments, complaint in [
+    for arguments, message in [
         ((None, theta), "motion: time is None; it must be an array"),
         (([0.0], [[0.0, 0.0]]), r"time has the shape \(1,\); it must be \(n,\), with at least two times"),
         ((time, [0.0, 1.0]), r"theta has the shape \(2,\); it must be \(2, 2\), a column each motor"),
@@ -212,12 +212,12 @@ def test_wrong_motions() -> None:
         (([0.0, float("nan")], theta), "time must increase"),
         ((["now", "then"], theta), "time does not consist of numbers"),
     ]:
-        with pytest.raises(prw.UserError, match=complaint):
+        with pytest.raises(prw.UserError, match=message):
             prw.Motion(*arguments)  # type: ignore[arg-type]
 
 
 def test_wrong_simulations(testbed: Path, tmp_path: Path) -> None:
-    for arguments, complaint in [
+    for arguments, message in [
         ({"parameters": {"k9": 1.0}}, "parameters: k9 is not known; there are J2, J3, H3"),
         ({"parameters": {"k1": -1.0}}, "the FMU stopped: .*k1 must not be below 1e-300"),
         ({"parameters": {"N": 7.5}}, "N.* 7.5"),
@@ -229,7 +229,7 @@ def test_wrong_simulations(testbed: Path, tmp_path: Path) -> None:
         ({"fmu": tmp_path / "absent.fmu"}, "absent.fmu: no such FMU$"),
         ({"motion": tmp_path / "absent.csv"}, "absent.csv: cannot be read"),
     ]:
-        with pytest.raises(prw.UserError, match=complaint) as caught:
+        with pytest.raises(prw.UserError, match=message) as caught:
             prw.simulate(**{"fmu": testbed, **dict(arguments)})  # type: ignore[call-overload]
         assert "\n" not in str(caught.value)
 
@@ -246,7 +246,7 @@ def test_sweep_draws(testbed: Path) -> None:
 
 
 def test_wrong_sweeps(testbed: Path) -> None:
-    for arguments, complaint in [
+    for arguments, message in [
         ({}, "nothing varies; give values of a parameter"),
         ({"grid": {"k9": [1.0]}}, "k9 is not known; there are J2"),
         ({"grid": {"k1": []}}, "k1: .* are not the values of a parameter"),
@@ -263,7 +263,7 @@ def test_wrong_sweeps(testbed: Path) -> None:
         ({"random": {"k1": 0.1}, "threads": 0}, "threads 0: at least 1"),
         ({"grid": {"k1": np.ones(4000), "k2": np.ones(4000)}}, "16000000 runs are more than"),
     ]:
-        with pytest.raises(prw.UserError, match=complaint):
+        with pytest.raises(prw.UserError, match=message):
             prw.sweep(fmu=testbed, **arguments)  # type: ignore[arg-type]
 
 
@@ -286,12 +286,12 @@ def test_the_command_linearize(testbed: Path, tmp_path: Path) -> None:
     written = json.loads((tmp_path / "out" / "linear.json").read_text())
     np.testing.assert_array_equal(written["A"], prw.linearize({"k1": 90.0}, fmu=testbed).A)
     assert written["outputs"][0] == "tau1" and written["units"]["tau1"] == "N.m"
-    for wrong, complaint in (
+    for wrong, message in (
         ("k1", "--set k1: write NAME=VALUE"),
         ("k1=stiff", "--set k1=stiff: 'stiff' is not a number"),
     ):
         result = command("--set", wrong)
-        assert result.returncode == 1 and complaint in result.stderr and result.stderr.count("\n") == 1
+        assert result.returncode == 1 and message in result.stderr and result.stderr.count("\n") == 1
 
 
 def blocks(page: str) -> list[tuple[str, str]]:

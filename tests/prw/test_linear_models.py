@@ -190,7 +190,7 @@ def _description(fmu: Path) -> str:
         ({"fmi_type": "ScheduledExecution"}, "offers no directional derivatives for ScheduledExecution"),
     ],
 )
-def test_complaints(testbed: Path, arguments: Any, message: Any) -> None:
+def test_errors(testbed: Path, arguments: Any, message: Any) -> None:
     with pytest.raises(prw.UserError) as caught:
         prw.linearize(fmu=testbed, **arguments)
     assert message in str(caught.value) and "\n" not in str(caught.value)

@@ -85,11 +85,11 @@ BAD = {
 
 @pytest.mark.parametrize("case", BAD)
 def test_recordings_that_cannot_be_read(file: Any, case: Any) -> None:
-    content, complaint = BAD[case]
+    content, message = BAD[case]
     path = file(content)
     with pytest.raises(UserError) as error:
         read(path)
-    assert str(error.value).startswith(str(path)) and complaint in str(error.value) and "\n" not in str(error.value)
+    assert str(error.value).startswith(str(path)) and message in str(error.value) and "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize(
@@ -137,7 +137,7 @@ def test_numbers_of_many_rows(tmp_path: Path, delimiter: Any, end: Any) -> None:
     np.testing.assert_array_equal(recording["theta1"], expected[:, 0])
     np.testing.assert_array_equal(recording["tau1"], expected[:, 3])
     np.testing.assert_array_equal(recording["pitch"], expected[:, 4])
-    for column, cell, complaint in [
+    for column, cell, message in [
         (2, "", "row 402, column theta1: empty cell"),
         (2, "1_0", "row 402, column theta1: '1_0' is not a number"),
         (3, "inf", "row 402, column theta2: inf is not finite"),
@@ -146,7 +146,7 @@ def test_numbers_of_many_rows(tmp_path: Path, delimiter: Any, end: Any) -> None:
     ]:
         before, cells[400][column] = cells[400][column], cell
         write()
-        with pytest.raises(UserError, match=re.escape(complaint)):
+        with pytest.raises(UserError, match=re.escape(message)):
             read(path)
         cells[400][column] = before
 
@@ -325,6 +325,6 @@ def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
         ({**good, "theta1 [deg]": [0.0, 1.0]}, "recording, column theta1: appears twice"),
         (None, "None is not a recording: neither a file nor a DataFrame"),
     ]
-    for source, complaint in wrong:
-        with pytest.raises(UserError, match=complaint):
+    for source, message in wrong:
+        with pytest.raises(UserError, match=message):
             read(source)

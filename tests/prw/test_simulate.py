@@ -152,7 +152,7 @@ def test_the_script_writes_the_example_recordings(tmp_path: Path) -> None:
         assert (tmp_path / path.name).read_bytes() == path.read_bytes()
 
 
-def test_other_complaints(prw: Any, tmp_path: Path) -> None:
+def test_other_errors(prw: Any, tmp_path: Path) -> None:
     (tmp_path / "good.csv").write_text(GOOD)
     (tmp_path / "no.fmu").write_text("not a zip")
     (tmp_path / "taken").write_text("a file where a directory should be")
