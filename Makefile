@@ -124,9 +124,10 @@ check-release: $(VENV)/importers.stamp need-rust
 # The FMUs are built by the programs that the Rust tests compiled.
 test: need-rust need-python
 	@$(MAKE) --no-print-directory $(TWO_JOBS) PROGRAMS=target/debug test-crates test-python $(VENV)/importers.stamp \
-	  $(VENV)/examples.stamp test-docs importer-fmus
+	  $(VENV)/examples.stamp test-docs importer-fmus source-fmu
 	$(PY) dev/platforms/bill_of_materials.py --check
 	PROGRAMS=target/debug $(PYTEST) $(FMU_TESTS) tests/closed_loop tests/importers tests/examples
+	$(PYTEST) -m small tests/source_fmu
 
 # C programs are compiled against the standard's headers, which FMPy brings.
 headers: $(VENV)/tests.stamp
@@ -242,7 +243,7 @@ release: need-rust $(DIST_VENV)/release.stamp
 	@$(DIST_VENV)/bin/python dev/platforms/release.py
 
 # The library is compiled to WebAssembly and translated to C, for targets with a C compiler but without Rust.
-source-fmu: need-rust $(VENV)/wasm2c.stamp
+source-fmu: need-rust $(VENV)/wasm2c.stamp $(if $(PROGRAMS),compile-tests)
 	@$(ADD_WEBASSEMBLY)
 	@$(WITH_WASM2C) $(BUILD_FMU) --c-sources
 

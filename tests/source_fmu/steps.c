@@ -96,23 +96,50 @@ static void on_threads(void) {
 static void on_threads(void) {}
 #endif
 
-/* Saves states until the memory is full, checks that the instance still works, and frees all states. */
-static void fill(Instance *fmu) {
-    static fmi2FMUstate states[1000];
+static fmi2FMUstate states[1000];
+
+static int save_until_full(Instance *fmu) {
     int count = 0;
     while (count < 1000 && fmi2GetFMUstate(fmu, &states[count]) == fmi2OK) {
         count++;
     }
     printf("states %d\n", count);
+    return count;
+}
+
+static void release(Instance *fmu, int i) {
+    if (fmi2FreeFMUstate(fmu, &states[i]) != fmi2OK) {
+        exit(1);
+    }
+}
+
+/* Saves states until the memory is full, and checks that each can be replaced and that the instance still works. Frees all states. */
+static void fill(Instance *fmu) {
+    int i, count = save_until_full(fmu);
     printf("full %d\n", fmi2GetFMUstate(fmu, &states[999]));
+    for (i = 0; i < count; i++) {
+        release(fmu, i);
+        if (fmi2GetFMUstate(fmu, &states[i]) != fmi2OK) {
+            exit(1);
+        }
+    }
     if (fmi2Reset(fmu) != fmi2OK) {
         exit(1);
     }
     initialize(fmu);
     printf("hash %016llx\n", (unsigned long long)run(fmu));
     while (count-- > 0) {
-        if (fmi2FreeFMUstate(fmu, &states[count]) != fmi2OK) {
-            exit(1);
+        release(fmu, count);
+    }
+}
+
+/* Saves and frees states often, which would show that memory is lost. */
+static void fill_often(Instance *fmu) {
+    int i, count;
+    for (i = 0; i < 100; i++) {
+        count = save_until_full(fmu);
+        while (count-- > 0) {
+            release(fmu, count);
         }
     }
 }
@@ -150,6 +177,7 @@ int main(int count, char **arguments) {
 
     fill(fmu);
     fill(fmu);
+    fill_often(fmu);
 
     /* Damages the module of one instance, which can then only be freed. The other instance must not be affected. */
     for (i = 0; i < FMU_TABLE; i++) {

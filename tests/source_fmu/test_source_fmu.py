@@ -96,9 +96,11 @@ def test_the_sources_are_strict_c99(name: str, sources: Path, tmp_path: Path) ->
         compiler.compile(sources, tmp_path / "object.o", *STRICT, "-O1", "-c", str(sources / file))
 
 
+#: Options for gcc that `make test` runs, too.
+SMALL = ("-std=c99", "-O0")
 #: Default options, and options that permit more optimization. In GNU mode, gcc fuses products and sums unless sources forbid it.
 OPTIONS = {
-    "gcc": [("-std=c99", "-O0"), ("-O2",), ("-O3", "-march=native")],
+    "gcc": [SMALL, ("-O2",), ("-O3", "-march=native")],
     "clang": [("-O2",), ("-O3", "-march=native")],
     "mingw": [("-O2",)],
     "aarch64": [("-std=gnu99", "-O2"), ("-O3", "-ffp-contract=fast")],
@@ -107,7 +109,14 @@ OPTIONS = {
 }
 
 
-@pytest.mark.parametrize(("name", "options"), [(name, o) for name, several in OPTIONS.items() for o in several])
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        pytest.param(name, options, marks=pytest.mark.small if options is SMALL else ())
+        for name, several in OPTIONS.items()
+        for options in several
+    ],
+)
 def test_every_processor_equals_the_library(
     name: str, options: tuple[str, ...], run: Callable[..., dict[str, list[str]]], library_hash: str
 ) -> None:
@@ -118,13 +127,15 @@ def test_every_processor_equals_the_library(
     assert 1000 < int(printed["stack"][0]) < 32768
     assert 2 <= int(printed["memory"][0]) < MEMORY
     assert MEMORY * 65536 < int(printed["block"][0]) < (MEMORY + 1) * 65536
-    # 3 is fmi2Error. The instance remains usable, and can save a state again for each state that is freed.
+    # 3 is fmi2Error. The instance remains usable.
     assert printed["full"] == ["3", "3"]
-    assert int(printed["states"][0]) > 20 and len(set(printed["states"])) == 1
+    # How many states fit depends a little on where the first are, but saving and freeing again and again loses no memory.
+    states = [int(count) for count in printed["states"]]
+    assert len(states) == 102 and min(states) > 20 and max(states[-10:]) == max(states)
     rejected = [
         line for line in printed["log"] if "free one, or compile the FMU with a larger FMU_MEMORY_PAGES" in line
     ]
-    assert len(rejected) == 4
+    assert len(rejected) == len(states) + len(printed["full"])
     # 4 is fmi2Fatal, which an instance with damaged memory returns from then on.
     assert printed["damaged"] == ["4", "4"]
     rest = [line for line in printed["log"] if line not in rejected]
@@ -240,9 +251,9 @@ def test_fmpy_compiles_and_runs_it(tmp_path: Path) -> None:
         assert results[0].tobytes() == results[1].tobytes()
 
 
-def cargo_test(library: Path, *arguments: str, **environment: str) -> str:
+def cargo_test(library: Path, *arguments: str, profile: str = "release", **environment: str) -> str:
     """Runs Rust tests on a library compiled from the C sources, which must have the guid of the source FMU; returns their output."""
-    command = ["cargo", "test", "--locked", "--release", *arguments]
+    command = ["cargo", "test", "--locked", "--profile", profile, *arguments]
     guid = fmpy.read_model_description(str(SOURCE_FMU)).guid
     environment = {**os.environ, "FMU_LIBRARY": str(library), "FMU_GUID": guid, **environment}
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
@@ -258,6 +269,16 @@ def test_the_tests_of_the_library_pass(sources: Path, tmp_path: Path) -> None:
     COMPILERS["gcc"].compile(sources, library, "-O2", "-fPIC", "-shared", "-DFMU_MEMORY_PAGES=64", *files, "-lm")
     output = cargo_test(library, "--test", "c_sources", "--test", "fmu", "--", "--include-ignored", "--nocapture")
     assert f"in {os.environ.get('SESSIONS', '300')} sessions" in output
+
+
+@pytest.mark.small
+def test_random_sessions(sources: Path, tmp_path: Path) -> None:
+    """The small form of the test above. The Rust test is the one that `make test` compiled with the workspace."""
+    library = tmp_path / "compiled.so"
+    files = [str(sources / name) for name in ("prw_testbed.c", "prw_testbed_fmi2.c")]
+    COMPILERS["gcc"].compile(sources, library, "-O0", "-fPIC", "-shared", "-DFMU_MEMORY_PAGES=64", *files, "-lm")
+    arguments = ("--workspace", "--test", "c_sources", "--", "--ignored", "--nocapture")
+    assert "in 30 sessions" in cargo_test(library, *arguments, profile="dev", SESSIONS="30")
 
 
 def test_random_sessions_with_sanitizers(sources: Path, tmp_path: Path) -> None:

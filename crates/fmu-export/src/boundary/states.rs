@@ -13,7 +13,7 @@ use std::ptr::without_provenance_mut;
 pub unsafe fn get_state<M: Exported>(instance: &mut Instance<M>, state: *mut *mut c_void) -> Outcome {
     // SAFETY: by contract, NULL or a pointer to a handle, which is initialized.
     let handle = unsafe { out_value(state, "FMUstate")?.assume_init_mut() };
-    check_memory(instance, *handle)?;
+    check_memory(instance, *handle, 0)?;
     *handle = without_provenance_mut(instance.save(handle.addr())?);
     Ok(())
 }
@@ -85,20 +85,25 @@ pub unsafe fn deserialize<M: Exported, Byte>(
             out_value(state, "FMUstate")?.assume_init_mut(),
         )
     };
-    check_memory(instance, std::ptr::null_mut())?;
+    check_memory(instance, std::ptr::null_mut(), size)?;
     *handle = without_provenance_mut(instance.deserialize(bytes, handle.addr())?);
     Ok(())
 }
 
-/// Rejects a further state if the memory of the instance is limited and too small for it.
-fn check_memory<M: Exported>(instance: &mut Instance<M>, handle: *mut c_void) -> Outcome {
+/// Rejects a further state if the memory of the instance is limited and too small for it. `serialized` is the length of the bytes
+/// that the state is read from.
+fn check_memory<M: Exported>(instance: &mut Instance<M>, handle: *mut c_void, serialized: usize) -> Outcome {
     #[cfg(target_family = "wasm")]
-    if handle.is_null() && !super::webassembly::has_memory(2 * instance.size_of_state()) {
-        return reject(
-            "the instance has no memory for another state; free one, or compile the FMU with a larger \
-             FMU_MEMORY_PAGES",
-        );
+    if handle.is_null() {
+        let [state, content] = instance.size_of_state();
+        // Collections may allocate twice as much as they contain.
+        if !super::webassembly::has_memory([state, 2 * content.max(serialized)]) {
+            return reject(
+                "the instance has no memory for another state; free one, or compile the FMU with a larger \
+                 FMU_MEMORY_PAGES",
+            );
+        }
     }
-    _ = (instance, handle);
+    _ = (instance, handle, serialized);
     Ok(())
 }

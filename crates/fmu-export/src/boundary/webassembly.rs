@@ -39,14 +39,17 @@ pub(super) fn keep_panics() {
     std::panic::set_hook(Box::new(keep));
 }
 
-/// Returns whether `size` contiguous bytes of memory are available, and some more for messages.
-pub(super) fn has_memory(size: usize) -> bool {
-    const SPARE: usize = 4096;
-    let mut piece = Vec::<u8>::new();
-    let is_there = piece.try_reserve_exact(size + SPARE).is_ok();
-    // Without this, the compiler may remove the unused allocation.
-    std::hint::black_box(piece);
-    is_there
+/// Returns whether blocks of memory with these sizes can be allocated at the same time, and another one for messages. They are
+/// separate because memory is fragmented: after a state was freed, another one must fit in its place.
+pub(super) fn has_memory<const N: usize>(sizes: [usize; N]) -> bool {
+    const MESSAGES: usize = 4096;
+    let allocate = |size| {
+        let mut block = Vec::<u8>::new();
+        // Without black_box, the compiler may remove the unused allocation.
+        block.try_reserve_exact(size).is_ok().then(|| std::hint::black_box(block))
+    };
+    let blocks = (sizes.map(allocate), allocate(MESSAGES));
+    blocks.0.iter().all(Option::is_some) && blocks.1.is_some()
 }
 
 /// Allocates `size` bytes for the arguments of a call, in place of the previous ones. Returns NULL if there
@@ -54,7 +57,7 @@ pub(super) fn has_memory(size: usize) -> bool {
 pub fn room(size: usize) -> *mut c_void {
     ROOM.with_borrow_mut(|room| {
         *room = Vec::new();
-        if !has_memory(size) {
+        if !has_memory([size]) {
             return std::ptr::null_mut();
         }
         room.reserve_exact(size.div_ceil(size_of::<u64>()));

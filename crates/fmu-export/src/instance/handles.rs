@@ -59,12 +59,14 @@ impl<V> Handles<V> {
         }
     }
 
-    /// Inserts an object and returns its handle. Returns `None` if there are too many for the bits of a handle.
+    /// Inserts an object and returns its handle. Returns `None` if there are too many for the bits of a handle or
+    /// for the memory.
     pub fn insert(&mut self, value: V) -> Option<usize> {
         self.identity.get_or_insert_with(|| Box::new(0));
         let index = match self.empty {
             Some(index) => index as usize,
             None if self.slots.len() <= INDEX_MASK => {
+                self.slots.try_reserve(1).ok()?;
                 self.slots.push(Slot { generation: 0, content: Content::Empty(None) });
                 self.slots.len() - 1
             }

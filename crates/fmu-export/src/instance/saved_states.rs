@@ -18,10 +18,10 @@ impl<M: Exported> Instance<M> {
         Origin(self.standard(), self.interface())
     }
 
-    /// Returns the current size of a saved state in bytes, including all data that it points to.
+    /// Returns the current size of a state in bytes, and of its content, which includes the data that it points to.
     #[cfg(target_family = "wasm")]
-    pub fn size_of_state(&mut self) -> usize {
-        size_of::<State<M>>() + serialized::size(&mut self.state)
+    pub fn size_of_state(&mut self) -> [usize; 2] {
+        [size_of::<State<M>>(), serialized::size(&mut self.state)]
     }
 
     /// Saves into the state of this handle, or into a new one; returns the handle. An existing state is
