@@ -11,8 +11,10 @@ use crate::pair::{PerSide, PitchRoll, from_modes, to_modes};
 use crate::parameters::Parameters;
 use crate::testbed::{State, StateBySide, split_by_side};
 
-/// State x and motion of the motors at one instant. All functions are linear in the instant, so they return
-/// values, partial derivatives (at unit points) or time derivatives (at the rates of a point).
+/// State x and motion of the motors at one instant.
+///
+/// All methods are linear in these numbers. If one number is 1 and the others are 0, the methods therefore return
+/// partial derivatives with respect to it; called on [`rates`](Self::rates), they return time derivatives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Instant {
     /// State x of eq. (11).
@@ -47,7 +49,7 @@ impl Instant {
 
     /// Returns the accelerations of the SECT input shafts, eq. (11a), rad/s2.
     pub fn accelerations(&self, system: &Decoupled) -> PerSide {
-        // M_II v_II' = -gamma - (load damping), split into pitch and roll.
+        // J v' = -tau - c v, separately for pitch and for roll.
         let torque = to_modes(self.torques(system)) * 0.5;
         let [.., v] = split_by_side(&self.x);
         let rate = to_modes(v) * 0.5;

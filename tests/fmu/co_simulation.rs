@@ -65,7 +65,7 @@ fn set_derivatives_come_first() {
                 [(); 3].map(|()| [random.between(-1.0, 1.0), random.between(-1.0, 1.0)]);
             fmu.set(&THETA, &theta);
             fmu.set(&OMEGA, &omega);
-            fmu.give_rates(&THETA, &rates);
+            fmu.set_input_derivatives(&THETA, &rates);
             assert_eq!(fmu.rates(THETA), rates);
             follower.step(&fmu, theta, rates, random.between(0.001, 0.05));
         }
@@ -90,7 +90,7 @@ fn the_order_of_setting_does_not_matter() {
         (fmu.rates(THETA), fmu.get([vr(Name::tau1), vr(Name::tau2)]))
     };
     let omega = |fmu: &Fmu| fmu.set(&OMEGA, &[5.0, -6.0]);
-    let derivative = |fmu: &Fmu| fmu.give_rates(&THETA, &[3.0, 4.0]);
+    let derivative = |fmu: &Fmu| fmu.set_input_derivatives(&THETA, &[3.0, 4.0]);
     let use_omega = |fmu: &Fmu| fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &1));
 
     let one = after_a_step(true, &[&omega, &derivative]);
@@ -185,7 +185,7 @@ fn higher_orders_are_harmless() {
         for fmu in [&plain, &rich] {
             fmu.set(&THETA, &[t.sin(), t.cos()]);
             if i % 4 < 2 {
-                fmu.give_rates(&THETA, &[t.cos(), -t.sin()]);
+                fmu.set_input_derivatives(&THETA, &[t.cos(), -t.sin()]);
             }
         }
         let values = [5.0, 6.0, 7.0, 8.0];
@@ -202,7 +202,7 @@ fn derivatives_of_the_initialization_are_used() {
     let [with, without] = [true, false].map(|given| {
         let fmu = in_mode(CoSimulation, Initialization);
         if given {
-            fmu.give_rates(&THETA, &[2.0, 0.0]);
+            fmu.set_input_derivatives(&THETA, &[2.0, 0.0]);
         }
         fmu.ok(fmu.fmi2ExitInitializationMode());
         fmu.step(0.0, 0.01);
@@ -217,11 +217,11 @@ fn steps_out_of_the_range_of_numbers() {
     let fmu = in_mode(CoSimulation, StepComplete);
     start_at(&fmu, [0.0; 6]);
     fmu.set(&[vr(Name::theta1)], &[f64::MAX]);
-    fmu.give_rates(&[vr(Name::theta1)], &[f64::MAX]);
+    fmu.set_input_derivatives(&[vr(Name::theta1)], &[f64::MAX]);
     fmu.rejected_with(&["would overflow"], |fmu| fmu.try_step(0.0, 10.0));
     fmu.rejected_with(&["tau1"], |fmu| fmu.fmi2GetReal(&vr(Name::tau1), 1, &mut 0.0));
     fmu.set(&[vr(Name::theta1)], &[0.1]);
-    fmu.give_rates(&[vr(Name::theta1)], &[0.0]);
+    fmu.set_input_derivatives(&[vr(Name::theta1)], &[0.0]);
     fmu.step(0.0, 10.0);
 }
 

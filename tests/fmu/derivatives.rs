@@ -103,7 +103,7 @@ fn co_simulation<F: Either>(use_omega: bool, at_rest: bool, with_rates: bool) {
         fits(&fmu);
         fmu.set(&INPUTS, &draw());
         if with_rates {
-            fmu.give_rates(&THETA, &draw()[..2]);
+            fmu.set_input_derivatives(&THETA, &draw()[..2]);
         }
         let restored = F::in_mode::<TestbedFmu>(CoSimulation, Instantiated);
         restored.restore(&fmu.bytes());
@@ -192,7 +192,7 @@ fn output_derivatives_are_exact() {
             let given = [random.between(-2.0, 2.0), random.between(-2.0, 2.0)];
             fmu.set(&OMEGA, &given);
             if rates == Rates::Derivatives {
-                fmu.give_rates(&THETA, &given);
+                fmu.set_input_derivatives(&THETA, &given);
             }
             if rates == Rates::Samples && step == 2 {
                 // A change of the slope, so that later samples lie on a curve.

@@ -84,10 +84,10 @@ fn the_last_angles_before_the_first_step_count() {
 fn a_rejected_step_starts_nothing() {
     let fmu = in_mode(CoSimulation, StepComplete);
     fmu.set(&THETA, &[f64::MAX, 0.0]);
-    fmu.give_rates(&THETA, &[f64::MAX; 2]);
+    fmu.set_input_derivatives(&THETA, &[f64::MAX; 2]);
     assert_eq!(fmu.try_step(0.0, 10.0), Status::Error);
     fmu.set(&THETA, &ANGLES);
-    fmu.give_rates(&THETA, &[0.0; 2]);
+    fmu.set_input_derivatives(&THETA, &[0.0; 2]);
     rests(&fmu);
 }
 

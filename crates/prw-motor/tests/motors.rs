@@ -32,7 +32,7 @@ fn after_a_step(inertia: f64, friction: f64) -> [f64; 4] {
     fmu.set(&OUTPUTS, &START);
     fmu.initialize(0.0);
     fmu.set(&INPUTS, &torques(0.0));
-    fmu.give_rates(&INPUTS, &SLOPES);
+    fmu.set_input_derivatives(&INPUTS, &SLOPES);
     fmu.step(0.0, 0.1);
     fmu.get(OUTPUTS)
 }

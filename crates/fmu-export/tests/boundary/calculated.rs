@@ -34,7 +34,7 @@ fn after_every_change_in_co_simulation() {
     changes(&fmu, |fmu| fmu.ok(fmu.fmi2SetInteger(&(Name::integer as u32), 1, &8)));
     changes(&fmu, |fmu| fmu.ok(fmu.fmi2SetString(&(Name::string as u32), 1, &c"longer".as_ptr())));
     changes(&fmu, |fmu| fmu.set(&[Name::weight as u32], &[9.0]));
-    changes(&fmu, |fmu| fmu.give_rates(&[REAL], &[0.5]));
+    changes(&fmu, |fmu| fmu.set_input_derivatives(&[REAL], &[0.5]));
     changes(&fmu, |fmu| fmu.step(0.0, 1.0));
     changes(&fmu, |fmu| fmu.ok(fmu.fmi2SetBoolean(&BOOLEAN, 1, &1)));
     changes(&fmu, |fmu| assert_eq!(fmu.try_step(1.0, 1.0), Status::Discard));

@@ -100,11 +100,11 @@ fn output_derivatives<F: Either>() {
     let mut time = 0.0;
     for size in [0.02, 0.005, 0.03] {
         fmu.set(&KNOWNS[..1], &[0.5 - time]);
-        fmu.give_rates(&KNOWNS[..1], &[-2.0]);
+        fmu.set_input_derivatives(&KNOWNS[..1], &[-2.0]);
         let slope = fmu.rate(KNOWNS[0]);
         output_derivatives_fit_steps::<Oscillator>(&fmu, time, "a step", |h| {
             fmu.set(&KNOWNS[..1], &[0.5 - time + slope * h]);
-            fmu.give_rates(&KNOWNS[..1], &[-2.0]);
+            fmu.set_input_derivatives(&KNOWNS[..1], &[-2.0]);
         });
         fmu.step(time, size);
         time += size;

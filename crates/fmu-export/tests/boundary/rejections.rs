@@ -148,12 +148,12 @@ fn steps() {
 fn out_of_the_range_of_numbers() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, StepComplete);
     fmu.set(&[FORCE], &[f64::MAX]);
-    fmu.give_rates(&[FORCE], &[f64::MAX]);
+    fmu.set_input_derivatives(&[FORCE], &[f64::MAX]);
     fmu.set(&[MASS], &[0.1]);
     fmu.rejected_with(&["range of numbers"], |fmu| fmu.try_step(0.0, 1e3));
     fmu.rejected("an infinite rate", |fmu| fmu.fmi2GetRealOutputDerivatives(&ACCELERATION, 1, &1, &mut 0.0));
     fmu.set(&[FORCE], &[0.1]);
-    fmu.give_rates(&[FORCE], &[0.0]);
+    fmu.set_input_derivatives(&[FORCE], &[0.0]);
     fmu.step(0.0, 10.0);
     let fmu = Importer::in_mode::<Oscillator>(ModelExchange, ContinuousTime);
     fmu.set(&[POSITION, FORCE], &[1e200, 0.1]);

@@ -65,8 +65,8 @@ fn integration_in_both_versions() {
 #[test]
 fn input_derivatives() {
     let [once, never, rich] = [(); 3].map(|()| Importer::in_mode::<Oscillator>(CoSimulation, StepComplete));
-    once.give_rates(&[FORCE], &[5.0]);
-    rich.give_rates(&[FORCE], &[5.0]);
+    once.set_input_derivatives(&[FORCE], &[5.0]);
+    rich.set_input_derivatives(&[FORCE], &[5.0]);
     let orders = [2, 7, i32::MAX];
     rich.ok(rich.fmi2SetRealInputDerivatives([FORCE; 3].as_ptr(), 3, orders.as_ptr(), [9.0; 3].as_ptr()));
     [&once, &never, &rich].iter().for_each(|fmu| fmu.step(0.0, 0.1));
