@@ -1,7 +1,7 @@
-//! The models that the macros reject, and the messages: each module in the files of compile_fail is one mistake.
+//! The compiler's messages about invalid models. Each module in the files of `compile_fail` contains one mistake.
 
-/// A compiler reports only the mistakes of its first failing phase, so there is a file for each phase. `TRYBUILD=overwrite`
-/// writes the messages again after an update of the compiler; compare them with the old ones.
+/// The compiler reports only the mistakes of the first phase that fails, so there is one file for each phase. After an
+/// update of the compiler, `TRYBUILD=overwrite` writes the new messages; compare them with the old ones.
 #[test]
 fn messages_of_the_compiler() {
     trybuild::TestCases::new().compile_fail("tests/compile_fail/*.rs");

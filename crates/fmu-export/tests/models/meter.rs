@@ -1,4 +1,4 @@
-//! A model with numbers in every kind of field, a state that starts at rest, and `step_fast`.
+//! A model with Reals in every kind of field, a state whose start value is calculated, and `step_fast`.
 
 use fmu_export::*;
 use std::ops::{Index, IndexMut};
@@ -9,7 +9,7 @@ pub struct Wire {
     is_set: bool,
 }
 
-/// Two numbers whose first changes its place in memory with every step.
+/// Two numbers that exchange their indices in every step, so that element 0 changes its address.
 #[derive(Clone, Default)]
 pub struct Ring {
     begin: usize,
@@ -30,7 +30,7 @@ impl IndexMut<usize> for Ring {
     }
 }
 
-/// Adds up its inputs. A level on a spring follows one of them.
+/// Adds up its inputs. A level on a spring follows the first of them.
 #[derive(Clone, Default)]
 pub struct Meter {
     plain: f64,
@@ -119,7 +119,7 @@ impl CoSimulation for Meter {
         Ok(Stepped::Done)
     }
 
-    /// Only steps of size 1 use this path.
+    /// Only steps of size 1 are fast.
     fn step_fast(&mut self, size: f64) -> bool {
         if size != 1.0 {
             return false;
@@ -149,7 +149,7 @@ impl Partials for Meter {
         })
     }
 
-    /// level = plain / stiffness, at rest.
+    /// In the initialization, level = plain / stiffness.
     fn initial_partial(&self, unknown: Name, known: Name) -> Option<f64> {
         Some(match (unknown, known) {
             (Name::total | Name::sum, _) => return self.partial(unknown, known),
