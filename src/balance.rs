@@ -29,8 +29,8 @@ impl Balance {
         Self { scale, halvings: (norm / 0.25).log2() }
     }
 
-    /// Returns how often a step must be halved before the series is evaluated, and the result doubled after it.
-    /// `log2_of_h` is the base-2 logarithm of the step size in s.
+    /// Returns the number of times that a step is halved before the series is evaluated. The result is then doubled as many
+    /// times. `log2_of_h` is the base-2 logarithm of the step size in s.
     pub(crate) fn doublings(&self, log2_of_h: f64) -> i32 {
         (self.halvings + log2_of_h).ceil().clamp(0.0, 2100.0) as i32
     }

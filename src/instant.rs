@@ -120,7 +120,7 @@ impl Instant {
         let [.., v] = split_by_side(&self.x);
         let rate = to_modes(v) * 0.5;
         let acceleration = to_modes(self.accelerations(system)) * 0.5;
-        // The shares of J2, H3, J3 and c3 in the inertia and damping of pitch and of roll.
+        // Changes of the inertia and of the load damping, for pitch and for roll.
         let roll_share = 2.0 * system.roll_ratio * system.roll_ratio;
         let inertia = PitchRoll::new(change.J2 + 0.5 * change.H3, change.J2 + roll_share * change.J3);
         let damping = PitchRoll::new(0.5 * change.c3, roll_share * change.c3);

@@ -229,8 +229,7 @@ impl Motors {
         self.with_rates(self.parabolas())
     }
 
-    /// Returns the motions at the current communication point that the parabolas through the last three
-    /// samples give.
+    /// Returns the motions at the current communication point on the parabolas through the last three samples.
     #[inline(always)]
     fn parabolas(&self) -> Motions {
         let [inverse_last, inverse_before, inverse_mean] = self.times.inverses;
@@ -240,9 +239,9 @@ impl Motors {
         Motion { angle: self.theta(), rate: last + acceleration * self.times.half_last_step, acceleration }
     }
 
-    /// Returns the motions at the current communication point. The rates come from the importer's derivative,
-    /// from omega, or from the parabolas through the last three samples. Two samples give a straight line;
-    /// with one sample the motors are at rest.
+    /// Returns the motions at the current communication point. The rates come from the importer's derivative, from omega,
+    /// or from the parabolas through the last three samples. If there are only two samples, the rates are their difference
+    /// quotients; with one sample, the motors are at rest.
     pub fn extrapolate(&self) -> Motions {
         let at_rate = |rate| Motion { angle: self.theta(), rate, acceleration: PerSide::default() };
         self.with_rates(match self.times.count {

@@ -80,7 +80,7 @@ impl<T: Arithmetic> Equations<T> {
             ramp_term = (ah * ramp_term).map(|entry| entry / f64::from(n + 1));
             ramp += ramp_term;
         }
-        // Both shafts turned by 1, no velocity.
+        // The state in which both shafts are at rest at 1 rad.
         let turned = Vector3::new(T::one(), T::one(), T::zero());
         let two = T::from(2.0);
         for _ in 0..doublings {
@@ -113,7 +113,7 @@ impl Rounded {
         Self { growth, ramp: exact.ramp.map(T::rounded), keeps_velocity: f64::from(u8::from(keeps)) }
     }
 
-    /// Returns the effect at the end of the step of a unit jump of the motor angle at its start.
+    /// Returns the change of z at the end of the step per unit jump of the motor angle at its start.
     fn after_jump(&self, system: &Subsystem) -> Vector3<f64> {
         let jump = system.b_rate;
         self.growth * jump + Vector3::new(jump.x, jump.y, jump.z * self.keeps_velocity)

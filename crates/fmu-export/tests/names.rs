@@ -111,7 +111,7 @@ mod choices {
     pub enum Item {}
     pub enum Value {}
     fmu_export::enumeration! {
-        /// An enumeration whose items are called like Rust's.
+        /// An enumeration whose items have names of Rust.
         pub enum Scalar {
             /// One
             Some = 1,
@@ -120,10 +120,10 @@ mod choices {
         }
     }
     fmu_export::saved! {
-        /// A struct called like a trait.
+        /// A struct with the name of a trait.
         #[derive(Clone, Copy, Default)]
         pub struct Saved {
-            /// A field called like an argument.
+            /// A field with the name of an argument.
             pub visitor: f64,
         }
     }

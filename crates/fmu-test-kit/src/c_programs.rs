@@ -1,6 +1,6 @@
-//! C programs that load FMUs, compiled and run for tests, with the headers of the FMI standards.
+//! Compiles and runs C programs that load FMUs, for tests, with the headers of the FMI standards.
 //!
-//! All functions panic if a tool or file is missing; the message names the remedy.
+//! If a tool or a file is missing, the functions panic with a message that names the remedy.
 
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::ffi::OsStr;

@@ -50,7 +50,7 @@ fn costs_of_model<M: Exported>() -> Option<[u64; 2]> {
 /// A label and calls at a communication point, whose time is the last argument.
 type Incident<'a, F> = (&'static str, &'a dyn Fn(&mut F, f64));
 
-/// Passes each incident after which steps must stay fast to `check`.
+/// Calls `check` with each incident after which steps must stay fast.
 fn incidents<F: Either, M: Exported>(check: &mut dyn FnMut(Incident<'_, F>)) {
     let parameter = (0..).zip(M::TABLE).find_map(|(index, of)| Some((index, start_of(of)?)));
     check(("nothing", &|_, _| ()));
@@ -95,10 +95,11 @@ fn incidents<F: Either, M: Exported>(check: &mut dyn FnMut(Incident<'_, F>)) {
 /// Checks that steps of an instance cost as much as steps of the model itself, after anything that may happen to the
 /// instance. Does nothing where instructions cannot be counted.
 ///
-/// The calls through FMI have a cost, too. It is the difference between instance and model in steps of one size.
+/// The calls through FMI have a cost, too. It is measured as the difference between an instance and the model in steps of
+/// one size.
 ///
 /// # Panics
-/// Panics if a round of alternating sizes takes more than 1.3 times the instructions of the model and of the calls.
+/// Panics if a round of alternating sizes takes more instructions than 1.3 times the sum for the model and the calls.
 pub fn steps_stay_cheap<M: Exported>() {
     if let Some([steady, alternating]) = costs_of_model::<M>() {
         of_instances::<Importer, M>(steady, alternating, usize::MAX);

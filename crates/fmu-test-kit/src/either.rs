@@ -98,7 +98,7 @@ fn log_of<'a>(version: &Version<'a>) -> &'a Log {
 /// An instance of FMI 2.0 or FMI 3.0, as an importer uses it. A variable is identified by its index in the variable
 /// table.
 ///
-/// Methods that do not return a status or a `Result` assert that the call succeeds.
+/// Methods that return neither a status nor a `Result` assert that the call succeeds.
 #[allow(clippy::missing_panics_doc, reason = "the functions that assert panic on purpose")]
 pub trait Either: Send {
     /// Returns the FMI version.

@@ -62,7 +62,7 @@ fn counted(work: &mut dyn FnMut()) -> Option<u64> {
     None
 }
 
-/// Returns `None`, because the count is only implemented for Linux on x86-64 and ARM.
+/// Returns `None`, because counting is only implemented for Linux on x86-64 and 64-bit ARM.
 #[cfg(not(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64"))))]
 pub fn instructions(_: &mut dyn FnMut()) -> Option<u64> {
     None

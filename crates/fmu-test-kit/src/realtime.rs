@@ -4,8 +4,8 @@
 //!   `#[global_allocator] static COUNTING: Counting = Counting;`, see [`allocations`].
 //! * The work runs in a copy of the process that the kernel ends at the first system call, see
 //!   [`without_kernel`].
-//! * The source must not contain the names of locks, see [`assert_nothing_to_lock`]. A free lock is only an
-//!   atomic instruction, which no run and no sanitizer detects.
+//! * The source must not contain the names of locks, see [`assert_nothing_to_lock`]. The source is searched because
+//!   taking a free lock is only an atomic instruction, which cannot be detected at run time.
 //! * In a build with `--cfg rtsan` and the RealtimeSanitizer, [`sanitizer`] marks the code in which blocking
 //!   calls are forbidden.
 

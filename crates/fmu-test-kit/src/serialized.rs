@@ -4,7 +4,8 @@
 //! The layout is: 7 bytes of magic, one byte for the version, the hash of the guid, and the interface type
 //! (plus 2 for FMI 3.0). The mode, the end flag, time, start time, stop time and tolerance follow, then the
 //! values and the `memory` fields of the variable table. The last 8 bytes are the FNV-1a checksum of all bytes before.
-//! Integers have 64 bits, little-endian. An optional value follows a Boolean of one byte that is true if it exists.
+//! Integers have 64 bits, little-endian. Before an optional value, there is a Boolean of one byte, which is
+//! true if the value exists.
 
 use fmu_export::Mode;
 use std::ops::Range;

@@ -4,7 +4,7 @@
 //! correction:
 //!
 //! ```text
-//! twist      = rigid - measured          rigid: eq. (1) of the motors' angles as they are
+//! twist      = rigid - measured          rigid: eq. (1) for the current motor angles
 //! correction = b twist + (1 - b) I - D               b = Kp / (1 + Kp)
 //! I'         = Ki (1 - b) (twist - I)
 //! D          = Kd rate, filtered with the time constant 2 Kd
@@ -256,7 +256,7 @@ impl Controller {
         let limits = Limits { rate: p.max_rate, acceleration: p.max_acceleration };
         self.on_goal = true;
         for (motor, (goal, torque)) in self.motors.iter_mut().zip(goals.into_iter().zip(inputs.torque)) {
-            // Limits the further twist of the couplings, forward and back.
+            // Limits how much farther the couplings can be twisted, in both directions.
             let farthest = motor.angle + (p.max_torque + torque) / p.stiffness;
             let nearest = motor.angle - (p.max_torque - torque) / p.stiffness;
             let allowed = goal.min(farthest).max(nearest);

@@ -55,7 +55,7 @@ fn logging_on_and_off() {
     assert_eq!(shown(&fmu), "OWDE");
 }
 
-/// Checks that a list changes only the listed categories.
+/// Checks that fmi2SetDebugLogging with a list of categories changes only these.
 #[test]
 fn categories() {
     let cases: &[(bool, bool, &[&CStr], &str)] = &[
@@ -107,7 +107,7 @@ fn logging_of_fmi3() {
     fmu.rejected("no category", |fmu| fmu.fmi3SetDebugLogging(1, 1, &c"logNothing".as_ptr()));
 }
 
-/// Checks the messages of a run.
+/// Checks which messages about a run are logged if logging is on.
 #[test]
 fn events() {
     let fmu = logging::<Oscillator>(true);

@@ -82,7 +82,7 @@ impl Variables {
         }
     }
 
-    /// Returns the number of values of these variables; an array has as many as elements.
+    /// Returns the number of values of these variables; an array has one value for each element.
     fn values(&self, references: &[u32]) -> usize {
         let length = |reference: &u32| self.arrays.iter().find(|(array, _)| array == reference);
         references.iter().map(|reference| length(reference).map_or(1, |(_, length)| *length)).sum()

@@ -1,4 +1,4 @@
-//! The functions that the fault-injecting importer calls most often or by their names, for each FMI version.
+//! Names of the functions that the fault-injecting importer calls most often or treats specially, for each FMI version.
 
 use crate::{Either, Importer, fmi3};
 use std::ffi::CStr;
