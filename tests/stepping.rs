@@ -246,7 +246,7 @@ fn earlier_steps_do_not_matter() {
     }
 }
 
-/// Checks that a testbed without load damping whose sides turn with their motors continues to do so, accurate to the last
+/// Checks a testbed without load damping whose sides turn with their motors. They must keep turning, accurate to the last
 /// digits, for any stiffness, any small damping of the couplings and any step size.
 #[test]
 fn a_testbed_that_turns_keeps_turning() {

@@ -39,7 +39,7 @@ fn of_fmi2<M: Exported>(prepare: impl FnOnce(&Importer)) -> Importer {
 }
 
 /// Results of a step that ends immediately; the tests change some fields.
-const AT_ONCE: Stepped = Stepped {
+const IMMEDIATE: Stepped = Stepped {
     event_handling_needed: false,
     terminate: false,
     early_return: false,
@@ -196,7 +196,7 @@ fn the_importer_handles_events() {
     assert_eq!(fmu.update(), Updated { next: Some(0.25), ..Updated::default() });
     fmu.ok(fmu.fmi3EnterStepMode());
     let at = |last_successful_time, early_return| {
-        Ok(Stepped { event_handling_needed: true, early_return, last_successful_time, ..AT_ONCE })
+        Ok(Stepped { event_handling_needed: true, early_return, last_successful_time, ..IMMEDIATE })
     };
     assert_eq!(fmu.do_step(0.0, 1.0), at(0.25, true));
     assert_eq!(fmu.get([SUM]), [1.0], "the event is not handled yet");
@@ -268,7 +268,7 @@ fn the_initial_event_ends_the_simulation() {
             fmu.ok(fmu.fmi3EnterStepMode());
         }
         let before = fmu.bytes();
-        assert_eq!(fmu.do_step(0.0, 1.0), Ok(Stepped { terminate: true, early_return, ..AT_ONCE }));
+        assert_eq!(fmu.do_step(0.0, 1.0), Ok(Stepped { terminate: true, early_return, ..IMMEDIATE }));
         assert_eq!(fmu.bytes(), before);
         fmu.rejected("a wrong point", |fmu| fmu.try_step(1.0, 1.0));
         fmu.ok(fmu.fmi3Terminate());
@@ -349,7 +349,7 @@ fn more_events_than_a_step_may_have() {
 #[test]
 fn early_return() {
     let fmu = of_fmi3::<Fuse>(fmi3False, fmi3True, |_| ());
-    let early = Stepped { early_return: true, last_successful_time: 8.0, ..AT_ONCE };
+    let early = Stepped { early_return: true, last_successful_time: 8.0, ..IMMEDIATE };
     assert_eq!(fmu.do_step(0.0, 10.0), Ok(early));
     // The simulation continues from there until the fuse melts.
     let stepped = fmu.do_step(8.0, 20.0).unwrap();
@@ -364,7 +364,7 @@ fn early_return() {
     assert!(text.contains("ends early, at 8: the model stops there, and earlyReturnAllowed has"), "{text}");
     fmu.step(0.0, 8.0);
     // The end of the simulation is reported without early return.
-    let ended = Stepped { terminate: true, last_successful_time: 18.0, ..AT_ONCE };
+    let ended = Stepped { terminate: true, last_successful_time: 18.0, ..IMMEDIATE };
     assert_eq!(fmu.do_step(8.0, 20.0), Ok(ended));
 }
 

@@ -44,7 +44,7 @@ fn set_and_read<F: Either>(count: usize) {
         now[5] = fmu.get([Name::moving as u32])[0];
         assert_eq!(fmu.integer(Name::marks as u32), 10 * seconds);
     }
-    assert_eq!(fmu.integer(Name::steps_at_once as u32), 4);
+    assert_eq!(fmu.integer(Name::fast_steps as u32), 4);
 }
 
 #[test]

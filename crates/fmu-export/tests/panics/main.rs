@@ -125,8 +125,8 @@ fn is_contained<F: Either>((interface, names, fault, call): Case<F>, bystanders:
 }
 
 /// Tests the library that `FMU_LIBRARY` names, which was compiled from the C sources of the model (`make test-source-fmu`).
-/// Cases with the faults `None`, `Drop` and `Memory` are left out, because the setting for all instances has no effect
-/// there, and because a panic while a model is dropped or saved ends differently there. One case of saving is added.
+/// Cases with the fault `None` are left out, because [`while_all_break`] has no effect in that library. Panics while a model
+/// is dropped or saved end differently there, so the cases with `Drop` and `Memory` are replaced by one case of saving.
 #[test]
 #[ignore = "needs compiled C sources"]
 fn every_panic_of_c_sources_is_contained() {
