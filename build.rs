@@ -1,5 +1,5 @@
-//! Compiles the parameters into the library: Table 1, or the file that `PRW_PARAMETERS` names. A relative
-//! path starts at this directory. `build_fmu --parameters` sets the variable.
+//! Compiles the parameters into the library: Table 1 of the paper, or the file that the environment variable
+//! `PRW_PARAMETERS` names. A relative path is relative to this directory. `build_fmu --parameters` sets the variable.
 
 use prw_parameters::file;
 use std::path::{Path, PathBuf};

@@ -7,7 +7,7 @@ use fmu_package::{BuildOptions, Builder, Companion, Page, Sources, Terminal};
 use std::path::{Path, PathBuf, absolute};
 use std::process::ExitCode;
 
-/// Table 1.
+/// Table 1 of the paper.
 const PARAMETERS: &str = "modelDescription/parameters.json";
 
 /// Builds the FMU of the pitch-roll wrist testbed: target/fmu/prw_testbed.fmu for FMI 2.0 and
@@ -55,12 +55,12 @@ fn run(options: &Options) -> Result<()> {
     builder.run(&options.build)
 }
 
-/// The directory of the project.
+/// Returns the directory of the project.
 fn project() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("crates/build-fmu is in it")
+    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("crates/build-fmu is two levels below it")
 }
 
-/// The files that the library and its description are made from. The guid is a hash of them.
+/// Returns the files from which the library and its description are built. The guid is a hash of them.
 fn sources(project: &Path) -> Sources {
     Sources {
         directory: project.to_owned(),
@@ -72,7 +72,7 @@ fn sources(project: &Path) -> Sources {
     }
 }
 
-/// The view of the wrist in the page, and the controller that closes the loop there.
+/// Returns the scripts that draw the wrist on the page of the FMU, and the controller FMU that closes the loop there.
 fn page(project: &Path) -> Page {
     let controller = Sources {
         licenses: vec!["../../LICENSE-APACHE", "../../LICENSE-MIT"],
@@ -90,7 +90,7 @@ fn page(project: &Path) -> Page {
     }
 }
 
-/// The terminals of the testbed.
+/// Returns the terminals of the testbed.
 fn terminals() -> Vec<Terminal> {
     vec![
         Terminal::plug("motor1")

@@ -3,17 +3,17 @@
 use crate::number::Number;
 use nalgebra::Matrix3;
 
-/// The velocity unit in which the series of a subsystem converges best, and the rate of convergence.
+/// The velocity unit in which the Taylor series of a subsystem converges best, and how fast it converges.
 ///
-/// Angles and velocities differ in magnitude. With the velocity in this unit, the entries that couple them
-/// have the same magnitude. This makes the norm smaller, and the error of the doublings too. The unit is a
-/// power of 2, so the scaling is exact.
+/// Angles and velocities differ in magnitude. With the velocity in this unit, the entries of the state matrix
+/// that couple them have the same magnitude. Therefore the norm of the matrix and the rounding error of the
+/// doublings are smaller. The unit is a power of 2, so the scaling is exact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Balance {
     /// Velocity unit, rad/s.
     pub(crate) scale: f64,
-    /// Base-2 logarithm of the factor by which a step of 1 s must be divided for the series to converge. The
-    /// logarithm avoids overflow for long steps of stiff systems.
+    /// Base-2 logarithm of the factor by which a step of 1 s must be divided so that the norm of `A h` is 1/4.
+    /// The factor itself would overflow for long steps of stiff systems.
     halvings: f64,
 }
 
@@ -29,7 +29,8 @@ impl Balance {
         Self { scale, halvings: (norm / 0.25).log2() }
     }
 
-    /// Returns the number of halvings for a step size with this base-2 logarithm.
+    /// Returns the number of times that a step is halved before the series is evaluated. The result is then doubled as many
+    /// times. `log2_of_h` is the base-2 logarithm of the step size in s.
     pub(crate) fn doublings(&self, log2_of_h: f64) -> i32 {
         (self.halvings + log2_of_h).ceil().clamp(0.0, 2100.0) as i32
     }

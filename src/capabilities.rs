@@ -125,9 +125,10 @@ impl ModelExchange for TestbedFmu {
     }
 }
 
-/// Defines derivatives of variables that are not linear, such as a power. Linear variables need only a name in
-/// `moving_variables!`, because their derivatives do not depend on the state. For each other variable, a line gives its change
-/// as a function of the [`Moving`] values now and of their changes; for a product it is `now.a * change.b + change.a * now.b`.
+/// Defines the derivatives of variables that are not linear, such as a mechanical power (torque times rate). Linear
+/// variables need only a name in `moving_variables!`, because their derivatives do not depend on the state. Each other
+/// variable has a line here, which calculates its change from the current [`Moving`] values and their changes; for a
+/// product `a * b` the change is `now.a * change.b + change.a * now.b`.
 macro_rules! products {
     ($($name:ident = |$now:ident, $change:ident| $value:expr;)*) => {
         const PRODUCTS: &[Name] = &[$(Name::$name),*];
@@ -152,7 +153,7 @@ macro_rules! names {
 /// The variables of [`Moving`] in the order of [`Row`].
 const MOVING: [Name; size_of::<Row>() / size_of::<f64>()] = moving_variables!(names);
 
-/// Position of each line of the table in a [`Row`]; its length for a variable that is not there.
+/// Index in a [`Row`] of each variable of the table; the length of a `Row` for a variable that it does not contain.
 const POSITIONS: [usize; TestbedFmu::NAMES.len()] = {
     let mut positions = [MOVING.len(); _];
     let mut position = 0;
@@ -163,7 +164,7 @@ const POSITIONS: [usize; TestbedFmu::NAMES.len()] = {
     positions
 };
 
-/// Rejects a table with a variable whose derivatives are unknown.
+/// Compilation fails if the table contains a Real input, output or local variable whose derivatives are not defined.
 const _: () = {
     let mut line = 0;
     while line < TestbedFmu::TABLE.len() {
@@ -189,7 +190,7 @@ const _: () = {
 
 impl InputDerivatives for TestbedFmu {
     /// Accepts order 1 of theta, the slope over the next step. Higher orders and derivatives of omega are
-    /// ignored: between communication points the motors move on straight lines.
+    /// ignored, because the motor angles change linearly between communication points.
     fn set_input_derivative(&mut self, of: Name, order: u32, value: f64) {
         match (of, order) {
             (Name::theta1, 1) => self.testbed.motors.set_rate(0, value),
@@ -239,8 +240,8 @@ impl TestbedFmu {
         }
     }
 
-    /// Returns the state and the motor motion after a known has been set to its value again. An angle is then a new sample,
-    /// and a rate takes effect.
+    /// Returns the state and the motor motion after a known has been set to its current value. Even this has an effect:
+    /// an angle becomes a new sample, and a rate takes effect.
     #[cold]
     fn set_again(&self, known: Option<Name>) -> Instant {
         let Some(known) = known else { return self.now() };
@@ -352,8 +353,8 @@ impl TestbedFmu {
         }
     }
 
-    /// Returns the partial derivatives with respect to a parameter. The setter of the variable table writes 1
-    /// to this parameter; all others are 0.
+    /// Returns the partial derivatives with respect to a parameter. The parameters of `unit` are the direction of
+    /// the derivative: 1 for this parameter, 0 for all others.
     #[cold]
     #[inline(never)]
     fn sensitivities_to_parameter(&self, parameter: Name) -> Cow<'_, Row> {

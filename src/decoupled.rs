@@ -10,10 +10,10 @@
 //! J v'           = c2 (q_I' - v) + k2 (q_I - q_II) - c v               SECT input shaft, eq. (8) row 3
 //! ```
 //!
-//! Here u and w are the mean (or half difference) of the motor angles and rates. The code inserts `q_I'` and
-//! uses the abbreviations [`stiffness_motor`](Side::stiffness_motor),
+//! Here u and w are the mean (or half difference) of the motor angles and rates. The code substitutes `q_I'` in
+//! the last equation and uses the abbreviations [`stiffness_motor`](Side::stiffness_motor),
 //! [`stiffness_sect`](Side::stiffness_sect) and [`damping`](Side::damping). This avoids differences of large
-//! terms and keeps extreme parameters accurate.
+//! terms, so the results are accurate even for extreme parameters.
 
 use crate::balance::Balance;
 use crate::motor::Motion;
@@ -105,9 +105,10 @@ pub struct Subsystem<T = f64> {
     pub load_damping: T,
     /// State matrix.
     pub a: Matrix3<T>,
-    /// Column of the motor angle. Equals `-a [1, 1, 0]`: a testbed turned as a whole stays at rest.
+    /// Column of the input matrix for the motor angle. Equals `-a [1, 1, 0]`, because a testbed whose motors and shafts are all turned
+    /// by the same angle stays at rest.
     pub b_angle: Vector3<T>,
-    /// Column of the motor rate; also the jump of z when the motor angle jumps by 1.
+    /// Column of the input matrix for the motor rate; also the jump of z when the motor angle jumps by 1 rad.
     pub b_rate: Vector3<T>,
 }
 
@@ -162,7 +163,8 @@ pub struct Decoupled {
     pub balances: [Balance; 2],
     /// N / 2M of eq. (1).
     pub roll_ratio: f64,
-    /// Pitch and roll of the output shaft per sum and difference of theta5 and theta6, eq. (1).
+    /// Factors that convert the sum and the difference of theta5 and theta6 to pitch and roll of the output shaft,
+    /// eq. (1).
     pub output_shaft: PitchRoll,
 }
 

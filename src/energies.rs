@@ -4,20 +4,20 @@
 
 use crate::parameters::Parameters;
 
-/// Angles of one instant, rad. Used for rates (rad/s) as well.
+/// Angles at one instant, rad. Also used for their rates, rad/s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Angles {
-    /// Motors.
+    /// Motor 1.
     pub theta1: f64,
-    /// Motors.
+    /// Motor 2.
     pub theta2: f64,
     /// Massless shaft between couplings 1 and 2.
     pub theta3: f64,
     /// Massless shaft between couplings 3 and 4.
     pub theta4: f64,
-    /// SECT input shaft.
+    /// SECT input shaft 1.
     pub theta5: f64,
-    /// SECT input shaft.
+    /// SECT input shaft 2.
     pub theta6: f64,
 }
 
@@ -55,8 +55,8 @@ pub fn potential_energy(p: &Parameters, q: &Angles) -> f64 {
 
 /// Returns Rayleigh's dissipation function, eq. (7), W.
 ///
-/// The function equals V of eq. (6) with rates for angles and c for k, plus `c3/2 (theta7'^2 + theta8'^2)`. The
-/// dissipated power is twice this value.
+/// It is V of eq. (6) with angles replaced by rates and k by c, plus `c3/2 (theta7'^2 + theta8'^2)`. The dissipated
+/// power is twice this value.
 pub fn dissipation(p: &Parameters, rates: &Angles) -> f64 {
     let (pitch_rate, roll_rate) = sect(p, rates.theta5, rates.theta6);
     0.5 * p.c1 * (square(rates.theta1 - rates.theta3) + square(rates.theta2 - rates.theta4))

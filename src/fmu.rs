@@ -39,13 +39,13 @@ pub(crate) use moving_variables;
 
 macro_rules! moving {
     ($($name:ident)+) => {
-        /// Values of these variables, or their derivatives.
+        /// Values of the variables in `moving_variables!`, or the derivatives of these variables.
         #[derive(Clone, Copy, Debug, Default)]
         pub(crate) struct Moving {
             $(pub $name: f64),+
         }
 
-        /// The same numbers as an array, which an index reads quickly.
+        /// The numbers of a [`Moving`] as an array, because reading one by its index is fast.
         pub(crate) type Row = [f64; [$(stringify!($name)),+].len()];
 
         impl From<Moving> for Row {
@@ -69,7 +69,7 @@ impl Clone for TestbedFmu {
         Self { testbed: self.testbed.clone(), ..*self }
     }
 
-    /// Copies the testbed with [`Testbed::copy_from`], which copies less if the parameters are equal.
+    /// Copies the testbed with [`Testbed::copy_from`], which copies only the state and the motors if the parameters are equal.
     fn clone_from(&mut self, source: &Self) {
         let Self { testbed, interface, start, torques, angles, rates, jacobian } = source;
         if self.testbed.copy_from(testbed) {

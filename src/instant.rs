@@ -11,8 +11,10 @@ use crate::pair::{PerSide, PitchRoll, from_modes, to_modes};
 use crate::parameters::Parameters;
 use crate::testbed::{State, StateBySide, split_by_side};
 
-/// State x and motion of the motors at one instant. All functions are linear in the instant, so they return
-/// values, partial derivatives (at unit points) or time derivatives (at the rates of a point).
+/// State x and motion of the motors at one instant.
+///
+/// All methods are linear in these numbers. If one number is 1 and the others are 0, the methods therefore return
+/// partial derivatives with respect to it; called on [`rates`](Self::rates), they return time derivatives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Instant {
     /// State x of eq. (11).
@@ -47,7 +49,7 @@ impl Instant {
 
     /// Returns the accelerations of the SECT input shafts, eq. (11a), rad/s2.
     pub fn accelerations(&self, system: &Decoupled) -> PerSide {
-        // M_II v_II' = -gamma - (load damping), split into pitch and roll.
+        // J v' = -tau - c v, separately for pitch and for roll.
         let torque = to_modes(self.torques(system)) * 0.5;
         let [.., v] = split_by_side(&self.x);
         let rate = to_modes(v) * 0.5;
@@ -118,7 +120,7 @@ impl Instant {
         let [.., v] = split_by_side(&self.x);
         let rate = to_modes(v) * 0.5;
         let acceleration = to_modes(self.accelerations(system)) * 0.5;
-        // The shares of J2, H3, J3 and c3 in the inertia and damping of pitch and of roll.
+        // Changes of the inertia and of the load damping, for pitch and for roll.
         let roll_share = 2.0 * system.roll_ratio * system.roll_ratio;
         let inertia = PitchRoll::new(change.J2 + 0.5 * change.H3, change.J2 + roll_share * change.J3);
         let damping = PitchRoll::new(0.5 * change.c3, roll_share * change.c3);

@@ -6,22 +6,22 @@
 //! couplings. A massless shaft (theta3, theta4) connects the two couplings. The output shaft of the SECT
 //! pitches (theta7) and rolls (theta8).
 //!
-//! In this order, the modules follow the derivation in the paper, *Modelling and Simulation of the Testbed for
-//! a Pitch-Roll Wrist Prototype Based on Spherical Cam-Rollers*. From [`motor`] on, they are additions of
-//! this project:
+//! The modules are listed in the order of the derivation in the paper, *Modelling and Simulation of the Testbed
+//! for a Pitch-Roll Wrist Prototype Based on Spherical Cam-Rollers*. The paper covers the first three; [`motor`]
+//! and all later ones are additions of this project:
 //!
 //! 1. [`parameters`]: inertias, stiffnesses, damping (Table 1).
 //! 2. [`energies`]: the kinematics of the SECT, eq. (1); kinetic energy, eqs. (3) to (5); potential energy,
 //!    eq. (6); dissipation, eq. (7).
 //! 3. [`state_space`]: the matrices that follow from Lagrange's equation, eq. (2). Eq. (8) is
 //!    `M q'' + Delta q' + K q = f`. The shafts between the couplings have no mass, so their rows are of first
-//!    order. Solved for `q_I'`, they give a system of six states, eq. (11). Its outputs include the sensor
-//!    torques, eqs. (9) and (10). The transfer matrices are G(s), eqs. (12) and (13), and H(s), eqs. (14) and
-//!    (15).
+//!    order. Solving these rows for the rates `q_I'` of the shafts gives a system of six states, eq. (11). Its
+//!    outputs include the sensor torques, eqs. (9) and (10). The transfer matrices are G(s), eqs. (12) and (13),
+//!    and H(s), eqs. (14) and (15).
 //! 4. [`motor`]: the motion of a motor between samples of its angle.
 //! 5. [`decoupled`]: the same equations for pitch and roll, the mean and the half difference of the two
 //!    sides. Pitch and roll do not influence each other.
-//! 6. [`propagator`]: the exact solution over one step during which the motors move on straight lines; its
+//! 6. [`propagator`]: the exact solution over one step during which the motor angles change linearly; its
 //!    matrices are computed with the scaling of [`balance`].
 //! 7. [`testbed`]: motors and state, advanced from one communication point to the next.
 //! 8. [`instant`]: torques, rates and accelerations at one instant, and their derivatives with respect to the

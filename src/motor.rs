@@ -5,7 +5,7 @@ use crate::pair::PerSide;
 /// Times of the last two samples before the current one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SampleTimes {
-    /// Number of earlier samples: 0, 1, or 2 for two and more.
+    /// Number of earlier samples: 0, 1, or 2 for two or more.
     pub count: i32,
     /// Step from the previous sample to the current one, s.
     pub last_step: f64,
@@ -13,15 +13,15 @@ pub struct SampleTimes {
     pub step_before: f64,
     /// The step size that leaves these fields unchanged; 0 if there is none.
     steady_step: f64,
-    /// 1 / last_step, 1 / step_before and 1 / mean of both, each for both motors. With them and
-    /// `half_last_step`, a step needs no division.
+    /// 1 / last_step, 1 / step_before and 1 / mean of both, each as a pair for both motors. They are stored, like
+    /// `half_last_step`, so that a step with constant size does not divide.
     inverses: [PerSide; 3],
     half_last_step: PerSide,
 }
 
 impl SampleTimes {
-    /// Makes the current sample the previous one after a step of size `h`, whose `inverse` is 1 / h.
-    /// It divides once, because the inverses of both steps are known.
+    /// Makes the current sample the previous one after a step of size `h`, whose `inverse` is 1 / h. Divides only
+    /// once, for the mean of both steps, because the inverses of the steps are known.
     pub fn shift(&mut self, h: f64, inverse: f64) {
         if h == self.steady_step {
             return;
@@ -39,14 +39,14 @@ impl SampleTimes {
             && (self.count < 2 || self.step_before > 0.0)
     }
 
-    /// Updates the fields that are derived from the steps.
+    /// Computes the private fields from `count`, `last_step` and `step_before`.
     pub fn update(&mut self) {
         let inverse = |step: f64| PerSide::splat(1.0 / step);
         (self.inverses[0], self.inverses[1]) = (inverse(self.last_step), inverse(self.step_before));
         self.update_both();
     }
 
-    /// Updates the fields that are derived from both steps.
+    /// Computes the private fields except the inverses of the two steps.
     #[inline]
     fn update_both(&mut self) {
         let Self { count, last_step, step_before, .. } = *self;
@@ -88,8 +88,8 @@ impl Motions {
         Motion { angle: self.angle[motor], rate: self.rate[motor], acceleration: self.acceleration[motor] }
     }
 
-    /// Returns the motion after time `h`. The angle moves on a straight line. The rate follows the parabola,
-    /// so that torques before the next sample are second-order accurate too.
+    /// Returns the motion after time `h`. The angle changes linearly, but the rate changes with the estimated
+    /// acceleration, so that the torques up to the next sample are second-order accurate too.
     #[inline]
     pub fn after(&self, h: f64) -> Self {
         Self {
@@ -102,13 +102,13 @@ impl Motions {
 
 /// The angle of one motor as the importer sets it.
 ///
-/// An importer sets one number at a time, and reading 16 bytes right after 8 of them were written stalls the
-/// processor. The compiler reads two numbers at once if they are neighbours, or if the first of them is aligned to
-/// 16 bytes. So the flag is stored before each angle.
+/// The flag is stored before the angle for speed: an importer sets one angle at a time, and a processor stalls if it
+/// reads 16 bytes right after 8 of them were written. The compiler would generate such a read of two numbers if they
+/// were neighbours, or if the first of them were aligned to 16 bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct Sample {
-    /// Whether theta has been set since the last step. If not, the end of the path replaces the sample.
+    /// Whether theta has been set since the last step. If not, [`Motors::segment_end`] replaces the sample.
     pub is_new: bool,
     /// Angle, rad; see [`Motors::theta_changed`].
     pub theta: f64,
@@ -116,7 +116,7 @@ pub struct Sample {
 
 /// The motors of the FMU: their inputs and the values stored from earlier steps.
 ///
-/// A caller that sets inputs as fields must then call [`theta_changed`](Self::theta_changed),
+/// After a caller has written an input field directly, it must call [`theta_changed`](Self::theta_changed),
 /// [`omega_changed`](Self::omega_changed) or [`use_omega_changed`](Self::use_omega_changed).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motors {
@@ -131,7 +131,7 @@ pub struct Motors {
     pub given_rate: [Option<f64>; 2],
     /// theta of the previous two samples, rad; the newer sample first.
     pub earlier: [PerSide; 2],
-    /// Motion at the end of the straight lines of the last step.
+    /// Motion at the end of the last step, during which the angles changed linearly.
     pub segment_end: Motions,
     /// Times of the samples.
     pub times: SampleTimes,
@@ -229,8 +229,7 @@ impl Motors {
         self.with_rates(self.parabolas())
     }
 
-    /// Returns the motions at the current communication point that the parabolas through the last three
-    /// samples give.
+    /// Returns the motions at the current communication point on the parabolas through the last three samples.
     #[inline(always)]
     fn parabolas(&self) -> Motions {
         let [inverse_last, inverse_before, inverse_mean] = self.times.inverses;
@@ -240,9 +239,9 @@ impl Motors {
         Motion { angle: self.theta(), rate: last + acceleration * self.times.half_last_step, acceleration }
     }
 
-    /// Returns the motions at the current communication point. The rates come from the importer's derivative,
-    /// from omega, or from the parabolas through the last three samples. Two samples give a straight line;
-    /// with one sample the motors are at rest.
+    /// Returns the motions at the current communication point. The rates come from the importer's derivative, from omega,
+    /// or from the parabolas through the last three samples. If there are only two samples, the rates are their difference
+    /// quotients; with one sample, the motors are at rest.
     pub fn extrapolate(&self) -> Motions {
         let at_rate = |rate| Motion { angle: self.theta(), rate, acceleration: PerSide::default() };
         self.with_rates(match self.times.count {
@@ -252,7 +251,8 @@ impl Motors {
         })
     }
 
-    /// Replaces the rates that are given or come from omega; their accelerations are 0.
+    /// Replaces an estimated rate if the importer has set a derivative or if the rate comes from omega. The
+    /// acceleration of this motor is then 0.
     #[inline(always)]
     fn with_rates(&self, motions: Motions) -> Motions {
         if !self.has_rates {
@@ -270,14 +270,15 @@ impl Motors {
         }
     }
 
-    /// Returns whether motor 0 or 1 is at the end of the last path because no new sample has been set.
+    /// Returns whether motor 0 or 1 is at [`segment_end`](Self::segment_end), because its angle has not been set
+    /// since the last step.
     #[inline]
     pub fn is_at_segment_end(&self, motor: usize) -> bool {
         !self.samples[motor].is_new && self.times.count > 0
     }
 
-    /// Returns the current motions: the motion at the sample, or at the end of the path if there is no new
-    /// sample.
+    /// Returns the current motion of each motor: extrapolated from its new sample, or
+    /// [`segment_end`](Self::segment_end) if there is none.
     pub fn now(&self) -> Motions {
         if self.is_at_segment_end(0) && self.is_at_segment_end(1) {
             return self.segment_end;
@@ -289,9 +290,9 @@ impl Motors {
         Motions::new(now(0), now(1))
     }
 
-    /// Returns the change of these motors per change `theta` of their angles. The motions are
-    /// linear in angles, earlier samples and rates. Only the angles change, so the changes of the others
-    /// are 0.
+    /// Returns motors whose motion is the derivative of the current motion in the direction `theta` of the angles.
+    /// A motion is linear in angles, earlier samples and rates. Earlier samples and rates are 0 in the result,
+    /// because they do not change.
     pub fn sensitivity(&self, theta: [f64; 2]) -> Self {
         Self {
             samples: theta.map(|theta| Sample { is_new: true, theta }),
@@ -302,15 +303,14 @@ impl Motors {
         }
     }
 
-    /// Returns the jumps from the ends of the last paths to the current samples, rad. The first samples do
-    /// not jump.
+    /// Returns the jumps from [`segment_end`](Self::segment_end) to the current samples, rad. The first samples are
+    /// not jumps.
     #[inline]
     pub fn input_jumps(&self) -> PerSide {
         if self.times.count == 0 { PerSide::default() } else { self.theta() - self.segment_end.angle }
     }
 
-    /// Makes the samples the earlier ones after a step from the angles `theta` to `end`. The caller updates
-    /// `times`.
+    /// Stores the samples `theta` at the start of a step, and the motions at its `end`. The caller updates `times`.
     #[inline(always)]
     pub fn finish_step(&mut self, theta: PerSide, end: &Motions) {
         self.earlier[1] = self.earlier[0];

@@ -12,7 +12,7 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Index, IndexMut, Mul, MulAssign, 
 /// vector register.
 ///
 /// The operators use vector instructions explicitly, because the compiler would handle the two numbers
-/// separately. The results are bit-identical.
+/// separately. The results are bit-identical in both cases.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(align(16))]
 pub struct Pair([f64; 2]);
@@ -53,13 +53,13 @@ pub type PerSide = Pair;
 /// A quantity of the pitch and of the roll subsystem.
 pub type PitchRoll = Pair;
 
-/// Returns the sum and the difference of the two sides, twice the quantities of pitch and roll. The step
-/// matrices contain the factor 1/2.
+/// Returns the sum and the difference of the two sides, which are twice the quantities of pitch and roll. The
+/// step matrices contain the missing factor 1/2.
 #[inline]
 pub fn to_modes(sides: PerSide) -> PitchRoll {
     #[cfg(target_arch = "x86_64")]
     {
-        // [a, b] -> [a, -b] + [b, a]. This shuffle copies, so it takes one instruction.
+        // [a, b] -> [a, -b] + [b, a]. This shuffle writes to another register, so it needs no separate copy.
         let sides = m128d::from(sides.0);
         let swapped = shuffle_ai_f32_all_m128i::<0b01_00_11_10>(cast_to_m128i_from_m128d(sides));
         Pair((bitxor_m128d(sides, [0.0, -0.0].into()) + cast_to_m128d_from_m128i(swapped)).into())
@@ -71,7 +71,8 @@ pub fn to_modes(sides: PerSide) -> PitchRoll {
     }
 }
 
-/// Returns the two sides from the quantities of pitch and roll, their mean and half difference.
+/// Returns the two sides from the quantities of pitch and roll, which are the mean and the half difference of the
+/// sides.
 #[inline]
 pub fn from_modes(z: PitchRoll) -> PerSide {
     to_modes(z)

@@ -1,4 +1,4 @@
-//! The exact solution for a subsystem over one step during which its motor angle moves on a straight line.
+//! The exact solution for a subsystem over one step during which its motor angle changes linearly.
 //!
 //! With the motor angle `u0 + w s` for `0 <= s <= h`, the solution of `z' = A z + b_angle u + b_rate w` is
 //!
@@ -8,8 +8,8 @@
 //! ramp   = integral over 0..h of exp(A (h - s)) (b_angle s + b_rate) ds
 //! ```
 //!
-//! The form follows from `A [1, 1, 0] + b_angle = 0`. Each step adds an increment to z. So a testbed at rest
-//! stays exactly at rest. Tiny steps lose no precision, although `exp(A h)` is close to 1.
+//! This form follows from `A [1, 1, 0] + b_angle = 0`. Because each step adds an increment to z, a testbed at rest
+//! stays exactly at rest, and tiny steps lose no precision although `exp(A h)` is close to 1.
 
 use crate::balance::{Balance, rescaled};
 use crate::decoupled::{Decoupled, Subsystem};
@@ -22,7 +22,7 @@ use nalgebra::{Matrix3, Vector3};
 pub struct Propagator<T = f64> {
     /// `exp(A h) - 1`.
     pub growth: Matrix3<T>,
-    /// Increment per motor rate.
+    /// Increment of z per unit of the motor rate.
     pub ramp: Vector3<T>,
 }
 
@@ -60,8 +60,8 @@ impl<T: Number> Equations<T> {
 }
 
 impl<T: Arithmetic> Equations<T> {
-    /// Computes growth and ramp for step size `h` in s. A Taylor series covers a fraction of the step in
-    /// which it converges quickly. Doublings extend the result to the full step.
+    /// Computes growth and ramp for step size `h` in s. A Taylor series is evaluated for a fraction of the step that is
+    /// short enough for fast convergence. Doublings extend the result to the full step.
     ///
     /// Two steps in sequence give the doubling: `growth(2h) = 2 growth + growth^2` and
     /// `ramp(2h) = 2 ramp + growth (ramp - [1, 1, 0] h)`.
@@ -80,7 +80,7 @@ impl<T: Arithmetic> Equations<T> {
             ramp_term = (ah * ramp_term).map(|entry| entry / f64::from(n + 1));
             ramp += ramp_term;
         }
-        // Both shafts turned by 1, no velocity.
+        // The state in which both shafts are at rest at 1 rad.
         let turned = Vector3::new(T::one(), T::one(), T::zero());
         let two = T::from(2.0);
         for _ in 0..doublings {
@@ -98,7 +98,7 @@ struct Rounded {
     growth: Matrix3<f64>,
     ramp: Vector3<f64>,
     /// 1, or 0 if at most half of the velocity remains after the step. With 0, the step replaces the velocity
-    /// instead of adding to it, because a sum would only keep the digits of the old velocity.
+    /// instead of adding to it, because the sum would have the rounding error of the larger old velocity.
     keeps_velocity: f64,
 }
 
@@ -113,7 +113,7 @@ impl Rounded {
         Self { growth, ramp: exact.ramp.map(T::rounded), keeps_velocity: f64::from(u8::from(keeps)) }
     }
 
-    /// Returns the effect at the end of the step of a unit jump of the motor angle at its start.
+    /// Returns the change of z at the end of the step per unit jump of the motor angle at its start.
     fn after_jump(&self, system: &Subsystem) -> Vector3<f64> {
         let jump = system.b_rate;
         self.growth * jump + Vector3::new(jump.x, jump.y, jump.z * self.keeps_velocity)
@@ -121,18 +121,18 @@ impl Rounded {
 
     /// Computes the propagators of the pitch and the roll subsystem.
     ///
-    /// Up to 8 doublings cost an `f64` at most 3 digits; more doublings may cost all digits. Stiff testbeds
-    /// have motions of very different rates. The remainder after the fast motion is a small difference, and
-    /// so is the remainder of a strongly damped velocity. Both need twice the digits.
+    /// Up to 8 doublings cost an `f64` at most 3 digits; more doublings may cost all digits. Stiff testbeds have
+    /// motions of very different rates. What remains after the fast motion is a small difference of large numbers, and
+    /// so is the remainder of a strongly damped velocity. In these cases, twice the digits are used.
     fn pitch_and_roll(system: &Decoupled, h: f64) -> [Self; 2] {
         let Decoupled { pitch, roll, balances, .. } = system;
         let log2_of_h = h.log2();
         let doublings = balances.map(|balance| balance.doublings(log2_of_h));
-        let uses_up = |s: &Subsystem| -s.a[(2, 2)] * h > std::f64::consts::LN_2;
-        if doublings.into_iter().any(|doublings| doublings > 8) || uses_up(pitch) || uses_up(roll) {
+        let is_damped = |s: &Subsystem| -s.a[(2, 2)] * h > std::f64::consts::LN_2;
+        if doublings.into_iter().any(|doublings| doublings > 8) || is_damped(pitch) || is_damped(roll) {
             let exact = Subsystem::<TwoFloat>::pitch_and_roll(&system.parameters);
             let rounded = exact.map(|subsystem| Self::new(&Propagator::new(&subsystem, h)));
-            // An overflow of a TwoFloat gives NaN.
+            // A TwoFloat that overflows is NaN; the matrices are then computed with f64.
             if rounded.iter().all(Self::is_finite) {
                 return rounded;
             }
@@ -158,8 +158,8 @@ impl Rounded {
     }
 }
 
-/// The propagators of both subsystems for one step size, entry by entry in pairs. They contain the factor 1/2
-/// because they multiply sums and differences.
+/// The propagators of both subsystems for one step size; each pair contains the same entry of pitch and of roll.
+/// The entries contain the factor 1/2, because they multiply sums and differences of the two sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepMatrices {
     half_growth: [[PitchRoll; 3]; 3],
@@ -186,30 +186,31 @@ impl StepMatrices {
     /// Computes the matrices for step size `h` in s.
     pub fn new(system: &Decoupled, h: f64) -> Self {
         let [pitch, roll] = Rounded::pitch_and_roll(system, h);
-        let beside = |pitch: Vector3<f64>, roll: Vector3<f64>| {
+        let half_pairs = |pitch: Vector3<f64>, roll: Vector3<f64>| {
             std::array::from_fn(|i| PitchRoll::new(pitch[i], roll[i]) * 0.5)
         };
-        let column = |j| beside(pitch.growth.column(j).into(), roll.growth.column(j).into());
+        let column = |j| half_pairs(pitch.growth.column(j).into(), roll.growth.column(j).into());
         let half_kept = PitchRoll::new(pitch.keeps_velocity, roll.keeps_velocity) * 0.5;
         Self {
             half_growth: [0, 1, 2].map(column),
-            half_ramp: beside(pitch.ramp, roll.ramp),
-            half_jump: beside(pitch.after_jump(&system.pitch), roll.after_jump(&system.roll)),
+            half_ramp: half_pairs(pitch.ramp, roll.ramp),
+            half_jump: half_pairs(pitch.after_jump(&system.pitch), roll.after_jump(&system.roll)),
             half_kept,
             keeps_velocities: half_kept == PitchRoll::both(0.5),
             inverse_h: 1.0 / h,
         }
     }
 
-    /// Returns the velocity to which the increment adds, from the sum and difference at the start of the
-    /// step. Returns `None` if the increment adds to the full velocity.
+    /// Returns the part of the velocity to which the increment is added, for pitch and roll. `v` is the sum and
+    /// the difference of the velocities at the start of the step. Returns `None` if the increment is added to the full
+    /// velocity.
     #[inline]
     pub fn remaining_velocity(&self, v: PitchRoll) -> Option<PitchRoll> {
-        if self.keeps_velocities { None } else { self.left_velocity_of(v) }
+        if self.keeps_velocities { None } else { self.damped_velocity(v) }
     }
 
     #[cold]
-    fn left_velocity_of(&self, v: PitchRoll) -> Option<PitchRoll> {
+    fn damped_velocity(&self, v: PitchRoll) -> Option<PitchRoll> {
         Some(self.half_kept * v)
     }
 
@@ -230,36 +231,36 @@ impl StepMatrices {
 
 const ZERO: PitchRoll = PitchRoll::both(0.0);
 
-/// The step matrices of the most recent step sizes. Importers use one step size or alternate among a few, also
-/// where they mean one: the differences of `np.arange(n) * 1e-3` vary in their last digits.
+/// The step matrices of the most recent step sizes. Importers use one step size or alternate among a few. The
+/// latter often happens by accident, because the differences of `np.arange(n) * 1e-3` vary in their last digits.
 ///
 /// An entry belongs to exactly one step size. Sizes that differ by rounding are not merged, because results
-/// would then depend on the sizes that were used before, and a restored state would not repeat them.
+/// would then depend on the sizes that were used before, and a restored state would not reproduce them.
 #[derive(Debug, Default)]
 pub struct StepCache {
     /// Step sizes of the entries, s; 0 marks an unused entry.
     sizes: [f64; Self::SIZE],
-    /// Entry of the last step, and its step size, s.
+    /// Index of the entry of the last step, and its step size, s.
     current: usize,
     current_size: f64,
-    /// Entry that the next unknown size replaces.
+    /// Index of the entry that the next new size replaces.
     oldest: usize,
     /// Number of times that matrices were computed.
     computed: u64,
-    /// All entries, or none before the first step of a cache without [capacity](Self::with_capacity).
+    /// Always [`SIZE`](Self::SIZE) entries, except that a [`default`](Self::default) cache is empty before its first step.
     entries: Vec<StepMatrices>,
 }
 
 impl StepCache {
     const SIZE: usize = 8;
 
-    /// Creates an empty cache that has allocated its memory, so that a step does not allocate. An empty cache
-    /// from [`default`](Self::default) allocates it at the first step.
+    /// Creates an empty cache that has already allocated its memory, so that a step does not allocate. A
+    /// [`default`](Self::default) cache allocates its memory at the first step.
     pub fn with_capacity() -> Self {
         Self { entries: vec![StepMatrices::UNUSED; Self::SIZE], ..Self::default() }
     }
 
-    /// Forgets all matrices and keeps the memory.
+    /// Forgets all matrices but keeps their memory allocated.
     pub fn clear(&mut self) {
         (self.sizes, self.current_size) = ([0.0; _], 0.0);
     }
@@ -299,11 +300,11 @@ impl StepCache {
         }
     }
 
-    /// Computes the matrices for step size `h`. They replace the oldest.
+    /// Computes the matrices for step size `h`. They replace the oldest entry.
     #[cold]
     #[inline(never)]
     fn compute(&mut self, system: &Decoupled, h: f64) {
-        // Allocates for a copy, whose cache is empty.
+        // Allocates the entries at the first step of a copied testbed; otherwise does nothing.
         self.entries.resize(Self::SIZE, StepMatrices::UNUSED);
         self.current = self.oldest;
         self.oldest = (self.oldest + 1) % Self::SIZE;
@@ -312,8 +313,8 @@ impl StepCache {
         (self.sizes[self.current], self.current_size) = (h, h);
     }
 
-    /// Returns the number of times that matrices were computed. A use that should find them in the cache
-    /// leaves it unchanged.
+    /// Returns the number of times that matrices were computed. It stays the same when a step finds its matrices in
+    /// the cache.
     pub fn computed(&self) -> u64 {
         self.computed
     }

@@ -43,8 +43,8 @@ fn sect_terms(of_pitch: f64, of_roll: f64, p: &Parameters) -> (f64, f64) {
     (0.25 * of_pitch + roll, 0.25 * of_pitch - roll)
 }
 
-/// Returns the common pattern of the couplings' stiffness and damping matrices: two chains motor - 1 - 2 -
-/// SECT.
+/// Returns the stiffness or damping matrix of the couplings, which has the same pattern for both: two chains of
+/// motor, coupling, massless shaft, coupling and SECT.
 fn couplings(motor_side: f64, sect_side: f64) -> Matrix4<f64> {
     let (sum, d) = (motor_side + sect_side, sect_side);
     Matrix4::new(
@@ -81,7 +81,7 @@ pub struct StateSpace {
 ///
 /// The first block row of eq. (8) is `C_I q_I' + K_I q_I + C_I,II v_II + K_I,II q_II = f_I`. Solved for
 /// `q_I'`, it gives A11, A12 and A13 with **negative** signs. The paper prints positive signs, with which A
-/// has an eigenvalue at +183 1/s. Inserted into eq. (10), it makes the first terms of D31 and D32
+/// has an eigenvalue at +183 1/s. Inserting `q_I'` into eq. (10) makes the first terms of D31 and D32
 /// **positive** (printed negative).
 ///
 /// # Panics

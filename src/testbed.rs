@@ -12,7 +12,7 @@ pub type State = [f64; 6];
 /// A state x in pairs of both sides: `[q_I, q_II, v]` of eq. (8), rad and rad/s.
 pub type StateBySide = [PerSide; 3];
 
-/// The testbed between two communication points.
+/// The testbed, which steps from one communication point to the next.
 #[derive(Debug)]
 pub struct Testbed {
     /// Parameters. Call [`parameters_changed`](Self::parameters_changed) after a change.
@@ -34,8 +34,8 @@ impl Clone for Testbed {
 }
 
 impl Testbed {
-    /// Copies all fields except the step matrices, and what follows from the parameters only if they differ. Returns
-    /// whether they differ.
+    /// Copies all fields except the step matrices. If the parameters are equal, their derived fields are not copied, and
+    /// the step matrices stay valid; otherwise the step matrices are discarded. Returns whether the parameters differ.
     pub fn copy_from(&mut self, source: &Self) -> bool {
         let differs = self.parameters != source.parameters;
         if differs {
@@ -91,7 +91,7 @@ impl Testbed {
         self.step_to(h).is_some()
     }
 
-    /// Does the same as [`step`](Self::step) and returns the state, or nothing if it would overflow.
+    /// Does the same as [`step`](Self::step), but returns the new state, or `None` if it would overflow.
     #[inline]
     pub fn step_to(&mut self, h: f64) -> Option<StateBySide> {
         self.cache.prepare(&self.system, h);
@@ -100,8 +100,8 @@ impl Testbed {
         Some(state)
     }
 
-    /// Does the same [step](Self::step) with fewer checks, if the size equals the size of the last two steps. Returns the
-    /// state after it, or nothing if the size differs or the state would overflow.
+    /// Does the same as [`step_to`](Self::step_to) with fewer checks, but only if the last two steps also had the size `h`.
+    /// Returns `None` and changes nothing if they had not, or if the state would overflow.
     #[inline(always)]
     pub fn step_fast(&mut self, h: f64) -> Option<StateBySide> {
         if !(self.motors.has_constant_step(h) && self.cache.has(h)) {

@@ -8,8 +8,9 @@ const ANGLE: Type = Type::real("Angle", &RAD).nominal(1.0);
 const ANGULAR_VELOCITY: Type = Type::real("AngularVelocity", &RAD_PER_S).nominal(1.0);
 const ANGULAR_ACCELERATION: Type = Type::real("AngularAcceleration", &RAD_PER_S2).nominal(100.0);
 const TORQUE: Type = Type::real("Torque", &N_M).nominal(1.0);
-/// Smallest positive value that is allowed. FMI ranges include their ends, so a range "> 0" needs a smallest
-/// value. C++ (`std::stod`) rejects numbers below about 1e-307, and in another unit they may underflow to 0.
+/// Smallest positive value that is allowed. FMI ranges include their ends, so a range "> 0" needs a smallest value.
+/// It is not smaller because C++ (`std::stod`) rejects numbers below about 1e-307, and because a value converted to
+/// another unit must not underflow to 0.
 const MORE_THAN_0: f64 = 1e-300;
 const INERTIA: Type = Type::real("MomentOfInertia", &KG_M2).min(MORE_THAN_0).nominal(0.01);
 const STIFFNESS: Type = Type::real("RotationalSpringConstant", &N_M_PER_RAD).min(MORE_THAN_0).nominal(100.0);

@@ -1,17 +1,17 @@
-//! Comparison of the FMU's compiled C sources with the library from the same Rust code. `make
-//! test-source-fmu` names the compiled sources in the environment variable `FMU_LIBRARY`.
+//! Compares two libraries of the FMU: one compiled from its C sources, and one from the same Rust code. `make
+//! test-source-fmu` names the first in the environment variable `FMU_LIBRARY`.
 
 use fmu_test_kit::fault_injection::{random_bytes, record};
 use fmu_test_kit::functions_of;
 use prw_testbed::TestbedFmu;
 
-/// Checks that random sequences of calls give equal bits, statuses and messages.
+/// Checks that random sequences of calls return bit-identical values, the same statuses and the same messages.
 #[test]
 #[ignore = "needs compiled C sources"]
 fn random_sessions_give_equal_results() {
     assert!(
         std::env::var_os("FMU_LIBRARY").is_some(),
-        "FMU_LIBRARY must name the compiled sources; make test-source-fmu"
+        "FMU_LIBRARY must name the library compiled from the C sources; run make test-source-fmu"
     );
     let sessions = std::env::var("SESSIONS").map_or(300, |value| value.parse().expect("a number"));
     let (mut calls, mut rejected) = (0, 0);

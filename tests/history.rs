@@ -4,7 +4,7 @@ use fmu_test_kit::history::Histories;
 use prw_testbed::TestbedFmu;
 
 #[test]
-fn what_was_undone_leaves_no_trace() {
+fn undone_calls_leave_no_trace() {
     Histories::default().check::<TestbedFmu>();
 }
 

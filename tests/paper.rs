@@ -1,5 +1,5 @@
-//! Comparison of the model with the paper: its reference values, and a test for each erratum that shows that
-//! the printed version fails.
+//! Compares the model with the reference values of the paper. For each erratum, a test shows that the printed equation
+//! is wrong.
 
 use nalgebra::{Complex, Matrix2, Matrix4, Matrix6, Vector4};
 use prw_testbed::energies::{Angles, dissipation, kinetic_energy, potential_energy, sect};
@@ -17,7 +17,7 @@ fn sorted_eigenvalues(a: Matrix6<f64>) -> Vec<Complex<f64>> {
     eigenvalues
 }
 
-/// Eigenvalues of A with Table 1, with all known digits, 1/s.
+/// Eigenvalues of A for Table 1, 1/s, to 8 decimals.
 const EIGENVALUES: [(f64, f64); 6] = [
     (-174.87270665, 0.0),
     (-174.36733032, 0.0),
@@ -50,7 +50,8 @@ fn dc_gains() {
     assert!((g[(0, 0)] - 1.0).norm() < 1e-12 && g[(1, 0)].norm() < 1e-12);
 }
 
-/// Checks that eqs. (13) and (15) give equal gains from motor angles (whose rates are s times them).
+/// Checks that eqs. (13) and (15) give equal gains from motor angles to shaft angles. In eq. (13), the motor rates are
+/// separate inputs, which are s times the angles.
 #[test]
 fn transfer_matrices_agree() {
     for hertz in [0.1, 1.0, 5.0, 30.0, 500.0] {
@@ -78,7 +79,7 @@ fn erratum_theta7_is_pitch_and_theta8_is_roll() {
     assert!((kinetic_energy(&TABLE_1, &rates) - (TABLE_1.J2 + 0.5 * TABLE_1.H3)).abs() < 1e-15);
 }
 
-/// Returns the Hessian of a quadratic form of theta1..theta6.
+/// Returns the Hessian matrix of a quadratic form of theta1 to theta6, by central differences, which are exact for it.
 fn hessian(form: impl Fn(&Angles) -> f64) -> Matrix6<f64> {
     let at = |i: usize, j: usize, si: f64, sj: f64| {
         let mut q = [0.0; 6];
@@ -92,7 +93,7 @@ fn hessian(form: impl Fn(&Angles) -> f64) -> Matrix6<f64> {
     })
 }
 
-/// Returns the part of the Hessian for theta3..theta6, whose motion eq. (8) describes.
+/// Returns the block of the Hessian matrix for theta3 to theta6, whose motion eq. (8) describes.
 fn free(hessian: &Matrix6<f64>) -> Matrix4<f64> {
     hessian.fixed_view::<4, 4>(2, 2).into_owned()
 }
@@ -112,7 +113,7 @@ fn erratum_last_term_of_eq_6_has_k2() {
 #[test]
 fn matrices_of_eq_8_follow_from_the_energies() {
     let mut exponent = 0.0;
-    // No parameter is 0.
+    // Parameters that differ from Table 1, none of them 0.
     let varied = TABLE_1.varied(|| {
         exponent += 0.1;
         exponent
@@ -177,17 +178,17 @@ fn erratum_signs_of_d31_d32() {
 }
 
 #[test]
-fn erratum_table_1_counts_in_degrees() {
+fn erratum_table_1_is_per_degree() {
     let printed = Parameters { k1: 2.11, k2: 0.76, c1: 7.83e-3, c2: 8.35e-3, c3: 6.66e-3, ..TABLE_1 };
     assert!((TABLE_1.k1 - 2.11 * DEG_PER_RAD).abs() < 1e-12);
     assert!((TABLE_1.c3 - 6.66e-3 * DEG_PER_RAD).abs() < 1e-14);
     assert!(!has_the_known_eigenvalues(&printed));
 }
 
-/// Checks the excitation. With the printed theta1' = sin(10 pi), the motors would be at rest, unlike in Fig.
-/// 4.
+/// Checks that the excitation is theta1' = sin(10 pi t). With the printed sin(10 pi), which is 0, the motors would be at
+/// rest, unlike in Fig. 4.
 #[test]
-fn erratum_excitation_of_sec_4_has_a_time_in_it() {
+fn erratum_excitation_of_sec_4_depends_on_time() {
     let peak_roll = |rate: &dyn Fn(f64) -> f64| {
         let mut testbed = Testbed::new(TABLE_1).unwrap();
         testbed.motors.use_omega = true;

@@ -1,3 +1,3 @@
-//! The control loop of the testbed.
+//! A control loop with the testbed, which must not allocate, make system calls, or lock.
 
 fmu_test_kit::control_loop!(prw_testbed::TestbedFmu);

@@ -1,5 +1,5 @@
-//! Comparison of the exact step with independent derivations: eq. (11) instead of the decoupled equations, and
-//! nalgebra's matrix exponential instead of the propagator.
+//! Compares the exact step with independent calculations: with eq. (11) instead of the decoupled equations, and with the
+//! matrix exponential of nalgebra instead of the propagator.
 
 use nalgebra::SMatrix;
 use proptest::prelude::*;
@@ -10,7 +10,7 @@ use prw_testbed::{BUILT_IN, Parameters, Testbed};
 
 #[allow(non_snake_case, reason = "the paper's symbols")]
 fn parameters() -> impl Strategy<Value = Parameters> {
-    // A factor of up to 5 around Table 1 for each parameter; the vector has more entries than needed.
+    // Each measured parameter of Table 1 is multiplied by a factor from 1/5 to 5. The vector has more exponents than needed.
     (prop::collection::vec(-1.6..1.6f64, 32), 1..9i32, 1..15i32).prop_map(|(exponents, M, N)| {
         let mut exponents = exponents.into_iter();
         let near = BUILT_IN.varied(|| exponents.next().unwrap());
@@ -18,7 +18,7 @@ fn parameters() -> impl Strategy<Value = Parameters> {
     })
 }
 
-/// Sets the samples of both motors, with their rates as derivatives.
+/// Sets the angles of both motors, and their rates as derivatives.
 fn sample(testbed: &mut Testbed, theta: [f64; 2], rates: [f64; 2]) {
     for motor in 0..2 {
         testbed.motors.set_theta(motor, theta[motor]);
@@ -26,7 +26,7 @@ fn sample(testbed: &mut Testbed, theta: [f64; 2], rates: [f64; 2]) {
     }
 }
 
-/// Returns `[x, theta, omega]` after time h with constant omega, by the exponential of one large matrix.
+/// Returns the state x after time h with constant motor rates omega, by the matrix exponential for `[x, theta, omega]`.
 fn reference(p: &Parameters, x: [f64; 6], theta: [f64; 2], omega: [f64; 2], h: f64) -> [f64; 6] {
     let system = state_space(p);
     let mut generator = SMatrix::<f64, 10, 10>::zeros();
@@ -45,8 +45,8 @@ proptest! {
         let system = state_space(&p);
         let decoupled = *Testbed::new(p).unwrap().system();
         let (pitch, roll) = (decoupled.pitch, decoupled.roll);
-        // In the full matrix, the diagonal entry of a side is mean + half difference, the off-diagonal entry
-        // mean - half difference.
+        // Each 2 x 2 block of eq. (11) has equal diagonal entries, half the sum of the pitch and roll entries, and equal
+        // off-diagonal entries, half their difference.
         for row in 0..3 {
             for column in 0..3 {
                 let expect = |sign: f64| 0.5 * (pitch.a[(row, column)] + sign * roll.a[(row, column)]);
@@ -98,8 +98,7 @@ proptest! {
         }
     }
 
-    /// Checks that fast steps and general steps are bit-identical, also with rates that are given or come
-    /// from omega.
+    /// Checks that fast steps and general steps are bit-identical, even if rates are set as derivatives or come from omega.
     #[test]
     fn fast_steps_are_steps(
         p in parameters(),
@@ -126,7 +125,7 @@ proptest! {
             }
             let h = if size == 0 { 2e-3 } else { 1e-3 };
             if size == 1 {
-                // A copy has no matrices.
+                // A copy has no step matrices, so its next step cannot be fast.
                 testbed = testbed.clone();
             }
             if testbed.step_fast(h).is_some() {
@@ -141,21 +140,22 @@ proptest! {
         prop_assume!(fast > 0);
     }
 
-    /// Checks on grids like `np.arange(n) * 1e-3`, whose differences vary in their last digits, that matrices are
-    /// computed once for each difference, regardless of the calls in between, and that each step uses the matrices of its size.
+    /// Checks that step matrices are computed once for each step size, regardless of the calls in between, and that each step
+    /// uses the matrices of its size. The times are grids like `np.arange(n) * 1e-3`, whose differences vary in their last
+    /// digits.
     #[test]
     fn matrices_are_computed_once_for_each_size(p in parameters(), dt in 1e-5..1e-2f64, first in 1..5000_i32) {
         let size = |k: i32| f64::from(k + 1) * dt - f64::from(k) * dt;
         let mut testbed = Testbed::new(p).unwrap();
         prop_assert!(testbed.step(dt));
-        // A changed parameter forgets the matrices, but not the memory for the next ones.
+        // A changed parameter discards the matrices but keeps the memory allocated for the next ones.
         testbed.parameters.k1 *= 1.5;
         testbed.parameters_changed().unwrap();
         for mut testbed in [testbed.clone(), testbed] {
             let mut sizes: Vec<f64> = Vec::new();
             let before = testbed.computed_matrices();
             for k in first..first + 40 {
-                // Computing matrices takes long, so a fresh copy follows rarely.
+                // A fresh copy computes its matrices again, which is slow, so only every eighth step is compared with one.
                 let mut fresh = (k % 8 == 0).then(|| testbed.clone());
                 testbed.motors.set_theta(0, 0.01 * f64::from(k % 7));
                 prop_assert!(testbed.step(size(k)));
@@ -167,7 +167,7 @@ proptest! {
                 if !sizes.contains(&size(k)) {
                     sizes.push(size(k));
                 }
-                // A saved state that is restored.
+                // Saves and restores the state.
                 let saved = testbed.clone();
                 testbed.copy_from(&saved);
             }
@@ -176,7 +176,7 @@ proptest! {
         }
     }
 
-    /// Checks that the pairs of propagators equal the separate propagators.
+    /// Checks that the step matrices, in which pitch and roll are calculated together, equal the propagators of pitch and roll.
     #[test]
     fn pairs_of_propagators_are_propagators(p in parameters(), exponent in -6.0..-3.0f64) {
         let h = 10f64.powf(exponent);
@@ -216,7 +216,7 @@ fn opposite_motors_leave_pitch_at_zero_and_equal_motors_roll() {
 
 /// Checks that stored step matrices are used only for their parameters and their step size.
 #[test]
-fn the_past_does_not_matter() {
+fn earlier_steps_do_not_matter() {
     let p = BUILT_IN;
     let other = Parameters { k1: 2.0 * p.k1, ..p };
     let step = |testbed: &mut Testbed, h: f64| {
@@ -242,14 +242,14 @@ fn the_past_does_not_matter() {
     }
     assert!(testbed.copy_from(&saved));
     for h in sizes() {
-        assert_eq!(step(&mut testbed, h), fresh(p, h), "{h} after a saved testbed is back");
+        assert_eq!(step(&mut testbed, h), fresh(p, h), "{h} after a saved testbed is restored");
     }
 }
 
-/// Checks that a testbed without load damping keeps turning as a whole, accurate to the last digits. This
-/// holds for any stiffness, any small damping and any step size.
+/// Checks a testbed without load damping whose sides turn with their motors. They must keep turning, accurate to the last
+/// digits, for any stiffness, any small damping of the couplings and any step size.
 #[test]
-fn a_testbed_that_turns_goes_on_turning() {
+fn a_testbed_that_turns_keeps_turning() {
     let mut worst = 0.0_f64;
     for exponents in (0..4).flat_map(|k| (0..4).map(move |c| [k, c])) {
         let [k, c] = exponents.map(|exponent| 1e3_f64.powi(exponent));
@@ -277,8 +277,8 @@ fn a_testbed_that_turns_goes_on_turning() {
     assert!(worst < 3e-15, "{worst:e}");
 }
 
-/// Checks that with almost no stiffness a velocity decays exponentially, and that a small remainder has all
-/// digits.
+/// Checks that a velocity decays exponentially if there is almost no stiffness, and that even a small remainder is accurate
+/// to the last digits.
 #[test]
 fn decayed_velocities_have_all_digits() {
     let built_in = BUILT_IN;

@@ -61,7 +61,7 @@ class WebAssembly:
         linker, number = Linker(engine), ValType.i32()
         linker.define_func("fmu", "fmu_log", FuncType([number] * 3, []), lambda *message: self.messages.append(message))
         self.functions = linker.instantiate(self.store, Module(engine, module)).exports(self.store)
-        self.buffer = self.call("fmu_room", 4096)
+        self.buffer = self.call("fmu_argument_buffer", 4096)
         self.write(0, b"page\0", guid.encode() + b"\0")
         self.component = self.call("fmi2Instantiate", self.buffer, 1, self.buffer + 5, 0, self.buffer + 1024, 0, 0)
         assert self.component

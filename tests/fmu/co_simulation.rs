@@ -1,4 +1,4 @@
-//! Motion of the motors between communication points in Co-Simulation, observed by an importer.
+//! Tests of the motion of the motors between communication points in Co-Simulation, through the functions of the FMU.
 
 use crate::exact::{STATES, advanced, distance, jacobian, jumped, parameters, set_parameters, start_at};
 use crate::{in_mode, new, vr};
@@ -20,8 +20,8 @@ fn slave(p: &Parameters, use_omega: bool) -> Fmu {
     fmu
 }
 
-/// A reference for steps with known angles and rates: the exact solution after the jump from the expected
-/// angles.
+/// A reference for steps with known motor angles and rates: the exact solution, including the jump if the angles at the
+/// start of a step are not those at the end of the last one.
 struct Follower<'a> {
     p: &'a Parameters,
     x: [f64; 6],
@@ -34,6 +34,7 @@ impl<'a> Follower<'a> {
         Self { p, x: [0.0; 6], expected_angles: None, time: 0.0 }
     }
 
+    /// Makes a step of the FMU and asserts that its states equal the exact solution.
     #[track_caller]
     fn step(&mut self, fmu: &Fmu, theta: [f64; 2], rates: [f64; 2], h: f64) {
         fmu.step(self.time, h);
@@ -51,10 +52,10 @@ impl<'a> Follower<'a> {
     }
 }
 
-/// Checks that the slope of fmi2SetRealInputDerivatives takes precedence over omega and samples, only for the
-/// next step.
+/// Checks that a derivative set with fmi2SetRealInputDerivatives takes precedence over omega and over the samples, but only
+/// in the next step.
 #[test]
-fn set_derivatives_come_first() {
+fn set_derivatives_take_precedence() {
     for use_omega in [false, true] {
         let p = parameters(1);
         let fmu = slave(&p, use_omega);
@@ -65,19 +66,19 @@ fn set_derivatives_come_first() {
                 [(); 3].map(|()| [random.between(-1.0, 1.0), random.between(-1.0, 1.0)]);
             fmu.set(&THETA, &theta);
             fmu.set(&OMEGA, &omega);
-            fmu.give_rates(&THETA, &rates);
+            fmu.set_input_derivatives(&THETA, &rates);
             assert_eq!(fmu.rates(THETA), rates);
             follower.step(&fmu, theta, rates, random.between(0.001, 0.05));
         }
-        // Without a new slope, the source that the parameter selects applies again.
+        // If no new derivative is set, the rates again come from the source that `use_omega` selects.
         fmu.set(&THETA, &[0.1, 0.2]);
         fmu.set(&OMEGA, &[3.0, 4.0]);
         assert_eq!(fmu.rates(THETA) == [3.0, 4.0], use_omega);
     }
 }
 
-/// Checks that the order of set calls has no effect: the rates and torques are equal, before theta is set
-/// too.
+/// Checks that the order of setting omega, derivatives and `use_omega` has no effect on rates and torques, even before theta
+/// is set again.
 #[test]
 fn the_order_of_setting_does_not_matter() {
     let p = parameters(7);
@@ -90,20 +91,21 @@ fn the_order_of_setting_does_not_matter() {
         (fmu.rates(THETA), fmu.get([vr(Name::tau1), vr(Name::tau2)]))
     };
     let omega = |fmu: &Fmu| fmu.set(&OMEGA, &[5.0, -6.0]);
-    let derivative = |fmu: &Fmu| fmu.give_rates(&THETA, &[3.0, 4.0]);
+    let derivative = |fmu: &Fmu| fmu.set_input_derivatives(&THETA, &[3.0, 4.0]);
     let use_omega = |fmu: &Fmu| fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &1));
 
     let one = after_a_step(true, &[&omega, &derivative]);
-    assert_eq!(one.0, [3.0, 4.0], "a derivative comes before omega");
+    assert_eq!(one.0, [3.0, 4.0], "a derivative takes precedence over omega");
     assert_eq!(one, after_a_step(true, &[&derivative, &omega]));
 
     let other = after_a_step(false, &[&omega, &use_omega]);
-    assert_eq!(other.0, [5.0, -6.0], "omega holds at once");
+    assert_eq!(other.0, [5.0, -6.0], "omega takes effect immediately");
     assert_eq!(other, after_a_step(false, &[&use_omega, &omega]));
     assert_ne!(one.1, other.1);
 }
 
-/// Checks that the slope is omega with use_omega; omega = 0 is an exact zero-order hold, including jumps.
+/// Checks that the motors turn at the rates omega if `use_omega` is true. With omega = 0, the inputs are held exactly,
+/// and the motors jump at each communication point.
 #[test]
 fn omega_is_the_slope() {
     let p = parameters(3);
@@ -125,15 +127,15 @@ fn parabola_slope(t: [f64; 3], y: [f64; 3]) -> f64 {
         + y[2] * (2.0 * t[2] - t[0] - t[1]) / ((t[2] - t[0]) * (t[2] - t[1]))
 }
 
-/// Checks slopes without omega and derivatives, with uneven steps: 0 on the first sample, a first-order
-/// difference on the second. From the third sample on, the difference is of second order. The torques and the
-/// step follow this slope.
+/// Checks the rates that are estimated from samples, in steps of different sizes: 0 at the first sample, the difference
+/// quotient at the second, and from the third on the slope of the parabola through the last three samples. Torques and
+/// steps must use this rate.
 #[test]
 fn samples_are_differentiated() {
     let p = parameters(5);
     let jacobian = jacobian(&p);
     let fmu = slave(&p, false);
-    fmu.set(&OMEGA, &[77.0, 88.0]); // no effect here
+    fmu.set(&OMEGA, &[77.0, 88.0]); // no effect, because use_omega is false
     let mut follower = Follower::new(&p);
     let mut random = Random(6);
     let (mut times, mut samples) = (vec![0.0_f64], Vec::<[f64; 2]>::new());
@@ -163,7 +165,7 @@ fn samples_are_differentiated() {
     }
 }
 
-/// Checks that the motors are at rest from the third step on if an importer sets an input only once.
+/// Checks that the motors come to rest at their angles if an importer sets these only once.
 #[test]
 fn inputs_that_are_not_set_stay() {
     let fmu = slave(&BUILT_IN, false);
@@ -174,7 +176,7 @@ fn inputs_that_are_not_set_stay() {
     assert!(distance(&fmu.get([vr(Name::theta3), vr(Name::pitch)]), &[0.3, 0.3]) < 1e-9);
 }
 
-/// Checks that higher orders, and derivatives of omega, are accepted and have no effect.
+/// Checks that derivatives of higher order, and derivatives of omega, are accepted but have no effect.
 #[test]
 fn higher_orders_are_harmless() {
     let [plain, rich] = [(); 2].map(|()| slave(&BUILT_IN, false));
@@ -185,7 +187,7 @@ fn higher_orders_are_harmless() {
         for fmu in [&plain, &rich] {
             fmu.set(&THETA, &[t.sin(), t.cos()]);
             if i % 4 < 2 {
-                fmu.give_rates(&THETA, &[t.cos(), -t.sin()]);
+                fmu.set_input_derivatives(&THETA, &[t.cos(), -t.sin()]);
             }
         }
         let values = [5.0, 6.0, 7.0, 8.0];
@@ -202,7 +204,7 @@ fn derivatives_of_the_initialization_are_used() {
     let [with, without] = [true, false].map(|given| {
         let fmu = in_mode(CoSimulation, Initialization);
         if given {
-            fmu.give_rates(&THETA, &[2.0, 0.0]);
+            fmu.set_input_derivatives(&THETA, &[2.0, 0.0]);
         }
         fmu.ok(fmu.fmi2ExitInitializationMode());
         fmu.step(0.0, 0.01);
@@ -211,22 +213,22 @@ fn derivatives_of_the_initialization_are_used() {
     assert!(with[0] > 0.0 && without[0] == 0.0);
 }
 
-/// Checks that a step to infinity is rejected and the instance stays usable.
+/// Checks that a step is rejected if the state would become infinite, and that the instance then works as before.
 #[test]
 fn steps_out_of_the_range_of_numbers() {
     let fmu = in_mode(CoSimulation, StepComplete);
     start_at(&fmu, [0.0; 6]);
     fmu.set(&[vr(Name::theta1)], &[f64::MAX]);
-    fmu.give_rates(&[vr(Name::theta1)], &[f64::MAX]);
+    fmu.set_input_derivatives(&[vr(Name::theta1)], &[f64::MAX]);
     fmu.rejected_with(&["would overflow"], |fmu| fmu.try_step(0.0, 10.0));
     fmu.rejected_with(&["tau1"], |fmu| fmu.fmi2GetReal(&vr(Name::tau1), 1, &mut 0.0));
     fmu.set(&[vr(Name::theta1)], &[0.1]);
-    fmu.give_rates(&[vr(Name::theta1)], &[0.0]);
+    fmu.set_input_derivatives(&[vr(Name::theta1)], &[0.0]);
     fmu.step(0.0, 10.0);
 }
 
-/// Checks that a step is rejected if the parabola's end is in range but its rate there is not, because the
-/// next state could not be saved.
+/// Checks that a step is rejected if the motor angle at its end is in the range of numbers but the motor rate is not,
+/// because the state after it could not be saved.
 #[test]
 fn motors_out_of_the_range_of_numbers() {
     let fmu = in_mode(CoSimulation, StepComplete);

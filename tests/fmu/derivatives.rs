@@ -1,4 +1,4 @@
-//! Derivatives with respect to variables (section 2.1.9 of FMI 2.0) and to time (section 4.2.1).
+//! Derivatives with respect to variables (section 2.1.9 of FMI 2.0) and with respect to time (section 4.2.1).
 
 use crate::exact::{
     INPUTS, LINEAR, STARTS, STATES, jacobian, parameters, real_parameters, set_parameters, start_at, unknowns,
@@ -16,7 +16,7 @@ use prw_testbed::TestbedFmu;
 use prw_testbed::variables::Name;
 use std::sync::LazyLock;
 
-/// Model structure that the description contains for FMI 2.0.
+/// The model structure in the model description for FMI 2.0.
 static STRUCTURE: LazyLock<ModelStructure> = LazyLock::new(|| {
     let (fmi2, fmi3) =
         (fmu_export::fmi2::functions::<TestbedFmu>(), fmu_export::fmi3::functions::<TestbedFmu>());
@@ -25,8 +25,8 @@ static STRUCTURE: LazyLock<ModelStructure> = LazyLock::new(|| {
     ModelStructure::of(&model.unwrap(), Standard::Fmi2, false).unwrap()
 });
 
-/// Returns central differences of the values that getters return, each with a bound of its rounding error.
-/// The values are linear in every known except the parameters of the equations.
+/// Returns central differences of the values of the unknowns with respect to `known`, each with a bound of its rounding
+/// error. The values are linear in every known except the parameters of the equations, so only for these is the width small.
 fn differences<F: Either>(fmu: &F, unknowns: &[u32], known: u32) -> Vec<(f64, f64)> {
     let [value] = fmu.get([known]);
     let is_linear = [&INPUTS[..], &STATES, &STARTS].concat().contains(&known);
@@ -50,8 +50,9 @@ fn differences<F: Either>(fmu: &F, unknowns: &[u32], known: u32) -> Vec<(f64, f6
     ends.map(|(a, b)| ((a - b) / (2.0 * width), 1e-10 * (a.abs() + b.abs()) / width)).collect()
 }
 
-/// Checks that every derivative agrees with differences. Undeclared ones must be 0, except for states that
-/// depend on their start values.
+/// Checks that every derivative agrees with its difference, and is 0 if the model structure does not declare the dependency.
+/// After the initialization, the latter is not checked until the simulation has `started`, because the states then still
+/// depend on start values; nor for parameters, whose dependencies are declared only for the initialization.
 fn fit_differences<F: Either>(fmu: &F, mode: Mode, started: bool, label: &str) {
     let structure = &*STRUCTURE;
     let (unknowns, listed) = match mode {
@@ -78,8 +79,8 @@ fn fit_differences<F: Either>(fmu: &F, mode: Mode, started: bool, label: &str) {
     }
 }
 
-/// Checks derivatives before the first step and after uneven steps: with no angle set, with one and with all,
-/// in another instance, at the end.
+/// Checks derivatives before the first step and after steps of different sizes: with no new motor angle, with one and with
+/// both, after the state is restored in another instance, and after the end of the simulation.
 fn co_simulation<F: Either>(use_omega: bool, at_rest: bool, with_rates: bool) {
     let label = format!("use_omega {use_omega}, start_at_rest {at_rest}, derivatives {with_rates}");
     let p = parameters(7);
@@ -103,7 +104,7 @@ fn co_simulation<F: Either>(use_omega: bool, at_rest: bool, with_rates: bool) {
         fits(&fmu);
         fmu.set(&INPUTS, &draw());
         if with_rates {
-            fmu.give_rates(&THETA, &draw()[..2]);
+            fmu.set_input_derivatives(&THETA, &draw()[..2]);
         }
         let restored = F::in_mode::<TestbedFmu>(CoSimulation, Instantiated);
         restored.restore(&fmu.bytes());
@@ -127,7 +128,7 @@ fn co_simulation<F: Either>(use_omega: bool, at_rest: bool, with_rates: bool) {
     assert_eq!(all(&fmu), before, "{label}, terminated");
 }
 
-/// Checks derivatives while the states depend on their start values, and later.
+/// Checks derivatives in Model Exchange, first while the states depend on their start values, then after the start.
 fn model_exchange<F: Either>(use_omega: bool, at_rest: bool) {
     let label = format!("use_omega {use_omega}, start_at_rest {at_rest}");
     let mut random = Random(9);
@@ -150,7 +151,7 @@ fn model_exchange<F: Either>(use_omega: bool, at_rest: bool) {
     fit_differences(&fmu, Event, true, &label);
 }
 
-/// Checks every mode that has directional derivatives. In FMI 3.0 the adjoint derivatives are equal.
+/// Checks every mode that has directional derivatives. In FMI 3.0, the test kit also compares the adjoint derivatives.
 #[test]
 fn every_pair_fits_differences() {
     for [use_omega, at_rest] in [[false, false], [false, true], [true, false], [true, true]] {
@@ -166,7 +167,7 @@ fn every_pair_fits_differences() {
 const THETA: [u32; 2] = [vr(Name::theta1), vr(Name::theta2)];
 const OMEGA: [u32; 2] = [vr(Name::omega1), vr(Name::omega2)];
 
-/// Source of the motor rates.
+/// Where the motor rates come from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Rates {
     Samples,
@@ -174,8 +175,8 @@ enum Rates {
     Derivatives,
 }
 
-/// Checks output derivatives right after the initialization and after each step. The samples are at the
-/// expected angles, so there are no jumps.
+/// Checks output derivatives right after the initialization and after each step. The samples are the angles at the end of
+/// the last step, so the motors do not jump.
 #[test]
 fn output_derivatives_are_exact() {
     for rates in [Rates::Samples, Rates::Omega, Rates::Derivatives] {
@@ -192,10 +193,10 @@ fn output_derivatives_are_exact() {
             let given = [random.between(-2.0, 2.0), random.between(-2.0, 2.0)];
             fmu.set(&OMEGA, &given);
             if rates == Rates::Derivatives {
-                fmu.give_rates(&THETA, &given);
+                fmu.set_input_derivatives(&THETA, &given);
             }
             if rates == Rates::Samples && step == 2 {
-                // A change of the slope, so that later samples lie on a curve.
+                // Changes the slope, so that the motors have an acceleration from here on.
                 theta[0] += 0.01;
                 fmu.set(&THETA, &theta);
             } else {
@@ -219,8 +220,8 @@ fn output_derivatives_are_exact() {
     }
 }
 
-/// Checks that the derivative of omega from samples is the second derivative of the parabola through the last
-/// three.
+/// Checks that the derivative of omega, if it is estimated from samples, is the second derivative of the parabola through
+/// the last three.
 #[test]
 fn acceleration_of_samples() {
     let fmu = in_mode(CoSimulation, StepComplete);

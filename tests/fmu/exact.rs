@@ -1,5 +1,5 @@
-//! Reference without the FMU: eq. (11) from [`prw_testbed::state_space`], values by matrix products, motion
-//! by the exponential of one large matrix.
+//! Reference for the FMU, calculated from eq. (11) in [`prw_testbed::state_space`]: values by matrix products, and motion by
+//! the matrix exponential for the vector of states, motor angles and motor rates.
 
 #![allow(non_snake_case, reason = "the paper's symbols")]
 
@@ -21,7 +21,7 @@ pub const STATES: [u32; 6] = [
     vr(Name::omega5),
     vr(Name::omega6),
 ];
-/// The parameters with the start values of the states, in the order of [`STATES`].
+/// The parameters that are the start values of the states, in the order of [`STATES`].
 pub const STARTS: [u32; 6] = [
     vr(Name::theta3_start),
     vr(Name::theta4_start),
@@ -98,7 +98,7 @@ pub fn jumped(p: &Parameters, x: [f64; 6], d: [f64; 2]) -> [f64; 6] {
     std::array::from_fn(|i| x[i] + b[(i, 2)] * d[0] + b[(i, 3)] * d[1])
 }
 
-/// Returns the largest difference.
+/// Returns the largest absolute difference of two elements with the same index.
 pub fn distance(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
@@ -111,7 +111,7 @@ pub fn start_at(fmu: &dyn Either, x: [f64; 6]) {
     fmu.set(&STARTS, &x);
 }
 
-/// Sets all parameters of eq. (11), the Reals in one call, because they are checked together.
+/// Sets all parameters of eq. (11). The Reals are set in one call, because the FMU checks them together.
 pub fn set_parameters(fmu: &dyn Either, p: &Parameters) {
     let (mut reals, mut values) = (Vec::new(), Vec::new());
     for (name, value) in p.start_values() {
@@ -133,7 +133,7 @@ pub fn real_parameters() -> impl Iterator<Item = u32> {
     (0..).zip(TABLE).filter(move |(_, variable)| is_one(variable)).map(|(vr, _)| vr)
 }
 
-/// Returns parameters that differ from Table 1, different for each seed.
+/// Returns random parameters that vary around Table 1, the same for the same seed.
 pub fn parameters(seed: u64) -> Parameters {
     let mut random = Random(seed);
     let [M, N] = [8.0, 14.0].map(|end| random.between(1.0, end) as i32);

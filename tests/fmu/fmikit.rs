@@ -1,5 +1,5 @@
 //! The calls of FMIKit, with which Simulink users import FMUs: `sfun_fmurun.c` of CATIA-Systems/FMIKit-Simulink, commit 7bf6e69.
-//! Each input is set with a call of its own, and only if it changed.
+//! FMIKit sets each input with a separate call, and only if the input has changed.
 
 use crate::exact::STATES;
 use crate::vr;
@@ -13,13 +13,13 @@ const THETA: [u32; 2] = [vr(Name::theta1), vr(Name::theta2)];
 const INPUTS: [u32; 4] = [vr(Name::theta1), vr(Name::theta2), vr(Name::omega1), vr(Name::omega2)];
 const OUTPUTS: [u32; 4] = [vr(Name::tau1), vr(Name::tau2), vr(Name::pitch), vr(Name::roll)];
 
-/// Returns angles and rates of motors that start at 0.3 and -0.2 rad, at rest.
+/// Returns the angles and the rates of motors that start at rest at 0.3 and -0.2 rad.
 fn motors(t: f64) -> [f64; 4] {
     let (angle, rate) = (0.1 * (1.0 - (20.0 * t).cos()), 2.0 * (20.0 * t).sin());
     [0.3 + angle, -0.2 - 0.5 * angle, rate, -0.5 * rate]
 }
 
-/// Sets the inputs that changed, one by one. Simulink's inputs are 0 before the first call.
+/// Sets the inputs that differ from `previous`, one by one. Simulink's inputs are 0 before the first call.
 fn set_inputs<F: Either>(fmu: &F, indices: &[u32], values: &[f64], previous: &mut [f64; 4]) {
     for (number, (index, value)) in indices.iter().zip(values).enumerate() {
         if previous[number] != *value {
@@ -29,7 +29,8 @@ fn set_inputs<F: Either>(fmu: &F, indices: &[u32], values: &[f64], previous: &mu
     }
 }
 
-/// Instantiates, configures, sets the parameters and enters Initialization Mode.
+/// Instantiates the FMU, enters and leaves Configuration Mode in FMI 3.0, sets the parameters and enters Initialization
+/// Mode.
 fn initialize<F: Either>(interface: Interface, parameters: &[(Name, f64)]) -> F {
     let fmu = F::new::<TestbedFmu>(interface);
     if let Version::Fmi3(importer) = fmu.version() {
@@ -46,7 +47,8 @@ fn initialize<F: Either>(interface: Interface, parameters: &[(Name, f64)]) -> F 
     fmu
 }
 
-/// `mdlOutputs` reads outputs in Initialization Mode at the start, and `mdlUpdate` sets the inputs after it.
+/// Simulates in Co-Simulation; returns the outputs. At the start, `mdlOutputs` reads the outputs in Initialization Mode
+/// before `mdlUpdate` sets the inputs.
 fn in_co_simulation<F: Either>() -> Vec<[f64; 4]> {
     let fmu: F = initialize(CoSimulation, &[(Name::k1, 90.0)]);
     let mut previous = [0.0; 4];
@@ -61,8 +63,8 @@ fn in_co_simulation<F: Either>() -> Vec<[f64; 4]> {
     outputs
 }
 
-/// `mdlStart` reads the states before inputs are set, and `mdlOutputs` sets these states. Simulink's ode4 then asks for the
-/// derivatives at four points of each step.
+/// Simulates in Model Exchange; returns the outputs. `mdlStart` reads the states before inputs are set, and `mdlOutputs` sets
+/// these states. Simulink's ode4 then needs the derivatives at four points of each step.
 fn in_model_exchange<F: Either>(parameters: &[(Name, f64)]) -> Vec<[f64; 4]> {
     let fmu: F = initialize(ModelExchange, parameters);
     fmu.ok(fmu.exit_initialization_mode());
@@ -95,16 +97,16 @@ fn in_model_exchange<F: Either>(parameters: &[(Name, f64)]) -> Vec<[f64; 4]> {
 }
 
 #[test]
-fn both_versions_give_the_same_digits() {
+fn both_versions_give_bit_identical_outputs() {
     assert_eq!(in_co_simulation::<fmu_test_kit::Importer>(), in_co_simulation::<fmi3::Importer>());
     let starts = [(Name::theta1, 0.3), (Name::theta2, -0.2)];
     let found = in_model_exchange::<fmu_test_kit::Importer>(&starts);
     assert_eq!(found, in_model_exchange::<fmi3::Importer>(&starts));
 }
 
-/// The states are read before the inputs are set and then set back, so the testbed cannot rest at the angles that come
-/// later: an integrator may keep a copy of its states, and the FMU cannot tell this call from a wish. Two remedies of the
-/// documentation give exactly the same start at rest.
+/// Checks that in FMIKit the testbed starts at rest only with start values. FMIKit reads the states before it sets the inputs
+/// and then sets the same states. The FMU cannot distinguish this from a start state that the user wants, so the testbed
+/// does not start at rest at the angles that are set later. Both remedies of the documentation give the start at rest.
 #[test]
 fn a_start_at_rest_needs_start_values() {
     let first = |parameters: &[(Name, f64)]| in_model_exchange::<fmu_test_kit::Importer>(parameters)[0];
@@ -123,7 +125,7 @@ fn a_start_at_rest_needs_start_values() {
             assert!((found - expected).abs() < 1e-15, "{found:?}");
         }
     }
-    assert!(first(&[])[0] < -18.0, "the remedies are not needed any more: tell the users");
+    assert!(first(&[])[0] < -18.0, "the remedies are no longer needed: update the documentation");
     let fmu: fmu_test_kit::Importer = initialize(ModelExchange, &angles);
     fmu.ok(fmu.exit_initialization_mode());
     assert_eq!(fmu.get(STATES), [0.3, -0.2, 0.3, -0.2, 0.0, 0.0]);

@@ -1,5 +1,5 @@
-//! Tests of the testbed FMU: physics, parameters, saved states. (fmu-export tests the C functions with test
-//! models.)
+//! Tests of the testbed FMU: physics, parameters and saved states. The tests of fmu-export cover the C functions, with test
+//! models.
 
 #![allow(unsafe_code)]
 
@@ -26,19 +26,19 @@ const fn vr(name: Name) -> u32 {
     name as u32
 }
 
-/// Makes an instance.
+/// Creates an instance.
 fn new(interface: Interface) -> Importer {
     Importer::new::<TestbedFmu>(interface)
 }
 
 const INTERFACES: [Interface; 2] = [Interface::CoSimulation, Interface::ModelExchange];
 
-/// Makes an instance in this mode.
+/// Creates an instance in this mode.
 fn in_mode(interface: Interface, mode: Mode) -> Importer {
     Importer::in_mode::<TestbedFmu>(interface, mode)
 }
 
-/// Checks that hold for every FMU.
+/// The checks of the test kit that every FMU must pass.
 mod every {
     fmu_test_kit::every_check!(prw_testbed::TestbedFmu);
 }

@@ -1,4 +1,4 @@
-//! Model Exchange (section 3.2 of FMI 2.0): eq. (11) for an importer's integrator.
+//! Model Exchange (section 3.2 of FMI 2.0): eq. (11), integrated by the importer.
 
 use crate::exact::{INPUTS, LINEAR, STATES, distance, jacobian, parameters, set_parameters};
 use crate::{new, vr};
@@ -8,7 +8,7 @@ use nalgebra::SVector;
 use prw_testbed::variables::Name;
 use prw_testbed::{BUILT_IN, Parameters};
 
-/// Checks derivatives and outputs at random points with random parameters; use_omega has no effect.
+/// Checks derivatives and outputs at random states and inputs with random parameters. `use_omega` must have no effect.
 #[test]
 fn equations() {
     let mut random = Random(3);
@@ -36,7 +36,7 @@ fn equations() {
     }
 }
 
-/// Returns angles and rates of motors that start smoothly from rest.
+/// Returns the angles and the rates of motors that start from rest.
 fn motors(t: f64) -> ([f64; 2], [f64; 2]) {
     ([(2.0 * t).cos() - 1.0, 0.5 * t * t], [-2.0 * (2.0 * t).sin(), t])
 }
@@ -71,7 +71,7 @@ fn integrated(p: &Parameters, steps: i32) -> [f64; 14] {
     fmu.get(LINEAR)
 }
 
-/// Simulates the motion in Co-Simulation, from samples or with given rates.
+/// Simulates the same motion in Co-Simulation, with rates from omega or estimated from samples.
 fn simulated(p: &Parameters, steps: i32, use_omega: bool) -> [f64; 14] {
     let fmu = new(CoSimulation);
     set_parameters(&fmu, p);
@@ -88,8 +88,8 @@ fn simulated(p: &Parameters, steps: i32, use_omega: bool) -> [f64; 14] {
     fmu.get(LINEAR)
 }
 
-/// Checks that both interface types give equal motions. In Co-Simulation the states follow the last sample
-/// only in the next step; this error is of second order in h, like the others.
+/// Checks that both interface types give the same motion, within an error of second order in the step size. One such error
+/// in Co-Simulation is that the states follow the last sample only in the next step.
 #[test]
 fn same_motion_as_co_simulation() {
     for p in [BUILT_IN, parameters(4)] {

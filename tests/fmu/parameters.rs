@@ -1,5 +1,5 @@
-//! Invalid parameters are rejected: one message with the reason, and no change. (fmu-export tests the rejections that do not
-//! depend on the model.)
+//! Invalid parameters are rejected with one message that contains the reason, and change nothing. The tests of fmu-export
+//! cover rejections that do not depend on the model.
 
 use crate::{TABLE, in_mode, vr};
 use fmu_export::Interface::CoSimulation;
@@ -9,10 +9,9 @@ use fmu_test_kit::Either;
 use prw_testbed::BUILT_IN;
 use prw_testbed::variables::Name;
 
-/// Checks the declared limits: the smallest declared value is accepted and runs; values below it are
-/// rejected.
+/// Checks for each parameter that a simulation with its declared minimum runs, and that smaller values are rejected.
 #[test]
-fn declared_limits_are_those() {
+fn declared_minima_are_the_limits() {
     let mut found = 0;
     for (index, variable) in (0..).zip(TABLE).filter(|(_, of)| of.causality() == Causality::Parameter) {
         let fmu = in_mode(CoSimulation, Instantiated);
@@ -40,10 +39,10 @@ fn declared_limits_are_those() {
     assert_eq!(found, BUILT_IN.start_values().len(), "every parameter of Table 1 has a limit");
 }
 
-/// Checks that one of the dampings may be 0, in either order of setting them; and parameters whose coefficients
-/// overflow.
+/// Checks that one of c1 and c2 may be 0 but not both, in either order of setting them, and that parameters are rejected if
+/// a coefficient of the equations overflows.
 #[test]
-fn parameters_that_do_not_fit_together() {
+fn combinations_of_parameters_are_checked() {
     let fmu = in_mode(CoSimulation, Instantiated);
     for (zero, other) in [(vr(Name::c1), vr(Name::c2)), (vr(Name::c2), vr(Name::c1))] {
         fmu.set(&[zero], &[0.0]);

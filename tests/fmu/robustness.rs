@@ -1,5 +1,5 @@
-//! Random sequences of calls; loading and unloading of the library together with another FMU.
-//! (crates/fmu-export tests the rest of docs/robustness.md, with test models.)
+//! Random sequences of calls, and loading and unloading of the library together with another FMU. The tests of fmu-export
+//! cover the rest of docs/robustness.md with test models.
 
 use fmu_test_kit::fault_injection::{run, run_seeds};
 use fmu_test_kit::{Importer, fmi3};
@@ -14,7 +14,7 @@ fn every_guarantee_holds_for_any_calls() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn unloading_leaves_nothing_behind() {
+fn loading_and_unloading_leaks_nothing() {
     use fmu_test_kit::c_programs::{compile, reload};
     use std::path::Path;
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/fmu-export/tests/c/reload.c");

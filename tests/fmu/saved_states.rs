@@ -1,4 +1,4 @@
-//! Saved states (section 2.1.8 of FMI 2.0): their content, and rejected states.
+//! Serialized states (section 2.1.8 of FMI 2.0) with invalid values of the testbed's own fields are rejected.
 
 use crate::{TABLE, in_mode};
 use fmu_export::BaseType;
@@ -8,21 +8,22 @@ use fmu_test_kit::Either;
 use fmu_test_kit::serialized::{VALUES, with};
 use std::ops::Range;
 
-/// Returns the range of a variable's value; the memory of the model follows the last variable.
-fn index_of(vr: u32) -> Range<usize> {
+/// Returns the range of a variable's value in the bytes of a state. The `memory` fields of the model follow the last
+/// variable.
+fn range_of(vr: u32) -> Range<usize> {
     let stored = TABLE[..vr as usize].iter().filter(|variable| variable.has_start() || variable.is_state());
     let length = |base| if base == BaseType::Boolean { 1 } else { 8 };
     let begin = VALUES + stored.map(|variable| length(variable.base())).sum::<usize>();
     begin..begin + 8
 }
 
-/// Checks that impossible numbers of samples are rejected; the number is the first value after the variables.
+/// Checks that impossible numbers of samples and times between them are rejected. They are the first `memory` fields.
 #[test]
 fn impossible_number_of_samples() {
     let fmu = in_mode(CoSimulation, StepComplete);
     fmu.step(0.0, 0.125);
     fmu.step(0.125, 0.125);
-    let (bytes, samples) = (fmu.bytes(), index_of(TABLE.len() as u32));
+    let (bytes, samples) = (fmu.bytes(), range_of(TABLE.len() as u32));
     assert_eq!(bytes[samples.clone()], 2_i64.to_le_bytes());
     for count in [-1, i64::from(i32::MIN), 3, i64::MAX] {
         fmu.rejected_bytes(&with(bytes.clone(), samples.clone(), &count.to_le_bytes()));

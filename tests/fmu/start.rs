@@ -1,4 +1,4 @@
-//! Start of the testbed: at rest at the motor angles, for any order of the importer's calls, or in a given
+//! Start of the testbed: either at rest at the motor angles, regardless of the order of the importer's calls, or in a given
 //! state.
 
 use crate::exact::{INPUTS, STATES, distance, start_at};
@@ -22,7 +22,7 @@ const INITIALIZING: Stage = 1;
 const INITIALIZED: Stage = 2;
 const STAGES: [Stage; 3] = [INSTANTIATED, INITIALIZING, INITIALIZED];
 
-/// Makes the importer's calls up to the first step, and calls `act` at each stage.
+/// Makes the importer's calls up to the first step, and calls `act` in each stage.
 fn initialize<F: Either>(fmu: &F, act: impl Fn(Stage)) {
     act(INSTANTIATED);
     fmu.enter_initialization(0.0, None);
@@ -31,13 +31,14 @@ fn initialize<F: Either>(fmu: &F, act: impl Fn(Stage)) {
     act(INITIALIZED);
 }
 
+/// Asserts that the testbed is at rest at `ANGLES`.
 #[track_caller]
 fn rests(fmu: &impl Either) {
     assert_eq!(fmu.get(STATES), REST);
     assert_eq!(fmu.get([vr(Name::tau1), vr(Name::tau2), vr(Name::der_theta3)]), [0.0; 3]);
 }
 
-/// Checks that the testbed in Co-Simulation stays exactly at rest, because nothing is twisted.
+/// Checks in Co-Simulation that the testbed stays exactly at rest, because its couplings are not twisted.
 fn rest_in_co_simulation<F: Either>() {
     for (stage, use_omega) in STAGES.into_iter().flat_map(|stage| [(stage, 0), (stage, 1)]) {
         let fmu = F::new::<TestbedFmu>(CoSimulation);
@@ -57,7 +58,7 @@ fn rest_in_co_simulation<F: Either>() {
             time += size;
         }
         fmu.set(&THETA, &[0.0; 2]);
-        assert_eq!(fmu.get(STATES), REST, "after the start");
+        assert_eq!(fmu.get(STATES), REST, "after the start, angles do not set the states");
     }
 }
 
@@ -74,7 +75,7 @@ fn the_last_angles_before_the_first_step_count() {
     fmu.set(&THETA, &ANGLES);
     fmu.step(0.0, 0.01);
     rests(&fmu);
-    // From here on the angles of the motors act only through motion.
+    // After the first step, the motor angles act on the states only through later steps.
     fmu.set(&THETA, &[0.0; 2]);
     assert_eq!(fmu.get(STATES), REST);
 }
@@ -84,10 +85,10 @@ fn the_last_angles_before_the_first_step_count() {
 fn a_rejected_step_starts_nothing() {
     let fmu = in_mode(CoSimulation, StepComplete);
     fmu.set(&THETA, &[f64::MAX, 0.0]);
-    fmu.give_rates(&THETA, &[f64::MAX; 2]);
+    fmu.set_input_derivatives(&THETA, &[f64::MAX; 2]);
     assert_eq!(fmu.try_step(0.0, 10.0), Status::Error);
     fmu.set(&THETA, &ANGLES);
-    fmu.give_rates(&THETA, &[0.0; 2]);
+    fmu.set_input_derivatives(&THETA, &[0.0; 2]);
     rests(&fmu);
 }
 
@@ -103,7 +104,7 @@ fn rest_in_model_exchange<F: Either>() {
         fmu.enter_continuous_time();
         rests(&fmu);
         assert_eq!(fmu.derivatives::<6>(), [0.0; 6]);
-        // From here on the importer integrates, whether or not it has set states.
+        // In Continuous-Time Mode the importer integrates the states, so the angles no longer set them.
         fmu.set(&THETA, &[0.0; 2]);
         assert_eq!(fmu.get(STATES), REST);
         fmu.ok(fmu.enter_event_mode());
@@ -120,7 +121,8 @@ fn rest_in_both_versions() {
     rest_in_model_exchange::<fmi3::Importer>();
 }
 
-/// OpenModelica sets parameters late, and in Event Mode sets states that it has just read.
+/// Checks the calls of OpenModelica, which sets parameters after the initialization and, in Event Mode, sets states that it
+/// has just read.
 #[test]
 fn late_parameters_and_states_in_event_mode() {
     for given in [false, true] {
@@ -138,13 +140,13 @@ fn late_parameters_and_states_in_event_mode() {
         x[4] += 0.25;
         fmu.ok(fmu.fmi2SetContinuousStates(x.as_ptr(), 6));
         fmu.set(&THETA, &[5.0; 2]);
-        assert_eq!(fmu.get(STATES), x, "states that are set are the importer's");
+        assert_eq!(fmu.get(STATES), x, "states that the importer has set are kept");
         fmu.enter_continuous_time();
         assert_eq!(fmu.get(STATES), x);
     }
 }
 
-/// Checks a start in a given state, set at any stage, until the first step.
+/// Checks that the start state can be given in any stage before the first step, but not later.
 #[test]
 fn a_given_start() {
     for interface in INTERFACES {
@@ -166,25 +168,26 @@ fn a_given_start() {
     assert_eq!(fmu.get(STATES), [0.0; 6], "after the first step");
 }
 
-/// Checks that a state saved before the first step still follows the motors, and that a reset restores this.
+/// Checks that after restoring a state that was saved before the first step, and after a reset, the states again follow the
+/// motor angles.
 #[test]
 fn saved_and_reset() {
     for interface in INTERFACES {
         let fmu = new(interface);
         initialize(&fmu, |_| fmu.set(&THETA, &[0.1, 0.2]));
         let (state, bytes) = (fmu.save(), fmu.bytes());
-        let go = || match interface {
+        let start = || match interface {
             CoSimulation => fmu.step(0.0, 0.01),
             ModelExchange => _ = fmu.enter_continuous_time(),
         };
-        go();
-        let gone = fmu.bytes();
+        start();
+        let started = fmu.bytes();
         let restores: [&dyn Fn(); 2] = [&|| fmu.ok(fmu.fmi2SetFMUstate(state)), &|| fmu.restore(&bytes)];
         for restore in restores {
             restore();
             fmu.set(&THETA, &ANGLES);
             rests(&fmu);
-            fmu.restore(&gone);
+            fmu.restore(&started);
             fmu.set(&THETA, &ANGLES);
             assert!(distance(&fmu.get(STATES), &REST) > 0.1, "{interface}");
         }

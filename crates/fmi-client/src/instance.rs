@@ -3,7 +3,7 @@
 
 use crate::float::keeping_environment;
 use crate::library::{Functions, Library};
-use crate::log::{Listen, Log, callbacks, log_of_fmi3};
+use crate::log::{Log, LogListener, callbacks, log_of_fmi3};
 use crate::rejection::{Message, Rejection};
 use crate::saved::States;
 use fmi_abi::c_types::{c_int, c_void};
@@ -36,7 +36,7 @@ pub struct Settings<'a> {
     /// Whether a step may end early (FMI 3.0).
     pub early_return: bool,
     /// Receiver of all messages, and the number that identifies this instance to it.
-    pub listener: Option<(Arc<dyn Listen>, usize)>,
+    pub listener: Option<(Arc<dyn LogListener>, usize)>,
 }
 
 impl Settings<'_> {

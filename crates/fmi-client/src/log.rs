@@ -18,10 +18,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::thread::ThreadId;
 
 /// Receiver of log messages, called while the FMU logs, also from threads of the FMU. It must not call the FMU and must not panic.
-pub trait Listen: Send + Sync {
+pub trait LogListener: Send + Sync {
     /// Receives a message of the instance with this [`number`](crate::Settings::listener); `None` if the FMU does not name one of
     /// the living instances.
-    fn hear(&self, number: Option<usize>, message: &Message);
+    fn on_message(&self, number: Option<usize>, message: &Message);
 }
 
 /// Maximum number of stored messages. A later error quotes them as its reason; older ones are dropped.
@@ -33,7 +33,7 @@ pub(crate) struct Log {
     environment: usize,
     /// Messages since the last [`take`](Self::take), which follows each call that does not return OK.
     new: Mutex<VecDeque<Message>>,
-    listener: Option<(Arc<dyn Listen>, usize)>,
+    listener: Option<(Arc<dyn LogListener>, usize)>,
 }
 
 impl fmt::Debug for Log {
@@ -55,7 +55,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 impl Log {
     /// Creates a log and registers it in the list of living instances.
-    pub fn register(listener: Option<(Arc<dyn Listen>, usize)>) -> Arc<Self> {
+    pub fn register(listener: Option<(Arc<dyn LogListener>, usize)>) -> Arc<Self> {
         /// Distance between two environments. They are aligned like the pointers of `malloc`, in case an FMU checks that.
         const SPACING: usize = 16;
         static NEXT: AtomicUsize = AtomicUsize::new(0x1000);
@@ -91,7 +91,7 @@ impl Log {
 
     fn add(&self, message: Message) {
         if let Some((listener, number)) = &self.listener {
-            listener.hear(Some(*number), &message);
+            listener.on_message(Some(*number), &message);
         }
         push_limited(&mut lock(&self.new), message);
     }
@@ -115,14 +115,14 @@ fn store(environment: usize, message: Message) {
         drop(living);
         return log.add(message);
     }
-    let mut listeners: Vec<Arc<dyn Listen>> = Vec::new();
+    let mut listeners: Vec<Arc<dyn LogListener>> = Vec::new();
     for (listener, _) in living.values().filter_map(|log| log.listener.as_ref()) {
         if !listeners.iter().any(|other| Arc::ptr_eq(other, listener)) {
             listeners.push(Arc::clone(listener));
         }
     }
     drop(living);
-    listeners.iter().for_each(|listener| listener.hear(None, &message));
+    listeners.iter().for_each(|listener| listener.on_message(None, &message));
     push_limited(&mut lock(&STRAY), (std::thread::current().id(), message));
 }
 

@@ -1,4 +1,4 @@
-//! The oscillator of the tests as a shared library, for C programs.
+//! The test model `Oscillator` as a shared library, which the C programs of the tests load.
 
 #[path = "../tests/models/oscillator.rs"]
 mod oscillator;

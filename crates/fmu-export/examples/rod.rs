@@ -1,4 +1,4 @@
-//! The rod of the tests as a shared library, for importers that read arrays.
+//! The test model `Rod` as a shared library, for tests of importers that read arrays.
 
 #[path = "../tests/models/rod.rs"]
 #[allow(dead_code, missing_docs)]

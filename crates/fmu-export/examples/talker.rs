@@ -1,4 +1,4 @@
-//! The talker of the tests as a shared library: a second FMU in a process.
+//! The test model `Talker` as a shared library, which the C programs of the tests load as a second FMU.
 
 #[path = "../tests/models/talker.rs"]
 mod talker;

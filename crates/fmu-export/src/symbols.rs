@@ -38,11 +38,11 @@ macro_rules! symbols {
 
             $crate::fmi2_functions!($crate::symbols, @each fmi2 __fmu_model;);
 
-            /// See `fmu_export::fmi2::room`.
+            /// See `fmu_export::fmi2::argument_buffer`.
             #[cfg(target_family = "wasm")]
             #[unsafe(no_mangle)]
-            pub extern "C" fn fmu_room(size: usize) -> fmi2Component {
-                $crate::fmi2::room(size)
+            pub extern "C" fn fmu_argument_buffer(size: usize) -> fmi2Component {
+                $crate::fmi2::argument_buffer(size)
             }
 
             /// See `fmu_export::fmi2::add_file`.

@@ -1,5 +1,5 @@
-//! C programs that load shared libraries as importers do, compiled with the standards' own headers; and the types of the
-//! functions, compared with those headers by the C compiler.
+//! C programs that load shared libraries as importers do, compiled with the headers of the FMI standards. The C compiler
+//! also checks that the types of all functions agree with these headers.
 #![cfg(unix)]
 #![allow(missing_docs)]
 
@@ -33,8 +33,8 @@ fn run(name: &str) -> String {
 const OUTPUTS: [u32; 4] =
     [Name::position as u32, Name::velocity as u32, Name::spring_force as u32, Name::energy as u32];
 
-/// Checks that the FMU writes equal values in C and in Rust, and that the types have equal layouts. `reload`
-/// drives the FMU in FMI 3.0.
+/// Checks that an importer in C gets the same values from the FMU as one in Rust, and that types have the same sizes and
+/// offsets in both languages. This program uses FMI 2.0; `reload` also uses FMI 3.0.
 #[test]
 fn drive() {
     let printed = run("drive");
@@ -64,7 +64,7 @@ fn drive() {
     assert!(values.is_empty(), "{values:?}");
 }
 
-/// Makes the Co-Simulation run of the program.
+/// Performs the same Co-Simulation run as the C program; returns the outputs at its end.
 fn co_simulation() -> [f64; 4] {
     let fmu = Importer::initialized_at::<Oscillator>(0.0);
     for i in (0..64).map(f64::from) {
@@ -74,7 +74,7 @@ fn co_simulation() -> [f64; 4] {
     fmu.get(OUTPUTS)
 }
 
-/// Makes the Model Exchange run of the program.
+/// Performs the same Model Exchange run as the C program; returns the outputs at its end.
 fn model_exchange() -> [f64; 4] {
     let fmu = Importer::in_mode::<Oscillator>(ModelExchange, ContinuousTime);
     let mut x = [0.0; 2];
@@ -87,7 +87,7 @@ fn model_exchange() -> [f64; 4] {
     fmu.get(OUTPUTS)
 }
 
-/// Checks that a logger that formats its arguments and a logger that does not show the same messages.
+/// Checks that a logger that formats a message with `printf` shows the same text as one that uses the message unchanged.
 #[test]
 fn loggers() {
     let printed = run("loggers");
@@ -96,17 +96,17 @@ fn loggers() {
     assert!(printed.contains("there is no log category '_s_s_n'"), "{printed}");
 }
 
-/// Loads one library, and two libraries at the same time.
+/// Checks that loading and unloading leaks no memory, with one library and with two libraries at the same time.
 #[cfg(target_os = "linux")]
 #[test]
-fn loading_and_unloading_leaves_nothing_behind() {
+fn loading_and_unloading_leaks_nothing() {
     let program = program("reload");
     reload(&program, &["oscillator"]);
     reload(&program, &["oscillator", "talker"]);
 }
 
-/// Checks that the library exports only the 44 functions of FMI 2.0, the 75 of FMI 3.0, and the two functions for the program that
-/// packs the FMU.
+/// Checks that the library exports only the 44 functions of FMI 2.0, the 75 of FMI 3.0, and two functions that
+/// fmu-package calls.
 #[test]
 fn exported_symbols() {
     let flags: &[&str] = if cfg!(target_os = "macos") { &["-gU"] } else { &["-D", "--defined-only"] };
@@ -132,7 +132,7 @@ fn exported_symbols() {
     assert_eq!(declared, exported);
 }
 
-/// A type of C as Rust's declaration has it.
+/// Returns the type of C for a type in a Rust declaration.
 fn c_type(rust: &str) -> String {
     let rust: String = rust.chars().filter(|c| *c != ' ').collect();
     match rust.strip_prefix("*mut").or_else(|| rust.strip_prefix("*const")) {
@@ -147,8 +147,8 @@ fn c_type(rust: &str) -> String {
     }
 }
 
-/// The C compiler compares: each function, declared with the types that Rust has, is assigned to a pointer of the type in
-/// the standard's header; and the types have the same sizes.
+/// Checks the types of all functions with the C compiler. In a C file, each function is declared with the types that it has
+/// in Rust and assigned to a pointer of the type in the standard's header. The sizes of the types of FMI 3.0 are asserted.
 #[test]
 fn signatures() {
     use fmu_export::fmi3::types::*;
@@ -157,7 +157,7 @@ fn signatures() {
     macro_rules! sizes {
         ($($name:ident)+) => { [$((stringify!($name), size_of::<$name>())),+] };
     }
-    // `bool` and bytes are one type to C in all but name.
+    // Both declarations use the same names of types, so the sizes of these types are compared separately.
     let sizes = sizes! {
         fmi3Status fmi3Boolean fmi3Clock fmi3DependencyKind fmi3IntervalQualifier
         fmi3Instance fmi3InstanceEnvironment fmi3FMUState fmi3ValueReference
@@ -192,7 +192,7 @@ fn check_signatures(version: Standard, standard: &str, handle: &str, count: usiz
         check_syntax(&source, &headers)
     };
     assert_eq!(compile(&text), Ok(()));
-    // A type that differs is seen.
+    // The compiler detects a type that differs.
     let right = text.lines().find(|line| line.contains("SetTime(")).unwrap();
     let wrong = format!("{standard}Status rust_{standard}SetTime({handle}, float);");
     let error = compile(&text.replace(right, &wrong)).unwrap_err();

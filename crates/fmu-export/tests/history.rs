@@ -39,7 +39,7 @@ histories! {
     ticker Ticker;
 }
 
-/// The meter counts the steps that `step_fast` made.
+/// Checks histories without copies, because a variable of the meter counts the steps that `step_fast` made.
 #[test]
 fn meter() {
     Histories { with_copies: false, ..Histories::default() }.check::<Meter>();

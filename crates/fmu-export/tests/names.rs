@@ -1,4 +1,4 @@
-//! An author's crate may call its items like FMI's types, like this crate's, and like Rust's.
+//! The items of an author's crate may have the same names as types of FMI and items of this crate or of Rust.
 #![allow(
     dead_code,
     unused_macros,
@@ -10,7 +10,7 @@
 
 use fmu_export as fmi;
 
-/// A status of the author.
+/// A type of the author that has the name of an FMI type.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Status {
     #[default]
@@ -54,7 +54,7 @@ macro_rules! panic {
 }
 fn fmi2GetReal() {}
 
-/// Fields and variables are called as they like, too.
+/// Fields and variables may have such names, too.
 #[derive(::core::clone::Clone)]
 struct Idler {
     model: f64,
@@ -111,7 +111,7 @@ mod choices {
     pub enum Item {}
     pub enum Value {}
     fmu_export::enumeration! {
-        /// An enumeration whose items are called like Rust's.
+        /// An enumeration whose items have names of Rust.
         pub enum Scalar {
             /// One
             Some = 1,
@@ -120,10 +120,10 @@ mod choices {
         }
     }
     fmu_export::saved! {
-        /// A struct called like a trait.
+        /// A struct with the name of a trait.
         #[derive(Clone, Copy, Default)]
         pub struct Saved {
-            /// A field called like an argument.
+            /// A field with the name of an argument.
             pub visitor: f64,
         }
     }
@@ -132,10 +132,10 @@ mod choices {
 fmi::export_fmu!(Idler: CoSimulation + ModelExchange + Partials + InputDerivatives + OutputDerivatives);
 
 #[test]
-fn the_functions_are_those_of_the_fmu() {
-    // SAFETY: it has no conditions.
+fn the_macros_use_their_own_items() {
+    // SAFETY: the function has no requirements.
     let version = unsafe { fmi2_functions::fmi2GetVersion() };
-    // SAFETY: a string that lives as long as the library.
+    // SAFETY: the string is valid until the program ends.
     assert_eq!(unsafe { ::std::ffi::CStr::from_ptr(version) }, c"2.0");
     let table = <Idler as fmi::Variables>::TABLE;
     let index = <Idler as fmi::Variables>::index;

@@ -1,11 +1,11 @@
-//! The control loop of the oscillator.
+//! Control loops with test models, which must not allocate, make system calls, or lock.
 #![allow(missing_docs)]
 
 mod models;
 
 fmu_test_kit::control_loop!(models::Oscillator);
 
-/// Arrays, whole in FMI 3.0 and by their elements in FMI 2.0.
+/// Checks arrays, which are set and read as a whole in FMI 3.0 and by their elements in FMI 2.0.
 #[test]
 fn arrays_are_set_and_read_without_allocation() {
     use fmu_export::Variables;
@@ -33,7 +33,8 @@ fn arrays_are_set_and_read_without_allocation() {
     assert_eq!((count, of_fmi3), (0, of_fmi2));
 }
 
-/// The model may fail half-way, so it is copied before each step. Its vector has its final length after three steps.
+/// Checks a model that is copied before each step, because the step may fail half-way. Its vector has its final length after
+/// three steps, so the first four are not counted.
 #[test]
 fn steps_that_can_be_undone_do_not_allocate() {
     use fmu_test_kit::Either;
@@ -51,7 +52,7 @@ fn steps_that_can_be_undone_do_not_allocate() {
 
 #[cfg(rtsan)]
 #[test]
-#[ignore = "the sanitizer must end it, and does if make sanitize goes on"]
+#[ignore = "the RealtimeSanitizer must end this test; make sanitize checks it"]
 fn allocation_is_caught() {
     let _context = fmu_test_kit::realtime::sanitizer::enter();
     drop(std::hint::black_box(Box::new(1)));

@@ -1,4 +1,4 @@
-//! Test models with any calls in any order, and on threads.
+//! Test models with random calls in random order, and on several threads.
 #![allow(missing_docs)]
 
 mod models;
@@ -27,7 +27,7 @@ const NEVER: &str = "fmi2CancelStep fmi2GetStatus fmi2GetIntegerStatus fmi2GetSt
     fmi3SetIntervalFraction fmi3SetShiftDecimal fmi3SetShiftFraction fmi3EvaluateDiscreteStates \
     fmi3ActivateModelPartition";
 
-/// Checks that every function succeeds at times, and at times is rejected.
+/// Checks that every function was accepted at least once, except those in `NEVER`, and rejected at least once.
 fn check_counts(tally: &Tally, functions: &[&str]) {
     for name in functions {
         let [ok, _, rejected] = tally[name];
@@ -50,7 +50,7 @@ fn every_guarantee_of_fmi3_holds_for_any_calls() {
     check_counts(&tally, &["fmi3InstantiateCoSimulation", "fmi3InstantiateModelExchange"]);
 }
 
-/// Runs the inputs that libFuzzer found worth keeping, for every test model in both FMI versions.
+/// Runs the inputs that libFuzzer has collected, each with every test model in both FMI versions.
 #[test]
 fn every_guarantee_holds_for_the_corpus() {
     let archive = include_bytes!("../fuzz/corpus.zip");
@@ -72,7 +72,7 @@ const THREADS: usize = 4;
 const INSTANCES: usize = 8;
 const TURNS: usize = 400;
 
-/// An instance in the pool. Even numbers are of FMI 2.0, odd numbers of FMI 3.0.
+/// An instance in the pool: of FMI 2.0 if its number is even, of FMI 3.0 if it is odd.
 struct Job {
     fmu: Box<dyn Either>,
     number: usize,
@@ -95,7 +95,7 @@ impl Job {
         self.steps += 1;
     }
 
-    /// Returns the state after these steps, which is different for each number and each count.
+    /// Returns the state after this number of steps, which is different for each instance and each number of steps.
     fn bytes(number: usize, steps: usize) -> Vec<u8> {
         let mut job = Self::new(number);
         (0..steps).for_each(|_| job.step());
@@ -103,9 +103,9 @@ impl Job {
     }
 }
 
-/// Checks that the threads that step an instance have no effect on its state.
+/// Checks that the state of an instance does not depend on which threads step it.
 ///
-/// Threads never wait for a lock: the ThreadSanitizer cannot observe the part of the standard library that waits.
+/// Threads never wait for a lock, because the ThreadSanitizer cannot observe the part of the standard library that waits.
 #[test]
 fn threads_pass_instances_on() {
     let pool: Vec<_> = (0..INSTANCES).map(|number| Mutex::new(Job::new(number))).collect();
@@ -114,7 +114,7 @@ fn threads_pass_instances_on() {
             let next = (turn * (thread + 1) % INSTANCES..).map(|at| pool[at % INSTANCES].try_lock());
             let mut job = next.flatten().next().expect("fewer threads than instances");
             (0..3).for_each(|_| job.step());
-            // Some are freed and replaced.
+            // Frees and replaces some instances, and creates and frees others.
             if turn % 37 == thread {
                 *job = Job::new(job.number);
                 drop(Importer::new::<Oscillator>(ModelExchange));

@@ -1,5 +1,5 @@
-//! Calls in the log callback, and memory that was never written. Valgrind and Miri detect more than the
-//! assertions (`make sanitize`).
+//! Calls in the log callback, uninitialized memory, and instances freed in any order. `make sanitize` runs these tests with
+//! Valgrind and Miri, which detect more than the assertions.
 #![allow(missing_docs)]
 
 mod models;
@@ -16,8 +16,8 @@ use std::ptr::null_mut;
 use std::sync::{Arc, Mutex};
 use valid_calls::ValidCall;
 
-/// A log callback that makes all calls for every message: of rejected calls, of discarded queries, of events,
-/// of the model. Each call returns an error, and the interrupted call continues.
+/// Checks a log callback that calls all functions, for messages about rejected calls and events and of the model. Each of
+/// these calls must return an error, and the call that logs must then continue.
 fn log_callback_calls_back<F: Either + 'static>(free: unsafe fn(&F)) {
     let arguments = Arguments { logging_on: 1, ..Arguments::new::<Talker>(CoSimulation) };
     let fmu = Box::new(F::make::<Talker>(&arguments).unwrap());
@@ -30,7 +30,7 @@ fn log_callback_calls_back<F: Either + 'static>(free: unsafe fn(&F)) {
         let (mut state, mut value, mut calls) = (null_mut(), [0.0], fmu.call_all());
         calls.extend([("GetFMUState", fmu.get_state(&mut state)), ("Get", fmu.try_get(&[0], &mut value))]);
         assert!(state.is_null());
-        // SAFETY: ignored, because the FMU is delivering a message.
+        // SAFETY: the FMU ignores the call, because it is delivering a message.
         unsafe { free(fmu) };
         other.initialize(0.0);
         other.ok(other.reset());
@@ -62,7 +62,7 @@ fn the_log_callback_calls_back() {
     log_callback_calls_back::<fmi3::Importer>(|fmu| unsafe { fmu.free() });
 }
 
-/// Checks that no function reads an array before it writes to it, and that each writes all values.
+/// Checks that no function reads an uninitialized output array, and that each function writes all its values.
 #[test]
 fn memory_that_was_never_written() {
     fn check<F: Either, M: Exported>() {

@@ -130,13 +130,13 @@ class Fmu {
     const instance = new WebAssembly.Instance(module, { fmu: { fmu_log: log } });
     this.functions = /** @type {Exports} */ (/** @type {unknown} */ (instance.exports));
     for (const [name, content] of files) {
-      this.next = this.functions.fmu_room(content.length + 4 * name.length + 64);
+      this.next = this.functions.fmu_argument_buffer(content.length + 4 * name.length + 64);
       const [path, address] = [this.put(`/resources/${name}`), this.take(content.length)];
       new Uint8Array(this.functions.memory.buffer, address, content.length).set(content);
       this.functions.fmu_file(path, address, content.length);
     }
     // Memory for value references, values and strings.
-    this.next = this.functions.fmu_room(8192 + 128 * description.variables.length);
+    this.next = this.functions.fmu_argument_buffer(8192 + 128 * description.variables.length);
     const strings = [description.identifier, description.guid, files.size ? "file:///resources" : ""];
     const [name, guid, resources] = strings.map((text) => this.put(text));
     const callbacks = this.take(20);

@@ -156,7 +156,7 @@ impl Names<'_> {
         let others = [
             ("fmi2Instantiate", "fmi2Instantiate"),
             ("fmi2FreeInstance", "fmi2FreeInstance"),
-            ("room", "fmu_room"),
+            ("argument_buffer", "fmu_argument_buffer"),
             ("broken", "fmu_broken"),
         ];
         for (name, of_module) in functions.chain(others) {
@@ -324,7 +324,7 @@ mod tests {
     /// The names in a header, and the errors if one is missing.
     #[test]
     fn a_header_that_lacks_a_name_is_rejected() {
-        let names = ["fmi2Instantiate", "fmi2FreeInstance", "fmu_room", "fmu_broken"];
+        let names = ["fmi2Instantiate", "fmi2FreeInstance", "fmu_argument_buffer", "fmu_broken"];
         let names = names.into_iter().chain(ALLOWED.iter().map(|rule| rule.name));
         let functions: String = names.map(|name| format!("u32 w2c_m__m_{name}(w2c_m__m*);\n")).collect();
         let header = format!(
@@ -334,13 +334,17 @@ mod tests {
         let code = "wasm_rt_allocate_memory(&instance->w2c_memory, 3, 65536);\n\
                     wasm_rt_allocate_funcref_table(&instance->w2c_T0, 7, 7);\n";
         let made = NAMES().header(&header, code).unwrap();
-        for line in ["FMU_MEMORY_PAGES 5", "FMU_INITIAL_PAGES 3", "FMU_TABLE 7", "FMU_room w2c_m__m_fmu_room"]
-        {
+        for line in [
+            "FMU_MEMORY_PAGES 5",
+            "FMU_INITIAL_PAGES 3",
+            "FMU_TABLE 7",
+            "FMU_argument_buffer w2c_m__m_fmu_argument_buffer",
+        ] {
             assert!(made.contains(&format!("#define {line}\n")), "{made}");
         }
         for (lacking, message) in [
             ("fmi2DoStep(", "no w2c_m__m_fmi2DoStep"),
-            ("fmu_room(", "no w2c_m__m_fmu_room"),
+            ("fmu_argument_buffer(", "no w2c_m__m_fmu_argument_buffer"),
             ("u32 w2c_g0;", "no u32 w2c_g0;"),
             ("#include", "no #include"),
         ] {

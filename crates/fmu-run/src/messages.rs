@@ -1,6 +1,6 @@
 //! Messages of FMUs for callers that want them all.
 
-use fmi_client::{Listen, Message};
+use fmi_client::{LogListener, Message};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -49,8 +49,8 @@ impl Feed {
     }
 }
 
-impl Listen for Feed {
-    fn hear(&self, number: Option<usize>, message: &Message) {
+impl LogListener for Feed {
+    fn on_message(&self, number: Option<usize>, message: &Message) {
         let count = self.components.len().max(1);
         let instance = number.map(|number| number / count);
         let run = instance.and_then(|instance| lock(&self.runs).get(&instance).copied());
@@ -76,9 +76,9 @@ pub(crate) struct Logging {
 
 impl Logging {
     /// Returns the listener for a component of the instance.
-    pub fn listener(&self, component: usize) -> Option<(Arc<dyn Listen>, usize)> {
+    pub fn listener(&self, component: usize) -> Option<(Arc<dyn LogListener>, usize)> {
         let (feed, instance) = self.feed.as_ref()?;
         let count = feed.components.len().max(1);
-        Some((Arc::clone(feed) as Arc<dyn Listen>, instance * count + component))
+        Some((Arc::clone(feed) as Arc<dyn LogListener>, instance * count + component))
     }
 }

@@ -1,14 +1,14 @@
-//! C programs that load FMUs, compiled and run for tests, with the headers of the FMI standards.
+//! Compiles and runs C programs that load FMUs, for tests, with the headers of the FMI standards.
 //!
-//! All functions panic if a tool or file is missing; the message names the remedy.
+//! If a tool or a file is missing, the functions panic with a message that names the remedy.
 
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Returns the directory with `fmi2Functions.h` and `fmi3Functions.h`. It is `FMI2_HEADERS`, or the directory
-/// in the pip package fmpy in the `.venv` of this directory or one above it.
+/// Returns the directory with `fmi2Functions.h` and `fmi3Functions.h`. It is the value of the environment variable
+/// `FMI2_HEADERS`, or else a directory of the Python package fmpy in the `.venv` of `directory` or of one above it.
 ///
 /// # Panics
 /// Panics if there is no such directory.
@@ -23,8 +23,8 @@ pub fn headers(directory: &Path) -> PathBuf {
     )
 }
 
-/// Returns the shared library of this name. Cargo writes it to the directory of the test, to the parent
-/// directory, or to the examples there.
+/// Returns the path of the shared library of this name. Cargo writes libraries to the directory of the test, to its
+/// parent, or to the `examples` directory in one of them.
 ///
 /// # Panics
 /// Panics if the library has not been built.
@@ -42,10 +42,10 @@ pub fn library(name: &str) -> PathBuf {
     })
 }
 
-/// Returns the output of a program.
+/// Runs a program and returns its standard output.
 ///
 /// # Panics
-/// Panics with the message `missing` if the program cannot be run. Panics if the program fails.
+/// Panics with the message `missing` if the program cannot be started. Also panics if the program fails.
 pub fn output(command: &mut Command, missing: &str) -> String {
     let output = command.output().unwrap_or_else(|error| panic!("{missing}: {command:?}: {error}"));
     let stderr = String::from_utf8_lossy(&output.stderr);
@@ -53,7 +53,8 @@ pub fn output(command: &mut Command, missing: &str) -> String {
     String::from_utf8(output.stdout).expect("UTF-8")
 }
 
-/// Compiles a C program to a directory, with the headers found from the directory of its source.
+/// Compiles a C program into a directory and returns the path of the program. The FMI headers are searched from the
+/// directory of `source` upwards, see [`headers`].
 ///
 /// # Panics
 /// Panics if the compiler reports an error or a warning.
@@ -83,7 +84,8 @@ fn c_compiler(headers: &Path) -> Command {
     compiler
 }
 
-/// Returns the command for a program, run by the command in `C_RUNNER` if set (`make sanitize`: valgrind).
+/// Returns the command that runs a program. If the environment variable `C_RUNNER` is set, its command runs the program;
+/// `make sanitize` sets it to valgrind.
 ///
 /// # Panics
 /// Never panics.
@@ -95,11 +97,11 @@ pub fn command(program: &Path) -> Command {
     command
 }
 
-/// Runs `reload.c`, which loads, uses and unloads libraries repeatedly.
+/// Runs `reload.c`, which loads, uses and unloads libraries repeatedly, and checks that its memory does not grow.
 ///
-/// The memory must grow by less than 100 bytes per round over the last nine tenths of the rounds. The count
-/// of pages varies by some 100 KiB, independent of the number of rounds. An instance leaked in each round
-/// would add 50 times as much. With `make sanitize`, valgrind detects every leaked byte.
+/// Growth by less than 100 bytes per round is accepted over the last nine tenths of the rounds, because the number of
+/// pages varies by some 100 KiB in total, however many rounds there are. If each round leaked an instance, the memory
+/// would grow by 50 times as much. With `make sanitize`, valgrind detects every leaked byte.
 ///
 /// # Panics
 /// Panics if the memory grows by more.

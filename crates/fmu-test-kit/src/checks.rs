@@ -1,5 +1,5 @@
-//! Checks of saved states and steps that hold for every FMU with both interface types.
-//! [`every_check!`](crate::every_check) defines the tests for a model.
+//! Checks of saved states and steps that every FMU must pass. [`every_check!`](crate::every_check) defines a test of
+//! each check for a model.
 
 use crate::serialized::{MODE, sealed, time};
 use crate::{Either, Random};
@@ -8,7 +8,7 @@ use fmu_export::Mode::{self, *};
 use fmu_export::{BaseType, Causality, Exported, Interface, Status, Variable};
 use std::ptr::null_mut;
 
-/// Defines a test of both FMI versions for each check of a model.
+/// Defines one test per check for a model; each test runs in both FMI versions.
 #[macro_export]
 macro_rules! every_check {
     ($model:ty) => { $crate::every_check! { @each $model: random_contents_break_nothing steps_of_any_size } };
@@ -46,7 +46,7 @@ pub(crate) fn boolean_parameters<M: Exported>() -> Vec<u32> {
     })
 }
 
-/// Returns the start value of a Real parameter.
+/// Returns the start value of a Real parameter; `None` for any other variable.
 pub(crate) fn start_of<M: Exported>(variable: &Variable<M>) -> Option<f64> {
     use fmu_export::{Setup, Value};
     if variable.causality() != Causality::Parameter {
@@ -58,7 +58,7 @@ pub(crate) fn start_of<M: Exported>(variable: &Variable<M>) -> Option<f64> {
     }
 }
 
-/// Returns every interface type of the model with each of its modes that can be entered.
+/// Returns all pairs of an interface type that the model supports and a mode that an instance can enter.
 pub fn modes_of_model<F: Either, M: Exported>() -> Vec<(Interface, Mode)> {
     let has_events = M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode());
     let offered = [(CoSimulation, M::CO_SIMULATION.is_some()), (ModelExchange, M::MODEL_EXCHANGE.is_some())];
@@ -68,8 +68,8 @@ pub fn modes_of_model<F: Either, M: Exported>() -> Vec<(Interface, Mode)> {
     all.filter(|pair| has_events || *pair != (CoSimulation, Event)).collect()
 }
 
-/// Compares first time derivatives with finite differences over short steps. Every step begins at the same saved
-/// state. After each step, `set_inputs` receives the step size and sets the inputs for the end of the step.
+/// Compares the first time derivatives of outputs and local variables with finite differences over short steps. Every
+/// step begins at the same saved state. After a step, `set_inputs` is called with its size and sets the inputs for its end.
 #[track_caller]
 pub fn output_derivatives_fit_steps<M: Exported>(
     fmu: &dyn Either,
@@ -96,14 +96,15 @@ pub fn output_derivatives_fit_steps<M: Exported>(
     for (i, index) in moving.iter().enumerate() {
         let expected =
             (-25.0 * y[0][i] + 48.0 * y[1][i] - 36.0 * y[2][i] + 16.0 * y[3][i] - 3.0 * y[4][i]) / (12.0 * H);
-        // Tolerance for the rounding error of the difference and the truncation error of the series.
+        // Allows for the rounding error and the truncation error of the difference.
         let tolerance = 1e-7 * (1.0 + y[0][i].abs() + expected.abs());
         let name = M::TABLE[*index as usize].name();
         assert!((found[i] - expected).abs() < tolerance, "{label}: {name}' is {expected}, not {}", found[i]);
     }
 }
 
-/// Checks that no call is fatal after a damaged state that the FMU accepts. Miri, which is slow, tries fewer.
+/// Checks that no call is fatal after the FMU has accepted a damaged state. Under Miri, which is slow, fewer states
+/// are tried.
 pub fn random_contents_break_nothing<F: Either, M: Exported>() {
     const DAMAGED: usize = if cfg!(miri) { 60 } else { 3_000 };
     let fmu = F::in_mode::<M>(CoSimulation, StepComplete);
@@ -112,7 +113,7 @@ pub fn random_contents_break_nothing<F: Either, M: Exported>() {
     for _ in 0..DAMAGED {
         let mut bytes = original.clone();
         for _ in 0..=random.bits() % 3 {
-            // Writes numbers of any magnitude, aligned with values or not.
+            // Writes a number of any magnitude at any offset, so that it may overlap two values.
             let at = MODE.end + random.bits() as usize % (bytes.len() - MODE.end - 16);
             let word = random.bits() >> (random.bits() % 64);
             let width = if random.between(0.0, 1.0) < 0.5 { 4 } else { 8 };
@@ -147,7 +148,8 @@ pub fn steps_of_any_size<F: Either, M: Exported>() {
             let _ = sender.send((fmu.try_step(0.0, step_size), fmu.read(&indices::<M>(is_real))));
         });
         let received = receiver.recv_timeout(std::time::Duration::from_secs(10));
-        let (status, _) = received.unwrap_or_else(|_| panic!("a step of {step_size:e} s takes for ever"));
+        let (status, _) =
+            received.unwrap_or_else(|_| panic!("a step of {step_size:e} s takes over 10 seconds"));
         assert!(matches!(status, Status::Ok | Status::Error), "{step_size:e}: {status:?}");
     }
 }

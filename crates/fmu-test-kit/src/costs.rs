@@ -1,7 +1,8 @@
-//! An instance with a past steps as fast as the model itself.
+//! Checks that steps stay fast after anything that may happen to an instance, such as a restored state.
 //!
-//! The reference is the model without an instance: nothing has copied it, so it has everything that makes it fast, such as
-//! a cache of step sizes. Steps are compared when their sizes repeat; an instance may prepare for a new size once.
+//! The reference is the model itself, stepped without FMI. It is never copied or restored, so it keeps everything that makes
+//! it fast, such as cached matrices of its step sizes. Only steps of repeated sizes are compared, because an instance may
+//! need longer for the first step of a new size.
 
 use crate::checks::start_of;
 use crate::{Either, Importer, fmi3, instructions};
@@ -9,11 +10,11 @@ use fmu_export::Interface::CoSimulation;
 use fmu_export::{Experiment, Exported, Setup, Status, Step};
 use std::ptr::null_mut;
 
-/// Step sizes of a round, relative to the default step size.
+/// Step sizes of a round of two steps, relative to the default step size of the model.
 const ALTERNATING: [f64; 2] = [1.0, 0.75];
 const STEADY: [f64; 2] = [1.0; 2];
 
-/// Makes the steps of a round; returns the time after it.
+/// Performs the steps of a round; returns the time after it.
 fn round(sizes: [f64; 2], unit: f64, mut time: f64, step: &mut dyn FnMut(f64, f64)) -> f64 {
     for size in sizes {
         step(time, size * unit);
@@ -22,7 +23,7 @@ fn round(sizes: [f64; 2], unit: f64, mut time: f64, step: &mut dyn FnMut(f64, f6
     time
 }
 
-/// Counts the instructions of a round after two equal rounds.
+/// Counts the instructions of a round, after two rounds of the same sizes that are not counted.
 fn cost(sizes: [f64; 2], unit: f64, time: &mut f64, step: &mut dyn FnMut(f64, f64)) -> Option<u64> {
     for _ in 0..2 {
         *time = round(sizes, unit, *time, step);
@@ -30,7 +31,7 @@ fn cost(sizes: [f64; 2], unit: f64, time: &mut f64, step: &mut dyn FnMut(f64, f6
     instructions(&mut || _ = round(sizes, unit, *time, step))
 }
 
-/// Returns the costs of a steady and of an alternating round of the model itself.
+/// Returns the instructions of a steady and of an alternating round of the model itself.
 fn costs_of_model<M: Exported>() -> Option<[u64; 2]> {
     let mut model = M::new(&Setup::new(CoSimulation)).expect("a model");
     model.calculate_start();
@@ -46,10 +47,11 @@ fn costs_of_model<M: Exported>() -> Option<[u64; 2]> {
     Some([costs[0]?, costs[1]?])
 }
 
-/// Something that happens to an instance at a communication point.
-type Happens<'a, F> = (&'static str, &'a dyn Fn(&mut F, f64));
+/// A label and calls at a communication point, whose time is the last argument.
+type Incident<'a, F> = (&'static str, &'a dyn Fn(&mut F, f64));
 
-fn events<F: Either, M: Exported>(check: &mut dyn FnMut(Happens<'_, F>)) {
+/// Calls `check` with each incident after which steps must stay fast.
+fn incidents<F: Either, M: Exported>(check: &mut dyn FnMut(Incident<'_, F>)) {
     let parameter = (0..).zip(M::TABLE).find_map(|(index, of)| Some((index, start_of(of)?)));
     check(("nothing", &|_, _| ()));
     if let Some((index, start)) = parameter {
@@ -79,7 +81,7 @@ fn events<F: Either, M: Exported>(check: &mut dyn FnMut(Happens<'_, F>)) {
         fmu.ok(fmu.set_state(state));
         fmu.forget(state);
     }));
-    check(("another instance continues", &|fmu, _| {
+    check(("a copy in another instance", &|fmu, _| {
         let other = F::new::<M>(CoSimulation);
         other.restore(&fmu.bytes());
         *fmu = other;
@@ -90,21 +92,24 @@ fn events<F: Either, M: Exported>(check: &mut dyn FnMut(Happens<'_, F>)) {
     }));
 }
 
-/// Checks that steps of an instance cost as much as steps of the model, after anything that may happen to it. Does
-/// nothing where instructions cannot be counted.
+/// Checks that steps of an instance cost as much as steps of the model itself, after anything that may happen to the
+/// instance. Does nothing where instructions cannot be counted.
+///
+/// The calls through FMI have a cost, too. It is measured as the difference between an instance and the model in steps of
+/// one size.
 ///
 /// # Panics
-/// Panics if steps of alternating sizes cost more than 1.3 times as much as the same steps of the model without FMI, after
-/// the cost of the calls in steps of one size is added.
+/// Panics if a round of alternating sizes takes more instructions than 1.3 times the sum for the model and the calls.
 pub fn steps_stay_cheap<M: Exported>() {
     if let Some([steady, alternating]) = costs_of_model::<M>() {
         of_instances::<Importer, M>(steady, alternating, usize::MAX);
-        // Both FMI versions share the code of these events.
+        // Both FMI versions share most of the code, so two incidents suffice in FMI 3.0.
         of_instances::<fmi3::Importer, M>(steady, alternating, 2);
     }
 }
 
-fn of_instances<F: Either, M: Exported>(steady_model: u64, alternating_model: u64, most_events: usize) {
+/// Checks the first `most_incidents` incidents in an FMI version.
+fn of_instances<F: Either, M: Exported>(steady_model: u64, alternating_model: u64, most_incidents: usize) {
     let unit = M::INFO.default_experiment.step_size;
     let cost = |fmu: &F, sizes, time: &mut f64| {
         cost(sizes, unit, time, &mut |time, size| fmu.step(time, size)).unwrap_or_default()
@@ -112,9 +117,9 @@ fn of_instances<F: Either, M: Exported>(steady_model: u64, alternating_model: u6
     let of_calls = cost(&F::initialized_at::<M>(0.0), STEADY, &mut 0.0).saturating_sub(steady_model);
     let allowed = 1.3 * (alternating_model + of_calls) as f64;
     let mut count = 0;
-    events::<F, M>(&mut |(label, happens)| {
+    incidents::<F, M>(&mut |(label, happens)| {
         count += 1;
-        if count > most_events {
+        if count > most_incidents {
             return;
         }
         let (mut fmu, mut time) = (F::initialized_at::<M>(0.0), 0.0);

@@ -32,7 +32,8 @@ pub enum Version<'a> {
     Fmi3(&'a fmi3::Importer),
 }
 
-/// Defines the methods whose functions differ only in names, and the methods for one value.
+/// Defines the methods for functions that differ only in their names in FMI 2.0 and 3.0, and the setters and getters of
+/// one value.
 macro_rules! methods {
     (
         calls { $($name:ident $fmi2:ident $fmi3:ident ($($argument:ident: $type:ty),*);)+ }
@@ -94,8 +95,10 @@ fn log_of<'a>(version: &Version<'a>) -> &'a Log {
     }
 }
 
-/// An instance of FMI 2.0 or FMI 3.0, as an importer uses it. Variables are given by their indices in the
+/// An instance of FMI 2.0 or FMI 3.0, as an importer uses it. A variable is identified by its index in the variable
 /// table.
+///
+/// Methods that return neither a status nor a `Result` assert that the call succeeds.
 #[allow(clippy::missing_panics_doc, reason = "the functions that assert panic on purpose")]
 pub trait Either: Send {
     /// Returns the FMI version.
@@ -103,7 +106,7 @@ pub trait Either: Send {
     where
         Self: Sized;
 
-    /// Returns the names of the functions on an instance.
+    /// Returns the names of the functions that take an instance.
     fn functions() -> &'static [&'static str]
     where
         Self: Sized;
@@ -117,7 +120,7 @@ pub trait Either: Send {
         Self: Sized;
 
     /// Returns a handle without an instance (NULL).
-    fn nothing<M: Exported>() -> Self
+    fn null_instance<M: Exported>() -> Self
     where
         Self: Sized;
 
@@ -151,7 +154,7 @@ pub trait Either: Send {
         }
     }
 
-    /// Returns the modes of an interface type, except fatal, which needs a model that panics.
+    /// Returns the modes of an interface type, except the one after a fatal error, which only a model that panics enters.
     fn modes_of(interface: Interface) -> &'static [Mode]
     where
         Self: Sized,
@@ -172,10 +175,10 @@ pub trait Either: Send {
         }
     }
 
-    /// Calls the function of this name with arguments as words; missing ones are 0 or NULL.
+    /// Calls the function of this name with arguments as 64-bit words; missing arguments are 0 or NULL.
     ///
     /// # Safety
-    /// The words are valid arguments of the function, as in C.
+    /// The words must be valid arguments of the function, as in C.
     ///
     /// # Panics
     /// Panics if the FMI version has no function of this name.
@@ -202,12 +205,12 @@ pub trait Either: Send {
         log_of(&self.version()).take()
     }
 
-    /// Runs this code in the log callback, for every message.
+    /// Runs this code in the log callback for every later message.
     fn on_message(&self, hook: Hook) {
         *lock(&log_of(&self.version()).hook) = Some(hook);
     }
 
-    /// Enters Initialization Mode.
+    /// Enters Initialization Mode, in FMI 2.0 after `fmi2SetupExperiment`.
     fn enter_initialization_mode(&self, start_time: f64, stop_time: Option<f64>) -> Status {
         let (defined, stop_time) = (stop_time.is_some(), stop_time.unwrap_or(f64::NAN));
         match self.version() {
@@ -257,7 +260,8 @@ pub trait Either: Send {
         }
     }
 
-    /// Performs a step to its end, which must equal the time of the FMU exactly. Allocates nothing.
+    /// Performs a step. Asserts that it is complete and that the time of the FMU is then exactly `point + step_size`.
+    /// Allocates nothing.
     #[track_caller]
     fn step(&self, point: f64, step_size: f64) {
         const LAST_SUCCESSFUL_TIME: i32 = 2;
@@ -278,9 +282,9 @@ pub trait Either: Send {
         }
     }
 
-    /// Sets the time derivatives of up to 8 inputs; FMI 3.0 has no function for it.
+    /// Sets the first time derivatives of up to 8 inputs. Does nothing in FMI 3.0, which has no function for this.
     #[track_caller]
-    fn give_rates(&self, indices: &[u32], values: &[f64]) {
+    fn set_input_derivatives(&self, indices: &[u32], values: &[f64]) {
         let (orders, count) = ([1; 8], indices.len());
         assert!(count == values.len() && count <= orders.len());
         if let Version::Fmi2(fmu) = self.version() {
@@ -289,7 +293,7 @@ pub trait Either: Send {
         }
     }
 
-    /// Reads the time derivative of a variable.
+    /// Reads the time derivative of this order of a variable.
     fn try_rate(&self, index: u32, order: i32, rate: &mut f64) -> Status {
         match self.version() {
             Version::Fmi2(fmu) => fmu.fmi2GetRealOutputDerivatives(&index, 1, &order, rate),
@@ -299,8 +303,8 @@ pub trait Either: Send {
 
     /// Reads the directional derivatives of up to 16 unknowns with respect to up to 16 knowns.
     ///
-    /// FMI 3.0 also reads the adjoint derivatives of each unknown. By definition, their scalar product with the
-    /// seed is the directional derivative; for one known, both are bit-identical.
+    /// In FMI 3.0, also reads the adjoint derivatives of each unknown and asserts that their scalar product with the seed
+    /// equals the directional derivative. For one known, both must be bit-identical.
     fn try_directional(&self, unknowns: &[u32], knowns: &[u32], seed: &[f64], results: &mut [f64]) -> Status {
         let [us, ks] = [unknowns.len(), knowns.len()];
         assert_eq!([seed.len(), results.len()], [ks, us]);
@@ -366,8 +370,8 @@ pub trait Either: Send {
         Ok(Updated { again, terminate, nominals_changed, states_changed, next: defined.then_some(next) })
     }
 
-    /// Reports a completed step of an integrator. Returns whether there is an event, and whether the
-    /// simulation ends.
+    /// Calls `fmi2CompletedIntegratorStep` or `fmi3CompletedIntegratorStep`. Returns whether the importer must enter Event
+    /// Mode, and whether it must end the simulation.
     ///
     /// # Errors
     /// Returns the status if it is not OK.
@@ -403,7 +407,8 @@ pub trait Either: Send {
         }
     }
 
-    /// Makes an instance of a model in this program, or of the library that `FMU_LIBRARY` names.
+    /// Creates an instance of a model in this program. In FMI 2.0, the environment variable `FMU_LIBRARY` can name another
+    /// library of the model.
     #[track_caller]
     fn new<M: Exported>(interface: Interface) -> Self
     where
@@ -412,7 +417,7 @@ pub trait Either: Send {
         Self::make::<M>(&Arguments::new::<M>(interface)).expect("an instance")
     }
 
-    /// Makes an instance and initializes it at this time.
+    /// Creates an instance for Co-Simulation and initializes it at this time.
     fn initialized_at<M: Exported>(start_time: f64) -> Self
     where
         Self: Sized,
@@ -422,8 +427,9 @@ pub trait Either: Send {
         fmu
     }
 
-    /// Makes an instance in this mode, with Event Mode if it is supported. An error leaves the mode
-    /// unchanged, so only a de-serialized state leads to the mode "error".
+    /// Creates an instance in this mode, with Event Mode if it is supported. The modes `StepFailed` and `Error` are set by
+    /// de-serializing a state: only models that end steps early enter the first, and no call leads to the second,
+    /// because a rejected call leaves the mode unchanged.
     fn in_mode<M: Exported>(interface: Interface, mode: Mode) -> Self
     where
         Self: Sized,
@@ -447,7 +453,7 @@ pub trait Either: Send {
         fmu
     }
 
-    /// Continues to the first step if the importer handles events.
+    /// Enters Step Mode in FMI 3.0 if the instance is in Event Mode.
     fn leave_event_mode(&self) {
         if let Version::Fmi3(fmu) = self.version()
             && fmu.fmi3EnterStepMode() != Status::Ok
@@ -456,7 +462,7 @@ pub trait Either: Send {
         }
     }
 
-    /// Calls each function with all arguments 0 or NULL.
+    /// Calls each function with all arguments 0 or NULL. Returns the statuses with the names of the functions.
     fn call_all(&self) -> Vec<(&'static str, Status)>
     where
         Self: Sized,
@@ -470,8 +476,8 @@ pub trait Either: Send {
         assert_eq!(status, Status::Ok, "log: {:#?}", self.take_log());
     }
 
-    /// Asserts the guarantees for a rejected call: an error, one clean message that names the function, and
-    /// an unchanged instance. Returns the message.
+    /// Asserts that a call is rejected: it returns an error, logs one clean message that names the function, and leaves the
+    /// instance unchanged. Returns the message.
     #[track_caller]
     fn rejected(&self, label: &str, call: impl FnOnce(&Self) -> Status) -> String
     where
@@ -487,13 +493,17 @@ pub trait Either: Send {
         assert_eq!(found, (Status::Error, "logStatusError"), "{label}");
         message.assert_clean();
         let prefix = &Self::functions()[0][..4];
-        assert!(message.message.starts_with(prefix), "{label}: which function? {}", message.message);
+        assert!(
+            message.message.starts_with(prefix),
+            "{label}: the message does not name the function: {}",
+            message.message
+        );
         assert_eq!(before, self.serialized(), "{label} changed the instance");
         self.take_log();
         message.message.clone()
     }
 
-    /// Asserts that a call is rejected with a message that contains these words.
+    /// Asserts that a call is rejected with a message that contains all these strings.
     #[track_caller]
     fn rejected_with(&self, words: &[&str], call: impl FnOnce(&Self) -> Status)
     where
@@ -503,7 +513,7 @@ pub trait Either: Send {
         words.iter().for_each(|word| assert!(message.contains(word), "'{word}' is not in: {message}"));
     }
 
-    /// Returns the serialized state; `None` if the FMU does not serialize.
+    /// Returns the serialized state; `None` if the FMU cannot serialize it.
     fn serialized(&self) -> Option<Vec<u8>> {
         let mut state = null_mut();
         if self.get_state(&mut state) != Status::Ok {
@@ -519,14 +529,13 @@ pub trait Either: Send {
         (status == Status::Ok).then_some(bytes)
     }
 
-    /// Returns the serialized state.
+    /// Returns the serialized state; asserts success.
     #[track_caller]
     fn bytes(&self) -> Vec<u8> {
         self.serialized().expect("the FMU serializes its state")
     }
 
-    /// Asserts that de-serializing these bytes is rejected and the handle stays unchanged; returns the
-    /// message.
+    /// Asserts that de-serializing these bytes is rejected and that the handle stays NULL; returns the message.
     #[track_caller]
     fn rejected_bytes(&self, bytes: &[u8]) -> String
     where
@@ -549,7 +558,7 @@ pub trait Either: Send {
         self.forget(state);
     }
 
-    /// Saves the state and returns it.
+    /// Saves the state and returns its handle.
     #[track_caller]
     fn save(&self) -> *mut c_void {
         let mut state = null_mut();
@@ -570,15 +579,15 @@ pub trait Either: Send {
         self.ok(self.enter_initialization_mode(start_time, stop_time));
     }
 
-    /// Initializes an instance: from instantiated to the first communication point or to Event Mode.
+    /// Initializes a new or reset instance, up to the first communication point or Event Mode.
     #[track_caller]
     fn initialize(&self, start_time: f64) {
         self.enter_initialization(start_time, None);
         self.ok(self.exit_initialization_mode());
     }
 
-    /// Performs the event iteration in Event Mode and enters Continuous-Time Mode. Returns the combined
-    /// results of the iterations.
+    /// Iterates in Event Mode until the discrete states are final, and then enters Continuous-Time Mode. Returns the
+    /// combined results of the iterations.
     #[track_caller]
     fn enter_continuous_time(&self) -> Updated {
         let mut all = Updated::default();
@@ -627,7 +636,7 @@ pub trait Either: Send {
     fn string(&self, index: u32) -> String {
         let mut value = null();
         self.ok(self.get_string(index, &mut value));
-        // SAFETY: a string of the FMU, valid until the next call.
+        // SAFETY: the FMU's string is valid until the next call.
         unsafe { CStr::from_ptr(value) }.to_str().expect("UTF-8").to_owned()
     }
 
@@ -638,7 +647,7 @@ pub trait Either: Send {
         self.ok(self.set_string(index, value.as_ptr()));
     }
 
-    /// Returns the time derivative of a variable.
+    /// Returns the first time derivative of a variable.
     #[track_caller]
     fn rate(&self, index: u32) -> f64 {
         let mut rate = f64::NAN;
@@ -646,7 +655,7 @@ pub trait Either: Send {
         rate
     }
 
-    /// Returns time derivatives.
+    /// Returns the first time derivatives of variables.
     #[track_caller]
     fn rates<const COUNT: usize>(&self, indices: [u32; COUNT]) -> [f64; COUNT]
     where
@@ -655,7 +664,7 @@ pub trait Either: Send {
         indices.map(|index| self.rate(index))
     }
 
-    /// Returns a partial derivative.
+    /// Returns the partial derivative of an unknown with respect to a known.
     #[track_caller]
     fn partial(&self, unknown: u32, known: u32) -> f64 {
         let mut partial = f64::NAN;
@@ -663,7 +672,7 @@ pub trait Either: Send {
         partial
     }
 
-    /// Returns directional derivatives.
+    /// Returns the directional derivatives of the unknowns.
     #[track_caller]
     fn directional(&self, unknowns: &[u32], knowns: &[u32], seed: &[f64]) -> Vec<f64> {
         let mut results = vec![f64::NAN; unknowns.len()];
@@ -677,13 +686,13 @@ pub trait Either: Send {
         self.try_update().unwrap_or_else(|status| panic!("{status:?}, log: {:#?}", self.take_log()))
     }
 
-    /// Reports a completed step of an integrator; asserts success.
+    /// Does the same as [`try_completed_step`](Self::try_completed_step); asserts success.
     #[track_caller]
     fn completed_step(&self) -> [bool; 2] {
         self.try_completed_step().unwrap_or_else(|status| panic!("{status:?}, log: {:#?}", self.take_log()))
     }
 
-    /// Returns values of Reals as a vector.
+    /// Returns the values of Reals as a vector.
     #[track_caller]
     fn read(&self, indices: &[u32]) -> Vec<f64> {
         let mut values = vec![f64::NAN; indices.len()];
@@ -691,7 +700,7 @@ pub trait Either: Send {
         values
     }
 
-    /// Returns values of Reals as an array.
+    /// Returns the values of Reals as an array.
     #[track_caller]
     fn get<const COUNT: usize>(&self, indices: [u32; COUNT]) -> [f64; COUNT]
     where
@@ -748,7 +757,7 @@ macro_rules! either {
                 Self::instantiate($($functions_of)::+::<M>(), arguments)
             }
 
-            fn nothing<M: Exported>() -> Self {
+            fn null_instance<M: Exported>() -> Self {
                 Self::without_instance($($functions_of)::+::<M>())
             }
 

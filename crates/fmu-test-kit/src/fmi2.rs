@@ -8,9 +8,9 @@ use std::ptr::{null, null_mut};
 
 fmi_abi::fmi2_functions!(importer, fmi2FreeInstance;);
 
-/// The logger without its `...`, which stable Rust cannot define. The function ignores variadic arguments. On
-/// every platform of this project, variadic and plain calls pass named arguments in the same way. Miri checks
-/// the calling convention, so it gets a variadic function.
+/// The log callback, declared without its variadic arguments (`...`), because stable Rust cannot define a variadic
+/// function. On every platform of this project, variadic and plain calls pass named arguments in the same way. Miri
+/// checks the calling convention, so the function is variadic there.
 unsafe extern "C" fn log_message(
     environment: fmi2ComponentEnvironment,
     instance_name: fmi2String,
@@ -19,7 +19,8 @@ unsafe extern "C" fn log_message(
     message: fmi2String,
     #[cfg(miri)] _: ...
 ) {
-    // SAFETY: section 2.1.5 of FMI 2.0 requires NULL or NUL-terminated strings, and NULL or the log.
+    // SAFETY: section 2.1.5 of FMI 2.0 requires that each string is NULL or NUL-terminated. The environment is NULL or
+    // the log.
     unsafe { remember(environment, instance_name, status, category, message) }
 }
 
@@ -67,10 +68,10 @@ fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi2Componen
 /// Functions that exist only in FMI 2.0.
 #[allow(clippy::missing_panics_doc, reason = "that is what they are for")]
 impl Importer {
-    /// Returns version and platform, which need no instance (section 2.1.4 of FMI 2.0).
+    /// Returns the version and the platform of the library; both functions need no instance (section 2.1.4 of FMI 2.0).
     pub fn version_and_platform(&self) -> [&CStr; 2] {
         let Functions { fmi2GetVersion, fmi2GetTypesPlatform, .. } = self.functions;
-        // SAFETY: both functions return strings that the library keeps.
+        // SAFETY: both functions return strings that stay valid while the library is loaded.
         [fmi2GetVersion, fmi2GetTypesPlatform].map(|function| unsafe { CStr::from_ptr(function()) })
     }
 

@@ -14,11 +14,12 @@ unsafe extern "C" fn log_message(
     category: fmi3String,
     message: fmi3String,
 ) {
-    // SAFETY: section 2.3.1 of FMI 3.0 requires strings, and NULL or the log. FMI 3.0 passes no instance name.
+    // SAFETY: section 2.3.1 of FMI 3.0 requires NUL-terminated strings. The environment is NULL or the log. NULL is the
+    // name of the instance, which FMI 3.0 does not pass.
     unsafe { remember(environment, null(), status, category, message) }
 }
 
-/// Calls the function that makes instances of the interface type.
+/// Calls the instantiation function of the interface type.
 fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi3Instance {
     let pointer = |string: Option<&CStr>| string.map_or(null(), CStr::as_ptr);
     let name = pointer(arguments.instance_name);

@@ -1,9 +1,9 @@
-//! Random histories of an instance: calls that were undone do not change any later result.
+//! Checks with random histories of an instance that calls which failed or were undone do not change any later result.
 //!
-//! A history consists of random calls, many of which fail, of saved, restored and serialized states, resets and copies
-//! that continue in another instance. The calls that remain are the *path*: calls that failed are not in it, and a
-//! restored state or a reset ends it where it was then. A fresh instance that makes only the calls of the path must
-//! return the same bits from every getter, then and after more calls.
+//! A history is a random sequence of calls, many of which fail. It also saves, restores and serializes states, resets the
+//! instance, and continues in a copy. The *path* contains the calls that led to the current state: a call that failed is
+//! not added, a restored state restores its path, and a reset empties the path. A fresh instance that makes only the calls
+//! of the path must return the same bits from every getter, also after further calls.
 
 use crate::checks::{inputs, outputs};
 use crate::either::Version;
@@ -16,11 +16,11 @@ use std::ffi::{CStr, CString};
 use std::marker::PhantomData;
 use std::ptr::null_mut;
 
-/// Histories of each FMI version and interface type; Miri is slow.
+/// Number of histories of each FMI version and interface type; fewer under Miri, which is slow.
 const HISTORIES: u64 = if cfg!(miri) { 1 } else { 6 };
-/// Calls of a history.
+/// Number of calls in a history.
 const CALLS: usize = 60;
-/// Calls that follow when an instance is compared with a fresh one.
+/// Number of further calls when an instance is compared with a fresh one.
 const FOLLOWING: usize = 6;
 
 /// A call that changes an instance.
@@ -46,14 +46,14 @@ enum Call {
     Terminate,
 }
 
-/// Arguments of each instantiation, and the start values of the model.
-struct World<'a> {
+/// Arguments of each instantiation, the start values of the model, and whether histories continue in copies.
+struct Context<'a> {
     arguments: Arguments<'a>,
     starts: Vec<Option<Value>>,
     with_copies: bool,
 }
 
-/// A call with its status.
+/// Calls, each with its status.
 type Path = Vec<(Call, Status)>;
 
 /// A saved state, and the path to it.
@@ -62,8 +62,8 @@ struct Saved {
     path: Path,
 }
 
-/// An instance with the path that leads to its state.
-struct Traveller<F, M> {
+/// An instance with the path to its state.
+struct Tracked<F, M> {
     fmu: F,
     path: Path,
     saved: Vec<Saved>,
@@ -71,15 +71,15 @@ struct Traveller<F, M> {
 }
 
 /// Everything that an importer can read, as statuses and bits, and the serialized state.
-type Seen = (Vec<(Status, u64)>, Option<Vec<u8>>);
+type Readings = (Vec<(Status, u64)>, Option<Vec<u8>>);
 
-impl<F: Either, M: Exported> Traveller<F, M> {
-    fn new(world: &World) -> Self {
-        let fmu = F::make::<M>(&world.arguments).expect("an instance");
+impl<F: Either, M: Exported> Tracked<F, M> {
+    fn new(context: &Context) -> Self {
+        let fmu = F::make::<M>(&context.arguments).expect("an instance");
         Self { fmu, path: Vec::new(), saved: Vec::new(), model: PhantomData }
     }
 
-    /// Returns the mode; `None` if a number that is not finite keeps the state from being serialized.
+    /// Returns the mode; `None` if the state cannot be serialized because a number in it is not finite.
     fn mode(&self) -> Option<Mode> {
         let bytes = self.serialized()?;
         let number = i64::from_le_bytes(bytes[MODE].try_into().expect("8 bytes"));
@@ -120,7 +120,7 @@ impl<F: Either, M: Exported> Traveller<F, M> {
                 Version::Fmi2(fmu) => fmu.fmi2SetupExperiment(0, 0.0, *start, 0, 0.0),
                 Version::Fmi3(_) => Status::Error,
             },
-            // FMI 2.0 sets the start time in a call of its own.
+            // FMI 2.0 sets the start time with a separate function, see `SetUp`.
             Call::EnterInitialization(start) => match self.fmu.version() {
                 Version::Fmi2(fmu) => fmu.fmi2EnterInitializationMode(),
                 Version::Fmi3(fmu) => fmu.fmi3EnterInitializationMode(0, 0.0, *start, 0, 0.0),
@@ -142,20 +142,20 @@ impl<F: Either, M: Exported> Traveller<F, M> {
         }
     }
 
-    /// Makes a call. A call that fails must change nothing.
-    fn go(&mut self, random: &mut Random, call: Call, world: &World) -> Status {
+    /// Makes a call, and adds it to the path if it succeeds. Asserts that a call that fails changes nothing.
+    fn attempt(&mut self, random: &mut Random, call: Call, context: &Context) -> Status {
         let (mode, before) = (self.mode(), self.serialized());
         let status = self.make(&call);
-        // In FMI 2.0, a discarded step has ended early.
+        // In FMI 2.0, a step that ends early returns fmi2Discard, and it changes the state.
         let ended_early = status == Status::Discard && F::standard() == Standard::Fmi2;
         match status {
             Status::Fatal => panic!("{call:?} is fatal: {:?}", self.fmu.take_log()),
             Status::Ok => self.path.push((call, status)),
             _ if ended_early => self.path.push((call, status)),
             _ => {
-                assert!(self.serialized() == before, "{call:?} has failed, and the state is another");
+                assert!(self.serialized() == before, "{call:?} failed and changed the state");
                 if matches!(mode, Some(Instantiated | Initialization)) {
-                    self.set_again(random, &call, world);
+                    self.set_again(random, &call, context);
                 }
             }
         }
@@ -163,8 +163,8 @@ impl<F: Either, M: Exported> Traveller<F, M> {
         status
     }
 
-    /// Sets a valid start value, because an instance remembers rejected ones.
-    fn set_again(&mut self, random: &mut Random, rejected: &Call, world: &World) {
+    /// Sets a valid start value after a rejected one, because an instance remembers that a start value was rejected.
+    fn set_again(&mut self, random: &mut Random, rejected: &Call, context: &Context) {
         let (Call::Real(index, _)
         | Call::Integer(index, _)
         | Call::Item(index, _)
@@ -174,7 +174,7 @@ impl<F: Either, M: Exported> Traveller<F, M> {
             return;
         };
         for _ in 0..20 {
-            let valid = value::<M>(random, index, 0.0, world);
+            let valid = value::<M>(random, index, 0.0, context);
             if let Some(call) = valid
                 && self.set(&call) == Status::Ok
             {
@@ -190,7 +190,7 @@ impl<F: Either, M: Exported> Traveller<F, M> {
         self.path.clear();
     }
 
-    /// Saves the state, sometimes over an earlier one.
+    /// Saves the state, sometimes over an earlier saved state.
     fn save(&mut self, random: &mut Random) {
         let reused = if random.chance(0.3) { self.saved.pop().map(|saved| saved.handle) } else { None };
         let mut state = std::ptr::without_provenance_mut(reused.unwrap_or(0));
@@ -198,6 +198,7 @@ impl<F: Either, M: Exported> Traveller<F, M> {
         self.saved.push(Saved { handle: state.addr(), path: self.path.clone() });
     }
 
+    /// Restores one of the saved states if there are any, and sometimes frees it.
     fn restore(&mut self, random: &mut Random) {
         if self.saved.is_empty() {
             return;
@@ -212,9 +213,10 @@ impl<F: Either, M: Exported> Traveller<F, M> {
         }
     }
 
-    /// Returns an instance that continues from the serialized state of this one.
-    fn copy(&self, world: &World) -> Self {
-        let mut copy = Self { path: self.path.clone(), ..Self::new(world) };
+    /// Returns an instance that continues from the serialized state of this one, or a fresh one if the state cannot be
+    /// serialized.
+    fn copy(&self, context: &Context) -> Self {
+        let mut copy = Self { path: self.path.clone(), ..Self::new(context) };
         if let Some(bytes) = self.serialized() {
             copy.fmu.restore(&bytes);
         } else {
@@ -223,16 +225,17 @@ impl<F: Either, M: Exported> Traveller<F, M> {
         copy
     }
 
-    /// Returns a fresh instance that makes the calls of the path.
-    fn shortest(&self, world: &World) -> Self {
-        let fresh = Self { path: self.path.clone(), ..Self::new(world) };
+    /// Returns a fresh instance after the calls of the path. Asserts that their statuses are the same.
+    fn replay_path(&self, context: &Context) -> Self {
+        let fresh = Self { path: self.path.clone(), ..Self::new(context) };
         for (call, status) in &self.path {
             assert_eq!(fresh.make(call), *status, "{call:?} of {:?}\n{:?}", self.path, fresh.fmu.take_log());
         }
         fresh
     }
 
-    fn seen(&self) -> Seen {
+    /// Reads all values, the partial derivatives of outputs with respect to inputs, and the serialized state.
+    fn readings(&self) -> Readings {
         let values = (0..).zip(M::TABLE).map(|(index, variable)| {
             let (mut real, mut integer, mut boolean, mut string) = (0.0, 0, 0, c"".as_ptr());
             let fmu = &self.fmu;
@@ -243,7 +246,7 @@ impl<F: Either, M: Exported> Traveller<F, M> {
                 BaseType::Boolean => (fmu.get_boolean(index, &mut boolean), boolean.into()),
                 BaseType::String => {
                     let status = fmu.get_string(index, &mut string);
-                    // SAFETY: a string until the next call.
+                    // SAFETY: the FMU's string is valid until the next call.
                     let hash = fnv1a(unsafe { CStr::from_ptr(string) }.to_bytes());
                     (status, u64::from_le_bytes(hash))
                 }
@@ -263,25 +266,27 @@ impl<F: Either, M: Exported> Traveller<F, M> {
             })
         });
         let all = values.chain(derivatives);
-        let seen = all.map(|(status, bits)| (status, if status == Status::Ok { bits } else { 0 })).collect();
-        let seen = (seen, self.serialized());
+        let readings =
+            all.map(|(status, bits)| (status, if status == Status::Ok { bits } else { 0 })).collect();
+        let readings = (readings, self.serialized());
         self.fmu.take_log();
-        seen
+        readings
     }
 
-    /// Compares with a fresh instance, now and after the same further calls.
-    fn compare(&mut self, random: &mut Random, world: &World) {
-        let fresh = self.shortest(world);
+    /// Compares this instance with a fresh one after the calls of the path, now and after the same further calls. Restores
+    /// the current state afterwards.
+    fn compare(&mut self, random: &mut Random, context: &Context) {
+        let fresh = self.replay_path(context);
         let label = || format!("{} after {:?}", M::INFO.name, self.path);
-        assert_eq!(self.seen(), fresh.seen(), "{}", label());
+        assert_eq!(self.readings(), fresh.readings(), "{}", label());
         let path = self.path.clone();
         let mut state = null_mut();
         self.fmu.ok(self.fmu.get_state(&mut state));
         for _ in 0..FOLLOWING {
-            let Some(call) = call::<M>(random, self.mode(), world) else { continue };
+            let Some(call) = call::<M>(random, self.mode(), context) else { continue };
             let both = [self.make(&call), fresh.make(&call)];
             assert_eq!(both[0], both[1], "{call:?} of {path:?}: {:?}", self.fmu.take_log());
-            assert_eq!(self.seen(), fresh.seen(), "{call:?} of {path:?}");
+            assert_eq!(self.readings(), fresh.readings(), "{call:?} of {path:?}");
             fresh.fmu.take_log();
         }
         self.fmu.ok(self.fmu.set_state(state));
@@ -290,12 +295,12 @@ impl<F: Either, M: Exported> Traveller<F, M> {
     }
 }
 
-/// Draws a new value for a variable: near its start value, or extreme or impossible with this probability. `None` if
-/// the type has no setter here.
-fn value<M: Exported>(random: &mut Random, index: u32, extreme: f64, world: &World) -> Option<Call> {
+/// Draws a call that sets a variable to a value near its start value or, with the probability `extreme`, to an extreme or
+/// invalid one. Returns `None` if the variable has no start value or [`Call`] has no setter for its type.
+fn value<M: Exported>(random: &mut Random, index: u32, extreme: f64, context: &Context) -> Option<Call> {
     let variable = &M::TABLE[index as usize];
     let extreme = random.chance(extreme);
-    Some(match (&variable.variable_type().attributes, world.starts[index as usize].clone()?) {
+    Some(match (&variable.variable_type().attributes, context.starts[index as usize].clone()?) {
         (Attributes::Real { .. }, Value::Real(start)) if variable.base() == BaseType::Real => {
             let near =
                 if start == 0.0 { random.between(-1.0, 1.0) } else { start * random.between(0.8, 1.25) };
@@ -319,8 +324,8 @@ fn value<M: Exported>(random: &mut Random, index: u32, extreme: f64, world: &Wor
     })
 }
 
-/// Draws a call that an importer could make in this mode, and sometimes one that is wrong there.
-fn call<M: Exported>(random: &mut Random, mode: Option<Mode>, world: &World) -> Option<Call> {
+/// Draws a call that is usually allowed in this mode. Returns `None` if there is none, or if the mode is `None`.
+fn call<M: Exported>(random: &mut Random, mode: Option<Mode>, context: &Context) -> Option<Call> {
     let some_of = |random: &mut Random, wanted: &dyn Fn(&Variable<M>) -> bool| {
         let all = crate::checks::indices::<M>(wanted);
         (!all.is_empty()).then(|| all[random.below(all.len())])
@@ -330,24 +335,24 @@ fn call<M: Exported>(random: &mut Random, mode: Option<Mode>, world: &World) -> 
     let settable = |variable: &Variable<M>| variable.has_start() || is_input(variable);
     if random.chance(0.1) {
         let index = some_of(random, &|_| true)?;
-        return value::<M>(random, index, 0.5, world);
+        return value::<M>(random, index, 0.5, context);
     }
     let near = M::INFO.default_experiment.step_size;
     match mode? {
         Instantiated | Initialization if random.chance(0.6) => {
             let index = some_of(random, &settable)?;
-            value::<M>(random, index, 0.1, world)
+            value::<M>(random, index, 0.1, context)
         }
         Instantiated if random.chance(0.5) => Some(Call::SetUp([0.0, 0.0, 2.5, f64::NAN][random.below(4)])),
         Instantiated => Some(Call::EnterInitialization([0.0, 0.0, 2.5, f64::NAN][random.below(4)])),
         Initialization => Some(Call::ExitInitialization),
         StepComplete | Event | ContinuousTime if random.chance(0.35) => {
             let index = some_of(random, &is_input)?;
-            value::<M>(random, index, 0.05, world)
+            value::<M>(random, index, 0.05, context)
         }
         StepComplete | Event | ContinuousTime if random.chance(0.15) => {
             let index = some_of(random, &is_parameter)?;
-            value::<M>(random, index, 0.1, world)
+            value::<M>(random, index, 0.1, context)
         }
         StepComplete if M::INPUT_DERIVATIVES && random.chance(0.1) => {
             Some(Call::Rate(some_of(random, &is_input)?, random.between(-1.0, 1.0)))
@@ -377,72 +382,73 @@ fn call<M: Exported>(random: &mut Random, mode: Option<Mode>, world: &World) -> 
     }
 }
 
-/// Restores states that were saved with different parameters in turn. The calls after each have the same arguments, so that
-/// values that a model keeps for the last parameters would be used again.
-fn parameters_in_turn<F: Either, M: Exported>(random: &mut Random, world: &World) {
+/// Alternately restores states that were saved with different parameters, and makes a step of the same size after each. If
+/// a model did not discard values that it has stored for the other parameters, it would use them in this step.
+fn parameters_in_turn<F: Either, M: Exported>(random: &mut Random, context: &Context) {
     let near = M::INFO.default_experiment.step_size;
-    let mut traveller = Traveller::<F, M>::new(world);
+    let mut tracked = Tracked::<F, M>::new(context);
     for _ in 0..2 {
-        traveller.reset();
+        tracked.reset();
         for index in crate::checks::indices::<M>(|variable| variable.causality() == Causality::Parameter) {
-            if let Some(call) = value::<M>(random, index, 0.0, world) {
-                traveller.go(random, call, world);
+            if let Some(call) = value::<M>(random, index, 0.0, context) {
+                tracked.attempt(random, call, context);
             }
         }
         for call in [Call::EnterInitialization(0.0), Call::ExitInitialization] {
-            traveller.go(random, call, world);
+            tracked.attempt(random, call, context);
         }
         for _ in 0..8 {
-            let call = match traveller.mode() {
-                Some(Event) => call::<M>(random, Some(Event), world),
+            let call = match tracked.mode() {
+                Some(Event) => call::<M>(random, Some(Event), context),
                 Some(ContinuousTime) => Some(Call::Advance(near)),
                 _ => Some(Call::Step(near)),
             };
             if let Some(call) = call {
-                traveller.go(random, call, world);
+                tracked.attempt(random, call, context);
             }
         }
-        traveller.save(random);
+        tracked.save(random);
     }
     for _ in 0..4 {
-        traveller.restore(random);
-        if traveller.mode() == Some(StepComplete) {
-            traveller.go(random, Call::Step(near), world);
+        tracked.restore(random);
+        if tracked.mode() == Some(StepComplete) {
+            tracked.attempt(random, Call::Step(near), context);
         }
-        traveller.compare(random, world);
+        tracked.compare(random, context);
     }
 }
 
-fn history<F: Either, M: Exported>(seed: u64, world: &World) {
+/// Runs one random history with the calls that this seed determines.
+fn history<F: Either, M: Exported>(seed: u64, context: &Context) {
     let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
-    parameters_in_turn::<F, M>(&mut random, world);
-    let mut all = vec![Traveller::<F, M>::new(world)];
+    parameters_in_turn::<F, M>(&mut random, context);
+    let mut all = vec![Tracked::<F, M>::new(context)];
     for _ in 0..CALLS {
         let (number, count) = (random.below(all.len()), all.len());
-        let traveller = &mut all[number];
+        let tracked = &mut all[number];
         match random.below(100) {
-            0..=3 => traveller.save(&mut random),
-            4..=9 => traveller.restore(&mut random),
-            10 => traveller.reset(),
-            11..=13 if world.with_copies => *traveller = traveller.copy(world),
-            14..=15 if world.with_copies && count < 3 => {
-                let copy = traveller.copy(world);
+            0..=3 => tracked.save(&mut random),
+            4..=9 => tracked.restore(&mut random),
+            10 => tracked.reset(),
+            11..=13 if context.with_copies => *tracked = tracked.copy(context),
+            14..=15 if context.with_copies && count < 3 => {
+                let copy = tracked.copy(context);
                 all.push(copy);
             }
-            16..=20 => _ = traveller.seen(),
-            21..=24 => traveller.compare(&mut random, world),
+            16..=20 => _ = tracked.readings(),
+            21..=24 => tracked.compare(&mut random, context),
             _ => {
-                if let Some(call) = call::<M>(&mut random, traveller.mode(), world) {
-                    traveller.go(&mut random, call, world);
+                if let Some(call) = call::<M>(&mut random, tracked.mode(), context) {
+                    tracked.attempt(&mut random, call, context);
                 } else if random.chance(0.5) {
-                    traveller.restore(&mut random);
+                    tracked.restore(&mut random);
                 } else {
-                    traveller.reset();
+                    tracked.reset();
                 }
             }
         }
     }
-    all.iter_mut().for_each(|traveller| traveller.compare(&mut random, world));
+    all.iter_mut().for_each(|tracked| tracked.compare(&mut random, context));
 }
 
 /// Random histories of a model in both FMI versions and all its interface types.
@@ -450,8 +456,8 @@ fn history<F: Either, M: Exported>(seed: u64, world: &World) {
 pub struct Histories<'a> {
     /// Location of the resources, if the model reads files.
     pub resource_location: Option<&'a CStr>,
-    /// Whether a history may continue in another instance, from a serialized state. The first step there takes the general
-    /// path, which a model with its own `step_fast` can count.
+    /// Whether a history may continue in another instance, from a serialized state. Set it to false if the model counts
+    /// the steps that do not use its `step_fast`, because the first step after a copy is one of them.
     pub with_copies: bool,
 }
 
@@ -473,13 +479,13 @@ impl Histories<'_> {
             let location = self.resource_location.map(|location| location.to_string_lossy().into_owned());
             let setup = Setup { resource_location: location, ..Setup::new(interface) };
             let model = M::new(&setup).expect("a model");
-            let world = |arguments| World {
+            let context = |arguments| Context {
                 arguments: Arguments { resource_location: self.resource_location, ..arguments },
                 starts: M::TABLE.iter().map(|variable| variable.value(&model)).collect(),
                 with_copies: self.with_copies,
             };
-            let plain = world(Arguments::new::<M>(interface));
-            let with_events = world(Arguments::with_events::<M>(interface));
+            let plain = context(Arguments::new::<M>(interface));
+            let with_events = context(Arguments::with_events::<M>(interface));
             for seed in 0..HISTORIES {
                 history::<Importer, M>(seed, &plain);
                 history::<fmi3::Importer, M>(seed, &plain);

@@ -1,4 +1,4 @@
-//! FMI instance as an importer uses it. Its methods are generated from the function list of an FMI version.
+//! An instance as an importer uses it. Its methods are generated from the list of functions of an FMI version.
 
 use fmi_abi::c_types::{c_char, c_int, c_void};
 use fmu_export::{Category, Exported, Interface, Status};
@@ -8,7 +8,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// A log message that the importer received.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
-    /// The name of the instance; FMI 3.0 does not pass it.
+    /// The name of the instance; empty in FMI 3.0, which does not pass it.
     pub instance_name: String,
     /// Status of the message.
     pub status: Status,
@@ -19,8 +19,8 @@ pub struct Message {
 }
 
 impl Message {
-    /// Asserts that the message is not empty, contains no `%`, `#` or newline, which `printf` or importers
-    /// interpret (FMI 2.0, section 2.1.5), and has a known category.
+    /// Asserts that the message is not empty and has a known category. It must not contain `%`, `#` or a newline,
+    /// because `printf` or importers interpret these characters (section 2.1.5 of FMI 2.0).
     ///
     /// # Panics
     /// Panics if one of these assertions fails.
@@ -89,8 +89,9 @@ pub(crate) unsafe fn remember(
     }
 }
 
-/// Arguments of the instantiation functions. `callbacks: false` passes NULL instead of FMI 2.0's
-/// structure, `logger: false` no logger, and `environment: false` no environment (messages are then ignored).
+/// Arguments of the instantiation functions. If `callbacks` is false, NULL replaces the structure of callbacks of
+/// FMI 2.0; if `logger` or `environment` is false, NULL replaces the log callback or its environment. Messages without
+/// an environment are ignored.
 #[derive(Clone, Debug)]
 #[allow(missing_docs, reason = "as in the standards: section 2.1.5 of FMI 2.0, 2.3.1 of FMI 3.0")]
 pub struct Arguments<'a> {
@@ -106,14 +107,14 @@ pub struct Arguments<'a> {
     pub environment: bool,
     pub visible: bool,
     pub logging_on: u8,
-    /// This and the following fields are only for FMI 3.0.
+    /// Only for FMI 3.0, like the following fields.
     pub event_mode_used: u8,
     pub early_return_allowed: u8,
     pub required_intermediate_variables: &'a [u32],
 }
 
 impl Arguments<'static> {
-    /// Returns the arguments of an importer without optional capabilities.
+    /// Returns the arguments of an importer that neither handles events nor permits early return.
     pub fn new<M: Exported>(interface: Interface) -> Self {
         Self {
             instance_name: Some(c"instance"),
@@ -215,7 +216,7 @@ macro_rules! importer {
             }
         }
 
-        /// Functions of the FMI version, under their names, with the arguments of C.
+        /// Functions of the FMI version, with their names and the argument types of C.
         #[allow(non_snake_case, missing_docs, clippy::too_many_arguments)]
         impl Importer {
             $(
@@ -236,7 +237,7 @@ macro_rules! importer {
             }
         }
 
-        /// Names of the functions on an instance.
+        /// Names of the functions that take an instance.
         pub const FUNCTIONS: &[&str] = &[$(stringify!($function)),+];
     };
 }

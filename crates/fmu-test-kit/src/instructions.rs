@@ -1,8 +1,9 @@
-//! Counts the instructions of some work, the same number on every run and machine with the same program.
+//! Counts the instructions of some work. Unlike a duration, the count of the same program is the same in every run and on
+//! every machine.
 
-/// Counts the instructions that the work executes in a copy of this process, which the kernel stops after each of them.
-/// A thousand take some milliseconds. The work leaves this process unchanged. Returns `None` if this process may not
-/// trace another, as in some containers.
+/// Returns the number of instructions that the work executes; a thousand take some milliseconds to count. The work runs in
+/// a copy of this process, which the kernel stops after each instruction, and leaves this process unchanged. Returns
+/// `None` if this process may not trace another, as in some containers.
 ///
 /// # Panics
 /// Panics if the process cannot be copied, or if the work ends it.
@@ -15,8 +16,8 @@ pub fn instructions(work: &mut dyn FnMut()) -> Option<u64> {
 #[cfg(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")))]
 fn counted(work: &mut dyn FnMut()) -> Option<u64> {
     use std::ptr::null_mut;
-    // SAFETY: the child stops, does the work, stops again and is then ended. If the work allocates, the child may wait for
-    // a lock of another thread only if that thread held it during the fork, which glibc prevents for its allocator.
+    // SAFETY: the child stops, does the work, stops again and is then ended. It would wait for ever for a lock that another
+    // thread held during the fork, but glibc prevents this for the lock of its allocator.
     let child = unsafe { libc::fork() };
     assert!(child >= 0, "fork: {}", std::io::Error::last_os_error());
     if child == 0 {
@@ -61,7 +62,7 @@ fn counted(work: &mut dyn FnMut()) -> Option<u64> {
     None
 }
 
-/// Counts nothing on other systems.
+/// Returns `None`, because counting is only implemented for Linux on x86-64 and 64-bit ARM.
 #[cfg(not(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64"))))]
 pub fn instructions(_: &mut dyn FnMut()) -> Option<u64> {
     None

@@ -1,13 +1,15 @@
 //! Code that tests, fuzzing and benchmarks of FMUs share; not published.
 //!
-//! [`Importer`] is a plain importer of FMI 2.0: the C functions as methods of an instance that frees itself.
-//! [`fmi3`] contains the importer of FMI 3.0. [`Either`] contains the operations that both share, and
-//! assertions. [`serialized`] describes the bytes of saved states; [`c_programs`] supports tests with C
-//! programs. [`fault_injection`] is a fault-injecting importer that makes any calls in any order. [`realtime`]
-//! checks that code may run in a control loop. [`checks`] contains checks that hold for every FMU,
-//! [`history`] and [`costs`] check instances that have already run for a while.
+//! * [`Importer`] is an instance of FMI 2.0: its methods are the C functions, and it is freed when dropped.
+//!   [`fmi3::Importer`] is the same for FMI 3.0. [`Either`] contains the operations that both share, and assertions.
+//! * [`serialized`] describes the bytes of saved states.
+//! * [`c_programs`] compiles and runs C programs that load FMUs.
+//! * [`fault_injection`] is a fault-injecting importer, which makes any calls in any order.
+//! * [`realtime`] checks that code may run in a control loop.
+//! * [`checks`] contains checks that every FMU must pass; [`history`] and [`costs`] contain checks of instances that have
+//!   already run for a while.
 
-// Under Miri, the logger is variadic as in C.
+// Under Miri, the log callback is variadic as in C; see `fmi2`.
 #![cfg_attr(miri, feature(c_variadic))]
 
 pub mod c_programs;

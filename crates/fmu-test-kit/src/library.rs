@@ -6,7 +6,8 @@ use fmu_export::Exported;
 use std::path::Path;
 use std::sync::OnceLock;
 
-/// Loads the shared library of an FMU that has all functions. The library is never unloaded.
+/// Loads the shared library of an FMU for FMI 2.0, which must have all functions of the standard. The library is never
+/// unloaded.
 ///
 /// # Safety
 /// The file is the library of an FMU for FMI 2.0: its functions have the types of the standard, and loading
@@ -26,17 +27,16 @@ pub unsafe fn load(path: &Path) -> Result<Functions, libloading::Error> {
     Ok(unsafe { Functions::find(|name| symbol(name).ok()) })
 }
 
-/// Returns the functions of a model in this program. If the environment variable `FMU_LIBRARY` is set,
-/// returns the functions of the library that it names, for tests of other builds of the model. [`load`] must
-/// accept this library.
+/// Returns the functions of a model in this program, or of the library that the environment variable `FMU_LIBRARY` names.
+/// The variable is used to test other builds of the model.
 ///
 /// # Panics
-/// Panics if that library cannot be loaded.
+/// Panics if [`load`] fails for that library.
 pub fn functions_of<M: Exported>() -> Functions {
     other_library().unwrap_or_else(fmu_export::fmi2::functions::<M>)
 }
 
-/// Returns the functions of the library that `FMU_LIBRARY` names.
+/// Returns the functions of the library that `FMU_LIBRARY` names; `None` if it is not set or empty.
 pub(crate) fn other_library() -> Option<Functions> {
     static LIBRARY: OnceLock<Option<Functions>> = OnceLock::new();
     *LIBRARY.get_or_init(|| {

@@ -1,6 +1,6 @@
-//! A sequence of pseudorandom numbers, equal in every run.
+//! Pseudorandom numbers that are the same in every run.
 
-/// Generator with its state, initially the seed.
+/// Generator; its field is the state, which is initially the seed.
 #[derive(Debug)]
 pub struct Random(pub u64);
 
@@ -22,7 +22,7 @@ impl Random {
         self.between(0.0, 1.0) < probability
     }
 
-    /// Returns an index below a number, which must not be 0.
+    /// Returns an integer below `count`, which must not be 0.
     pub fn below(&mut self, count: usize) -> usize {
         (self.bits() >> 33) as usize % count
     }

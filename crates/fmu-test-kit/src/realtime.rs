@@ -1,11 +1,11 @@
-//! Checks that code may run in a control loop: it must not allocate, call the kernel, or lock.
+//! Checks that code may run in a control loop: it must not allocate, make system calls, or lock.
 //!
 //! * An allocator that the test installs counts allocations:
 //!   `#[global_allocator] static COUNTING: Counting = Counting;`, see [`allocations`].
 //! * The work runs in a copy of the process that the kernel ends at the first system call, see
 //!   [`without_kernel`].
-//! * The source must not contain the names of locks, see [`assert_nothing_to_lock`]. A free lock is only an
-//!   atomic instruction, which no run and no sanitizer detects.
+//! * The source must not contain the names of locks, see [`assert_nothing_to_lock`]. The source is searched because
+//!   taking a free lock is only an atomic instruction, which cannot be detected at run time.
 //! * In a build with `--cfg rtsan` and the RealtimeSanitizer, [`sanitizer`] marks the code in which blocking
 //!   calls are forbidden.
 
@@ -27,11 +27,11 @@ thread_local! {
 pub struct Counting;
 
 fn count() {
-    // The counter has no destructor, so it exists as long as its thread.
+    // The counter has no destructor, so it is valid until its thread ends.
     ALLOCATIONS.with(|count| count.set(count.get() + 1));
 }
 
-// SAFETY: passes all calls to the system's allocator.
+// SAFETY: all calls are passed to the system's allocator.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count();
@@ -65,8 +65,8 @@ pub fn allocations(work: impl FnOnce()) -> u64 {
     ALLOCATIONS.with(Cell::get) - start
 }
 
-/// Defines the tests of a model whose sources are in this package: a control loop neither allocates, nor
-/// calls the kernel, nor locks. `make sanitize` runs the same loop under the RealtimeSanitizer.
+/// Defines tests that a control loop with a model neither allocates, nor makes system calls, nor locks. The sources of
+/// the model must be in the package of the test. `make sanitize` runs the same loop under the RealtimeSanitizer.
 #[macro_export]
 macro_rules! control_loop {
     ($model:ty) => {
@@ -78,7 +78,7 @@ macro_rules! control_loop {
             $crate::realtime::assert_no_allocation::<$model>();
         }
 
-        /// Checks that the source shares no data between instances, so that it needs no locks.
+        /// Checks that the sources contain no data that instances share, so that no locks are needed.
         #[test]
         fn the_library_has_nothing_to_lock() {
             let sources = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
@@ -96,7 +96,7 @@ macro_rules! control_loop {
     };
 }
 
-/// Calls of an importer in a control loop.
+/// The instance in a control loop, with the arguments of its calls.
 struct Loop<F: Either> {
     fmu: F,
     state: *mut c_void,
@@ -130,14 +130,14 @@ impl<F: Either> Loop<F> {
         let Self { fmu, state, time, values: [set, read], inputs, outputs, .. } = self;
         set.iter_mut().zip(1_u8..).for_each(|(value, i)| *value = (*time * f64::from(i)).sin());
         fmu.set(inputs, set);
-        fmu.give_rates(inputs, set);
+        fmu.set_input_derivatives(inputs, set);
         fmu.step(*time, h);
         fmu.ok(fmu.try_get(outputs, read));
         fmu.ok(fmu.get_state(state));
         *time += h;
     }
 
-    /// Performs rarer calls: sets a parameter and Booleans, restores a state, and reads derivatives.
+    /// Makes calls that are rarer: sets a parameter and Booleans, restores a state, and reads derivatives.
     fn change(&self, factor: f64) {
         let Self { fmu, parameter: (parameter, start), .. } = self;
         fmu.set(&[*parameter], &[start * factor]);
@@ -147,8 +147,8 @@ impl<F: Either> Loop<F> {
         fmu.partial(self.outputs[0], self.inputs[0]);
     }
 
-    /// Performs a thousand steps of one size and a thousand steps of different sizes, with changes in
-    /// between. The largest step sizes cover special code for stiff models.
+    /// Performs a thousand steps of one size, alternating with a thousand steps of increasing sizes, and the rarer calls
+    /// in between. The largest step sizes run special code for stiff models.
     fn run(&mut self) {
         let _context = sanitizer::enter();
         for i in 0..1000 {
@@ -167,7 +167,7 @@ impl<F: Either> Drop for Loop<F> {
     }
 }
 
-/// Runs the loop of a model in both FMI versions.
+/// Runs the loop with a model in both FMI versions.
 ///
 /// # Panics
 /// Panics if the loop allocates.
@@ -176,7 +176,7 @@ pub fn assert_no_allocation<M: Exported>() {
     assert_eq!([allocations(|| old.run()), allocations(|| new.run())], [0; 2]);
 }
 
-/// Runs the loop of a model in both FMI versions.
+/// Runs the loop with a model in both FMI versions.
 ///
 /// # Panics
 /// Panics if the loop makes a system call, or if system calls are not detected.
@@ -184,13 +184,13 @@ pub fn assert_no_allocation<M: Exported>() {
 pub fn assert_no_system_call<M: Exported>() {
     assert_eq!(without_kernel(&mut || ()), Ended::Exited(0));
     let caught = without_kernel(&mut || drop(std::fs::metadata("/")));
-    assert_eq!(caught, Ended::Killed(libc::SIGSYS), "they are caught");
+    assert_eq!(caught, Ended::Killed(libc::SIGSYS), "system calls are detected");
     let (mut old, mut new) = (Loop::<Importer>::new::<M>(), Loop::<fmi3::Importer>::new::<M>());
     assert_eq!(without_kernel(&mut || old.run()), Ended::Exited(0));
     assert_eq!(without_kernel(&mut || new.run()), Ended::Exited(0));
 }
 
-/// Searches all files of a directory for locks and other shared data; returns the number of files.
+/// Searches all files below a directory for locks and other shared data; returns the number of files.
 ///
 /// # Panics
 /// Panics if it finds any.
@@ -262,7 +262,7 @@ pub use sandbox::{Ended, without_kernel};
 mod sandbox {
     use libc::{BPF_ABS, BPF_JEQ, BPF_JMP, BPF_K, BPF_LD, BPF_RET, BPF_W, sock_filter, sock_fprog};
 
-    /// End of a process.
+    /// How a process ended.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum Ended {
         /// The process exited with this code.
@@ -276,8 +276,8 @@ mod sandbox {
     /// # Panics
     /// Panics if the process cannot be copied.
     pub fn without_kernel(work: &mut dyn FnMut()) -> Ended {
-        // SAFETY: the child runs the work and exits. If the work allocates or locks, the child may deadlock
-        // with a lock held by another thread, but then the test must fail anyway.
+        // SAFETY: the child runs the work and exits. If the work allocates or locks, the child may wait for ever for a
+        // lock that another thread held during the fork, but such work must fail the test anyway.
         let child = unsafe { libc::fork() };
         assert!(child >= 0, "fork: {}", std::io::Error::last_os_error());
         if child == 0 {

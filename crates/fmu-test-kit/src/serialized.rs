@@ -1,10 +1,11 @@
-//! The bytes of a saved state of fmu-export. This code follows a description of the layout and shares no code
-//! with fmu-export, so that tests detect errors there.
+//! The bytes of a serialized state of fmu-export. This module was written from a description of the layout and shares no
+//! code with fmu-export, so that tests detect errors there.
 //!
 //! The layout is: 7 bytes of magic, one byte for the version, the hash of the guid, and the interface type
 //! (plus 2 for FMI 3.0). The mode, the end flag, time, start time, stop time and tolerance follow, then the
-//! values and the memory of the table. The last bytes are the FNV-1a checksum of all bytes before. Integers
-//! have 64 bits, little-endian. An optional value has a Boolean of one byte before it.
+//! values and the `memory` fields of the variable table. The last 8 bytes are the FNV-1a checksum of all bytes before.
+//! Integers have 64 bits, little-endian. Before an optional value, there is a Boolean of one byte, which is
+//! true if the value exists.
 
 use fmu_export::Mode;
 use std::ops::Range;
@@ -35,7 +36,7 @@ pub fn fnv1a(bytes: &[u8]) -> [u8; 8] {
     hash.to_le_bytes()
 }
 
-/// Updates the checksum.
+/// Returns the bytes with an updated checksum.
 pub fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
     let end = bytes.len() - CHECKSUM;
     let checksum = fnv1a(&bytes[..end]);
@@ -43,7 +44,7 @@ pub fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
-/// Replaces some bytes and updates the checksum.
+/// Replaces the bytes in the range `at` and updates the checksum.
 pub fn with(mut bytes: Vec<u8>, at: Range<usize>, patch: &[u8]) -> Vec<u8> {
     bytes[at].copy_from_slice(patch);
     sealed(bytes)

@@ -4,26 +4,26 @@
 //! correction:
 //!
 //! ```text
-//! twist      = rigid - measured          rigid: eq. (1) of the motors' angles as they are
+//! twist      = rigid - measured          rigid: eq. (1) for the current motor angles
 //! correction = b twist + (1 - b) I - D               b = Kp / (1 + Kp)
 //! I'         = Ki (1 - b) (twist - I)
 //! D          = Kd rate, filtered with the time constant 2 Kd
 //! goal       = inverse of eq. (1) of (reference + correction)
 //! ```
 //!
-//! This is PI control. If the motors are at their goal, rigid = reference + correction. Then, with Kd = 0,
-//! twist - correction is the error e = reference - measured, correction = Kp e + I, and I' = Ki e. In this
-//! form, only the twist of the couplings counts as error, not the remaining distance to the goal. The
-//! integral pauses while a motor moves or is limited by its torque (anti-windup), so a move leaves no error
-//! to correct afterwards.
+//! This is PI control, because rigid = reference + correction if the motors are at their goal. Then, with Kd = 0,
+//! twist - correction is the error e = reference - measured, correction = Kp e + I, and I' = Ki e. But unlike usual
+//! PI control, this form corrects only the twist of the couplings while the motors move, not their remaining distance
+//! to the goal. The integral pauses while a motor moves or is limited by its torque (anti-windup), so no error
+//! accumulates during a move.
 //!
-//! D damps the vibration of the couplings, because of which the wrist lags behind its motors. A stiff wrist
-//! follows immediately. Without the filter, the motors' own rate would be fed back with the gain Kd /
-//! sample_time, far above 1, and cause a limit cycle. With the filter, the gain at high frequencies is 1/2.
+//! D damps the vibration of the couplings. Its filter is needed for a wrist that is so stiff that it follows the motors
+//! immediately: without the filter, the rate of the motors would be fed back with the gain Kd / sample_time, which is
+//! far above 1 and would cause a limit cycle. With the filter, the gain at high frequencies is 1/2.
 //!
-//! Torque limiting: The goal of a motor is limited to the angle at which, with a blocked wrist, the
-//! couplings would reach the torque limit. Beyond the torque limit, this goal lies behind the motor. The
-//! motor always moves so slowly that it can stop at its goal, so it does not exceed the limit by its motion.
+//! Torque limiting: the goal of a motor is limited to the angle at which the couplings of a blocked wrist would reach
+//! the torque limit. If the torque exceeds the limit, this angle is behind the motor, so the motor turns back. Because a
+//! motor always moves so slowly that it can stop at its goal, its own motion does not exceed the limit.
 
 use crate::motor::{Limits, MotorSetpoint};
 use crate::parameters::{InvalidParameter, Parameters};
@@ -44,7 +44,7 @@ pub struct Inputs {
 }
 
 impl Inputs {
-    /// Returns the inputs after `time` s at a constant `slope`.
+    /// Returns the inputs after `time` s if each changes with its constant `slope`.
     fn after(&self, slope: &Self, time: f64) -> Self {
         let after = |values: [f64; 2], slopes: [f64; 2]| from_fn(|i| values[i] + slopes[i] * time);
         Self {
@@ -56,8 +56,8 @@ impl Inputs {
     }
 }
 
-/// Schedule of the samples: at `epoch` and every `period` from there. Times are products, not sums, so
-/// rounding errors do not accumulate.
+/// Schedule of the samples: one at `epoch`, and one after every `period`. Times are products, not sums, so that rounding
+/// errors do not accumulate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Schedule {
     /// Time of the sample with number 0, s.
@@ -74,14 +74,14 @@ impl Schedule {
     }
 }
 
-/// The controller between two communication points.
+/// The controller: its parameters and inputs, and its state after the last sample.
 #[derive(Clone, Debug)]
 pub struct Controller {
     /// Parameters. Call [`parameters_changed`](Self::parameters_changed) after a change.
     pub parameters: Parameters,
     /// Inputs at the current communication point.
     pub inputs: Inputs,
-    /// Slopes of the inputs, if the importer has set them since the last step; per s.
+    /// Slopes of the inputs, per s; 0 if the importer has not set them since the last step.
     pub slopes: Inputs,
     /// Motors 1 and 2 at the last sample.
     pub motors: [MotorSetpoint; 2],
@@ -91,19 +91,20 @@ pub struct Controller {
     pub damping: PitchRoll,
     /// The last correction of pitch and roll, rad.
     pub correction: PitchRoll,
-    /// Whether both motors were on their goals at the last sample.
+    /// Whether, at the last sample, both motors were at their goals or within two samples of them, and no goal was limited
+    /// by the torque.
     pub on_goal: bool,
     /// Schedule of the samples.
     pub schedule: Schedule,
     /// Time of the last sample, s.
     pub sampled_at: f64,
-    /// Time of the motors' [`motion`](Self::motion), s: in Co-Simulation the communication point.
+    /// Time for which [`motion`](Self::motion) returns the motion, s; in Co-Simulation the communication point.
     pub now: f64,
 }
 
-/// Maximum number of samples in a step: an hour at 1 kHz, which takes less than a second.
+/// Maximum number of samples in a step: one hour of samples at 1 kHz, which take less than a second to calculate.
 const MOST_SAMPLES: f64 = 3.6e6;
-/// Beyond this number a double cannot represent all integers.
+/// Largest number of a sample; an `f64` cannot represent all larger integers.
 const LAST_SAMPLE: f64 = (1_u64 << 53) as f64;
 
 impl Controller {
@@ -128,7 +129,7 @@ impl Controller {
         })
     }
 
-    /// Checks the parameters. A new sample time applies from the next sample on.
+    /// Checks the parameters and updates the schedule. A new sample time applies from the next sample on.
     ///
     /// # Errors
     /// Fails if the parameters are invalid; the schedule then stays unchanged.
@@ -151,7 +152,7 @@ impl Controller {
         (self.sampled_at, self.now) = (start_time, start_time);
     }
 
-    /// Returns the current motion of the motors. It depends only on earlier samples: an input acts from the
+    /// Returns the current motion of the motors. It depends only on earlier samples, because an input takes effect at the
     /// next sample after it has been set.
     #[inline]
     pub fn motion(&self) -> [MotorSetpoint; 2] {
@@ -160,7 +161,7 @@ impl Controller {
 
     /// Advances from `time` to `time + h` (s) and takes the samples that are due before the end.
     ///
-    /// A sample within rounding error of the end belongs to the next step, which has its inputs.
+    /// A sample at the end, within rounding error, belongs to the next step, because only then are its inputs set.
     ///
     /// Returns false and changes nothing if the step contains too many samples.
     #[must_use]
@@ -207,7 +208,7 @@ impl Controller {
         true
     }
 
-    /// Returns the tolerance for times of importers.
+    /// Returns the tolerance, in s, for rounding errors in the times of an importer.
     fn rounding(&self, time: f64, h: f64) -> f64 {
         (0.01 * h.min(self.schedule.period)).min(1e-9) + 8.0 * f64::EPSILON * time.abs()
     }
@@ -255,7 +256,7 @@ impl Controller {
         let limits = Limits { rate: p.max_rate, acceleration: p.max_acceleration };
         self.on_goal = true;
         for (motor, (goal, torque)) in self.motors.iter_mut().zip(goals.into_iter().zip(inputs.torque)) {
-            // Limits the further twist of the couplings, forward and back.
+            // Limits how much farther the couplings can be twisted, in both directions.
             let farthest = motor.angle + (p.max_torque + torque) / p.stiffness;
             let nearest = motor.angle - (p.max_torque - torque) / p.stiffness;
             let allowed = goal.min(farthest).max(nearest);

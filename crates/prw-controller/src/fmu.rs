@@ -52,7 +52,8 @@ impl Model for Controller {
 }
 
 impl CoSimulation for Controller {
-    /// A sample at the end of a step waits for the inputs of the next step.
+    /// Each sample is an event for importers that handle events. Otherwise `step` takes the samples, and a sample at the end
+    /// of a step is taken in the next step, with its inputs.
     const EVENTS: Events = Events::StopIfHandled;
     const ATOMIC_STEP: bool = true;
 
@@ -66,14 +67,14 @@ impl CoSimulation for Controller {
             return Ok(Stepped::Done);
         }
         Err(Error::new(
-            "the step holds so many samples that it would take more than a second; take a smaller step or a longer \
+            "the step contains so many samples that it would take more than a second; take a smaller step or a longer \
              sample_time",
         ))
     }
 }
 
-/// The controller has no continuous states: between samples, which are time events, the motion of the motors
-/// is known.
+/// The controller has no continuous states, because the motion of the motors is known between samples. The samples are
+/// time events.
 impl ModelExchange for Controller {
     fn event(&mut self, time: f64) -> Result<Event, Error> {
         if self.take_samples(time) {
@@ -87,7 +88,8 @@ impl ModelExchange for Controller {
 }
 
 impl InputDerivatives for Controller {
-    /// Sets a slope by the variable table: `slopes` has the layout of `inputs`.
+    /// Sets a slope with the setter of the input in the variable table. For this, `inputs` and `slopes`, which have the same
+    /// type, are exchanged.
     fn set_input_derivative(&mut self, of: Name, order: u32, value: f64) {
         if order == 1 {
             std::mem::swap(&mut self.inputs, &mut self.slopes);
@@ -116,8 +118,8 @@ impl OutputDerivatives for Controller {
 }
 
 impl Partials for Controller {
-    /// Inputs and parameters act from the next sample on, so nothing depends on them at a communication
-    /// point. Motor angles depend only on their own start values.
+    /// Outputs do not depend on inputs and parameters, because these take effect at the next sample. Motor angles depend
+    /// only on their own start values.
     fn partial(&self, unknown: Name, known: Name) -> Option<f64> {
         Some(f64::from(u8::from(unknown == known)))
     }

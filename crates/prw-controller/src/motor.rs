@@ -1,10 +1,9 @@
 //! Motion of a motor from sample to sample: as fast as its limits permit, without overshoot.
 //!
-//! During a sample period the acceleration is constant. So the angle is a parabola, and the rate is its exact
-//! derivative, a straight line. At each sample the motor chooses the highest rate from which it can still
-//! stop at its goal by full braking *in whole samples*. Continuous-time formulas for the braking distance
-//! overshoot by a fraction of a sample and then oscillate around the goal. This rule reaches the goal exactly
-//! and stays there.
+//! The acceleration is constant during a sample period, so the rate changes linearly and the angle is a parabola. At
+//! each sample, the motor chooses the highest rate from which it can still stop at its goal by full braking *in whole
+//! samples*. Therefore it reaches the goal exactly and stays there. With a formula for braking in continuous time, it
+//! would overshoot by a fraction of a sample and then oscillate around the goal.
 
 /// Limits of a motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,9 +38,9 @@ impl MotorSetpoint {
 
     /// Chooses the acceleration for the next `period` s on the way to `goal` (rad; may be infinite).
     ///
-    /// Within the limits the motor reaches the goal in the least number of samples. If the goal lies behind,
-    /// or is nearer than the stopping distance, the motor passes it and returns. Returns whether the motor is
-    /// at rest at its goal, or will be within two samples.
+    /// Within its limits, the motor reaches the goal in the least number of samples. If the goal is behind the motor or
+    /// nearer than its stopping distance, the motor first stops and then turns back. Returns whether the motor is at rest
+    /// at its goal, or will be within two samples.
     pub fn plan_acceleration(&mut self, goal: f64, limits: &Limits, period: f64) -> bool {
         let Limits { rate: max_rate, acceleration: max } = *limits;
         // Units: the rate a T that the motor gains in one period T at full acceleration a, and the angle a T^2 that it
@@ -52,18 +51,20 @@ impl MotorSetpoint {
         let rate = wanted.clamp(-max_rate, max_rate);
         let acceleration = (rate - self.rate) / period;
         self.acceleration = acceleration.clamp(-max, max);
-        // Braking from less than one unit takes one period. Neither limit may be in the way.
+        // The next rate is then less than one unit, so that braking from it takes one period. The motor arrives after these
+        // two periods unless a limit of the rate or the acceleration was applied.
         distance.abs() < 1.0 && rate == wanted && acceleration == self.acceleration
     }
 }
 
-/// Returns the highest rate v, at most `limit`, for which the rest of this sample and braking from v cover
-/// the distance q: v/2 + D(v) = q, in the units of [`MotorSetpoint::plan_acceleration`].
+/// Returns the rate v at the next sample, at most `limit`, from which the motor can just stop within the distance q. The
+/// units are those of [`MotorSetpoint::plan_acceleration`].
 ///
-/// Braking takes m = floor(v) whole samples and one more for the rest v - m. So D(v) = (m + 1/2) v - m (m +
-/// 1)/2, and q = (m + 1) v - m (m + 1)/2, which is m (m + 1)/2 at v = m.
+/// Until the next sample, a motor that reaches v covers v/2 (the part that depends on its current rate is already
+/// subtracted from q). Braking takes m = floor(v) whole samples, and one more for the remainder v - m, over the distance
+/// D(v) = (m + 1/2) v - m (m + 1)/2. Hence q = v/2 + D(v) = (m + 1) v - m (m + 1)/2, which is m (m + 1)/2 at v = m.
 fn max_stoppable_rate(q: f64, limit: f64) -> f64 {
-    // v <= sqrt(2 q) always holds. For larger q, infinite q included, the limit applies.
+    // For a q beyond this bound, which may be infinite, v would exceed the limit.
     if q > 0.5 * (limit + 1.0) * (limit + 2.0) {
         return limit;
     }
@@ -77,9 +78,9 @@ mod tests {
 
     const PERIOD: f64 = 1e-3;
 
-    /// Moves to `goal`; returns the number of samples, the largest angle in the direction of the goal, and
-    /// the motor.
-    fn go(mut motor: MotorSetpoint, goal: f64, limits: &Limits) -> (usize, f64, MotorSetpoint) {
+    /// Moves a motor to `goal`. Returns the number of samples, the farthest angle in the direction of the goal, and the
+    /// motor at the end.
+    fn move_to(mut motor: MotorSetpoint, goal: f64, limits: &Limits) -> (usize, f64, MotorSetpoint) {
         let direction = (goal - motor.angle).signum();
         let mut farthest = motor.angle;
         for samples in 0..100_000 {
@@ -106,9 +107,10 @@ mod tests {
         for (rate, acceleration) in [(3.0, 30.0), (2.345, 17.89), (0.5, 1e3), (100.0, 30.0), (0.02, 30.0)] {
             let limits = Limits { rate, acceleration };
             for goal in [1.1220, -0.5, 1e-3, 3.3e-5, 1e-5, -1e-7, 0.022_2] {
-                let (samples, farthest, _) = go(MotorSetpoint::default(), goal, &limits);
+                let (samples, farthest, _) = move_to(MotorSetpoint::default(), goal, &limits);
                 assert!((farthest - goal) * f64::signum(goal) <= 1e-12, "{goal}: {farthest}");
-                // Time of bang-bang motion in continuous time; sampling may add up to three samples.
+                // The shortest time in continuous time, with full acceleration and braking. Sampling adds at most three
+                // samples.
                 let distance = goal.abs();
                 let peak = (distance * acceleration).sqrt().min(rate);
                 let shortest = distance / peak + peak / acceleration;
@@ -121,9 +123,10 @@ mod tests {
         }
     }
 
-    /// The last limits permit no rate of one unit, so the motor needs several periods for the last unit of its way.
+    /// Checks the return value of `plan_acceleration`. With the last two limits, the maximum rate is less than one unit, so
+    /// the motor needs several periods for the last unit.
     #[test]
-    fn it_says_so_when_two_samples_are_enough() {
+    fn arrival_within_two_samples_is_announced() {
         let mut announced = 0;
         for (rate, acceleration) in [(3.0, 30.0), (2.345, 17.89), (0.5, 1e3), (0.02, 30.0), (0.004, 30.0)] {
             let limits = Limits { rate, acceleration };
@@ -150,7 +153,7 @@ mod tests {
     #[test]
     fn it_stays_where_it_has_arrived() {
         let limits = Limits { rate: 3.0, acceleration: 30.0 };
-        let (_, _, mut motor) = go(MotorSetpoint::default(), 0.7, &limits);
+        let (_, _, mut motor) = move_to(MotorSetpoint::default(), 0.7, &limits);
         for _ in 0..1000 {
             motor.plan_acceleration(0.7, &limits, PERIOD);
             motor = motor.after(PERIOD);
@@ -162,7 +165,7 @@ mod tests {
     fn a_goal_that_comes_too_near_is_passed_once() {
         let limits = Limits { rate: 3.0, acceleration: 30.0 };
         let fast = MotorSetpoint { angle: 0.0, rate: 3.0, acceleration: 0.0 };
-        let (_, farthest, motor) = go(fast, 0.05, &limits);
+        let (_, farthest, motor) = move_to(fast, 0.05, &limits);
         // The motor cannot stop before 3^2 / 60 = 0.15.
         assert!((farthest - 0.15).abs() < 1e-9, "{farthest}");
         assert!((motor.angle - 0.05).abs() < 1e-12);

@@ -2,9 +2,10 @@
 
 use std::fmt;
 
-/// Smallest positive parameter. Within the bounds, products and quotients of parameters do not overflow.
+/// Smallest value of a parameter that must be positive. Together with [`LARGEST`], it ensures that products and
+/// quotients of parameters do not overflow.
 pub const SMALLEST: f64 = 1e-9;
-/// Largest parameter; see [`SMALLEST`].
+/// Largest value of a Real parameter; see [`SMALLEST`].
 pub const LARGEST: f64 = 1e9;
 
 /// Sample time, limits of the motors, gains, and the assumed properties of the wrist.

@@ -47,7 +47,7 @@ variables! {
     /// Measured torque of sensor 2, negative while the motor drives, for torque limiting; may be left unconnected
     tau2 = input(&TORQUE) in inputs.torque[1];
 
-    // Inputs and parameters act from the next sample on: at a communication point nothing depends on them.
+    // Inputs and parameters take effect at the next sample, so the outputs at a communication point do not depend on them.
 
     /// Angle of motor 1; its start value is the initial angle
     theta1 = output(&ANGLE).exact().depends_on(&[Index::TIME]) in motors[0].angle by |c| c.motion()[0].angle;

@@ -1,11 +1,11 @@
-//! Eq. (1): the motion of a rigid wrist from its motors, and the motor angles for a given pitch and roll.
+//! Kinematics of a rigid wrist, eq. (1): pitch and roll for given motor angles, and the inverse.
 
-/// Pitch and roll, or their rates; rad, rad/s.
+/// Pitch and roll, rad, or their rates, rad/s.
 pub type PitchRoll = [f64; 2];
-/// Angles of motors 1 and 2, or their rates; rad, rad/s.
+/// Angles of motors 1 and 2, rad, or their rates, rad/s.
 pub type Motors = [f64; 2];
 
-/// Kinematics of the wrist, from its numbers of cam lobes and rollers.
+/// Kinematics of a wrist with certain numbers of cam lobes and rollers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kinematics {
     /// M / N: angle of motor 1 per roll angle; motor 2 turns in the opposite direction.

@@ -1,4 +1,4 @@
-//! Options that `build_closed_loop` rejects.
+//! Invalid options of `build_closed_loop` are rejected.
 
 use std::process::Command;
 

@@ -1,4 +1,4 @@
-//! The control law, with sensors that have an offset or are stuck, with a blocked wrist, or without a wrist.
+//! The control law with a rigid or blocked wrist, with sensors that have an offset or are stuck, and with random inputs.
 
 use proptest::prelude::*;
 use prw_controller::controller::{Controller, Inputs};
@@ -16,7 +16,8 @@ fn radians(degrees: PitchRoll) -> PitchRoll {
     degrees.map(f64::to_radians)
 }
 
-/// Runs for `duration` s in steps of 1 ms; `measure` computes the inputs from the motors' motion.
+/// Runs the controller for `duration` s in steps of 1 ms; `measure` calculates the inputs from the time and the motion of
+/// the motors. Returns the motion after each step.
 fn run(
     c: &mut Controller,
     duration: f64,
@@ -33,7 +34,7 @@ fn run(
     motions
 }
 
-/// Returns the inputs of a wrist without couplings.
+/// Returns a function that measures a wrist without flexible couplings.
 fn rigid(reference: PitchRoll) -> impl Fn(f64, [MotorSetpoint; 2]) -> Inputs {
     let kinematics = Kinematics::new(4, 7);
     move |_, motors| Inputs {
@@ -44,7 +45,7 @@ fn rigid(reference: PitchRoll) -> impl Fn(f64, [MotorSetpoint; 2]) -> Inputs {
     }
 }
 
-/// Checks a sensor with an offset of 2 degrees, which feed-forward without integral would not remove.
+/// Checks that the integral removes the error of sensors with an offset of 2 degrees, which feed-forward cannot.
 #[test]
 fn the_integral_removes_a_constant_error() {
     let reference = radians([10.0, -20.0]);
@@ -63,7 +64,7 @@ fn the_integral_removes_a_constant_error() {
     }
 }
 
-/// Checks constant measurements: the correction reaches its limit, and the motors stop.
+/// Checks that the correction stays within its limit and the motors stop if the measurements do not change.
 #[test]
 fn stuck_sensors_keep_motors_and_correction_bounded() {
     let reference = radians([30.0, 60.0]);
@@ -77,8 +78,8 @@ fn stuck_sensors_keep_motors_and_correction_bounded() {
     assert_eq!(c.correction.map(f64::abs), [bound; 2]);
 }
 
-/// Checks a blocked wrist. The couplings (32 N.m/rad, as the controller assumes) take the whole twist, and
-/// the torque never exceeds the limit. After the release there is no error to correct.
+/// Checks a blocked wrist, whose couplings (32 N.m/rad, as the controller assumes) are twisted by the whole motor angle. The
+/// torque must never exceed the limit. After the wrist is released, the motors must not overshoot.
 #[test]
 fn motors_back_off_from_a_blocked_wrist() {
     let reference = radians([120.0, 0.0]);
@@ -103,7 +104,7 @@ fn motors_back_off_from_a_blocked_wrist() {
     }
 }
 
-/// Checks that torque above the limit, from any source, drives the motor back.
+/// Checks that the motor turns back if the torque exceeds the limit, even if the motor did not cause it.
 #[test]
 fn torque_beyond_the_limit_reverses_the_motor() {
     let mut c = controller(|_| ());
@@ -124,7 +125,7 @@ fn samples_do_not_depend_on_the_communication_step() {
         let mut c = controller(|_| ());
         let mut time = 0.0_f64;
         for h in steps {
-            // The inputs are held since the last sample, so that all runs sample equal values.
+            // The inputs change only at samples, so that all runs sample equal values.
             c.inputs = wrist((time * 1e3 + 1e-6).floor() / 1e3);
             assert!(c.step(time, h));
             time += h;
@@ -138,7 +139,7 @@ fn samples_do_not_depend_on_the_communication_step() {
     }
 }
 
-/// Checks that samples within a long step use inputs that change with their slopes.
+/// Checks that samples within a long step use inputs that are extrapolated with their slopes.
 #[test]
 fn input_slopes_reach_the_samples_inside_a_step() {
     let ramp = |time: f64| 0.5 * time;
@@ -192,7 +193,7 @@ fn invalid_parameters_are_rejected() {
     assert_eq!(c.schedule.next, 0.0);
 }
 
-/// Generates any number that an importer can set, including the largest.
+/// Generates any finite number that an importer can set, including the largest ones.
 fn any_input() -> impl Strategy<Value = f64> {
     prop_oneof![8 => -3.0..3.0, 1 => -1e308..1e308, 1 => Just(f64::MAX), 1 => Just(-f64::MAX)]
 }
@@ -200,7 +201,8 @@ fn any_input() -> impl Strategy<Value = f64> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
 
-    /// Checks limits and finite values for any inputs and steps, and that omega is the derivative of theta.
+    /// Checks for any inputs and steps that values are finite and within their limits, and that omega is the derivative of
+    /// theta.
     #[test]
     fn limits_hold_and_rates_are_derivatives(
         inputs in prop::collection::vec(prop::array::uniform8(any_input()), 1..20),
@@ -221,7 +223,8 @@ proptest! {
                     prop_assert!(new.angle.is_finite());
                     prop_assert!(new.rate.abs() <= rate * (1.0 + 1e-9), "{new:?}");
                     prop_assert!((new.rate - old.rate).abs() <= acceleration * step * (1.0 + 1e-9) + 1e-12);
-                    // The mean of the rates is exact for one parabola, and nearly exact for several.
+                    // The mean of both rates gives the exact change of the angle if the step is within one sample period,
+                    // and nearly the exact one otherwise.
                     let mean = 0.5 * (old.rate + new.rate) * step;
                     prop_assert!((new.angle - old.angle - mean).abs() <= acceleration * step * step + 1e-9);
                 }

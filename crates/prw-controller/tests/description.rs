@@ -1,4 +1,4 @@
-//! The committed description of the controller.
+//! The committed model description of the controller.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::process::Command;
 
 const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/modelDescription/modelDescription.xml");
 
-/// Checks that the description is up to date, because the tables of the documentation come from it.
+/// Checks that the description is up to date, because the tables in the documentation are generated from it.
 #[test]
 fn the_committed_description_is_up_to_date() {
     let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).join("controller");

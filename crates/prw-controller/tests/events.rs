@@ -1,4 +1,4 @@
-//! Samples as events: the motion of the motors is bit-identical, regardless of the code that handles the
+//! Samples as events: the motion of the motors is bit-identical, regardless of whether the importer or the FMU handles the
 //! events.
 
 use fmu_export::Interface::{CoSimulation, ModelExchange};
@@ -28,12 +28,12 @@ const OUTPUTS: [u32; 6] = [
 ];
 const KD: u32 = Name::Kd as u32;
 const SAMPLE_TIME: u32 = Name::sample_time as u32;
-// Sums of these times are exact.
+// These times are powers of 2, so their sums are exact.
 const START: f64 = 0.125;
 const PERIOD: f64 = 1.0 / 128.0;
 const SAMPLES: u32 = 200;
 
-/// Returns all inputs of the controller, each a function of time.
+/// Returns the values of all inputs at this time.
 fn inputs(time: f64) -> [f64; 8] {
     let wave = |amplitude: f64, frequency: f64| amplitude * (frequency * time).sin();
     [
@@ -56,8 +56,8 @@ fn bits(outputs: [f64; 6]) -> [u64; 6] {
     outputs.map(f64::to_bits)
 }
 
-/// Returns the outputs at communication points one sample apart; the controller handles the samples within
-/// its steps.
+/// Returns the outputs after each of `SAMPLES` steps of one sample period in FMI 2.0, where the FMU handles the samples
+/// within its steps.
 fn steps_of_fmi2() -> Vec<[f64; 6]> {
     let fmu = fmu_test_kit::Importer::new::<Controller>(CoSimulation);
     fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
@@ -93,7 +93,7 @@ fn without_event_mode() {
     }
 }
 
-/// Checks steps of one sample, which end at an event, and long steps, which end early.
+/// Checks steps of one sample period, at whose end there is an event, and longer steps, which end early at an event.
 #[test]
 fn in_event_mode() {
     for (early_return_allowed, samples_per_step) in [(fmi3False, 1), (fmi3True, 1), (fmi3True, 1000)] {
@@ -116,8 +116,8 @@ fn in_event_mode() {
     }
 }
 
-/// Checks an importer that handles events only at its communication points. Between them the inputs are
-/// constant, as for importers without Event Mode.
+/// Checks an importer that uses Event Mode but does not allow early return, so that the FMU handles the samples within a
+/// step. They use the inputs at the start of the step, as for importers without Event Mode.
 #[test]
 fn in_event_mode_with_samples_within_a_step() {
     let (fmu, unaware) = (with(fmi3True, fmi3False), with(fmi3False, fmi3False));
@@ -149,7 +149,7 @@ fn too_many_samples_within_a_step() {
     assert!(fmu.do_step(START, 70.0).unwrap().event_handling_needed);
 }
 
-/// Checks that the next step handles an event at the end of a step if the importer does not.
+/// Checks that, if the importer does not handle an event at the end of a step, the next step handles it.
 #[test]
 fn an_event_that_the_importer_does_not_handle() {
     let (fmu, unaware) = (with(fmi3True, fmi3False), with(fmi3False, fmi3False));
@@ -176,7 +176,7 @@ fn in_model_exchange() {
             fmu.set(&INPUTS, &inputs(time));
             assert_eq!(fmu.update(), Updated { next: Some(next), ..Updated::default() });
             fmu.ok(fmu.enter_continuous_time_mode());
-            // A solver may evaluate later times first and return.
+            // A solver may evaluate a later time first and then an earlier one.
             for share in [0.5, 1.0, 0.25, 1.0] {
                 fmu.ok(fmu.set_time(time + share * PERIOD));
                 fmu.set(&INPUTS, &inputs(time + share * PERIOD));
@@ -191,17 +191,17 @@ fn in_model_exchange() {
     check::<fmu_test_kit::fmi3::Importer>();
 }
 
-/// Checks that an importer that ignores time events for hours gets an error.
+/// Checks that an event with too many samples is rejected, as after an importer has ignored all time events for 10^6 s.
 #[test]
-fn too_many_samples_at_once() {
+fn too_many_samples_in_an_event() {
     let fmu = fmu_test_kit::Importer::new::<Controller>(ModelExchange);
     fmu.initialize(0.0);
     fmu.ok(fmu.fmi2SetTime(1e6));
     fmu.rejected_with(&["sample_time"], |fmu| fmu.fmi2NewDiscreteStates(&mut Default::default()));
 }
 
-/// Checks partial derivatives with respect to time, which FMI 3.0 counts among the knowns, against
-/// differences. Between samples, the motion of the motors is a function of time.
+/// Compares partial derivatives with respect to time, which is a known in FMI 3.0, with differences. Between samples, the
+/// motion of the motors is a function of time only.
 #[test]
 fn partial_derivatives_with_respect_to_time() {
     const WIDTH: f64 = 1.0 / 65_536.0;

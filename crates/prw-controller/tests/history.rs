@@ -1,7 +1,7 @@
 //! Random histories of the controller.
 
 #[test]
-fn what_was_undone_leaves_no_trace() {
+fn undone_calls_leave_no_trace() {
     fmu_test_kit::history::Histories::default().check::<prw_controller::controller::Controller>();
 }
 

@@ -1,20 +1,21 @@
-//! The two motors of the testbed as an FMU, for models in which a torque drives them.
+//! The two motors of the testbed as an FMU, for systems in which the motors are driven by torques.
 //!
-//! The testbed takes motor angles, and returns the torques of the wrist on its motors. This FMU closes the loop:
-//! `J1 omega' = torque + tau - friction omega`. Its variables have the names that the testbed has.
+//! The inputs of the testbed are motor angles, and its outputs include the torques of the wrist on the motors. This FMU
+//! calculates the angles from the torques: `J1 omega' = torque + tau - friction omega`. Its variables have the same names as
+//! the variables of the testbed to which they are connected.
 
 use fmu_export::*;
 
-/// Motors 1 and 2, or one value of each.
+/// A value of motor 1 and of motor 2.
 type Pair = [f64; 2];
 
-/// Both motors between two communication points.
+/// Both motors: their inputs, states and parameters.
 #[derive(Clone, Debug)]
 pub struct Motors {
-    /// Torques of the motors and of the wrist, N.m.
+    /// Torques of the motors (`torque`) and of the wrist on the motors (`tau`), N.m.
     torque: Pair,
     tau: Pair,
-    /// Their slopes in the next step, if the importer has set them; N.m/s.
+    /// Slopes of these torques in the next step, N.m/s; 0 if the importer has not set them.
     torque_slope: Pair,
     tau_slope: Pair,
     theta: Pair,
@@ -66,7 +67,7 @@ impl Motors {
         (self.torque[motor] + self.tau[motor] - self.friction * self.omega[motor]) / self.inertia
     }
 
-    /// Returns angle and rate of a motor after `h` s, in which the torques are straight lines: the exact solution.
+    /// Returns the angle and the rate of a motor after `h` s; exact if the torques change linearly.
     fn after(&self, motor: usize, h: f64) -> Pair {
         let (theta, omega) = (self.theta[motor], self.omega[motor]);
         let acceleration = (self.torque[motor] + self.tau[motor]) / self.inertia;
@@ -79,9 +80,10 @@ impl Motors {
     }
 }
 
-/// Returns exp(-z) and its integrals, which solve y' = -y + t^k: the k-th is sum (-z)^n / (n + k)!.
+/// Returns the functions sum over n of (-z)^n / (n + k)! for k = 0 to 3. The first is exp(-z); the others result from
+/// integrating it repeatedly.
 fn decays(z: f64) -> [f64; 4] {
-    // Each difference loses digits if z is small, where the series has few terms.
+    // If z is small, the differences below lose digits, but a few terms of the series are accurate.
     if z < 0.5 {
         return std::array::from_fn(|k| {
             let first = [1.0, 1.0, 0.5, 1.0 / 6.0][k];

@@ -1,4 +1,4 @@
-//! The motors, whose exact step is compared with the derivatives that they have in Model Exchange.
+//! Tests of the motors: the exact step in Co-Simulation is compared with an integration in Model Exchange.
 
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_test_kit::{Either, Importer};
@@ -9,6 +9,7 @@ const OUTPUTS: [u32; 4] =
     [Name::theta1 as u32, Name::theta2 as u32, Name::omega1 as u32, Name::omega2 as u32];
 const PARAMETERS: [u32; 2] = [Name::J1 as u32, Name::friction as u32];
 
+/// The checks of the test kit that every FMU must pass.
 mod every {
     fmu_test_kit::every_check!(prw_motor::Motors);
 }
@@ -25,19 +26,19 @@ fn torques(t: f64) -> [f64; 4] {
 const SLOPES: [f64; 4] = [-2.0, 1.0, 0.5, 0.0];
 const START: [f64; 4] = [0.5, -0.2, 3.0, -1.0];
 
-/// Angles and rates after one step of 0.1 s, in which the torques follow their slopes.
+/// Returns the angles and rates after one step of 0.1 s, during which the torques follow their slopes.
 fn after_a_step(inertia: f64, friction: f64) -> [f64; 4] {
     let fmu = Importer::new::<Motors>(CoSimulation);
     fmu.set(&PARAMETERS, &[inertia, friction]);
     fmu.set(&OUTPUTS, &START);
     fmu.initialize(0.0);
     fmu.set(&INPUTS, &torques(0.0));
-    fmu.give_rates(&INPUTS, &SLOPES);
+    fmu.set_input_derivatives(&INPUTS, &SLOPES);
     fmu.step(0.0, 0.1);
     fmu.get(OUTPUTS)
 }
 
-/// The same by 4,000 steps of the classical Runge-Kutta method.
+/// Returns the same values, calculated with 4,000 steps of the classical Runge-Kutta method.
 fn integrated(inertia: f64, friction: f64) -> [f64; 4] {
     let fmu = Importer::new::<Motors>(ModelExchange);
     fmu.set(&PARAMETERS, &[inertia, friction]);
@@ -64,7 +65,8 @@ fn integrated(inertia: f64, friction: f64) -> [f64; 4] {
     x
 }
 
-/// From no friction to a decay in a tenth of the step, on both sides of the change of the formula.
+/// Checks frictions from 0 to one with which a rate decays in a tenth of the step. Two of them are just below and above the
+/// limit at which `decays` changes its formula.
 #[test]
 fn a_step_is_the_exact_solution() {
     for (inertia, friction) in
@@ -81,7 +83,8 @@ fn a_step_is_the_exact_solution() {
     }
 }
 
-/// Checks Newton's law with numbers that need no computer: 2 N.m turn 0.5 kg.m2 by 8 rad in 2 s, and the wrist takes half of that.
+/// Checks Newton's law with simple numbers: 2 N.m turn 0.5 kg.m2 by 8 rad in 2 s. If the wrist takes half of the torque, the
+/// angle is half as large.
 #[test]
 fn the_torque_of_the_wrist_is_added() {
     for (tau, theta, omega) in [(0.0, 8.0, 8.0), (-1.0, 4.0, 4.0)] {

@@ -1,7 +1,7 @@
 //! Reads `modelDescription/parameters.json`, Table 1 of the paper as printed, or a file of the same format.
 //!
-//! This module uses no derive macros, because every build of the library begins by compiling it, and the macros would take longer
-//! than everything else in the build script.
+//! This module uses no derive macros, because every build of the library begins by compiling it, and derive macros would take
+//! longer to compile than everything else in the build script.
 
 use crate::{Integer, Parameters, Real};
 use serde_core::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
@@ -12,8 +12,8 @@ use std::fs;
 use std::marker::PhantomData;
 use std::path::Path;
 
-/// Factor from "per degree" to "per radian". The SI value is the printed value, read to the nearest double,
-/// times this double, rounded once. In Python, `value * (180 / math.pi)` gives the same bits.
+/// Factor from "per degree" to "per radian". The SI value is the product of this `f64` and the `f64` nearest to the printed
+/// value. In Python, `value * (180 / math.pi)` gives the same bits.
 const DEG_PER_RAD: f64 = 180.0 / PI;
 
 /// Reads and checks a parameter file.
@@ -55,8 +55,8 @@ macro_rules! file {
 }
 table!(file);
 
-/// Returns the value of an entry like `{ "value": 2.11, "unit": "N.m/deg" }` in an SI unit. A value per radian may be
-/// given per degree.
+/// Returns the value of an entry like `{ "value": 2.11, "unit": "N.m/deg" }` in the SI unit `si`. If this unit is per radian,
+/// the entry may also be per degree.
 fn in_unit<T: Number>(entry: &Object<Value>, si: &str) -> Result<T, String> {
     entry.check_names(&["value", "unit", "meaning"])?;
     let (value, unit) = (entry.member("value")?, entry.member("unit")?);
@@ -72,15 +72,15 @@ fn in_unit<T: Number>(entry: &Object<Value>, si: &str) -> Result<T, String> {
     }
 }
 
-/// A type of parameters.
+/// A type that parameters have: [`Real`] or [`Integer`].
 trait Number: Sized {
-    /// The values that are read, for messages.
+    /// Name of the values that are accepted, for error messages.
     const KIND: &str;
 
     /// Returns the number if it has this type.
     fn from_json(value: &Value) -> Option<Self>;
 
-    /// Multiplies by a factor between units.
+    /// Multiplies the number by the factor of a unit conversion. Fails if the product is too large.
     fn times(self, factor: f64) -> Result<Self, String>;
 }
 
@@ -110,7 +110,7 @@ impl Number for Integer {
     }
 }
 
-/// The members of a JSON object in their order. A map would lose the second of two members with one name.
+/// The members of a JSON object in their order. It is not a map, so that two members with the same name are detected.
 struct Object<T>(Vec<(String, T)>);
 
 impl<T> Object<T> {
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn units_per_radian_and_entries_without_meaning_are_taken() {
+    fn units_per_radian_and_entries_without_meaning_are_accepted() {
         let json = with_line("k1", r#""k1": {"value": 120, "unit": "N.m/rad"},"#);
         assert_eq!(parse(&json).unwrap().k1, 120.0);
         let json = with_line("c3", r#""c3": {"unit": "N.m.s/rad", "value": -0.0},"#);

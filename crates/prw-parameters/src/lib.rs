@@ -1,8 +1,8 @@
 //! The parameters of the testbed (Table 1 of the paper), in SI units.
 //!
-//! They are in a separate package because three programs need them: the model, the build script that compiles the values into
-//! its library, and `build_fmu`, which writes them into the model description. The file with the values is read only while an FMU
-//! is built, by the module `file`.
+//! They are in a separate package because three programs need them: the model, its build script, which compiles the values
+//! into the library, and `build_fmu`, which writes them into the model description. The file with the values is read only
+//! while an FMU is built, by the module `file`.
 
 use std::fmt;
 
@@ -54,11 +54,11 @@ macro_rules! parameters {
                 vec![$((stringify!($name).to_owned(), self.$name.to_string())),+]
             }
 
-            /// All parameters 0: a direction in which no parameter changes.
+            /// All parameters 0. Used for the direction of a derivative, in which some parameters are then set.
             pub const ZERO: Self = Self { $($name: 0 as $kind,)+ };
 
-            /// Returns other parameters, for tests: every measured value times exp of the next exponent, in the order of
-            /// Table 1. The value 0 would stay 0, so the largest value with its unit takes its place.
+            /// Returns other parameters, for tests. In the order of Table 1, every measured value is multiplied by exp of the
+            /// next exponent. A value of 0 would stay 0, so the largest value with its unit is used instead.
             #[must_use]
             pub fn varied(&self, mut exponent: impl FnMut() -> f64) -> Self {
                 let values = [$(($unit, f64::from(self.$name))),+];
@@ -82,7 +82,7 @@ macro_rules! parameters {
 }
 table!(parameters);
 
-/// Varies a parameter of each type; see [`Parameters::varied`].
+/// Varies a Real parameter, and leaves an Integer unchanged; see [`Parameters::varied`].
 trait Varied {
     fn varied(self, instead_of_0: f64, exponent: &mut impl FnMut() -> f64) -> Self;
 }

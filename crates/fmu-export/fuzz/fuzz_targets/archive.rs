@@ -1,4 +1,4 @@
-//! libFuzzer looks for archives that harm the reader, or write a file outside of its directory.
+//! libFuzzer searches for zip files with which opening an FMU or a system panics, or writes outside of its directory.
 #![no_main]
 
 #[path = "../../../fmu-run/tests/readers/harness.rs"]

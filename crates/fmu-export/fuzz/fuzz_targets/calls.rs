@@ -1,5 +1,5 @@
-//! libFuzzer looks for bytes that, read as calls of the FMU's functions, violate a guarantee of `fmu_test_kit::fault_injection` or, under
-//! the AddressSanitizer, the memory.
+//! libFuzzer searches for calls of an FMU's functions, decoded from bytes, that violate a guarantee that
+//! `fmu_test_kit::fault_injection` checks. The AddressSanitizer also detects invalid accesses to memory.
 #![no_main]
 
 #[path = "../../tests/models/mod.rs"]
@@ -11,9 +11,10 @@ use libfuzzer_sys::fuzz_target;
 use std::sync::atomic::{AtomicU64, Ordering};
 use models::*;
 
-/// The test models in FMI 2.0, then in FMI 3.0. What is new goes to the end: the committed bytes count on the places.
+/// The test models in FMI 2.0 and FMI 3.0. Add new models at the end, because the last byte of each input in
+/// `corpus.zip` selects a model by its index.
 ///
-/// Any exported model can stand here: `run::<Importer, prw_testbed::TestbedFmu>` with that crate among the dependencies.
+/// Any exported model can be added, for example `run::<Importer, prw_testbed::TestbedFmu>` with that crate as a dependency.
 const MODELS: [RunBytes; 16] = [
     run::<Importer, Oscillator>,
     run::<Importer, Ball>,

@@ -1,4 +1,4 @@
-//! libFuzzer looks for model descriptions that harm the reader.
+//! libFuzzer searches for model descriptions with which the parser of fmu-run panics.
 #![no_main]
 
 #[path = "../../../fmu-run/tests/readers/harness.rs"]

@@ -1,4 +1,5 @@
-//! libFuzzer looks for systems and parameters that harm the reader. The last byte selects the file that is written.
+//! libFuzzer searches for systems and parameter files with which opening a system panics. The last byte of the input selects
+//! which of the two files the other bytes replace.
 #![no_main]
 
 #[path = "../../../fmu-run/tests/readers/corpus.rs"]
@@ -12,7 +13,7 @@ use libfuzzer_sys::fuzz_target;
 use std::sync::LazyLock;
 use tempfile::TempDir;
 
-/// Directory of a system. Its FMU has no library, so opening it can only fail in a reader.
+/// Directory of a system. Its FMU contains only a description, so that no library is loaded.
 static DIRECTORY: LazyLock<TempDir> = LazyLock::new(|| {
     let directory = TempDir::new().expect("a directory");
     std::fs::create_dir(directory.path().join("m")).expect("a directory");
@@ -22,7 +23,7 @@ static DIRECTORY: LazyLock<TempDir> = LazyLock::new(|| {
     directory
 });
 
-/// Writes the files of a system that is read.
+/// Writes valid files of a system.
 fn reset(directory: &std::path::Path) {
     let system = corpus::systems().into_iter().find(|(name, _)| *name == "parameters").expect("a system").1;
     std::fs::write(directory.join("SystemStructure.ssd"), system).expect("a file");

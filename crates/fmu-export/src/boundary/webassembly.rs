@@ -16,7 +16,7 @@ use std::cell::{Cell, RefCell};
 use std::panic::PanicHookInfo;
 
 thread_local! {
-    static ROOM: RefCell<Vec<u64>> = const { RefCell::new(Vec::new()) };
+    static ARGUMENT_BUFFER: RefCell<Vec<u64>> = const { RefCell::new(Vec::new()) };
     static PANIC: Cell<Option<String>> = const { Cell::new(None) };
 }
 
@@ -54,14 +54,14 @@ pub(super) fn has_memory<const N: usize>(sizes: [usize; N]) -> bool {
 
 /// Allocates `size` bytes for the arguments of a call, in place of the previous ones. Returns NULL if there
 /// is not enough memory.
-pub fn room(size: usize) -> *mut c_void {
-    ROOM.with_borrow_mut(|room| {
-        *room = Vec::new();
+pub fn argument_buffer(size: usize) -> *mut c_void {
+    ARGUMENT_BUFFER.with_borrow_mut(|buffer| {
+        *buffer = Vec::new();
         if !has_memory([size]) {
             return std::ptr::null_mut();
         }
-        room.reserve_exact(size.div_ceil(size_of::<u64>()));
-        room.as_mut_ptr().cast()
+        buffer.reserve_exact(size.div_ceil(size_of::<u64>()));
+        buffer.as_mut_ptr().cast()
     })
 }
 

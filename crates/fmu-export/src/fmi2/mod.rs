@@ -29,7 +29,7 @@ pub use fmi_abi::fmi2::{ALLOWED, Function, Functions, types};
 pub use instances::{fmi2FreeInstance, fmi2GetTypesPlatform, fmi2GetVersion, fmi2Instantiate};
 
 #[cfg(target_family = "wasm")]
-pub use crate::boundary::webassembly::{add_file, broken, room};
+pub use crate::boundary::webassembly::{add_file, argument_buffer, broken};
 
 use types::*;
 

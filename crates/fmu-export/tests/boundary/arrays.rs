@@ -1,4 +1,5 @@
-//! Arrays: one variable in FMI 3.0, a scalar for each element in FMI 2.0; and values of every type of FMI 3.0.
+//! Arrays, which are one variable in FMI 3.0 and one scalar variable per element in FMI 2.0; and values of all types of
+//! FMI 3.0.
 
 use crate::models::rod::{Name, PIECES};
 use crate::models::{Palette, Rod, Talker, palette, talker};
@@ -41,7 +42,7 @@ fn names_and_indices() {
     assert_eq!(Rod::STATES.len(), PIECES);
 }
 
-/// Checks several arrays at once, with scalars, in any order and repeated.
+/// Checks calls for several arrays and scalars, in any order and with repeated variables.
 #[test]
 fn whole_arrays_are_read_and_set() {
     let fmu = Importer::in_mode::<Rod>(Interface::CoSimulation, Mode::StepComplete);
@@ -72,7 +73,7 @@ fn whole_arrays_are_read_and_set() {
     fmu.ok(fmu.fmi3SetString(&vr(Name::labels), 1, texts.as_ptr(), 2));
     let mut read: [*const c_char; 2] = [null(); 2];
     fmu.ok(fmu.fmi3GetString(&vr(Name::reports), 1, read.as_mut_ptr(), 2));
-    // SAFETY: strings of the FMU, valid until the next call.
+    // SAFETY: the FMU's strings are valid until the next call.
     let read = read.map(|text| unsafe { CStr::from_ptr(text) });
     assert_eq!(read, [c"one is warm", c"two is warm"]);
 }
@@ -89,7 +90,7 @@ fn states_and_their_derivatives_are_in_the_same_order() {
     assert_eq!(other.derivatives::<PIECES>(), fmu.derivatives());
 }
 
-/// Checks seeds and sensitivities of whole arrays.
+/// Checks derivatives of whole arrays with respect to whole arrays, and time derivatives of whole arrays.
 #[test]
 fn partial_derivatives_of_arrays() {
     let fmu = Importer::in_mode::<Rod>(Interface::ModelExchange, Mode::ContinuousTime);
@@ -144,7 +145,8 @@ fn rejections_name_the_element() {
     });
 }
 
-/// Checks each getter and setter with the limits of its type. The tests of `Rod` check arrays of most types.
+/// Checks each getter and setter with the largest and the smallest number of its type. The tests with `Rod` check
+/// arrays of most types.
 #[test]
 fn numbers_of_every_type() {
     let palette = Importer::initialized_at::<Palette>(0.0);
@@ -212,14 +214,14 @@ impl CoSimulation for Rack {
 offer!(Rack: CoSimulation);
 
 #[test]
-fn bytes_of_two() {
+fn arrays_of_binary_values() {
     let fmu = Importer::in_mode::<Rack>(Interface::CoSimulation, Mode::StepComplete);
     let vr = reference(Rack::index(Shelf::bytes) as u32);
     let (sizes, values) = ([3, 1], [c"abc", c"d"].map(|text| text.as_ptr().cast()));
     fmu.ok(fmu.fmi3SetBinary(&vr, 1, sizes.as_ptr(), values.as_ptr(), 2));
     let (mut sizes, mut read) = ([0; 2], [null::<u8>(); 2]);
     fmu.ok(fmu.fmi3GetBinary(&vr, 1, sizes.as_mut_ptr(), read.as_mut_ptr(), 2));
-    // SAFETY: bytes of the FMU with these lengths, valid until the next call.
+    // SAFETY: the FMU's bytes have these lengths and are valid until the next call.
     let read = [0, 1].map(|k| unsafe { std::slice::from_raw_parts(read[k], sizes[k]) });
     assert_eq!(read, [&b"abc"[..], b"d"]);
     fmu.rejected_with(&["bytes[2]", "NULL"], |fmu| {
@@ -228,12 +230,12 @@ fn bytes_of_two() {
 }
 
 #[test]
-fn bytes() {
+fn binary_values() {
     let (fmu, vr) = (Importer::initialized_at::<Palette>(0.0), reference(palette::Name::binary as u32));
     let read = || {
         let (mut size, mut value) = (usize::MAX, null());
         fmu.ok(fmu.fmi3GetBinary(&vr, 1, &mut size, &mut value, 1));
-        // SAFETY: bytes of the FMU, valid until the next call.
+        // SAFETY: the FMU's bytes have this length and are valid until the next call.
         unsafe { std::slice::from_raw_parts(value, size) }.to_vec()
     };
     assert!(read().is_empty());
@@ -262,7 +264,7 @@ fn ranges() {
     let mut item = 0;
     fmu.ok(fmu.fmi3GetInt64(&colour, 1, &mut item, 1));
     assert_eq!(item, i64::from(palette::Colour::Red.number()));
-    // An item is a 32-bit integer.
+    // The number of an item has 32 bits, so its upper bits must not be ignored.
     let (fmu, mood) =
         (Importer::new::<Talker>(Interface::CoSimulation), reference(talker::Name::mood as u32));
     fmu.rejected("beyond Int32", |fmu| fmu.fmi3SetInt64(&mood, 1, &(7 + (1 << 32)), 1));

@@ -1,4 +1,4 @@
-//! Tests of `Model::calculate`: it runs again after every change, before a value is read and before an event.
+//! Tests of `Model::calculate`: after any change, it runs again before a value is read and before an event.
 
 use crate::models::{Lazy, lazy::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
@@ -10,7 +10,7 @@ const REAL: u32 = Name::real as u32;
 const BOOLEAN: u32 = Name::boolean as u32;
 const STATE: u32 = Name::state as u32;
 
-/// Returns the sum after checking that it equals the sum of the other values read.
+/// Returns the calculated sum. Asserts that it equals the sum of the values that are read without `calculate`.
 #[track_caller]
 fn sum(fmu: &Importer) -> f64 {
     let [sum, summands, time] = fmu.get([SUM, Name::summands as u32, Name::time as u32]);
@@ -18,7 +18,7 @@ fn sum(fmu: &Importer) -> f64 {
     sum
 }
 
-/// Checks that a call changes the sum, which was calculated before the call.
+/// Checks that a call changes the sum although it was already calculated before the call.
 #[track_caller]
 fn changes(fmu: &Importer, call: impl FnOnce(&Importer)) {
     let before = sum(fmu);
@@ -34,7 +34,7 @@ fn after_every_change_in_co_simulation() {
     changes(&fmu, |fmu| fmu.ok(fmu.fmi2SetInteger(&(Name::integer as u32), 1, &8)));
     changes(&fmu, |fmu| fmu.ok(fmu.fmi2SetString(&(Name::string as u32), 1, &c"longer".as_ptr())));
     changes(&fmu, |fmu| fmu.set(&[Name::weight as u32], &[9.0]));
-    changes(&fmu, |fmu| fmu.give_rates(&[REAL], &[0.5]));
+    changes(&fmu, |fmu| fmu.set_input_derivatives(&[REAL], &[0.5]));
     changes(&fmu, |fmu| fmu.step(0.0, 1.0));
     changes(&fmu, |fmu| fmu.ok(fmu.fmi2SetBoolean(&BOOLEAN, 1, &1)));
     changes(&fmu, |fmu| assert_eq!(fmu.try_step(1.0, 1.0), Status::Discard));
@@ -63,7 +63,8 @@ fn after_every_change_in_model_exchange() {
     changes(&fmu, |fmu| fmu.ok(fmu.fmi2CompletedIntegratorStep(1, &mut 0, &mut 0)));
 }
 
-/// Checks all functions that read calculated values, and an event or a completed step after a change.
+/// Checks that values are calculated again, after a change, by all functions that read them, and before an event and a
+/// completed step, which use them.
 #[test]
 fn before_everything_that_needs_it() {
     let fmu = Importer::new::<Lazy>(ModelExchange);
@@ -102,8 +103,8 @@ fn before_everything_that_needs_it() {
     assert_eq!(fmu.rates([SUM]), [sum(&fmu)]);
 }
 
-/// Checks a state that was saved between a change and the calculation: in a new state, in a reused one, and
-/// serialized.
+/// Checks states that were saved after a change but before the calculation: a new one, one saved over an earlier state,
+/// and a serialized one.
 #[test]
 fn after_a_state_is_restored() {
     let fmu = Importer::new::<Lazy>(CoSimulation);

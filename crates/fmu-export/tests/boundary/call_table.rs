@@ -1,5 +1,5 @@
-//! Allowed calls: every function in every state of the state machines, compared with the standards. The
-//! tables are copied here independently from the text of FMI 2.0.5, and of FMI 3.0.2, sections 2.3, 3.2 and 4.2.
+//! Allowed calls: every function in every state of the state machines, compared with the standards. The tables here were
+//! copied from the text of FMI 2.0.5 and from sections 2.3, 3.2 and 4.2 of FMI 3.0.2, independently of the tested code.
 
 use crate::models::*;
 use crate::valid_calls::ValidCall;
@@ -89,8 +89,8 @@ const CO_SIMULATION: &str = "
     fmi2GetBooleanStatus         |  |  |  |x |x |x |  |x |  |
     fmi2GetStringStatus          |  |  |  |x |x |x |  |x |  |";
 
-/// Calls of FMI 2.0 beyond the standard that real importers need: FMI Library terminates after an error,
-/// OpenModelica sets time and states in Event Mode. Other tests cover tolerances for single variables.
+/// Calls of FMI 2.0 that the standard forbids but real importers make: FMI Library terminates after an error, and
+/// OpenModelica sets time and states in Event Mode. Other tests cover calls that are tolerated for single variables.
 const TOLERATED: [(&str, Interface, Mode); 8] = [
     ("fmi2Terminate", CoSimulation, Error),
     ("fmi2Terminate", ModelExchange, Error),
@@ -131,12 +131,12 @@ fn standard_of_fmi2(function: &str, interface: Interface, mode: Mode) -> bool {
     }
 }
 
-/// Functions of the super state FMU State Settable, section 2.3.1 of FMI 3.0.
+/// Functions that are allowed in all states below: those of the super state FMU State Settable, section 2.3.1 of FMI 3.0.
 const EVERYWHERE: &str = "SetDebugLogging Reset GetFMUState SetFMUState FreeFMUState SerializedFMUStateSize \
     SerializeFMUState DeserializeFMUState";
 
-/// Functions of its states: common ones, further ones of Model Exchange, further ones of Co-Simulation.
-/// `Set*` and `Get*` represent the functions of all types.
+/// Functions that are allowed in each state: in both interface types, only in Model Exchange, only in Co-Simulation.
+/// `Set*` and `Get*` are the setters and getters of all types.
 const STATES: [(Mode, &str, &str, &str); 6] = [
     (
         Instantiated,
@@ -188,7 +188,7 @@ const STATES: [(Mode, &str, &str, &str); 6] = [
     ),
 ];
 
-/// Calls beyond the standard, in interface types that have the function.
+/// Calls of FMI 3.0 that the standard forbids but the FMU accepts, in interface types that have the function.
 const TOLERATED_IN_FMI3: [(&str, &[Mode]); 7] = [
     ("EnterEventMode", &[Event]),
     ("ExitConfigurationMode", &[Instantiated]),
@@ -218,7 +218,7 @@ fn standard_of_fmi3(function: &str, interface: Interface, mode: Mode) -> bool {
     [EVERYWHERE, both, more].into_iter().flat_map(str::split_whitespace).any(fits)
 }
 
-/// Returns whether the standard allows the call in one of our modes.
+/// Returns whether the standard of the function allows the call in this mode.
 fn standard(function: &str, interface: Interface, mode: Mode) -> bool {
     match function.starts_with("fmi2") {
         true => standard_of_fmi2(function, interface, mode),
@@ -226,7 +226,7 @@ fn standard(function: &str, interface: Interface, mode: Mode) -> bool {
     }
 }
 
-/// Returns whether a function sets variables of types that are never continuous.
+/// Returns whether a function, named without its prefix, sets variables of a type that is never continuous.
 fn sets_discrete(name: &str) -> bool {
     let of = name.strip_prefix("Set").filter(|of| *of == "Integer" || TYPES.contains(of));
     of.is_some_and(|of| !of.starts_with("Float"))
@@ -245,7 +245,8 @@ pub fn accepted(function: &str, interface: Interface, mode: Mode) -> bool {
     standard(function, interface, mode) || tolerated(function, interface, mode)
 }
 
-/// Returns a part of the message of a function that needs a capability that the model lacks.
+/// Returns a part of the message with which an allowed call is rejected because the model lacks a capability; `None` if
+/// the model lacks none.
 pub fn lacking<M: Exported>(function: &str, interface: Interface, mode: Mode) -> Option<&'static str> {
     let has_event_mode = M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode());
     match &function[4..] {
@@ -286,7 +287,7 @@ fn check_every_function<F: Either, M: Exported>() {
     for (interface, mode) in modes_of_model::<F, M>() {
         for function in F::functions() {
             if mode == ContinuousTime && sets_discrete(&function[4..]) {
-                // Depends on the values, see `tolerances`.
+                // Accepted only if the value does not change, see `tolerances`.
                 continue;
             }
             let label = format!("{function} in state '{mode}' of {interface}, {}", M::INFO.name);
@@ -329,7 +330,7 @@ fn every_function_in_every_state() {
     check_every_function::<fmi3::Importer, Talker>();
 }
 
-/// Makes random calls: the rules always hold, and no call is ever fatal.
+/// Makes random calls. Each must be accepted or rejected according to the tables, and none may be fatal.
 #[test]
 fn random_walks() {
     walk::<Importer, Oscillator>(CoSimulation);
@@ -346,7 +347,7 @@ fn walk<F: Either, M: Exported>(interface: Interface) {
     let mut visits = std::collections::BTreeMap::new();
     for _ in 0..20_000 {
         let function = F::functions()[random.bits() as usize % F::functions().len()];
-        // Resets are rare, because most other calls need an initialized instance.
+        // Fewer calls end the simulation, because most other calls need an initialized instance.
         if matches!(&function[4..], "Reset" | "Terminate") && random.bits() % 8 > 0 {
             continue;
         }
@@ -366,8 +367,8 @@ fn walk<F: Either, M: Exported>(interface: Interface) {
     assert!(visits.len() == modes && visits.values().all(|calls| *calls > 100), "{visits:?}");
 }
 
-/// Checks that the table in the code agrees, also about states that cannot be reached here, and that it
-/// distinguishes the standard from tolerated calls.
+/// Checks that the table in fmu-export agrees with the tables here. Unlike the calls, this covers all states, and checks
+/// which calls the table marks as tolerated.
 #[test]
 fn table_in_the_code() {
     fn check<F: Either>() {
@@ -407,14 +408,14 @@ fn table_in_the_code() {
     check::<fmi3::Importer>();
 }
 
-/// Functions that reject a NULL or misaligned pointer, but need none here.
+/// Pointers that may be NULL: the functions never write through them, or have nothing to free.
 fn needs_no_pointer(function: &str, name: &str) -> bool {
     matches!(function, "fmi2GetStatus" | "fmi2GetIntegerStatus" | "fmi2GetStringStatus")
         || function.contains("FreeFMU") && name == "state"
 }
 
-/// Checks every pointer of every function: NULL, misaligned, and of an array larger than memory. The call is
-/// rejected with the reason, and changes nothing.
+/// Checks every pointer of every function with NULL, with a misaligned address, and with a length that is larger than
+/// memory. The call must be rejected with the reason and must not change anything.
 fn pointers<F: Either, M: Exported>() {
     let mut checked = 0;
     for (interface, mode) in modes_of_model::<F, M>() {

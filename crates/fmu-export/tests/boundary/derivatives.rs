@@ -1,5 +1,5 @@
-//! Derivatives with respect to variables (section 2.1.9 of FMI 2.0) and to time (4.2.1), in both FMI
-//! versions. [`Either::try_directional`] compares adjoint with directional derivatives.
+//! Derivatives with respect to variables (section 2.1.9 of FMI 2.0) and with respect to time (section 4.2.1), in both
+//! FMI versions. [`Either::try_directional`] also compares the adjoint with the directional derivatives.
 
 use crate::models::{Fuse, Meter, Oscillator, meter, oscillator::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
@@ -20,7 +20,8 @@ const UNKNOWNS: [u32; 5] = [
 const KNOWNS: [u32; 3] = [Name::force as u32, Name::position as u32, Name::velocity as u32];
 const PARAMETERS: [u32; 3] = [Name::mass as u32, Name::stiffness as u32, Name::damping as u32];
 
-/// Returns the central differences of all unknowns, which are quadratic functions of the knowns.
+/// Returns central differences of all unknowns with respect to `known`. They have no truncation error, because the
+/// unknowns are quadratic functions of the knowns.
 fn differences(fmu: &impl Either, known: u32) -> [f64; 5] {
     let [start] = fmu.get([known]);
     let width = 1e-5 * start.abs().max(1.0);
@@ -32,8 +33,8 @@ fn differences(fmu: &impl Either, known: u32) -> [f64; 5] {
     std::array::from_fn(|i| (above[i] - below[i]) / (2.0 * width))
 }
 
-/// Checks single pairs, and several unknowns and knowns in any order and repeated, in every mode that has
-/// directional derivatives. Parameters are knowns in Initialization Mode.
+/// Checks directional derivatives in every mode that has them: of single pairs, and of several unknowns and knowns in any
+/// order and with repetitions. In Initialization Mode, parameters are knowns, too.
 fn fit_differences<F: Either>() {
     for (interface, mode) in [
         (CoSimulation, Initialization),
@@ -72,8 +73,8 @@ fn fit_differences<F: Either>() {
     }
 }
 
-/// Checks that a calculated state is an unknown in Initialization Mode, where the chain rule applies to
-/// variables that depend on it. Later it is a known.
+/// Checks that a calculated state is an unknown in Initialization Mode, so that variables that depend on it are
+/// differentiated with the chain rule. After the initialization, it is a known.
 fn calculated_states<F: Either>() {
     use meter::Name::{der_level, level, plain, stiffness};
     for interface in [CoSimulation, ModelExchange] {
@@ -91,8 +92,8 @@ fn calculated_states<F: Either>() {
     }
 }
 
-/// Checks derivatives with respect to time: of every Real variable, in agreement with steps, and of no other
-/// order than 1, which is the highest of the models.
+/// Checks that the time derivatives of all Real variables agree with steps. Orders other than 1 are rejected, because 1 is
+/// the highest order of the test models.
 fn output_derivatives<F: Either>() {
     let fmu = F::in_mode::<Oscillator>(CoSimulation, Instantiated);
     fmu.set(&KNOWNS[1..], &[0.25, -3.0]);
@@ -100,11 +101,11 @@ fn output_derivatives<F: Either>() {
     let mut time = 0.0;
     for size in [0.02, 0.005, 0.03] {
         fmu.set(&KNOWNS[..1], &[0.5 - time]);
-        fmu.give_rates(&KNOWNS[..1], &[-2.0]);
+        fmu.set_input_derivatives(&KNOWNS[..1], &[-2.0]);
         let slope = fmu.rate(KNOWNS[0]);
         output_derivatives_fit_steps::<Oscillator>(&fmu, time, "a step", |h| {
             fmu.set(&KNOWNS[..1], &[0.5 - time + slope * h]);
-            fmu.give_rates(&KNOWNS[..1], &[-2.0]);
+            fmu.set_input_derivatives(&KNOWNS[..1], &[-2.0]);
         });
         fmu.step(time, size);
         time += size;
@@ -128,8 +129,8 @@ fn in_both_versions() {
     check::<fmi3::Importer>();
 }
 
-/// Checks the derivative of time, which is a variable in FMI 3.0, and partial derivatives with respect to a
-/// parameter, which may be set at any time.
+/// Checks what differs in FMI 3.0: time is a variable and has a derivative, and parameters are knowns in every mode,
+/// because the FMU accepts new values for them at any time.
 #[test]
 fn only_in_fmi3() {
     let fmu = fmi3::Importer::new::<Oscillator>(CoSimulation);

@@ -14,7 +14,8 @@ const LAST: u32 = ticker::Name::last as u32;
 const TROUBLE: u32 = grumbler::Name::trouble as u32;
 const TEMPERATURE: u32 = fuse::Name::temperature as u32;
 
-/// Combinations of eventModeUsed and earlyReturnAllowed with which the FMU handles events within a step.
+/// Combinations of eventModeUsed and earlyReturnAllowed for which the FMU must handle events within a step, because the
+/// importer cannot handle them at their time.
 const UNAWARE: [(fmi3Boolean, fmi3Boolean); 3] =
     [(fmi3False, fmi3False), (fmi3False, fmi3True), (fmi3True, fmi3False)];
 
@@ -37,7 +38,8 @@ fn of_fmi2<M: Exported>(prepare: impl FnOnce(&Importer)) -> Importer {
     fmu
 }
 
-const AT_ONCE: Stepped = Stepped {
+/// Results of a step that ends immediately; the tests change some fields.
+const IMMEDIATE: Stepped = Stepped {
     event_handling_needed: false,
     terminate: false,
     early_return: false,
@@ -66,7 +68,7 @@ fn progress(fmu: &Importer) -> (f64, bool) {
     (time, terminated == 1)
 }
 
-/// Checks that a step of FMI 2.0 is discarded; returns the messages.
+/// Checks that a step of FMI 2.0 is discarded; returns the messages, joined to one string.
 fn discarded(fmu: &Importer, point: f64, step_size: f64) -> String {
     fmu.ok(fmu.set_debug_logging(true, &[c"logStatusDiscard"]));
     assert_eq!(fmu.try_step(point, step_size), Status::Discard);
@@ -75,7 +77,7 @@ fn discarded(fmu: &Importer, point: f64, step_size: f64) -> String {
     log.into_iter().map(|message| message.message).collect::<Vec<_>>().join("; ")
 }
 
-/// Checks a state event, its effects, and the information about completed steps.
+/// Checks a state event, its effects, and the results of completed integrator steps.
 fn bounces<F: Either>() {
     let fmu: F = F::in_mode::<Ball>(ModelExchange, Mode::Instantiated);
     fmu.set(&[0, 1], &[0.0, -2.0]);
@@ -95,7 +97,7 @@ fn bounces<F: Either>() {
         (nominals[0] - 1.4_f64.powi(2) / (2.0 * 9.81)).abs() < 1e-12 && nominals[1] > 0.0,
         "{nominals:?}"
     );
-    // The model detects a missed event, and a lost ball.
+    // If the ball is below the ground and falls, an event was missed. Far below, the model ends the simulation.
     for (x, expected) in [
         ([1.0, -1.0], [false, false]),
         ([-0.5, -1.0], [true, false]),
@@ -109,7 +111,7 @@ fn bounces<F: Either>() {
     assert!(fmu.update().states_changed);
     assert_eq!(fmu.integer(ball::Name::bounces as u32), 2);
     fmu.ok(fmu.terminate());
-    // Events of the importer, in any number, change nothing. The oscillator is not informed about steps.
+    // An importer may enter Event Mode at any time. The oscillator has no events, so nothing changes.
     let fmu: F = F::in_mode::<Oscillator>(ModelExchange, Mode::ContinuousTime);
     assert_eq!(fmu.completed_step(), [false; 2]);
     for _ in 0..3 {
@@ -127,8 +129,8 @@ fn prepare_counter(fmu: &impl Either) {
     fmu.set(&[period as u32, weight as u32], &[0.25, 0.5]);
 }
 
-/// Checks time events, and that an event that causes another at the same time needs one more iteration. The
-/// full count is visible in between.
+/// Checks time events. An event that causes another one at the same time needs one more iteration, and between the two
+/// the count can be read before it is carried.
 fn event_iteration<F: Either>() {
     let fmu: F = F::in_mode::<Counter>(ModelExchange, Mode::Instantiated);
     prepare_counter(&fmu);
@@ -138,14 +140,14 @@ fn event_iteration<F: Either>() {
         (again, next.unwrap(), fmu.integer(counter::Name::count as u32))
     };
     assert_eq!(round(), (false, 0.25, 0), "nothing is due at the start");
-    // After two periods, both counts are due, and the second one fills the count.
+    // After two periods, two ticks are due. The second makes the count exceed its limit of 10, so that it is carried.
     fmu.ok(fmu.enter_continuous_time_mode());
     fmu.ok(fmu.set_time(0.5));
     fmu.ok(fmu.enter_event_mode());
     assert_eq!(round(), (true, 0.5, 7));
     assert_eq!(round(), (true, 0.75, 14));
     assert_eq!(round(), (false, 0.75, 4));
-    assert_eq!(round(), (false, 0.75, 4), "an importer may ask once more");
+    assert_eq!(round(), (false, 0.75, 4), "one more iteration is allowed");
     // A failed event is undone, and so is a failed step.
     fmu.set(&[counter::Name::weight as u32], &[f64::MAX]);
     fmu.ok(fmu.enter_continuous_time_mode());
@@ -167,8 +169,8 @@ fn in_model_exchange() {
     event_iteration::<fmi3::Importer>();
 }
 
-/// Section 2.4.8 of FMI 3.0: a variable represents the event indicator. Section 2.3.5: states without reinit
-/// may be set in Event Mode.
+/// Checks that an event indicator is a variable (section 2.4.8 of FMI 3.0), and that states may be set in Event Mode even
+/// if the model never changes them at events (section 2.3.5).
 #[test]
 fn indicators_and_states_of_fmi3() {
     let fmu = fmi3::Importer::in_mode::<Ball>(ModelExchange, Mode::ContinuousTime);
@@ -186,23 +188,24 @@ fn indicators_and_states_of_fmi3() {
     assert_eq!(fmu.get([1]), [0.5]);
 }
 
+/// Checks an importer that handles events itself, in Event Mode.
 #[test]
-fn the_importer_handles_them() {
+fn the_importer_handles_events() {
     let fmu = of_fmi3::<Ticker>(fmi3True, fmi3True, |_| ());
     fmu.rejected("no step in event mode", |fmu| fmu.try_step(0.0, 1.0));
     assert_eq!(fmu.update(), Updated { next: Some(0.25), ..Updated::default() });
     fmu.ok(fmu.fmi3EnterStepMode());
     let at = |last_successful_time, early_return| {
-        Ok(Stepped { event_handling_needed: true, early_return, last_successful_time, ..AT_ONCE })
+        Ok(Stepped { event_handling_needed: true, early_return, last_successful_time, ..IMMEDIATE })
     };
     assert_eq!(fmu.do_step(0.0, 1.0), at(0.25, true));
-    assert_eq!(fmu.get([SUM]), [1.0], "nothing has happened yet");
+    assert_eq!(fmu.get([SUM]), [1.0], "the event is not handled yet");
     fmu.ok(fmu.fmi3EnterEventMode());
     fmu.set(&[ticker::Name::amount as u32], &[10.0]);
     assert_eq!(fmu.update().next, Some(0.5));
     assert_eq!(fmu.get([SUM]), [11.0]);
     fmu.ok(fmu.fmi3EnterStepMode());
-    // An event at the end of a step is not early.
+    // If the event is at the end of the step, the step does not return early.
     assert_eq!(fmu.do_step(0.25, 0.25), at(0.5, false));
     // A model without events has no Event Mode.
     let arguments = Arguments { event_mode_used: fmi3True, ..Arguments::new::<Fuse>(CoSimulation) };
@@ -210,9 +213,9 @@ fn the_importer_handles_them() {
     assert!(log[0].message.contains("hasEventMode is false"), "{log:?}");
 }
 
-/// If the importer does not handle events, the library handles them within the step.
+/// Checks that the library handles events within the step if the importer does not handle them.
 #[test]
-fn the_library_handles_them() {
+fn the_library_handles_events() {
     fn check(fmu: &impl Either) {
         assert_eq!(fmu.get([SUM]), [1.0], "the tick at the start");
         fmu.step(0.0, 0.6);
@@ -239,7 +242,7 @@ fn an_event_ends_the_simulation() {
     let fmu = of_fmi3::<Ticker>(fmi3False, fmi3False, |fmu| fmu.ok(fmu.set_integer(LAST, 3)));
     let stepped = fmu.do_step(0.0, 1.0).unwrap();
     assert_eq!((stepped.terminate, stepped.last_successful_time), (true, 0.5));
-    // A repeated step gives the same result if the importer ignored it.
+    // If the importer ignores the request to terminate, the next step returns the same result.
     assert_eq!(fmu.do_step(0.5, 1.0), Ok(stepped));
     fmu.ok(fmu.fmi3Terminate());
 }
@@ -248,8 +251,9 @@ fn trouble(fmu: &impl Either, trouble: Trouble) {
     fmu.ok(fmu.set_item(TROUBLE, trouble as i32));
 }
 
-/// Section 4.2.3: the first step informs an importer of FMI 2.0. The step also informs an importer of FMI 3.0
-/// without Event Mode, and one that ignores the result of fmi3UpdateDiscreteStates (FMPy).
+/// Checks that the first step reports an end of the simulation that an event at the start has requested: in FMI 2.0
+/// (section 4.2.3), and in FMI 3.0 if the importer has no Event Mode or ignores the result of fmi3UpdateDiscreteStates,
+/// as FMPy does.
 #[test]
 fn the_initial_event_ends_the_simulation() {
     let fmu = of_fmi2::<Grumbler>(|fmu| trouble(fmu, Trouble::End));
@@ -264,14 +268,14 @@ fn the_initial_event_ends_the_simulation() {
             fmu.ok(fmu.fmi3EnterStepMode());
         }
         let before = fmu.bytes();
-        assert_eq!(fmu.do_step(0.0, 1.0), Ok(Stepped { terminate: true, early_return, ..AT_ONCE }));
+        assert_eq!(fmu.do_step(0.0, 1.0), Ok(Stepped { terminate: true, early_return, ..IMMEDIATE }));
         assert_eq!(fmu.bytes(), before);
         fmu.rejected("a wrong point", |fmu| fmu.try_step(1.0, 1.0));
         fmu.ok(fmu.fmi3Terminate());
     }
 }
 
-/// Section 4.2.1 of FMI 3.0: no earlyReturn for errors, and a discarded step changes nothing.
+/// Checks that a step that fails returns an error, not an early return, and changes nothing (section 4.2.1 of FMI 3.0).
 #[test]
 fn a_step_that_fails_half_way() {
     for (event_mode_used, early_return_allowed) in UNAWARE {
@@ -290,7 +294,7 @@ fn a_step_that_fails_half_way() {
     }
 }
 
-/// Checks that in FMI 2.0 the first iteration of a failed event is undone, and with it the whole step.
+/// Checks in FMI 2.0 that an event that fails in its second iteration undoes the first one and the whole step.
 #[test]
 fn an_event_that_fails_in_its_second_round() {
     let fmu = Importer::new::<Grumbler>(CoSimulation);
@@ -311,7 +315,7 @@ fn an_event_that_fails_in_its_second_round() {
     fmu.step(0.0, 0.5);
 }
 
-/// Checks that a shorter step succeeds.
+/// Checks that a step with more than 10,000 events is discarded, and that a shorter step then succeeds.
 #[test]
 fn more_events_than_a_step_may_have() {
     const EXPECTED: &str = "it has more than 10000 events; make shorter steps, or give the events hysteresis if the model chatters";
@@ -330,7 +334,7 @@ fn more_events_than_a_step_may_have() {
     let text = discarded(&fmu, 2500.0, 2500.25);
     assert!(text.contains("at 5000.25: ") && text.contains(EXPECTED), "{text}");
     assert_eq!(progress(&fmu), (5000.25, false));
-    // An endless event.
+    // An event that always requests another iteration.
     let fmu = Importer::new::<Grumbler>(CoSimulation);
     trouble(&fmu, Trouble::Rounds);
     fmu.enter_initialization(0.0, None);
@@ -340,11 +344,12 @@ fn more_events_than_a_step_may_have() {
     assert!(log.iter().any(|message| message.message.contains(words)), "{log:?}");
 }
 
-/// The fuse warms by 10 degrees per second from 20: hot after 8 s, melted after 18 s.
+/// Checks early returns. The fuse warms up from 20 degrees by 10 degrees per second, so it is hot after 8 s and melts
+/// after 18 s.
 #[test]
 fn early_return() {
     let fmu = of_fmi3::<Fuse>(fmi3False, fmi3True, |_| ());
-    let early = Stepped { early_return: true, last_successful_time: 8.0, ..AT_ONCE };
+    let early = Stepped { early_return: true, last_successful_time: 8.0, ..IMMEDIATE };
     assert_eq!(fmu.do_step(0.0, 10.0), Ok(early));
     // The simulation continues from there until the fuse melts.
     let stepped = fmu.do_step(8.0, 20.0).unwrap();
@@ -353,18 +358,18 @@ fn early_return() {
     fmu.ok(fmu.fmi3Reset());
     fmu.initialize(0.0);
     fmu.step(0.0, 1.0);
-    // If it is not allowed, the step changes nothing, so that a shorter one is possible.
+    // If early return is not allowed, the step is discarded and changes nothing, so that a shorter one is possible.
     let fmu = of_fmi3::<Fuse>(fmi3False, fmi3False, |_| ());
     let text = undone(&fmu, Status::Discard, 0.0, 10.0);
     assert!(text.contains("ends early, at 8: the model stops there, and earlyReturnAllowed has"), "{text}");
     fmu.step(0.0, 8.0);
     // The end of the simulation is reported without early return.
-    let ended = Stepped { terminate: true, last_successful_time: 18.0, ..AT_ONCE };
+    let ended = Stepped { terminate: true, last_successful_time: 18.0, ..IMMEDIATE };
     assert_eq!(fmu.do_step(8.0, 20.0), Ok(ended));
 }
 
-/// An importer of FMI 2.0 reads the time reached, restores the state and makes a shorter step; or it ends the
-/// simulation there, or resets the instance.
+/// Checks what an importer of FMI 2.0 can do after a step that ended early: read the time that was reached, and restore
+/// a state and make a shorter step, or end the simulation there, or reset the instance.
 #[test]
 fn an_early_end_and_a_shorter_step() {
     let fmu = of_fmi2::<Fuse>(|_| ());
@@ -373,7 +378,7 @@ fn an_early_end_and_a_shorter_step() {
     let message = discarded(&fmu, 5.0, 5.0);
     assert!(message.contains("10") && message.contains("early, at 8"), "{message}");
     assert_eq!(progress(&fmu), (8.0, false));
-    assert_eq!(fmu.get([TEMPERATURE]), [100.0], "readable where it ended");
+    assert_eq!(fmu.get([TEMPERATURE]), [100.0], "the value at the early end can be read");
     fmu.rejected("a step after it", |fmu| fmu.try_step(8.0, 1.0));
     fmu.rejected("an input after it", |fmu| fmu.try_set(&[fuse::Name::load as u32], &[0.0]));
     fmu.ok(fmu.fmi2Terminate());
@@ -400,7 +405,7 @@ fn an_early_end_and_a_shorter_step() {
     assert_eq!(fmu.get([TEMPERATURE]), [20.0]);
 }
 
-/// A model that ends every step early, or at an event if its input is 1, and declares neither.
+/// A model that ends every step early, or at an event if its input is 1, but declares neither.
 mod hasty {
     use fmu_export::*;
 
@@ -431,7 +436,7 @@ mod hasty {
     offer!(Hasty: CoSimulation);
 }
 
-/// Checks that the FMU does not contradict its description: the step is fatal.
+/// Checks that such a step is fatal, because it contradicts the model description.
 #[test]
 fn an_early_end_that_the_model_has_not_announced() {
     fn check<F: Either>() {
@@ -444,7 +449,7 @@ fn an_early_end_that_the_model_has_not_announced() {
     check::<fmi3::Importer>();
 }
 
-/// The message names the declaration that an event needs, which an early end does not.
+/// Checks that the message names the declaration that events need, which differs from the one for early ends.
 #[test]
 #[should_panic(expected = "add `const EVENTS: Events = Events::Stop;` to its impl CoSimulation")]
 fn an_event_that_the_model_has_not_declared() {

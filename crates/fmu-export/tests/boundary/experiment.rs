@@ -1,5 +1,5 @@
-//! Data that the importer passes about itself and its experiment (sections 2.1.5 and 2.1.6 of FMI 2.0), and their effect
-//! on the model.
+//! Names, resources, times and tolerances that the importer passes (sections 2.1.5 and 2.1.6 of FMI 2.0), and how the
+//! model receives them.
 
 use crate::models::{Talker, talker::Name};
 use crate::variables::texts;
@@ -29,7 +29,7 @@ fn the_instance_name() {
     assert_eq!(texts(&one, [Name::who]), ["Gödel"], "after a reset too");
 }
 
-/// Checks start time, stop time and tolerance; -1 represents an undefined value.
+/// Checks start time, stop time and tolerance. The model returns -1 for an undefined value.
 #[test]
 fn times_and_tolerance() {
     for (tolerance, start, stop) in [(None, 0.0, None), (Some(1e-4), 2.0, Some(3.0)), (Some(0.0), -1.5, None)]
@@ -80,7 +80,7 @@ fn files_in_the_resources() {
     }
 }
 
-/// Checks that a model that cannot be made returns a message.
+/// Checks that the message of a model that rejects its resources is logged.
 #[test]
 fn bad_resources() {
     let location = CString::new(resources("mute", "\n").to_str().unwrap()).unwrap();

@@ -1,5 +1,5 @@
-//! Reals in every kind of field, accessed one at a time and in groups: fast paths agree with the general
-//! path.
+//! Reals in every kind of field, accessed one at a time and in groups. The fast implementations for some fields and
+//! counts must agree with the general one.
 
 use crate::models::{Meter, meter::Name};
 use fmu_export::Interface::CoSimulation;
@@ -11,8 +11,8 @@ const TOTAL: u32 = Name::total as u32;
 const SUM: u32 = Name::sum as u32;
 const LEVEL: u32 = Name::level as u32;
 
-/// Sets and reads `count` inputs per call, with each as the first, before the first step and after it. All
-/// must keep their values.
+/// Sets and reads `count` inputs per call, each of them once as the first, before the first step and between steps.
+/// Asserts that all inputs have the values that were set, and that each setter had its side effect.
 fn set_and_read<F: Either>(count: usize) {
     let fmu = F::new::<Meter>(CoSimulation);
     fmu.initialize(0.0);
@@ -33,18 +33,18 @@ fn set_and_read<F: Either>(count: usize) {
         let marks = [1, 2, 3].iter().filter(|index| indices.contains(index)).count() as i32;
         assert_eq!(fmu.integer(Name::marks as u32), 10 * seconds + marks, "{indices:?}");
         if round == 0 {
-            assert_eq!(fmu.get([LEVEL]), [now[0]], "it starts there");
+            assert_eq!(fmu.get([LEVEL]), [now[0]], "the level starts at rest");
         }
-        // The sizes cover rejected fast steps, steps with a later calculation, and fast steps.
+        // The model makes steps of size 0.5 with a later calculation, of size 2 without one, and of size 1 with `step_fast`.
         let size = [0.5, 2.0, 1.0][round % 3];
         fmu.step(time, size);
         time += size;
-        // The other entry of the ring was never set, or was set two steps ago.
+        // Each step exchanges the two values of the ring, so `moving` has the value from two steps ago, or 0.
         assert_eq!(fmu.get([TOTAL]), fmu.get([SUM]));
         now[5] = fmu.get([Name::moving as u32])[0];
         assert_eq!(fmu.integer(Name::marks as u32), 10 * seconds);
     }
-    assert_eq!(fmu.integer(Name::steps_at_once as u32), 4);
+    assert_eq!(fmu.integer(Name::fast_steps as u32), 4);
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn rejected<F: Either>() {
         assert_eq!(fmu.bytes(), before);
         fmu.step(f64::from(round), 1.0);
     }
-    // The sum of both is out of range; each one is in range.
+    // Each value is in the range of numbers, but the sum of both is not.
     fmu.set(&[0, 1], &[f64::MAX, f64::MAX]);
     assert_eq!(fmu.get([0, 1]), [f64::MAX; 2]);
     fmu.rejected_with(&["total", "out of the range"], |fmu| fmu.try_get(&[TOTAL, 0, 1, 2], &mut [0.0; 4]));
@@ -85,12 +85,12 @@ fn rejected<F: Either>() {
 }
 
 #[test]
-fn rejected_as_before() {
+fn invalid_variables_and_values() {
     rejected::<Importer>();
     rejected::<fmi3::Importer>();
 }
 
-/// Arrays as long as a discretized equation has them.
+/// A model with arrays as long as in a discretized partial differential equation.
 mod long {
     use fmu_export::*;
 

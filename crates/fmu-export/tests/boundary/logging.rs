@@ -1,4 +1,4 @@
-//! Content and times of log messages (sections 2.1.5 and 2.2.4 of FMI 2.0).
+//! Content of log messages, and when they are logged (sections 2.1.5 and 2.2.4 of FMI 2.0).
 
 use crate::models::grumbler::{self, Trouble};
 use crate::models::{Grumbler, Oscillator, Talker, talker::Name};
@@ -15,7 +15,7 @@ fn logging<M: Exported>(logging_on: bool) -> Importer {
     Importer::make::<M>(&arguments).unwrap()
 }
 
-/// Returns the logged statuses of an event, a warning, a discarded query and an error: O, W, D, E.
+/// Causes an event, a warning, a discarded query and an error. Returns the letters O, W, D and E of those that are logged.
 fn shown(fmu: &Importer) -> String {
     fmu.take_log();
     fmu.ok(fmu.fmi2Reset());
@@ -42,8 +42,8 @@ fn shown(fmu: &Importer) -> String {
     letters.into_iter().collect()
 }
 
-/// Checks that errors and warnings are always logged, other messages on demand: in section 2.1.3 of FMI 2.0, fmi2Discard
-/// is logged only in debug mode.
+/// Checks that errors and warnings are always logged, and other messages only if logging is on. According to section
+/// 2.1.3 of FMI 2.0, the message of fmi2Discard is logged only in debug mode.
 #[test]
 fn logging_on_and_off() {
     assert_eq!(shown(&logging::<Talker>(false)), "WE");
@@ -55,7 +55,7 @@ fn logging_on_and_off() {
     assert_eq!(shown(&fmu), "OWDE");
 }
 
-/// Checks that a list changes only the listed categories.
+/// Checks that fmi2SetDebugLogging with a list of categories changes only these.
 #[test]
 fn categories() {
     let cases: &[(bool, bool, &[&CStr], &str)] = &[
@@ -87,10 +87,10 @@ fn categories_that_do_not_exist() {
     fmu.rejected("NULL entry", |fmu| fmu.fmi2SetDebugLogging(1, 2, [c"logEvents".as_ptr(), null()].as_ptr()));
     fmu.rejected("NULL list", |fmu| fmu.fmi2SetDebugLogging(1, 3, null()));
     fmu.rejected("no UTF-8", |fmu| fmu.set_debug_logging(true, &[c"\xff"]));
-    assert_eq!(shown(&fmu), "WE", "nothing was switched");
+    assert_eq!(shown(&fmu), "WE", "no category was changed");
 }
 
-/// Section 2.3.1 of FMI 3.0: without logging there are only errors, which cannot be disabled.
+/// Checks that without logging only errors are logged (section 2.3.1 of FMI 3.0). Errors cannot be disabled.
 #[test]
 fn logging_of_fmi3() {
     let fmu = fmi3::Importer::new::<Talker>(CoSimulation);
@@ -107,7 +107,7 @@ fn logging_of_fmi3() {
     fmu.rejected("no category", |fmu| fmu.fmi3SetDebugLogging(1, 1, &c"logNothing".as_ptr()));
 }
 
-/// Checks the messages of a run.
+/// Checks which messages about a run are logged if logging is on.
 #[test]
 fn events() {
     let fmu = logging::<Oscillator>(true);
@@ -150,7 +150,7 @@ fn messages_of_the_model() {
     assert_eq!(fmu.take_log(), []);
 }
 
-/// Checks messages of the model in a rejected call, and during instantiation.
+/// Checks messages that the model logs in a rejected call and during instantiation.
 #[test]
 fn messages_of_a_model_that_fails() {
     let fmu = logging::<Grumbler>(false);
@@ -170,14 +170,14 @@ fn messages_of_a_model_that_fails() {
     fmu.ok(fmu.fmi2EnterInitializationMode());
     assert_eq!(fmu.fmi2ExitInitializationMode(), Status::Error);
     assert_eq!(messages(&fmu), failed("fmi2ExitInitializationMode", "SecondRound"));
-    // Bytes that the model rejects.
+    // The model rejects the de-serialized bytes.
     let bytes = with(fmu.bytes(), VALUES..VALUES + 8, &(Trouble::Update as i64).to_le_bytes());
     let status = fmu.fmi2DeSerializeFMUstate(bytes.as_ptr().cast(), bytes.len(), &mut null_mut());
     assert_eq!(status, Status::Error);
     assert_eq!(messages(&fmu), failed("fmi2DeSerializeFMUstate", "Update"));
     fmu.ok(fmu.fmi2Reset());
     assert_eq!(messages(&fmu), ["made"]);
-    // Messages of a step before an event.
+    // The model logs in steps that end at an event.
     fmu.initialize(0.0);
     fmu.ok(fmu.set_debug_logging(true, &[c"logEvents"]));
     fmu.step(0.0, 2.0);
@@ -199,7 +199,8 @@ fn instances_do_not_mix() {
     }
 }
 
-/// Checks that a NULL logger only suppresses the messages. (All tests pass NULL for the memory callbacks.)
+/// Checks that a NULL logger suppresses the messages and has no other effect. All tests here pass NULL for the memory
+/// callbacks.
 #[test]
 fn no_logger() {
     let arguments = Arguments { logger: false, logging_on: 1, ..Arguments::new::<Talker>(ModelExchange) };

@@ -49,7 +49,7 @@ fn offers<M: Exported>(interface: Interface) -> bool {
     }
 }
 
-/// Tests for every FMU with all capabilities.
+/// The checks of the test kit that every FMU must pass.
 mod every {
     fmu_test_kit::every_check!(crate::models::Oscillator);
 }

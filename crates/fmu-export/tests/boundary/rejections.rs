@@ -1,5 +1,5 @@
-//! Invalid calls are rejected: `fmi2Error`, one message with the reason, and no change. [`Either::rejected`] checks
-//! this; the tables here list the calls and parts of their messages. Other files contain the rejections of their calls.
+//! Invalid calls are rejected: they return `fmi2Error`, log one message with the reason, and change nothing.
+//! [`Either::rejected`] checks this for the calls listed here. Calls of one topic, such as saved states, are in other files.
 
 use crate::models::{Ball, Fuse, Oscillator, Talker, oscillator::Name, talker};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
@@ -24,7 +24,7 @@ const UNKNOWN: u32 = Oscillator::TABLE.len() as u32;
 const NAN: f64 = f64::NAN;
 const INF: f64 = f64::INFINITY;
 
-/// Call, and parts of the message.
+/// A call, and parts of the message with which it is rejected.
 type Case = (fn(&Importer) -> Status, &'static [&'static str]);
 
 #[track_caller]
@@ -32,7 +32,7 @@ fn all_rejected(fmu: &Importer, cases: &[Case]) {
     cases.iter().for_each(|(call, words)| fmu.rejected_with(words, call));
 }
 
-/// Variables of other types, and values out of their range. `indices.rs` checks invalid value references.
+/// Calls with variables of another type, and with values out of their range. `indices.rs` checks invalid value references.
 const VALUES: &[Case] = &[
     (|fmu| fmu.set_integer(MASS, 1), &["mass is of type Real, not Integer"]),
     (|fmu| fmu.set_string(DAMPED, c"1".as_ptr()), &["damped is of type Boolean, not String"]),
@@ -65,7 +65,7 @@ fn empty_arrays_are_fine() {
     fmu.ok(fmu.fmi2SetRealInputDerivatives(null(), 0, null(), null()));
 }
 
-/// Checks that all values of one call are checked together: one by one they would be rejected.
+/// Checks that the values of one call are validated together. Set one by one, they would be rejected.
 #[test]
 fn combinations_are_set_together() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, Instantiated);
@@ -77,9 +77,9 @@ fn combinations_are_set_together() {
     fmu.rejected("the damper again", |fmu| fmu.fmi2SetBoolean(&DAMPED, 1, &1));
 }
 
-/// The type of a variable is checked before its value.
+/// Checks rejected strings, and that the type of a variable is checked before its value.
 #[test]
-fn texts() {
+fn strings() {
     const GREETING: u32 = talker::Name::greeting as u32;
     const HEARD: u32 = talker::Name::heard as u32;
     all_rejected(
@@ -111,7 +111,7 @@ fn experiments() {
             fmu.fmi2SetupExperiment(defined, tolerance, start, stop_defined, stop)
         });
     }
-    // Undefined values are ignored; a tolerance of 0 means none.
+    // Values that are not defined are ignored, and a tolerance of 0 is accepted.
     fmu.ok(fmu.fmi2SetupExperiment(0, NAN, 0.0, 0, NAN));
     fmu.ok(fmu.fmi2SetupExperiment(1, 0.0, 0.0, 1, 0.0));
 }
@@ -142,18 +142,18 @@ fn steps() {
     fmu.step(1.25, 0.75);
 }
 
-/// Checks that a step to infinity is rejected and the instance stays usable, and that reading an infinite
-/// value is rejected.
+/// Checks that a step is rejected if the state would become infinite, that the instance then works as before, and that
+/// reading an infinite value is rejected.
 #[test]
 fn out_of_the_range_of_numbers() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, StepComplete);
     fmu.set(&[FORCE], &[f64::MAX]);
-    fmu.give_rates(&[FORCE], &[f64::MAX]);
+    fmu.set_input_derivatives(&[FORCE], &[f64::MAX]);
     fmu.set(&[MASS], &[0.1]);
     fmu.rejected_with(&["range of numbers"], |fmu| fmu.try_step(0.0, 1e3));
     fmu.rejected("an infinite rate", |fmu| fmu.fmi2GetRealOutputDerivatives(&ACCELERATION, 1, &1, &mut 0.0));
     fmu.set(&[FORCE], &[0.1]);
-    fmu.give_rates(&[FORCE], &[0.0]);
+    fmu.set_input_derivatives(&[FORCE], &[0.0]);
     fmu.step(0.0, 10.0);
     let fmu = Importer::in_mode::<Oscillator>(ModelExchange, ContinuousTime);
     fmu.set(&[POSITION, FORCE], &[1e200, 0.1]);
@@ -240,18 +240,18 @@ fn status_kinds() {
     }
     fmu.rejected("NULL", |fmu| fmu.fmi2GetRealStatus(2, null_mut()));
     fmu.rejected("NULL", |fmu| fmu.fmi2GetBooleanStatus(3, null_mut()));
-    // Each query has one function; the other functions name it in their message.
+    // Each kind of status is returned by one function. The others are discarded, with a message that names this function.
     fmu.ok(fmu.set_debug_logging(true, &[c"logStatusDiscard"]));
-    type Question = fn(&Importer) -> Status;
-    let questions: &[(Question, &str)] = &[
+    type Query = fn(&Importer) -> Status;
+    let queries: &[(Query, &str)] = &[
         (|fmu| fmu.fmi2GetRealStatus(0, &mut 0.0), "synchronously"),
         (|fmu| fmu.fmi2GetRealStatus(3, &mut 0.0), "fmi2GetBooleanStatus"),
         (|fmu| fmu.fmi2GetBooleanStatus(2, &mut 0), "fmi2GetRealStatus"),
         (|fmu| fmu.fmi2GetStringStatus(1, &mut null()), "synchronously"),
         (|fmu| fmu.fmi2GetIntegerStatus(2, &mut 0), "fmi2GetRealStatus"),
     ];
-    for (question, word) in questions {
-        assert_eq!(question(&fmu), Status::Discard);
+    for (query, word) in queries {
+        assert_eq!(query(&fmu), Status::Discard);
         let log = fmu.take_log();
         assert!(log.len() == 1 && log[0].message.contains(word), "{log:?}");
     }
@@ -263,7 +263,7 @@ fn status_kinds() {
     assert_eq!((time, terminated), (0.25, 0));
 }
 
-/// Checks that there is no instance of the model with changed arguments, and parts of the message.
+/// Checks that instantiation with changed arguments fails with a message that contains these strings.
 fn no_instance<F: Either, M: Exported>(change: impl Fn(&mut Arguments<'static>), words: &[&str]) {
     let mut arguments = Arguments::new::<M>(CoSimulation);
     change(&mut arguments);
@@ -274,9 +274,9 @@ fn no_instance<F: Either, M: Exported>(change: impl Fn(&mut Arguments<'static>),
     for word in words.iter().chain(&[&format!("{}Instantiate", &F::functions()[0][..4])[..]]) {
         assert!(message.message.contains(word), "'{word}' is not in: {}", message.message);
     }
-    // Without a logger the call is rejected as well.
+    // The call is also rejected without a logger.
     arguments.logger = false;
-    assert!(F::make::<M>(&arguments).is_err_and(|log| log.is_empty()), "{words:?}, silently");
+    assert!(F::make::<M>(&arguments).is_err_and(|log| log.is_empty()), "{words:?}, without a logger");
 }
 
 #[test]

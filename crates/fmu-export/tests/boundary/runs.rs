@@ -1,5 +1,5 @@
-//! Runs of test models: equal inputs and steps give bit-identical results in both FMI versions. Input
-//! derivatives, start values and errors of the model take effect.
+//! Runs of test models: equal inputs and steps give bit-identical results in both FMI versions, and input derivatives and
+//! start values take effect.
 
 use crate::INTERFACES;
 use crate::models::{oscillator::Name, *};
@@ -12,7 +12,8 @@ use fmu_test_kit::{Either, Importer, fmi3, serialized};
 const FORCE: u32 = Name::force as u32;
 const STATES: [u32; 2] = [Name::position as u32, Name::velocity as u32];
 
-/// Returns the state without the byte for FMI version and interface type, the mode, and the checksum.
+/// Returns the serialized state without the bytes that differ between FMI versions: the version and interface type, the
+/// mode, and the checksum.
 fn content(fmu: &impl Either) -> Vec<u8> {
     let bytes = fmu.bytes();
     bytes[serialized::ENDED..bytes.len() - serialized::CHECKSUM].to_vec()
@@ -61,18 +62,18 @@ fn integration_in_both_versions() {
     assert_eq!(run::<Importer>(), run::<fmi3::Importer>());
 }
 
-/// Checks that a slope applies only to the next step, and that higher orders have no effect.
+/// Checks that a first derivative of an input applies only to the next step, and that higher orders have no effect.
 #[test]
 fn input_derivatives() {
     let [once, never, rich] = [(); 3].map(|()| Importer::in_mode::<Oscillator>(CoSimulation, StepComplete));
-    once.give_rates(&[FORCE], &[5.0]);
-    rich.give_rates(&[FORCE], &[5.0]);
+    once.set_input_derivatives(&[FORCE], &[5.0]);
+    rich.set_input_derivatives(&[FORCE], &[5.0]);
     let orders = [2, 7, i32::MAX];
     rich.ok(rich.fmi2SetRealInputDerivatives([FORCE; 3].as_ptr(), 3, orders.as_ptr(), [9.0; 3].as_ptr()));
     [&once, &never, &rich].iter().for_each(|fmu| fmu.step(0.0, 0.1));
     assert_eq!(once.get(STATES), rich.get(STATES));
     assert!(once.get(STATES)[0] > 0.0 && never.get(STATES) == [0.0; 2]);
-    // The second step equals a step of an instance without slope.
+    // The second step equals a step of an instance whose input has no derivative.
     let state = once.get(STATES);
     once.step(0.1, 0.1);
     let other = Importer::new::<Oscillator>(CoSimulation);
@@ -82,8 +83,8 @@ fn input_derivatives() {
     assert_eq!(once.get(STATES), other.get(STATES));
 }
 
-/// Checks start values of states, their nominal values, which come from the types, and that a state set as a
-/// variable and a state set in the array of states have equal effects.
+/// Checks start values and nominal values of states. The nominal values are those of the types. A state has the same
+/// effect whether it is set as a variable or in the array of states.
 #[test]
 fn states() {
     fn check<F: Either>() {

@@ -1,4 +1,4 @@
-//! Saved states (section 2.1.8 of FMI 2.0): their content, and rejected states.
+//! Saved states (section 2.1.8 of FMI 2.0): what they contain, and which handles and bytes are rejected.
 
 use crate::INTERFACES;
 use crate::models::*;
@@ -13,7 +13,8 @@ use std::ptr::{null_mut, without_provenance_mut};
 
 const FORCE: u32 = oscillator::Name::force as u32;
 
-/// Checks that a state is saved over an earlier one. (The fault-injecting importer checks the contents.)
+/// Checks that saving with the handle of an earlier state replaces that state. The fault-injecting importer checks
+/// the content of states.
 #[test]
 fn handles_are_reused() {
     let fmu = Importer::initialized_at::<Oscillator>(0.0);
@@ -28,18 +29,19 @@ fn handles_are_reused() {
     assert_eq!(fmu.bytes(), bytes);
 }
 
-/// Checks that an instance frees its saved states (section 2.1.5 of FMI 2.0). Handles of other instances, freed handles
-/// and other addresses are rejected, not dereferenced.
+/// Checks that handles of other instances, freed handles and other addresses are rejected and not dereferenced. The two
+/// states that remain are freed with their instances (section 2.1.5 of FMI 2.0).
 #[test]
-fn handles_that_are_none() {
+fn invalid_handles() {
     let [fmu, other] = [(); 2].map(|()| Importer::in_mode::<Talker>(CoSimulation, StepComplete));
     let (own, foreign, freed) = (fmu.save(), other.save(), fmu.save());
     fmu.forget(freed);
     let on_the_stack = (&raw const own).cast_mut().cast();
-    let none = [foreign, freed, on_the_stack, without_provenance_mut(8), without_provenance_mut(usize::MAX)];
+    let invalid =
+        [foreign, freed, on_the_stack, without_provenance_mut(8), without_provenance_mut(usize::MAX)];
     let bytes = fmu.bytes();
-    for wild in none {
-        let mut handle = wild;
+    for invalid in invalid {
+        let mut handle = invalid;
         let mut buffer = vec![0; bytes.len()];
         for message in [
             fmu.rejected("get", |fmu| fmu.fmi2GetFMUstate(&mut handle)),
@@ -54,14 +56,14 @@ fn handles_that_are_none() {
             }),
         ] {
             assert!(message.contains("unknown state handle"), "{message}");
-            assert_eq!(handle, wild);
+            assert_eq!(handle, invalid);
         }
     }
     other.ok(other.fmi2SetFMUstate(foreign));
     fmu.ok(fmu.fmi2SetFMUstate(own));
 }
 
-/// Checks that a handle stays invalid after its state was freed, although the next state may have its memory.
+/// Checks that the handle of a freed state stays invalid even if later states use the same memory.
 #[test]
 fn freed_handles_stay_invalid() {
     fn check<F: Either>() {
@@ -82,7 +84,7 @@ fn freed_handles_stay_invalid() {
     check::<fmi3::Importer>();
 }
 
-/// Checks that freeing the oldest of many states takes as long as freeing the oldest of few.
+/// Checks that freeing the oldest of many states takes about as many instructions as freeing the oldest of a few.
 #[test]
 fn states_are_freed_in_constant_time() {
     use fmu_test_kit::instructions;
@@ -98,8 +100,8 @@ fn states_are_freed_in_constant_time() {
     }
 }
 
-/// Checks that the model's memory may contain any number. A variable that is not finite could not be read
-/// back, so it is not written.
+/// Checks that the `memory` fields of a model may contain infinity. A state with a variable that is not finite is not
+/// serialized, because de-serializing it would be rejected.
 #[test]
 fn infinite_numbers() {
     let fmu = Importer::new::<Grumbler>(CoSimulation);
@@ -157,11 +159,12 @@ fn restores(fmu: &Importer, bytes: &[u8]) -> bool {
     status == Status::Ok
 }
 
-/// Distance of the positions that are changed or cut. Miri is slow and tries a tenth.
+/// Step between the byte positions that are changed or cut. Under Miri, which is slow, every tenth is tried.
 const STRIDE: usize = if cfg!(miri) { 10 } else { 1 };
 
-/// Checks that any changed byte is detected and the state of the handle stays unchanged. Miri changes one bit.
-fn no_changed_byte_goes_unseen<F: Either, M: Exported>() {
+/// Checks that any change of a byte is detected, and that the state of the handle then stays unchanged. Under Miri, only
+/// one bit of a byte is changed.
+fn every_changed_byte_is_detected<F: Either, M: Exported>() {
     let changes = || 1..=if cfg!(miri) { 1 } else { u8::MAX };
     for (interface, mode) in [(CoSimulation, StepComplete), (ModelExchange, ContinuousTime)] {
         let fmu = F::in_mode::<M>(interface, mode);
@@ -179,7 +182,7 @@ fn no_changed_byte_goes_unseen<F: Either, M: Exported>() {
         assert_eq!(
             fmu.take_log().len(),
             changes().count() * bytes.len().div_ceil(STRIDE),
-            "each was reported"
+            "each change is reported"
         );
         assert_eq!(fmu.bytes(), bytes);
         fmu.ok(fmu.set_state(state));
@@ -188,7 +191,7 @@ fn no_changed_byte_goes_unseen<F: Either, M: Exported>() {
     }
 }
 
-fn no_cut_and_no_extension_goes_unseen<F: Either, M: Exported>() {
+fn every_other_length_is_detected<F: Either, M: Exported>() {
     let fmu = F::in_mode::<M>(CoSimulation, StepComplete);
     let bytes = fmu.bytes();
     for length in (0..bytes.len()).step_by(STRIDE) {
@@ -204,8 +207,8 @@ fn no_cut_and_no_extension_goes_unseen<F: Either, M: Exported>() {
     }
 }
 
-/// Checks that a reset restores all values (section 2.1.6 of FMI 2.0).
-fn reset_is_a_new_beginning<F: Either, M: Exported>() {
+/// Checks that an instance is equal to a new one after a reset (section 2.1.6 of FMI 2.0).
+fn a_reset_instance_is_like_a_new_one<F: Either, M: Exported>() {
     for (interface, mode) in modes_of_model::<F, M>() {
         let fmu = F::in_mode::<M>(interface, Initialization);
         for (index, variable) in (0..).zip(M::TABLE) {
@@ -225,7 +228,7 @@ fn reset_is_a_new_beginning<F: Either, M: Exported>() {
     }
 }
 
-/// Checks that every state restores its mode, time and stop time, even an earlier mode.
+/// Checks that a restored state restores the mode, the time and the stop time, even if the instance is in a later mode.
 fn every_mode_is_restored<F: Either, M: Exported>() {
     for (interface, mode) in modes_of_model::<F, M>() {
         let bytes = F::in_mode::<M>(interface, mode).bytes();
@@ -246,8 +249,8 @@ fn every_mode_is_restored<F: Either, M: Exported>() {
     fmu.rejected("past the stop time", |fmu| fmu.try_step(2.5, 0.6));
 }
 
-/// Checks that bytes of a state are rejected in the other FMI version and in the other interface type, because the
-/// state machines differ; and that a handle is valid only in its instance.
+/// Checks that the bytes of a state are rejected in another FMI version or interface type, because the state machines
+/// differ, and that a handle is valid only in its instance.
 fn states_of_other_origins<F: Either, O: Either>([from, to]: [&str; 2]) {
     for (interface, of_other) in INTERFACES.into_iter().flat_map(|own| INTERFACES.map(|other| (own, other))) {
         let fmu = F::in_mode::<Oscillator>(interface, Initialization);
@@ -266,12 +269,12 @@ fn states_of_other_origins<F: Either, O: Either>([from, to]: [&str; 2]) {
 fn in_both_versions() {
     fn check<F: Either>() {
         null_handles::<F>();
-        no_changed_byte_goes_unseen::<F, Oscillator>();
-        no_changed_byte_goes_unseen::<F, Talker>();
-        no_cut_and_no_extension_goes_unseen::<F, Talker>();
-        no_cut_and_no_extension_goes_unseen::<F, Palette>();
-        reset_is_a_new_beginning::<F, Oscillator>();
-        reset_is_a_new_beginning::<F, Talker>();
+        every_changed_byte_is_detected::<F, Oscillator>();
+        every_changed_byte_is_detected::<F, Talker>();
+        every_other_length_is_detected::<F, Talker>();
+        every_other_length_is_detected::<F, Palette>();
+        a_reset_instance_is_like_a_new_one::<F, Oscillator>();
+        a_reset_instance_is_like_a_new_one::<F, Talker>();
         every_mode_is_restored::<F, Oscillator>();
         random_contents_break_nothing::<F, Counter>();
         random_contents_break_nothing::<F, Talker>();
@@ -287,7 +290,7 @@ fn in_both_versions() {
 fn messages_say_where_a_state_comes_from() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, StepComplete);
     let bytes = fmu.bytes();
-    assert_eq!(sealed(bytes.clone()), bytes, "the layout is as this test believes");
+    assert_eq!(sealed(bytes.clone()), bytes, "the layout is as this test assumes");
     assert_eq!(bytes[GUID_HASH], fnv1a(Oscillator::INFO.guid.as_bytes()));
     assert_eq!(time(&bytes), 0.0);
 
@@ -304,7 +307,7 @@ fn messages_say_where_a_state_comes_from() {
     assert!(fmu.rejected_bytes(cut).contains("length"));
 }
 
-/// Checks invalid contents with a correct checksum.
+/// Checks that invalid values in the bytes are rejected even if the checksum is correct.
 #[test]
 fn impossible_contents() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, StepComplete);
@@ -336,21 +339,21 @@ fn impossible_contents() {
     assert_eq!(fmu.get([FORCE]), [f64::MAX]);
 }
 
-/// Checks invalid strings and items. Unit tests of the layout check lengths.
+/// Checks that invalid strings and enumeration items are rejected. Unit tests of the layout check lengths.
 #[test]
 fn invalid_strings_and_items() {
     let fmu = Importer::in_mode::<Talker>(CoSimulation, StepComplete);
     fmu.write_string(talker::Name::heard as u32, "heard");
     let bytes = fmu.bytes();
-    // The heard string and the greeting have a length and 5 letters, the mood is an integer.
+    // The strings `heard` and `greeting` are a length of 8 bytes and 5 letters each. `mood` follows, an integer of 8 bytes.
     let heard = VALUES + 8..VALUES + 10;
     let mood = VALUES + 26..VALUES + 34;
-    assert_eq!(bytes[mood.clone()], 1_i64.to_le_bytes(), "the layout is as this test believes");
+    assert_eq!(bytes[mood.clone()], 1_i64.to_le_bytes(), "the layout is as this test assumes");
     for item in [0, 3, 1 << 32 | 1, i64::MIN] {
         fmu.rejected_bytes(&with(bytes.clone(), mood.clone(), &item.to_le_bytes()));
     }
     fmu.rejected_bytes(&with(bytes.clone(), heard.clone(), b"\xff\xfe"));
-    // C would read a NUL as the end of the string.
+    // A NUL is replaced, because C would read it as the end of the string.
     assert!(restores(&fmu, &with(bytes, heard, b"a\0")));
     assert_eq!(texts(&fmu, [talker::Name::heard]), ["a ard"]);
 }

@@ -8,7 +8,7 @@ use fmu_export::{BaseType, Causality, Exported, Initial, Status, Variability, Va
 use fmu_test_kit::checks::modes_of_model;
 use fmu_test_kit::{Either, Importer};
 
-/// Returns whether the standard allows setting the variable, state by state.
+/// Returns whether the standard allows setting the variable in this mode.
 fn standard<M>(variable: &Variable<M>, interface: Interface, mode: Mode) -> bool {
     let exact = variable.initial() == Some(Initial::Exact) && variable.variability() != Variability::Constant;
     let input = variable.causality() == Causality::Input;
@@ -25,8 +25,8 @@ fn standard<M>(variable: &Variable<M>, interface: Interface, mode: Mode) -> bool
     }
 }
 
-/// Returns whether setting is tolerated for real importers: inputs before the initialization, parameters
-/// after it.
+/// Returns whether the FMU also accepts the variable in this mode, because real importers set inputs before the
+/// initialization and parameters after it.
 fn tolerated<M>(variable: &Variable<M>, mode: Mode) -> bool {
     match (variable.causality(), mode) {
         (Causality::Input, Instantiated) | (Causality::Parameter, StepComplete | Event) => true,
@@ -49,7 +49,7 @@ fn set(fmu: &Importer, vr: u32, base: BaseType) -> Status {
     }
 }
 
-/// Returns whether the variable has the value that was set above.
+/// Returns whether the variable has the value that [`set`] sets.
 fn is_set(fmu: &Importer, vr: u32, base: BaseType) -> bool {
     match base {
         BaseType::Real => fmu.get([vr]) == [0.625],
@@ -78,13 +78,13 @@ fn check_every_variable<M: Exported>() {
             let message = fmu.rejected(&label, |fmu| set(fmu, vr, base));
             let in_this_state = matches!(mode, Instantiated | Initialization | StepComplete | Event)
                 || (mode == ContinuousTime && base == BaseType::Real);
-            // If the whole function is rejected, its variables are not checked.
+            // If the mode does not allow the function, it does not look at variables, and the message names none.
             assert!(!in_this_state || message.contains(variable.name()), "{label}: {message}");
         }
     }
 }
 
-/// Checks that set values are read back, including inputs, without a step in between.
+/// Checks that the getters return the values that were set, even of inputs, without a step in between.
 #[test]
 fn values_are_read_back() {
     for_every_model!(check_values);

@@ -1,9 +1,9 @@
-//! Tests of [`Simulation`], the test driver for authors.
+//! Tests of [`Simulation`], with which authors test their models without an FMU.
 
 use crate::models::{Rod, Ticker};
 use fmu_export::{Simulation, Value};
 
-/// Checks a variable that follows arrays, array elements, and whole arrays.
+/// Checks a scalar variable, elements of arrays and whole arrays, all by their names in the model description.
 #[test]
 fn variables_have_the_names_of_the_description() {
     let mut rod = Simulation::<Rod>::new().unwrap();
@@ -35,7 +35,7 @@ fn errors_name_the_mistake() {
     );
 }
 
-/// Checks events within a step, and an end of the simulation that the model requests.
+/// Checks that events within a step are handled, and that the simulation ends when the model requests it.
 #[test]
 fn events_are_handled() {
     let mut ticker = Simulation::<Ticker>::new().unwrap();
@@ -47,9 +47,10 @@ fn events_are_handled() {
     assert_eq!(ticker.get("ticks").unwrap(), 4.0);
 }
 
-/// Checks that a state includes `next`, the time of the next tick, which is memory of the model.
+/// Checks that another simulation can continue from a saved state. The state must include the `memory` fields of the
+/// model: here `next`, the time of the next tick.
 #[test]
-fn a_state_goes_on_in_another_simulation() {
+fn another_simulation_continues_from_a_state() {
     let mut ticker = Simulation::<Ticker>::new().unwrap();
     let saved = ticker.step_size(0.3).set("amount", 2.0).unwrap().run(0.6).unwrap().save().unwrap();
     let mut other = Simulation::<Ticker>::new().unwrap();

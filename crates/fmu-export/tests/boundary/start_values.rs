@@ -1,5 +1,5 @@
-//! Start values. Rejected ones are recorded, because some importers (fmi-sim, OMSimulator) continue after the
-//! error. The model may calculate start values of states.
+//! Start values: rejected ones, and start values of states that the model calculates. An instance records rejected start
+//! values, because some importers (fmi-sim, OMSimulator) ignore the error and would simulate with other values.
 
 use crate::INTERFACES;
 use crate::models::{Meter, Oscillator, Talker, meter, oscillator::Name, talker};
@@ -12,7 +12,7 @@ use std::ptr::null;
 const MASS: u32 = Name::mass as u32;
 const STIFFNESS: u32 = Name::stiffness as u32;
 
-/// Ends the mode of an instance.
+/// Leaves this mode for the next one.
 fn leave_mode<F: Either>(fmu: &F, mode: Mode) -> Status {
     if mode == Instantiated {
         fmu.enter_initialization_mode(0.0, None)
@@ -21,8 +21,8 @@ fn leave_mode<F: Either>(fmu: &F, mode: Mode) -> Status {
     }
 }
 
-/// Sets a start value with `wrong`, in each mode for start values. Checks that the end of the mode then fails
-/// with the same message until `right` has been called.
+/// Sets an invalid start value with `wrong` in each mode that accepts start values. Checks that the mode cannot be left,
+/// with the same message as before, until `right` has set a valid value.
 #[track_caller]
 fn is_remembered<F: Either>(wrong: impl Fn(&F) -> Status, right: impl Fn(&F) -> Status) {
     for (interface, mode) in INTERFACES.into_iter().flat_map(|i| [(i, Instantiated), (i, Initialization)]) {
@@ -46,7 +46,7 @@ fn a_rejected_start_value_is_remembered() {
         is_remembered::<F>(|fmu| fmu.try_set(&[force], &[f64::NAN]), |fmu| fmu.try_set(&[force], &[0.0]));
         is_remembered::<F>(|fmu| fmu.set_integer(springs, 10), |fmu| fmu.set_integer(springs, 9));
         is_remembered::<F>(|fmu| fmu.set_boolean(damped, 2), |fmu| fmu.set_boolean(damped, 1));
-        // The model itself rejects this value.
+        // This value is in its range, but the model rejects it in `update`.
         is_remembered::<F>(|fmu| fmu.try_set(&[damping], &[1e6]), |fmu| fmu.try_set(&[damping], &[0.0]));
         for mode in [Instantiated, Initialization] {
             let fmu = F::in_mode::<Talker>(CoSimulation, mode);
@@ -64,7 +64,7 @@ fn a_rejected_start_value_is_remembered() {
     check::<fmi3::Importer>();
 }
 
-/// Checks that a rejected call sets nothing, so each of its variables must be set again.
+/// Checks that all variables of a rejected call must be set again, because the call sets none of them.
 #[test]
 fn every_variable_of_a_rejected_call() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, Instantiated);
@@ -79,7 +79,7 @@ fn every_variable_of_a_rejected_call() {
     fmu.initialize(0.0);
 }
 
-/// Checks that an error about several values is reported once.
+/// Checks that the model's error about a combination of values is reported only once.
 #[test]
 fn values_that_do_not_fit_together() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, Instantiated);
@@ -106,8 +106,8 @@ fn reset_and_restored_states_start_again() {
     fmu.forget(state);
 }
 
-/// Checks that a rejected variable that has no start value has no effect later, because importers probe. The
-/// same holds for a value that is rejected during the simulation.
+/// Checks that only rejected start values are recorded. Other rejected calls have no consequences, because importers
+/// probe what an FMU accepts; neither has a value that is rejected during the simulation.
 #[test]
 fn probing_has_no_consequences() {
     for interface in INTERFACES {
@@ -131,8 +131,8 @@ fn probing_has_no_consequences() {
     }
 }
 
-/// Checks that a calculated start follows the other values until the first step, or until the importer sets
-/// the state; also in a restored state.
+/// Checks that a calculated start value follows the values on which it depends until the first step, or until the importer
+/// sets the state. It does so even in a restored state.
 fn calculated_start<F: Either>() {
     let [plain, stiffness, level] =
         [meter::Name::plain, meter::Name::stiffness, meter::Name::level].map(|name| name as u32);

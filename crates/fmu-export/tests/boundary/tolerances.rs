@@ -1,4 +1,4 @@
-//! Unusual calls of real importers, outside the standard or at its limits, that must work.
+//! Unusual calls of real importers that must work although the standard forbids them or leaves them open.
 
 use crate::models::{Counter, Oscillator, Palette, counter, oscillator::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
@@ -10,8 +10,8 @@ use std::ops::Range;
 const FORCE: u32 = Name::force as u32;
 const ACCELERATION: u32 = Name::der_velocity as u32;
 
-/// OpenModelica sets fixed parameters after the initialization, and users tune during the simulation. The
-/// next values use the new parameters.
+/// Checks that parameters can be set after the initialization and take effect immediately. OpenModelica sets fixed
+/// parameters then, and users tune parameters during the simulation.
 #[test]
 fn parameters_after_the_initialization() {
     for (interface, mode) in [(CoSimulation, StepComplete), (ModelExchange, Event)] {
@@ -28,8 +28,8 @@ fn parameters_after_the_initialization() {
     }
 }
 
-/// FMPy sets discrete inputs in Continuous-Time Mode whenever an FMU has an event indicator. A value that the input has
-/// already is accepted; any other value belongs to an event, and the whole call is rejected.
+/// Checks that a discrete input may be set to its current value in Continuous-Time Mode, because FMPy does this if an FMU
+/// has an event indicator. Any other value would need an event, so the call is rejected.
 fn unchanged_discrete_inputs<F: Either>() {
     use counter::Name::{increment, on, weight};
     let fmu = F::in_mode::<Counter>(ModelExchange, ContinuousTime);
@@ -51,7 +51,8 @@ fn discrete_inputs_that_do_not_change() {
     unchanged_discrete_inputs::<fmi3::Importer>();
 }
 
-/// FMIKit configures every FMU for FMI 3.0 that has inputs, with or without structural parameters.
+/// Checks that Configuration Mode can be entered without structural parameters, because FMIKit enters it in every FMU for
+/// FMI 3.0 that has inputs.
 #[test]
 fn configuration_without_structural_parameters() {
     for interface in [CoSimulation, ModelExchange] {
@@ -66,7 +67,7 @@ fn configuration_without_structural_parameters() {
     }
 }
 
-/// Communication points of an importer: number of the step -> point and step size.
+/// Returns the communication point and the step size of the step with this number.
 type Clock = fn(i32) -> (f64, f64);
 
 /// Communication points as importers compute them, with different rounding errors.
@@ -107,7 +108,7 @@ fn communication_points_off_by_rounding() {
     }
 }
 
-/// Checks that the last step may exceed the stop time by a rounding error, for several ways to compute times.
+/// Checks that the last step may exceed the stop time by a rounding error.
 #[test]
 fn stop_time_passed_by_rounding() {
     let cases: &[(&str, f64, i32, f64)] = &[
@@ -133,8 +134,8 @@ fn stop_time_passed_by_rounding() {
 
 const H: f64 = 1e-3;
 
-/// Performs steps of 1 ms with an importer that multiplies, beginning at `range.start * H`, and with one that
-/// adds, beginning at `sum`. Both must be accepted, and the FMU's time must equal theirs exactly. Returns the
+/// Performs steps of 1 ms with two importers: one calculates its time as `step * H`, the other adds `H` to `sum` in each
+/// step. Both must be accepted, and the times of the FMUs must equal the times of their importers exactly. Returns the
 /// final time of the adding importer.
 fn run<F: Either>(range: Range<u64>, mut sum: f64) -> f64 {
     let multiplying = F::initialized_at::<Palette>(range.start as f64 * H);
@@ -154,9 +155,9 @@ fn added_up(steps: u64) -> f64 {
     (0..steps).fold(0.0, |sum, _| sum + H)
 }
 
-/// The instance keeps no separate time. The end of a step is the importer's point plus its step size, and the
-/// next point may differ by a rounding error. So the test makes only some steps at the start and some before
-/// 10^8, with the accumulated time of an adding importer.
+/// Checks that the time of an instance does not drift from the importer's time. After a step, the time is the importer's
+/// point plus the step size, and the next point may differ by a rounding error. Therefore it suffices to test some of the
+/// 10^8 steps: the first ones and, with the accumulated time of an adding importer, the last ones.
 #[test]
 fn time_does_not_drift() {
     let first = MANY_STEPS - 10_000;
@@ -167,7 +168,7 @@ fn time_does_not_drift() {
     run::<fmi3::Importer>(first..MANY_STEPS, sum);
 }
 
-/// Makes all steps: seconds in a release build, minutes otherwise.
+/// Makes all 10^8 steps, which takes seconds in a release build and minutes otherwise.
 #[test]
 #[ignore = "make sanitize runs it, with optimization"]
 fn a_hundred_million_steps() {
@@ -175,6 +176,7 @@ fn a_hundred_million_steps() {
     assert_eq!(run::<fmi3::Importer>(0..MANY_STEPS, 0.0), end);
     let drift = end - MANY_STEPS as f64 * H;
     println!("adding up ends at {end:?}, {drift:.1e} s off");
-    // A separate clock of the FMU would differ from one of the importers: the tolerance is only 2e-10 s.
+    // The times of the two importers differ by much more than the tolerance of 2e-10 s, so an FMU with a separate clock
+    // would have rejected the steps of one of them.
     assert!(drift.abs() > 1e-5);
 }

@@ -23,27 +23,26 @@ fn fails(fmu: &impl Either, fails: Fails) {
     fmu.ok(fmu.set_integer(FAILS, fails as i32));
 }
 
-/// All that an importer can see: bits of Reals, the number of events, the serialized state.
-type Seen = (Vec<u64>, i32, Vec<u8>);
+/// Everything that an importer can read: the bits of the Reals, the number of events, and the serialized state.
+type Readings = (Vec<u64>, i32, Vec<u8>);
 
-/// Returns all that an importer can see.
-fn seen(fmu: &impl Either) -> Seen {
+fn readings(fmu: &impl Either) -> Readings {
     let reals = fmu.read(&REALS).into_iter().map(f64::to_bits).collect();
     (reals, fmu.integer(ClumsyName::count as u32), fmu.bytes())
 }
 
-/// Checks that the call fails and changes nothing, then removes the cause.
+/// Lets the model fail with `cause`, checks that the call then fails and changes nothing, and removes the cause.
 #[track_caller]
 fn undone<F: Either>(fmu: &F, cause: Fails, call: impl FnOnce(&F) -> Status) {
     fails(fmu, cause);
-    let before = seen(fmu);
+    let before = readings(fmu);
     let message = fmu.rejected(&format!("{cause:?}"), call);
     assert!(message.contains("it has failed half-way"), "{message}");
-    assert_eq!(seen(fmu), before, "{cause:?}");
+    assert_eq!(readings(fmu), before, "{cause:?}");
     fails(fmu, Fails::Nothing);
 }
 
-/// Initializes, after failed attempts if there are any.
+/// Initializes the instance, after failed attempts if `with_failures`.
 fn begin<F: Either>(fmu: &F, with_failures: bool) {
     fmu.set(&[U], &[0.5]);
     if with_failures {
@@ -55,8 +54,8 @@ fn begin<F: Either>(fmu: &F, with_failures: bool) {
     fmu.initialize(0.0);
 }
 
-/// Simulates in Co-Simulation with events in some steps. Returns the results of all steps.
-fn simulate<F: Either, M: Exported>(with_failures: bool) -> Vec<(Seen, Seen)> {
+/// Simulates in Co-Simulation, with events in some steps. Returns the readings before and after each step.
+fn simulate<F: Either, M: Exported>(with_failures: bool) -> Vec<(Readings, Readings)> {
     let fmu = F::new::<M>(CoSimulation);
     begin(&fmu, with_failures);
     let step = |step: u32| {
@@ -71,9 +70,9 @@ fn simulate<F: Either, M: Exported>(with_failures: bool) -> Vec<(Seen, Seen)> {
             }
         }
         fmu.set(&[U], &[0.1 + time]);
-        let before = seen(&fmu);
+        let before = readings(&fmu);
         fmu.step(time, 0.35);
-        (before, seen(&fmu))
+        (before, readings(&fmu))
     };
     (0..8).map(step).collect()
 }

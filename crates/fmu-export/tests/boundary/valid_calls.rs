@@ -9,8 +9,8 @@ use std::ffi::c_void;
 use std::mem::MaybeUninit;
 use std::ptr::without_provenance;
 
-/// Arguments of a call, as words, with the memory to which they point. Memory that the function writes is
-/// uninitialized.
+/// Arguments of a call as 64-bit words, with the memory to which they point. Memory that the function must write is
+/// uninitialized, so that Miri and valgrind detect missing values.
 pub struct ValidCall {
     pub function: &'static str,
     pub arguments: &'static [Argument],
@@ -65,7 +65,8 @@ impl ValidCall {
                         _ if is_handle(of) => 0,
                         _ => 1,
                     };
-                    // A pointer that is stored as an integer has no provenance.
+                    // The first word of the memory. It is stored as a pointer, because a pointer that is stored as an
+                    // integer has no provenance.
                     let content = match of {
                         "String" if read => c"text".as_ptr().cast(),
                         "Binary" if read => c"bytes".as_ptr().cast(),
@@ -106,16 +107,16 @@ impl ValidCall {
         call
     }
 
-    /// Makes the call, with other words than the valid ones if `change` changes them.
+    /// Makes the call after `change` has changed some of the words.
     pub fn make(&self, fmu: &impl Either, change: impl FnOnce(&mut [u64])) -> Status {
         let mut words = self.words.clone();
         change(&mut words);
-        // SAFETY: the pointers refer to enough memory, or the FMU must reject them without access.
+        // SAFETY: the pointers point to enough memory, or the FMU must reject them before it accesses them.
         unsafe { fmu.call(self.function, &words) }
     }
 
-    /// Reads all values that a successful call must have written; returns their number. Miri and valgrind detect
-    /// uninitialized values.
+    /// Reads all values that a successful call must have written, so that Miri and valgrind detect uninitialized ones.
+    /// Returns the number of values.
     pub fn read_outputs(&self) -> usize {
         let mut sizes = self.arguments.iter().zip(&self.words).filter(|(argument, _)| argument.of == "usize");
         let count = sizes.next_back().map_or(1, |(_, word)| *word as usize);
@@ -124,7 +125,7 @@ impl ValidCall {
         for ((of, _), memory) in outputs.filter(|((of, to_read), _)| !to_read && !is_handle(of)) {
             let start = memory.as_ptr();
             for index in 0..count {
-                // SAFETY: the call returned OK, so the values are written.
+                // SAFETY: the call returned OK, so it has written the values.
                 let value = unsafe {
                     match element_size(of, self.function) {
                         _ if of == "EventInfo" => {

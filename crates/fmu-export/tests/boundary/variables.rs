@@ -1,5 +1,4 @@
-//! Values of Strings, Booleans, Enumerations and rarer kinds of variables: section 2.2.7 of FMI 2.0, 2.2.6 of
-//! FMI 3.0.
+//! Values of Strings, Booleans, Enumerations, tunable parameters and time (section 2.2.7 of FMI 2.0, 2.2.6 of FMI 3.0).
 
 use crate::INTERFACES;
 use crate::models::grumbler::{self, Trouble};
@@ -17,8 +16,8 @@ pub fn texts<F: Either, const N: usize>(fmu: &F, names: [Name; N]) -> [String; N
     names.map(|name| fmu.string(name as u32))
 }
 
-/// Checks strings in both directions, several at once and repeated, of any length and script.
-fn texts_in_and_out<F: Either>() {
+/// Checks that strings of any length and script are set and read, several in one call and with repeated variables.
+fn strings_are_set_and_read<F: Either>() {
     let long = "long ".repeat(10_000);
     for interface in INTERFACES {
         let fmu = F::in_mode::<Talker>(interface, Initialization);
@@ -34,20 +33,20 @@ fn texts_in_and_out<F: Either>() {
     }
 }
 
-/// Checks that the strings of a call stay valid until the next call on this instance, regardless of other
-/// instances.
-fn how_long_texts_live<F: Either>() {
+/// Checks that the strings that a call returns stay valid until the next call on this instance, even if other instances
+/// are called in between.
+fn strings_stay_valid<F: Either>() {
     let [one, other] = [(); 2].map(|()| F::in_mode::<Talker>(CoSimulation, StepComplete));
     one.write_string(Name::heard as u32, "the one");
     let mut text = null();
     one.ok(one.get_string(Name::reply as u32, &mut text));
     other.write_string(Name::heard as u32, "the other");
     texts(&other, [Name::reply]);
-    // SAFETY: there was no call on this instance since.
+    // SAFETY: there was no later call on this instance.
     assert_eq!(unsafe { CStr::from_ptr(text) }, c"the one");
 }
 
-/// Checks that Enumerations accept only their items, and that a step uses them and the texts.
+/// Checks that Enumerations accept only their items, and that a step uses the items and strings that are set.
 fn enumerations<F: Either>() {
     let fmu = F::in_mode::<Talker>(CoSimulation, StepComplete);
     assert_eq!(texts(&fmu, [Name::said]), ["Hello"]);
@@ -79,8 +78,8 @@ fn booleans<F: Either>() {
     });
 }
 
-/// Checks a tunable parameter and a variable that depends on it, during the simulation; and that a
-/// calculation begins with the start value: different start values lead to different roots.
+/// Checks a variable that depends on a tunable parameter, during the simulation. Also checks that an iterative calculation
+/// begins at the start value, because different start values lead to different roots.
 fn tunable_and_calculated_variables<F: Either>() {
     for (interface, mode) in [(CoSimulation, StepComplete), (ModelExchange, Event)] {
         let fmu = F::in_mode::<Talker>(interface, mode);
@@ -105,13 +104,13 @@ fn the_time<F: Either>() {
     assert_eq!(fmu.get([time]), [0.0]);
     fmu.step(0.0, 0.5);
     assert_eq!(fmu.get([time]), [0.5]);
-    fmu.rejected("the time is not set like this", |fmu| fmu.try_set(&[time], &[1.0]));
+    fmu.rejected("the time is not settable", |fmu| fmu.try_set(&[time], &[1.0]));
     let fmu = F::in_mode::<Talker>(ModelExchange, ContinuousTime);
     fmu.ok(fmu.set_time(-3.0));
     assert_eq!(fmu.get([time]), [-3.0]);
 }
 
-/// Checks a user-defined type with only the required functions, and a value that is not finite.
+/// Checks a variable whose type is defined by the author of a model, with only the required functions.
 fn types_of_authors<F: Either>() {
     let fmu = F::in_mode::<Grumbler>(CoSimulation, Instantiated);
     let ambient = grumbler::Name::ambient as u32;
@@ -126,8 +125,8 @@ fn types_of_authors<F: Either>() {
 #[test]
 fn in_both_versions() {
     fn check<F: Either>() {
-        texts_in_and_out::<F>();
-        how_long_texts_live::<F>();
+        strings_are_set_and_read::<F>();
+        strings_stay_valid::<F>();
         enumerations::<F>();
         booleans::<F>();
         tunable_and_calculated_variables::<F>();
@@ -138,7 +137,7 @@ fn in_both_versions() {
     check::<fmi3::Importer>();
 }
 
-/// Checks several strings in one call of FMI 2.0; the last value of a repeated variable counts.
+/// Checks several strings in one call of FMI 2.0. If a variable is repeated, its last value is used.
 #[test]
 fn several_texts() {
     let fmu = Importer::in_mode::<Talker>(CoSimulation, StepComplete);
@@ -148,8 +147,8 @@ fn several_texts() {
     assert_eq!(texts(&fmu, [Name::heard, Name::greeting]), ["three", "two"]);
 }
 
-/// Checks every getter with every variable: only the function of its type succeeds. An Enumeration is an
-/// Integer in FMI 2.0 and an Int64 in FMI 3.0.
+/// Checks that only the getter of its type succeeds for each variable. An Enumeration is read as an Integer in FMI 2.0 and
+/// as an Int64 in FMI 3.0.
 #[test]
 fn wrong_types() {
     let (fmu, old) =
@@ -192,7 +191,7 @@ fn wrong_types() {
     }
 }
 
-/// Checks that value references of FMI 3.0 begin with 1; every function rejects 0.
+/// Checks that value references of FMI 3.0 begin with 1, and that all functions reject 0.
 #[test]
 fn value_references_count_from_1() {
     let (fmu, mut value) = (fmi3::Importer::initialized_at::<Oscillator>(0.0), 0.0);
@@ -207,7 +206,8 @@ fn value_references_count_from_1() {
     fmu.rejected_with(&words, |fmu| fmu.fmi3GetDirectionalDerivative(&0, 1, &1, 1, &1.0, 1, &mut value, 1));
 }
 
-/// Checks that every model of FMI 3.0 has a time: in its table, or after all other variables.
+/// Checks that every FMU for FMI 3.0 has the independent variable `time`: the one of the model's table, or else one that
+/// follows all other variables.
 #[test]
 fn the_time_of_fmi3() {
     fn check<M: Exported>() {
@@ -230,7 +230,7 @@ fn the_time_of_fmi3() {
     fmu.rejected("the time", |fmu| fmu.try_get(&[Palette::TABLE.len() as u32], &mut [0.0]));
 }
 
-/// Checks that a value that is not finite is not read.
+/// Checks that reading a value that is not finite is rejected.
 #[test]
 fn out_of_the_range_of_float32() {
     let (fmu, mut value) = (fmi3::Importer::new::<Grumbler>(CoSimulation), f32::NAN);

@@ -1,5 +1,6 @@
-/* Simulates the FMU like an importer in C: drive LIBRARY GUID.
-   Prints "name value" for what the tests compare. With TESTBED defined the FMU is the testbed, else the oscillator. */
+/* Simulates an FMU as an importer in C does: drive LIBRARY GUID.
+   Prints a line "name value" for each value that the tests compare. The FMU is the test model Oscillator, or the testbed
+   if TESTBED is defined. */
 #include "fmu.h"
 
 #ifdef TESTBED
@@ -53,13 +54,13 @@ static void layout(void) {
     CHECK(strcmp(fmi2GetVersion(), "2.0") == 0);
 }
 
-/* A Boolean is an int, and only that int is written. */
+/* Checks that a Boolean is an int of which only 0 and 1 are accepted, and that a getter writes only one int. */
 static void booleans(unsigned reference) {
     fmi2Component c = instantiate(fmi2CoSimulation);
     fmi2Boolean values[] = {-1, -1}, yes = 1, two = 256;
     CHECK(fmi2SetBoolean(c, &reference, 1, &two) == fmi2Error && messages == 1);
     CHECK(fmi2SetupExperiment(c, 0, 0, 0, 0, 0) == fmi2OK);
-    /* Initialization Mode is rejected until the value is set. */
+    /* Entering Initialization Mode is rejected until a valid value is set. */
     CHECK(fmi2EnterInitializationMode(c) == fmi2Error && messages == 2);
     CHECK(fmi2SetBoolean(c, &reference, 1, &yes) == fmi2OK);
     CHECK(fmi2EnterInitializationMode(c) == fmi2OK);
@@ -68,7 +69,7 @@ static void booleans(unsigned reference) {
     fmi2FreeInstance(c);
 }
 
-/* One input increases at the rate 1; another input is this rate. */
+/* Sets the first input to the time. The testbed's second input is the rate of the first, 1. */
 static void set_inputs(fmi2Component c, double t) {
     const fmi2Real values[] = {t, 1};
     CHECK(fmi2SetReal(c, inputs, sizeof inputs / sizeof *inputs, values) == fmi2OK);
@@ -98,7 +99,8 @@ static void co_simulation(void) {
     for (i = 0; i < 4; ++i) printf("cs%d %.17g\n", i, values[i]);
 }
 
-/* Forward Euler is accurate enough to detect missing values. */
+/* Simulates in Model Exchange with the explicit Euler method, because the results need not be accurate: the test compares
+   them with the same calculation in Rust. */
 static void model_exchange(void) {
     fmi2Real x[STATES + 1] = {0}, der[STATES + 1] = {0}, nominals[STATES], values[4];
     struct { char before[8]; fmi2EventInfo info; char after[8]; } event;
@@ -136,13 +138,13 @@ static void model_exchange(void) {
     for (i = 0; i < 4; ++i) printf("me%d %.17g\n", i, values[i]);
 }
 
-/* FMPy unloads the library after each simulation, so the library must be removed from the process. */
+/* Checks that the library can be unloaded from the process, as FMPy does after each simulation. */
 static void load_and_unload(const char *path) {
     int i;
     for (i = 0; i < 100; ++i) {
         void *library = load(path);
         fmi2Component c = instantiate(i % 2 ? fmi2CoSimulation : fmi2ModelExchange);
-        CHECK(c && fmi2Terminate(c) == fmi2Error); /* with a message */
+        CHECK(c && fmi2Terminate(c) == fmi2Error); /* logs a message */
         fmi2FreeInstance(c);
         CHECK(dlclose(library) == 0);
         CHECK(!dlopen(path, RTLD_NOW | RTLD_NOLOAD)); /* the library is unloaded */

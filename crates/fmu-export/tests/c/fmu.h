@@ -1,4 +1,4 @@
-/* Loads the shared library of an FMU, with the types of the standards' headers. */
+/* Loads the functions of an FMU's shared library, with their types from the headers of the FMI standards. */
 #ifndef FMU_H
 #define FMU_H
 
@@ -71,7 +71,7 @@ static inline void *load(const char *path) {
     void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (!library) fprintf(stderr, "%s\n", dlerror());
     CHECK(library);
-    /* ISO C has no cast from data pointers to function pointers, POSIX wants this. */
+    /* ISO C cannot cast a data pointer to a function pointer; POSIX recommends this assignment for dlsym. */
 #define LOAD(name) *(void **)&fmi2##name = symbol(library, "fmi2" #name);
     FMI2_FUNCTIONS(LOAD)
 #undef LOAD

@@ -1,5 +1,5 @@
-/* Two ways of real importers to show a log message: one formats it as printf does, one takes the format
-   string as it is. Both must get the same text, whatever is in it: loggers LIBRARY GUID. */
+/* Some importers format a log message as printf does, others show the format string unchanged. Checks that both show the
+   same text, regardless of the characters in it: loggers LIBRARY GUID. */
 #include "fmu.h"
 #include <stdarg.h>
 
@@ -22,7 +22,7 @@ static void take(fmi2ComponentEnvironment environment, fmi2String instance_name,
     snprintf(plain[plain_count++], 1000, "[%s] %s", instance_name, message);
 }
 
-/* Calls whose messages quote strings of the importer. */
+/* Makes calls whose messages quote strings that the importer has passed. */
 static void provoke(const char *guid, fmi2CallbackFunctions callbacks) {
     const fmi2String wishes[] = {"%s%s%n", "#r1#"};
     const unsigned vr = 99;

@@ -32,7 +32,7 @@ static struct fmu open_fmu(const char *path) {
     return fmu;
 }
 
-/* Each FMU rejects a wrong guid and reports its own. */
+/* Reads the guid of an FMU from the message with which it rejects a wrong one. */
 static void learn_guid(fmi2ComponentEnvironment guid, fmi2String instance, fmi2Status status, fmi2String category,
                        fmi2String message, ...) {
     const char *own = strstr(message, "library's {");
@@ -83,7 +83,7 @@ static void use(struct fmu *fmu) {
     }
 }
 
-/* Frees the instances, beginning with `first`. Some saved states are freed before their instances, some with them. */
+/* Frees the instances, beginning with `first`. Some saved states are freed explicitly, others with their instances. */
 static void free_all(struct fmu *fmu, int first) {
     int i;
     for (i = 0; i < INSTANCES; ++i) {

@@ -1,6 +1,6 @@
-//! Names that are defined twice, and names that nothing has.
+//! Names that are defined twice, and names that are not defined.
 
-// Names are unique.
+// Variables must have different names.
 mod two_of_one_name {
     include!("shared/fields.rs");
 
@@ -12,7 +12,7 @@ mod two_of_one_name {
     }
 }
 
-// Other variables are named by their names.
+// Only variables of the table can be named in a line.
 mod unknown_names {
     include!("shared/fields.rs");
 

@@ -1,5 +1,5 @@
-//! Tables and capabilities that contradict themselves, detected while constants are evaluated. The description of a variable
-//! is the rule that its line violates.
+//! Invalid tables and capabilities that are detected while constants are evaluated. The description of a variable is the
+//! rule that its line violates.
 
 mod lines {
     include!("shared/fields.rs");
@@ -37,7 +37,7 @@ mod lines {
         integer_derivative = local(&INTEGER).derivative_of(x) by |plant| plant.n;
         /// A continuous variable is a Real (section 2.2.7 of FMI 2.0)
         integer_state = output(&INTEGER).state() in n;
-        // A variable has a description.
+        // A variable has a description, which this one lacks.
         no_description = input(&NUMBER) in u;
         /// A variable has a field or a calculation
         nothing = output(&NUMBER);
@@ -64,7 +64,7 @@ mod lines {
     }
 }
 
-// A capability that is implemented is named.
+// A capability that is implemented must be named in `offer!`.
 mod capability_not_named {
     include!("shared/model.rs");
 

@@ -1,6 +1,6 @@
 //! Types, fields and functions that do not exist or do not fit.
 
-// A capability that is named is implemented.
+// A capability that is named in `offer!` must be implemented.
 mod capability_not_implemented {
     include!("shared/fields.rs");
 
@@ -20,14 +20,14 @@ mod capability_not_implemented {
     offer!(Plant: CoSimulation);
 }
 
-// A capability is named once.
+// A capability must be named only once.
 mod capability_twice {
     include!("shared/model.rs");
 
     offer!(Plant: CoSimulation + CoSimulation);
 }
 
-// No variable is a character.
+// `char` is not a type of variables.
 mod no_type_for_values {
     include!("shared/fields.rs");
 
@@ -37,7 +37,7 @@ mod no_type_for_values {
     }
 }
 
-// No variable is a duration.
+// `Duration` is not a type of variables.
 mod no_type_in_place {
     use fmu_export::*;
 
@@ -52,7 +52,7 @@ mod no_type_in_place {
     }
 }
 
-// A place is a field of the model, and a kind is a function of Variable.
+// After `in`, a field of the model is needed, and after `=` a function of `Variable`.
 mod unknown_names {
     include!("shared/fields.rs");
 

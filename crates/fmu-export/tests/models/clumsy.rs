@@ -1,4 +1,4 @@
-//! Models that change everything they have, and then fail.
+//! Models that overwrite their fields before they fail, for tests that the library undoes failed calls.
 
 use fmu_export::*;
 
@@ -15,7 +15,7 @@ pub enum Fails {
     Update,
 }
 
-/// Defines such a model. Its memory is of any type that collects numbers; `trace` must end a new number.
+/// Defines such a model. `$memory` is the type of `trace`, which stores the last three numbers.
 macro_rules! clumsy {
     ($model:ident, $names:ident, $memory:ty) => {
         #[derive(Clone, Default)]
@@ -26,15 +26,15 @@ macro_rules! clumsy {
             gain: f64,
             fails: i32,
             trace: $memory,
-            /// Sum of `trace`; `restored` updates it.
+            /// Sum of `trace`, which is not saved; `restored` calculates it again.
             sum: f64,
-            /// Gain times u; `update` and `calculate` update it.
+            /// Gain times u, calculated by `update` and `calculate`.
             product: f64,
             next: f64,
-            /// Follows u until the first step.
+            /// Equal to u until the first step.
             level: f64,
             has_stepped: bool,
-            /// Only `calculate` updates it.
+            /// Calculated only by `calculate`.
             shown: f64,
         }
 
@@ -60,6 +60,7 @@ macro_rules! clumsy {
         }
 
         impl $model {
+            /// If `fails` is true, overwrites the fields and returns an error.
             fn fail_if(&mut self, fails: bool) -> Result<(), Error> {
                 if !fails {
                     return Ok(());
@@ -151,7 +152,9 @@ macro_rules! clumsy {
     };
 }
 
+/// A memory of three numbers.
 trait Collects {
+    /// Adds a number and removes the oldest one.
     fn collect(&mut self, number: f64);
 }
 

@@ -1,8 +1,9 @@
-//! A counter that is asked in regular intervals: time events, event iteration, Integers and Booleans.
+//! A counter with a fixed period: time events, event iteration, Integers and Booleans.
 
 use fmu_export::*;
 
-/// Adds its input to a count in every period, and carries where the count is full.
+/// Adds its input to a count in every period. When the count reaches `full`, the counter divides it by `full`: the quotient
+/// is added to `carries`, and the remainder stays.
 #[derive(Clone)]
 pub struct Counter {
     on: bool,
@@ -76,7 +77,8 @@ impl Model for Counter {
 }
 
 impl ModelExchange for Counter {
-    /// Does at most one thing; if more is due at the same time, the importer calls again (section 3.2.2 of FMI 2.0).
+    /// Either carries or counts, not both. If more is due at the same time, the event requests another iteration (section
+    /// 3.2.2 of FMI 2.0).
     fn event(&mut self, time: f64) -> Result<Event, Error> {
         if self.count >= self.full {
             self.carry();
@@ -91,7 +93,7 @@ impl ModelExchange for Counter {
 impl CoSimulation for Counter {
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         const MOST: f64 = 1000.0;
-        // The last count of a step happens even if rounding has the step end just before it.
+        // A tick at the end of the step belongs to this step even if a rounding error puts it just after the end.
         let end = step.time + step.size + 1e-9 * self.period;
         if end - self.next > MOST * self.period || end + self.period == end {
             return Err(Error::new(format!("a step may have {MOST} periods, and they must not vanish")));

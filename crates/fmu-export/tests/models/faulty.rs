@@ -1,9 +1,9 @@
-//! A model whose every method can panic; not an example for authors.
+//! A model of which every method can panic. It is not an example for authors.
 
 use fmu_export::*;
 use std::cell::Cell;
 
-/// Where it breaks.
+/// The method in which the model panics.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(i32)]
 pub enum Fault {
@@ -26,21 +26,21 @@ pub enum Fault {
     OutputDerivative,
     Memory,
     Drop,
-    /// With a payload that is not a string.
+    /// Panics in a getter with a payload that is not a string.
     NoMessage,
-    /// With a payload whose drop panics with such a payload.
+    /// Panics in a getter with a payload that panics when it is dropped, with a payload that does the same.
     Bomb,
-    /// In the next instance or copy, regardless of the parameter.
+    /// Set for all instances by [`while_all_break`], not by the parameter; so is `Clone`.
     New,
     Clone,
 }
 
 thread_local! {
-    /// Breaks every new instance or every copy.
+    /// [`Fault::New`] or [`Fault::Clone`] while every new instance or every copy panics.
     static EVERYWHERE: Cell<Fault> = const { Cell::new(Fault::None) };
 }
 
-/// Runs the work while every new instance or copy breaks.
+/// Runs the work while every new instance ([`Fault::New`]) or every copy ([`Fault::Clone`]) panics.
 pub fn while_all_break<T>(fault: Fault, work: impl FnOnce() -> T) -> T {
     EVERYWHERE.set(fault);
     let result = work();
@@ -48,7 +48,7 @@ pub fn while_all_break<T>(fault: Fault, work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Breaks in the method that its parameter names.
+/// Panics in the method that the parameter `fault` selects.
 pub struct Faulty {
     fault: i32,
     number: f64,
@@ -58,7 +58,7 @@ pub struct Faulty {
     memory: Memory,
 }
 
-/// Memory besides the variables: the fault again.
+/// A `memory` field that stores the fault, so that visiting it can panic too.
 #[derive(Clone)]
 struct Memory(i32);
 

@@ -1,9 +1,9 @@
-//! A model whose steps end early, and one way or the other the simulation.
+//! A model of which some steps end early, and one ends the simulation.
 
 use fmu_export::*;
 
-/// Warms up under a load. A step that crosses 100 degrees ends there, for the importer to know when that was; at 200 it
-/// melts, and the simulation ends.
+/// Warms up under a load. A step that would exceed 100 degrees ends early at 100, so that the importer learns the time. At
+/// 200 degrees the fuse melts, and the simulation ends.
 #[derive(Clone)]
 pub struct Fuse {
     load: f64,
@@ -34,10 +34,10 @@ impl CoSimulation for Fuse {
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         let (start, end) = (self.temperature, self.temperature + self.load * step.size);
         if !end.is_finite() {
-            return Err(Error::new("nothing gets as hot as that"));
+            return Err(Error::new("the temperature leaves the range of numbers"));
         }
         let time_of = |temperature: f64| step.time + (temperature - start).max(0.0) / self.load;
-        // A step to just there, up to rounding, is not early.
+        // A step that ends at 100 degrees, within rounding error, is not early.
         if start < HOT - 1e-6 && end > HOT + 1e-6 {
             self.temperature = HOT;
             return Ok(Stepped::Early(time_of(HOT)));

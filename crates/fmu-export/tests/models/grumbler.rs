@@ -1,4 +1,4 @@
-//! A clock that fails where its parameter requests it, after a warning.
+//! A clock that logs a warning and then fails in the method that its parameter selects.
 
 use fmu_export::*;
 
@@ -24,7 +24,7 @@ enumeration! {
     }
 }
 
-/// A temperature, as an author may wrap it, with only the required functions.
+/// A temperature in a type that the author of a model may define, with only the required functions.
 #[derive(Clone, Copy)]
 pub struct Celsius(pub f32);
 
@@ -48,7 +48,7 @@ impl Scalar for Celsius {
     }
 }
 
-/// Has an event of two rounds every second, and no more after the last.
+/// Has an event with two iterations every second, until the time `last`.
 #[derive(Clone)]
 pub struct Grumbler {
     trouble: Trouble,
@@ -56,7 +56,7 @@ pub struct Grumbler {
     warmer: f32,
     rounds: i32,
     last: f64,
-    /// Time of the next event; infinity for never.
+    /// Time of the next event; infinity if there is none.
     next: f64,
     log: Log,
 }

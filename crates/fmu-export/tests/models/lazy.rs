@@ -1,4 +1,4 @@
-//! A model that calculates values once before they are read, and uses them in events.
+//! A model that calculates values in `calculate`, once before they are read, and uses them in events.
 
 use fmu_export::*;
 

@@ -1,15 +1,16 @@
-//! A model with numbers in every kind of field, a state that starts at rest, and `step_fast`.
+//! A model with Reals in every kind of field, a state whose start value is calculated, and `step_fast`.
 
 use fmu_export::*;
 use std::ops::{Index, IndexMut};
 
+/// A value, and a mark that its setter sets.
 #[derive(Clone, Default)]
-pub struct Wire {
+pub struct Marked {
     value: f64,
     is_set: bool,
 }
 
-/// Two numbers whose first changes its place in memory with every step.
+/// Two numbers that exchange their indices in every step, so that element 0 changes its address.
 #[derive(Clone, Default)]
 pub struct Ring {
     begin: usize,
@@ -30,12 +31,12 @@ impl IndexMut<usize> for Ring {
     }
 }
 
-/// Adds up its inputs. A level on a spring follows one of them.
+/// Adds up its inputs. A level on a spring follows the first of them.
 #[derive(Clone, Default)]
 pub struct Meter {
     plain: f64,
-    wires: [Wire; 2],
-    boxed: Box<Wire>,
+    marked: [Marked; 2],
+    boxed: Box<Marked>,
     list: Vec<f64>,
     ring: Ring,
     counted: i32,
@@ -43,19 +44,19 @@ pub struct Meter {
     stiffness: f64,
     has_started: bool,
     total: f64,
-    steps_at_once: i32,
+    fast_steps: i32,
 }
 
 const STIFFNESS: Type = Type::real("Stiffness", &units::ONE).min(0.5);
 
-variables! { for Meter, memory in has_started, ring.begin, ring.values, counted, steps_at_once,
-    wires[0].is_set, wires[1].is_set, boxed.is_set;
+variables! { for Meter, memory in has_started, ring.begin, ring.values, counted, fast_steps,
+    marked[0].is_set, marked[1].is_set, boxed.is_set;
     /// In a field
     plain = input(&NUMBER) in plain;
     /// In an array, with a mark
-    first = input(&NUMBER) in wires[0].value then wires[0].is_set;
+    first = input(&NUMBER) in marked[0].value then marked[0].is_set;
     /// In an array, with a mark and an action
-    second = input(&NUMBER) in wires[1].value then wires[1].is_set then |meter| { meter.counted += 1 };
+    second = input(&NUMBER) in marked[1].value then marked[1].is_set then |meter| { meter.counted += 1 };
     /// Behind a pointer, and so is its mark
     boxed = input(&NUMBER) in boxed.value then boxed.is_set;
     /// In a vector
@@ -66,9 +67,9 @@ variables! { for Meter, memory in has_started, ring.begin, ring.values, counted,
     total = output(&NUMBER) from total;
     /// Sum, calculated when it is read
     sum = output(&NUMBER) by |meter| meter.sum();
-    /// Number of marks that are set, plus 10 times the number of times that the second wire was set
+    /// Number of marks that are set, plus 10 times the number of times that the second input was set
     marks = output(&INTEGER) by |meter| {
-        10 * meter.counted + meter.wires.iter().chain([&*meter.boxed]).map(|wire| i32::from(wire.is_set)).sum::<i32>()
+        10 * meter.counted + meter.marked.iter().chain([&*meter.boxed]).map(|input| i32::from(input.is_set)).sum::<i32>()
     };
     /// Starts at rest: at the number in a field, divided by the stiffness
     level = output(&NUMBER).state().calculated().depends_on(&[plain, stiffness]) in level
@@ -78,13 +79,13 @@ variables! { for Meter, memory in has_started, ring.begin, ring.values, counted,
     /// Stiffness of the spring that carries the level
     stiffness = parameter(&STIFFNESS) in stiffness;
     /// Steps that `step_fast` made
-    steps_at_once = local(&INTEGER) by |meter| meter.steps_at_once;
+    fast_steps = local(&INTEGER) by |meter| meter.fast_steps;
 }
 
 impl Meter {
     fn sum(&self) -> f64 {
-        let wires = self.wires.iter().chain([&*self.boxed]).map(|wire| wire.value);
-        self.plain + wires.sum::<f64>() + self.list[1] + self.ring[0]
+        let marked = self.marked.iter().chain([&*self.boxed]).map(|input| input.value);
+        self.plain + marked.sum::<f64>() + self.list[1] + self.ring[0]
     }
 }
 
@@ -111,7 +112,7 @@ impl CoSimulation for Meter {
         self.has_started = true;
         self.level += step.size;
         self.ring.begin += 1;
-        self.wires.iter_mut().chain([&mut *self.boxed]).for_each(|wire| wire.is_set = false);
+        self.marked.iter_mut().chain([&mut *self.boxed]).for_each(|input| input.is_set = false);
         if step.size == 2.0 {
             self.total = self.sum();
             return Ok(Stepped::Calculated);
@@ -119,12 +120,12 @@ impl CoSimulation for Meter {
         Ok(Stepped::Done)
     }
 
-    /// Only steps of size 1 use this path.
+    /// Only steps of size 1 are fast.
     fn step_fast(&mut self, size: f64) -> bool {
         if size != 1.0 {
             return false;
         }
-        self.steps_at_once += 1;
+        self.fast_steps += 1;
         let stepped = self.step(Step::new(0.0, size));
         self.total = self.sum();
         stepped.is_ok()
@@ -149,7 +150,7 @@ impl Partials for Meter {
         })
     }
 
-    /// level = plain / stiffness, at rest.
+    /// In the initialization, level = plain / stiffness.
     fn initial_partial(&self, unknown: Name, known: Name) -> Option<f64> {
         Some(match (unknown, known) {
             (Name::total | Name::sum, _) => return self.partial(unknown, known),

@@ -2,7 +2,7 @@
 
 use fmu_export::*;
 
-/// m v' = F - k x - c v, solved exactly for forces that are straight lines in time.
+/// m v' = F - k x - c v, solved exactly if the force changes linearly during a step.
 #[derive(Clone)]
 pub struct Oscillator {
     force: f64,
@@ -68,7 +68,7 @@ impl Oscillator {
         (self.force - self.all_springs() * self.position - self.damper() * self.velocity) / self.mass
     }
 
-    /// Half the sum of the eigenvalues with the sign of decay, and the square of the frequency.
+    /// Returns the decay rate, which is the negative real part of the eigenvalues, and the square of the angular frequency.
     fn decay_and_frequency_squared(&self) -> (f64, f64) {
         let decay = 0.5 * self.damper() / self.mass;
         (decay, self.all_springs() / self.mass - decay * decay)
@@ -78,7 +78,7 @@ impl Oscillator {
 impl Model for Oscillator {
     const INFO: Info = Info {
         description: "Mass on springs",
-        guid: "{oscillator}", // Tests have no build script that makes one.
+        guid: "{oscillator}", // The guid of a real FMU is a hash that fmu-package calculates.
         ..info!("Oscillator", "oscillator")
     };
 
@@ -110,7 +110,7 @@ impl Model for Oscillator {
 impl CoSimulation for Oscillator {
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         let (k, c, slope, h) = (self.all_springs(), self.damper(), self.slope.unwrap_or(0.0), step.size);
-        // One solution follows the force, x = a + b t; what is missing to the start value rings out.
+        // x = a + b t is one solution. The difference between it and the start values is a decaying oscillation.
         let b = slope / k;
         let a = (self.force - c * b) / k;
         let (x, v) = (self.position - a, self.velocity - b);
@@ -146,7 +146,7 @@ impl Partials for Oscillator {
             (Name::spring_force, Name::stiffness) => -f64::from(self.springs) * self.position,
             (Name::energy, Name::position) => k * self.position,
             (Name::energy, Name::velocity) => m * self.velocity,
-            // Not provided, for tests of the error.
+            // Not provided, so that tests can check the error message.
             (Name::energy, Name::mass | Name::stiffness | Name::damping) => return None,
             _ => 0.0,
         })

@@ -1,4 +1,4 @@
-//! A value of every type.
+//! A model with a variable of every type.
 
 use fmu_export::*;
 
@@ -12,7 +12,7 @@ enumeration! {
     }
 }
 
-/// Keeps the values that are set.
+/// Stores the values that are set and calculates nothing.
 #[derive(Clone, Default)]
 pub struct Palette {
     float64: f64,

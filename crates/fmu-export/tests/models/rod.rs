@@ -1,4 +1,5 @@
-//! A heated rod: arrays of every kind that both standards have, as states, inputs, parameters and outputs.
+//! A heated rod with arrays of Reals, Integers, Booleans, Strings and Enumerations, as states, inputs, parameters and
+//! outputs.
 
 use fmu_export::*;
 
@@ -15,7 +16,8 @@ enumeration! {
     }
 }
 
-/// C T' = conductance of the neighbours' differences + power of the heater, with the far end in still air.
+/// Each piece obeys C T' = conductance times the temperature differences to its neighbours + power of its heater. The far
+/// end of the rod is insulated.
 #[derive(Clone)]
 pub struct Rod {
     wall: f64,
@@ -158,7 +160,7 @@ impl Model for Rod {
 }
 
 impl CoSimulation for Rod {
-    /// Euler's rule, in steps that are short for any capacity.
+    /// Uses the explicit Euler method, with substeps that are short enough for any capacity.
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         let count = (step.size / 0.01).ceil().clamp(1.0, 1e4);
         let mut next = self.temperatures;
@@ -167,7 +169,7 @@ impl CoSimulation for Rod {
             next.iter_mut().zip(rates).for_each(|(next, rate)| *next += step.size / count * rate);
         }
         if !next.iter().all(|temperature| temperature.is_finite()) {
-            return Err(Error::new("the rod gets hotter than numbers can say"));
+            return Err(Error::new("a temperature leaves the range of numbers"));
         }
         self.temperatures = next;
         self.look();

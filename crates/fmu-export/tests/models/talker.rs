@@ -1,4 +1,5 @@
-//! Strings, names and the rarer kinds of variables; messages, resources, and the experiment.
+//! A model with Strings and rare kinds of variables that uses log messages, resources, the name of its instance and the
+//! experiment.
 
 use fmu_export::*;
 
@@ -14,7 +15,7 @@ enumeration! {
     }
 }
 
-/// Says what it hears, in its own way.
+/// Repeats what it hears, in a way that depends on its mood.
 #[derive(Clone)]
 pub struct Talker {
     heard: String,
@@ -24,7 +25,7 @@ pub struct Talker {
     radicand: f64,
     guess: f64,
     root: f64,
-    /// All that it has said.
+    /// All replies so far, after the greeting.
     said: Vec<String>,
     who: String,
     words: String,
@@ -127,7 +128,7 @@ impl Model for Talker {
         Ok(())
     }
 
-    /// Newton's method begins with the start value; a few rounds more or less do not matter.
+    /// Calculates the root with at most 60 iterations of Newton's method, which begins at the start value.
     fn calculate(&mut self, _: f64) {
         let rounds = (0..60).try_fold(self.guess, |root, _| {
             let next = 0.5 * (root + self.radicand / root);

@@ -1,4 +1,4 @@
-//! Every function that runs code of a model, with the fault that breaks it.
+//! A call of every function that runs code of the model, with the fault that makes this code panic.
 
 use crate::models::Faulty;
 use crate::models::faulty::{Fault, Name, while_all_break};
@@ -10,7 +10,7 @@ use fmu_test_kit::{Either, Importer, fmi3};
 use std::ffi::c_void;
 use std::ptr::{null, null_mut};
 
-/// A call that breaks an instance of this interface type with this fault, and its names without `fmi2` and `fmi3`.
+/// Interface type, name of the function without `fmi2` and without `fmi3`, fault, and a call that panics with this fault.
 pub type Case<F> = (Interface, [&'static str; 2], Fault, fn(&F) -> Status);
 
 /// Calls that both FMI versions have.
@@ -115,7 +115,7 @@ impl Special for fmi3::Importer {
         (CoSimulation, ["", "GetAdjointDerivative"], Fault::Partial, |fmu| {
             fmu.fmi3GetAdjointDerivative(&reference(Y), 1, &reference(U), 1, &1.0, 1, &mut 0.0, 1)
         }),
-        // The variable of the indicator.
+        // The variable that represents the event indicator.
         (ModelExchange, ["", "GetFloat64"], Fault::Indicators, |fmu| {
             fmu.try_get(&[indicator::<Faulty>(0)], &mut [0.0])
         }),

@@ -1,7 +1,7 @@
-//! The model as a shared library, which is made into C sources for a test.
+//! The model as a library, which a test converts to C sources.
 
 #[path = "../models/faulty.rs"]
-#[allow(dead_code, reason = "some of it is for tests in the same program")]
+#[allow(dead_code, reason = "only tests use some of its functions")]
 mod faulty;
 
 fmu_export::symbols!(faulty::Faulty);

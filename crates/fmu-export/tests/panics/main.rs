@@ -1,5 +1,5 @@
-//! A model whose every method can panic: the importer gets `fmi2Fatal` or `fmi3Fatal` and a message, and its process, its
-//! other instances and its memory are safe.
+//! Panics of a model, in every method: the importer gets `fmi2Fatal` or `fmi3Fatal` and a message, and neither its
+//! process, nor other instances, nor its memory are affected.
 #![allow(missing_docs)]
 
 #[path = "../models/mod.rs"]
@@ -28,7 +28,7 @@ fn initialized<F: Either>(interface: Interface) -> F {
     fmu
 }
 
-/// Runs the call, which must be fatal, with one message about it.
+/// Asserts that the call is fatal and logs one message about it; returns the message.
 #[track_caller]
 fn fatal<F: Either>(fmu: &F, label: &str, call: impl FnOnce(&F) -> Status) -> String {
     fmu.take_log();
@@ -41,19 +41,19 @@ fn fatal<F: Either>(fmu: &F, label: &str, call: impl FnOnce(&F) -> Status) -> St
     log[0].message.clone()
 }
 
-/// Faults that show as soon as the parameter says so: it is set by the call itself.
-fn appears_at_once(fault: Fault) -> bool {
+/// Returns whether the fault already occurs in the call that sets the parameter.
+fn occurs_when_set(fault: Fault) -> bool {
     [Fault::Update, Fault::Log].contains(&fault)
 }
 
-/// One test for both FMI versions, because the messages of Rust about panics are switched off for the whole process.
+/// Checks both FMI versions in one test, because Rust's output about panics can only be disabled for the whole process.
 #[test]
 fn every_panic_is_contained() {
     contained::<Importer>();
     contained::<fmi3::Importer>();
 }
 
-/// The name of a function in the standard.
+/// Returns the name of a function with the prefix of its FMI version.
 fn named<F: Either>(name: &str) -> String {
     format!("{}{name}", &F::functions()[0][..4])
 }
@@ -81,12 +81,13 @@ fn contained<F: Special>() {
     (0..3).for_each(|_| _ = fmu.save());
     without_output(|| drop(fmu));
 
-    // A panic while one is made, for the first time and by a reset.
+    // A panic while an instance is reset or created is reported.
     let fmu = F::new::<Faulty>(CoSimulation);
     fatal(&fmu, "reset", |fmu| while_all_break(Fault::New, || fmu.reset()));
     check_that_all_is_over(&fmu);
     let none = || F::make::<Faulty>(&Arguments::new::<Faulty>(CoSimulation)).map(drop);
-    let log = without_output(|| while_all_break(Fault::New, none)).expect_err("no instance comes of a panic");
+    let log = without_output(|| while_all_break(Fault::New, none))
+        .expect_err("a panic while an instance is created");
     let [message] = log.as_slice() else {
         panic!("a message about a panic while an instance is made: {log:?}")
     };
@@ -99,11 +100,11 @@ fn contained<F: Special>() {
     assert_eq!([co_simulation.take_log(), model_exchange.take_log()], [vec![], vec![]]);
 }
 
-/// Breaks an instance with the call; `bystanders` do not notice.
+/// Asserts that the call is fatal for its instance and leaves the `bystanders`, two other instances, usable.
 fn is_contained<F: Either>((interface, names, fault, call): Case<F>, bystanders: &[F; 2]) {
     let name = named::<F>(names[usize::from(named::<F>("") == "fmi3")]);
     let fmu: F = initialized(interface);
-    if !appears_at_once(fault) {
+    if !occurs_when_set(fault) {
         fmu.ok(set_fault(&fmu, fault));
     }
     if interface == ModelExchange {
@@ -123,8 +124,9 @@ fn is_contained<F: Either>((interface, names, fault, call): Case<F>, bystanders:
     }
 }
 
-/// Tests the compiled C sources of the model, which `FMU_LIBRARY` names (`make test-source-fmu`). Some faults
-/// break all instances of a process, so they are tested only in this program.
+/// Tests the library that `FMU_LIBRARY` names, which was compiled from the C sources of the model (`make test-source-fmu`).
+/// Cases with the fault `None` are left out, because [`while_all_break`] has no effect in that library. Panics while a model
+/// is dropped or saved end differently there, so the cases with `Drop` and `Memory` are replaced by one case of saving.
 #[test]
 #[ignore = "needs compiled C sources"]
 fn every_panic_of_c_sources_is_contained() {
@@ -144,7 +146,7 @@ fn every_panic_of_c_sources_is_contained() {
     std::thread::scope(|scope| (0..4).for_each(|_| _ = scope.spawn(on_a_thread)));
 }
 
-/// Runs the work without the messages that Rust prints about panics.
+/// Runs the work without Rust's output about panics.
 fn without_output<T>(work: impl FnOnce() -> T) -> T {
     std::panic::set_hook(Box::new(|_| {}));
     let result = work();
@@ -152,12 +154,12 @@ fn without_output<T>(work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// After a panic every function is fatal and says so; only freeing is left, which the end of the test does.
+/// Asserts that every function returns fatal and logs a message after a panic. The instance can then only be freed.
 fn check_that_all_is_over<F: Either>(fmu: &F) {
-    let answers = fmu.call_all();
+    let statuses = fmu.call_all();
     let log = fmu.take_log();
-    assert_eq!(answers.len(), log.len());
-    for ((name, status), message) in answers.iter().zip(&log) {
+    assert_eq!(statuses.len(), log.len());
+    for ((name, status), message) in statuses.iter().zip(&log) {
         assert_eq!((*status, message.status), (Status::Fatal, Status::Fatal), "{name}");
         assert!(message.message.starts_with(name) && message.message.contains("fatal"), "{message:?}");
         assert_eq!(message.category, "logStatusFatal");

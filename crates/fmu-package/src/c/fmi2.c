@@ -19,8 +19,8 @@ typedef struct {
     fmi2ComponentEnvironment environment;
     char *name;
     u32 component; /* the instance in the module */
-    u32 room;      /* memory of the module for arguments */
-    u32 room_size;
+    u32 buffer;    /* memory of the module for arguments */
+    u32 buffer_size;
     bool dead; /* after a failure that the module cannot report */
 } Instance;
 
@@ -55,7 +55,7 @@ static void begin(Call *call, Instance *instance, const char *function) {
     call->instance = instance;
     call->function = function;
     call->stack = instance->module.FMU_STACK;
-    call->next = instance->room;
+    call->next = instance->buffer;
     call->endless = false;
     instance->module.w2c_memory.trap = &call->trap;
     instance->module.w2c_memory.is_full = false;
@@ -73,7 +73,7 @@ static u32 count(const Call *call, size_t n) {
 
 /* Allocates `n` times `each` bytes for arguments, and `more` bytes for gaps and other arguments. The module rejects a
    length that no array can have. */
-static inline bool room(Call *call, size_t n, size_t each, size_t more) {
+static inline bool reserve(Call *call, size_t n, size_t each, size_t more) {
     Instance *instance = call->instance;
     size_t size;
     if (n > PTRDIFF_MAX / 8) {
@@ -84,14 +84,14 @@ static inline bool room(Call *call, size_t n, size_t each, size_t more) {
         return false;
     }
     size = n * each + more;
-    if (size > instance->room_size) {
-        instance->room_size = 0;
-        instance->room = FMU_room(&instance->module, (u32)size);
-        if (instance->room == 0) {
+    if (size > instance->buffer_size) {
+        instance->buffer_size = 0;
+        instance->buffer = FMU_argument_buffer(&instance->module, (u32)size);
+        if (instance->buffer == 0) {
             return false;
         }
-        instance->room_size = (u32)size;
-        call->next = instance->room;
+        instance->buffer_size = (u32)size;
+        call->next = instance->buffer;
     }
     return true;
 }
@@ -198,9 +198,9 @@ static fmi2Status broken(Call *call) {
     instance->module.FMU_STACK = call->stack;
     if (setjmp(call->trap) == 0) {
         const char *why = reason(&instance->module.w2c_memory);
-        if (room(call, length(call->function) + length(why), 1, 16)) {
+        if (reserve(call, length(call->function) + length(why), 1, 16)) {
             u32 function, text;
-            call->next = instance->room;
+            call->next = instance->buffer;
             call->endless = false;
             function = string(call, call->function);
             text = string(call, why);
@@ -228,8 +228,8 @@ static fmi2Status broken(Call *call) {
         return broken(&call);                                           \
     }
 
-#define ROOM(name, n, each, more)                                                               \
-    if (!room(&call, n, each, more)) {                                                          \
+#define RESERVE(name, n, each, more)                                                            \
+    if (!reserve(&call, n, each, more)) {                                                       \
         return reject(&call, name ": the instance has no memory for so many values; compile the " \
                                   "FMU with a larger FMU_MEMORY_PAGES");                        \
     }
@@ -281,7 +281,7 @@ static bool make(Instance *instance, fmi2String name, fmi2Type type, fmi2String 
     }
     FMU_instantiate(&instance->module, (struct w2c_fmu *)(void *)instance);
     call.stack = instance->module.FMU_STACK;
-    if (room(&call, length(name) + length(guid) + length(resources), 1, 4096)) {
+    if (reserve(&call, length(name) + length(guid) + length(resources), 1, 4096)) {
         Callbacks callbacks = {0, 0, 0, 0, 0};
         u32 in_name = string(&call, name), in_guid = string(&call, guid), in_resources = string(&call, resources);
         callbacks.logger = instance->logger != NULL;
@@ -335,7 +335,7 @@ void fmi2FreeInstance(fmi2Component c) {
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean logging_on, size_t n, const fmi2String categories[]) {
     BEGIN("fmi2SetDebugLogging")
-    ROOM("fmi2SetDebugLogging", n, sizeof(u32), 64 + length_of_all(categories, n))
+    RESERVE("fmi2SetDebugLogging", n, sizeof(u32), 64 + length_of_all(categories, n))
     CALL(FMU_fmi2SetDebugLogging, (u32)logging_on, count(&call, n), strings(&call, categories, n));
     END
 }
@@ -380,7 +380,7 @@ WITHOUT_ARGUMENTS(fmi2EnterContinuousTimeMode)
     fmi2Status get(fmi2Component c, const fmi2ValueReference vr[], size_t n, type value[]) {              \
         u32 values;                                                                                       \
         BEGIN(#get)                                                                                       \
-        ROOM(#get, n, sizeof *vr + sizeof *value, 64)                                                     \
+        RESERVE(#get, n, sizeof *vr + sizeof *value, 64)                                                  \
         values = OUT(value, n, type);                                                                     \
         CALL(FMU_##get, IN(vr, n, fmi2ValueReference), count(&call, n), values);                          \
         COPY_OUT(value, values, n)                                                                        \
@@ -388,7 +388,7 @@ WITHOUT_ARGUMENTS(fmi2EnterContinuousTimeMode)
     }                                                                                                     \
     fmi2Status set(fmi2Component c, const fmi2ValueReference vr[], size_t n, const type value[]) {        \
         BEGIN(#set)                                                                                       \
-        ROOM(#set, n, sizeof *vr + sizeof *value, 64)                                                     \
+        RESERVE(#set, n, sizeof *vr + sizeof *value, 64)                                                  \
         CALL(FMU_##set, IN(vr, n, fmi2ValueReference), count(&call, n), IN(value, n, type));              \
         END                                                                                               \
     }
@@ -401,7 +401,7 @@ fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     u32 values;
     size_t i;
     BEGIN("fmi2GetString")
-    ROOM("fmi2GetString", n, sizeof *vr + sizeof(u32), 64)
+    RESERVE("fmi2GetString", n, sizeof *vr + sizeof(u32), 64)
     values = output(&call, value, n, sizeof(u32), ALIGNMENT(fmi2String));
     CALL(FMU_fmi2GetString, IN(vr, n, fmi2ValueReference), count(&call, n), values);
     for (i = 0; status == fmi2OK && i < n; i++) {
@@ -414,7 +414,7 @@ fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2String value[]) {
     BEGIN("fmi2SetString")
-    ROOM("fmi2SetString", n, sizeof *vr + sizeof(u32), 64 + length_of_all(value, n))
+    RESERVE("fmi2SetString", n, sizeof *vr + sizeof(u32), 64 + length_of_all(value, n))
     CALL(FMU_fmi2SetString, IN(vr, n, fmi2ValueReference), count(&call, n), strings(&call, value, n));
     END
 }
@@ -436,7 +436,7 @@ static fmi2FMUstate to_importer(const Instance *instance, u32 handle) {
 /* Copies the handle of a state, if the argument is a valid pointer. */
 #define STATE_IN(name, place, n)                                         \
     u32 in_place;                                                           \
-    ROOM(name, n, 1, 64)                                                    \
+    RESERVE(name, n, 1, 64)                                                 \
     in_place = output(&call, place, 1, sizeof(u32), ALIGNMENT(fmi2FMUstate)); \
     if (in_place != 0 && in_place % sizeof(u32) == 0) {                     \
         u32 in_module = to_module(instance, *place);                   \
@@ -471,7 +471,7 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
     u32 sizes, written;
     BEGIN("fmi2SerializedFMUstateSize")
-    ROOM("fmi2SerializedFMUstateSize", 0, 1, 64)
+    RESERVE("fmi2SerializedFMUstateSize", 0, 1, 64)
     sizes = output(&call, size, 1, sizeof(u32), ALIGNMENT(size_t));
     CALL(FMU_fmi2SerializedFMUstateSize, to_module(instance, state), sizes);
     if (status == fmi2OK) {
@@ -484,7 +484,7 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte byte[], size_t n) {
     u32 bytes;
     BEGIN("fmi2SerializeFMUstate")
-    ROOM("fmi2SerializeFMUstate", n, 1, 64)
+    RESERVE("fmi2SerializeFMUstate", n, 1, 64)
     bytes = OUT(byte, n, fmi2Byte);
     CALL(FMU_fmi2SerializeFMUstate, to_module(instance, state), bytes, count(&call, n));
     COPY_OUT(byte, bytes, n)
@@ -504,8 +504,8 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         fmi2Real dv_unknown[]) {
     u32 result;
     BEGIN("fmi2GetDirectionalDerivative")
-    ROOM("fmi2GetDirectionalDerivative", n_known, 12, 64)
-    ROOM("fmi2GetDirectionalDerivative", n_unknown, 12, 64 + (call.endless ? 0 : n_known * 12))
+    RESERVE("fmi2GetDirectionalDerivative", n_known, 12, 64)
+    RESERVE("fmi2GetDirectionalDerivative", n_unknown, 12, 64 + (call.endless ? 0 : n_known * 12))
     result = OUT(dv_unknown, n_unknown, fmi2Real);
     CALL(FMU_fmi2GetDirectionalDerivative, IN(unknown, n_unknown, fmi2ValueReference), count(&call, n_unknown),
          IN(known, n_known, fmi2ValueReference), count(&call, n_known), IN(dv_known, n_known, fmi2Real), result);
@@ -516,7 +516,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                                        const fmi2Integer order[], const fmi2Real value[]) {
     BEGIN("fmi2SetRealInputDerivatives")
-    ROOM("fmi2SetRealInputDerivatives", n, 16, 64)
+    RESERVE("fmi2SetRealInputDerivatives", n, 16, 64)
     CALL(FMU_fmi2SetRealInputDerivatives, IN(vr, n, fmi2ValueReference), count(&call, n), IN(order, n, fmi2Integer),
          IN(value, n, fmi2Real));
     END
@@ -526,7 +526,7 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
                                         const fmi2Integer order[], fmi2Real value[]) {
     u32 values;
     BEGIN("fmi2GetRealOutputDerivatives")
-    ROOM("fmi2GetRealOutputDerivatives", n, 16, 64)
+    RESERVE("fmi2GetRealOutputDerivatives", n, 16, 64)
     values = OUT(value, n, fmi2Real);
     CALL(FMU_fmi2GetRealOutputDerivatives, IN(vr, n, fmi2ValueReference), count(&call, n), IN(order, n, fmi2Integer),
          values);
@@ -538,7 +538,7 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
     fmi2Status name(fmi2Component c, const fmi2StatusKind kind, type *value) {           \
         u32 place;                                                                       \
         BEGIN(#name)                                                                     \
-        ROOM(#name, 0, 1, 64)                                                            \
+        RESERVE(#name, 0, 1, 64)                                                         \
         place = OUT(value, 1, type);                                                     \
         CALL(FMU_##name, (u32)kind, place);                                              \
         COPY_OUT(value, place, 1)                                                        \
@@ -562,7 +562,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
     EventInfo event;
     u32 place;
     BEGIN("fmi2NewDiscreteStates")
-    ROOM("fmi2NewDiscreteStates", 0, 1, 64)
+    RESERVE("fmi2NewDiscreteStates", 0, 1, 64)
     place = output(&call, info, 1, sizeof event, ALIGNMENT(fmi2EventInfo));
     CALL(FMU_fmi2NewDiscreteStates, place);
     if (status == fmi2OK) {
@@ -581,7 +581,7 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set_state
                                        fmi2Boolean *terminate) {
     u32 enter_place, terminate_place;
     BEGIN("fmi2CompletedIntegratorStep")
-    ROOM("fmi2CompletedIntegratorStep", 0, 1, 64)
+    RESERVE("fmi2CompletedIntegratorStep", 0, 1, 64)
     enter_place = OUT(enter_event_mode, 1, fmi2Boolean);
     terminate_place = OUT(terminate, 1, fmi2Boolean);
     CALL(FMU_fmi2CompletedIntegratorStep, (u32)no_set_state_prior, enter_place, terminate_place);
@@ -592,7 +592,7 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set_state
 
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n) {
     BEGIN("fmi2SetContinuousStates")
-    ROOM("fmi2SetContinuousStates", n, sizeof *x, 64)
+    RESERVE("fmi2SetContinuousStates", n, sizeof *x, 64)
     CALL(FMU_fmi2SetContinuousStates, IN(x, n, fmi2Real), count(&call, n));
     END
 }
@@ -601,7 +601,7 @@ fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n
     fmi2Status name(fmi2Component c, fmi2Real x[], size_t n) {    \
         u32 values;                                               \
         BEGIN(#name)                                              \
-        ROOM(#name, n, sizeof *x, 64)                             \
+        RESERVE(#name, n, sizeof *x, 64)                          \
         values = OUT(x, n, fmi2Real);                             \
         CALL(FMU_##name, values, count(&call, n));                \
         COPY_OUT(x, values, n)                                    \

@@ -1,5 +1,5 @@
-//! Decodes the arguments of a call from bytes. Most are valid, so that simulations make progress; the rest
-//! covers everything that a C caller can pass.
+//! Decodes the arguments of a call from bytes. Most are valid, so that simulations make progress. The others cover all
+//! faults of a C caller that an FMU can detect.
 
 use arbitrary::{Result, Unstructured};
 use fmu_export::fmi2::types::*;
@@ -7,7 +7,7 @@ use fmu_export::{BaseType, Causality, Exported, Standard, Variable};
 use std::ffi::CStr;
 use std::ptr::null;
 
-/// Base types of the variables of getters and setters, by the final part of the names of the functions.
+/// Base types of the variables that getters and setters accept, by the last part of the function's name.
 #[rustfmt::skip]
 const BY_END: [(&str, &[BaseType]); 15] = {
     use BaseType::*;
@@ -30,7 +30,7 @@ const BY_END: [(&str, &[BaseType]); 15] = {
     ]
 };
 
-/// Returns the base types of the variables of a function; Reals by default.
+/// Returns the base types of the variables that a function accepts; Real if its name has no ending of the table.
 pub fn bases_of(function: &str) -> &'static [BaseType] {
     BY_END.into_iter().find(|(end, _)| function.ends_with(end)).unwrap_or(BY_END[0]).1
 }
@@ -41,7 +41,7 @@ pub struct Variables {
     real_inputs: Vec<u32>,
     real_starts: Vec<u32>,
     unknowns: Vec<u32>,
-    /// Variables by the final part of the names of functions.
+    /// Value references for the functions whose names end with this string.
     by_end: [(&'static str, Vec<u32>); BY_END.len()],
     states: usize,
     indicators: usize,
@@ -55,12 +55,12 @@ impl Variables {
         let reference = |index| standard.reference(index);
         // In FMI 3.0, elements of arrays are not variables.
         let is_one = |variable: &Variable<M>| standard == Standard::Fmi2 || variable.element() == 0;
-        let those = |wanted: &dyn Fn(&Variable<M>) -> bool| {
+        let references = |wanted: &dyn Fn(&Variable<M>) -> bool| {
             let indices = (0..).zip(M::TABLE).filter(|(_, variable)| is_one(variable) && wanted(variable));
             indices.map(|(index, _)| reference(index)).collect::<Vec<u32>>()
         };
         let reals = |wanted: fn(&Variable<M>) -> bool| {
-            those(&|variable| variable.base() == BaseType::Real && wanted(variable))
+            references(&|variable| variable.base() == BaseType::Real && wanted(variable))
         };
         Self {
             all: reference(M::TABLE.len() as u32),
@@ -69,7 +69,8 @@ impl Variables {
             unknowns: reals(|variable| {
                 variable.causality() == Causality::Output || variable.differentiates().is_some()
             }),
-            by_end: BY_END.map(|(end, bases)| (end, those(&|variable| bases.contains(&variable.base())))),
+            by_end: BY_END
+                .map(|(end, bases)| (end, references(&|variable| bases.contains(&variable.base())))),
             states: M::STATES.len(),
             indicators: M::MODEL_EXCHANGE.map_or(0, |offer| offer.indicators),
             arrays: (0..)
@@ -81,13 +82,13 @@ impl Variables {
         }
     }
 
-    /// Returns the number of values of these variables.
+    /// Returns the number of values of these variables; an array has one value for each element.
     fn values(&self, references: &[u32]) -> usize {
         let length = |reference: &u32| self.arrays.iter().find(|(array, _)| array == reference);
         references.iter().map(|reference| length(reference).map_or(1, |(_, length)| *length)).sum()
     }
 
-    /// Chooses value references, mostly of variables that suit the function.
+    /// Chooses value references, mostly of variables that the function accepts.
     fn references(&self, u: &mut Unstructured, count: usize, function: &str) -> Result<Vec<u32>> {
         let fitting = match function {
             "fmi2SetReal" if u.ratio(1, 2)? => &self.real_inputs,
@@ -107,7 +108,7 @@ impl Variables {
     }
 }
 
-/// Fault of a pointer. Wrong pointers that the FMU cannot detect are not passed.
+/// Fault of a pointer that is passed. It must be one that the FMU can detect, because any other crashes the test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
     None,
@@ -136,7 +137,7 @@ pub struct CallArguments {
     endless: bool,
 }
 
-/// Real numbers that are tried often.
+/// Special numbers, which make up two thirds of the [`wild`] ones.
 #[rustfmt::skip]
 const SPECIAL: [f64; 20] = [
     0.0, -0.0, 1.0, -1.0, 1e-9, 1e9, 1e150, -1e150, 1e308, -1e308, f64::MAX, f64::MIN, f64::EPSILON,
@@ -162,17 +163,17 @@ const CATEGORIES: [Option<&CStr>; 8] = [
 
 const STEP_SIZES: [f64; 8] = [1e-3, 1e-3, 1e-2, 1.0 / 60.0, 0.1, 2.0, 1e-9, 1e4];
 
-/// Chooses any number.
+/// Chooses any number, including infinite ones and NaN.
 fn wild(u: &mut Unstructured) -> Result<f64> {
     Ok(if u.ratio(2, 3)? { *u.choose(&SPECIAL)? } else { f64::from_bits(u.arbitrary()?) })
 }
 
-/// Chooses an ordinary number.
+/// Chooses a number from -4 to 4.
 fn tame(u: &mut Unstructured) -> Result<f64> {
     Ok(f64::from(u.arbitrary::<i16>()?) / 8192.0)
 }
 
-/// Fills an array; a long array repeats its first elements.
+/// Creates an array of `count` elements; from the 17th on, they repeat the first 16.
 fn array<T: Clone>(count: usize, element: impl FnMut() -> Result<T>) -> Result<Vec<T>> {
     let first: Vec<T> = std::iter::repeat_with(element).take(count.min(16)).collect::<Result<_>>()?;
     Ok(first.into_iter().cycle().take(count).collect())
@@ -187,7 +188,7 @@ fn strings(u: &mut Unstructured, count: usize, known: &[Option<&CStr>]) -> Resul
     array(count, || Ok(u.choose(known)?.map_or(null(), CStr::as_ptr)))
 }
 
-/// Returns the function of FMI 2.0 with similar arguments.
+/// Returns the function of FMI 2.0 that has similar arguments; the same name for all other functions.
 fn like(function: &str) -> &str {
     match function {
         "fmi3GetFloat64" => "fmi2GetReal",
@@ -202,7 +203,7 @@ fn like(function: &str) -> &str {
 }
 
 impl CallArguments {
-    /// Decodes the arguments of a call at this time of the instance.
+    /// Decodes the arguments of a call to an instance that is at this time.
     pub fn decode(u: &mut Unstructured, function: &str, time: f64, variables: &Variables) -> Result<Self> {
         let function = like(function);
         let count = match u.int_in_range(0..=63_u8)? {
@@ -236,7 +237,7 @@ impl CallArguments {
         } else {
             [wild(u)?, wild(u)?, wild(u)?]
         };
-        // At most 100 knowns for many unknowns, because all 5000 by 5000 derivatives would take seconds.
+        // Limits the knowns to 100 if there are many unknowns, because 5000 by 5000 derivatives would take seconds.
         let known_count = if count > 100 { 100 } else { u.int_in_range(0..=6)? };
         let small = |u: &mut Unstructured| -> Result<i32> {
             Ok(if u.ratio(15, 16)? { u.int_in_range(0..=3)? } else { u.arbitrary()? })
@@ -245,7 +246,7 @@ impl CallArguments {
         if known_count == 0 && u.ratio(1, 8)? {
             known.push(u.arbitrary()?);
         }
-        // Only a quarter of the calls may contain invalid strings.
+        // Only a quarter of the calls choose among all strings, some of which are invalid.
         let good = if u.ratio(3, 4)? { &STRINGS[..5] } else { &STRINGS };
         let vr = variables.references(u, count, function)?;
         let (values, known_values) = (variables.values(&vr), variables.values(&known));
@@ -267,18 +268,17 @@ impl CallArguments {
         })
     }
 
-    /// Returns the length to pass for arrays of `count` values.
+    /// Returns the length to pass for an array of `count` values.
     pub fn count(&self, count: usize) -> usize {
         if self.endless { usize::MAX } else { count }
     }
 
-    /// Returns the address to pass for an array with elements of this size; `place` is its index among the
-    /// function's arrays.
+    /// Returns the address to pass for an array with elements of `size` bytes. `array` is its real address, and `index` is
+    /// its index among the array arguments of the function.
     pub fn address(&self, index: usize, array: usize, size: usize) -> usize {
         match self.faults[index % self.faults.len()] {
             Fault::Null => 0,
-            // Never dereferenced, because the FMU rejects the pointer. Bytes are always aligned, so they have
-            // no such fault.
+            // Never dereferenced, because the FMU rejects the pointer. An array of bytes cannot be misaligned.
             Fault::Misaligned if size > 1 => array + 1,
             _ => array,
         }

@@ -1,4 +1,4 @@
-//! One call of a function on an instance. The list of functions gives the meaning of each argument.
+//! One call of a function on an instance. Arguments are chosen by the types and names in the list of functions.
 
 use super::arguments::CallArguments;
 use super::standards::Caller;
@@ -14,19 +14,20 @@ pub struct Call {
     pub arguments: CallArguments,
 }
 
-/// Result of a call, with values as bits, so that NaN compares as well.
+/// Result of a call. Values are stored as bits, so that even NaN can be compared.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CallResult {
     pub status: Status,
     pub values: Vec<u64>,
 }
 
-/// Returns whether a function has handles of saved states; the session calls such functions.
+/// Returns whether a function has a handle of a saved state as an argument. The session calls such functions itself.
 pub fn has_handles(function: &str) -> bool {
     function.contains("FMUstate") || function.contains("FMUState")
 }
 
-/// Returns the size of a pointee of a function's argument; 4 for the parts of an event information.
+/// Returns the size in bytes of an element to which an argument of type `of` points. It is 4 for an `EventInfo`, which is
+/// handled as an array of 4-byte words.
 pub fn element_size(of: &str, function: &str) -> usize {
     match of {
         "Boolean" if function.starts_with("fmi2") => 4,
@@ -45,8 +46,8 @@ impl Call {
         status != Status::Ok && !early || self.function[4..].starts_with("Get")
     }
 
-    /// Calls the function. Panics on an invalid result: an unexpected status, a value that is not finite, or
-    /// more values than requested.
+    /// Calls the function. Panics if the result is invalid: an unexpected status, a value that is not finite, or more values
+    /// than requested.
     pub fn run<F: Caller>(&self, fmu: &F) -> CallResult {
         let (name, a) = (self.function, &self.arguments);
         let list = signature(name).expect("a function of the standard").arguments;
@@ -74,9 +75,9 @@ impl Call {
             }
         };
         let words: Vec<u64> = list.iter().map(word).collect();
-        // SAFETY: the function has this name, and each pointer refers to as many values as the counts give,
-        // plus one; they live as long as `arrays`. The FMU rejects NULL, misaligned and endless arrays
-        // without access.
+        // SAFETY: the function has this name. Each pointer points to at least one value more than the counts say, and
+        // the values live as long as `arrays`. The FMU rejects arrays that are NULL, misaligned or of impossible length
+        // before it accesses them.
         let status = unsafe { fmu.call(name, &words) };
         let discards = (name.ends_with("Status") || name.ends_with("DoStep")) && status == Status::Discard;
         assert!(discards || [Status::Ok, Status::Error].contains(&status), "{name} returns {status:?}");
@@ -84,7 +85,7 @@ impl Call {
         for index in 0..arrays.len() {
             let array = &arrays[index];
             let Some(count) = array.written else { continue };
-            assert!(array.elements.end_untouched(count), "too much: {self:?}");
+            assert!(array.elements.end_untouched(count), "written after the end: {self:?}");
             if status == Status::Ok {
                 let before = index.checked_sub(1).map(|index| &arrays[index].elements);
                 array.values(count, before, &mut values);
@@ -117,10 +118,10 @@ impl Call {
     }
 }
 
-/// Content of an array before the FMU writes to it.
+/// Value of each byte of an array before the FMU writes to it.
 const UNTOUCHED: u8 = 0xa5;
 
-/// Numbers or pointers of one size, followed by two more elements, aligned for any type.
+/// Memory of an array of numbers or pointers of one size, followed by at least two more elements. It is aligned for any type.
 struct Elements {
     size: usize,
     memory: Vec<u64>,
@@ -149,7 +150,7 @@ impl Elements {
         u64::from_le_bytes([UNTOUCHED; 8]) >> (64 - 8 * self.size)
     }
 
-    /// Returns whether nothing is written after `count` elements.
+    /// Returns whether nothing has been written after `count` elements.
     fn end_untouched(&self, count: usize) -> bool {
         let all = 8 * self.memory.len() / self.size;
         (count..all).all(|index| self.bits(index) == self.untouched())
@@ -191,14 +192,14 @@ impl Array {
             return Self { of, elements, written: Some(count), _bytes: bytes };
         }
         let address = |string: *const c_char| string.expose_provenance() as u64;
-        // Room for as many elements as any count may give.
+        // As many elements as the largest count that may be passed.
         let room = a.values.max(a.known_values).max(a.vr.len()) + 2;
         let bits: Vec<u64> = match (of, name) {
             ("ValueReference", "known") => a.known.iter().map(|vr| u64::from(*vr)).collect(),
             ("ValueReference", _) => a.vr.iter().map(|vr| u64::from(*vr)).collect(),
             ("String", "categories") => a.categories.iter().map(|string| address(*string)).collect(),
             ("String", _) => a.strings.iter().map(|string| address(*string)).collect(),
-            // Some sizes are larger than any variable here permits.
+            // Some of these sizes of binary values are larger than any variable of the test models permits.
             ("usize", _) => a.integers.iter().map(|n| *n as u64 % (LONGEST + 1)).collect(),
             ("Binary", _) => {
                 bytes = a.reals.iter().flat_map(|value| value.to_le_bytes()).collect();
@@ -219,7 +220,8 @@ impl Array {
         Self { of, elements: Elements::new(size, count, bits), written: None, _bytes: bytes }
     }
 
-    /// Adds the written values; `sizes` is the previous array.
+    /// Checks the written values and appends their bits to `values`; strings and binary values are hashed. `sizes` is the
+    /// previous array, which contains the sizes of binary values.
     fn values(&self, count: usize, sizes: Option<&Elements>, values: &mut Vec<u64>) {
         if self.of == "EventInfo" {
             let bits = |index| self.elements.bits(index);
@@ -239,7 +241,7 @@ impl Array {
                 "Boolean" | "Clock" => checked_boolean(bits),
                 "String" => {
                     assert!(bits != 0, "no string");
-                    // SAFETY: a string of the FMU, valid until the next call.
+                    // SAFETY: the FMU's string is valid until the next call.
                     let string = unsafe { CStr::from_ptr(std::ptr::with_exposed_provenance(bits as usize)) }
                         .to_bytes();
                     assert!(std::str::from_utf8(string).is_ok(), "not UTF-8: {string:?}");
@@ -247,7 +249,7 @@ impl Array {
                 }
                 "Binary" => {
                     let size = sizes.expect("their sizes come before").bits(index) as usize;
-                    // SAFETY: bytes of the FMU with this length, valid until the next call.
+                    // SAFETY: the FMU's bytes have this length and are valid until the next call.
                     let bytes = unsafe {
                         std::slice::from_raw_parts(std::ptr::with_exposed_provenance(bits as usize), size)
                     };
@@ -259,10 +261,10 @@ impl Array {
     }
 }
 
-/// Length of the longest bytes that are set.
+/// Largest size in bytes of a binary value that is set.
 const LONGEST: u64 = 24;
 
-/// Size of `fmi2EventInfo`: five Booleans, a gap, a number.
+/// Size of `fmi2EventInfo` in bytes: five Booleans, padding, and the time of the next event.
 const EVENT_INFO: usize = size_of::<fmu_export::fmi2::types::fmi2EventInfo>();
 
 /// Checks that a number is finite and returns its bits.

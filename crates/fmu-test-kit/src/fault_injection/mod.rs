@@ -1,11 +1,10 @@
 //! A fault-injecting importer for both FMI versions: it decodes bytes into calls on several instances, and
 //! checks every result.
 //!
-//! After every call, the importer checks that the status is valid, and that a rejected or reading call has
-//! left the serialized state unchanged. Values must be valid, nothing may be written after the end of an
-//! array, and messages must be clean. Sometimes the importer restores the last saved state of an instance,
-//! here or in another instance, and repeats the calls made since. All results and the final state must be
-//! bit-identical.
+//! After every call, the importer checks that the status is valid, and that the serialized state is unchanged if the call
+//! was rejected or only reads. Values must be valid, nothing may be written after the end of an array, and messages must
+//! be clean. Sometimes the importer restores the last saved state of an instance, in it or in another instance, and
+//! repeats all calls after the save. All results and the final state must then be bit-identical.
 //!
 //! The bytes come from [`random_bytes`] or from a fuzzer.
 
@@ -31,7 +30,7 @@ use std::time::{Duration, Instant};
 /// Number of calls of each function by status: OK, discarded, rejected.
 pub type Tally = BTreeMap<&'static str, [u64; 3]>;
 
-/// Decodes the bytes into calls, makes them and counts them.
+/// Decodes the bytes into calls, makes these calls and counts them.
 ///
 /// # Panics
 /// Panics at the first violated guarantee.
@@ -39,7 +38,7 @@ pub fn run<F: Caller, M: Exported>(bytes: &[u8], tally: &mut Tally) {
     session::<F, M>(&F::make::<M>, bytes, tally, None);
 }
 
-/// Makes the calls with these functions of a model, and returns the results and messages of each call.
+/// Makes the calls with these functions of a model in FMI 2.0. Returns one string per call with its result and messages.
 ///
 /// # Panics
 /// Panics at the first violated guarantee.
@@ -72,11 +71,12 @@ fn session<F: Caller, M: Exported>(
     session.end();
 }
 
-/// One sequence of calls, decoded from bytes: [`run`] for an FMI version and a model.
+/// Type of [`run`] for an FMI version and a model.
 pub type RunBytes = fn(&[u8], &mut Tally);
 
-/// Runs sequences of every model with seeds 0, 1, ... for some seconds, which `ROBUSTNESS_SECONDS` sets. Runs
-/// at least `at_least` seeds, so that checks of the counts do not depend on the machine. Prints the counts.
+/// Runs a sequence of calls of every model with seeds 0, 1, ... for 3 seconds, or for as many as the environment variable
+/// `ROBUSTNESS_SECONDS` sets. Runs at least `at_least` seeds, so that checks of the counts do not depend on the speed of
+/// the machine. Prints and returns the counts.
 ///
 /// # Panics
 /// Panics if a sequence violates a guarantee, or if `ROBUSTNESS_SECONDS` is not a number.
@@ -87,7 +87,7 @@ pub fn run_seeds(at_least: u64, models: &[(&str, RunBytes)]) -> Tally {
     let mut seed = 0;
     while seed < at_least || Instant::now() < end {
         for (model, session) in models {
-            println!("{model}, seed {seed}"); // to reproduce a failure
+            println!("{model}, seed {seed}"); // needed to reproduce a failure
             session(&random_bytes(seed, 1 << 16), &mut tally);
         }
         seed += 1;
@@ -100,9 +100,9 @@ pub fn run_seeds(at_least: u64, models: &[(&str, RunBytes)]) -> Tally {
     tally
 }
 
-/// Returns pseudorandom bytes that are equal in every run.
+/// Returns pseudorandom bytes that are the same in every run.
 pub fn random_bytes(seed: u64, count: usize) -> Vec<u8> {
-    // Factor of splitmix64: consecutive seeds begin at distant states.
+    // The multiplier of splitmix64 turns consecutive seeds into distant states.
     let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     (0..count.div_ceil(8)).flat_map(|_| random.bits().to_le_bytes()).take(count).collect()
 }
@@ -113,9 +113,9 @@ struct Session<'a, F, M> {
     instances: [Option<Slot<F>>; 3],
     /// Saved states of each instance.
     states: [[*mut c_void; 3]; 3],
-    /// The bytes of these states; empty if they are not known.
+    /// The bytes of these states; empty for a de-serialized state, whose bytes are not recorded.
     contents: [[Vec<u8>; 3]; 3],
-    /// A serialized state, possibly damaged.
+    /// The last serialized state, possibly damaged.
     saved: Vec<u8>,
     variables: arguments::Variables,
     tally: &'a mut Tally,
@@ -130,7 +130,7 @@ struct Slot<F> {
     since: Vec<(Call, CallResult)>,
 }
 
-/// Number of calls that are stored for a replay.
+/// Maximum number of calls that are stored for a replay.
 const MEMORY: usize = 40;
 
 impl<F: Caller, M: Exported> Session<'_, F, M> {
@@ -143,9 +143,9 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         self.tally.entry(function).or_default()[column] += 1;
     }
 
-    fn record(&mut self, what: impl FnOnce() -> String) {
+    fn record(&mut self, line: impl FnOnce() -> String) {
         if let Some(record) = &mut self.record {
-            record.push(what());
+            record.push(line());
         }
     }
 
@@ -155,6 +155,7 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         self.states[index] = [null_mut(); 3];
     }
 
+    /// Decodes and performs the next action: one call, or several calls that belong together. Fails at the end of the bytes.
     fn act(&mut self, u: &mut Unstructured) -> Result<()> {
         let index = u.int_in_range(0..=self.instances.len() - 1)?;
         let kind = u.int_in_range(0..=63_u8)?;
@@ -211,8 +212,8 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
             }
             arguments.resource_location = *u.choose(&strings)?;
             arguments.callbacks = u.arbitrary()?;
-            // Accepted names are all equal: a model may display its name, which is included in states of
-            // other instances.
+            // All instances with a valid name have the same name. A model may put it into its state, and then a copy in
+            // an instance with another name would not be equal.
             arguments.instance_name = match *u.choose(&strings)? {
                 Some(name) if !name.to_bytes().trim_ascii().is_empty() => Some(c"instance"),
                 rejected => rejected,
@@ -236,24 +237,24 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         Ok(())
     }
 
-    /// Makes calls without an instance, which must not crash.
+    /// Makes a call with NULL as the instance, which must be rejected without a crash.
     fn without_instance(&mut self, u: &mut Unstructured) -> Result<()> {
-        let nothing = F::nothing::<M>();
-        for function in nothing.check_version() {
+        let fmu = F::null_instance::<M>();
+        for function in fmu.check_version() {
             self.count(function, Status::Ok);
         }
         let function = *u.choose(&callable::<F>())?;
         let arguments = CallArguments::decode(u, function, 0.0, &self.variables)?;
         let call = Call { function, arguments };
-        assert_eq!(call.run(&nothing).status, Status::Error, "{function} without an instance");
+        assert_eq!(call.run(&fmu).status, Status::Error, "{function} without an instance");
         self.count(function, Status::Error);
         Ok(())
     }
 
-    /// Makes the calls that initialize an instance, which random sequences rarely contain.
+    /// Makes the calls that initialize an instance, because random calls are rarely in this order.
     fn initialize(&mut self, index: usize) {
         let Some(slot) = &mut self.instances[index] else { return };
-        // Passes 0 for all arguments, so times have no limit.
+        // All arguments are 0, so no stop time is defined.
         let begin = |function: &&'static str| (*function, slot.fmu.call_with_zeros(function));
         let statuses: Vec<_> = F::BEGINNING.iter().map(begin).collect();
         slot.start_over();
@@ -274,10 +275,10 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
             record.push(format!("{:x?} {function} {result:?} {messages:?}", fnv1a(&before)));
         }
         check_messages(messages);
-        let unasked = function.ends_with("CompletedIntegratorStep")
+        let is_no_op = function.ends_with("CompletedIntegratorStep")
             && M::MODEL_EXCHANGE.is_none_or(|offer| !offer.step_completed);
-        assert!(!unasked || result.values.iter().all(|flag| *flag == 0), "{result:?}");
-        if unasked || call.must_not_change(result.status) {
+        assert!(!is_no_op || result.values.iter().all(|flag| *flag == 0), "{result:?}");
+        if is_no_op || call.must_not_change(result.status) {
             assert_eq!(before, slot.fmu.bytes(), "changed by a call that returned {result:?}: {call:?}");
         }
         let status = result.status;
@@ -289,7 +290,8 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         Ok(())
     }
 
-    /// Repeats the calls since the last saved state, in this instance or in another one.
+    /// Restores the last saved state, in this instance or in another one, and repeats the calls after it. Asserts that the
+    /// results and the final state are the same.
     fn replay(&mut self, index: usize, elsewhere: bool) {
         let Some(slot) = &mut self.instances[index] else { return };
         let end = slot.fmu.bytes();
@@ -387,7 +389,8 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
 impl<F: Caller> Slot<F> {
     /// Starts a new record of calls at the current state.
     ///
-    /// The state is restored immediately, because a state does not contain rejected start values.
+    /// The state is restored immediately, because an instance remembers rejected start values, but its saved state does
+    /// not contain them.
     fn start_over(&mut self) {
         self.saved = self.fmu.bytes();
         self.fmu.restore(&self.saved);
@@ -395,12 +398,12 @@ impl<F: Caller> Slot<F> {
     }
 }
 
-/// Returns the functions without handles.
+/// Returns the functions that have no handle of a saved state as an argument.
 fn callable<F: Caller>() -> Vec<&'static str> {
     F::functions().iter().copied().filter(|name| !has_handles(name)).collect()
 }
 
-/// Returns a pointer for one value, sometimes NULL or misaligned; the FMU does not dereference such pointers.
+/// Returns a pointer to the value, which is sometimes replaced by NULL or misaligned. The FMU must not dereference either.
 fn pointer_to<T>(value: &mut T, u: &mut Unstructured) -> Result<*mut T> {
     Ok(match u.int_in_range(0..=15_u8)? {
         0 => null_mut(),
@@ -409,7 +412,7 @@ fn pointer_to<T>(value: &mut T, u: &mut Unstructured) -> Result<*mut T> {
     })
 }
 
-/// Damages some bytes of a serialized state, sometimes with a matching checksum.
+/// Damages some bytes of a serialized state, and often updates the checksum so that the damage is not detected by it.
 fn damage(bytes: &mut Vec<u8>, u: &mut Unstructured) -> Result<()> {
     if u.ratio(1, 2)? || bytes.len() < 16 {
         return Ok(());

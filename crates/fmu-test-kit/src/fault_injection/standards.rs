@@ -1,4 +1,4 @@
-//! Functions that the fault-injecting importer calls most, and those that it must know by name.
+//! Names of the functions that the fault-injecting importer calls most often or treats specially, for each FMI version.
 
 use crate::{Either, Importer, fmi3};
 use std::ffi::CStr;
@@ -10,15 +10,15 @@ pub trait Caller: Either + Sized {
     const STEPS: &'static [&'static str];
     /// Most frequent functions in Model Exchange.
     const INTEGRATION: &'static [&'static str];
-    /// Functions from a reset to the end of the initialization.
+    /// Functions that reset and initialize an instance, in this order.
     const BEGINNING: &'static [&'static str];
-    /// Functions that make instances, for Co-Simulation and for Model Exchange.
+    /// Instantiation functions for Co-Simulation and for Model Exchange.
     const INSTANTIATE: [&'static str; 2];
     const FREE: &'static str;
     /// Functions of saved states: get, set, free, size, serialize, de-serialize.
     const HANDLES: [&'static str; 6];
 
-    /// Checks the functions without an instance; returns their names.
+    /// Checks the functions that take no instance; returns their names.
     fn check_version(&self) -> &'static [&'static str];
 }
 
@@ -73,7 +73,7 @@ impl Caller for fmi3::Importer {
     ];
 
     fn check_version(&self) -> &'static [&'static str] {
-        // SAFETY: a string that the library keeps.
+        // SAFETY: the function returns a string that stays valid while the library is loaded.
         assert_eq!(unsafe { CStr::from_ptr((self.functions().fmi3GetVersion)()) }, c"3.0");
         &["fmi3GetVersion"]
     }

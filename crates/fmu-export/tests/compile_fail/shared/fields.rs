@@ -1,4 +1,4 @@
-// Fields of the models here.
+// The model of these tests, with its fields.
 use fmu_export::*;
 
 #[derive(Clone)]

@@ -1,4 +1,4 @@
-// A model with one variable and steps.
+// A complete model for Co-Simulation with one variable.
 include!("fields.rs");
 
 variables! { for Plant;
