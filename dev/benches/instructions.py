@@ -38,7 +38,7 @@ def compiler() -> str:
     return subprocess.run(["rustc", "--version"], check=True, capture_output=True, text=True).stdout.strip()
 
 
-def is_measurable() -> str | None:
+def why_not_measurable() -> str | None:
     """Returns why the counts cannot be compared with the table here, or None."""
     if shutil.which("valgrind") is None:
         return "valgrind is missing; on Debian: apt install valgrind"

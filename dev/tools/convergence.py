@@ -25,9 +25,19 @@ CUTS = 16
 
 
 class Convergence(NamedTuple):
-    """Errors over the step. step: (k,) s. Errors by output name, (k,) each, as a fraction of the output's largest value: with
-    `angles` only, with `rates` as well (use_omega), and for motors that turn at a constant, given rate in each step
-    (`piecewise_linear`), where the FMU is exact."""
+    """Errors for k step sizes, by output, as fractions of the output's largest value.
+
+    Attributes
+    ----------
+    step
+        (k,) s.
+    angles
+        (k,) by output, if only angles are set.
+    rates
+        (k,) by output, if rates are set as well (use_omega).
+    piecewise_linear
+        (k,) by output, for motors that turn at a constant, given rate in each step, where the FMU is exact.
+    """
 
     step: np.ndarray
     angles: dict[str, np.ndarray]

@@ -18,8 +18,21 @@ SUBSCRIPTS = "₀₁₂₃₄₅₆₇₈₉"
 
 
 class Transfer(NamedTuple):
-    """One Bode plot. key: the letter of Fig. 5 and of its files. title: input and output. unit: unit of 0 dB. curve: complex
-    over CURVE. points: measured, complex, at POINTS."""
+    """One Bode plot.
+
+    Attributes
+    ----------
+    key
+        Letter of the plot in Fig. 5 and in file names.
+    title
+        Input and output.
+    unit
+        Unit of 0 dB.
+    curve
+        Complex response of the linear model at the frequencies CURVE.
+    points
+        Complex response that was measured at the frequencies POINTS.
+    """
 
     key: str
     title: str

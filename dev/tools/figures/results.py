@@ -34,10 +34,22 @@ class Step(NamedTuple):
 
 
 class Results(NamedTuple):
-    """The linear model of the FMU, whose outputs are SHAFTS, TORQUES and then all OUTPUTS; and runs of the FMU.
+    """The linear model of the FMU, and results of its runs.
 
-    sweep: the measured response of SHAFTS and TORQUES at POINTS. fig4, fig4_equal: the experiment of Fig. 4 and its counterpart. pitch_step: both motors step by 1 degree. roll_step:
-    motor 2 steps by -1 degree instead.
+    Attributes
+    ----------
+    model
+        The linear model; its outputs are SHAFTS, then TORQUES.
+    modes
+        Pitch and roll.
+    sweep
+        Measured response of SHAFTS and TORQUES at POINTS.
+    fig4, fig4_equal
+        The experiment of Fig. 4, and the same with equal motors.
+    pitch_step, roll_step
+        Responses if both motors step by 1 degree, and if motor 2 steps by -1 degree instead.
+    convergence
+        Errors for several step sizes.
     """
 
     model: StateSpace

@@ -19,8 +19,17 @@ DURATION = 0.96
 
 
 class Study(NamedTuple):
-    """step: (k,) s; the largest error of pitch and roll at common communication points, (k,) deg each: inputs held
-    over a step (`held`), and extrapolated with fmi2SetRealInputDerivatives of order 1 (`derivatives`)."""
+    """Largest errors of pitch and roll at common communication points, for k step sizes.
+
+    Attributes
+    ----------
+    step
+        (k,) s.
+    held
+        (k,) deg, if inputs are held over a step.
+    derivatives
+        (k,) deg, if inputs are extrapolated with fmi2SetRealInputDerivatives of order 1.
+    """
 
     step: np.ndarray
     held: np.ndarray

@@ -23,9 +23,20 @@ SOLVER_TOLERANCE = 1e-7
 
 @dataclass(frozen=True)
 class Tool:
-    """An importer or a co-simulation master. package: the Python package that contains it. interface: the type that it
-    imports. run: of an importer run(fmu, experiment, parameters), with these parameters instead of the experiment's; of
-    a master run(system)."""
+    """An importer or a co-simulation master.
+
+    Attributes
+    ----------
+    name
+        Name of the tool.
+    package
+        Python package that contains it.
+    interface
+        Interface type that it imports.
+    run
+        For an importer run(fmu, experiment, parameters), with parameters that replace the experiment's; for a master
+        run(system).
+    """
 
     name: str
     package: str

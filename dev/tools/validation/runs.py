@@ -30,8 +30,23 @@ CHANGE = 0.01
 
 @dataclass(frozen=True)
 class Row:
-    """One run. version, interface, fmi: empty if a file does not contain it. share: the largest difference in terms of its tolerance.
-    largest: difference by quantity (angle, rate, torque), in rad, rad/s and N.m."""
+    """One run of an experiment.
+
+    Attributes
+    ----------
+    importer
+        Name of the tool.
+    version, interface, fmi
+        Version of the tool, interface type and FMI version; empty if a file does not contain them.
+    experiment
+        Name of the experiment.
+    share
+        Largest difference as a fraction of its tolerance.
+    largest
+        Largest difference by quantity: angle (rad), rate (rad/s), torque (N.m).
+    outputs
+        Number of compared outputs.
+    """
 
     importer: str
     version: str
@@ -59,8 +74,24 @@ class Row:
 
 @dataclass(frozen=True)
 class Validation:
-    """All results. experiments: description by name. sensitivity: the share of the tolerance that a change of a parameter
-    by CHANGE takes, by experiment and parameter. absent: importers that are not installed."""
+    """All results.
+
+    Attributes
+    ----------
+    guid
+        Guid of the FMU for FMI 2.0.
+    date, machine
+        When and where the experiments were run.
+    experiments
+        Descriptions by name.
+    rows
+        The runs.
+    sensitivity
+        Largest difference that a change of a parameter by CHANGE causes, as a fraction of its tolerance, by experiment and
+        parameter.
+    absent
+        Importers that are not installed.
+    """
 
     guid: str
     date: str

@@ -15,13 +15,13 @@ from prw.errors import UserError
 from prw.state_space import StateSpace
 from prw.testbed import CONTINUOUS, existing_fmu, loaded
 
-#: Start values of the testbed with which its states and inputs are independent of each other in Co-Simulation. With
-#: others a motor angle also changes the rate that is estimated from it and, before the first step, the states.
+#: With these start values of the testbed, its states and inputs are independent of each other in Co-Simulation.
+#: Otherwise a motor angle also changes the rate that is estimated from it and, before the first step, the states.
 INDEPENDENT = {"use_omega": True, "start_at_rest": False}
 Interface = Literal["co-simulation", "model-exchange"]
 INTERFACES = {"CoSimulation": "Co-Simulation", "ModelExchange": "Model Exchange"}
 #: The names of the interface types in `fmu_run`.
-HELD: dict[str, Interface] = {"CoSimulation": "co-simulation", "ModelExchange": "model-exchange"}
+FMU_RUN_NAMES: dict[str, Interface] = {"CoSimulation": "co-simulation", "ModelExchange": "model-exchange"}
 
 
 def linearize(
@@ -99,7 +99,7 @@ class Linearizer:
     def _select(self, outputs: str | Iterable[str] | None, fmi_type: str | None) -> None:
         """Select the states, inputs and outputs of the model. Raises UserError."""
         loaded, variables = self.loaded, self.loaded.variables
-        self._interface = HELD[self._chosen(fmi_type)]
+        self._interface = FMU_RUN_NAMES[self._chosen(fmi_type)]
         self.states = tuple(loaded.derivatives)
         self.inputs = tuple(v.name for v in variables.values() if v.causality == "input" and v.type in CONTINUOUS)
         self.outputs = loaded.outputs if outputs is None else names_of("outputs", outputs)
@@ -118,7 +118,8 @@ class Linearizer:
 
     def at(self, parameters: Given = None) -> StateSpace:
         """The linear model with start values `parameters` (of parameters, states and inputs, by name, in the FMU's
-        units, or a file with them); others keep the FMU's own. Raises UserError for a name or a value that the FMU does not take."""
+        units, or a file with them); others keep the FMU's own. Raises UserError for a name that the FMU lacks or a
+        value that it rejects."""
         if self._closed:
             raise UserError(f"{self.fmu}: is closed")
         given = values_of(parameters, self.loaded)
@@ -157,7 +158,7 @@ class Linearizer:
     def _chosen(self, wanted: str | None) -> str:
         """The interface type to use."""
         offers = self.loaded.directional
-        directional = {name: offers[held] for name, held in HELD.items() if held in offers}
+        directional = {name: offers[other] for name, other in FMU_RUN_NAMES.items() if other in offers}
         attribute = "providesDirectionalDerivative" + ("" if self.loaded.fmi_version == "2.0" else "s")
         able = [name for name, offered in directional.items() if offered]
         if wanted is None and able:

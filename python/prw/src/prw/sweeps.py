@@ -53,9 +53,9 @@ def sweep(
     grid
         Values by parameter, in SI or with a unit as ([1.5, 1.9], "N.m/deg"); all combinations are run.
     random
-        By parameter ("uniform", low, high), ("normal", mean, standard deviation) or ("lognormal", median, relative standard
-        deviation), in SI; for the last also only the relative standard deviation (0.1 is 10 %), about the start value, or
-        (median, relative).
+        The distribution of each parameter, in SI: ("uniform", low, high), ("normal", mean, standard deviation) or
+        ("lognormal", median, relative standard deviation). For a lognormal distribution, (median, relative) suffices,
+        or only the relative standard deviation (0.1 is 10 %) if the median is the start value.
     parameters
         Values that are the same in all runs, as for `prw.simulate`.
     runs, seed

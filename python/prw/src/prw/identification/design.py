@@ -64,7 +64,7 @@ def motions(
     return found
 
 
-#: Factors of two waves in the motion of motor 1, and in the motion of motor 2.
+#: For each pattern, the factors of two waves in the motion of motor 1, and the factors in the motion of motor 2.
 PATTERNS = {
     "equal": ((1, 0), (1, 0)),
     "opposite": ((1, 0), (-1, 0)),
@@ -157,9 +157,9 @@ def _within(name: str, time: Array, motors: Sequence[Array], limits: Limits) -> 
 def _optimal(
     model: Model, task: Task, time: Array, frequency: Array, limits: Limits, noise: Mapping[str, float]
 ) -> Motion:
-    """The multisine whose power is spread over frequencies, equal and opposite motors such that the determinant of the
-    information is largest within the limits (D-optimal; multiplicative algorithm, Silvey, Titterington
-    and Torsney, Comm. Stat. A 7 (1978) 1379)."""
+    """The multisine whose power is distributed over the frequencies, and over equal and opposite motor motion, so that
+    the determinant of the information is largest within the limits (D-optimal; multiplicative algorithm, Silvey,
+    Titterington and Torsney, Comm. Stat. A 7 (1978) 1379)."""
     share = 1e-4
     logarithms = task.first()
     steps = share * np.vstack([np.eye(len(logarithms)), -np.eye(len(logarithms))])
@@ -181,7 +181,7 @@ def _optimal(
         power *= np.einsum("kpq,qp->k", each, inverse) / len(logarithms)
         power /= power.sum()
     size = np.sqrt(power.reshape(2, -1) / cost)
-    # The sides' mean and half difference get frequencies of their own phases.
+    # The mean of the motors and half their difference have different phases.
     mean, half = (_multisine(time, frequency, s, k) for k, s in enumerate(size))
     return _within("multisine_optimal", time, [mean + half, mean - half], limits)
 
@@ -195,10 +195,10 @@ def typical_error(information: Array) -> float:
 
 #: Sensors that come in pairs.
 SENSORS = (("tau1", "tau2"), ("theta3", "theta4"), ("pitch", "roll"))
-#: Estimates are limited to this factor about their start values.
+#: Estimates are limited to the start values divided and multiplied by this factor.
 REACH = 10.0
 DURATION, RATE = 10.0, 1000.0
-#: The patterns of a motion in messages.
+#: Descriptions of the patterns in messages.
 DESCRIBED = {
     "equal": "equal motors",
     "opposite": "opposite motors",

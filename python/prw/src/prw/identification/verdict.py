@@ -25,13 +25,14 @@ from prw.testbed import OUTPUTS
 #: Probability below which a coherence with the motion is a misfit. It is small, because the steps of encoders are not normally
 #: distributed; 1e-8 occurs in slow motion.
 CHANCE = 1e-10
-#: Ratio of the size of a fault to its standard error above which the fault is significant, and above which it widens
-#: intervals. Friction always does, because no bearing is without it.
+#: Ratios of the size of a fault to its standard error. Above CLEAR the fault is significant, and above SMALL it widens
+#: intervals. Friction always widens them, because every bearing has some.
 CLEAR, SMALL = 4.7, 2.5
-#: As CLEAR, for faults that follow the sign of a rate. In a periodic motion, steps of encoders also follow that sign.
+#: CLEAR for faults that follow the sign of a rate. It is larger, because in a periodic motion the steps of encoders
+#: also follow that sign.
 CLEAR_SIGN = 7.0
-#: Largest ratio of a channel's noise in the compared band to its noise above the band, and the tolerance of the ratio in
-#: standard errors.
+#: EXCESS: largest ratio of a channel's noise in the compared band to its noise above the band. LUCK: tolerance of this
+#: ratio in standard errors.
 EXCESS, LUCK = 1.3, 5.0
 #: Frequencies per piece of the local regression, and maximum number of pieces.
 PIECE, MAX_PIECES = 16, 6
@@ -48,8 +49,8 @@ PAIRS = (("tau1", "tau2"), ("theta3", "theta4"), ("pitch", "roll"), ("pitch_rate
 
 
 def groups(solution: Solution, kind: str, channels: Sequence[str] = ()) -> list[tuple[str, ...]]:
-    """Groups of channels (default: all) that may share a fault of a kind and have no distortion of this kind yet: single
-    ones, pairs, all. Gains are tried up to pairs."""
+    """Groups of channels (default: all) that may share a fault of a kind and have no distortion of this kind yet:
+    single channels, pairs, and all together, except for gains."""
     channels, known = channels or solution.fitter.channels, set(solution.task.distortions)
     found: list[tuple[str, ...]] = [(name,) for name in channels]
     found += [pair for pair in PAIRS if set(pair) <= set(channels)]
@@ -64,9 +65,23 @@ def named(kind: str, group: Sequence[str]) -> str:
 
 
 class Fault(NamedTuple):
-    """A possible fault. name, unit: of its size. size, error: estimated together with the parameters, and its standard
-    error. shift: (p,), the change of the unknowns that it would cause. per_error: (p,), the change by one standard error.
-    gain: rise of twice the log likelihood."""
+    """A possible fault.
+
+    Attributes
+    ----------
+    name
+        Name of the fault.
+    unit
+        Unit of its size.
+    size, error
+        Size, estimated together with the parameters, and its standard error.
+    shift
+        (p,), change of the unknowns that the fault would cause.
+    per_error
+        (p,), change of the unknowns by one standard error of the size.
+    gain
+        Rise of twice the log likelihood if the fault is included.
+    """
 
     name: str
     unit: str
@@ -102,7 +117,17 @@ class Fault(NamedTuple):
 
 
 class Misfit(NamedTuple):
-    """An unexplained residual of a channel. low, high: Hz, the range with most of it."""
+    """An unexplained residual of a channel.
+
+    Attributes
+    ----------
+    experiment, channel
+        Names of both.
+    low, high
+        Frequencies between which most of the residual is, Hz.
+    text
+        Description.
+    """
 
     experiment: str
     channel: str
@@ -115,8 +140,17 @@ class Misfit(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """misfits: unexplained residuals; none if the model fits. faults: tested faults, in decreasing order of significance.
-    widening: (p,) standard deviations by faults that are too small to distinguish from chance."""
+    """Whether the model explains the data.
+
+    Attributes
+    ----------
+    misfits
+        Unexplained residuals; none if the model fits.
+    faults
+        The tested faults, in decreasing order of significance.
+    widening
+        (p,), standard deviations that are added because faults may be too small to be distinguished from chance.
+    """
 
     misfits: tuple[Misfit, ...]
     faults: tuple[Fault, ...]
@@ -192,7 +226,7 @@ class _Score:
         prior = self._shift.T @ solution.task.prior_information() @ self._shift
         self._variance = solution.comparisons[i].score_variance(rest) + prior
         self._information = flat.T @ rest.reshape(flat.shape)
-        # A part of the Jacobian is noise, and so is that part of the difference between the directions and it.
+        # Part of the Jacobian is noise, so the directions after its subtraction contain noise, too.
         self._noise = self._shift.T @ solution.noise_information @ self._shift
         for other, comparison in enumerate(solution.comparisons):
             if other != i:

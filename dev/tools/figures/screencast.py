@@ -35,7 +35,7 @@ POINTER = ((0, 0), (0, 19), (4.5, 15), (8, 22.5), (11, 21), (7.7, 14), (13.5, 14
 DRAWN = "new Promise(done => { const { port1, port2 } = new MessageChannel(); port1.onmessage = done; port2.postMessage(0); })"
 
 
-def film(fmu: Path, path: Path) -> None:
+def record(fmu: Path, path: Path) -> None:
     """Films a hand that turns the gripper on the page in Chromium, and writes the film as GIF unless `path` already shows it."""
     from playwright.sync_api import sync_playwright
 

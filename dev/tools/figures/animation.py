@@ -24,7 +24,7 @@ MOTORS = ("theta1", "theta2", "omega1", "omega2")
 CONTROLLED = ("pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2")
 
 
-def story(testbed_fmu: Path, controller_fmu: Path) -> tuple[Run, list[tuple[float, str]]]:
+def captioned_run(testbed_fmu: Path, controller_fmu: Path) -> tuple[Run, list[tuple[float, str]]]:
     """Run the testbed, first with prescribed motor motions, then with the controller. The run begins and ends at rest at zero.
     Returns the run and its captions, each with the time (s) from which it is shown."""
     prescribed = _there_and_back()
