@@ -31,12 +31,12 @@ Motion = Callable[[float], tuple[np.ndarray, np.ndarray]]
 
 
 def jump(time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Angles (2,) rad and rates (2,) rad/s that the motors should have: the goal of a jump at time 0, at rest."""
+    """Angles (2,) rad and rates (2,) rad/s that the motors should have if the reference jumps to STEP at time 0."""
     return STEP, np.zeros(2)
 
 
 def move(time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Angles and rates on half a cosine to the goal."""
+    """Angles (2,) rad and rates (2,) rad/s that the motors should have on half a cosine to GOAL."""
     phase = np.pi * min(time / MOVE, 1.0)
     return GOAL * (1 - np.cos(phase)) / 2, GOAL * np.pi / (2 * MOVE) * np.sin(phase)
 

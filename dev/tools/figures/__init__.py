@@ -1,5 +1,6 @@
-"""Reproduces the paper's Figs. 4 and 5 and draws Bode plots of the torques, poles and zeros, step responses and the order
-of convergence, all from the FMU. Writes each figure as SVG and PNG, and the figures behind the text as numbers.json."""
+"""Reproduces the paper's Figs. 4 and 5 and draws Bode plots of the torques, poles and zeros, step responses and the
+order of convergence, all from the FMU. Writes each figure as SVG and PNG, and the numbers that the text quotes as
+numbers.json."""
 
 from __future__ import annotations
 
@@ -10,11 +11,11 @@ from prw.commands.options import add_paths
 from prw.files import write_text
 from prw.testbed import existing_fmu
 
-#: The copies that are kept with the sources, for the documentation and the README.
+#: Directory of the figures that git tracks, for the documentation and the README.
 COMMITTED = Path("docs/fmu-page/figures")
-#: README's first image.
+#: The first image of the README, an animation of the wrist.
 ANIMATION = Path("docs/wrist.gif")
-#: README's second image, of the page in the FMU.
+#: The second image of the README, a screencast of the page in the FMU.
 SCREENCAST = Path("docs/try-it.gif")
 
 HELP = "reproduce the paper's figures from runs of the FMU"

@@ -12,7 +12,7 @@ from prw.testbed import ANGLE_OF
 from tools.figures.results import CURVE, POINTS, Results
 from tools.frequency import SHAFTS, TORQUES, decibels, degrees
 
-#: Degrees between the ticks of a phase, the first that makes at most five.
+#: Possible distances between the ticks of a phase, degrees; the smallest with at most five intervals is used.
 PHASE_STEPS = (10, 15, 30, 45, 90, 180, 360)
 SUBSCRIPTS = "₀₁₂₃₄₅₆₇₈₉"
 

@@ -1,4 +1,5 @@
-"""The error of coupling at communication points: Jacobi's method with and without input derivatives, over the step."""
+"""The error of coupling at communication points by Jacobi's method, with and without input derivatives, for several
+step sizes."""
 
 from __future__ import annotations
 
@@ -43,7 +44,7 @@ class Study(NamedTuple):
 def study(system: System) -> Study | None:
     """Couple the FMUs of the system with STEPS, and compare with steps of FINEST.
 
-    None if not every FMU takes and gives derivatives.
+    Returns None unless every FMU supports input and output derivatives.
     """
     for fmu in system.fmus.values():
         offer = fmpy.read_model_description(str(system.osp / fmu)).coSimulation
@@ -66,7 +67,7 @@ def couple(
     derivatives: bool,
     outputs: Sequence[str] = ("testbed.pitch", "testbed.roll"),
 ) -> np.ndarray:
-    """A master by Jacobi's method. Returns the outputs at every communication point from 0 on, (n + 1, outputs).
+    """Couple the FMUs by Jacobi's method. Returns the outputs at every communication point from 0 on, (n + 1, outputs).
 
     With `derivatives` each input also gets the time derivative that its output has at the communication point.
     """

@@ -89,7 +89,8 @@ def by_scipy(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value])
             derivatives: Array = instance.get_derivatives()[0]
             return derivatives
 
-        # Interpolated inputs bend at every row.
+        # Interpolated inputs have a corner at every row, so no step of the solver may be longer than the distance
+        # between two rows.
         step, start = experiment.step["CoSimulation"], instance.get_continuous_states()[0]
         solved = solve_ivp(right_hand_side, time[[0, -1]], start, t_eval=time, rtol=SOLVER_TOLERANCE, max_step=step)
         rows = []

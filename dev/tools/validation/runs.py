@@ -24,7 +24,7 @@ from tools.validation.importers import IMPORTERS, Tool, by_fmu_run
 
 #: Paths of the FMUs by FMI version.
 FMUS = {"2.0": Path("prw_testbed.fmu"), "3.0": Path("fmi3/prw_testbed.fmu")}
-#: Relative change of a parameter to find the sensitivity of the tolerances.
+#: Relative change of a parameter, with which the tolerances are tested.
 CHANGE = 0.01
 
 
@@ -152,7 +152,7 @@ def row(importer: str, version: str, fmi: str, agreement: Agreement) -> Row:
 
 
 def share(agreement: Agreement) -> float:
-    """The largest difference in terms of its tolerance."""
+    """The largest difference as a fraction of its tolerance."""
     return max(difference.largest / difference.allowed for difference in agreement.variables.values())
 
 
@@ -163,12 +163,13 @@ def of_testbed(values: Mapping[str, Array]) -> Result:
 
 
 def sensitivity(fmu: Path, experiment: Experiment) -> dict[str, float]:
-    """The share of the tolerance that a change of each parameter takes, in Co-Simulation."""
+    """The largest difference that a change of each parameter by CHANGE causes in Co-Simulation, as a fraction of its
+    tolerance."""
     found = {}
     with Fmu(fmu) as loaded:
         measured = Parameters(loaded).real
     for name in measured:
-        # A parameter that is 0 changes by this number.
+        # A parameter that is 0 becomes CHANGE.
         changed = {**experiment.parameters, name: experiment.parameters[name] * (1 + CHANGE) or CHANGE}
         found[name] = share(compare(by_fmu_run(fmu, experiment, changed), experiment, "CoSimulation"))
     return found

@@ -52,7 +52,7 @@ class System:
 
 
 def read(ssp: Path, osp: Path) -> System:
-    """Read the SSP, valid against the schema of SSP 1.0, and step and end from its OSP twin. Raises UserError."""
+    """Read the SSP, and the step size and the stop time from OspSystemStructure.xml. Raises UserError."""
     from fmpy.ssp import ssd
 
     for path in (ssp, osp / "OspSystemStructure.xml"):
