@@ -58,7 +58,7 @@ def existing_fmu(fmu: str | os.PathLike[str] | None) -> Path:
 
 
 def loaded(fmu: Path) -> fmu_run.Fmu:
-    """The FMU file, loaded. Raises UserError if the file cannot be loaded."""
+    """Loads the FMU file. Raises UserError if it cannot be loaded."""
     try:
         return fmu_run.Fmu(fmu)
     except fmu_run.FmuError as error:

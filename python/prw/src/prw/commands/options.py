@@ -195,7 +195,7 @@ def value(string: str) -> float | bool:
 
 
 def spread(string: str) -> float | tuple[float, float]:
-    """[VALUE:]PERCENT% as a fraction, or (value, fraction). Raises ValueError."""
+    """Converts PERCENT% to a fraction, and VALUE:PERCENT% to (value, fraction). Raises ValueError."""
     match = re.fullmatch(r"(?:([^:]+):)?\s*([^:%]+)%", string)
     if not match:
         raise ValueError("write NAME=10%, or NAME=VALUE:10%")
@@ -204,7 +204,7 @@ def spread(string: str) -> float | tuple[float, float]:
 
 
 def bounds(string: str) -> tuple[float, float]:
-    """LOW:HIGH. Raises ValueError."""
+    """Converts LOW:HIGH to two positive numbers. Raises ValueError."""
     low, colon, high = string.partition(":")
     if not colon:
         raise ValueError("write NAME=LOW:HIGH")

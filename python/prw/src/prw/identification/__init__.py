@@ -66,7 +66,7 @@ def identify(
     files
         CSV tables, DataFrames or dicts of arrays for `prw.read`, or return values of `prw.read` or `prw.simulate`.
     estimate
-        Names of the parameters, or one.
+        Names of the parameters to estimate, or one name.
     priors
         Prior knowledge by parameter: the standard deviation as a fraction of its start value
         (0.1 is 10 %, 1 the most), or (value, fraction). The parameter is then estimated, too.

@@ -48,7 +48,8 @@ def motions(
 ) -> list[Motion]:
     """All candidates within `limits`: each kind with equal, opposite, single and independent motors.
 
-    duration: s. rate: samples per second. noise: by channel in SI; the optimal multisine is made for these channels.
+    duration: s. rate: samples per second. noise: standard deviations by channel, SI; the optimal multisine is made for
+    these channels.
     """
     time = np.arange(int(round(duration * rate)) + 1) / rate
     top = min(WIDEST, rate / 5)
@@ -236,7 +237,8 @@ def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) 
 
 
 def _best(trials: Mapping[tuple[str, str], float]) -> list[str]:
-    """The description of the trial with the least error, if that is small enough. trials: errors by description."""
+    """A list with the description of the trial with the least error; empty if that error is too large. trials: errors
+    by description."""
     (begin, end), error = min(trials.items(), key=lambda trial: trial[1], default=(("", ""), np.inf))
     return [f"{begin} (worst standard error then {error:.1%}{end})"] if error < UNDETERMINED else []
 
@@ -252,7 +254,7 @@ def _worst(information: Array) -> float:
 
 
 def _limits(experiments: Sequence[Experiment]) -> Limits:
-    """Limits of the motors: the largest values in the experiments, and at least small ones."""
+    """Limits of the motors: the largest values in the experiments, but not less than small defaults."""
     angle = max(np.abs(e.theta - e.theta.mean(axis=0)).max() for e in experiments)
     rate = max(np.abs(e.omega).max() for e in experiments)
     return Limits(max(angle, 0.1), max(rate, 1.0), max(40 * rate, 50.0))

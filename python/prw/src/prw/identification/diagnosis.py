@@ -88,7 +88,8 @@ def _causes(solution: Solution, verdict: Verdict) -> list[_Cause]:
 
 
 def _with_fault(solution: Solution, name: str) -> Solution:
-    """The fit with this fault, of unknown size, in all experiments; repeated with the rates of the first fit."""
+    """The fit with this fault, of unknown size, in all experiments. It is repeated once, because the effect of the
+    fault depends on the rates that the fit finds."""
     found = solution
     for _ in range(2):
         pairs = zip(found.fitter.experiments, found.comparisons)

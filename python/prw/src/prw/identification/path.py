@@ -22,11 +22,12 @@ from prw.motion import Array
 #: A sparse matrix from the coefficients to a measured quantity, and its measured values.
 Block = tuple[csr_matrix, Array]
 DEGREE = 5
-#: Order of the differences of coefficients that are penalized; third differences are proportional to jerk.
+#: Differences of the coefficients of this order are penalized; third differences are proportional to jerk.
 ORDER = 3
 #: Range of log10 of the penalty: below, the path interpolates; above, the normal equations lose their digits.
 STIFFNESS = (-6.0, 10.0)
-#: Range of log10 of the weight of logged rates, s^2, and the start values of the search by the number of blocks.
+#: RATIO: range of log10 of the weight of logged rates, s^2. GUESSES: start values of its search, by the number of
+#: blocks.
 RATIO = (-14.0, 4.0)
 GUESSES: dict[int, list[list[float]]] = {1: [[]], 2: [[-2.0], [-4.0], [-6.0]]}
 #: Divisor of the most probable penalty. Too little smoothing adds some noise, too much biases the parameters. The highest

@@ -42,7 +42,8 @@ def ends(solution: Solution, white: Array, errors: Array, quantile: float) -> tu
 
 
 def _end(solution: Solution, i: int, step: Array, wanted: float) -> float:
-    """Logarithm of parameter i at which the least misfit has risen by `wanted`. step: (p,), the first trial."""
+    """Logarithm of parameter i at which the misfit, minimized over the other parameters, has risen by `wanted`. step:
+    (p,), the first trial."""
     centre, (low, high) = solution.logarithms, solution.task.span()
     for _ in range(TRIALS):
         point = np.clip(centre + step, low, high)

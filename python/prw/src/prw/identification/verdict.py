@@ -1,9 +1,9 @@
 """Tests whether the model explains the data, and whether a fault would explain them.
 
-The residuals of a correct fit are noise. Three tests compare them with the motion. Local regression over frequency finds
-residuals that are coherent with the motors' spectra or the channel's own. Score tests (Rao, Proc. Cambridge Phil. Soc. 44
-(1948) 50) find the effects of single faults: a delay, a lag or a gain of a channel or of two in common, friction, backlash.
-The third test compares the residuals' strength with the noise at frequencies at which the motors do not move.
+The residuals of a correct fit are noise. Three tests compare them with the motion. Local regression over frequency
+finds residuals that are coherent with the motors' spectra or the channel's own. Score tests (Rao, Proc. Cambridge Phil.
+Soc. 44 (1948) 50) find the effects of single faults: a delay, a lag or a gain of one channel or of several, friction,
+backlash. The third test compares the residuals' strength with the noise at frequencies at which the motors do not move.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ EXCESS, LUCK = 1.3, 5.0
 PIECE, MAX_PIECES = 16, 6
 #: Least ratio of the power of a moving signal to the power of encoders' errors in it.
 CLEARLY_MOVING = 30.0
-#: Least share of a direction that is independent of the others.
+#: A direction is left out if less than this share of it is independent of the others.
 NEW = 0.02
-#: Share of its greatest magnitude above which a rate has a sign.
+#: Share of its greatest magnitude above which a rate counts as clearly positive or negative.
 TURNING = 0.02
 
 
@@ -110,8 +110,9 @@ class Fault(NamedTuple):
     def bias(self) -> Array:
         """Root mean square (p,) of the unknowns' errors by the fault, if its size is normally distributed about the estimate.
 
-        It is not 0 if the estimate is: the fault may then still have the size of its standard error. An interval widened by
-        this contains the true value with at least its probability, however large the fault is."""
+        It is not 0 even if the estimated size is 0, because the fault may then still have the size of its standard
+        error. An interval that is widened by this contains the true value with at least its nominal probability,
+        however large the fault is."""
         shift = self.shift if self.possible else np.zeros_like(self.shift)
         return np.hypot(shift, self.per_error)
 
