@@ -21,7 +21,8 @@ STEP = np.array([0.2, -0.1])  # motor angles after a step, rad
 GOAL = np.deg2rad(
     30 + 4 / 7 * 60 * np.array([1, -1])
 )  # motor angles for 30 degrees of pitch and 60 of roll, by eq. (1)
-# The motor is an assumption, because the paper gives no data: inertia kg.m2, N.m, rad/s, N.m.s/rad, Ohm, H, N.m/A.
+# Assumed data of the motor, because the paper gives none: inertia kg.m2, dry friction N.m and its rate rad/s, damping
+# N.m.s/rad, resistance Ohm, inductance H, torque constant N.m/A.
 J1, FRICTION, CREEP, DAMPING, R, L, K = 2e-3, 0.05, 0.02, 2e-3, 1.0, 2e-3, 0.5
 STIFFNESS, RATE_GAIN = 40.0, 0.6  # angle loop, N.m/rad and N.m.s/rad
 PROPORTIONAL, INTEGRAL = 2.0, 1000.0  # current loop, V/A and V/(A.s)

@@ -2,7 +2,7 @@
 
 It prints Markdown tables and writes their numbers to dev/benches/ratios.json, from which `make docs` writes
 docs/performance.md. The programs of a table are measured alternately. Each time is the minimum of several rounds. If
-the environment variable BENCH_QUICK is set, counts are small, and the file is target/bench/quick.json: they only show
+the environment variable BENCH_QUICK is set, the counts are small and the file is target/bench/quick.json, only to show
 that the benchmarks run.
 """
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from prw.errors import UserError
 from prw.files import read_text
 
-#: A larger relative standard deviation is a mistake: percent instead of a fraction.
+#: A larger relative standard deviation is probably a mistake: percent instead of a fraction.
 MAX_RELATIVE = 1.0
 #: A table in memory, with columns by name.
 Table = Mapping[str, Any]

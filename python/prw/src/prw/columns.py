@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from prw.errors import UserError, one_line
 
-#: Factor to SI of every unit a column may have, by quantity. The first is SI.
+#: Factor to SI of every unit that a column may have, by quantity. The first unit of each quantity is the SI unit.
 UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "angle": {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180, "arcmin": pi / 10800, "rev": 2 * pi},

@@ -36,12 +36,12 @@ def linearize(
     Parameters
     ----------
     parameters
-        Start values of parameters, states and inputs by name, in the FMU's units or with a unit as (1.9, "N.m/deg"), or the
-        JSON file with them that `prw.identify` writes; other variables keep their start values. The
-        testbed is linear, so only parameters matter there. `use_omega` is set to true and `start_at_rest` to
-        false if they are not given: A, B, C and D are then the matrices of eq. (11), with the motors' angles and rates as
-        independent inputs. With `use_omega` false, Co-Simulation estimates the rates from the angles and ignores
-        `omega1` and `omega2`.
+        Start values of parameters, states and inputs by name, in the FMU's units or with a unit as in (1.9, "N.m/deg"),
+        or the path of a JSON file that `prw identify` has written. Other variables keep their start values. The testbed
+        is linear, so only parameters matter there. `use_omega` is set to true and `start_at_rest` to false if they are
+        not given: A, B, C and D are then the matrices of eq. (11), with the motors' angles and rates as independent
+        inputs. With `use_omega` false, Co-Simulation estimates the rates from the angles and ignores `omega1` and
+        `omega2`.
     fmu
         The FMU (default: the testbed's).
     outputs, fmi_type
@@ -117,9 +117,8 @@ class Linearizer:
         self._closed = False
 
     def at(self, parameters: Given = None) -> StateSpace:
-        """The linear model with start values `parameters` (of parameters, states and inputs, by name, in the FMU's
-        units, or a file with them); others keep the FMU's own. Raises UserError for a name that the FMU lacks or a
-        value that it rejects."""
+        """The linear model for the start values `parameters`, as for `linearize`. Raises UserError for a name that the
+        FMU lacks or a value that it rejects."""
         if self._closed:
             raise UserError(f"{self.fmu}: is closed")
         given = values_of(parameters, self.loaded)

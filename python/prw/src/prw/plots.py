@@ -42,7 +42,7 @@ PAGE_STYLE: Any = {
     "xtick.labelsize": 8,
     "ytick.labelsize": 8,
 }
-#: Time intervals that a long curve is reduced to, each drawn by its extremes; more than the figure has pixels.
+#: Number of intervals to which a long curve is reduced, each drawn by its extremes. The figure has fewer pixels.
 INTERVALS = 4000
 #: If all curves of a panel are below this, the scale is -1 to 1, so that rounding errors look like zero.
 ROUNDING = 1e-9

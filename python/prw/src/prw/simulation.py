@@ -153,8 +153,8 @@ def simulate(
         The motion of the motors, or a recording of it (a CSV file, a DataFrame or a dict of arrays as `prw.read` takes it;
         only its motors matter here), or a run to repeat. Default: the paper's experiment of Fig. 4.
     parameters
-        Values by name, in SI or with a unit as (1.9, "N.m/deg"), or the JSON file with them that `prw.identify` writes; others
-        keep the FMU's start values.
+        Values of parameters by name, in SI or with a unit as in (1.9, "N.m/deg"), or the path of a JSON file that `prw
+        identify` has written. Other parameters keep the FMU's start values.
     fmu
         The testbed FMU, of FMI 2.0 or 3.0 (default: the one inside this package, see `default_fmu`).
     outputs

@@ -175,16 +175,16 @@ def _modelica(path: Path, content: Mapping[str, Any]) -> dict[str, Array]:
     """The trajectories in a file of OpenModelica or Dymola, by title. For each name, dataInfo contains the number N of
     the matrix data_N (0 for the time, which is in every matrix), and the column, which is negative if the sign must be
     changed."""
-    across = "".join(content["Aclass"][3]).strip().rstrip("\0") == "binTrans"
+    is_transposed = "".join(content["Aclass"][3]).strip().rstrip("\0") == "binTrans"
 
-    def upright(name: str) -> Any:
-        return content[name].T if across else content[name]
+    def rows_of(name: str) -> Any:
+        return content[name].T if is_transposed else content[name]
 
-    titles = ["".join(row).rstrip("\0 ") for row in upright("name")]
-    about = ["".join(row).rstrip("\0 ") for row in upright("description")]
+    titles = ["".join(row).rstrip("\0 ") for row in rows_of("name")]
+    about = ["".join(row).rstrip("\0 ") for row in rows_of("description")]
     columns = {}
-    for title, description, (table, index, *_) in zip(titles, about, upright("dataInfo")):
-        data = upright(f"data_{table or 2}")
+    for title, description, (table, index, *_) in zip(titles, about, rows_of("dataInfo")):
+        data = rows_of(f"data_{table or 2}")
         if table == 1:  # does not change
             continue
         unit = re.search(r"\[([^\]|:#]+)[^\]]*\]\s*$", description)

@@ -40,7 +40,8 @@ Rates = Literal["motors", "inputs", "angles"]
 #: Fractions of a motor's range. If the noise is at most EXACT and the quantum at most DIGITS, a recording may come from
 #: a simulation. If the noise is at most ROUNDED, samples are used without smoothing.
 EXACT, DIGITS, ROUNDED = 1e-3, 1e-4, 1e-6
-#: Number of draws of encoders' errors, and the number of neighbouring frequencies into which a line of them leaks.
+#: DRAWS: number of draws of the encoders' errors. FURTHEST: number of neighbouring frequencies into which a spectral
+#: line of these errors leaks.
 DRAWS, FURTHEST = 64, 100
 #: Largest deviation of even times, as a fraction of a step.
 EVEN = 1e-3
@@ -147,7 +148,8 @@ class Experiment:
 
     @cached_property
     def shares(self) -> Array:
-        """Squares of the samplers' numbers per point of `time`, (c,): the share of points that have a value."""
+        """(c,), sum of the squares of each sampler's weights per point of `time`, which is the share of points that
+        have a value."""
         if self.samplers is None:
             return np.ones(len(self.channels))
         return np.array([s.power(2).sum() / len(self.time) for s in self.samplers])
@@ -307,7 +309,8 @@ def _power(errors: Complex) -> Array:
 
 
 def _with_rates(errors: Array, rate_noise: float | None, step: float) -> Complex:
-    """Spectra (d, f) of draws (d, n) of an angle's errors; smaller if its rate was logged with this noise."""
+    """Spectra (d, f) of draws (d, n) of an angle's errors. They are smaller if the rate was logged, with noise of the
+    standard deviation rate_noise."""
     found = spectra(errors.T).T
     if rate_noise is None:
         return found

@@ -215,8 +215,8 @@ class Comparison:
         return found
 
     def score_variance(self, jacobian: Array) -> Array:
-        """Variance (p, p) of the score J'r, with the drawn encoders' errors: in a periodic motion they have
-        its phase and repeat with it. jacobian: (2, bins, c, p)."""
+        """Variance (p, p) of the score J'r, calculated with drawn errors of the encoders, because in a periodic motion
+        these errors repeat with the motion. jacobian: (2, bins, c, p)."""
         scores = np.einsum("rfcp,rfcd->dp", jacobian, self._drawn, optimize=True)
         noise = self._whiten * np.sqrt(self._noise)
         of_noise = np.einsum("fcj,rfcp->rfjp", noise.conj(), jacobian, optimize=True).reshape(-1, jacobian.shape[-1])

@@ -108,7 +108,8 @@ class Fault(NamedTuple):
 
     @property
     def bias(self) -> Array:
-        """Root mean square (p,) of the unknowns' errors by the fault, if its size is normally distributed about the estimate.
+        """Root mean square (p,) of the unknowns' errors that the fault causes, if its size is normally distributed
+        about the estimate.
 
         It is not 0 even if the estimated size is 0, because the fault may then still have the size of its standard
         error. An interval that is widened by this contains the true value with at least its nominal probability,
@@ -312,7 +313,8 @@ def single_faults(
 def _mechanical_friction(
     solution: Solution, experiment: Experiment, comparison: Comparison
 ) -> Iterator[tuple[str, str, Complex]]:
-    """Dry friction of the output about pitch and roll, and of the input shafts, both or one: as `single_faults`."""
+    """Dry friction of the output about pitch and roll, of both input shafts, and of each of them, in the form of
+    `single_faults`."""
     model, known = solution.fitter.model.at(solution.values), solution.values
     turns = model.C[[OUTPUTS.index("pitch_rate"), OUTPUTS.index("roll_rate")]][:, 4:]
     inertia = known["J2"] * np.eye(2) + turns.T @ np.diag([known["H3"], known["J3"]]) @ turns
