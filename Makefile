@@ -1,4 +1,4 @@
-# The first commands for a new user: `make demo` and `make test`. Their files are in .venv/, target/ and out/.
+# New users begin with `make demo` and `make test`, which write into .venv/, target/ and out/.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -o pipefail -c
@@ -19,7 +19,7 @@ WITH_WASM2C := WASM2C='$(CURDIR)/$(VENV)/bin/wasm2c'
 PY   := $(VENV)/bin/python
 # Python compiles modules at the first import; compiling all takes longer than the installation.
 PIP_INSTALL := $(PY) -m pip install --progress-bar off --no-compile
-# Installs into the environment of a stamp. uv needs a tenth of pip's time.
+# Installs into the environment that contains the stamp. uv takes a tenth of the time of pip.
 UV_INSTALL = $(@D)/bin/uv pip install --quiet --python $(@D)/bin/python
 # One process for each core; `.venv/bin/python -m pytest -x FILE` runs a part.
 PYTEST := $(PY) -m pytest -q -p no:cacheprovider -n auto --dist worksteal
@@ -36,7 +36,7 @@ LOCKED ?= --locked
 
 # Rust target of the page in the FMU and of the C sources.
 WEBASSEMBLY := wasm32-unknown-unknown
-# make closes its job server to programs, and rustc would warn that it cannot be reached.
+# make does not pass its job server on to these programs, so rustc would warn that it cannot connect to it.
 NO_JOBS := env -u MAKEFLAGS -u MFLAGS
 HAS_WEBASSEMBLY = ls "$$($(NO_JOBS) rustc --print target-libdir --target $(WEBASSEMBLY))" 2>/dev/null | grep -q libstd
 ADD_WEBASSEMBLY = $(HAS_WEBASSEMBLY) || rustup target add $(WEBASSEMBLY)
@@ -120,8 +120,8 @@ check: $(VENV)/tests.stamp need-rust
 check-release: $(VENV)/importers.stamp need-rust
 	@$(PY) dev/tools/release_check.py $(ARGS)
 
-# Two targets run at a time, so that installations and documentation use the time in which a processor would wait.
-# The FMUs are built by the programs that the Rust tests compiled.
+# Two targets run at a time, so that no processor waits during an installation. The FMUs are built by the programs that
+# the Rust tests compiled.
 test: need-rust need-python
 	@$(MAKE) --no-print-directory $(TWO_JOBS) PROGRAMS=target/debug test-crates test-python $(VENV)/importers.stamp \
 	  $(VENV)/examples.stamp test-docs importer-fmus source-fmu
@@ -129,7 +129,7 @@ test: need-rust need-python
 	PROGRAMS=target/debug $(PYTEST) $(FMU_TESTS) tests/closed_loop tests/importers tests/examples
 	$(PYTEST) -m small tests/source_fmu
 
-# C programs are compiled against the standard's headers, which FMPy brings.
+# C programs are compiled with the headers of the standard, which FMPy contains.
 headers: $(VENV)/tests.stamp
 
 test-rust: test-crates test-docs
@@ -185,7 +185,7 @@ instructions: $(VENV)/tests.stamp fmu
 figures: need-rust $(VENV)/tests.stamp closed-loop-fmus
 	@$(PY) dev/tools figures --fmu $(FMU) --commit
 
-# The pages' tables come from the model descriptions.
+# The tables of the pages come from the model descriptions, so these are written first.
 docs: need-rust $(VENV)/tests.stamp $(VENV)/examples.stamp closed-loop-fmus
 	@$(BUILD_FMU) --describe
 	@$(BUILD_CONTROLLER) --describe
@@ -232,7 +232,7 @@ importer-fmus: closed-loop-fmus
 test-importers: $(VENV)/importers.stamp importer-fmus
 	$(PYTEST) tests/importers
 
-# Takes about a minute for each three faults.
+# Takes about a minute for every three faults.
 test-faults: need-rust headers
 	@$(PY) dev/tools/seeded_faults.py $(ARGS)
 

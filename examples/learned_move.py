@@ -31,12 +31,13 @@ def shaped(impulses: int, duration: float) -> np.ndarray:
 
 
 def draw(value: float, unlike: int, rng: np.random.Generator, count: int) -> np.ndarray:
-    """Returns `count` values: `unlike` random values, repeated."""
+    """Returns `count` values: `unlike` different random values, repeated."""
     return np.resize(rng.uniform(0.8 * value, 1.2 * value, unlike), count)
 
 
 def wrists(count: int, unlike: int) -> VectorEnv:
-    """Environments of `unlike` different wrists. The action is the rate of both motors; the reward is the error after MOVE."""
+    """Environments of `unlike` different wrists. The action is the rate of both motors; the reward is the negative
+    squared error after MOVE."""
     task = Task(
         fmu="target/fmu/prw_testbed.fmu",
         actions={"rate": (-RATE, RATE)},

@@ -1,8 +1,8 @@
 """LQR and Kalman filter for the wrist, against the PI controller
 
-You learn to linearize the FMU (`prw.linearize`) and to design a state feedback and a Kalman filter with
-python-control. The loop is closed around the FMU, sample by sample, with noisy encoders. The error is less than half
-of the error with the PI controller, because that controller knows neither the couplings nor the rate of the reference.
+You learn to linearize the FMU (`prw.linearize`) and to design a state feedback and a Kalman filter with python-control.
+The loop is closed around the FMU, sample by sample, with noisy encoders. The error is less than half of the error with
+the PI controller, because that controller uses neither a model of the couplings nor the rate of the reference.
 
     make examples; .venv/bin/python examples/lqr.py
 """

@@ -2,8 +2,8 @@
 
     python make_recordings.py
 
-The motors follow trapezoidal velocity profiles. Angles are encoder counts (2500 lines, read four times a line, on the
-motor shaft) turned into radians. Runs with Python alone and always writes the same bytes.
+The motors follow trapezoidal velocity profiles. Angles are the counts of encoders on the motor shafts (2500 lines with
+four counts each), converted to radians. The script needs no packages and always writes the same bytes.
 """
 
 import csv
@@ -16,10 +16,11 @@ VELOCITY = 2.5  # rad/s, cruise
 ACCELERATION = 25.0  # rad/s^2
 PAUSE = 0.35  # s, before every move and after the last
 START = (20.0, -15.0)  # deg
-#: Motor angles to go to, one after the other, in deg: pitch, roll, one motor alone, and both back at their own lengths.
+#: Motor angles at the end of each move, deg. The moves are in pitch, in roll, with one motor, with both motors by
+#: different angles, and back to the start.
 TARGETS = ((55.0, 20.0), (85.0, -10.0), (85.0, 30.0), (40.0, 10.0), START)
 
-#: Start (s), angles from and to (rad), longest way (rad).
+#: Start time (s), angles at the start and at the end (rad), and the longer distance of both motors (rad).
 Move = tuple[float, list[float], list[float], float]
 
 
@@ -51,7 +52,7 @@ def moves() -> tuple[list[Move], float]:
 
 
 def motors(plan: list[Move], t: float) -> tuple[list[float], list[float]]:
-    """Angles (rad) and rates (rad/s) of both motors at time t: each move goes along a straight line, both in step."""
+    """Angles (rad) and rates (rad/s) of both motors at time t. In each move, the motors start and stop together."""
     begin, here, there, length = [move for move in plan if move[0] <= t][-1] if t >= plan[0][0] else plan[0]
     distance, speed = trapezoid(length, t - begin)
     angles = [a + (b - a) * distance / length for a, b in zip(here, there)]
@@ -59,7 +60,7 @@ def motors(plan: list[Move], t: float) -> tuple[list[float], list[float]]:
 
 
 def encoder(angle: float) -> float:
-    """The angle as the encoder sees it: whole counts, in rad."""
+    """The angle that the encoder measures, rounded down to a count, in rad."""
     return math.floor(angle * COUNTS_PER_TURN / (2 * math.pi)) * 2 * math.pi / COUNTS_PER_TURN
 
 
@@ -78,7 +79,7 @@ def write(name: str, times: list[float], with_rates: bool) -> None:
 def main() -> None:
     _, end = moves()
     write("point_to_point.csv", [k / 1000 for k in range(int(end * 1000) + 1)], with_rates=True)
-    # A slow bus: about every 5 ms, never quite on time, and no velocities.
+    # Polled over a slow bus: about every 5 ms at uneven times, without velocities.
     jitter = random.Random(2009)
     polled = [round(k / 200 + 0.003 * jitter.random(), 5) for k in range(int(end * 200))]
     write("point_to_point_polled.csv", polled, with_rates=False)

@@ -1,8 +1,8 @@
 """Predictive control with a black-box model, by 1,024 rollouts per decision
 
-You learn to plan with any FMU as its own model (MPPI: model predictive path integral control). The state of the plant
-is serialized and passed to 1,024 instances (`serialize`, `deserialize`). Each of them tries a different motion of the
-motors, and the plant follows a weighted mean of these motions, in which better ones have more weight.
+You learn to plan with an FMU as the model of the plant (MPPI: model predictive path integral control). The state of the
+plant is serialized and passed to 1,024 instances (`serialize`, `deserialize`). Each of them tries a different motion of
+the motors, and the plant follows a weighted mean of these motions, in which better ones have more weight.
 
     make examples; .venv/bin/python examples/predictive_control.py
 """

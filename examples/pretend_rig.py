@@ -2,9 +2,9 @@
 
     python examples/pretend_rig.py MOTION.csv RUN.csv [--seed N] [--noise N] [--measure tau1,tau2,theta3,theta4,pitch,roll]
 
-The FMU runs with random parameters, which --seed selects. The sensors add errors to its outputs: encoders have 10000 counts,
-torques 20 mN.m of noise, the inertial sensor 0.06 deg of noise, and each sensor an unknown offset. The errors differ from run to
-run, unless --noise selects them.
+The FMU runs with random parameters, which --seed selects. The sensors add errors to its outputs: encoders have 10000
+counts per revolution, the noise is 20 mN.m for torques and 0.06 deg for the inertial sensor, and each sensor has an
+unknown offset. The errors differ from run to run, unless --noise selects them.
 """
 
 from __future__ import annotations

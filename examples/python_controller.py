@@ -1,9 +1,10 @@
-"""A controller for the wrist in Python, as an FMU: pip install pythonfmu==0.7.0, then
+"""A controller for the wrist in Python, as an FMU. Enter `pip install pythonfmu==0.7.0`, then
 
     pythonfmu build -f examples/python_controller.py -d target/fmu
     cargo run --release -p prw_controller --bin build_closed_loop -- --controller target/fmu/PythonController.fmu --out out/python
 
-connects it to the testbed, because it has the inputs and outputs of prw_controller.fmu. The FMU needs Python.
+The second command connects the FMU to the testbed. This works because the FMU has the inputs and outputs of
+prw_controller.fmu. To run the FMU, Python must be installed.
 """
 
 from typing import Any

@@ -21,7 +21,8 @@ STEP = np.array([0.2, -0.1])  # motor angles after a step, rad
 GOAL = np.deg2rad(
     30 + 4 / 7 * 60 * np.array([1, -1])
 )  # motor angles for 30 degrees of pitch and 60 of roll, by eq. (1)
-# The motor is an assumption, because the paper gives no data: inertia kg.m2, N.m, rad/s, N.m.s/rad, Ohm, H, N.m/A.
+# Assumed data of the motor, because the paper gives none: inertia kg.m2, dry friction N.m and its rate rad/s, damping
+# N.m.s/rad, resistance Ohm, inductance H, torque constant N.m/A.
 J1, FRICTION, CREEP, DAMPING, R, L, K = 2e-3, 0.05, 0.02, 2e-3, 1.0, 2e-3, 0.5
 STIFFNESS, RATE_GAIN = 40.0, 0.6  # angle loop, N.m/rad and N.m.s/rad
 PROPORTIONAL, INTEGRAL = 2.0, 1000.0  # current loop, V/A and V/(A.s)
@@ -31,12 +32,12 @@ Motion = Callable[[float], tuple[np.ndarray, np.ndarray]]
 
 
 def jump(time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Angles (2,) rad and rates (2,) rad/s that the motors should have: the goal of a jump at time 0, at rest."""
+    """Angles (2,) rad and rates (2,) rad/s that the motors should have if the reference jumps to STEP at time 0."""
     return STEP, np.zeros(2)
 
 
 def move(time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Angles and rates on half a cosine to the goal."""
+    """Angles (2,) rad and rates (2,) rad/s that the motors should have on half a cosine to GOAL."""
     phase = np.pi * min(time / MOVE, 1.0)
     return GOAL * (1 - np.cos(phase)) / 2, GOAL * np.pi / (2 * MOVE) * np.sin(phase)
 

@@ -1,8 +1,9 @@
 """Times the FMUs against programs in C and other tools; `make bench`.
 
-It prints Markdown tables and writes the figures to dev/benches/ratios.json, from which `make docs` writes docs/performance.md.
-The programs of a table are measured alternately. Each time is the minimum of several rounds. If the environment variable
-BENCH_QUICK is set, counts are small, and the file is target/bench/quick.json: they only show that the benchmarks run.
+It prints Markdown tables and writes their numbers to dev/benches/ratios.json, from which `make docs` writes
+docs/performance.md. The programs of a table are measured alternately. Each time is the minimum of several rounds. If
+the environment variable BENCH_QUICK is set, the counts are small and the file is target/bench/quick.json, only to show
+that the benchmarks run.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ from tools.validation.system import read  # noqa: E402
 FMUS, WORK = ROOT / "target" / "fmu", ROOT / "target" / "bench"
 RATIOS = Path(__file__).with_name("ratios.json")
 QUICK = "BENCH_QUICK" in os.environ
-#: Communication step size, s. The sums of EXACT have no rounding errors.
+#: Communication step sizes, s. Multiples of EXACT have no rounding errors.
 STEP, EXACT = 1e-3, 2.0**-10
 SAMPLES, RUNS, ROUNDS, LOOPS = (21, 4, 1, 2) if QUICK else (2001, 2000, 7, 1000)
 #: Numbers of instances, each with the number of steps.
@@ -57,12 +58,12 @@ WAYS = {
 VECTORS, RATES, OMEGA, ALTERNATING, GRID, NEW_SIZES = 0, 2, 3, 4, 5, 6
 
 
-#: The figures of all tables, by the name of the table and the label of the row.
+#: The numbers of all tables, by the name of the table and the label of the row.
 FIGURES: dict[str, dict[str, list[float]]] = {}
 
 
 def table(name: str, *rows: Iterable[object]) -> None:
-    """Prints a table and keeps its figures, under its name."""
+    """Prints a table and stores its numbers in FIGURES."""
     lines = [f"| {' | '.join(f'{x:,.3g}' if isinstance(x, float) else str(x) for x in row)} |\n" for row in rows]
     lines.insert(1, "|---" * lines[0].count(" |") + "|\n")
     print("", *lines, sep="", flush=True)
@@ -71,7 +72,7 @@ def table(name: str, *rows: Iterable[object]) -> None:
 
 
 def write_figures() -> None:
-    """Writes the figures of all tables."""
+    """Writes the numbers of all tables."""
     path = WORK / "quick.json" if QUICK else RATIOS
     path.write_text(json.dumps(FIGURES, indent=2) + "\n", encoding="utf-8")
 
@@ -165,7 +166,7 @@ class Case:
         self.table = np.ascontiguousarray(np.column_stack(list(inputs.values())))
         self.slave = instantiate_fmu(self.directory, self.description, fmi_type="CoSimulation")
         self.loaded = fmu_run.Fmu(fmu)
-        # An array of start values makes as many runs as it has elements.
+        # fmu_run makes one run for each element of an array of start values.
         self.start = {next(iter(inputs)): np.full(runs, self.table[0, 0])}
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Counts the instructions of about twenty-five uses of the FMU and of fmu-run with callgrind; `make instructions`.
+"""Counts the instructions of about 25 typical uses of the FMU and of fmu-run with callgrind; `make instructions`.
 
 Counts of instructions do not depend on the load of a machine, so a test compares them with the committed table
 instructions.json. They depend on the compiler, so the table names its version.
@@ -20,10 +20,11 @@ import fmpy
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLE = Path(__file__).with_name("instructions.json")
-#: Counts may differ from the table by this much: small changes of the compiler's decisions far away.
+#: Relative difference from the table that is tolerated, because a change elsewhere may change decisions of the
+#: compiler.
 TOLERANCE = 0.03
-#: Uses of crates/fmu-run/examples/count_runs.rs: the name in the table, the repetitions, and the units in each. Repetitions are many,
-#: because the first runs on a busy machine are repeated if a new instance seems to take long.
+#: Uses in crates/fmu-run/examples/count_runs.rs: the name in the table, the repetitions, and the units (such as steps)
+#: in each. There are many repetitions, because on a busy machine fmu-run may repeat the first runs.
 RUNS = {
     "load": ("fmu-run: open the FMU", 1, 1),
     "one step": ("fmu-run: a run of one step", 200, 1),
@@ -38,7 +39,7 @@ def compiler() -> str:
     return subprocess.run(["rustc", "--version"], check=True, capture_output=True, text=True).stdout.strip()
 
 
-def is_measurable() -> str | None:
+def why_not_measurable() -> str | None:
     """Returns why the counts cannot be compared with the table here, or None."""
     if shutil.which("valgrind") is None:
         return "valgrind is missing; on Debian: apt install valgrind"

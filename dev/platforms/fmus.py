@@ -50,5 +50,6 @@ def _pack(
 
 
 def _run(program: str, *arguments: str) -> None:
-    # These programs compile the model to WebAssembly, for the page and for the C sources.
+    # These programs also compile the model to WebAssembly, for the page and for the C sources, so they need this
+    # environment.
     run(str(target_directory() / "debug" / program), *arguments, environment=environment())

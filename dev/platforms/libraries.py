@@ -19,7 +19,8 @@ from pathlib import Path
 import macos_linker
 from targets import GLIBC, LINUX, MODEL, MODELS, PACKERS, ROOT, TARGETS, WINDOWS, Target
 
-#: Compiles the standard library too, without the code that prints backtraces, which is a third of a library. Importers print no backtraces.
+#: Compiles the standard library as well, without the code for backtraces, which would be a third of a library although
+#: importers print none.
 STD = ("-Zbuild-std=std,panic_unwind", "-Zbuild-std-features=panic-unwind")
 #: The earliest time in a zip file. A fixed time makes archives reproducible.
 EPOCH = "315532800"
@@ -84,7 +85,7 @@ def link(target: Target, name: str, exports: Sequence[str]) -> list[str]:
         listed = ROOT / "target" / f"{name}.def"
         listed.parent.mkdir(exist_ok=True)
         listed.write_text("\n".join(["EXPORTS", *exports, ""]), encoding="utf-8")
-        # A relative path, because symbols have a hash of the flags.
+        # The path is relative, because symbols contain a hash of the flags.
         arguments = (f"target/{listed.name}",)
     elif target.macos:
         # -S -x: strips the library before it is signed.
@@ -132,8 +133,8 @@ def library(model: str, target: Target) -> Path:
 def export_from_object() -> list[str]:
     """Flags of rustc for the library of the wheel for Windows.
 
-    maturin 1.16 lists PyInit_fmu_run._native, which does not exist, in the last list of exports, and zig reads only that one.
-    Therefore that list is empty, and an object file names the export.
+    zig reads only the last list of exports, in which maturin 1.16 names PyInit_fmu_run._native, which does not exist.
+    Therefore that list is replaced by an empty file, and an object file names the export.
     """
     listed = target_directory() / "maturin" / "fmu_run._native.def"
     listed.parent.mkdir(exist_ok=True)

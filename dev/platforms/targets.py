@@ -57,8 +57,9 @@ TARGETS = (LINUX, LINUX_ARM, WINDOWS, MAC, MAC_ARM)
 #: Target that is translated to C, for all other platforms.
 WEBASSEMBLY = Target("wasm32-unknown-unknown", ".wasm")
 
-#: The directories of `binaries/` in FMI 2.0 and the targets of their libraries; two targets make a universal library. FMI 2.0.5 and
-#: FMI 3.0 have equal names for ARM. Importers on ARM Macs look in darwin64.
+#: The directories of `binaries/` in FMI 2.0 and the targets of their libraries; two targets make a universal library.
+#: The names for ARM are the same in FMI 2.0.5 and FMI 3.0. darwin64 contains ARM as well, because importers on ARM Macs
+#: look there.
 DIRECTORIES = {
     "linux64": (LINUX,),
     "win64": (WINDOWS,),

@@ -1,7 +1,7 @@
 """Checks the changes since the last commit, or the last commit if there are none; `make check`.
 
-Format and lints of the changed files, the unit tests of the changed crates, and, if the FMU may have changed, a new one
-under its core tests. `make test` runs everything.
+Checks format and lints of the changed files, and runs the unit tests of the changed crates. If the FMU may have
+changed, it is built again and its core tests run. `make test` runs everything.
 """
 
 from __future__ import annotations

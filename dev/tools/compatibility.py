@@ -11,7 +11,8 @@ from pathlib import Path
 from prw.errors import UserError
 from prw.files import write_text
 
-#: Directory of the results of tests/importers, a file each; the page with their table, and its heading.
+#: Directory with one file for each result of tests/importers; the page with the table of the results, and the table's
+#: heading.
 RESULTS, PAGE, HEADING = Path("target/importers"), Path("docs/compatibility.md"), "Results of tests/importers"
 HEADS = ("tool", "version", "fmu", "run", "seen", "date")
 TITLES = ("tool", "version", "FMU", "run", "result", "date")

@@ -1,4 +1,5 @@
-"""The error of the Co-Simulation FMU over the step, for each kind of input that describes the motors' motion."""
+"""The error of the FMU in Co-Simulation as a function of the step size, if angles are set, if rates are set as well,
+and for piecewise linear motion."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ from prw.testbed import OUTPUTS, Testbed
 AMPLITUDE, RATE, PHASE = np.array([0.3, 0.2]), np.array([14.0, 23.0]), np.array([0.4, 1.9])
 #: Duration, s.
 DURATION = 1.0
-#: Time, s, from which errors count, because with angles only, the rates are unknown in the first two steps.
+#: Time, s, from which errors count. Before, an error remains from the first two steps, in which the rates are unknown
+#: if only angles are set.
 FROM = 0.3
 STEPS_PER_SECOND = (125, 250, 500, 1000, 2000)
 #: Number of steps of the reference run in each step of the piecewise linear motion.
@@ -25,9 +27,19 @@ CUTS = 16
 
 
 class Convergence(NamedTuple):
-    """Errors over the step. step: (k,) s. Errors by output name, (k,) each, as a fraction of the output's largest value: with
-    `angles` only, with `rates` as well (use_omega), and for motors that turn at a constant, given rate in each step
-    (`piecewise_linear`), where the FMU is exact."""
+    """Errors for k step sizes, by output, as fractions of the output's largest value.
+
+    Attributes
+    ----------
+    step
+        (k,) s.
+    angles
+        (k,) by output, if only angles are set.
+    rates
+        (k,) by output, if rates are set as well (use_omega).
+    piecewise_linear
+        (k,) by output, for motors that turn at a constant, given rate in each step, where the FMU is exact.
+    """
 
     step: np.ndarray
     angles: dict[str, np.ndarray]

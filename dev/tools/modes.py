@@ -15,9 +15,9 @@ PAIRS = (("theta3", "theta4"), ("theta5", "theta6"), ("omega5", "omega6"))
 class Mode(NamedTuple):
     """Pitch or roll: x' = A x + b theta + b_rate theta', angle = c x.
 
-    x: half the sum (pitch) or half the difference (roll) of each pair of states; theta: likewise of the motors' angles,
-    rad. A: (3, 3), b, b_rate, c: (3,). mixing: the largest coupling to the other mode left in A and B, which symmetry
-    makes zero.
+    x is half the sum (pitch) or half the difference (roll) of each pair of states, and theta likewise of the motors' angles,
+    rad. A is (3, 3); b, b_rate and c are (3,). `mixing` is the largest coupling to the other mode that is left in A and B;
+    symmetry makes it zero.
     """
 
     A: np.ndarray

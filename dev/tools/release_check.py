@@ -46,7 +46,7 @@ def run(name: str, arguments: tuple[str, ...], logs: Path) -> tuple[str, float]:
     begin, before = time.monotonic(), changed()
     log = logs / f"{arguments[0]}.log"
     print(f"== {name}: make {' '.join(arguments)} > {log.relative_to(ROOT)}", flush=True)
-    # The targets of the parts start their own make. ARGS names the parts.
+    # The targets start make again, which must not inherit the flags of this make, nor ARGS, which names the parts.
     inherited = ("ARGS", "MAKEFLAGS", "MAKELEVEL", "MAKEOVERRIDES", "MFLAGS")
     environment = {key: value for key, value in os.environ.items() if key not in inherited}
     with log.open("w", encoding="utf-8") as file:

@@ -59,8 +59,8 @@ def read(path: Path) -> list[Fault]:
 
 
 def copy_sources() -> None:
-    """Makes SOURCE_COPY equal to the files that git tracks. The files that have not changed keep their modification times, so that cargo does not compile
-    them again."""
+    """Makes SOURCE_COPY equal to the files that git tracks. Unchanged files keep their modification times, so that
+    cargo does not compile them again."""
     command = ["git", "ls-files", "-z"]
     names = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout.split("\0")
     for path in [

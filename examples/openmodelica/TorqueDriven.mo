@@ -1,8 +1,8 @@
 // The testbed with motors that have inertia: both motors get a torque, and the wrist pushes back on them. torque_driven.mos imports
 // the FMU and simulates `Machine` and `MachineOfLibrary`, which are the same machine in two notations.
 //
-// The sign decides: tau1 and tau2 of the testbed are the torques that the wrist exerts on its motors (eq. (9) of the paper), so they are
-// added to the torque of the motor. With the other sign the machine is unstable.
+// tau1 and tau2 of the testbed are the torques that the wrist exerts on its motors (eq. (9) of the paper), so they are added to the
+// torque of the motor. With the opposite sign the machine is unstable.
 //
 // Model Exchange needs neither `pre` nor a sample here, because a motor with inertia passes no torque through at the same instant:
 // tau1 changes the acceleration of the motor, and only its integral returns to the FMU. The loop is therefore not algebraic.

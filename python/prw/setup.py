@@ -1,5 +1,6 @@
-"""Adds the files of the page, which the package shares with the FMU, and to an installation from a clone the path of the
-clone, where `make fmu` leaves the FMU. pyproject.toml has all else. Nothing is built in the clone."""
+"""Adds the files of the page, which the FMU also contains, to the package. If the package is installed from a clone, it
+also adds the path of the clone, where `make fmu` writes the FMU. pyproject.toml has all other settings. The build
+writes nothing into the clone."""
 
 from __future__ import annotations
 
@@ -11,13 +12,13 @@ from setuptools import setup
 from setuptools.command.build_py import build_py
 
 CLONE = Path(__file__).resolve().parents[2]
-#: Directories as in prw.files, and the files that prw.frames needs.
+#: The directories that prw.files also lists, and the files that prw.frames needs.
 PAGE_DIRECTORIES = ("crates/fmu-package/page", "docs/fmu-page/wrist")
 PAGE_FILES = ("live.css", "player.js", "plot.js", "animation.js", "wrist.js", "wrist.json")
 
 
 class WithClone(build_py):
-    """Adds these files to the modules."""
+    """Copies these files next to the modules."""
 
     def run(self) -> None:
         super().run()

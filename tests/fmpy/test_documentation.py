@@ -23,8 +23,8 @@ from prw.errors import UserError
 from prw.motion import Motion
 from tools.documentation.pages import PAGES, TESTBED, render
 from tools.documentation.sources import read_table
-from tools.figures import COMMITTED, bode, gallery
-from tools.figures.gallery import figures
+from tools.figures import COMMITTED, bode, plots
+from tools.figures.plots import figures
 from tools.figures.results import numbers, results
 from tools.figures.writing import write_for_page, write_small_png
 
@@ -224,7 +224,7 @@ def in_the_last_digit(value, random):
 def test_another_processor_writes_the_same_files(found, written, tmp_path, monkeypatch):
     """`make figures` on another machine changes no committed file."""
     random = np.random.default_rng(1)
-    monkeypatch.setattr(gallery, "COLUMN", gallery.COLUMN * (1 + EPSILON))
+    monkeypatch.setattr(plots, "COLUMN", plots.COLUMN * (1 + EPSILON))
     monkeypatch.setattr(bode, "CURVE", in_the_last_digit(bode.CURVE, random))
     there = write(tmp_path, in_the_last_digit(found, random))
     assert written.keys() == there.keys()

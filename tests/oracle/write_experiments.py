@@ -136,8 +136,8 @@ between communication points cause a first-order error that exceeds the toleranc
 {kinds}. In Co-Simulation the tolerance of torques is wider, because many
 importers read outputs before they set the next inputs: torques then belong to the last rates.
 
-In rate_step the motors turn at constant rates, so Co-Simulation is exact at any step size, and Model Exchange is exact up to
-the solver's tolerance. The motors of the other experiments are sampled every {SAMPLE_TIME * 1e3:g} ms.
+In rate_step the motors turn at constant rates, so Co-Simulation is exact at any step size, and Model Exchange is exact up
+to the solver's tolerance. The motors of the other experiments are sampled every {SAMPLE_TIME * 1e3:g} ms.
 
 `prw check RESULT` compares a table of any tool with an experiment.
 """

@@ -20,7 +20,7 @@ from prw.cli import run as run_command
 from tools import compatibility, figures
 from tools.documentation import performance
 from tools.documentation.pages import CONTROLLER, TESTBED
-from tools.figures import film, gallery, visit
+from tools.figures import animation, plots, screencast
 
 #: A fault that the tests of fmi-abi find, and a change without effect.
 FAULTS = """
@@ -69,7 +69,7 @@ def test_the_benchmarks(fmu: Path) -> None:
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the counts are for linux64")
 def test_no_use_takes_more_instructions_than_before(fmu: Path) -> None:
     """Fails also if a use takes fewer, because the table would then hide a later rise."""
-    if why := instructions.is_measurable():
+    if why := instructions.why_not_measurable():
         pytest.skip(why)
     table = json.loads(instructions.TABLE.read_text(encoding="utf-8"))["instructions"]
     changed = instructions.differences(instructions.measure(fmu), table)
@@ -110,28 +110,28 @@ def test_figures_are_written(fmu: Path, tmp_path: Path, monkeypatch: pytest.Monk
         pytest.skip("chromium is not installed")
     built("prw_controller.fmu")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(film, "SPEED", 20)
-    monkeypatch.setattr(visit, "GESTURES", ((1, False, (0, 0)), (1, True, (4, 0))))
-    draw = gallery.figures
+    monkeypatch.setattr(animation, "SPEED", 20)
+    monkeypatch.setattr(screencast, "GESTURES", ((1, False, (0, 0)), (1, True, (4, 0))))
+    draw = plots.figures
     some = ("fig4_pair", "poles")
-    monkeypatch.setattr(gallery, "figures", lambda found: {k: v for k, v in draw(found).items() if k in some})
+    monkeypatch.setattr(plots, "figures", lambda found: {k: v for k, v in draw(found).items() if k in some})
     (tmp_path / "docs").mkdir()
     assert (
         run_command("tools", "", {"figures": figures}, ["figures", "--fmu", str(fmu), "--out", "out", "--commit"]) == 0
     )
     written = {path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file() and "out" not in path.parts}
     assert len(written) == 5 and all((ROOT / path).is_file() for path in written)
-    shown = figures.VISIT.read_bytes()
-    visit.film(fmu, figures.VISIT)
-    assert figures.VISIT.read_bytes() == shown
+    shown = figures.SCREENCAST.read_bytes()
+    screencast.record(fmu, figures.SCREENCAST)
+    assert figures.SCREENCAST.read_bytes() == shown
     # A film that differs is replaced.
-    with Image.open(figures.VISIT) as kept:
+    with Image.open(figures.SCREENCAST) as kept:
         frames = [frame.convert("RGB") for frame in ImageSequence.Iterator(kept)]
     frames[1].paste("red", (0, 0, 5, 5))
-    frames[0].save(figures.VISIT, save_all=True, append_images=frames[1:])
-    changed = figures.VISIT.read_bytes()
-    visit.film(fmu, figures.VISIT)
-    assert figures.VISIT.read_bytes() != changed
+    frames[0].save(figures.SCREENCAST, save_all=True, append_images=frames[1:])
+    changed = figures.SCREENCAST.read_bytes()
+    screencast.record(fmu, figures.SCREENCAST)
+    assert figures.SCREENCAST.read_bytes() != changed
 
 
 def test_compatibility_writes_the_rows_that_tests_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

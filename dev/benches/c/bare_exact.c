@@ -12,8 +12,8 @@ typedef double Lanes __attribute__((vector_size(16)));
 typedef struct {
     double input[4], set_rate[2];
     Lanes z[3], u, w;    /* at the end of the last step; w from the parabola through the last samples */
-    Lanes sample[2];     /* the last motor angles and those before */
-    Lanes rate[3], bend[3]; /* the parabola's slope and curvature now, per sample: current, last, before */
+    Lanes sample[2];     /* the last motor angles and the ones before them */
+    Lanes rate[3], bend[3]; /* weights of three samples (current, last, before) in the parabola's slope and curvature */
     double h1, h2;       /* the last steps */
     int samples, uneven, special, has_rate[2], use_omega;
 } State;

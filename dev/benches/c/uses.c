@@ -65,7 +65,7 @@ static void report(const char *use, long count) {
 
 static const long MANY = 1000;
 
-/* Before the steps that are counted, a use may do something that must not make them slower. */
+/* Before the counted steps, a use may do something that must not make these steps slower. */
 typedef void Preparation(void);
 
 static void nothing(void) {}

@@ -1,5 +1,6 @@
 """Writes the documentation of both FMUs from the text in docs/fmu-page, the tables of the model descriptions,
-docs/compatibility.md and the figures that `make figures` has made, and docs/performance.md from the figures of `make bench`."""
+docs/compatibility.md and the figures that `make figures` has drawn. Writes docs/performance.md from the results of
+`make bench` and `make instructions`."""
 
 from __future__ import annotations
 

@@ -20,7 +20,8 @@ PRINTED = Path("modelDescription/parameters.json")
 
 @dataclass(frozen=True)
 class Page:
-    """The page of an FMU: the directory of its text within SOURCES/text, and the files for the FMU."""
+    """The page of an FMU: the directory of its text within SOURCES/text, and the directory of the files that are copied
+    into the FMU."""
 
     text: str
     content: Path
@@ -145,8 +146,8 @@ def typeset(text: str) -> str:
 
 
 def _tidy(mathml: str) -> str:
-    """Remove parts that HTML does not need. Matrices get brackets from the style sheet, because brackets that are characters
-    grow with the matrix only with a font for mathematics."""
+    """Remove parts that HTML does not need. Matrices get brackets from the style sheet, because characters for brackets
+    grow with the matrix only in a font for mathematics."""
     mathml = mathml.replace(' xmlns="http://www.w3.org/1998/Math/MathML"', "")
     special = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
     mathml = re.sub(r"&#x([0-9A-Fa-f]+);", lambda m: special.get(chr(int(m[1], 16)), chr(int(m[1], 16))), mathml)

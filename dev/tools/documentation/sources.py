@@ -55,11 +55,11 @@ def read_table(path: Path, heading: str) -> Table:
 
 
 def shown_unit(variable: Any) -> str:
-    """A variable's unit as the model description writes it; empty for 1 and for none."""
+    """The unit of a variable in the model description; empty if the unit is 1 or missing."""
     unit = variable.unit or getattr(variable.declaredType, "unit", None) or ""
     return "" if unit == "1" else unit
 
 
 def format_start(variable: Any) -> str:
-    """A variable's start value; eight digits of a Real."""
+    """The start value of a variable; a Real has eight digits."""
     return f"{float(variable.start):.8g}" if variable.type == "Real" else variable.start

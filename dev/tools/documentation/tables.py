@@ -80,7 +80,7 @@ def _inline(text: str) -> str:
 
 
 def _table(title: str, header: Sequence[str], rows: Iterable[str], numbers: Sequence[int] = (), kind: str = "") -> str:
-    """numbers: indices of the columns with right-aligned numbers."""
+    """A table in HTML. numbers: indices of the columns with right-aligned numbers. kind: its CSS class."""
     attributes = (' class="number"' if column in numbers else "" for column in range(len(header)))
     head = "".join(f"<th{attribute}>{title}</th>" for attribute, title in zip(attributes, header))
     heading = f"<h3>{title}</h3>\n" if title else ""

@@ -1,5 +1,6 @@
-"""Reproduces the paper's Figs. 4 and 5 and draws Bode plots of the torques, poles and zeros, step responses and the order
-of convergence, all from the FMU. Writes each figure as SVG and PNG, and the figures behind the text as numbers.json."""
+"""Reproduces the paper's Figs. 4 and 5 and draws Bode plots of the torques, poles and zeros, step responses and the
+order of convergence, all from the FMU. Writes each figure as SVG and PNG, and the numbers that the text quotes as
+numbers.json."""
 
 from __future__ import annotations
 
@@ -10,12 +11,12 @@ from prw.commands.options import add_paths
 from prw.files import write_text
 from prw.testbed import existing_fmu
 
-#: The copies that are kept with the sources, for the documentation and the README.
+#: Directory of the figures that git tracks, for the documentation and the README.
 COMMITTED = Path("docs/fmu-page/figures")
-#: README's first image.
-FILM = Path("docs/wrist.gif")
-#: README's second image, of the page in the FMU.
-VISIT = Path("docs/try-it.gif")
+#: The first image of the README, an animation of the wrist.
+ANIMATION = Path("docs/wrist.gif")
+#: The second image of the README, a screencast of the page in the FMU.
+SCREENCAST = Path("docs/try-it.gif")
 
 HELP = "reproduce the paper's figures from runs of the FMU"
 
@@ -26,14 +27,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--commit",
         action="store_true",
-        help=f"also renew the copies kept with the sources, in {COMMITTED}, {FILM} and {VISIT} (with the browser chromium)",
+        help=f"also renew the copies kept with the sources, in {COMMITTED}, {ANIMATION} and {SCREENCAST} (with the browser chromium)",
     )
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `tools figures`. Raises UserError with a message of one line."""
     # FMPy and matplotlib take a while to load.
-    from tools.figures.gallery import figures
+    from tools.figures.plots import figures
     from tools.figures.results import numbers, results
     from tools.figures.writing import write_for_page, write_png, write_small_png, write_svg
 
@@ -53,10 +54,10 @@ def run(arguments: argparse.Namespace) -> None:
                 write_small_png(COMMITTED / f"{name}.png", figure.figure)
         write_text(COMMITTED / "numbers.json", numbers(found))
         from prw.animation import animate
-        from tools.figures import visit
-        from tools.figures.film import SPEED, story
+        from tools.figures import screencast
+        from tools.figures.animation import SPEED, captioned_run
 
-        run, captions = story(fmu, fmu.with_name("prw_controller.fmu"))
-        animate(run, FILM, speed=SPEED, captions=captions)
-        visit.film(fmu, VISIT)
-        print(f"renewed {COMMITTED}, {FILM} and {VISIT}")
+        run, captions = captioned_run(fmu, fmu.with_name("prw_controller.fmu"))
+        animate(run, ANIMATION, speed=SPEED, captions=captions)
+        screencast.record(fmu, SCREENCAST)
+        print(f"renewed {COMMITTED}, {ANIMATION} and {SCREENCAST}")

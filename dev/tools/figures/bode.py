@@ -12,14 +12,27 @@ from prw.testbed import ANGLE_OF
 from tools.figures.results import CURVE, POINTS, Results
 from tools.frequency import SHAFTS, TORQUES, decibels, degrees
 
-#: Degrees between the ticks of a phase, the first that makes at most five.
+#: Possible distances between the ticks of a phase, degrees; the smallest with at most five intervals is used.
 PHASE_STEPS = (10, 15, 30, 45, 90, 180, 360)
 SUBSCRIPTS = "₀₁₂₃₄₅₆₇₈₉"
 
 
 class Transfer(NamedTuple):
-    """One Bode plot. key: the letter of Fig. 5 and of its files. title: input and output. unit: unit of 0 dB. curve: complex
-    over CURVE. points: measured, complex, at POINTS."""
+    """One Bode plot.
+
+    Attributes
+    ----------
+    key
+        Letter of the plot in Fig. 5 and in file names.
+    title
+        Input and output.
+    unit
+        Unit of 0 dB.
+    curve
+        Complex response of the linear model at the frequencies CURVE.
+    points
+        Complex response that was measured at the frequencies POINTS.
+    """
 
     key: str
     title: str

@@ -20,7 +20,7 @@ from tools.modes import Mode, pitch_and_roll
 #: Frequencies in Hz of the curves of the Bode plots, and of the measured points.
 CURVE = np.geomspace(0.1, 1000, 321)
 POINTS = 10 ** (np.arange(-6, 16) / 6)
-#: Highest frequency in Hz of the points whose deviations are stated.
+#: Highest frequency in Hz of the points for which the text states the deviation from the curves.
 STATED = 50.0
 
 Run = tuple[Motion, dict[str, np.ndarray]]
@@ -34,10 +34,22 @@ class Step(NamedTuple):
 
 
 class Results(NamedTuple):
-    """The linear model of the FMU, whose outputs are SHAFTS, TORQUES and then all OUTPUTS; and runs of the FMU.
+    """The linear model of the FMU, and results of its runs.
 
-    sweep: the measured response of SHAFTS and TORQUES at POINTS. fig4, fig4_equal: the experiment of Fig. 4 and its counterpart. pitch_step: both motors step by 1 degree. roll_step:
-    motor 2 steps by -1 degree instead.
+    Attributes
+    ----------
+    model
+        The linear model; its outputs are SHAFTS, then TORQUES.
+    modes
+        Pitch and roll.
+    sweep
+        Measured response of SHAFTS and TORQUES at POINTS.
+    fig4, fig4_equal
+        The experiment of Fig. 4, and the same with equal motors.
+    pitch_step, roll_step
+        Responses if both motors step by 1 degree, and if motor 2 steps by -1 degree instead.
+    convergence
+        Errors for several step sizes.
     """
 
     model: StateSpace
@@ -84,7 +96,7 @@ def _step(fmu: Path, sides: tuple[int, int]) -> Step:
 
 
 def numbers(found: Results) -> str:
-    """The quoted results by name, and the version of matplotlib that drew the figures, as JSON."""
+    """The numbers that the text quotes, by name, and the version of matplotlib that drew the figures, as JSON."""
     low = POINTS <= STATED
     ratio = found.sweep / found.model.response_at_hz(POINTS, ANGLE_OF)
     high = found.model.response_at_hz(1e5, ANGLE_OF)

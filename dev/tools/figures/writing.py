@@ -27,7 +27,7 @@ COLOURS = {
 }
 #: Prefixes of matplotlib's ids, and their replacements.
 ID_WORDS = {"p": "clip", "m": "mark", "h": "hatch"}
-#: Size of the numbers at the ticks, which are most of the text.
+#: Font size of the numbers at the ticks, which is stated once, because they are most of the text.
 TICK_SIZE = "8px"
 SVG = "{http://www.w3.org/2000/svg}"
 XLINK = "{http://www.w3.org/1999/xlink}"
@@ -70,8 +70,8 @@ def _svg(figure: Figure, transparent: bool = False) -> bytes:
 
 
 def _with_counted_ids(svg: str) -> str:
-    """clip1, clip2, mark1 in order of appearance: matplotlib's ids are hashes of coordinates to the last digit, which
-    is not the same on every processor."""
+    """The SVG with ids clip1, clip2, mark1 in order of appearance. matplotlib's ids are hashes of coordinates with all
+    digits, and the last digit is not the same on every processor."""
     for kind, word in ID_WORDS.items():
         ids = dict.fromkeys(re.findall(rf'["#]({kind}[0-9a-f]{{10}})[")]', svg))
         for number, identifier in enumerate(ids, 1):

@@ -1,4 +1,5 @@
-"""The error of coupling at communication points: Jacobi's method with and without input derivatives, over the step."""
+"""The error of coupling at communication points by Jacobi's method, with and without input derivatives, for several
+step sizes."""
 
 from __future__ import annotations
 
@@ -19,8 +20,17 @@ DURATION = 0.96
 
 
 class Study(NamedTuple):
-    """step: (k,) s; the largest error of pitch and roll at common communication points, (k,) deg each: inputs held
-    over a step (`held`), and extrapolated with fmi2SetRealInputDerivatives of order 1 (`derivatives`)."""
+    """Largest errors of pitch and roll at common communication points, for k step sizes.
+
+    Attributes
+    ----------
+    step
+        (k,) s.
+    held
+        (k,) deg, if inputs are held over a step.
+    derivatives
+        (k,) deg, if inputs are extrapolated with fmi2SetRealInputDerivatives of order 1.
+    """
 
     step: np.ndarray
     held: np.ndarray
@@ -34,7 +44,7 @@ class Study(NamedTuple):
 def study(system: System) -> Study | None:
     """Couple the FMUs of the system with STEPS, and compare with steps of FINEST.
 
-    None if not every FMU takes and gives derivatives.
+    Returns None unless every FMU supports input and output derivatives.
     """
     for fmu in system.fmus.values():
         offer = fmpy.read_model_description(str(system.osp / fmu)).coSimulation
@@ -57,7 +67,7 @@ def couple(
     derivatives: bool,
     outputs: Sequence[str] = ("testbed.pitch", "testbed.roll"),
 ) -> np.ndarray:
-    """A master by Jacobi's method. Returns the outputs at every communication point from 0 on, (n + 1, outputs).
+    """Couple the FMUs by Jacobi's method. Returns the outputs at every communication point from 0 on, (n + 1, outputs).
 
     With `derivatives` each input also gets the time derivative that its output has at the communication point.
     """

@@ -23,9 +23,20 @@ SOLVER_TOLERANCE = 1e-7
 
 @dataclass(frozen=True)
 class Tool:
-    """An importer or a co-simulation master. package: the Python package that contains it. interface: the type that it
-    imports. run: of an importer run(fmu, experiment, parameters), with these parameters instead of the experiment's; of
-    a master run(system)."""
+    """An importer or a co-simulation master.
+
+    Attributes
+    ----------
+    name
+        Name of the tool.
+    package
+        Python package that contains it.
+    interface
+        Interface type that it imports.
+    run
+        For an importer run(fmu, experiment, parameters), with parameters that replace the experiment's; for a master
+        run(system).
+    """
 
     name: str
     package: str
@@ -78,7 +89,8 @@ def by_scipy(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value])
             derivatives: Array = instance.get_derivatives()[0]
             return derivatives
 
-        # Interpolated inputs bend at every row.
+        # Interpolated inputs have a corner at every row, so no step of the solver may be longer than the distance
+        # between two rows.
         step, start = experiment.step["CoSimulation"], instance.get_continuous_states()[0]
         solved = solve_ivp(right_hand_side, time[[0, -1]], start, t_eval=time, rtol=SOLVER_TOLERANCE, max_step=step)
         rows = []

@@ -1,8 +1,8 @@
 """Third-party co-simulation masters that run the closed loop: FMPy's SSP support, libcosim, Ecos.
 
-All three couple by Jacobi's method: every FMU does its step with the outputs the others had at its beginning. So with
-the same step they must agree within rounding error. Each runs in a separate process, because libraries in C++ bring
-their own loggers, thread pools and crashes.
+All three couple by Jacobi's method: during a step, every FMU gets the outputs that the others had at the beginning of
+the step. So with the same step size, their results must agree within rounding error. Each master runs in a separate
+process, because libraries in C++ start loggers and thread pools, and may crash.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def ecos(system: System) -> np.ndarray:
     Ecos returns outputs after the inputs of the next step have been set. Torques depend on these inputs directly, so they differ
     from the other masters' by the jump of an input at a communication point. Signals that are fed back do not differ.
     """
-    # Ecos does not name the path of its dependency: the wheel `tbb` puts it into the environment's lib.
+    # Ecos does not find its dependency, which the wheel `tbb` installs into `lib` of the environment.
     ctypes.CDLL(str(Path(sys.prefix, "lib", "libtbb.so.12")), mode=ctypes.RTLD_GLOBAL)
     from ecospy import EcosSimulation, EcosSimulationStructure
 

@@ -24,14 +24,29 @@ from tools.validation.importers import IMPORTERS, Tool, by_fmu_run
 
 #: Paths of the FMUs by FMI version.
 FMUS = {"2.0": Path("prw_testbed.fmu"), "3.0": Path("fmi3/prw_testbed.fmu")}
-#: Relative change of a parameter to find the sensitivity of the tolerances.
+#: Relative change of a parameter, with which the tolerances are tested.
 CHANGE = 0.01
 
 
 @dataclass(frozen=True)
 class Row:
-    """One run. version, interface, fmi: empty if a file does not contain it. share: the largest difference in terms of its tolerance.
-    largest: difference by quantity (angle, rate, torque), in rad, rad/s and N.m."""
+    """One run of an experiment.
+
+    Attributes
+    ----------
+    importer
+        Name of the tool.
+    version, interface, fmi
+        Version of the tool, interface type and FMI version; empty if a file does not contain them.
+    experiment
+        Name of the experiment.
+    share
+        Largest difference as a fraction of its tolerance.
+    largest
+        Largest difference by quantity: angle (rad), rate (rad/s), torque (N.m).
+    outputs
+        Number of compared outputs.
+    """
 
     importer: str
     version: str
@@ -59,8 +74,24 @@ class Row:
 
 @dataclass(frozen=True)
 class Validation:
-    """All results. experiments: description by name. sensitivity: the share of the tolerance that a change of a parameter
-    by CHANGE takes, by experiment and parameter. absent: importers that are not installed."""
+    """All results.
+
+    Attributes
+    ----------
+    guid
+        Guid of the FMU for FMI 2.0.
+    date, machine
+        When and where the experiments were run.
+    experiments
+        Descriptions by name.
+    rows
+        The runs.
+    sensitivity
+        Largest difference that a change of a parameter by CHANGE causes, as a fraction of its tolerance, by experiment and
+        parameter.
+    absent
+        Importers that are not installed.
+    """
 
     guid: str
     date: str
@@ -121,7 +152,7 @@ def row(importer: str, version: str, fmi: str, agreement: Agreement) -> Row:
 
 
 def share(agreement: Agreement) -> float:
-    """The largest difference in terms of its tolerance."""
+    """The largest difference as a fraction of its tolerance."""
     return max(difference.largest / difference.allowed for difference in agreement.variables.values())
 
 
@@ -132,12 +163,13 @@ def of_testbed(values: Mapping[str, Array]) -> Result:
 
 
 def sensitivity(fmu: Path, experiment: Experiment) -> dict[str, float]:
-    """The share of the tolerance that a change of each parameter takes, in Co-Simulation."""
+    """The largest difference that a change of each parameter by CHANGE causes in Co-Simulation, as a fraction of its
+    tolerance."""
     found = {}
     with Fmu(fmu) as loaded:
         measured = Parameters(loaded).real
     for name in measured:
-        # A parameter that is 0 changes by this number.
+        # A parameter that is 0 becomes CHANGE.
         changed = {**experiment.parameters, name: experiment.parameters[name] * (1 + CHANGE) or CHANGE}
         found[name] = share(compare(by_fmu_run(fmu, experiment, changed), experiment, "CoSimulation"))
     return found

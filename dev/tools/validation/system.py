@@ -16,10 +16,24 @@ OSP = "{http://opensimulationplatform.com/MSMI/OSPSystemStructure}"
 
 @dataclass(frozen=True)
 class System:
-    """ssp: the SSP file; osp: the directory with OspSystemStructure.xml. Variables are written `component.variable`.
+    """The closed loop. Variables are written `component.variable`.
 
-    fmus: file name by component. connections: output to input. start: values of FMU variables. inputs: the system's
-    inputs, each with its target and its value. stop_time and step in s.
+    Attributes
+    ----------
+    ssp
+        The SSP file.
+    osp
+        The directory with OspSystemStructure.xml.
+    fmus
+        File name by component.
+    connections
+        Pairs of an output and an input.
+    start
+        Start values by variable.
+    inputs
+        Target and value by input of the system.
+    stop_time, step
+        s.
     """
 
     ssp: Path
@@ -38,7 +52,7 @@ class System:
 
 
 def read(ssp: Path, osp: Path) -> System:
-    """Read the SSP, valid against the schema of SSP 1.0, and step and end from its OSP twin. Raises UserError."""
+    """Read the SSP, and the step size and the stop time from OspSystemStructure.xml. Raises UserError."""
     from fmpy.ssp import ssd
 
     for path in (ssp, osp / "OspSystemStructure.xml"):

@@ -1,5 +1,5 @@
-"""The pitch-roll wrist testbed in Python: simulate it, read recordings of it, find its parameters in them, linearize it,
-run it with thousands of parameter sets, animate it, compare results of other tools with a reference::
+"""The pitch-roll wrist testbed in Python: simulate it, read recordings of it, find its parameters in them, linearize
+it, run it with thousands of parameter sets, animate it, and compare results of other tools with a reference::
 
     import prw
 

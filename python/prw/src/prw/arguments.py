@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from prw.errors import UserError
 from prw.files import read_text
 
-#: A larger relative standard deviation is a mistake: percent instead of a fraction.
+#: A larger relative standard deviation is probably a mistake: percent instead of a fraction.
 MAX_RELATIVE = 1.0
-#: Rows of CSV, in memory.
+#: A table in memory, with columns by name.
 Table = Mapping[str, Any]
 
 
@@ -41,7 +41,7 @@ def check_names(argument: str, names: Iterable[str], known: Collection[str], oth
 
 
 def counted(argument: str, value: Any) -> int:
-    """An integer of at least 1."""
+    """The value as an int. Raises UserError unless it is an integer of at least 1."""
     if not isinstance(value, Integral) or value < 1:
         raise UserError("at least 1 is needed", argument=argument, given=repr(value))
     return int(value)
@@ -62,8 +62,8 @@ def not_negative(argument: str, value: Any, name: str = "") -> float:
 
 
 def spread_of(argument: str, name: str, given: Any, start: float) -> tuple[float, float]:
-    """The central value of a parameter and its relative standard deviation. `given` is both, or only the deviation;
-    then the central value is `start`."""
+    """The central value of a parameter and its relative standard deviation. `given` is (value, deviation), or only the
+    deviation; then the central value is `start`."""
     value, relative = given if isinstance(given, Sequence) and len(given) == 2 else (start, given)
     if value is start and start == 0:
         raise UserError(f"{name} starts at 0; write (value, fraction)", argument=argument)
@@ -86,7 +86,8 @@ def is_table(given: Any) -> bool:
 
 
 def columns_of(table: Any) -> dict[str, Any]:
-    """The columns of a DataFrame (of pandas, polars, ...) or a dict of arrays; a named index is the first."""
+    """The columns of a DataFrame (of pandas, polars, ...) or a dict of arrays; a named index becomes the first
+    column."""
     names = table.keys() if hasattr(table, "keys") else table.columns
     index = getattr(getattr(table, "index", None), "name", None)
     first = {} if index is None or index in names else {str(index): table.index}
@@ -125,7 +126,7 @@ def values_of(given: Given, loaded: fmu_run.Fmu) -> dict[str, Any]:
     path = Path(given)
     try:
         content = json.loads(read_text(path))
-        # The whole report has them among other things.
+        # report.json contains the parameters among other things.
         entries = dict(content["parameters"] if isinstance(content.get("parameters"), dict) else content)
     except OSError as error:
         raise UserError(f"{path} cannot be read ({error.strerror or error})", argument="parameters") from None
@@ -147,7 +148,8 @@ def in_own_unit(name: str, value: Any, loaded: fmu_run.Fmu) -> Any:
 
 
 def _value(path: Path, name: str, entry: Any, loaded: fmu_run.Fmu) -> float | int | bool:
-    """A number in the FMU's unit, of one in this unit or of an entry that names another."""
+    """An entry of the file, converted to the FMU's unit. The entry is a number in that unit, or a dict with a value and
+    its unit."""
     value, unit = (entry.get("value"), str(entry.get("unit", ""))) if isinstance(entry, dict) else (entry, "")
     if not isinstance(value, (int, float)):
         raise UserError(f"{path}: {name} is {value!r}, not a number", argument="parameters")

@@ -23,7 +23,8 @@ def statistics(
     threads: int,
     progress: Callable[[int, int], None] | None = None,
 ) -> Statistics:
-    """The statistics of runs with the start values `start`, a value for all runs or one for each."""
+    """The statistics of runs with the start values `start`: for each name one value for all runs, or an array with one
+    value per run."""
     runs = testbed.loaded.run(
         motion.time, outputs=OUTPUTS, measures=MEASURES, threads=threads, progress=progress, **driven_by(motion, start)
     )

@@ -17,17 +17,17 @@ from prw.commands import check, excite, identify, linearize, simulate, sweep
 from prw.commands.options import Formatter
 from prw.errors import UserError, one_line
 
-#: The subcommands by name. Each module has a docstring that describes it, HELP in a line, run(arguments), and perhaps
-#: add_options(parser) and EXAMPLES.
+#: The subcommands by name. Each module has a docstring, which is the description, HELP in one line, run(arguments), and
+#: optionally add_options(parser) and EXAMPLES.
 _MODULES = (simulate, check, linearize, identify, excite, sweep)
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in _MODULES}
-#: The option by argument of a function, if their names differ.
+#: The option for each argument of a function, if their names differ.
 OPTIONS = {"parameters": "--set", "priors": "--prior", "skip": "--skip-lines"}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run `prw` with the arguments argv (default: the process's). Returns the exit status: 0, the `status` of a UserError (1;
-    3 if data do not fit), 130 when interrupted."""
+    """Run `prw` with the arguments argv (default: the process's). Returns the exit status: 0, the `status` of a
+    UserError (1, or 3 if the model does not explain the data), or 130 after an interrupt."""
     return run("prw", "Simulate the pitch-roll wrist testbed through its FMU.", COMMANDS, argv)
 
 
@@ -67,8 +67,8 @@ def run(program: str, description: str, commands: Mapping[str, ModuleType], argv
 
 
 def _end_on_sigterm() -> Any:
-    """Let SIGTERM end the process as an exception, so that temporary files are removed. Returns the handler before, or None if
-    nothing has changed."""
+    """Make SIGTERM raise SystemExit, so that temporary files are removed. Returns the previous handler, or None if
+    nothing was changed."""
     if threading.current_thread() is not threading.main_thread():
         return None
     if signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:

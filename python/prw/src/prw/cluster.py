@@ -19,7 +19,7 @@ from prw.testbed import OUTPUTS, Testbed
 
 #: Timeout of a connection to the scheduler, s.
 PATIENCE = 15
-#: Number of tasks, unless the limits of their lengths require another number.
+#: Number of tasks, unless they would then have fewer than SHORTEST or more than LONGEST runs.
 TASKS = 16
 #: Minimum and maximum number of runs in a task.
 SHORTEST, LONGEST = 16, 256
@@ -33,8 +33,8 @@ def on_cluster(
     address: str,
     progress: Callable[[int], None],
 ) -> Statistics:
-    """The statistics of runs on the Dask cluster at `address`. The runs of a task whose worker died again and again are
-    recorded as failed."""
+    """The statistics of runs on the Dask cluster at `address`. If a worker dies, its task is tried twice more; then its
+    runs are recorded as failed."""
     total = len(next(iter(values.values())))
     measured = {f"{name}_{measure}": np.full(total, np.nan) for name in OUTPUTS for measure in MEASURES}
     errors: dict[int, str] = {}
@@ -66,7 +66,7 @@ def on_cluster(
 
 def _on_worker(shared: tuple[bytes, Motion, Mapping[str, Any]], values: Mapping[str, Array]) -> Statistics:
     fmu, motion, fixed = shared
-    # A worker makes as many tasks at a time as it has threads.
+    # A worker runs one task per thread at a time, so each task uses one thread.
     return statistics(_loaded(fmu), motion, {**fixed, **values}, threads=1)
 
 

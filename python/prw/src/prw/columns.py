@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from prw.errors import UserError, one_line
 
-#: Factor to SI of every unit a column may have, by quantity. The first is SI.
+#: Factor to SI of every unit that a column may have, by quantity. The first unit of each quantity is the SI unit.
 UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "angle": {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180, "arcmin": pi / 10800, "rev": 2 * pi},
@@ -34,8 +34,16 @@ ALIASES = {
 
 
 class Channel(NamedTuple):
-    """A measured output. quantity: a key of UNITS. noise: the standard deviation assumed before anything is measured,
-    in SI: a torque sensor of 20 N.m with 0.1 %, an encoder or inertial sensor of 0.06 deg and 0.6 deg/s."""
+    """A measured output.
+
+    Attributes
+    ----------
+    quantity
+        A key of UNITS.
+    noise
+        Standard deviation in SI that is assumed before anything is measured. It belongs to a torque sensor of 20 N.m with
+        0.1 %, or to an encoder or inertial sensor with 0.06 deg and 0.6 deg/s.
+    """
 
     quantity: str
     noise: float
@@ -57,7 +65,8 @@ QUANTITIES = {"time": "time", **MOTORS, **{name: channel.quantity for name, chan
 
 
 def factor(name: str, unit: str) -> float:
-    """The factor from `unit` to SI for column `name`. Raises UserError for a unit of another quantity. A unit may be divided, as in rev/10000 for the counts of an encoder."""
+    """The factor from `unit` to SI for column `name`. A unit may be divided, as in rev/10000 for the counts of an
+    encoder. Raises UserError for a unit of another quantity."""
     whole, slash, count = unit.partition("/")
     if slash and count.strip().isdigit() and int(count) > 0:
         return factor(name, whole) / int(count)
@@ -77,7 +86,8 @@ def si_unit(name: str) -> str:
 
 ANGLES = ("theta1", "theta2")
 RATES = ("omega1", "omega2")
-#: `pitch [deg]`, `pitch (deg)`, or `pitch_deg`, `pitch/deg`, `pitch deg`; names in capitals or not, `t` for time
+#: Header of a column: `pitch [deg]`, `pitch (deg)`, `pitch_deg`, `pitch/deg` or `pitch deg`. Upper and lower case are
+#: equal, and `t` is the time.
 NAMES = "|".join(sorted([*QUANTITIES, "t"], key=len, reverse=True))
 COLUMN = re.compile(rf"^\s*({NAMES})(?:\s*\[([^\]]*)\]|\s*\(([^)]*)\)|[\s_/,]+(\S+))?\s*$", re.IGNORECASE)
 #: Maximum number of column names quoted in an error message.
@@ -85,7 +95,17 @@ SHOWN = 12
 
 
 class Columns(NamedTuple):
-    """taken: (name, index) of the columns to read, time first. units: unit by name. notes: lines for the user."""
+    """The columns to read from a table.
+
+    Attributes
+    ----------
+    taken
+        (name, index) of each column, the time first.
+    units
+        Unit by name.
+    notes
+        Lines for the user.
+    """
 
     taken: list[tuple[str, int]]
     units: dict[str, str]
@@ -103,7 +123,8 @@ def columns(
     """Find time, both angles, both rates if present, and those `outputs` (names of measured outputs) that are present.
 
     A column's unit is in its header (`pitch [deg]`) or in `units` by name; without either it is SI, or degrees and
-    degrees per second if `degrees`. Raises UserError naming file, row (`line`, 0 if there are none) and column.
+    degrees per second if `degrees`. Raises UserError that names file, row and column. line: row of the header, or 0 for
+    a table in memory.
     """
     where = f"{path}, row {line}" if line else str(path)
     wanted = ("time", *MOTORS, *outputs)

@@ -6,12 +6,13 @@ import importlib.util
 import unicodedata
 from typing import Any
 
-#: Number of characters of a message at most.
+#: Maximum number of characters of a message.
 LONGEST = 1000
 
 
 def one_line(text: str, longest: int = LONGEST) -> str:
-    """The string without characters that a terminal would obey or cannot show, which become escapes, and cut to `longest`."""
+    """The string, cut to `longest` characters. Characters that a terminal would interpret or cannot show become
+    escapes."""
     cut = text if len(text) <= longest else text[:longest] + "..."
     return "".join(c if c.isprintable() or unicodedata.category(c) == "Zs" else _escaped(c) for c in cut)
 

@@ -44,7 +44,7 @@ def page_file(name: str) -> Path:
     return next((path for path in locations if path.is_file()), locations[0])
 
 
-#: Largest file that is read as a whole, in bytes.
+#: Maximum size of a file that is read as a whole, in bytes.
 MAX_BYTES = 64 << 20
 
 
@@ -69,8 +69,8 @@ def read_text(path: Path) -> str:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a temporary path next to `path`. The file replaces `path` if the block succeeds, and is removed otherwise. What killed
-    processes have left there is removed before.
+    """Yield a temporary path next to `path`. The file replaces `path` if the block succeeds, and is removed otherwise.
+    Temporary files of killed processes are removed first.
 
     Creates missing directories. Raises UserError if the file cannot be written.
     """
@@ -133,8 +133,8 @@ def write_text(path: str | os.PathLike[str] | None, text: str) -> str:
 
 
 def write_table(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
-    """Write the columns (n,) by name as CSV, with a line of names. Numbers have as many digits as it takes to read them back
-    unchanged."""
+    """Write the columns (n,) by name as CSV, with a line of names. Numbers have as many digits as are needed to read
+    them back unchanged."""
     # Adding 0.0 turns -0.0 into 0.0.
     table = np.column_stack(list(columns.values())) + 0.0
     with (

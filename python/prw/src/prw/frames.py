@@ -1,5 +1,5 @@
-"""The frames of an animation, the testbed in 3D and plots of its angles and torques below; and its files: GIF, MP4, or an HTML
-page that loads no other file."""
+"""Draws the frames of an animation, the testbed in 3D with plots of its angles and torques below, and writes them as
+GIF, MP4, or an HTML page that loads no other file."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ AZIMUTH, ELEVATION = -64, 20
 #: Directions to the viewer and to the lamp in matplotlib's axes.
 VIEWER = np.array([np.cos(np.deg2rad(AZIMUTH)), np.sin(np.deg2rad(AZIMUTH)), np.tan(np.deg2rad(ELEVATION))])
 LAMP = np.array([0.15, -0.62, 0.77])
-#: Degrees of brightness above the darkest: few, so that a GIF needs few colours.
+#: Number of brightness levels above the darkest; few, so that a GIF needs few colours.
 LEVELS = 2
 #: Opacity of a curve after the present instant.
 FAINT = 0.25
@@ -150,7 +150,8 @@ PANELS = (
 
 
 class Moving(NamedTuple):
-    """Moving parts of a variable: the line up to the instant, the dot at its end, and the value as a number."""
+    """The parts of a plot that change for one variable: the line up to the instant, the dot at its end, and the value
+    as a number."""
 
     name: str
     panel: Panel
@@ -329,7 +330,7 @@ def _lit(corners: Array, colours: Array) -> Array:
 
 
 def _bright(colour: ArrayLike, level: ArrayLike) -> Array:
-    """The colour at one of the degrees of brightness, 0 ... LEVELS."""
+    """The colour at one of the brightness levels 0 ... LEVELS."""
     bright: Array = (0.6 + 0.4 * np.asarray(level) / LEVELS) * np.asarray(colour)
     return bright
 

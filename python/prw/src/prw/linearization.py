@@ -15,13 +15,13 @@ from prw.errors import UserError
 from prw.state_space import StateSpace
 from prw.testbed import CONTINUOUS, existing_fmu, loaded
 
-#: Start values of the testbed with which its states and inputs are independent of each other in Co-Simulation. With
-#: others a motor angle also changes the rate that is estimated from it and, before the first step, the states.
+#: With these start values of the testbed, its states and inputs are independent of each other in Co-Simulation.
+#: Otherwise a motor angle also changes the rate that is estimated from it and, before the first step, the states.
 INDEPENDENT = {"use_omega": True, "start_at_rest": False}
 Interface = Literal["co-simulation", "model-exchange"]
 INTERFACES = {"CoSimulation": "Co-Simulation", "ModelExchange": "Model Exchange"}
 #: The names of the interface types in `fmu_run`.
-HELD: dict[str, Interface] = {"CoSimulation": "co-simulation", "ModelExchange": "model-exchange"}
+FMU_RUN_NAMES: dict[str, Interface] = {"CoSimulation": "co-simulation", "ModelExchange": "model-exchange"}
 
 
 def linearize(
@@ -36,12 +36,12 @@ def linearize(
     Parameters
     ----------
     parameters
-        Start values of parameters, states and inputs by name, in the FMU's units or with a unit as (1.9, "N.m/deg"), or the
-        JSON file with them that `prw.identify` writes; other variables keep their start values. The
-        testbed is linear, so only parameters matter there. `use_omega` is set to true and `start_at_rest` to
-        false if they are not given: A, B, C and D are then the matrices of eq. (11), with the motors' angles and rates as
-        independent inputs. With `use_omega` false, Co-Simulation estimates the rates from the angles and ignores
-        `omega1` and `omega2`.
+        Start values of parameters, states and inputs by name, in the FMU's units or with a unit as in (1.9, "N.m/deg"),
+        or the path of a JSON file that `prw identify` has written. Other variables keep their start values. The testbed
+        is linear, so only parameters matter there. `use_omega` is set to true and `start_at_rest` to false if they are
+        not given: A, B, C and D are then the matrices of eq. (11), with the motors' angles and rates as independent
+        inputs. With `use_omega` false, Co-Simulation estimates the rates from the angles and ignores `omega1` and
+        `omega2`.
     fmu
         The FMU (default: the testbed's).
     outputs, fmi_type
@@ -99,7 +99,7 @@ class Linearizer:
     def _select(self, outputs: str | Iterable[str] | None, fmi_type: str | None) -> None:
         """Select the states, inputs and outputs of the model. Raises UserError."""
         loaded, variables = self.loaded, self.loaded.variables
-        self._interface = HELD[self._chosen(fmi_type)]
+        self._interface = FMU_RUN_NAMES[self._chosen(fmi_type)]
         self.states = tuple(loaded.derivatives)
         self.inputs = tuple(v.name for v in variables.values() if v.causality == "input" and v.type in CONTINUOUS)
         self.outputs = loaded.outputs if outputs is None else names_of("outputs", outputs)
@@ -117,8 +117,8 @@ class Linearizer:
         self._closed = False
 
     def at(self, parameters: Given = None) -> StateSpace:
-        """The linear model with start values `parameters` (of parameters, states and inputs, by name, in the FMU's
-        units, or a file with them); others keep the FMU's own. Raises UserError for a name or a value that the FMU does not take."""
+        """The linear model for the start values `parameters`, as for `linearize`. Raises UserError for a name that the
+        FMU lacks or a value that it rejects."""
         if self._closed:
             raise UserError(f"{self.fmu}: is closed")
         given = values_of(parameters, self.loaded)
@@ -157,7 +157,7 @@ class Linearizer:
     def _chosen(self, wanted: str | None) -> str:
         """The interface type to use."""
         offers = self.loaded.directional
-        directional = {name: offers[held] for name, held in HELD.items() if held in offers}
+        directional = {name: offers[other] for name, other in FMU_RUN_NAMES.items() if other in offers}
         attribute = "providesDirectionalDerivative" + ("" if self.loaded.fmi_version == "2.0" else "s")
         able = [name for name, offered in directional.items() if offered]
         if wanted is None and able:
@@ -173,7 +173,8 @@ class Linearizer:
         return variable is not None and (variable.causality, variable.type) == ("parameter", "Boolean")
 
     def _start(self, name: str, value: Any) -> Any:
-        """The value, if it is one of the variable's type. Raises UserError."""
+        """Returns the value if it has the type of the variable. Raises UserError otherwise, or if there is no such
+        variable."""
         variables = self.loaded.variables
         if name not in variables:
             settable = [v.name for v in variables.values() if v.causality in ("parameter", "input")]

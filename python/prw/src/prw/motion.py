@@ -74,8 +74,8 @@ class Motion:
 def fig4(step: float = 1e-3, opposite: bool = True) -> Motion:
     """The paper's experiment (Sec. 4, Fig. 4): theta1' = sin(10 pi t) = -theta2'.
 
-    The angles are the integrals from zero, (1 - cos(10 pi t)) / (10 pi). Angle and rate are both the true values at the
-    communication point: the torque there is then the true one, and the path in between is second-order accurate.
+    The angles are the integrals from zero, (1 - cos(10 pi t)) / (10 pi). Angle and rate are the true values at each
+    communication point, so the torque there is the true one, and the path between two points is second-order accurate.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from prw.motion import Array, Motion
 
 BLUE, VERMILION = "#0072B2", "#D55E00"
-#: Colours of pitch and roll; the sides of the motors have the first two.
+#: Colours of pitch and roll. BLUE and VERMILION are the colours of motor 1 and motor 2.
 GREEN, PURPLE = "#009E73", "#CC79A7"
 STYLE: Any = {
     "font.family": "DejaVu Sans",  # included in matplotlib
@@ -42,7 +42,7 @@ PAGE_STYLE: Any = {
     "xtick.labelsize": 8,
     "ytick.labelsize": 8,
 }
-#: Time intervals that a long curve is reduced to, each drawn by its extremes; more than the figure has pixels.
+#: Number of intervals to which a long curve is reduced, each drawn by its extremes. The figure has fewer pixels.
 INTERVALS = 4000
 #: If all curves of a panel are below this, the scale is -1 to 1, so that rounding errors look like zero.
 ROUNDING = 1e-9
@@ -143,7 +143,8 @@ def _draw_panel(axis: Axes, time: Array, panel: Panel) -> None:
 
 
 def envelope(time: Array, y: Array, intervals: int = INTERVALS) -> tuple[Array, Array]:
-    """The curve y (n,) over time (n,) in at most 2 * intervals points that draw the same: each interval's extremes."""
+    """The curve y (n,) over time (n,), reduced to the extremes in each interval: at most 2 * intervals points, which
+    look the same when drawn."""
     if len(time) <= 2 * intervals:
         return time, y
     starts = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], intervals, endpoint=False)))

@@ -1,4 +1,4 @@
-"""Reads a recorded experiment, and notes probable mistakes in it."""
+"""Reads a recorded experiment. prw.plausibility finds probable mistakes in it."""
 
 from __future__ import annotations
 
@@ -15,26 +15,9 @@ from prw.arguments import Table, check_names, columns_of, is_path, is_table, num
 from prw.columns import ANGLES, MEASURED, QUANTITIES, RATES, Columns, columns, factor, shown
 from prw.errors import UserError
 from prw.motion import Array, Motion
+from prw.plausibility import notes_on_gaps, notes_on_values
 from prw.table import Choice, read_table
 
-#: Motor speed in rad/s that no wrist move reaches. It is exceeded if the file is in degrees but is read as radians.
-PLAUSIBLE_SPEED = 30.0
-#: Motor angle in rad that no wrist move reaches.
-PLAUSIBLE_ANGLE = 4 * np.pi
-#: Motion of a motor, in rad, below which its rate is not checked.
-SMALL_MOVE = 0.02
-#: Rate in rad/s below which a motor counts as at rest.
-SLOW = 0.1
-#: Time between two samples in s that is probably a mistake. It is exceeded if the file is in milliseconds but is read as seconds.
-SLOW_SAMPLING = 0.5
-#: Rows are missing if the time between two rows is more than this multiple of the median.
-MISSING = 5.0
-#: Gap in s above which the motion of a moving motor cannot be interpolated, so that the recording is rejected.
-LONGEST_GAP = 0.04
-#: Number of rows before and after a gap in which a motor must be at rest, so that it is assumed to rest in the gap, too.
-REST = 5
-#: Change of a motor angle between two samples in rad that is probably a jump by a turn.
-JUMP = 0.9 * np.pi
 #: Name of a recording that is not read from a file.
 IN_MEMORY = Path("recording")
 
@@ -190,7 +173,7 @@ def _read(
     omega = np.column_stack([table.pop(name) for name in RATES]) if RATES[0] in table else None
     # Angles near the largest float overflow without a warning, because the FMU rejects them.
     with np.errstate(all="ignore"):
-        notes = found.notes + _gaps(path, time, theta) + doubts(time, theta, omega, found.units)
+        notes = found.notes + notes_on_gaps(path, time, theta) + notes_on_values(time, theta, omega, found.units)
     return Recording(path, Motion(time, theta, omega, path.stem, notes), table, found.units)
 
 
@@ -219,72 +202,3 @@ def _renamed(title: str, names: Mapping[str, str]) -> str:
     """The column title with its name replaced as in `names`; a unit after the name is kept."""
     name = max((n for n in names if re.fullmatch(re.escape(n) + r"\s*([\[(].*[\])])?", title)), key=len, default="")
     return names[name] + title.removeprefix(name) if name else title
-
-
-def _gaps(path: Path, time: Array, theta: Array) -> list[str]:
-    """Returns a note on missing rows. Raises UserError if rows are missing for too long while the motors move."""
-    steps = np.diff(time)
-    usual = float(np.median(steps))
-    gaps = np.flatnonzero(steps > MISSING * usual)
-    long = [int(k) for k in gaps if steps[k] > LONGEST_GAP and _moves(theta, int(k))]
-    if long:
-        worst = int(max(long, key=lambda k: float(steps[k])))
-        raise UserError(
-            f"{path}: no rows from {time[worst]:.6g} to {time[worst + 1]:.6g} s, {steps[worst]:.3g} s instead of the usual {usual:.3g} s, while "
-            "the motors move; their motion is not known. Cut the recording there, into separate files"
-        )
-    if not len(gaps):
-        return []
-    k = int(gaps[np.argmax(steps[gaps])])
-    count = "rows are missing once" if len(gaps) == 1 else f"rows are missing {len(gaps)} times"
-    return [f"{count}, for up to {steps[k]:.3g} s after {time[k]:.6g} s; a smooth path bridges that"]
-
-
-def _moves(theta: Array, k: int) -> bool:
-    """Returns whether the motors move in the rows near k and k + 1, between which rows are missing."""
-    near = theta[max(k - REST, 0) : k + 2 + REST]
-    return bool(np.ptp(near, axis=0).max() > max(SMALL_MOVE / 10, 0.002 * float(np.ptp(theta, axis=0).max())))
-
-
-def doubts(time: Array, theta: Array, omega: Array | None, units: Mapping[str, str]) -> list[str]:
-    """Returns notes on values that are possible but are probably mistakes. units: the unit of each column in the file."""
-    notes = []
-    if len(time) > 1 and (step := (time[-1] - time[0]) / (len(time) - 1)) > SLOW_SAMPLING:
-        notes.append(f"a sample every {step:.3g} s; if time is in ms, call its column time [ms]")
-    for side, name in enumerate(ANGLES):
-        # A percentile, because a single step of a coarse encoder is not a speed.
-        speed = np.percentile(np.abs(np.diff(theta[:, side]) / np.diff(time)), 99)
-        reach = np.abs(theta[:, side]).max()
-        hint = f"if it is in degrees, call it {name} [deg]" if units[name] == "rad" else "are these the right units?"
-        steps = np.abs(np.diff(theta[:, side]))
-        if len(steps) and (jump := steps.max()) > JUMP:
-            notes.append(
-                f"{name} jumps by {jump:.3g} rad after {time[steps.argmax()]:.6g} s; angles must continue past a full turn and "
-                "not restart (numpy.unwrap removes such jumps)"
-            )
-        if speed > PLAUSIBLE_SPEED:
-            notes.append(f"{name} turns at {speed:.0f} rad/s ({speed * 30 / np.pi:.0f} rpm); {hint}")
-        elif reach > PLAUSIBLE_ANGLE:
-            notes.append(f"{name} reaches {reach:.0f} rad ({reach / (2 * np.pi):.1f} turns); {hint}")
-    if omega is None:
-        notes.append(
-            "no omega1, omega2: the rates come from the angles, so if the angles are quantised or noisy, the torques "
-            "are noisy, too; record omega1 and omega2 if you can"
-        )
-        return notes
-    if np.abs(omega[0]).max() > SLOW:
-        notes.append("the motors turn already in the first row; the testbed starts at rest and has to catch up")
-    notes += [note for side in (0, 1) if (note := _mismatch(time, theta[:, side], omega[:, side], side))]
-    return notes
-
-
-def _mismatch(time: Array, theta: Array, omega: Array, side: int) -> str:
-    """Returns a note if the integral of the rate omega (n,) differs from the motion of the angle theta (n,), else an empty string."""
-    turned = theta - theta.mean()
-    if np.ptp(theta) < SMALL_MOVE:
-        return ""
-    by_rate = np.concatenate([[0], np.cumsum(np.diff(time) * (omega[1:] + omega[:-1]) / 2)])
-    ratio = turned @ by_rate / (turned @ turned)
-    if 0.8 < ratio < 1.25:
-        return ""
-    return f"{RATES[side]} adds up to {ratio:.3g} times the motion of {ANGLES[side]}; check units and sign"

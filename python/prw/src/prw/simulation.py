@@ -43,8 +43,8 @@ class Run(Mapping[str, Array]):
     parameters
         The value of every parameter of the FMU in this run, in SI.
     sampling_errors
-        By output the largest error due to sampling of the motors, as a fraction of the output's peak. The errors are
-        estimated from a run with every other time.
+        The largest error of each output that is caused by the sampling of the motors, as a fraction of the output's
+        peak. The errors are estimated by a second run, with every other time.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class Run(Mapping[str, Array]):
 
     @property
     def doubt(self) -> str:
-        """A line on the sampling error, if it is large."""
+        """A warning about the sampling error, if it is large, else an empty string."""
         worst = max(self.sampling_errors, key=self.sampling_errors.__getitem__, default="")
         if not worst or (error := self.sampling_errors[worst]) < DOUBTFUL:
             return ""
@@ -99,8 +99,7 @@ class Run(Mapping[str, Array]):
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write time (s), the motors' angles (rad) and, if given, rates (rad/s), and the outputs (SI) to `path`, a
-        row each time. Time and motors keep all their digits; outputs have twelve. Raises UserError if the
-        file cannot be written."""
+        row each time. Numbers keep all their digits. Raises UserError if the file cannot be written."""
         write_table(Path(path), {**self.motion.columns, **self._outputs})
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -154,8 +153,8 @@ def simulate(
         The motion of the motors, or a recording of it (a CSV file, a DataFrame or a dict of arrays as `prw.read` takes it;
         only its motors matter here), or a run to repeat. Default: the paper's experiment of Fig. 4.
     parameters
-        Values by name, in SI or with a unit as (1.9, "N.m/deg"), or the JSON file with them that `prw.identify` writes; others
-        keep the FMU's start values.
+        Values of parameters by name, in SI or with a unit as in (1.9, "N.m/deg"), or the path of a JSON file that `prw
+        identify` has written. Other parameters keep the FMU's start values.
     fmu
         The testbed FMU, of FMI 2.0 or 3.0 (default: the one inside this package, see `default_fmu`).
     outputs
@@ -195,8 +194,8 @@ def simulate(
 
 
 def _sampling_error(fine: Array, coarse: Array) -> float:
-    """The error of the output `fine` (n,) as a fraction of its peak. `coarse` is calculated with every other time: the FMU is
-    of second order, so that its error is four times as large."""
+    """The error of the output `fine` (n,) as a fraction of its peak. `coarse` is the same output of a run with every
+    other time, in which the error is four times as large, because it is second order in the step size."""
     peak = float(np.abs(fine).max())
     return float(np.abs(coarse - fine[::2]).max()) / 3 / peak if peak > ROUNDING else 0.0
 
@@ -204,7 +203,7 @@ def _sampling_error(fine: Array, coarse: Array) -> float:
 def _rounded_up(number: float) -> float:
     """The next number of two digits."""
     digits = 10.0 ** (np.floor(np.log10(number)) - 1)
-    # Rounding errors of the division do not count.
+    # The subtraction prevents that a rounding error of the division raises the number.
     return float(np.ceil(number / digits - 1e-9) * digits)
 
 

@@ -49,8 +49,8 @@ class StateSpace:
     def transfer(self, s: ArrayLike, rates: Mapping[str, str] | None = None) -> Complex:
         """The transfer matrix C (s 1 - A)^-1 B + D, for s (k,) in 1/s: complex, (k, p, m).
 
-        rates: inputs that are the derivative of another input, by name: {"omega1": "theta1"}. Their columns, times s, are
-        added to the column of the other input and left out, see `moved`. Raises UserError for
+        rates: inputs that are the derivative of another input, by name: {"omega1": "theta1"}. Each of their columns is
+        multiplied by s, added to the column of the other input, and then left out; see `moved`. Raises UserError for
         names that are not inputs.
         """
         s = np.atleast_1d(np.asarray(s, dtype=np.complex128))

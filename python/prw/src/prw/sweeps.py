@@ -53,9 +53,9 @@ def sweep(
     grid
         Values by parameter, in SI or with a unit as ([1.5, 1.9], "N.m/deg"); all combinations are run.
     random
-        By parameter ("uniform", low, high), ("normal", mean, standard deviation) or ("lognormal", median, relative standard
-        deviation), in SI; for the last also only the relative standard deviation (0.1 is 10 %), about the start value, or
-        (median, relative).
+        The distribution of each parameter, in SI: ("uniform", low, high), ("normal", mean, standard deviation) or
+        ("lognormal", median, relative standard deviation). For a lognormal distribution, (median, relative) suffices,
+        or only the relative standard deviation (0.1 is 10 %) if the median is the start value.
     parameters
         Values that are the same in all runs, as for `prw.simulate`.
     runs, seed
@@ -72,9 +72,10 @@ def sweep(
     Returns
     -------
     pyarrow.Table
-        An Arrow table (its method to_pandas makes a DataFrame), a row for each run: `run`; `status`, "done" or
-        "failed"; `message`, the cause of a failure, for example that the FMU rejects a value; the parameters; and of each
-        output the peak (of its magnitude), rms and value at the end, such as `roll_peak`, in SI.
+        An Arrow table with a row for each run; its method to_pandas makes a DataFrame. The columns are `run`; `status`,
+        "done" or "failed"; `message`, the cause of a failure, for example that the FMU rejects a value; the parameters;
+        and three statistics of each output in SI: the peak of its magnitude, as in `roll_peak`, its rms, and its value
+        at the end.
 
     Raises
     ------
@@ -141,8 +142,8 @@ def layout(
     testbed: Testbed,
     fixed: Mapping[str, Any],
 ) -> dict[str, Array]:
-    """The values of the parameters that vary, (runs,) each: all combinations of the grid, each with all draws, about
-    `fixed` or the FMU's start values. Raises UserError for invalid arguments."""
+    """The values of the parameters that vary, (runs,) each: all combinations of the grid, each with all draws. The
+    draws are about the values in `fixed` or the FMU's start values. Raises UserError for invalid arguments."""
     testbed.with_starts(fixed)
     starts = {**testbed.starts, **fixed}
     check_names("grid", grid, testbed.starts)

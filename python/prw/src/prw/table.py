@@ -22,10 +22,10 @@ from prw.progress import Progress
 DELIMITERS = (",", ";", "\t")
 #: Rows between two progress reports.
 REPORT_ROWS = 4096
-#: Characters of a line at most.
+#: Maximum number of characters of a line.
 LONGEST_LINE = 1 << 20
 
-#: The columns to read, (name, index), of a header in the line with this number.
+#: Selects the columns to read, (name, index) each, from the header and the number of its line.
 Choice = Callable[[Sequence[str], int], Sequence[tuple[str, int]]]
 
 

@@ -58,7 +58,7 @@ def existing_fmu(fmu: str | os.PathLike[str] | None) -> Path:
 
 
 def loaded(fmu: Path) -> fmu_run.Fmu:
-    """The FMU file, loaded. Raises UserError if the file cannot be loaded."""
+    """Loads the FMU file. Raises UserError if it cannot be loaded."""
     try:
         return fmu_run.Fmu(fmu)
     except fmu_run.FmuError as error:
@@ -72,7 +72,7 @@ class Testbed:
     Raises UserError if the FMU is missing, is not the testbed, or rejects a call (with its log message).
     """
 
-    # pytest takes a class for tests by its name.
+    # Otherwise pytest would take this class for tests because of its name.
     __test__ = False
 
     def __init__(self, fmu: Path | None = None):
@@ -123,8 +123,8 @@ class Testbed:
         the FMU's units); each sample is one communication point.
 
         Returns `outputs` (any Real variables) by name, each (n,), in the FMU's units (N.m, rad, rad/s). Sample k is
-        read at time[k] with the motors' angles (and rates, if the motion has them) of sample k set, so a row
-        belongs together.
+        read at time[k], after the motors' angles (and rates, if the motion has them) of sample k were set, so all
+        values of a row belong to the same instant.
         """
         try:
             runs = self.loaded.run(motion.time, outputs=outputs, **driven_by(motion, start))

@@ -115,7 +115,7 @@ def _side(motor: int, side: int, colour: str) -> Iterable[Part]:
 
 
 def _ring() -> Iterable[Part]:
-    """The central ring, which pitches: of rectangular section, about Z."""
+    """The central ring, which pitches. It has a rectangular section and the axis Z."""
     angle = np.linspace(0, 2 * np.pi, 2 * ROUND + 1)
     ring = PARTS["ring"]
     section = [(ring["radius"] * radius, z) for radius, z in ring["section"]]
@@ -157,8 +157,9 @@ def _around(x: float, radius: float, angles: ArrayLike) -> Array:
 
 
 def _lathe(profile: Sequence[tuple[float, float]], colours: Sequence[str], lobes: float = 0) -> list[Face]:
-    """A body turned about X from points (x, radius), in sectors of the colours, with four lobes of the share `lobes` of
-    its radius. Long ones are divided, because faces are drawn from the farthest to the nearest as a whole."""
+    """A solid of revolution about X from points (x, radius), with sectors in the colours, and with four lobes whose
+    height is the fraction `lobes` of the radius. Long bodies are divided, because faces are drawn as a whole, from the
+    farthest to the nearest."""
     angle = np.linspace(0, 2 * np.pi, ROUND + 1)
     wave = 1 + lobes * np.cos(4 * angle)
     points = [np.array(profile[0])]

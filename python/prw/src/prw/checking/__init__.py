@@ -39,7 +39,7 @@ def check(
     model_exchange
         Apply the tolerances for Model Exchange instead of the tolerances for Co-Simulation.
     component
-        The name before the dot, if several components have columns of one name (default: `testbed`).
+        The name before the dot, if columns of several components have the same name (default: `testbed`).
     units
         Unit by name.
     fmu

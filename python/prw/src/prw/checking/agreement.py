@@ -24,15 +24,28 @@ if TYPE_CHECKING:
 
 #: Times that differ by less than this, in s, are equal.
 SAME_TIME = 1e-9
-#: Motors that differ by more than this share of their largest angle or rate follow another motion.
+#: If a motor differs by more than this share of its largest angle or rate, the result belongs to another motion.
 OTHER_MOTORS = 1e-2
-#: Relative distance within which a factor counts as the factor of a unit.
+#: Relative difference up to which the ratio of result and reference is taken for the factor of a wrong unit or sign.
 NEAR = 0.02
 
 
 class Difference(NamedTuple):
-    """The difference of one output, in `unit` (SI). largest: at the time `at` (s), where the value is `found` instead of
-    `expected`. allowed: the tolerance."""
+    """The difference of one output from the reference, all in `unit` except the time.
+
+    Attributes
+    ----------
+    largest
+        Largest difference.
+    at
+        Time of the largest difference, s.
+    found, expected
+        Value of the result and of the reference at that time.
+    allowed
+        Tolerance.
+    unit
+        SI unit.
+    """
 
     largest: float
     at: float
@@ -49,8 +62,23 @@ class Difference(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class Agreement:
-    """The differences of `source` from an experiment. interface: the interface type of the tolerances. time: (n,) s, the
-    reference's times that the result covers. found, expected: (n,) by output. notes: lines for the user."""
+    """The differences of a result from an experiment.
+
+    Attributes
+    ----------
+    source
+        File of the result.
+    experiment
+        The reference experiment.
+    interface
+        Interface type whose tolerances are used.
+    time
+        (n,) s, the times of the reference that the result covers.
+    found, expected
+        (n,) by output, the result and the reference, SI.
+    notes
+        Lines for the user.
+    """
 
     source: Path
     experiment: Experiment
@@ -154,8 +182,7 @@ def compare(result: Result, experiment: Experiment, interface: str) -> Agreement
 
 
 def nearest(result: Result, known: Sequence[Experiment]) -> Experiment:
-    """The experiment whose motors and outputs are nearest to the result's. Raises UserError if none has a time in
-    common with it."""
+    """The experiment whose motors and outputs are nearest to the motors and outputs of the result."""
 
     def distance(experiment: Experiment) -> float:
         time, shares = _common_times(result, experiment), []
@@ -173,8 +200,8 @@ def nearest(result: Result, known: Sequence[Experiment]) -> Experiment:
 
 
 def interpolated(time: Array, values: Array, at: Array) -> Array:
-    """Values (n,) at the times `at` (m,) within `time` (n,): if there is none, the value of the cubic through the four
-    nearest."""
+    """Values (n,) at the times `time` (n,), interpolated to the times `at` (m,): the value of that row, if there is
+    one, else the cubic through the four nearest rows."""
     count = min(4, len(time))
     first = np.clip(np.searchsorted(time, at) - count // 2, 0, len(time) - count)
     nodes = first[:, None] + np.arange(count)
@@ -184,7 +211,7 @@ def interpolated(time: Array, values: Array, at: Array) -> Array:
         others = [j for j in range(count) if j != i]
         weight = np.prod((at[:, None] - t[:, others]) / (t[:, [i]] - t[:, others]), axis=1)
         found += weight * values[nodes[:, i]]
-    # Curves may bend at a row; the row itself is right.
+    # A cubic misses the value at a row in which the curve has a corner.
     near = np.clip(np.searchsorted(time, at - SAME_TIME), 0, len(time) - 1)
     same = np.abs(time[near] - at) <= SAME_TIME
     return np.where(same, values[near], found)
@@ -232,7 +259,8 @@ def _notes(bare: Agreement, result: Result) -> list[str]:
 
 
 def _late_by(bare: Agreement, result: Result) -> float:
-    """The delay of one communication step of either interface type, in s, with which everything agrees; else 0."""
+    """The communication step (s) by which the result is late, if everything agrees after a shift by this step, else 0.
+    Tries the steps of both interface types and of the result."""
     for step in {*bare.experiment.step.values(), float(np.median(np.diff(result.time)))}:
         inside = bare.time + step <= result.time[-1] + SAME_TIME
         allowed = bare.experiment.tolerance[bare.interface]

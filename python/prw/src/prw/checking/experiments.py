@@ -24,9 +24,23 @@ Value = float | int | bool
 
 @dataclass(frozen=True)
 class Experiment:
-    """One experiment, in SI. inputs, reference: (n,) by name, each with its own `time`; inputs are to be interpolated
-    linearly. parameters: of the FMU. step: communication step in s, tolerance: how far an output may be off, by
-    interface type and name."""
+    """A reference experiment, in SI.
+
+    Attributes
+    ----------
+    name, description
+        From the list of experiments in the FMU.
+    stop_time
+        s; the experiment starts at 0.
+    inputs, reference
+        (n,) by name, each with a column `time`. Inputs are to be interpolated linearly.
+    parameters
+        Values of the FMU's parameters by name.
+    step
+        Communication step by interface type, s.
+    tolerance
+        Largest difference that is allowed, by interface type and output.
+    """
 
     name: str
     description: str

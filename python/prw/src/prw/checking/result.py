@@ -18,13 +18,23 @@ from prw.table import read_table
 
 #: The components before a name, separated by dots in Modelica and SSP, by slashes in Simulink.
 PREFIXED = re.compile(rf"^(.*[./:|])?((?:{NAMES}|tout).*)$", re.IGNORECASE)
-#: The default component if several have columns of one name.
+#: The default component if columns of several components have the same name.
 TESTBED = "testbed"
 
 
 @dataclass(frozen=True)
 class Result:
-    """The result of another tool, in SI. time: (n,) s, increasing. values: (n,) by name in `prw.channels.QUANTITIES`."""
+    """The result of another tool, in SI.
+
+    Attributes
+    ----------
+    source
+        File of the result.
+    time
+        (n,) s, increasing.
+    values
+        (n,) by name in `prw.columns.QUANTITIES`.
+    """
 
     source: Path
     time: Array
@@ -32,8 +42,8 @@ class Result:
 
 
 def read_result(path: Path, units: Mapping[str, str], component: str | None) -> Result:
-    """Read the columns of time, motors and outputs; see `prw.check`. Of several rows at one time the last one counts: there,
-    inputs and outputs belong together. Raises UserError naming the file and the cause."""
+    """Read the columns of time, motors and outputs; see `prw.check`. If several rows have the same time, the last one
+    counts, because only there do inputs and outputs belong together. Raises UserError naming the file and the cause."""
     check_names("units", units, QUANTITIES)
     if not path.is_file():
         raise UserError(f"{path}: no such file")
@@ -95,7 +105,7 @@ def _known(title: str) -> tuple[str, str, str]:
 
 
 def _csv(path: Path) -> dict[str, Array]:
-    """The columns of a CSV file by title; unknown columns without values."""
+    """The columns of a CSV file by title; the arrays of unknown columns are empty."""
     titles: list[str] = []
     taken: list[tuple[str, int]] = []
 
@@ -162,18 +172,19 @@ def _of_variable(name: str, value: Any) -> dict[str, Array]:
 
 
 def _modelica(path: Path, content: Mapping[str, Any]) -> dict[str, Array]:
-    """OpenModelica's and Dymola's trajectories: in dataInfo, for each name, which data_N it is in (0: any, the time), and
-    in which column, negative if the sign is to be changed."""
-    across = "".join(content["Aclass"][3]).strip().rstrip("\0") == "binTrans"
+    """The trajectories in a file of OpenModelica or Dymola, by title. For each name, dataInfo contains the number N of
+    the matrix data_N (0 for the time, which is in every matrix), and the column, which is negative if the sign must be
+    changed."""
+    is_transposed = "".join(content["Aclass"][3]).strip().rstrip("\0") == "binTrans"
 
-    def upright(name: str) -> Any:
-        return content[name].T if across else content[name]
+    def rows_of(name: str) -> Any:
+        return content[name].T if is_transposed else content[name]
 
-    titles = ["".join(row).rstrip("\0 ") for row in upright("name")]
-    about = ["".join(row).rstrip("\0 ") for row in upright("description")]
+    titles = ["".join(row).rstrip("\0 ") for row in rows_of("name")]
+    about = ["".join(row).rstrip("\0 ") for row in rows_of("description")]
     columns = {}
-    for title, description, (table, index, *_) in zip(titles, about, upright("dataInfo")):
-        data = upright(f"data_{table or 2}")
+    for title, description, (table, index, *_) in zip(titles, about, rows_of("dataInfo")):
+        data = rows_of(f"data_{table or 2}")
         if table == 1:  # does not change
             continue
         unit = re.search(r"\[([^\]|:#]+)[^\]]*\]\s*$", description)

@@ -1,6 +1,7 @@
-"""Compares a table of results with one of the reference experiments in the FMU: motions of the motors, and the
-response of the testbed, calculated by a program that shares no code with the FMU. Reports for every output the largest
-difference, its time, and whether it is within the tolerance; draws the outputs beyond it. Exit status 0 if all agree, else 1.
+"""Compares a table of results with one of the reference experiments in the FMU: motions of the motors, and the response
+of the testbed, calculated by a program that shares no code with the FMU. Reports for every output the largest
+difference, its time, and whether it is within the tolerance, and draws the outputs that exceed it. Exit status 0 if all
+agree, else 1.
 
 FILE is CSV, a .mat file of OpenModelica, or one that MATLAB saved with -v7 or earlier. Columns are found by name, with
 or without a component (testbed.roll). Units are in the header, as in `roll [deg]`, or in --units; otherwise SI.

@@ -103,7 +103,7 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
 
 
 class Named(argparse.Action):
-    """Collects NAME=VALUE, with commas or by repetition, as a dict of `read(string)` by name."""
+    """Collects NAME=VALUE pairs, which commas separate or several options give, as a dict of `read(VALUE)` by name."""
 
     def __init__(self, read: Callable[[str], Any] = str, **options: Any):
         super().__init__(default={}, **options)
@@ -153,7 +153,7 @@ def finite(string: str) -> float:
 
 
 def listed(string: str) -> tuple[str, ...]:
-    """Names with commas, each once."""
+    """The names in a string, separated by commas, without repetitions."""
     return tuple(dict.fromkeys(filter(None, (part.strip() for part in string.split(",")))))
 
 
@@ -176,7 +176,7 @@ def add_parameter_options(parser: argparse.ArgumentParser, unit: str) -> None:
 
 
 def parameters_of(arguments: argparse.Namespace) -> dict[str, Any]:
-    """The values by name that these options give."""
+    """The values by name from --parameters and --set."""
     found: dict[str, Any] = {}
     if arguments.parameters is not None:
         with loaded(existing_fmu(arguments.fmu)) as inside:
@@ -195,7 +195,7 @@ def value(string: str) -> float | bool:
 
 
 def spread(string: str) -> float | tuple[float, float]:
-    """[VALUE:]PERCENT% as a fraction, or (value, fraction). Raises ValueError."""
+    """Converts PERCENT% to a fraction, and VALUE:PERCENT% to (value, fraction). Raises ValueError."""
     match = re.fullmatch(r"(?:([^:]+):)?\s*([^:%]+)%", string)
     if not match:
         raise ValueError("write NAME=10%, or NAME=VALUE:10%")
@@ -204,7 +204,7 @@ def spread(string: str) -> float | tuple[float, float]:
 
 
 def bounds(string: str) -> tuple[float, float]:
-    """LOW:HIGH. Raises ValueError."""
+    """Converts LOW:HIGH to two positive numbers. Raises ValueError."""
     low, colon, high = string.partition(":")
     if not colon:
         raise ValueError("write NAME=LOW:HIGH")

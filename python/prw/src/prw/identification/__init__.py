@@ -66,7 +66,7 @@ def identify(
     files
         CSV tables, DataFrames or dicts of arrays for `prw.read`, or return values of `prw.read` or `prw.simulate`.
     estimate
-        Names of the parameters, or one.
+        Names of the parameters to estimate, or one name.
     priors
         Prior knowledge by parameter: the standard deviation as a fraction of its start value
         (0.1 is 10 %, 1 the most), or (value, fraction). The parameter is then estimated, too.
@@ -124,7 +124,7 @@ def identify(
     if not several:
         raise UserError("there are none", argument="files")
     delay, lag, gain = names_of("delay", delay), names_of("lag", lag), names_of("gain", gain)
-    # Matrices are small and many: more threads are slower.
+    # There are many small matrices, with which more threads would be slower.
     with Model(fmu) as model, threadpool_limits(1):
         kinds = zip(DISTORTIONS, (delay, lag, gain))
         distortions = tuple(dict.fromkeys(Distortion(kind, name) for kind, names in kinds for name in names))
@@ -148,6 +148,8 @@ def identify(
         experiments = [prepare(each, quantum, how, how != "motors") for each, how in zip(measured, rates)]
         solution = fit(model, experiments, task, starts, seed)
         verdict = judge(solution)
+        # If the model does not explain a recording, it may be a simulation of the FMU, with jumps of the motors between
+        # steps. So the recording is then compared with the steps of the FMU.
         exact = [may_be_simulated(experiment) for experiment in experiments]
         ways: tuple[Rates, ...] = ("inputs", "angles") if any(exact) else ()
         for way in ways:

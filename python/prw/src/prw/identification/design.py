@@ -48,7 +48,8 @@ def motions(
 ) -> list[Motion]:
     """All candidates within `limits`: each kind with equal, opposite, single and independent motors.
 
-    duration: s. rate: samples per second. noise: by channel in SI; the optimal multisine is made for these channels.
+    duration: s. rate: samples per second. noise: standard deviations by channel, SI; the optimal multisine is made for
+    these channels.
     """
     time = np.arange(int(round(duration * rate)) + 1) / rate
     top = min(WIDEST, rate / 5)
@@ -64,7 +65,7 @@ def motions(
     return found
 
 
-#: Factors of two waves in the motion of motor 1, and in the motion of motor 2.
+#: For each pattern, the factors of two waves in the motion of motor 1, and the factors in the motion of motor 2.
 PATTERNS = {
     "equal": ((1, 0), (1, 0)),
     "opposite": ((1, 0), (-1, 0)),
@@ -157,9 +158,9 @@ def _within(name: str, time: Array, motors: Sequence[Array], limits: Limits) -> 
 def _optimal(
     model: Model, task: Task, time: Array, frequency: Array, limits: Limits, noise: Mapping[str, float]
 ) -> Motion:
-    """The multisine whose power is spread over frequencies, equal and opposite motors such that the determinant of the
-    information is largest within the limits (D-optimal; multiplicative algorithm, Silvey, Titterington
-    and Torsney, Comm. Stat. A 7 (1978) 1379)."""
+    """The multisine whose power is distributed over the frequencies, and over equal and opposite motor motion, so that
+    the determinant of the information is largest within the limits (D-optimal; multiplicative algorithm, Silvey,
+    Titterington and Torsney, Comm. Stat. A 7 (1978) 1379)."""
     share = 1e-4
     logarithms = task.first()
     steps = share * np.vstack([np.eye(len(logarithms)), -np.eye(len(logarithms))])
@@ -181,7 +182,7 @@ def _optimal(
         power *= np.einsum("kpq,qp->k", each, inverse) / len(logarithms)
         power /= power.sum()
     size = np.sqrt(power.reshape(2, -1) / cost)
-    # The sides' mean and half difference get frequencies of their own phases.
+    # The mean of the motors and half their difference have different phases.
     mean, half = (_multisine(time, frequency, s, k) for k, s in enumerate(size))
     return _within("multisine_optimal", time, [mean + half, mean - half], limits)
 
@@ -195,10 +196,10 @@ def typical_error(information: Array) -> float:
 
 #: Sensors that come in pairs.
 SENSORS = (("tau1", "tau2"), ("theta3", "theta4"), ("pitch", "roll"))
-#: Estimates are limited to this factor about their start values.
+#: Estimates are limited to the start values divided and multiplied by this factor.
 REACH = 10.0
 DURATION, RATE = 10.0, 1000.0
-#: The patterns of a motion in messages.
+#: Descriptions of the patterns in messages.
 DESCRIBED = {
     "equal": "equal motors",
     "opposite": "opposite motors",
@@ -236,7 +237,8 @@ def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) 
 
 
 def _best(trials: Mapping[tuple[str, str], float]) -> list[str]:
-    """The description of the trial with the least error, if that is small enough. trials: errors by description."""
+    """A list with the description of the trial with the least error; empty if that error is too large. trials: errors
+    by description."""
     (begin, end), error = min(trials.items(), key=lambda trial: trial[1], default=(("", ""), np.inf))
     return [f"{begin} (worst standard error then {error:.1%}{end})"] if error < UNDETERMINED else []
 
@@ -252,7 +254,7 @@ def _worst(information: Array) -> float:
 
 
 def _limits(experiments: Sequence[Experiment]) -> Limits:
-    """Limits of the motors: the largest values in the experiments, and at least small ones."""
+    """Limits of the motors: the largest values in the experiments, but not less than small defaults."""
     angle = max(np.abs(e.theta - e.theta.mean(axis=0)).max() for e in experiments)
     rate = max(np.abs(e.omega).max() for e in experiments)
     return Limits(max(angle, 0.1), max(rate, 1.0), max(40 * rate, 50.0))

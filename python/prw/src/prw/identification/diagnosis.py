@@ -32,19 +32,20 @@ FLAT, FLATS, STUCK = 4, 3, 0.25
 AT_REST = 1e-3
 #: Number of candidate sets of channels that are fitted.
 TRIED = 2
-#: Share of the best fault's gain from which another fault is named, instead of the best or in addition to it.
+#: Another fault is named if its gain is at least this share of the best fault's gain: SHARE for an alternative to the
+#: best fault, SECOND for a fault that remains after the best one is included.
 SHARE, SECOND = 0.6, 0.05
 
 
 def diagnose(solution: Solution, verdict: Verdict) -> list[str]:
     """Possible causes, a sentence each, the most likely first."""
-    found = [cause for i, e in enumerate(solution.fitter.experiments) for cause in _looks(solution, i, e)]
+    found = [cause for i, e in enumerate(solution.fitter.experiments) for cause in _obvious_causes(solution, i, e)]
     if found:
         return list(dict.fromkeys(found))
     causes = _causes(solution, verdict)
     reported = [cause.message for cause in causes[:2] if cause.gain > SHARE * causes[0].gain]
     if causes and not causes[0].explains:
-        # Further causes, while the first one is included in the fit.
+        # Causes that remain if the first one is included in the fit.
         after = causes[0].after()
         left = judge(after)
         others = [] if left.fits else _causes(after, left)
@@ -54,8 +55,19 @@ def diagnose(solution: Solution, verdict: Verdict) -> list[str]:
 
 
 class _Cause(NamedTuple):
-    """A possible cause. gain: rise of twice the log likelihood. name: of the fault. message: its description. explains: whether
-    the data fit then. after: the fit with the fault."""
+    """A possible cause.
+
+    Attributes
+    ----------
+    gain
+        Rise of twice the log likelihood if the cause is included.
+    name, message
+        Name of the fault and its description.
+    explains
+        Whether the data fit if the cause is included.
+    after
+        Returns the fit that includes the cause.
+    """
 
     gain: float
     name: str
@@ -76,7 +88,8 @@ def _causes(solution: Solution, verdict: Verdict) -> list[_Cause]:
 
 
 def _with_fault(solution: Solution, name: str) -> Solution:
-    """The fit with this fault, of unknown size, in all experiments; repeated with the rates of the first fit."""
+    """The fit with this fault, of unknown size, in all experiments. It is repeated once, because the effect of the
+    fault depends on the rates that the fit finds."""
     found = solution
     for _ in range(2):
         pairs = zip(found.fitter.experiments, found.comparisons)
@@ -85,15 +98,15 @@ def _with_fault(solution: Solution, name: str) -> Solution:
     return found
 
 
-def _looks(solution: Solution, i: int, experiment: Experiment) -> Iterator[str]:
-    """Faults that are detected without another fit."""
+def _obvious_causes(solution: Solution, i: int, experiment: Experiment) -> Iterator[str]:
+    """Causes that are found without another fit: wrong units and signs, exchanged, saturated and stuck channels."""
     assert experiment.values is not None
     before = Fitter(solution.fitter.model, [experiment], replace(solution.task, distortions=()), solution.noise)
     first = before.task.first()
     gains, likes = [], []
     for outputs in (before.compare(first)[0].response.outputs, solution.comparisons[i].response.outputs):
         y, m = experiment.observed(outputs)[2:], experiment.measured[2:]
-        # The square of any smaller size would be 0; channels of a testbed at rest have the size 0.
+        # The lower bound avoids a division by 0 for channels at rest; the square of a smaller number would be 0.
         size, measured = (np.maximum(np.linalg.norm(values, axis=0), 1e-150) for values in (y, m))
         product = (y.conj().T @ m).real
         gains.append(np.diag(product) / size**2)
@@ -149,11 +162,11 @@ def _flat(name: str, time: Array, column: Array, moving: NDArray[np.bool_]) -> I
 
 
 def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
-    """Distortions of single channels, pairs and all."""
+    """Distortions of single channels, of pairs and of all channels, as possible causes."""
     clear = {fault.name: fault.gain for fault in verdict.faults}
 
     def expected_gain(kind: str, group: Sequence[str]) -> float:
-        """A set that explains no more than its parts ranks below them."""
+        """The gain expected of a group; a group that explains no more than its parts ranks below them."""
         like = "gain" if kind == "gain" else "delay"
         parts = sum(clear.get(named(like, (name,)), 0.0) for name in group)
         return max(parts, clear.get(named(like, group), 0.0)) - 10 * len(group)
@@ -183,7 +196,8 @@ def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
 
 
 def _sizes(found: Solution, new: tuple[Distortion, ...]) -> str:
-    """The estimates of the last distortions of a fit, `new`; equal ones together."""
+    """The estimates of the last distortions of a fit, `new`, as a string; channels with equal estimates are listed
+    together."""
     errors = np.sqrt(np.diag(covariance_of(information_of(found.jacobians) + found.task.prior_information())))
     sizes: dict[str, list[str]] = {}
     for distortion, x, error in zip(new, found.logarithms[-len(new) :], errors[-len(new) :]):

@@ -1,4 +1,4 @@
-"""An experiment prepared for the fit: spectra of the motors' paths and of the measurements, and of the errors of both.
+"""Prepares an experiment for the fit: spectra of the motors' paths, of the measurements, and of the errors of both.
 
 The fit compares discrete Fourier transforms of the whole recording, up to the frequency at which the motors' motion
 is lost in the noise of their samples. Transforms are unitary: white noise of variance v has the power v at every
@@ -22,24 +22,26 @@ from prw.motion import Array, Motion
 from prw.recording import Recording
 from prw.state_space import Complex
 
-#: Ratio of a motor's motion to the noise of its samples (power, averaged over neighbouring frequencies) that defines the
-#: highest frequency of the fit, and a factor on that frequency.
+#: The fit ends at the highest frequency at which the power of a motor's motion, averaged over NEIGHBOURS frequencies,
+#: is CLEARLY_MOVING times the noise of its samples; MARGIN multiplies that frequency.
 CLEARLY_MOVING, MARGIN = 10.0, 1.15
 NEIGHBOURS = 9
 #: Share of the greatest power below which power is a rounding error.
 ROUNDING = 1e-10
-#: Least relative error of a spectral line (limited by doubles, CSV digits and the linear model), and least error of a
-#: value in SI.
+#: FINEST: least relative error of a spectral line, because doubles, digits in CSV files and the linear model are not
+#: exact. LEAST: least error of a value in SI.
 FINEST, LEAST = 1e-7, 1e-15
 #: A channel is constant if its range is at most this fraction of its default noise.
 STILL = 1e-6
-#: Motion of the motors between the rows of a recording: smooth; or as in a simulation of the FMU in Co-Simulation with a
-#: step from row to row, with the motors' rates as inputs, or with rates that the FMU estimates from the angles.
+#: Motion of the motors between the rows of a recording. "motors": smooth. The others are for a simulation of the FMU in
+#: Co-Simulation with a step from row to row: "inputs" if the motors' rates were inputs, "angles" if the FMU estimated
+#: them from the angles.
 Rates = Literal["motors", "inputs", "angles"]
-#: Fractions of a motor's range. A recording may come from a simulation if the noise is at most EXACT and the quantum at most
-#: DIGITS. Samples with a noise of at most ROUNDED are used without smoothing.
+#: Fractions of a motor's range. If the noise is at most EXACT and the quantum at most DIGITS, a recording may come from
+#: a simulation. If the noise is at most ROUNDED, samples are used without smoothing.
 EXACT, DIGITS, ROUNDED = 1e-3, 1e-4, 1e-6
-#: Number of draws of encoders' errors, and the number of neighbouring frequencies into which a line of them leaks.
+#: DRAWS: number of draws of the encoders' errors. FURTHEST: number of neighbouring frequencies into which a spectral
+#: line of these errors leaks.
 DRAWS, FURTHEST = 64, 100
 #: Largest deviation of even times, as a fraction of a step.
 EVEN = 1e-3
@@ -49,15 +51,40 @@ MIN_FREQUENCIES, MIN_VALUES = 8, 20
 
 @dataclass(frozen=True)
 class Experiment:
-    """A measured or planned experiment. name: of the experiment. time: (n,) s, even. theta, omega: (n, 2) rad, rad/s, of the
-    motors at `time`. channels: names of the measured outputs. sampled: (s,) s, their sampling times. values: (s, c) in SI,
-    NaN if missing; None if the experiment is planned. between: (s, n), interpolation from `time` to `sampled`, or None if
-    both are equal. samplers: the interpolation of each channel, with empty rows at missing values; None if no value is
-    missing and `between` is None. bins: number of compared frequencies, from 0. motor_errors: (d, bins, 2) rad, spectra of
-    d draws of the errors of the motors' samples. channel_errors: (d, bins, c), spectra of the channels' errors by encoders'
-    steps. paths: of the two motors, or None if they are known exactly. notes: lines for the user. jumps: (n, 2) rad if the
-    FMU simulated the recording, else None: the difference of each angle from the extrapolation with its rate, which the FMU
-    adds to the states at the start of the next step."""
+    """A measured or planned experiment with n times, s samples and c channels.
+
+    Attributes
+    ----------
+    name
+        Name of the experiment.
+    time
+        (n,) s, evenly spaced.
+    theta, omega
+        (n, 2), angles (rad) and rates (rad/s) of the motors at `time`.
+    channels
+        Names of the measured outputs.
+    sampled
+        (s,) s, times of the samples.
+    bins
+        Number of compared frequencies, from 0.
+    motor_errors
+        (d, bins, 2) rad, spectra of d draws of the errors of the motors' samples.
+    channel_errors
+        (d, bins, c), spectra of d draws of the channels' errors that are caused by the steps of encoders.
+    values
+        (s, c) in SI, NaN if missing; None if the experiment is planned.
+    between
+        (s, n), interpolation from `time` to `sampled`, or None if both are equal.
+    samplers
+        Interpolation of each channel, with empty rows at missing values; None if no value is missing and `between` is None.
+    paths
+        Paths of the two motors, or None if they are known exactly.
+    notes
+        Lines for the user.
+    jumps
+        (n, 2) rad, if the FMU simulated the recording, else None: the difference of each angle from its extrapolation
+        with the rate, which makes the FMU's states jump at the start of the next step.
+    """
 
     name: str
     time: Array
@@ -104,7 +131,7 @@ class Experiment:
     def finest(self) -> Array:
         """Lower bound (c,) of the channels' noise, SI: the error of the numbers and of the path between samples."""
         turn = 2 * np.pi * np.arange(1, self.bins) / len(self.time)
-        # Twelve times the error of the cubic between two samples; more if rows are uneven.
+        # Twelve times the error of a cubic between two samples, or 72 times if the rows are uneven.
         between = turn**4 * (0.0 if self.jumps is not None else 1 / 60 if self.between is None else 1 / 10)
         found: Array = np.max((FINEST + between)[:, None] * np.abs(self.measured[1:]), axis=0, initial=LEAST)
         return found
@@ -121,7 +148,8 @@ class Experiment:
 
     @cached_property
     def shares(self) -> Array:
-        """Squares of the samplers' numbers per point of `time`, (c,): the share of points that have a value."""
+        """(c,), sum of the squares of each sampler's weights per point of `time`, which is the share of points that
+        have a value."""
         if self.samplers is None:
             return np.ones(len(self.channels))
         return np.array([s.power(2).sum() / len(self.time) for s in self.samplers])
@@ -207,7 +235,7 @@ def prepare(recording: Recording, quantum: float = 0.0, rates_of: Rates = "motor
 
 
 def may_be_simulated(experiment: Experiment) -> bool:
-    """Whether the motors' samples are exact enough for a simulation."""
+    """Whether the motors' samples are so exact that they may come from a simulation."""
     paths = experiment.paths or ()
     exact = [
         path.noise <= EXACT * reach and path.quantum <= DIGITS * reach
@@ -264,7 +292,7 @@ def planned(motion: Motion, channels: Sequence[str]) -> Experiment:
 
 
 def _drawn(path: Path, time: Array, sampled: Array) -> Array:
-    """Draws of the samples' errors, (DRAWS, n), at the times (n,)."""
+    """Draws (DRAWS, n) of the errors of the samples at the times `sampled`, interpolated to the times (n,)."""
     random = np.random.default_rng(0)
     return np.array([np.interp(time, sampled, path.errors(random)) for _ in range(DRAWS)])
 
@@ -272,8 +300,8 @@ def _drawn(path: Path, time: Array, sampled: Array) -> Array:
 def _power(errors: Complex) -> Array:
     """Mean power (bins, ...) of the spectra (d, bins, ...) of draws."""
     mean: Array = np.mean(np.abs(errors) ** 2, axis=0)
-    # In a periodic motion errors are lines. The leakage of a line is correlated with the line, even if it is small, so
-    # each frequency gets at least the leakage of a line between two frequencies.
+    # In a periodic motion, the spectrum of the errors consists of lines. The leakage of a line is correlated with the
+    # line, even if it is small, so each frequency gets at least the leakage of a line between two frequencies.
     leaked = 1 / (np.pi * np.arange(1, FURTHEST + 1)) ** 2
     spread = [np.convolve(column, [*leaked[::-1], 0.0, *leaked])[FURTHEST:-FURTHEST] for column in mean.T]
     power: Array = np.maximum(mean, np.column_stack(spread))
@@ -281,7 +309,8 @@ def _power(errors: Complex) -> Array:
 
 
 def _with_rates(errors: Array, rate_noise: float | None, step: float) -> Complex:
-    """Spectra (d, f) of draws (d, n) of an angle's errors; smaller if its rate was logged with this noise."""
+    """Spectra (d, f) of draws (d, n) of an angle's errors. They are smaller if the rate was logged, with noise of the
+    standard deviation rate_noise."""
     found = spectra(errors.T).T
     if rate_noise is None:
         return found
@@ -292,8 +321,8 @@ def _with_rates(errors: Array, rate_noise: float | None, step: float) -> Complex
 
 
 def _clear(theta: Array, errors: Array, rate_noise: float | None, step: float) -> int:
-    """Number of frequencies, from 0, up to the highest at which the angle (n,) moves clearly more than its errors, drawn
-    (draws, n)."""
+    """Number of frequencies, from 0, up to the highest one at which the angle theta (n,) moves clearly more than its
+    errors. errors: (d, n), draws of them."""
     n = len(theta)
     window = np.hanning(n - 1)
 
@@ -302,8 +331,9 @@ def _clear(theta: Array, errors: Array, rate_noise: float | None, step: float) -
         found = np.abs(np.fft.rfft((increments - increments.mean()) * window)) ** 2 / (window @ window)
         return np.convolve(found, np.ones(NEIGHBOURS) / NEIGHBOURS, mode="same")
 
-    # In a periodic motion an encoder's errors are lines at multiples of its frequency, which differ much between draws.
-    # Half of the strongest counts, which for white noise is less than the mean.
+    # In a periodic motion, the spectrum of an encoder's errors consists of lines at multiples of the motion's
+    # frequency, which differ much between draws. So at least half of the strongest draw counts; for white noise this is
+    # less than the mean.
     drawn = [power(signal) for signal in errors]
     noise = np.maximum(np.mean(drawn, axis=0), np.max(drawn, axis=0) / 2)
     if rate_noise is not None:

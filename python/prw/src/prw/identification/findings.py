@@ -17,7 +17,7 @@ from prw.identification.statistics import Certainty
 from prw.identification.verdict import Verdict
 from prw.motion import Array
 
-#: Factor between residuals and given noise that causes a note.
+#: If residuals and given noise differ by more than this factor, a note reports it.
 UNLIKE = 1.5
 #: An estimate that is off its prior by this many standard deviations contradicts it.
 CONTRADICTION = 3.0
@@ -26,9 +26,25 @@ HOPELESS = 1.0
 
 
 class Estimate(NamedTuple):
-    """A parameter that was estimated. value, standard_error: in `unit` (SI), as are both ends of the 95 % `interval`.
-    relative: standard error as a fraction. shown, factor: the display unit of the FMU, and the factor from that unit to SI.
-    prior: its prior or None."""
+    """A parameter that was estimated.
+
+    Attributes
+    ----------
+    value, standard_error
+        In `unit`.
+    interval
+        Both ends of the 95 % interval, in `unit`.
+    relative
+        Standard error as a fraction of the value.
+    unit
+        SI unit.
+    shown
+        Display unit of the FMU.
+    factor
+        Factor from the display unit to SI.
+    prior
+        Prior knowledge of the parameter, or None.
+    """
 
     value: float
     standard_error: float
@@ -51,9 +67,25 @@ class Estimate(NamedTuple):
 
 
 class ChannelFit(NamedTuple):
-    """Result of one channel of one experiment. samples: number of values. noise: in the band, without encoders' errors;
-    residual: rms over all frequencies; offset: of the sensor; all SI. explained: share of its motion, or None if the
-    motors do not move the channel."""
+    """The fit of one channel in one experiment.
+
+    Attributes
+    ----------
+    experiment, channel
+        Names of both.
+    unit
+        SI unit of the channel and of the next numbers.
+    samples
+        Number of values.
+    noise
+        Standard deviation of the noise in the compared band, without the steps of encoders, in `unit`.
+    residual
+        Root mean square of measured minus modelled values, over all frequencies, in `unit`.
+    offset
+        Estimated offset of the sensor, in `unit`.
+    explained
+        Share of the channel's motion that the model explains, or None if the motors do not move the channel.
+    """
 
     experiment: str
     channel: str
@@ -67,7 +99,7 @@ class ChannelFit(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class Findings:
-    """Estimates and doubts about one FMU; `prw.identification.results.Identification` has the attributes and writes them."""
+    """Estimates and doubts about one FMU. `prw.identification.results.Identification` documents the attributes."""
 
     fmu: Path
     known: Parameters

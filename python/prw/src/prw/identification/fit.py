@@ -29,12 +29,12 @@ from prw.motion import Array
 from prw.progress import Progress
 from prw.state_space import Complex, StateSpace
 
-#: Step of the logarithms for the central differences, with errors of 1e-8 in the sensitivities.
+#: Step of the logarithms in central differences; the relative error of the sensitivities is then 1e-8.
 DIFFERENCE = 1e-4
 #: Relative singular value below which a direction of the initial state is not estimated.
 UNDETERMINED = 1e-9
-#: Maximum number of rounds that fit and then estimate the noise; the same for the comparison of causes; and the change of the
-#: noise that ends the rounds. Maximum number of rounds that only estimate the noise.
+#: Fitting and estimating the noise alternate for at most ROUNDS rounds (FEW_ROUNDS for the comparison of causes), until
+#: the noise changes by less than SETTLED. In each round the noise is estimated at most NOISE_ROUNDS times.
 ROUNDS, FEW_ROUNDS, SETTLED = 12, 2, 0.003
 NOISE_ROUNDS = 30
 #: Least distance of the start of a search from the bounds.
@@ -56,9 +56,25 @@ class Prior(NamedTuple):
 
 @dataclass(frozen=True)
 class Task:
-    """The unknowns of a fit. names: of the parameters. start: all parameters in SI by name. bounds: (least, greatest) by
-    name, SI. priors: by name. noise: given standard deviations by channel, SI. offsets: whether each channel has an
-    unknown offset. distortions: of channels, unknowns that follow the parameters' logarithms in every point (p,)."""
+    """The unknowns of a fit.
+
+    Attributes
+    ----------
+    names
+        Names of the parameters to estimate.
+    start
+        All parameters by name, SI.
+    bounds
+        (least, greatest) by name, SI.
+    priors
+        Prior knowledge by name.
+    noise
+        Given standard deviations by channel, SI.
+    offsets
+        Whether each channel has an unknown offset.
+    distortions
+        Distortions of channels, whose unknowns follow the logarithms of the parameters in every point (p,).
+    """
 
     names: tuple[str, ...]
     start: Mapping[str, float]
@@ -93,10 +109,18 @@ class Task:
 
 
 class Comparison:
-    """An experiment compared with the model at one set of parameters, at given noise.
+    """An experiment compared with the model, for one set of parameters and given noise.
 
-    residual: (2, bins, c), real and imaginary parts of the difference of measured and modelled spectra, uncorrelated
-    and of variance 1, after elimination of offsets and initial state. offsets: (c,) SI. initial: (6,), x[0] - x[n]."""
+    Attributes
+    ----------
+    residual
+        (2, bins, c), real and imaginary parts of the difference of measured and modelled spectra, uncorrelated and of
+        variance 1, after elimination of offsets and initial state.
+    offsets
+        (c,), offsets of the sensors, SI.
+    initial
+        (6,), difference x[0] - x[n] of the states at the start and at the end.
+    """
 
     def __init__(
         self,
@@ -148,7 +172,7 @@ class Comparison:
         return float(-4 * np.log(diagonal).sum())
 
     def project(self, table: Array) -> Array:
-        """Parts (2, bins, c, ...) after elimination of offsets and initial state."""
+        """Removes the effect of offsets and initial state from real and imaginary parts (2, bins, c, ...)."""
         flat = table.reshape(len(self._basis), -1)
         return (flat - self._basis @ (self._basis.T @ flat)).reshape(table.shape)
 
@@ -191,8 +215,8 @@ class Comparison:
         return found
 
     def score_variance(self, jacobian: Array) -> Array:
-        """Variance (p, p) of the score J'r, with the drawn encoders' errors: in a periodic motion they have
-        its phase and repeat with it. jacobian: (2, bins, c, p)."""
+        """Variance (p, p) of the score J'r, calculated with drawn errors of the encoders, because in a periodic motion
+        these errors repeat with the motion. jacobian: (2, bins, c, p)."""
         scores = np.einsum("rfcp,rfcd->dp", jacobian, self._drawn, optimize=True)
         noise = self._whiten * np.sqrt(self._noise)
         of_noise = np.einsum("fcj,rfcp->rfjp", noise.conj(), jacobian, optimize=True).reshape(-1, jacobian.shape[-1])
@@ -220,12 +244,33 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Solution:
-    """The result of a fit. logarithms: (p,) of the parameters. noise: by channel, SI. comparisons: one for each experiment.
-    jacobians: for each experiment (2, bins, c, p), derivatives of the residuals. noise_information: (p, p), see
-    Comparison.slopes. modelled: for each experiment (s, c), the FMU's outputs, offsets included, SI.
-    misfit: sum of squares of residuals and priors. rivals: other minima that fit as well, as (logarithms, misfit).
-    tried: number of starting points. evaluations: number of compared sets of parameters. fitter: the fitter that found
-    the solution, ready for other parameters."""
+    """The result of a fit.
+
+    Attributes
+    ----------
+    logarithms
+        (p,), logarithms of the parameters, then the distortions.
+    noise
+        Standard deviations by channel, SI.
+    comparisons
+        One for each experiment.
+    jacobians
+        (2, bins, c, p) for each experiment, derivatives of the residuals.
+    noise_information
+        (p, p), the part of the Jacobians' squares that is noise, see `Comparison.slopes`.
+    modelled
+        (s, c) for each experiment, the FMU's outputs plus the offsets, SI.
+    misfit
+        Sum of the squares of residuals and of differences from priors.
+    rivals
+        Other minima that fit as well, as (logarithms, misfit).
+    tried
+        Number of starting points.
+    evaluations
+        Number of compared sets of parameters.
+    fitter
+        The fitter that found the solution, ready for other parameters.
+    """
 
     task: Task
     logarithms: Array
@@ -327,8 +372,8 @@ class Fitter:
         return np.vstack([*rows, -np.diag(self._priors()[1])])
 
     def search(self, start: Array, tolerances: Mapping[str, float] = FINE, held: int | None = None) -> OptimizeResult:
-        """scipy's trust-region least squares from `start` (p,) at the present noise. held: a parameter that keeps
-        its value in `start`. tolerances: scipy's."""
+        """scipy's trust-region least squares from `start` (p,) at the present noise. held: index of a parameter that
+        keeps its value in `start`. tolerances: scipy's."""
         free = np.arange(len(start)) != (-1 if held is None else held)
         low, high = (bound[free] for bound in self.task.span())
 
@@ -350,7 +395,7 @@ class Fitter:
         return found
 
     def settle(self, point: Array, rounds: int = ROUNDS, tolerances: Mapping[str, float] = FINE) -> Array:
-        """Fit and estimate the noise in turns, until the noise settles or `rounds` times."""
+        """Fit and estimate the noise in turns, until the noise settles, but at most `rounds` times."""
         for _ in range(rounds):
             point, before = self.search(point, tolerances).x, self.noise
             for _ in range(NOISE_ROUNDS):
@@ -386,7 +431,7 @@ class Fitter:
         return [self.model.at(self.task.values(point)) for point in points]
 
     def _discrete(self, models: Sequence[StateSpace], experiment: Experiment) -> Discrete:
-        """The models over the experiment's steps."""
+        """The models, discretized with the experiment's step."""
         return discrete(models, experiment.step, experiment.channels, experiment.jumps is not None)
 
     def _priors(self) -> tuple[Array, Array]:
@@ -446,8 +491,8 @@ def _solution(fitter: Fitter, point: Array, misfit: float, rivals: list[tuple[Ar
 def refitted(
     solution: Solution, distortions: tuple[Distortion, ...], faults: Sequence[Sequence[Complex]] = ()
 ) -> Solution:
-    """Repeat the fit with further distortions as unknowns, or faults of each experiment, accurately enough for a comparison.
-    It starts from the solution and, if it diverges, from the start values."""
+    """Repeat the fit with further distortions as unknowns, or with faults of each experiment, just accurately enough to
+    compare causes. It starts from the solution and, if it diverges, from the start values."""
     task = replace(solution.task, distortions=(*solution.task.distortions, *distortions))
     starts = [np.append(solution.logarithms, np.zeros(len(distortions))), task.first()]
     found = []

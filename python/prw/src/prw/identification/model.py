@@ -18,8 +18,21 @@ SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 
 
 class Parameter(NamedTuple):
-    """A parameter of the model description. start: its start value in SI. shown, factor: its display unit, and the
-    factor from that unit to SI. meaning: its description."""
+    """A parameter of the model description.
+
+    Attributes
+    ----------
+    start
+        Start value, SI.
+    unit
+        SI unit.
+    shown
+        Display unit.
+    factor
+        Factor from the display unit to SI.
+    meaning
+        Description.
+    """
 
     start: float
     unit: str
@@ -29,8 +42,15 @@ class Parameter(NamedTuple):
 
 
 class Parameters:
-    """The parameters that the model description of the testbed declares. real, counts: the Real and the Integer
-    parameters by name. guid: of the FMU, a hash of its sources and start values."""
+    """The parameters that the model description of the testbed declares.
+
+    Attributes
+    ----------
+    real, counts
+        The Real and the Integer parameters by name.
+    guid
+        Guid of the FMU, a hash of its sources and start values.
+    """
 
     def __init__(self, fmu: fmu_run.Fmu):
         self.guid: str = fmu.token

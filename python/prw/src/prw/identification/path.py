@@ -19,14 +19,15 @@ from scipy.sparse import csr_matrix, diags
 
 from prw.motion import Array
 
-#: Sparse rows from coefficients to measured quantities, and the measured values.
+#: A sparse matrix from the coefficients to a measured quantity, and its measured values.
 Block = tuple[csr_matrix, Array]
 DEGREE = 5
-#: Order of the differences of coefficients that are penalized; third differences are proportional to jerk.
+#: Differences of the coefficients of this order are penalized; third differences are proportional to jerk.
 ORDER = 3
 #: Range of log10 of the penalty: below, the path interpolates; above, the normal equations lose their digits.
 STIFFNESS = (-6.0, 10.0)
-#: Range of log10 of the weight of logged rates, s^2, and the start values of the search by the number of blocks.
+#: RATIO: range of log10 of the weight of logged rates, s^2. GUESSES: start values of its search, by the number of
+#: blocks.
 RATIO = (-14.0, 4.0)
 GUESSES: dict[int, list[list[float]]] = {1: [[]], 2: [[-2.0], [-4.0], [-6.0]]}
 #: Divisor of the most probable penalty. Too little smoothing adds some noise, too much biases the parameters. The highest
@@ -36,20 +37,32 @@ UNDERSMOOTHING = 16.0
 #: relative change of the angles. If the motor is slow, a path that follows the encoder's steps is rounded to these steps
 #: again, and the drawn errors are up to three times too large.
 OVERSMOOTHING, RESCALED = 64.0, 0.05
-#: A column is a multiple of a quantum if all its values are, to this fraction of the quantum.
+#: Tolerance, as a fraction of the quantum, within which all values of a column must be multiples of the quantum.
 ON_GRID = 0.05
 #: Maximum number of quanta between neighbouring values of a typical column.
 MAX_STEPS = 50
 #: If the variance exceeds the variance of the encoder's steps by this factor, the samples contain other noise.
 NOISIER = 1.2
-#: Number of values from which the quantum is found.
+#: Number of values at the start of a column that are used to find the quantum.
 QUANTUM_VALUES = 20000
 
 
 class Path(NamedTuple):
-    """The path of one angle. angle: spline over time (rad, s); its derivative is the rate. noise: standard deviation
-    of the samples, rad. quantum: of the samples, rad, 0 if none. rate_noise: of the logged rates, rad/s, or None.
-    quiet: (n,) rad, a path at the samples' times that does not follow their errors."""
+    """The path of one motor angle.
+
+    Attributes
+    ----------
+    angle
+        Spline over the time (s), in rad; its derivative is the rate.
+    noise
+        Standard deviation of the samples, rad.
+    quantum
+        Step of the encoder, rad, or 0 if the samples have none.
+    rate_noise
+        Standard deviation of the logged rates, rad/s, or None if there are none.
+    quiet
+        (n,) rad, a smoother path at the times of the samples, which does not follow their errors.
+    """
 
     angle: BSpline
     noise: float
@@ -81,7 +94,8 @@ def quantum_of(values: Array) -> float:
     if len(levels) < 3:
         return float(np.ptp(levels))
     gaps = np.diff(levels)
-    # Truncated digits split a level into two values. The remaining gaps are multiples of the quantum.
+    # If digits were truncated, one level may appear as two values, so small gaps are left out. The remaining gaps are
+    # multiples of the quantum.
     gaps = gaps[gaps > np.median(gaps) / MAX_STEPS]
     quantum = gaps.min()
     for _ in range(3):
@@ -135,8 +149,8 @@ class _Spline:
 
 
 class _Fit(NamedTuple):
-    """Coefficients of the path and of a smoother path; noise of the first block, rad; weights of the blocks relative to
-    the first (ratios of their variances)."""
+    """Coefficients of the path and of a smoother path, the noise of the first block (rad), and the weights of the blocks
+    relative to the first one (ratios of their variances)."""
 
     coefficients: Array
     quiet: Array

@@ -28,7 +28,7 @@ COLOURS = {
 }
 #: Number of intervals of a curve, about one per screen pixel. Only the extremes in each are drawn, which keeps the page small.
 INTERVALS = 500
-#: Unit that the page shows, and the factor to it, for each SI unit that it does not show.
+#: For each SI unit that the page replaces, the unit that it shows, and the factor from SI to that unit.
 SHOWN = {"rad": ("deg", np.degrees(1.0)), "rad/s": ("deg/s", np.degrees(1.0))}
 #: Duration of the close-up, s.
 CLOSE = 1.0

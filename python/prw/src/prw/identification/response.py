@@ -6,8 +6,9 @@ becomes z X = Ad X + (G0 + z G1) U + z d with z = exp(2 pi i f h) and d = x[0] -
 and ends anywhere differs from a periodic one by six numbers (Pintelon and Schoukens, System Identification: A Frequency
 Domain Approach, 2nd ed., Sec. 6.3.2).
 
-A recording that the FMU simulated in Co-Simulation is compared with the FMU's own steps: over a step each angle follows its rate, and at
-the start of the next step the states jump by the difference of the angle from this extrapolation.
+A recording that the FMU simulated in Co-Simulation is compared with the FMU's own steps: during a step each angle
+follows its rate, and at the start of the next step the states jump in proportion to the difference between the angle
+and this extrapolation.
 """
 
 from __future__ import annotations
@@ -54,8 +55,10 @@ class Distortion(NamedTuple):
 
 
 class Discrete(NamedTuple):
-    """x[k+1] = A x[k] + before u[k] + after u[k+1], y[k] = C x[k] + D u[k]: A (..., 6, 6), before and after
-    (..., 6, m), C (..., c, 6), D (..., c, m), with m = 4, or 6 with jumps."""
+    """A model over one step: x[k+1] = A x[k] + before u[k] + after u[k+1], y[k] = C x[k] + D u[k].
+
+    A is (..., 6, 6), before and after (..., 6, m), C (..., c, 6), D (..., c, m), with m = 4 inputs, or 6 with jumps.
+    """
 
     A: Array
     before: Array
@@ -70,7 +73,8 @@ class Discrete(NamedTuple):
 
 
 def discrete(models: Sequence[StateSpace], step: float, channels: tuple[str, ...], simulated: bool) -> Discrete:
-    """m models over steps of `step` s, with the rows of `channels`. simulated: in steps of the FMU."""
+    """Discretize m models for the outputs `channels` and steps of `step` s. simulated: whether the motors move as in a
+    simulation of the FMU in Co-Simulation, instead of along cubics."""
     rows = [OUTPUTS.index(name) for name in channels]
     A, B, C, D = (np.stack([getattr(model, block) for model in models]) for block in "ABCD")
     angle, rate, C, D = B[..., :2], B[..., 2:], C[..., rows, :], D[..., rows, :]

@@ -18,9 +18,11 @@ from scipy.special import ndtri
 from prw.identification.fit import Comparison, Solution
 from prw.motion import Array
 
-#: Standard errors (of the logarithm) below which the model counts as linear, and above which there is no interval.
+#: Standard errors of a logarithm. Below LINEAR the model counts as linear, and above HOPELESS no profile likelihood is
+#: calculated.
 LINEAR, HOPELESS = 0.01, 1.0
-#: Maximum number of trials for an end of an interval, relative tolerance of the step, and maximum ratio of two steps.
+#: TRIALS: maximum number of trials for an end of an interval. CLOSE: relative tolerance of the step. LONGEST: maximum
+#: ratio of two steps.
 TRIALS, CLOSE, LONGEST = 8, 0.02, 2.0
 #: Tolerances of the search over the other parameters.
 FOLLOWED = {"ftol": 1e-5, "xtol": 1e-5}
@@ -40,7 +42,8 @@ def ends(solution: Solution, white: Array, errors: Array, quantile: float) -> tu
 
 
 def _end(solution: Solution, i: int, step: Array, wanted: float) -> float:
-    """Logarithm of parameter i at which the least misfit has risen by `wanted`. step: (p,), the first trial."""
+    """Logarithm of parameter i at which the misfit, minimized over the other parameters, has risen by `wanted`. step:
+    (p,), the first trial."""
     centre, (low, high) = solution.logarithms, solution.task.span()
     for _ in range(TRIALS):
         point = np.clip(centre + step, low, high)
@@ -68,8 +71,15 @@ SHARE = 0.15
 
 
 class Combination(NamedTuple):
-    """A direction that the data do not determine. shares: exponent by parameter, the largest 1: the parameters can change
-    together like p -> p * x^share. error: standard deviation of log x."""
+    """A direction in the space of parameters that the data do not determine.
+
+    Attributes
+    ----------
+    shares
+        Exponents by parameter, the largest of magnitude 1: the parameters can change together like p -> p * x^share.
+    error
+        Standard deviation of log x.
+    """
 
     shares: Mapping[str, float]
     error: float
@@ -85,10 +95,27 @@ class Combination(NamedTuple):
 
 
 class Certainty(NamedTuple):
-    """names: of the parameters (p). relative: (p,) standard errors as fractions. low, high: (p,) ends of the 95 %
-    intervals, SI. correlation: (p, p). information: (p, p), of the logarithms, priors included, without
-    the encoders' contribution. condition: of its unit-diagonal form. whiteness: by how much the noise's correlation
-    widens the errors beyond what sensors explain, (p,). undetermined: combinations that the data do not determine."""
+    """Standard errors and intervals of the p unknowns: parameters, then distortions.
+
+    Attributes
+    ----------
+    names
+        Names of the unknowns.
+    relative
+        (p,), standard errors of their logarithms, which are fractions of the values.
+    low, high
+        (p,) each, ends of the 95 % intervals of the parameters, SI.
+    correlation
+        (p, p), correlation of the estimates.
+    information
+        (p, p), Fisher information about the logarithms, with the priors and without the encoders' contribution.
+    condition
+        Condition number of the information, scaled to a unit diagonal.
+    whiteness
+        (p,), factor by which correlation of the noise makes the standard errors larger than for white noise.
+    undetermined
+        Combinations that the data do not determine.
+    """
 
     names: Sequence[str]
     relative: Array
@@ -102,8 +129,8 @@ class Certainty(NamedTuple):
 
 
 def certainty(solution: Solution, widening: Array) -> Certainty:
-    """Standard errors, correlation, intervals and open combinations of a fit. widening: (p,) standard deviations, of
-    possible faults besides noise."""
+    """Standard errors, correlation, intervals and undetermined combinations of a fit. widening: (p,), standard
+    deviations that possible faults add to the noise."""
     names, prior = solution.task.unknowns, solution.task.prior_information()
     squares = prior + information_of(solution.jacobians)
     inverse = covariance_of(_positive(squares - solution.noise_information))
@@ -124,7 +151,7 @@ def certainty(solution: Solution, widening: Array) -> Certainty:
         errors = np.maximum(errors, np.sqrt(np.diag(covariance_of(corrected))))
     low, high = ends(solution, inverse, errors, float(ndtri(0.975)))
     unit = np.outer(scale, scale)
-    # An undetermined combination may have no variance but rounding errors, whose quotients are clipped.
+    # The variance of an undetermined combination may consist of rounding errors only, so quotients are clipped.
     with np.errstate(over="ignore"):
         correlation = np.clip(np.divide(expected, unit, out=np.eye(len(names)), where=unit > 0), -1, 1)
     return Certainty(
@@ -148,7 +175,8 @@ def information_of(jacobians: Sequence[Array]) -> Array:
 
 
 def scores(comparison: Comparison, jacobian: Array, inverse: Array) -> Array:
-    """Sum over frequencies of the square of each one's score J'r: (p, p). inverse: of the information, (p, p)."""
+    """Sum (p, p) over the frequencies of the outer product of each frequency's score J'r with itself. inverse: (p, p),
+    of the information."""
     # Residuals are divided by 1 - leverage, as in a jackknife.
     leverage = np.einsum("rfcp,pq,rfcq->rfc", jacobian, inverse, jacobian, optimize=True)
     residual = comparison.residual / np.maximum(1 - leverage, LEAST_FREEDOM)
@@ -196,7 +224,7 @@ def undetermined(names: Sequence[str], information: Array) -> list[Combination]:
     found = []
     for value, vector in zip(values, vectors.T):
         largest = np.abs(vector).max()
-        # The error of the largest parameter when all move along.
+        # The error of the parameter with the largest share, if the others change with it.
         error = largest / np.sqrt(max(value, 1e-30))
         if error > UNDETERMINED:
             vector = vector / vector[np.argmax(np.abs(vector))]

@@ -1,9 +1,9 @@
 """Tests whether the model explains the data, and whether a fault would explain them.
 
-The residuals of a correct fit are noise. Three tests compare them with the motion. Local regression over frequency finds
-residuals that are coherent with the motors' spectra or the channel's own. Score tests (Rao, Proc. Cambridge Phil. Soc. 44
-(1948) 50) find the effects of single faults: a delay, a lag or a gain of a channel or of two in common, friction, backlash.
-The third test compares the residuals' strength with the noise at frequencies at which the motors do not move.
+The residuals of a correct fit are noise. Three tests compare them with the motion. Local regression over frequency
+finds residuals that are coherent with the motors' spectra or the channel's own. Score tests (Rao, Proc. Cambridge Phil.
+Soc. 44 (1948) 50) find the effects of single faults: a delay, a lag or a gain of one channel or of several, friction,
+backlash. The third test compares the residuals' strength with the noise at frequencies at which the motors do not move.
 """
 
 from __future__ import annotations
@@ -25,21 +25,22 @@ from prw.testbed import OUTPUTS
 #: Probability below which a coherence with the motion is a misfit. It is small, because the steps of encoders are not normally
 #: distributed; 1e-8 occurs in slow motion.
 CHANCE = 1e-10
-#: Ratio of the size of a fault to its standard error above which the fault is significant, and above which it widens
-#: intervals. Friction always does, because no bearing is without it.
+#: Ratios of the size of a fault to its standard error. Above CLEAR the fault is significant, and above SMALL it widens
+#: intervals. Friction always widens them, because every bearing has some.
 CLEAR, SMALL = 4.7, 2.5
-#: As CLEAR, for faults that follow the sign of a rate. In a periodic motion, steps of encoders also follow that sign.
+#: CLEAR for faults that follow the sign of a rate. It is larger, because in a periodic motion the steps of encoders
+#: also follow that sign.
 CLEAR_SIGN = 7.0
-#: Largest ratio of a channel's noise in the compared band to its noise above the band, and the tolerance of the ratio in
-#: standard errors.
+#: EXCESS: largest ratio of a channel's noise in the compared band to its noise above the band. LUCK: tolerance of this
+#: ratio in standard errors.
 EXCESS, LUCK = 1.3, 5.0
 #: Frequencies per piece of the local regression, and maximum number of pieces.
 PIECE, MAX_PIECES = 16, 6
 #: Least ratio of the power of a moving signal to the power of encoders' errors in it.
 CLEARLY_MOVING = 30.0
-#: Least share of a direction that is independent of the others.
+#: A direction is left out if less than this share of it is independent of the others.
 NEW = 0.02
-#: Share of its greatest magnitude above which a rate has a sign.
+#: Share of its greatest magnitude above which a rate counts as clearly positive or negative.
 TURNING = 0.02
 
 
@@ -48,8 +49,8 @@ PAIRS = (("tau1", "tau2"), ("theta3", "theta4"), ("pitch", "roll"), ("pitch_rate
 
 
 def groups(solution: Solution, kind: str, channels: Sequence[str] = ()) -> list[tuple[str, ...]]:
-    """Groups of channels (default: all) that may share a fault of a kind and have no distortion of this kind yet: single
-    ones, pairs, all. Gains are tried up to pairs."""
+    """Groups of channels (default: all) that may share a fault of a kind and have no distortion of this kind yet:
+    single channels, pairs, and all together, except for gains."""
     channels, known = channels or solution.fitter.channels, set(solution.task.distortions)
     found: list[tuple[str, ...]] = [(name,) for name in channels]
     found += [pair for pair in PAIRS if set(pair) <= set(channels)]
@@ -64,9 +65,23 @@ def named(kind: str, group: Sequence[str]) -> str:
 
 
 class Fault(NamedTuple):
-    """A possible fault. name, unit: of its size. size, error: estimated together with the parameters, and its standard
-    error. shift: (p,), the change of the unknowns that it would cause. per_error: (p,), the change by one standard error.
-    gain: rise of twice the log likelihood."""
+    """A possible fault.
+
+    Attributes
+    ----------
+    name
+        Name of the fault.
+    unit
+        Unit of its size.
+    size, error
+        Size, estimated together with the parameters, and its standard error.
+    shift
+        (p,), change of the unknowns that the fault would cause.
+    per_error
+        (p,), change of the unknowns by one standard error of the size.
+    gain
+        Rise of twice the log likelihood if the fault is included.
+    """
 
     name: str
     unit: str
@@ -93,16 +108,28 @@ class Fault(NamedTuple):
 
     @property
     def bias(self) -> Array:
-        """Root mean square (p,) of the unknowns' errors by the fault, if its size is normally distributed about the estimate.
+        """Root mean square (p,) of the unknowns' errors that the fault causes, if its size is normally distributed
+        about the estimate.
 
-        It is not 0 if the estimate is: the fault may then still have the size of its standard error. An interval widened by
-        this contains the true value with at least its probability, however large the fault is."""
+        It is not 0 even if the estimated size is 0, because the fault may then still have the size of its standard
+        error. An interval that is widened by this contains the true value with at least its nominal probability,
+        however large the fault is."""
         shift = self.shift if self.possible else np.zeros_like(self.shift)
         return np.hypot(shift, self.per_error)
 
 
 class Misfit(NamedTuple):
-    """An unexplained residual of a channel. low, high: Hz, the range with most of it."""
+    """An unexplained residual of a channel.
+
+    Attributes
+    ----------
+    experiment, channel
+        Names of both.
+    low, high
+        Frequencies between which most of the residual is, Hz.
+    text
+        Description.
+    """
 
     experiment: str
     channel: str
@@ -115,8 +142,17 @@ class Misfit(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """misfits: unexplained residuals; none if the model fits. faults: tested faults, in decreasing order of significance.
-    widening: (p,) standard deviations by faults that are too small to distinguish from chance."""
+    """Whether the model explains the data.
+
+    Attributes
+    ----------
+    misfits
+        Unexplained residuals; none if the model fits.
+    faults
+        The tested faults, in decreasing order of significance.
+    widening
+        (p,), standard deviations that are added because faults may be too small to be distinguished from chance.
+    """
 
     misfits: tuple[Misfit, ...]
     faults: tuple[Fault, ...]
@@ -192,7 +228,7 @@ class _Score:
         prior = self._shift.T @ solution.task.prior_information() @ self._shift
         self._variance = solution.comparisons[i].score_variance(rest) + prior
         self._information = flat.T @ rest.reshape(flat.shape)
-        # A part of the Jacobian is noise, and so is that part of the difference between the directions and it.
+        # Part of the Jacobian is noise, so the directions after its subtraction contain noise, too.
         self._noise = self._shift.T @ solution.noise_information @ self._shift
         for other, comparison in enumerate(solution.comparisons):
             if other != i:
@@ -277,7 +313,8 @@ def single_faults(
 def _mechanical_friction(
     solution: Solution, experiment: Experiment, comparison: Comparison
 ) -> Iterator[tuple[str, str, Complex]]:
-    """Dry friction of the output about pitch and roll, and of the input shafts, both or one: as `single_faults`."""
+    """Dry friction of the output about pitch and roll, of both input shafts, and of each of them, in the form of
+    `single_faults`."""
     model, known = solution.fitter.model.at(solution.values), solution.values
     turns = model.C[[OUTPUTS.index("pitch_rate"), OUTPUTS.index("roll_rate")]][:, 4:]
     inertia = known["J2"] * np.eye(2) + turns.T @ np.diag([known["H3"], known["J3"]]) @ turns

@@ -1,4 +1,4 @@
-"""The animation of the wrist: equal motors, opposite motors, and both with a controller."""
+"""The animation of the wrist in the README: equal motors, opposite motors, and both motions with a controller."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ from prw.simulation import Run
 STEP = 1e-3
 #: Seconds of the run per second of the animation.
 SPEED = 0.8
-#: Amplitude of prescribed motor motions, rad, and the durations there, across and back, s.
+#: Amplitude of prescribed motor motions, rad, and the durations of their three parts, s: to the amplitude, to its
+#: opposite, and back to 0.
 SWING, LEGS = np.deg2rad(35), (0.45, 0.7, 0.45)
-#: Goals of the controller in sequence, pitch and roll in rad, and the time for each, s.
+#: Goals of the controller, pitch and roll in rad, one after the other, and the duration of each, s.
 GOALS, STAY = (np.deg2rad((30, 60)), np.zeros(2)), 0.8
 MOTORS = ("theta1", "theta2", "omega1", "omega2")
 CONTROLLED = ("pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2")
 
 
-def story(testbed_fmu: Path, controller_fmu: Path) -> tuple[Run, list[tuple[float, str]]]:
+def captioned_run(testbed_fmu: Path, controller_fmu: Path) -> tuple[Run, list[tuple[float, str]]]:
     """Run the testbed, first with prescribed motor motions, then with the controller. The run begins and ends at rest at zero.
     Returns the run and its captions, each with the time (s) from which it is shown."""
     prescribed = _there_and_back()

@@ -137,7 +137,7 @@ def _convergence(found: Results) -> Figure:
     for label, marker, name in (("torque", "s", "tau1"), ("roll rate", "^", "roll_rate"), ("roll", "o", "roll")):
         axis.loglog(milliseconds, angles[name], f"{marker}-", color=BLUE, markersize=4, label=f"{label}, angles only")
     rounding = np.maximum(np.max(list(piecewise_linear.values()), axis=0), ROUNDING)
-    label = f"all, broken line with its slopes (below {ROUNDING:g})"
+    label = f"all outputs, piecewise linear angles (< {ROUNDING:g})"
     axis.loglog(milliseconds, rounding, "D:", color=VERMILION, markersize=4, label=label)
     axis.set_xticks(milliseconds, [f"{value:g}" for value in milliseconds])
     axis.set_xticks([], minor=True)

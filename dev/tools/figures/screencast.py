@@ -1,4 +1,4 @@
-"""README's film of a hand on the page in the FMU that runs it, taken in a browser."""
+"""The screencast in the README: in a browser, the mouse drags the gripper on the page that runs the FMU."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from PIL import Image, ImageDraw, ImageSequence
 from prw.errors import UserError
 from prw.files import replacing
 
-#: Duration of each frame, ms, in the page and in the film, and the number of movements of the mouse in it.
+#: Duration of each frame, ms, and the number of mouse movements in a frame.
 STAY, SUBSTEPS = 100, 5
-#: Size of the window and width of the film, px.
+#: Size of the window and width of the GIF, px.
 WINDOW, WIDTH = (1000, 760), 640
-#: What the hand does in the film: frames, whether it holds the gripper, and its way, px.
+#: Movements of the mouse: number of frames, whether the button is down, and the distance to the right and down, px.
 GESTURES = (
     (4, False, (0, 0)),
     (11, True, (22, 0)),
@@ -35,8 +35,9 @@ POINTER = ((0, 0), (0, 19), (4.5, 15), (8, 22.5), (11, 21), (7.7, 14), (13.5, 14
 DRAWN = "new Promise(done => { const { port1, port2 } = new MessageChannel(); port1.onmessage = done; port2.postMessage(0); })"
 
 
-def film(fmu: Path, path: Path) -> None:
-    """Films a hand that turns the gripper on the page in Chromium, and writes the film as GIF unless `path` already shows it."""
+def record(fmu: Path, path: Path) -> None:
+    """Records how the mouse drags the gripper on the page in Chromium, and writes a GIF unless `path` already shows the
+    same."""
     from playwright.sync_api import sync_playwright
 
     chromium = shutil.which("chromium")
