@@ -1,4 +1,4 @@
-//! The motor: its voltage is switched on and off at times that are known in advance (time events).
+//! A motor whose voltage is switched on and off at times that are known in advance (time events).
 
 use fmu_export::*;
 
@@ -20,7 +20,7 @@ pub struct Motor {
     next: f64,
     /// Whether the next switching begins a period.
     rises: bool,
-    /// Begin of the last period, s.
+    /// Begin of the current period, s.
     begin: f64,
 }
 
@@ -146,7 +146,9 @@ impl CoSimulation for Motor {
         // A period that begins at the end belongs to the next step, even if rounding puts its begin just before the end.
         let last = end - 1e-9 * self.period;
         if (end - self.next) / self.period > MOST || end + self.period == end {
-            return Err(Error::new(format!("a step may have {MOST} periods, and they must not vanish")));
+            return Err(Error::new(format!(
+                "a step may have at most {MOST} periods, and a period must not vanish when it is added to the time"
+            )));
         }
         let mut time = step.time;
         while self.next < last {
