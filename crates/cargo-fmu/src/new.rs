@@ -20,7 +20,7 @@ pub struct Options {
     /// house (a file, strings, units with an offset), tank (the model of the guide: enumeration, array, events)
     #[arg(long, value_enum, value_name = "MODEL", default_value_t, hide_possible_values = true)]
     from: Begin,
-    /// Take fmu-export from this git repository, a URL, so that others can build the model
+    /// Take fmu-export from the git repository at this URL, so that others can build the model
     #[arg(long, value_name = "URL")]
     git: Option<String>,
 }
@@ -36,7 +36,7 @@ enum Begin {
     Tank,
 }
 
-/// The files of a model, except the files that every crate has.
+/// The files of a model, except `Cargo.toml` and `Cargo.lock`, which are written for each crate.
 macro_rules! files {
     ($model:literal: $($file:literal)+) => {
         ($model, &[$(($file, include_str!(concat!("../models/", $model, "/", $file)))),+])
@@ -231,7 +231,7 @@ unsafe_code = "deny"
     )
 }
 
-/// Replaces whole words.
+/// Replaces a word where it is not part of a longer one.
 fn renamed(text: &str, word: &str, replacement: &str) -> String {
     let mut result = String::new();
     let mut rest = text;

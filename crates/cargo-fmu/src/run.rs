@@ -109,7 +109,7 @@ pub fn check(package: &Package, given: &[PathBuf], options: &fmu_check::Options)
                 .filter_map(|directory| newest(directory, begin)),
         );
     }
-    // All FMUs are checked, regardless of the findings in the first.
+    // All FMUs are checked, even if the first one has findings.
     let mut good = true;
     for fmu in &fmus {
         let directory = fmu.parent().and_then(Path::file_name).unwrap_or_default();
@@ -162,7 +162,7 @@ fn newest(directory: &Path, since: SystemTime) -> Option<PathBuf> {
 fn simulate(options: &Options, path: &Path, directory: &Path) -> Result<bool> {
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let (csv, svg) = (directory.join(format!("{name}.csv")), directory.join(format!("{name}.svg")));
-    // A run that fails leaves no results of an earlier run.
+    // Removes the results of an earlier run, which would be wrong if this run fails.
     [&csv, &svg].iter().for_each(|old| drop(fs::remove_file(old)));
     // SAFETY: the FMU is the user's own model, which was just compiled.
     #[allow(unsafe_code)]

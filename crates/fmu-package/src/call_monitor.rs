@@ -17,12 +17,12 @@ pub(crate) struct CallMonitor {
 const INTERVAL: Duration = Duration::from_millis(200);
 
 impl CallMonitor {
-    /// Records the begin of a call, which has this name in messages. It ends when another one begins.
+    /// Records that a call begins, which has this name in messages. The call ends when another one begins.
     pub fn begin(&self, call: &'static str) {
         *lock(&self.call) = Some((call, Instant::now()));
     }
 
-    /// Records the end of the last call.
+    /// Records that the last call has ended.
     pub fn end(&self) {
         *lock(&self.call) = None;
     }

@@ -253,11 +253,11 @@ fn check_references(table: &Table, variable: &Variable) -> Result<()> {
         let known = &table.variables[*known as usize];
         ensure!(
             known.is_known(),
-            "{name} depends on {}, which is calculated or constant; name the inputs, states and parameters that it \
-             follows from",
+            "{name} depends on {}, which is calculated or constant; name the inputs, states and parameters from which it \
+             is calculated",
             known.name
         );
-        ensure!(before.insert(&known.name), "{name} names {} twice among what it depends on", known.name);
+        ensure!(before.insert(&known.name), "{name} names {} twice in its depends_on", known.name);
     }
     Ok(())
 }

@@ -60,7 +60,7 @@ pub struct BuildOptions {
     /// Leave out the page documentation/index.html that runs the FMU in a browser (as with --c-sources)
     #[arg(long)]
     pub no_page: bool,
-    /// Time that the model may take for one call while the build tries it [default: 60]
+    /// Time that the model may take for one call while the build checks it [default: 60]
     #[arg(long, value_name = "SECONDS")]
     pub time_limit: Option<u64>,
     /// Accept a library whose processor differs from its platform (in FMI 2.0, importers on ARM look in linux64)

@@ -22,7 +22,7 @@ pub const TARGETS: [&str; 5] = [
     "aarch64-apple-darwin",
 ];
 
-/// The glibc version that libraries for Linux require: the version of Enterprise Linux 7, which runs all later systems, too.
+/// The glibc version that libraries for Linux require. Enterprise Linux 7 has this version, and later systems have newer ones.
 pub const GLIBC: &str = "2.17";
 
 /// Checks that the tools for these targets are installed; the error lists all missing tools and how to install them. cargo-zigbuild
@@ -57,8 +57,8 @@ pub fn rustc_for(target: Option<&str>) -> (OsString, Option<String>) {
     }
 }
 
-/// Whether a target needs cargo-zigbuild: targets for another system or processor, or for an old glibc. WebAssembly needs no other
-/// linker. MinGW is preferred for Windows, because its libraries need less of the system.
+/// Whether a target needs cargo-zigbuild to link for another system or processor, or with an old glibc. WebAssembly does not need it.
+/// Windows needs it only if MinGW is missing, which is preferred because its libraries need less of the system.
 fn needs_zigbuild(target: &str) -> bool {
     match target {
         "x86_64-pc-windows-gnu" => !runs(MINGW),

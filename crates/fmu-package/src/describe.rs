@@ -75,8 +75,7 @@ impl Description<'_> {
         for name in generated.iter().filter_map(|variable| variable.attribute("name")) {
             ensure!(
                 !names.contains(&name),
-                "{name} is the name of a variable that FMI 3.0 needs; declare the time as independent, rename any other \
-                 variable of this name"
+                "{name} is the name of a variable that FMI 3.0 needs; declare it as independent if it is the time, else rename it"
             );
         }
         let variables = described

@@ -102,7 +102,8 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    /// Returns for each unknown the derivative that the model provides, and the difference quotient of its values, if they differ.
+    /// Returns for each unknown the derivative that the model provides and the difference quotient of its values; `None` if they agree
+    /// or cannot be compared.
     fn wrong(&self, points: &mut [Base], sizes: &[f64]) -> Vec<Option<(f64, f64)>> {
         let mut wrong: Vec<Vec<(f64, f64)>> = vec![Vec::new(); self.unknowns.len()];
         let mut always = vec![true; self.unknowns.len()];

@@ -13,9 +13,9 @@ pub(crate) const DESCRIPTION: &str = "modelDescription/modelDescription.xml";
 
 /// The files that an FMU is made from.
 ///
-/// The guid depends on the files that are named here, and always on the `Cargo.lock` in use, on the `Cargo.toml` of the workspace, and
-/// on the packages that are used by path, directly or indirectly: on the `Cargo.toml`, the build script and the directory of the
-/// library's sources of each.
+/// The guid depends on the files that are named here, and always on the `Cargo.lock` in use and on the `Cargo.toml` of the workspace.
+/// From each package that is used by path, directly or indirectly, it depends on the `Cargo.toml`, the build script and the directory
+/// of the library's sources.
 ///
 /// The guid does not depend on the compiler, the target and the profile, on environment variables such as compiler flags, on packages
 /// that `[patch]` replaces, or on files that code includes from other directories. So if another file changes the library, name it

@@ -54,11 +54,11 @@ pub struct Unknown {
 /// The kind of a dependency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DependencyKind {
-    /// The known has a factor that never changes.
+    /// The known is multiplied by a factor that never changes.
     Constant,
-    /// The known has a factor that does not change after the initialization.
+    /// The known is multiplied by a factor that does not change after the initialization.
     Fixed,
-    /// The known has a factor that changes with tunable parameters.
+    /// The known is multiplied by a factor that changes only with tunable parameters.
     Tunable,
     /// Any other dependency.
     Dependent,

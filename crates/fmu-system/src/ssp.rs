@@ -14,9 +14,9 @@ const COMMON: &str = "http://ssp-standard.org/SSP1/SystemStructureCommon";
 impl CheckedSystem<'_> {
     /// Writes the SSP file and returns its size in bytes.
     ///
-    /// The directory `resources` contains the FMUs, and a file of start values for each component that has
-    /// some. The file `resources/experiment.ssv` contains the start values of the system's inputs. All sets
-    /// of start values are named `default`.
+    /// The directory `resources` contains the FMUs, and a file with start values for each component that has
+    /// any. The file `resources/experiment.ssv` contains the start values of the system's inputs. In each of
+    /// these files, the parameter set is named `default`.
     ///
     /// # Errors
     /// Fails if the file cannot be written.
@@ -41,7 +41,7 @@ impl CheckedSystem<'_> {
         let mut elements = Vec::new();
         for (component, path) in components {
             let own = |end: &str| split(end).0 == *component;
-            // Writes only connectors with a connection, because importers fail on others.
+            // Writes only connectors that are connected, because some importers fail on others.
             let mut connectors = Vec::new();
             let to = inputs.iter().map(|(_, to, _)| *to).chain(connections.iter().map(|(_, to)| *to));
             for to in to.filter(|to| own(to)) {

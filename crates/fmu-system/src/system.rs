@@ -17,7 +17,7 @@ pub struct System<'a> {
     pub description: &'a str,
     /// Components: name and file of the FMU.
     pub components: Vec<(&'a str, PathBuf)>,
-    /// Inputs of the system: name, connected input of a component, start value in that input's unit.
+    /// Inputs of the system: name, connected input of a component, start value in the unit of the component's input.
     pub inputs: Vec<(&'a str, &'a str, String)>,
     /// Outputs of the system: name, connected output of a component.
     pub outputs: Vec<(&'a str, &'a str)>,

@@ -189,7 +189,7 @@ fn the_ssp_is_complete_and_reproducible() {
     let annotations: String = ssd.lines().map(str::trim).collect();
     let last = r#"<oms:SimulationInformation><oms:FixedStepMaster description="oms-ma" stepSize="0.001" absoluteTolerance="0.0001" relativeTolerance="0.0001"/></oms:SimulationInformation></oms:Annotations></ssc:Annotation></ssd:Annotations></ssd:System>"#;
     assert!(annotations.contains(last), "{ssd}");
-    // Only the used units.
+    // Only the units in use are defined.
     assert!(ssd.contains(r#"<ssc:Unit name="rad">"#) && !ssd.contains(r#"<ssc:Unit name="s">"#), "{ssd}");
     assert!(entry(&one, "resources/plant.ssv").contains(r#"<ssv:Boolean value="true"/>"#));
     assert!(entry(&one, "resources/experiment.ssv").contains(r#"<ssv:Real value="0.5" unit="rad"/>"#));
