@@ -81,10 +81,10 @@ pub fn run(options: &Options) -> Result<bool> {
 }
 
 /// Returns the time of the last change of each path and, for a directory, of everything in it.
-fn changes(mut open: Vec<PathBuf>) -> BTreeMap<PathBuf, Option<SystemTime>> {
+fn changes(mut pending: Vec<PathBuf>) -> BTreeMap<PathBuf, Option<SystemTime>> {
     let mut found = BTreeMap::new();
-    while let Some(path) = open.pop() {
-        open.extend(fs::read_dir(&path).into_iter().flatten().flatten().map(|entry| entry.path()));
+    while let Some(path) = pending.pop() {
+        pending.extend(fs::read_dir(&path).into_iter().flatten().flatten().map(|entry| entry.path()));
         let time = fs::metadata(&path).and_then(|data| data.modified()).ok();
         found.insert(path, time);
     }

@@ -108,13 +108,14 @@ impl Names<'_> {
             start += line.len();
         }
         let code = &code[start..];
-        ensure!(!code.is_empty(), "{}: no declaration of a function", unknown());
+        ensure!(!code.is_empty(), "{}: no declaration of a function", unknown_form());
         let types = format!("\nwasm_rt_func_type_t wasm2c_{prefix}_get_func_type(");
-        let (before, after) =
-            code.split_once(&types).with_context(|| format!("{}: no function get_func_type", unknown()))?;
-        let (_, after) = after.split_once("\n}\n").with_context(unknown)?;
-        let code = checked_by_the_base(&strict(&format!("{before}{after}")))?;
-        let lacking = used(&code).find(|name| !is_known(name, &code));
+        let (before, after) = code
+            .split_once(&types)
+            .with_context(|| format!("{}: no function get_func_type", unknown_form()))?;
+        let (_, after) = after.split_once("\n}\n").with_context(unknown_form)?;
+        let code = with_split_addresses(&without_void_returns(&format!("{before}{after}")))?;
+        let lacking = called_names(&code).find(|name| !is_known(name, &code));
         if let Some(name) = lacking {
             bail!("the model needs the instruction {name}, which the runtime of C sources lacks");
         }
@@ -128,12 +129,13 @@ impl Names<'_> {
     fn header(&self, header: &str, code: &str) -> Result<String> {
         let Names { identifier, prefix } = self;
         for expected in ["u32 w2c_g0;", "wasm_rt_memory_t w2c_memory;", "wasm_rt_funcref_table_t w2c_T0;"] {
-            ensure!(header.contains(expected), "{}: no {expected}", unknown());
+            ensure!(header.contains(expected), "{}: no {expected}", unknown_form());
         }
         let number = |call: &str| -> Result<u32> {
-            let (_, after) = code.split_once(call).with_context(|| format!("{}: no {call}", unknown()))?;
+            let (_, after) =
+                code.split_once(call).with_context(|| format!("{}: no {call}", unknown_form()))?;
             let digits = after.split(|c: char| !c.is_ascii_digit()).next().unwrap_or_default();
-            digits.parse().with_context(|| format!("{}: no number in {call}", unknown()))
+            digits.parse().with_context(|| format!("{}: no number in {call}", unknown_form()))
         };
         let pages = number("wasm_rt_allocate_memory(&instance->w2c_memory, ")?;
         let functions = number("wasm_rt_allocate_funcref_table(&instance->w2c_T0, ")?;
@@ -162,11 +164,11 @@ impl Names<'_> {
         ];
         for (name, of_module) in functions.chain(others) {
             let of_module = format!("w2c_{prefix}_{of_module}");
-            ensure!(header.contains(&format!(" {of_module}(")), "{}: no {of_module}", unknown());
+            ensure!(header.contains(&format!(" {of_module}(")), "{}: no {of_module}", unknown_form());
             define(&format!("FMU_{name}"), &of_module)?;
         }
         let include = "#include \"wasm-rt.h\"\n";
-        ensure!(header.contains(include), "{}: no {include}", unknown());
+        ensure!(header.contains(include), "{}: no {include}", unknown_form());
         let types = format!("wasm_rt_func_type_t wasm2c_{prefix}_get_func_type(");
         let lines = header.lines().filter(|line| !line.starts_with(&types));
         let header = lines.fold(String::new(), |text, line| text + line + "\n");
@@ -175,7 +177,7 @@ impl Names<'_> {
 }
 
 /// Removes `return` before a call in a void function, because strict C forbids it.
-fn strict(code: &str) -> String {
+fn without_void_returns(code: &str) -> String {
     let mut in_void = false;
     let lines = code.lines().map(|line| {
         let line = if in_void { line.replacen("return ", "", 1) } else { line.to_owned() };
@@ -187,15 +189,15 @@ fn strict(code: &str) -> String {
 
 /// Passes the base and the offset of each memory access separately, so that the compiler can check a base once for several accesses.
 /// Also removes the variables for the address and the size of the memory, because both are constant in this runtime.
-fn checked_by_the_base(code: &str) -> Result<String> {
+fn with_split_addresses(code: &str) -> Result<String> {
     let call =
         "_default32(wasm_rt_local_memory_base, wasm_rt_local_memory_size, &instance->w2c_memory, (u64)(";
     let mut parts = code.split(call);
     let mut checked = parts.next().unwrap_or_default().to_owned();
     for part in parts {
-        let (base, rest) = part.split_once(')').with_context(unknown)?;
+        let (base, rest) = part.split_once(')').with_context(unknown_form)?;
         let (offset, rest) = match rest.strip_prefix(" + ") {
-            Some(rest) => rest.split_at(rest.find([',', ')']).with_context(unknown)?),
+            Some(rest) => rest.split_at(rest.find([',', ')']).with_context(unknown_form)?),
             None => ("0u", rest),
         };
         write!(checked, "(&instance->w2c_memory, {base}, {offset}{rest}")?;
@@ -211,16 +213,16 @@ fn checked_by_the_base(code: &str) -> Result<String> {
             || declares.iter().any(|start| line.starts_with(start))
     };
     let lines: String = checked.split_inclusive('\n').filter(|line| !is_removed(line)).collect();
-    ensure!(!lines.contains("wasm_rt_local_memory"), "{}: another use of its memory", unknown());
+    ensure!(!lines.contains("wasm_rt_local_memory"), "{}: another use of its memory", unknown_form());
     Ok(lines)
 }
 
-fn unknown() -> String {
+fn unknown_form() -> String {
     format!("the output of wasm2c {WASM2C} has an unknown form")
 }
 
 /// Returns the names before an opening parenthesis in C code: functions, macros, keywords and types.
-fn used(code: &str) -> impl Iterator<Item = &str> {
+fn called_names(code: &str) -> impl Iterator<Item = &str> {
     let part = |c: char| c.is_ascii_alphanumeric() || c == '_';
     code.match_indices('(').filter_map(move |(end, _)| {
         let start = code[..end].rfind(|c| !part(c)).map_or(0, |position| position + 1);
@@ -294,7 +296,7 @@ mod tests {
         \x20 return var_i0;\n}\n";
 
     #[test]
-    fn addresses_are_checked_by_their_base() {
+    fn addresses_are_split_into_base_and_offset() {
         let code = NAMES().code(CODE).unwrap();
         let (_, function) = code.split_once("var_p0) {\n").unwrap();
         assert_eq!(
@@ -346,7 +348,7 @@ mod tests {
             ("#include", "no #include"),
         ] {
             let text = error(NAMES().header(&header.replace(lacking, "u32 nothing("), code));
-            assert!(text.starts_with(&unknown()) && text.contains(message), "{text}");
+            assert!(text.starts_with(&unknown_form()) && text.contains(message), "{text}");
         }
         let text = error(NAMES().header(&header, &code.replace("T0", "T1")));
         assert!(text.ends_with("no wasm_rt_allocate_funcref_table(&instance->w2c_T0, "), "{text}");

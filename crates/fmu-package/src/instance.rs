@@ -174,12 +174,12 @@ impl<'a> Instance<'a> {
             array.fill(any);
         }
         let is_set = |index: &u32| chosen[*index as usize];
-        let mut open: Vec<_> =
+        let mut remaining: Vec<_> =
             self.model.groups.iter().filter(|group| group.indices.iter().any(&is_set)).collect();
         loop {
-            let before = open.len();
+            let before = remaining.len();
             let mut rejected = None;
-            open.retain(|group| {
+            remaining.retain(|group| {
                 let indices: Vec<u32> = group.indices.iter().copied().filter(&is_set).collect();
                 let values: Vec<Value> =
                     indices.iter().flat_map(|index| values[*index as usize].clone()).collect();
@@ -195,7 +195,7 @@ impl<'a> Instance<'a> {
             });
             match rejected {
                 None => return Ok(()),
-                Some(message) if open.len() == before => return Err(message),
+                Some(message) if remaining.len() == before => return Err(message),
                 Some(_) => {}
             }
         }

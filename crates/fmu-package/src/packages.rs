@@ -33,11 +33,11 @@ impl Neighbourhood {
         let mut known = BTreeMap::new();
         let own = find(&mut known, directory)?;
         let mut used: Vec<LocalPackage> = Vec::new();
-        let mut open = own.dependencies;
-        while let Some(directory) = open.pop() {
+        let mut pending = own.dependencies;
+        while let Some(directory) = pending.pop() {
             if directory != own.directory && used.iter().all(|package| package.directory != directory) {
                 let package = find(&mut known, &directory)?;
-                open.extend(package.dependencies.iter().cloned());
+                pending.extend(package.dependencies.iter().cloned());
                 used.push(package);
             }
         }

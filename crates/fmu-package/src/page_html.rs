@@ -92,13 +92,13 @@ impl Resources {
         }
         files.sort();
         let mut resources = Self::default();
-        let mut room = RESOURCE_LIMIT;
+        let mut space_left = RESOURCE_LIMIT;
         for (size, name, path) in files {
-            match room.checked_sub(size) {
+            match space_left.checked_sub(size) {
                 Some(left) => {
                     let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
                     resources.packed.insert(name, base64(&deflated(&bytes)?));
-                    room = left;
+                    space_left = left;
                 }
                 None => resources.missing.push(name),
             }

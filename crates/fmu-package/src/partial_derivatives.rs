@@ -106,12 +106,15 @@ impl Check<'_> {
     /// or cannot be compared.
     fn wrong(&self, points: &mut [Base], sizes: &[f64]) -> Vec<Option<(f64, f64)>> {
         let mut wrong: Vec<Vec<(f64, f64)>> = vec![Vec::new(); self.unknowns.len()];
-        let mut always = vec![true; self.unknowns.len()];
+        let mut is_provided = vec![true; self.unknowns.len()];
         let variable =
             self.model.table.variable(self.known).filter(|_| self.known != self.model.table.time());
         for base in points {
             let partials = base.instance.partials(self.unknowns, self.known);
-            always.iter_mut().zip(&partials).for_each(|(always, partial)| *always &= partial.is_some());
+            is_provided
+                .iter_mut()
+                .zip(&partials)
+                .for_each(|(is_provided, partial)| *is_provided &= partial.is_some());
             if partials.iter().all(Option::is_none) {
                 continue;
             }
@@ -151,9 +154,10 @@ impl Check<'_> {
                 }
             }
         }
-        let first =
-            |(wrong, always): (Vec<_>, bool)| wrong.first().copied().filter(|_| always && wrong.len() > 1);
-        wrong.into_iter().zip(always).map(first).collect()
+        let first = |(wrong, is_provided): (Vec<_>, bool)| {
+            wrong.first().copied().filter(|_| is_provided && wrong.len() > 1)
+        };
+        wrong.into_iter().zip(is_provided).map(first).collect()
     }
 
     /// Returns the unknowns at a point after setting the known to another value; `None` if the model rejects that value.
