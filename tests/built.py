@@ -1,4 +1,4 @@
-"""Paths of the project and of the files that `make` has built, and tests for installed packages."""
+"""Paths of the project and of the files that `make` has built, and a check for installed packages."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 FMUS = ROOT / "target" / "fmu"
-#: The script that a page decompresses and runs.
+#: The call with which a page decompresses and runs its script.
 SCRIPT = re.compile(r'\nbegin\("([^"]*)"\)\.catch\(showFailure\);\n')
 
 
@@ -39,6 +39,6 @@ def needed(module: str, package: str) -> None:
 
 
 def script_of(page: str) -> str:
-    """The script that the page of an FMU decompresses."""
+    """Returns the decompressed script of the page in an FMU."""
     (packed,) = SCRIPT.findall(page)
     return zlib.decompress(base64.b64decode(packed), wbits=-15).decode()

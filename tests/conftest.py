@@ -1,4 +1,4 @@
-"""Fixtures that several directories of tests share: the packed FMUs. pyproject.toml lists where tests find modules."""
+"""Fixtures that several test directories share. pyproject.toml lists the directories from which tests import modules."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ def fmu() -> Path:
 
 @pytest.fixture(scope="session", params=["", "fmi3/"], ids=["fmi2", "fmi3"])
 def version(request: pytest.FixtureRequest) -> str:
-    """The directory of the FMUs for FMI 2.0, then the directory of the FMUs for FMI 3.0."""
+    """The directory of the FMUs in target/fmu, for FMI 2.0 and then for FMI 3.0."""
     return str(request.param)
 
 
 @pytest.fixture(scope="session")
 def testbed(version: str) -> Path:
-    """The testbed for FMI 2.0 and for FMI 3.0."""
+    """The testbed for FMI 2.0, and then for FMI 3.0."""
     return built(f"{version}prw_testbed.fmu", "fmu")
 
 
 @pytest.fixture(scope="session")
 def controller(version: str) -> Path:
-    """The controller for FMI 2.0 and for FMI 3.0."""
+    """The controller for FMI 2.0, and then for FMI 3.0."""
     return built(f"{version}prw_controller.fmu")
 
 
 @pytest.fixture(scope="session")
 def unpack() -> Iterator[Callable[[Path], str]]:
-    """Unpacks an FMU into a directory that is removed after the tests."""
+    """Returns a function that unpacks an FMU into a directory. The directories are removed after the tests."""
     directories: list[str] = []
 
     def unpack(fmu: Path) -> str:
@@ -55,8 +55,8 @@ def unpack() -> Iterator[Callable[[Path], str]]:
 
 @pytest.fixture
 def prw(tmp_path: Path, fmu: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Runs `prw` with arguments in this process, in a temporary directory. A warning is an error."""
-    # The environment of the platform tests has no prw.
+    """Returns a function that runs `prw` with arguments, in this process and a temporary directory. A warning is an error."""
+    # The import is here because the environment of the platform tests has no prw.
     from prw.cli import main
 
     monkeypatch.chdir(tmp_path)

@@ -15,7 +15,7 @@ from lagrange import OUTPUTS
 
 
 class Instance:
-    """A Co-Simulation instance. `messages` holds what it logged as (status, category, text)."""
+    """A Co-Simulation instance. `messages` holds its log messages as (status, category, text)."""
 
     def __init__(self, unpacked, description, name: str = "testbed"):
         self.variables = {v.name: v for v in description.modelVariables}
@@ -34,26 +34,26 @@ class Instance:
         self._references = {}
 
     def free(self) -> None:
-        """Free the instance and unload the library."""
+        """Frees the instance and unloads the library."""
         self.fmi.freeInstance()
 
-    def complaints(self) -> list:
-        """Messages that are warnings or errors, or whose category is not logEvents."""
+    def unexpected_messages(self) -> list:
+        """Returns the messages that are warnings or errors, or whose category is not logEvents."""
         return [message for message in self.messages if message[0] > 0 or message[1] != "logEvents"]
 
     def set(self, **values) -> None:
-        """Set variables by name, each with the setter of its type."""
+        """Sets variables by name, each with the setter of its type."""
         for name, value in values.items():
             variable = self.variables[name]
             setter = {"Real": self.fmi.setReal, "Integer": self.fmi.setInteger, "Boolean": self.fmi.setBoolean}
             setter[variable.type]([variable.valueReference], [value])
 
     def get(self, *names) -> np.ndarray:
-        """Values of Real variables by name."""
+        """Returns the values of the named Real variables."""
         return np.array(self.fmi.getReal([self.variables[name].valueReference for name in names]))
 
     def start(self, theta=(0.0, 0.0), rate=None, time=0.0, **parameters) -> None:
-        """Initialize at rest at the motor angles theta (2,) rad; with `rate` (2,) rad/s use_omega is on.
+        """Initializes at rest at the motor angles theta (2,) rad. If `rate` (2,) rad/s is given, use_omega is true.
 
         `parameters` are set by name before initialization.
         """
@@ -66,12 +66,14 @@ class Instance:
         self.fmi.exitInitializationMode()
 
     def step(self, t: float, h: float) -> None:
-        """fmi2DoStep from t over h."""
+        """Calls fmi2DoStep from the time t with the step size h."""
         self.fmi.doStep(currentCommunicationPoint=t, communicationStepSize=h)
 
     def run(self, t, theta, rate=None, derivative=None):
-        """Step through the times t (n,) with theta (n, 2) set at each; rate (n, 2) sets omega, derivative (n, 2) the
-        input derivatives. Call start() first. Returns (at, after) as the oracle's follow() does."""
+        """Steps through the times t (n,) after a call of `start`, and sets the motor angles theta (n, 2) at each time.
+
+        If given, rate (n, 2) sets omega, and derivative (n, 2) sets the input derivatives. Returns (at, after) like `follow` of
+        the oracle."""
         angles = [self.variables[name].valueReference for name in ("theta1", "theta2")]
         rates = [self.variables[name].valueReference for name in ("omega1", "omega2")]
         t = [float(s) for s in t]
@@ -93,7 +95,7 @@ class Instance:
 
 
 def assert_close(found, expected, tolerance: float) -> None:
-    """Every output within `tolerance` of the expected one, relative to the largest absolute value of the expected output."""
+    """Checks that the error of every output is within `tolerance`, relative to the largest absolute value of the expected output."""
     for name in OUTPUTS:
         scale = max(np.max(np.abs(expected[name])), 1e-300)
         error = np.max(np.abs(found[name] - expected[name])) / scale

@@ -7,7 +7,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
-#: Debian's package wine64 installs it only in this directory.
+#: The program of Debian's package wine64, which is not in a directory of PATH.
 WINE = "/usr/lib/wine/wine64"
 #: Programs and their Debian packages.
 PACKAGES = {

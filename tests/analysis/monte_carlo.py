@@ -1,19 +1,24 @@
-"""Tests on simulated rigs whether `prw identify` is unbiased and its intervals have the stated coverage; `make monte-carlo`.
+"""Tests on simulated rigs that `prw identify` is unbiased and that its intervals have the stated coverage; `make monte-carlo`.
 
     python tests/analysis/monte_carlo.py target/fmu/prw_testbed.fmu [--repetitions 300] [--sensors all|torque]
         [--motion independent|equal|opposite|fig4|slow|moves] [--seed 0]
         [--faulty N | --friction N] [--counts 10000] [--workers N] [--out out/monte_carlo.json]
 
 Every repetition has its own rig (parameters up to 30 % off Table 1, where the search starts), its own motion of 10 s
-at 1 kHz, its own noise, encoder positions and sensor offsets; see rig.py. Exit status 1 if an estimate is biased by
-more than a quarter of its standard error and twice the sampling error, if a 95 % interval holds the true value in less
-than 92 % of the repetitions, or if the verdict is "fits" in less than 97 %. The shares must also be improbable for the
-number of repetitions. With --faulty, exit status 1 if the verdict is "fits" although an interval misses by more than two
-of its widths, in more than 1 %.
+at 1 kHz, its own noise, encoder positions and sensor offsets; see rig.py. The exit status is 1 in three cases:
 
-With --friction, rigs of another origin are identified: plant.py integrates the balances of torques, with friction in the input
-shafts from none to gross. Exit status 1 if, at any friction, 95 % intervals of rigs whose verdict is "fits" hold in less than
-92 %, or if the verdict is "fits" in less than 97 % of the rigs without friction.
+* The bias of an estimate exceeds a quarter of its standard error plus twice the sampling error.
+* Less than 92 % of the 95 % intervals of a parameter contain the true value.
+* Less than 97 % of the verdicts are "fits".
+
+A low share only counts if chance is an improbable cause: with true shares of 95 % and 99 %, its probability must be below 5 %.
+
+With --faulty, the rigs have faults. The exit status is 1 if, of the rigs with an interval that misses the true value by more than
+two of its widths, more than 1 % have the verdict "fits".
+
+With --friction, the rigs are simulated by plant.py, which has other equations and friction in the input shafts, from none to gross.
+The exit status is 1 if less than 97 % of the rigs without friction have the verdict "fits". It is also 1 if, at any friction,
+less than 92 % of the 95 % intervals of rigs with this verdict contain the true value.
 """
 
 from __future__ import annotations
@@ -60,8 +65,8 @@ FAULTS = {
 }
 
 
-def spoilt(simulated: rig.Rig, fault: str, size: float) -> rig.Rig:
-    """The rig with a fault of FAULTS."""
+def with_fault(simulated: rig.Rig, fault: str, size: float) -> rig.Rig:
+    """Returns the rig with a fault of FAULTS. size: in the unit of the fault."""
     if fault == "late":
         return rig.late(simulated, 1e-3 * size)
     if fault == "lag":
@@ -80,24 +85,27 @@ def spoilt(simulated: rig.Rig, fault: str, size: float) -> rig.Rig:
     return simulated._replace(outputs=outputs)
 
 
-#: Friction of both input shafts, N.m.
+#: Friction of each input shaft, N.m, that --friction simulates.
 FRICTIONS = (0.0, 0.0005, 0.001, 0.002, 0.003, 0.005, 0.01, 0.02)
 
 
 def repetition(fmu: str, seed: int, channels, counts: int, motion: str, fault: str = "", size: float = 0.0) -> tuple:
-    """`identified` for a rig of `rig.experiment`, with a fault or without."""
+    """Identifies a rig of `rig.experiment`, with a fault if one is named."""
     simulated = rig.experiment(seed, 6.0 if fault else 10.0, pattern=motion)
-    return identified(fmu, spoilt(simulated, fault, size) if fault else simulated, seed, channels, counts)
+    return identified(fmu, with_fault(simulated, fault, size) if fault else simulated, seed, channels, counts)
 
 
 def braked(fmu: str, seed: int, motion: str, friction: float) -> tuple:
-    """`identified` for a rig of `plant.experiment`, with all sensors."""
+    """Identifies a rig of `plant.experiment` with all sensors. friction: N.m."""
     return identified(fmu, plant.experiment(seed, friction, motion), seed, rig.ALL, rig.COUNTS)
 
 
 def identified(fmu: str, simulated: rig.Rig, seed: int, channels, counts: int) -> tuple:
-    """Logarithms of estimate over true value, their standard errors, whether the 95 % intervals contain the true values, all (5,),
-    the seconds it took, whether the verdict is that it fits, and the worst miss of an interval in its widths."""
+    """Identifies the parameters NAMES from simulated measurements of a rig.
+
+    Returns five values each of log(estimate / true value), its standard error, and whether the 95 % interval contains the true value.
+    Then follow the seconds, whether the verdict is "fits", and the largest distance of a true value from its interval, in widths of
+    the interval; it is negative if all intervals contain the true values."""
     columns = rig.measure(simulated, seed + 1_000_000, channels, counts)
     with Model(fmu) as model, threadpool_limits(1):
         begin = time.perf_counter()
@@ -112,12 +120,12 @@ def identified(fmu: str, simulated: rig.Rig, seed: int, channels, counts: int) -
     return (solution.logarithms - true).tolist(), sure.relative.tolist(), inside.tolist(), seconds, verdict.fits, missed
 
 
-#: Files that results depend on.
+#: Directories on which the results depend.
 SOURCES = ("python/prw/src", "tests/analysis", "tests/oracle", "src", "modelDescription")
 
 
 def commit() -> str:
-    """Short hash of the commit, with "-dirty" if SOURCES differ from it."""
+    """Returns the short hash of the commit, with "-dirty" if SOURCES differ from it."""
 
     def git(*arguments: str) -> str:
         command = ["git", "-C", str(Path(__file__).resolve().parents[2]), *arguments]
@@ -127,8 +135,8 @@ def commit() -> str:
 
 
 def campaign(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[dict, bool]:
-    """The verdicts on rigs with faults, by fault and size. Also returns whether, of the rigs with an interval that misses by more
-    than two of its widths, at most 1 % have the verdict "fits"."""
+    """Returns the verdicts on rigs with faults, by fault and size, and whether gross errors are noticed. They are noticed if, of the
+    rigs with an interval that misses by more than two of its widths, at most 1 % have the verdict "fits"."""
     rows, rigs = {}, options.faulty
     print(
         f"{rigs} rigs for each fault and size, all sensors: share that does not fit (worst miss where it fits, in widths)"
@@ -157,8 +165,8 @@ def campaign(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[di
 
 
 def friction(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[dict, bool]:
-    """Verdicts and intervals of rigs by the friction of their input shafts. Also returns whether intervals hold where the verdict is
-    "fits", and rigs without friction fit."""
+    """Returns verdicts and coverage by the friction of the input shafts. Also returns whether rigs without friction fit, and whether
+    the intervals of all rigs that fit have the stated coverage."""
     rigs, motions = options.friction, tuple(plant.MOTIONS)
     jobs = [(options.fmu, options.seed + i, motions[i % len(motions)], size) for size in FRICTIONS for i in range(rigs)]
     results = iter(pool.map(braked, *zip(*jobs)))
@@ -179,7 +187,7 @@ def friction(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[di
 
 
 def draw(rows: dict, path: Path) -> None:
-    """Curves of detection over size; the same rows give the same bytes."""
+    """Draws the share of rigs that do not fit over the size of each fault; equal rows give equal bytes."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -202,25 +210,25 @@ def draw(rows: dict, path: Path) -> None:
 
 
 def write(found: dict, path: Path | None) -> None:
-    """Write the results as JSON, if a path is given."""
+    """Writes the results as JSON, if a path is given."""
     if path:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(found, indent=2) + "\n")
 
 
 def is_too_rare(hits: np.ndarray, least: float, expected: float) -> bool:
-    """Whether the share of hits is less than `least`, and has a probability below 5 % if the true share is `expected`."""
+    """Returns whether the share of hits is less than `least`, and so low a share has a probability below 5 % if `expected` is true."""
     return bool(hits.mean() < least and binom.cdf(hits.sum(), hits.size, expected) < 0.05)
 
 
 def main() -> int:
-    """Run the repetitions, print and write their results."""
+    """Runs the repetitions, prints and writes their results."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("fmu")
     parser.add_argument("--repetitions", type=int, default=300)
     parser.add_argument("--sensors", choices=SENSORS, default="all")
     parser.add_argument("--motion", choices=MOTIONS, default="independent")
-    parser.add_argument("--seed", type=int, default=0, help="of the first repetition; the others follow")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the first repetition; the others count up from it")
     parser.add_argument("--counts", type=int, default=rig.COUNTS)
     parser.add_argument("--workers", type=int, default=multiprocessing.cpu_count())
     parser.add_argument("--faulty", type=int, default=0, metavar="N", help="rigs for each fault and size instead")
@@ -256,7 +264,7 @@ def main() -> int:
     print(f"  the verdict is that it fits in {fits.mean():.1%}")
     whole = {"commit": commit(), "fits": float(fits.mean()), "repetitions": options.repetitions, "parameters": rows}
     write(whole, options.out)
-    print("unbiased, intervals honest" if good else "BIASED, intervals too narrow, or false alarms")
+    print("unbiased, intervals have the stated coverage" if good else "BIASED, intervals too narrow, or false alarms")
     return 0 if good else 1
 
 

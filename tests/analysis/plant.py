@@ -1,7 +1,7 @@
 """A testbed with friction in its input shafts, integrated by SciPy: it uses neither the FMU, nor `prw`, nor the oracle's equations.
 
-The balances of torques follow from eqs. (1), (5), (6) and (7) of the paper by hand. Its errors are corrected: the last
-spring of eq. (6) is k2, theta7 is pitch and theta8 is roll. Table 1 is per degree.
+The torque balances were derived by hand from eqs. (1), (5), (6) and (7) of the paper. Errors of the paper are corrected: the last
+spring of eq. (6) is k2, theta7 is pitch and theta8 is roll, and the values of Table 1 are per degree.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ ESTIMATED = {
     "c2": 8.35e-3 / DEGREE,
     "c3": 6.66e-3 / DEGREE,
 }
-#: Roll for one radian between the input shafts: N / (2 M), with 7 rollers and 4 lobes.
+#: Roll angle for a difference of one radian between the input shafts: N / (2 M), with 7 rollers and 4 lobes.
 RATIO = 7 / (2 * 4)
-#: Rate of a shaft, rad/s, above which its friction is nearly constant.
+#: Shaft rate, rad/s, that smooths dry friction: the torque is proportional to tanh(rate / KNEE).
 KNEE = 0.02
 
 
 class Drives(NamedTuple):
-    """Motion of the motors, a sum of sines each. amplitude (2, m) rad, frequency (m,) Hz, phase (2, m) rad."""
+    """Motion of the motors, each a sum of m sines. amplitude (2, m) rad, frequency (m,) Hz, phase (2, m) rad."""
 
     amplitude: np.ndarray
     frequency: np.ndarray
     phase: np.ndarray
 
     def at(self, time: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Angles and rates, (2, ...) rad and rad/s."""
+        """Returns the motor angles and rates, (2, ...) rad and rad/s."""
         turned = np.multiply.outer(time, 2 * np.pi * self.frequency)
         angle = [np.sum(a * np.sin(turned + p), axis=-1) for a, p in zip(self.amplitude, self.phase)]
         rate = [
@@ -56,7 +56,7 @@ MOTIONS = {
 
 
 def drives(random: np.random.Generator, motion: str, reach: float = 0.5) -> Drives:
-    """A motion of MOTIONS up to about `reach` rad, each motor with its own phases."""
+    """Returns a motion of MOTIONS up to about `reach` rad; each motor has its own phases."""
     low, high, count, fall = MOTIONS[motion]
     frequency = np.geomspace(low, high, count) * random.uniform(0.95, 1.05, count)
     phase = random.uniform(0, 2 * np.pi, (2, count))
@@ -72,8 +72,8 @@ def experiment(
     duration: float = 8.0,
     rate: float = 1000.0,
 ) -> Rig:
-    """A random testbed with stiffness and damping up to 30 % off Table 1, from rest at the motors' first angles. friction: N.m, of
-    both input shafts or of each."""
+    """Simulates a random testbed with stiffness and damping up to 30 % off Table 1, which starts at rest at the motors' first angles.
+    friction: N.m, one value for both input shafts or one for each."""
     random = np.random.default_rng(seed)
     p = {name: value * 1.3 ** random.uniform(-1, 1) for name, value in ESTIMATED.items()}
     motors, brake = drives(random, motion), np.broadcast_to(friction, 2)
@@ -82,12 +82,13 @@ def experiment(
     def slope(time: float, x: np.ndarray) -> np.ndarray:
         angle, turning = motors.at(time)
         shaft, carrier, carrier_rate = x[:2], x[2:4], x[4:]
-        # Shafts between the couplings have no mass: the torques of both couplings are equal.
+        # The shafts between the couplings have no inertia, so both couplings of a side transmit the same torque.
         shaft_rate = (k1 * (angle - shaft) + c1 * turning - k2 * (shaft - carrier) + c2 * carrier_rate) / (c1 + c2)
         drive = k2 * (shaft - carrier) + c2 * (shaft_rate - carrier_rate) - brake * np.tanh(carrier_rate / KNEE)
         pitch_rate = (carrier_rate[0] + carrier_rate[1]) / 2
         roll_rate = RATIO * (carrier_rate[0] - carrier_rate[1])
-        # Half of the pitch torque and RATIO of the roll torque load each input shaft; sum and difference are independent.
+        # Each input shaft carries half of the pitch torque, plus or minus RATIO times the roll torque. So the sum of the two
+        # shaft equations has only pitch, and their difference has only roll.
         together = (drive[0] + drive[1] - c3 * pitch_rate) / (J2 + H3 / 2)
         apart = (drive[0] - drive[1] - 2 * RATIO * c3 * roll_rate) / (J2 + 2 * RATIO**2 * J3)
         return np.concatenate([shaft_rate, carrier_rate, [(together + apart) / 2, (together - apart) / 2]])

@@ -15,14 +15,14 @@ from scipy.signal import lfilter
 
 SHAFT_SENSORS = ("theta3", "theta4")
 ALL = ("tau1", "tau2", "theta3", "theta4", "pitch", "roll")
-#: Estimated by default.
+#: Parameters that `prw identify` estimates by default.
 NAMES = ("k1", "k2", "c1", "c2", "c3")
-#: Encoder: 2500 lines, read four times a line.
+#: Counts of an encoder per turn: 2500 lines with four counts each.
 COUNTS = 10_000
 
 
 class Rig(NamedTuple):
-    """parameters: SI. time (n,) s. theta, omega: (n, 2) rad, rad/s. outputs: (n,) each, SI."""
+    """parameters: SI. time (n,) s. theta, omega: (n, 2) rad, rad/s. outputs: (n,) each, SI. at: theta, omega and outputs at any times."""
 
     parameters: dict[str, float]
     time: np.ndarray
@@ -33,10 +33,12 @@ class Rig(NamedTuple):
 
 
 def experiment(seed: int, duration: float = 10.0, rate: float = 1000.0, pattern: str = "independent") -> Rig:
-    """A random rig in a random motion: NAMES up to 30 % off Table 1, 40 sines from 0.1 to 20 Hz a motor, 30 deg.
-    Both motors in the same motion or in opposite ones, or each in its own; "fig4": the paper's, over and over; "slow":
-    slow smooth moves with small vibrations of 2 to 22 Hz on top; "moves": from point to point with rests between, and
-    three small sines on top."""
+    """Simulates a random rig, with NAMES up to 30 % off Table 1, in a random motion of up to 30 deg. The patterns are:
+
+    * "independent", "equal" and "opposite" motions of the two motors, 40 sines from 0.1 to 20 Hz each
+    * "fig4": the motion of the paper's Fig. 4, repeated
+    * "slow": slow smooth moves with small vibrations of 2 to 22 Hz
+    * "moves": moves from point to point with rests between them, and three small sines"""
     random = np.random.default_rng(seed)
     parameters = dict(table_1())
     for name in NAMES:
@@ -61,16 +63,16 @@ def experiment(seed: int, duration: float = 10.0, rate: float = 1000.0, pattern:
 
 
 def _moves(random: np.random.Generator, duration: float) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies (m,) and waves (2, m) of point-to-point moves with the least jerk, and of three small sines a motor.
+    """Returns frequencies (m,) and waves (2, m) of minimum-jerk moves from point to point, and of three small sines for each motor.
 
-    The moves are a Fourier series up to 15 Hz, with a period that is longer than the recording."""
+    The moves are approximated by a Fourier series up to 15 Hz, because `respond` takes sines. Its period exceeds the recording."""
     period = duration + 4
     when, lines = np.linspace(0, period, 4096, endpoint=False), int(15 * period)
     waves = np.zeros((2, lines + 6), dtype=complex)
     for i in (0, 1):
         signal, at, begin = np.zeros(4096), 0.0, random.uniform(0, 0.5)
         while begin < duration + 2:
-            # The last move returns to the first angle: a jump would ring.
+            # The last move returns to the first angle, because a jump at the end of the period would ring.
             to, takes = random.uniform(-1, 1) if begin < duration else 0.0, random.uniform(0.3, 1.2)
             x = np.clip((when - begin) / takes, 0, 1)
             signal += (to - at) * x**3 * (10 - 15 * x + 6 * x**2)
@@ -82,8 +84,8 @@ def _moves(random: np.random.Generator, duration: float) -> tuple[np.ndarray, np
 
 
 def respond(parameters, time: np.ndarray, frequency: np.ndarray, waves: np.ndarray, reach: float = 0.52) -> Rig:
-    """The response of the rig if motor i follows the real part of the sum of waves[i] exp(2 pi i f t), scaled to `reach`
-    rad, from rest at its first angle."""
+    """Returns the rig with its response from rest at the first motor angles. Motor k follows the real part of
+    sum(waves[k] * exp(2j * pi * frequency * t)), scaled so that the largest angle of both motors is `reach` rad."""
     s = 2j * np.pi * frequency
     turning = np.exp(np.outer(time, s))
     scale = reach / max(np.abs((turning @ wave).real).max() for wave in waves)
@@ -102,7 +104,7 @@ def respond(parameters, time: np.ndarray, frequency: np.ndarray, waves: np.ndarr
     share = np.linalg.solve(vectors, missing)
 
     def at(when: np.ndarray) -> dict[str, np.ndarray]:
-        """Motors and outputs at the times; at rest before the first."""
+        """Returns motor angles, rates and outputs at the times. Before the first time, everything has its first value."""
         when = np.maximum(when, time[0])
         turned = np.exp(np.outer(when, s))
         transient = (np.exp(np.outer(when - time[0], values)) * share) @ vectors.T
@@ -127,13 +129,13 @@ def _outputs(x: np.ndarray, tau: np.ndarray, parameters) -> dict[str, np.ndarray
     }
 
 
-#: Steps of the nonlinear rigs in one of the recording.
+#: Integration steps of `nonlinear` and `lagging` in one period of the recording.
 FINE = 16
 
 
 def nonlinear(simulated: Rig, backlash: float = 0.0, friction: float = 0.0) -> Rig:
-    """The rig with a play of `backlash` rad between each motor and its shaft, and dry friction of `friction` N.m
-    about pitch and roll; Heun's rule in fine steps."""
+    """Returns the rig with a play of `backlash` rad between each motor and its shaft, and dry friction of `friction` N.m
+    about pitch and roll. It is integrated by Heun's method in fine steps."""
     p, model = simulated.parameters, linear_model(simulated.parameters)
     count = (len(simulated.time) - 1) * FINE + 1
     fine = np.interp(np.arange(count) / FINE, np.arange(len(simulated.time)), simulated.time)
@@ -168,7 +170,7 @@ def nonlinear(simulated: Rig, backlash: float = 0.0, friction: float = 0.0) -> R
 
 
 def lagging(simulated: Rig, seconds: float) -> Rig:
-    """The rig with sensors that have a first-order lag, from their steady state."""
+    """Returns the rig with a first-order lag in all sensors, which start in their steady state."""
     fine = np.interp(
         np.arange((len(simulated.time) - 1) * FINE + 1) / FINE, np.arange(len(simulated.time)), simulated.time
     )
@@ -183,7 +185,7 @@ def lagging(simulated: Rig, seconds: float) -> Rig:
 
 
 def late(simulated: Rig, seconds: float) -> Rig:
-    """The rig with late torques."""
+    """Returns the rig with torques that are recorded late."""
     delayed = simulated.at(simulated.time - seconds)
     return simulated._replace(outputs={**simulated.outputs, **{name: delayed[name] for name in ("tau1", "tau2")}})
 
@@ -196,9 +198,10 @@ def measure(
     log_rates: bool = False,
     noise: float = 0.02,
 ):
-    """The columns that the sensors record, in SI: encoders on motors and shafts, each with its own zero; torques with `noise`
-    N.m, steps of a quarter of that and an offset; an inertial sensor with 1 mrad of noise and an offset on pitch and
-    roll."""
+    """Returns the columns that the sensors record, in SI.
+
+    Angles of motors and shafts are quantised, and the zeros of shafts are unknown. Torques have `noise` N.m of noise, an offset, and
+    steps of a quarter of the noise. Pitch and roll have 1 mrad of noise and an offset, as from an inertial sensor."""
     random = np.random.default_rng(seed)
     quantum = 2 * np.pi / counts
 
@@ -223,7 +226,7 @@ def measure(
 
 
 def write(path, columns: dict[str, np.ndarray], units: dict[str, tuple] | None = None, rows=slice(None)) -> None:
-    """Write the columns as CSV with nine digits. units: (unit, factor) by column, written into the header."""
+    """Writes the columns as CSV with nine digits. units: for columns that are not in SI, the unit for the header and its size in SI."""
     units = units or {}
     header = [f"{name} [{units[name][0]}]" if name in units else name for name in columns]
     table = np.column_stack([column / units.get(name, ("", 1.0))[1] for name, column in columns.items()])

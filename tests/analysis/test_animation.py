@@ -24,7 +24,7 @@ from prw.wrist import Wrist, about_x, about_y
 
 
 def swing(**changed: np.ndarray | None) -> Run:
-    """A motion without dynamics, both sides turn stiffly; None leaves an output out."""
+    """Returns a run in which both sides turn rigidly by the same angle. changed: replaces outputs; None removes one."""
     time = np.linspace(0, 0.5, 51)
     angle = 0.3 * np.sin(2 * np.pi * time) ** 2
     outputs = {name: angle if name not in ("tau1", "tau2", "roll") else 0 * angle for name in MEASURED} | changed
@@ -33,14 +33,14 @@ def swing(**changed: np.ndarray | None) -> Run:
 
 
 def corners(at: dict[str, float], colour: str) -> np.ndarray:
-    """The corners of all faces of a colour, (k, 3)."""
+    """Returns the corners (k, 3) of all faces of a colour. at: angles; the others are 0."""
     everything = dict.fromkeys((f"theta{k}" for k in range(1, 7)), 0.0) | {"pitch": 0.0, "roll": 0.0} | at
     found, colours = Wrist(1.0).faces(everything)
     return np.reshape(found[(colours == to_rgb(colour)).all(axis=1)], (-1, 3))
 
 
 def frames_of(path: Path) -> list[np.ndarray]:
-    """The frames of a GIF, (height, width, 3) each."""
+    """Returns the frames of a GIF, (height, width, 3) each."""
     with Image.open(path) as film:
         return [np.asarray(image.convert("RGB")).astype(int) for image in ImageSequence.Iterator(film)]
 

@@ -1,4 +1,4 @@
-"""`prw.check` and `prw check` on files as other tools write them; the numbers in them are the tests' own solution."""
+"""`prw.check` and `prw check` on files as other tools write them; their numbers are a solution of the tests, not of the FMU."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DEGREES = ("pitch", "roll", "theta3", "theta4")
 
 
 def fig4(**change: float) -> dict[str, np.ndarray]:
-    """Time, motors and outputs of Fig. 4 with opposite motors, every millisecond for a second."""
+    """Returns time, motors and outputs of Fig. 4 with opposite motors, every millisecond for a second. change: parameters."""
     t = np.arange(1001) * STEP
     theta = np.outer(2 * np.sin(5 * np.pi * t) ** 2 / (10 * np.pi), [1, -1])
     omega = np.outer(np.sin(10 * np.pi * t), [1, -1])
@@ -37,7 +37,7 @@ def right():
 
 @pytest.fixture(scope="module")
 def soft():
-    """k1 is 1 % too low."""
+    """The response of a testbed whose k1 is 1 % too low."""
     return fig4(k1=0.99 * table_1()["k1"])
 
 
@@ -49,7 +49,7 @@ def write_csv(path, columns, titles=None, delimiter=","):
 
 
 def character_matrix(strings, across):
-    """Strings as a matrix of characters, one in each row, or one in each column."""
+    """Returns strings as a matrix of characters, one string in each row or, if `across`, in each column."""
     width = max(map(len, strings), default=1)
     rows = [string.ljust(width) for string in strings]
     return np.array(["".join(column) for column in zip(*rows)] if across else rows)
@@ -117,7 +117,7 @@ def simulink_vectors(columns):
 
 
 def simulink_structure(columns):
-    """Structure with time, as the blocks Scope and To Workspace log it."""
+    """Returns a structure with time, as the blocks Scope and To Workspace log it."""
     signals = np.empty(len(columns) - 1, dtype=object)
     for i, (name, values) in enumerate((n, v) for n, v in columns.items() if n != "time"):
         signals[i] = {"values": values[:, None], "dimensions": 1.0, "label": name, "blockName": f"fig4/{name}"}
@@ -125,7 +125,7 @@ def simulink_structure(columns):
 
 
 def simulink_outports(columns):
-    """The structure of a model's outports whose signals have no names."""
+    """Returns the structure in which Simulink logs the outports of a model if their signals have no names."""
     logged = simulink_structure(columns)["out"]
     return {"yout": {**logged, "signals": np.array([{**signal, "label": ""} for signal in logged["signals"]])}}
 
@@ -143,7 +143,7 @@ def test_simulink(right, soft, fmu, tmp_path, layout):
 
 
 def test_names_units_and_separators_of_other_tools(right, fmu, tmp_path):
-    """Semicolons and decimal commas, degrees in the header, and components before the names."""
+    """Reads semicolons and decimal commas, degrees in the header, and names of components before the variables."""
     degrees = {n: np.rad2deg(v) if n in DEGREES else v for n, v in right.items()}
     titles = {n: f"wrist/testbed/{n} [deg]" if n in DEGREES else f"wrist.root.testbed.{n}" for n in right}
     path = write_csv(tmp_path / "run.csv", degrees, {**titles, "time": '"time"'}, ";")
@@ -159,7 +159,7 @@ def test_names_units_and_separators_of_other_tools(right, fmu, tmp_path):
 
 
 def test_of_two_rows_at_one_time_the_last_counts(right, fmu, tmp_path):
-    """OMSimulator writes a row before the inputs of an instant are set, and one after."""
+    """At each time, OMSimulator writes one row before it sets the inputs, and one row after."""
     rows = {n: np.repeat(v, 2) for n, v in right.items()}
     rows["tau1"][::2] += 1.0
     assert prw.check(write_csv(tmp_path / "rows.csv", rows), fmu=fmu).agrees
@@ -189,7 +189,7 @@ def test_two_components_with_one_name(right, soft, fmu, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "spoil, note",
+    "change, note",
     [
         (lambda c: {**c, "roll": -c["roll"], "pitch": c["pitch"]}, "roll has the other sign"),
         (lambda c: {n: v[:501] for n, v in c.items()}, "the result has only 0 to 0.5 s of the experiment's 0 to 1 s"),
@@ -206,8 +206,8 @@ def test_two_components_with_one_name(right, soft, fmu, tmp_path):
         ),
     ],
 )
-def test_possible_causes(right, fmu, tmp_path, spoil, note):
-    found = prw.check(write_csv(tmp_path / "run.csv", spoil(right)), "fig4_opposite", fmu=fmu)
+def test_possible_causes(right, fmu, tmp_path, change, note):
+    found = prw.check(write_csv(tmp_path / "run.csv", change(right)), "fig4_opposite", fmu=fmu)
     assert any(note in line for line in found.notes), found.notes
 
 

@@ -1,4 +1,4 @@
-"""Data with little noise or none: a simulation's own results, a rig without sensors' errors, channels that do not change."""
+"""Data with little noise or none: a simulation's own results, a rig with exact sensors, channels that do not change."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def columns(run: prw.Run) -> dict[str, np.ndarray]:
 
 
 def exact(simulated: rig.Rig) -> dict[str, np.ndarray]:
-    """The columns of sensors without errors."""
+    """Returns the columns that exact sensors record."""
     return {"time": simulated.time, **dict(zip(("theta1", "theta2"), simulated.theta.T)), **simulated.outputs}
 
 
 def check(found: prw.Identification, simulated: float, worst: float) -> None:
-    """The estimate of k1 is within its own interval, which is narrow."""
+    """Checks that the interval of k1 contains the simulated value and that the relative standard error is below `worst`."""
     assert found.fits, (found.misfits, found.diagnosis)
     estimate = found.parameters["k1"]
     assert estimate.interval[0] < simulated < estimate.interval[1]
@@ -48,7 +48,7 @@ def test_a_run_without_rates(run, fmu):
 
 
 def test_a_run_of_a_recording(fmu):
-    """The motors rest at first, and their angles have the steps of the encoder that recorded them, as in the simulation."""
+    """The motors rest at first. Their angles have the steps of an encoder, but are exact, because the simulation used them."""
     run = prw.simulate(ROOT / "examples" / "point_to_point.csv", {"k1": K1}, fmu=fmu)
     check(prw.identify(run, starts=1, fmu=fmu), K1, 1e-5)
 
@@ -62,7 +62,7 @@ def test_any_relative_noise(run, fmu, noise):
 
 
 def test_an_encoder_with_two_values(run, fmu):
-    """theta3 and theta4 have two values, which add almost no information and do no harm."""
+    """Angles theta3 and theta4 that only have two values add almost no information, but must do no harm."""
     random, table = np.random.default_rng(1), columns(run)
     for name, noise in (("tau1", 0.02), ("tau2", 0.02), ("roll", 1e-3)):
         table[name] = table[name] + random.normal(0, noise, len(run.time))

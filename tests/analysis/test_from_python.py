@@ -104,7 +104,7 @@ def test_wrong_arguments(recording, fmu, options, message):
 
 
 def test_a_parameter_that_is_0(recording, fmu):
-    """It can be fixed. It can be estimated from a prior's value or from between its bounds, as from another start value."""
+    """The parameter can be fixed. If it is estimated, the search starts at a prior's value or between the bounds, not at 0."""
     found = prw.identify(recording, estimate="k1", parameters={"c3": 0}, starts=1, fmu=fmu)
     assert found.values["c3"] == 0 and list(found.parameters) == ["k1"]
     expected = prw.identify(recording, estimate="c3", starts=1, fmu=fmu)
@@ -131,7 +131,7 @@ def test_sources_that_are_not_recordings():
 
 
 def test_columns_in_memory_and_one_name(recording, fmu):
-    """A dict in place of the file, also in a list, and a name in place of a list of one."""
+    """A dict may replace a file, also in a list, and a name may replace a list of one name."""
     read = prw.read(recording)
     columns = {name: read[name] for name in read.units}
     expected = prw.identify(recording, estimate=["k1"], starts=1, fmu=fmu).values

@@ -26,7 +26,7 @@ def report(directory) -> dict:
 
 
 def check_estimates(found: dict, simulated: dict, worst: float = 0.02) -> None:
-    """Checks that all estimates are within 4.5 standard errors of the true values, and none further than `worst` from them."""
+    """Checks that all estimates are within 4.5 standard errors of the true values, and that no relative error exceeds `worst`."""
     for name in rig.NAMES:
         entry = found["parameters"][name]
         off = np.log(entry["value"] / simulated[name])
@@ -63,7 +63,7 @@ def test_all_sensors(prw, tmp_path, experiment):
 
 
 def test_only_torques_and_the_exchanged_couplings(prw, tmp_path, experiment):
-    """Torques depend on two couplings in series, which may be exchanged: both results fit, and a note reports it."""
+    """The two couplings are in series, so torques fit as well with the couplings exchanged; a note reports it."""
     rig.write(tmp_path / "run.csv", rig.measure(experiment, 7, ("tau1", "tau2")))
     result = prw("identify", "run.csv", "--starts", 2)
     assert result.returncode == 0, result.stderr
@@ -91,7 +91,7 @@ def test_several_experiments_in_motion_with_gaps_and_uneven_rows(prw, tmp_path, 
 
 
 def test_other_tools_read_the_parameters(prw, tmp_path, experiment):
-    """`build_fmu`, whose model description gets the parameters; and any tool with SSP, by its schema."""
+    """`build_fmu` takes the parameters as start values, and the SSV file conforms to the schema of SSP."""
     rig.write(tmp_path / "run.csv", rig.measure(experiment, 5, ("tau1", "theta3", "theta4")), rows=slice(0, 4000))
     assert prw("identify", "run.csv", "--starts", 1).returncode == 0
     out = tmp_path / "out" / "identified"
@@ -122,7 +122,7 @@ def test_other_tools_read_the_parameters(prw, tmp_path, experiment):
 
 
 def test_equal_motors_do_not_determine_the_roll_inertia(prw, tmp_path):
-    """The undetermined combination is named, another motion is advised, and no old parameters remain."""
+    """The undetermined combination is named, another motion is advised, and the parameters of an earlier fit are deleted."""
     simulated = rig.experiment(seed=3, duration=5, pattern="equal")
     rig.write(tmp_path / "run.csv", rig.measure(simulated, 1, ("tau1", "tau2")))
     out = tmp_path / "out" / "identified"
@@ -180,7 +180,7 @@ def test_wrong_options(prw, tmp_path, experiment, arguments, message):
 
 
 def test_encoder_steps_are_not_taken_for_motion(prw, tmp_path):
-    """With equal motor angles the wrist does not roll. The encoders' steps differ, but must not determine J3. The other
+    """With equal motor angles the wrist does not roll, so J3 is undetermined, although the steps of the two encoders differ. The other
     parameters are identified."""
     simulated = rig.experiment(seed=3, duration=5, pattern="equal")
     rig.write(tmp_path / "run.csv", rig.measure(simulated, 1, ("tau1", "tau2", "theta3", "theta4")))

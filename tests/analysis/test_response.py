@@ -15,7 +15,7 @@ from prw.recording import Recording, read
 
 
 def recording(simulated: rig.Rig, rows=slice(None), **columns) -> Recording:
-    """The recording of sensors without errors, with some columns replaced by `columns`."""
+    """Returns the recording of exact sensors. columns: replace recorded ones."""
     motion = Motion(simulated.time, simulated.theta, simulated.omega)
     return read({name: column[rows] for name, column in {**motion.columns, **simulated.outputs, **columns}.items()})
 
@@ -31,7 +31,7 @@ def fixed(simulated: rig.Rig, model) -> dict[str, float]:
 
 @pytest.mark.parametrize("rows", [slice(None), slice(1234, 3235)], ids=["from rest", "in motion"])
 def test_perfect_sensors_leave_nothing(model, simulated, rows):
-    """The relative residual is below 1e-6, also if the recording starts and ends in motion."""
+    """The RMS of the residual is below 1e-6 of the signal, also if the recording starts and ends in motion."""
     task = task_of(model.known, rig.NAMES, parameters=fixed(simulated, model), offsets=False)
     fitter = Fitter(model, [prepare(recording(simulated, rows))], task, dict.fromkeys(rig.ALL, 1.0))
     modelled = fitter.modelled(task.first())[0]
@@ -55,7 +55,7 @@ def test_missing_and_uneven_rows_change_nothing(model, simulated):
 
 
 def test_derivatives_with_respect_to_the_parameters(model, simulated):
-    """The derivatives that the search uses equal differences, encoders' errors included."""
+    """The derivatives that the search uses agree with finite differences, also if angles are quantised."""
     measured = read(rig.measure(simulated, 5, counts=2000))
     task = task_of(model.known, rig.NAMES, parameters=fixed(simulated, model))
     noise = {"tau1": 0.02, "tau2": 0.02, "theta3": 1e-3, "theta4": 1e-3, "pitch": 1e-3, "roll": 1e-3}
@@ -69,7 +69,7 @@ def test_derivatives_with_respect_to_the_parameters(model, simulated):
 
 
 def wave(t):
-    """A motion of 0.3 rad up to 10 Hz: angle and rate."""
+    """Returns angle and rate of a motion of 0.3 rad with frequencies up to 10 Hz."""
     f, a = np.array([0.7, 3.1, 9.7]), np.array([0.25, 0.04, 0.01])
     phase = 2 * np.pi * np.outer(t, f) + [0.1, 2.0, 4.0]
     return np.sin(phase) @ a, np.cos(phase) @ (2 * np.pi * f * a)
@@ -114,14 +114,14 @@ def test_logged_rates_help_and_their_noise_is_found():
 
 
 def test_errors_drawn_at_two_angles_differ():
-    """At each of two angles at which the motor rests, the error of the encoder is any value up to half a quantum."""
+    """If a motor rests at an angle, the encoder's error is any value up to half a quantum. At two angles it is drawn independently."""
     t = np.arange(4001) * 1e-3
     quantum = 2 * np.pi / 10_000
     angle = 0.4 / (1 + np.exp(-(t - 2) / 0.02))
     path = smooth(t, np.round(angle / quantum) * quantum)
     random = np.random.default_rng(0)
     differences = [np.ptp(path.errors(random)[[1000, 3000]]) for _ in range(200)]
-    # of two uniform errors: sqrt(2 / 12)
+    # The difference of two uniform errors has an RMS of sqrt(2 / 12) quanta.
     assert np.sqrt(np.mean(np.square(differences))) == pytest.approx(quantum / np.sqrt(6), rel=0.2)
 
 
@@ -151,7 +151,7 @@ def test_quanta():
 
 @pytest.mark.parametrize("counts", [4096, 65_536])
 def test_periodic_errors_of_an_encoder_are_not_taken_for_motion(counts):
-    """In the motion of Fig. 4 the motor moves at 5 Hz only. All quantisation errors are at multiples of 5 Hz."""
+    """In Fig. 4 a motor moves at 5 Hz only, so its quantisation errors are at multiples of 5 Hz. They must not widen the band."""
     t = np.arange(10_001) * 1e-3
     quantum = 2 * np.pi / counts
     angle = (1 - np.cos(10 * np.pi * t)) / (10 * np.pi)

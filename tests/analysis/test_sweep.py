@@ -1,4 +1,4 @@
-"""`prw sweep`: the numbers of single runs, on this machine and on a cluster."""
+"""`prw sweep` returns the same numbers as single runs, on this machine and on a cluster."""
 
 from __future__ import annotations
 
@@ -16,9 +16,8 @@ def rows(directory):
 
 
 def test_grid_random_and_failures(prw, tmp_path, fmu):
-    result = prw(
-        "sweep", "--grid", "k1=-50:150:3", "--random", "c3=0.4:20%", "--runs", 4, "--workers", 2
-    )  # the name of --threads in 0.2.0
+    # --workers is the name that --threads had in 0.2.0.
+    result = prw("sweep", "--grid", "k1=-50:150:3", "--random", "c3=0.4:20%", "--runs", 4, "--workers", 2)
     assert result.returncode == 0, result.stderr
     assert "ran         12 runs on 2 threads" in result.stdout
     assert "failed      4 runs; run 0: the FMU stopped: fmi2SetReal: k1 must not be below 1e-300" in result.stdout
@@ -38,7 +37,7 @@ def test_grid_random_and_failures(prw, tmp_path, fmu):
 
 
 def test_dask_cluster(prw, tmp_path):
-    """Several tasks, the last ones with runs that fail."""
+    """The runs are divided into several tasks, and all runs of the last ones fail."""
     arguments = ["sweep", "--grid", "k1=150:-50:3", "--random", "c3=20%", "--runs", 20]
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:

@@ -1,4 +1,4 @@
-"""Every command of python/prw/tutorial.md, run in order, and its results."""
+"""Runs every command of python/prw/tutorial.md in order, and checks the results."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_the_commands_work_as_on_the_page(tmp_path, fmu):
             continue
         for line in block.strip().splitlines():
             if line.startswith("make "):
-                continue  # `make test` has run them to get here
+                continue  # The files exist already, because this test runs after `make` has built them.
             command = line.split()
             if command[0] == "cargo":
                 # The description shows that the parameters arrive; tests/packaging.rs compiles such FMUs.

@@ -6,7 +6,7 @@ import numpy as np
 import plant
 import pytest
 import rig
-from monte_carlo import spoilt
+from monte_carlo import with_fault
 
 import prw
 
@@ -46,7 +46,7 @@ FAULTY_COLUMNS = {
 @pytest.mark.parametrize("fault", FAULTY_RIGS, ids=lambda fault: f"{fault[0]} {fault[1]:g}")
 def test_a_rig_with_a_fault_does_not_fit(experiment, fmu, fault):
     channels, reported = FAULTY_RIGS[fault]
-    found = prw.identify(recording(spoilt(experiment, *fault)), starts=1, fmu=fmu)
+    found = prw.identify(recording(with_fault(experiment, *fault)), starts=1, fmu=fmu)
     assert not found.fits
     assert set(channels) <= {misfit.channel for misfit in found.verdict.misfits}, found.misfits
     assert any(reported in cause for cause in found.diagnosis), found.diagnosis
@@ -76,7 +76,7 @@ def test_two_faults_are_both_named(experiment, fmu):
 
 
 def test_a_common_fault_is_found_if_parameters_compensate_for_each_single_one(fmu):
-    # Torques 0.7 ms late, without encoders on the shafts: c1 is off by half, and the residuals look like noise.
+    # Without encoders on the shafts, torques that are 0.7 ms late change c1 by half, and the residuals look like noise.
     simulated = rig.late(rig.experiment(400004, 6, pattern="slow"), 7e-4)
     found = prw.identify(recording(simulated, ("tau1", "tau2", "pitch", "roll")), starts=1, fmu=fmu)
     assert {misfit.channel for misfit in found.verdict.misfits} == {"tau1", "tau2"}, found.misfits
@@ -109,7 +109,7 @@ def test_coarse_encoders_on_the_motors_are_not_a_fault(fmu):
     ],
 )
 def test_faults_are_estimated_along(experiment, fmu, fault, option, channels, size):
-    found = prw.identify(recording(spoilt(experiment, *fault)), starts=1, fmu=fmu, **{option: channels})
+    found = prw.identify(recording(with_fault(experiment, *fault)), starts=1, fmu=fmu, **{option: channels})
     assert found.fits, found.misfits
     for name in channels:
         value, error = found.distortions[f"{option} of {name}"]
@@ -139,13 +139,13 @@ def test_intervals_allow_for_friction_that_is_too_small_to_be_found(fmu, frictio
     for name, estimate in found.parameters.items():
         low, high = estimate.interval
         assert low < simulated.parameters[name] < high, name
-        # c3 cannot be told from friction as well as without it, but better than a few per cent.
+        # Possible friction makes c3 less certain, because both damp the motion, but the error must stay small.
         assert estimate.relative < 0.02, name
 
 
 def test_an_equal_gain_of_the_torques_is_found_if_inertias_are_known(experiment, fmu):
-    """It looks like stiffer couplings with more inertia. If all inertias are estimated, nothing shows it, and neither does a
-    rig without a gain look faulty."""
+    """An equal gain looks like stiffer couplings with more inertia. If all inertias are estimated, it cannot be detected, so no fault
+    is reported with or without a gain."""
     columns = recording(experiment)
     gained = {**columns, **{name: 1.01 * columns[name] for name in ("tau1", "tau2")}}
     found = prw.identify(gained, starts=1, fmu=fmu)

@@ -1,4 +1,4 @@
-"""fmu-check reports only the notes on the packed FMUs that docs/checking.md lists with their reasons."""
+"""On the packed FMUs, fmu-check only reports the notes that docs/checking.md lists with their reasons."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ CHECK = FMUS.parent / "debug" / "cargo-fmu"
 
 
 def listed(model: str) -> list[tuple[str, str, str]]:
-    """The notes on an FMU in the documentation: severity, name, observation."""
+    """Returns severity, name and observation of the notes on an FMU in the documentation."""
     rows = read_table(ROOT / "docs" / "checking.md", "This project's FMUs").rows
     return [("note", name.strip("`"), observation) for name, fmu, observation, _ in rows if fmu == model]
 
 
 def needs_new_system(fmu: Path) -> bool:
-    """Whether the library needs a glibc newer than 2.28. This depends on the system that linked it."""
+    """Returns whether the library needs a glibc newer than 2.28, which depends on the system that linked it."""
     with zipfile.ZipFile(fmu) as files:
         library = files.read(next(name for name in files.namelist() if name.endswith((".so", ".dll", ".dylib"))))
     return any(int(minor) > 28 for minor in re.findall(rb"GLIBC_2\.(\d+)", library))
@@ -32,13 +32,13 @@ def needs_new_system(fmu: Path) -> bool:
 @pytest.mark.parametrize("model", ["prw_testbed", "prw_controller", "prw_motor"])
 def test_only_listed_notes_are_found(version: str, model: str) -> None:
     fmu = built(f"{version}{model}.fmu")
-    # The check takes about 20 seconds, longer on a busy machine, on which every topic must still be reached.
+    # The check takes about 20 seconds. It may take longer, because a busy machine must still reach every topic.
     command = [CHECK, "fmu", "check", "--fmu", fmu, "--json", "--no-shrink", "--repeat", "0.3", "--time", "1500"]
     run = subprocess.run(command, capture_output=True, text=True, timeout=1800)
     report = json.loads(run.stdout)
     assert report["interfaces"] == ["Co-Simulation", "Model Exchange"], run.stderr
     assert report["unreached"] == []
-    # An observation begins with the function, whose name depends on the FMI version.
+    # The start of an observation is cut off: it is a function, whose name depends on the FMI version.
     found = [
         (finding["severity"], finding["name"], observed.split(" with ", 1)[-1])
         for finding in report["findings"]

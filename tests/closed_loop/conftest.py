@@ -23,7 +23,7 @@ def closed_loop() -> system.System:
 
 @pytest.fixture(scope="session", params=masters.MASTERS, ids=lambda master: master.name)
 def master(request) -> importers.Tool:
-    """Every master in turn, if it is installed."""
+    """Each master in turn. A test is skipped for a master that is not installed."""
     if request.param.version() is None:
         pytest.skip(f"{request.param.package} is not installed")
     return request.param

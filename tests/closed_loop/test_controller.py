@@ -38,7 +38,8 @@ def test_the_validator_reports_nothing(controller):
 
 
 def moved_by_fmpy(fmu, **options) -> np.ndarray:
-    """Returns the motors' motion (samples, 4) at each sample. All inputs are linear in time, so every importer interpolates them exactly."""
+    """Returns the motion of the motors (samples, 4) at each sample. All inputs are linear in time, so importers interpolate them
+    exactly."""
     time = np.arange(0.0, 1.0 + STEP / 2, STEP)
     slopes = {
         "pitch_ref": 0.5,
@@ -92,7 +93,7 @@ def test_a_jumping_reference_is_followed_within_limits(closed_loop):
         assert np.max(np.abs(np.rad2deg(wrist[end] - goal))) < 0.1
     assert np.max(np.abs(motors[:, 2:])) <= 3 + 1e-9
     assert np.max(np.abs(np.diff(motors[:, 2:], axis=0))) <= 30 * STEP * (1 + 1e-6)
-    # omega is the derivative of theta: exactly, between two samples, whose distance is one step.
+    # Between two samples, one step apart, theta is a parabola and omega its derivative, so this rule is exact.
     moved, mean = np.diff(motors[:, :2], axis=0), STEP * (motors[1:, 2:] + motors[:-1, 2:]) / 2
     np.testing.assert_allclose(moved, mean, atol=1e-14)
 

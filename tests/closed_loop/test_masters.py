@@ -22,7 +22,7 @@ def by_fmu_run(closed_loop, starts_late: bool) -> np.ndarray:
             time = np.arange(closed_loop.steps + 1) * round(closed_loop.step * 1e9) / 1e9
             runs = loop.run(time, outputs=masters.RECORDED)
             return np.column_stack([runs[name][0, 1:] for name in masters.RECORDED])
-        # FMPy sets the inputs of the system after its first step, and sums up its steps.
+        # FMPy sets the inputs of the system only after its first step, and adds up the step sizes to get the time.
         goals = {name: value for name, (_, value) in closed_loop.inputs.items()}
         one = loop.instances(start=dict.fromkeys(goals, 0.0))
         one.step(closed_loop.step)
@@ -47,7 +47,7 @@ def test_there_are_at_least_two_masters():
 
 
 def test_the_wrist_reaches_the_reference(response, closed_loop):
-    """Pitch stays within 0.1 degrees of 30 degrees, and roll of 60 degrees, after less than 0.6 s."""
+    """After less than 0.6 s, pitch stays within 0.1 degrees of 30 degrees, and roll within 0.1 degrees of 60 degrees."""
     for axis in ("pitch", "roll"):
         goal = closed_loop.inputs[f"{axis}_ref"][1]
         assert settling_time(response["time"], response[f"testbed.{axis}"], goal) < 0.6
@@ -63,14 +63,14 @@ def test_the_motors_keep_their_limits(response, closed_loop):
 
 
 def test_systems_of_fmu_run_agree_with_all_masters(master, response, closed_loop):
-    """All couple by Jacobi's method. FMPy and libcosim are bit-identical to fmu_run. Ecos has other rounding errors, and
-    reads torques, which depend on inputs at the same time, after it has set the next inputs."""
+    """All masters use Jacobi's method. FMPy and libcosim are bit-identical to fmu_run. Ecos has other rounding errors. It reads the
+    torques, which depend directly on inputs, after it has set the next inputs, so torques are not compared."""
     own = by_fmu_run(closed_loop, starts_late=master.name == "FMPy")
     for name, column in zip(masters.RECORDED, own.T):
         if master.name != "Ecos":
             assert np.array_equal(response[name], column), name
         elif "tau" not in name:
-            # An omega is a difference of angles divided by a step, and loses three digits.
+            # An omega is a difference of angles divided by a step, so it loses three digits.
             assert np.max(np.abs(response[name] - column)) < (1e-10 if "omega" in name else 1e-13), name
 
 
@@ -111,8 +111,8 @@ def study(closed_loop):
 
 
 def test_up_to_the_sample_time_derivatives_change_nothing_and_the_order_is_two(study):
-    """The controller reads exact samples. The remaining error: within a step the motors move on a parabola, but the testbed
-    assumes a straight line."""
+    """The controller reads exact samples. An error remains because within a step the motor angles are parabolas, but the testbed
+    assumes straight lines."""
     fine = study.step <= 1.001e-3
     np.testing.assert_allclose(study.held[fine], study.derivatives[fine], rtol=1e-6)
     order = np.diff(np.log(study.held[fine])) / np.diff(np.log(study.step[fine]))
@@ -120,7 +120,7 @@ def test_up_to_the_sample_time_derivatives_change_nothing_and_the_order_is_two(s
     assert study.held[fine][-1] < 1e-3
 
 
-def test_beyond_it_derivatives_keep_the_order(study):
+def test_beyond_the_sample_time_derivatives_keep_the_order(study):
     coarse = (study.step >= 0.999e-3) & (study.step <= 8.001e-3)
     step, held, derivatives = study.step[coarse], study.held[coarse], study.derivatives[coarse]
     order = np.diff(np.log(derivatives)) / np.diff(np.log(step))

@@ -21,8 +21,8 @@ WATCHED = ("testbed.pitch", "testbed.roll", "testbed.tau1", "controller.theta1")
 
 
 def run(system: System, steps: int) -> np.ndarray:
-    """Returns the watched variables at each sample, shape (SAMPLES + 1, len(WATCHED)). The integrator makes `steps` steps
-    between two samples.
+    """Returns the watched variables at each sample, shape (SAMPLES + 1, len(WATCHED)), with `steps` integrator steps between two
+    samples.
 
     Between samples the motors' motion depends only on time, so there is no algebraic loop."""
     references = {end.split(".")[1]: value for end, value in system.inputs.values()}
@@ -64,7 +64,7 @@ def run(system: System, steps: int) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def exact(closed_loop: System) -> np.ndarray:
-    """Response with so small a step size that halving it changes the result by less than 1e-9."""
+    """The response with a step size so small that doubling it changes the result by less than 1e-9."""
     coarse, fine = run(closed_loop, 8), run(closed_loop, 16)
     assert np.abs(fine - coarse).max() < 1e-9
     pitch, roll, torque, motor = np.abs(fine).max(axis=0)
@@ -72,8 +72,8 @@ def exact(closed_loop: System) -> np.ndarray:
     return fine
 
 
-def test_co_simulation_converges_to_it(exact, closed_loop: System):
-    """The error of the angles is second order in the communication step, of which a sample period contains an integer number."""
+def test_co_simulation_converges_to_model_exchange(exact, closed_loop: System):
+    """The error of the angles is second order in the communication step. A sample period is an integer number of steps."""
 
     def error(steps: int) -> np.ndarray:
         rows = coupling.couple(closed_loop, SAMPLE / steps, SAMPLE * SAMPLES, False, WATCHED)[::steps]

@@ -38,9 +38,9 @@ def test_the_validator_reports_nothing(name):
 
 
 @pytest.mark.parametrize("version, order", [("", "dependencies"), ("fmi3/", "jacobi")])
-def test_held_torques_cost_the_first_order(version, order):
-    """Masters that exchange all values at the end of a step (Jacobi), such as FMPy and libcosim, pass torques on that are read before
-    the angles are set."""
+def test_held_torques_cause_a_first_order_error(version, order):
+    """The order does not depend on when a master reads the torques. Masters that exchange all values at the end of a step (Jacobi),
+    such as FMPy and libcosim, read them before they set the new angles."""
     connections = {f"motors.{name}": f"wrist.{name}" for name in FROM_MOTORS}
     connections |= {f"wrist.{name}": f"motors.{name}" for name in FROM_WRIST}
     fmus = {"motors": built(f"{version}prw_motor.fmu"), "wrist": built(f"{version}prw_testbed.fmu")}
@@ -57,12 +57,12 @@ def test_held_torques_cost_the_first_order(version, order):
     coarse, fine = np.array(errors)
     assert np.all(fine < 0.01), fine
     rate = np.log2(coarse / fine)
-    # In the angles, parts of second order are not yet negligible.
+    # In the errors of the angles, second-order parts are not yet negligible.
     assert rate[:2] == pytest.approx(1, abs=0.15) and np.all((rate > 0.9) & (rate < 2)), rate
 
 
 def with_slopes(slope: str) -> float:
-    """Largest error of the torques in percent, with steps of 1 ms in which the motors extrapolate the torque of the wrist."""
+    """Returns the largest error of the torques in percent, with steps of 1 ms. slope: how the motors extrapolate the wrist's torque."""
     h, rows = 1e-3, []
     time = h * np.arange(round(END / h) + 1)
     with Fmu(built("prw_motor.fmu")) as motor, Fmu(built("prw_testbed.fmu")) as testbed:
@@ -87,13 +87,13 @@ def with_slopes(slope: str) -> float:
 def test_slopes_of_the_torque_in_the_document():
     rows = read_table(ROOT / "docs/compatibility.md", "Motors driven by torque").rows
     text = (ROOT / "docs/compatibility.md").read_text(encoding="utf-8")
-    assert len(rows) == 5  # the table of the example, which comes first
+    assert len(rows) == 5  # The first table of the section is the example's; the second is read below.
     stated = dict(re.findall(r"^\| (0|output derivatives|through the last two).*? \| ([\d.]+ %) \|$", text, flags=re.M))
     found = {name: f"{with_slopes(name.removeprefix('through the ')):.2f} %" for name in stated}
     assert len(stated) == 3 and found == stated
 
 
-def test_model_exchange_needs_no_sample():
+def test_model_exchange_needs_no_communication_points():
     """One solver integrates both FMUs, whose variables are connected directly."""
     with Fmu(built("prw_motor.fmu")) as motor, Fmu(built("prw_testbed.fmu")) as testbed:
         motors = motor.instances(interface="model-exchange", start={"J1": J1})
@@ -117,7 +117,7 @@ def test_model_exchange_needs_no_sample():
         np.testing.assert_allclose(states[f"omega{k + 1}"], expected.omega[:, k], rtol=0, atol=1e-7)
 
 
-def test_the_program_of_its_readme(monkeypatch):
+def test_the_program_in_the_readme(monkeypatch):
     built("prw_motor.fmu")
     monkeypatch.chdir(ROOT)
     readme = (ROOT / "crates/prw-motor/README.md").read_text(encoding="utf-8")

@@ -38,7 +38,7 @@ def test_the_programs(closed_loop, tmp_path, master, package):
 
 
 def test_the_script_for_omsimulator(closed_loop):
-    """A mock of OMSimulator records the calls of the script, which must equal the content of the SSP."""
+    """A mock of OMSimulator records the calls of the script, which must build the same system as the SSP."""
     page = (ROOT / TESTBED.path).read_text(encoding="utf-8")
     (script,) = re.findall(r'<pre data-script="oms" tabindex="0"><code>(.*?)</code></pre>', page, flags=re.S)
     library = Mock(CRef=lambda system, *names: ".".join(names))
@@ -57,7 +57,7 @@ def test_the_script_for_omsimulator(closed_loop):
 
 
 def test_the_model_for_openmodelica_has_the_connections_of_the_ssp(closed_loop):
-    """Compares names and values with the SSP, because no Modelica compiler is installed here."""
+    """Compares names and values with the SSP, because OpenModelica, which would import the FMUs, is not installed here."""
     model = (ROOT / "examples/openmodelica/ClosedLoop.mo").read_text(encoding="utf-8")
     connections = re.findall(r"^  connect\(([\w.]+), ([\w.]+)\);$", model, flags=re.M)
     # These signals are sampled, not connected. Without `pre`, OpenModelica assumes an algebraic loop.

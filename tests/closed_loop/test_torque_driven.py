@@ -26,7 +26,7 @@ TIME = np.linspace(0.0, 1.0, 1001)
 
 @pytest.fixture(scope="module")
 def moved() -> machine.Trajectory:
-    """The move to 30 and 60 degrees."""
+    """The move to a pitch of 30 and a roll of 60 degrees."""
     found = machine.simulate(TIME, table_1())
     assert np.rad2deg([found.pitch[-1], found.roll[-1]]) == pytest.approx([30, 60], abs=0.01)
     # A motor that drives the wrist feels a negative torque.
@@ -40,7 +40,7 @@ def example() -> Any:
 
 
 def errors(example: Any, h: float, extrapolated: bool) -> np.ndarray:
-    """Largest errors of tau1, tau2, pitch and roll at the start of the move, in the units of the FMU."""
+    """Returns the largest errors of tau1, tau2, pitch and roll in the first 0.25 s of the move, in the units of the FMU."""
     built("prw_testbed.fmu")
     time, found = example.simulate(h, extrapolated, example.move, 0.25)
     exact = machine.simulate(time, table_1())
@@ -48,7 +48,7 @@ def errors(example: Any, h: float, extrapolated: bool) -> np.ndarray:
     return np.array([np.abs(found[name] - y).max() for name, y in zip(("tau1", "tau2", "pitch", "roll"), expected)])
 
 
-def test_co_simulation_converges_to_it(example, monkeypatch):
+def test_co_simulation_converges_to_the_machine(example, monkeypatch):
     """The error is first order in the communication step with held torques, and second order with extrapolated ones."""
     monkeypatch.chdir(ROOT)
     for extrapolated, expected in ((False, 1), (True, 2)):
@@ -58,7 +58,7 @@ def test_co_simulation_converges_to_it(example, monkeypatch):
 
 
 def test_the_document_has_the_errors_that_the_example_prints(example, monkeypatch):
-    """The motors get a step of their references. An independent solution confirms the errors."""
+    """The references of the motors jump. An independent solution confirms the errors."""
     monkeypatch.chdir(ROOT)
     figure, found = example.main()
     stated = {h: [f"{share:.1f} %" if share < 100 else "unstable" for share in shares] for h, shares in found.items()}
@@ -66,7 +66,7 @@ def test_the_document_has_the_errors_that_the_example_prints(example, monkeypatc
     assert rows == [[f"{1e3 * h:g} ms", *shares] for h, shares in stated.items()]
     assert len(figure.axes) == 2
     fine = example.FINEST * np.arange(round(0.4 / example.FINEST) + 1)
-    exact = machine.simulate(fine, table_1(), moved=example.jump, breaks=()).tau[:, 0]
+    exact = machine.simulate(fine, table_1(), references=example.jump, breaks=()).tau[:, 0]
     for h in (2e-3, 0.25e-3):
         for extrapolated, share in zip((False, True), found[h]):
             _, coupled = example.simulate(h, extrapolated, example.jump, 0.1)
@@ -74,7 +74,7 @@ def test_the_document_has_the_errors_that_the_example_prints(example, monkeypatc
             assert 100 * error / np.abs(exact).max() == pytest.approx(share, rel=0.1, abs=0.01)
 
 
-def test_model_exchange_needs_no_sample(moved):
+def test_model_exchange_needs_no_communication_points(moved):
     """One solver integrates motors and testbed together, with direct connections both ways."""
     motor, gains = machine.MOTOR_DATA, machine.GAINS
     with Fmu(built("prw_testbed.fmu")) as fmu:
@@ -102,22 +102,22 @@ def test_model_exchange_needs_no_sample(moved):
 
 
 def compiled(text: str) -> dict[str, np.ndarray]:
-    """Simulates `Machine`, and returns all variables at TIME."""
+    """Simulates the model `Machine` of a Modelica text, and returns all variables at TIME."""
     modelica = pytest.importorskip("rumoca")
     testbed = (ROOT / "tests/closed_loop/testbed.mo").read_text(encoding="utf-8")
-    # The other machine needs the Modelica library.
+    # The other machine is cut out, because it needs the Modelica Standard Library.
     text = re.sub(r"  model DriveOfLibrary.*  end MachineOfLibrary;\n", "", text, flags=re.S)
     model = modelica.Session().loads(text + testbed, model="TorqueDriven.Machine", filename="in_memory/machine.mo")
     config = modelica.SimConfig(solver="bdf", rtol=1e-10, atol=1e-12, dt=1e-3)
     run = model.simulate(t=(0.0, 1.0), config=config)
     time = np.array(run.time)
-    kept = np.append(True, np.diff(time) > 1e-9)  # the end of the move, an event, has two rows
+    kept = np.append(True, np.diff(time) > 1e-9)  # The end of the move is an event, which has two rows.
     np.testing.assert_allclose(time[kept], TIME, rtol=0, atol=1e-12)
     return dict(zip(run.names, run.to_numpy()[:, kept]))
 
 
 def test_the_model_for_openmodelica(moved):
-    """A compiler of Modelica runs the text, with the testbed's equations in Modelica in place of the FMU."""
+    """A Modelica compiler simulates the text, in which the testbed's equations in Modelica replace the FMU."""
     found = compiled(MODEL)
     for k in (0, 1):
         drive = f"drive{k + 1}"

@@ -1,5 +1,5 @@
-// The testbed in Modelica, in place of the class that OpenModelica makes from the FMU: the equations of each part, as a mechanic would
-// write them, without eqs. (8) to (11).
+// The testbed in Modelica, which replaces the class that OpenModelica makes from the FMU. It has the equations of each part, not the
+// combined eqs. (8) to (11).
 model prw_testbed_me_FMU
   constant Real per_degree = 57.29577951308232;
   parameter Real J2 = 3.8681291e-3, J3 = 1.2750004e-2, H3 = 4.2363841e-2;
@@ -15,7 +15,7 @@ model prw_testbed_me_FMU
 equation
   tau1 = -(k1 * (theta1 - theta3) + c1 * (omega1 - der(theta3)));
   tau2 = -(k1 * (theta2 - theta4) + c1 * (omega2 - der(theta4)));
-  // The shafts between the couplings have no mass: the torques of both couplings are equal.
+  // The shafts between the couplings have no inertia, so both couplings of a side transmit the same torque.
   -tau1 = k2 * (theta3 - theta5) + c2 * (der(theta3) - omega5);
   -tau2 = k2 * (theta4 - theta6) + c2 * (der(theta4) - omega6);
   der(theta5) = omega5;
@@ -24,7 +24,7 @@ equation
   roll = ratio * (theta5 - theta6);
   pitching = H3 * (der(omega5) + der(omega6)) / 2 + c3 * (omega5 + omega6) / 2;
   rolling = J3 * ratio * (der(omega5) - der(omega6)) + c3 * ratio * (omega5 - omega6);
-  // By the balance of power a carrier takes half of the pitching torque, and plus or minus the ratio of the rolling torque.
+  // By the balance of power, a carrier takes half of the pitching torque, plus or minus `ratio` times the rolling torque.
   J2 * der(omega5) = -tau1 - pitching / 2 - ratio * rolling;
   J2 * der(omega6) = -tau2 - pitching / 2 + ratio * rolling;
 end prw_testbed_me_FMU;

@@ -16,7 +16,7 @@ from reference import at_rest, follow
 from prw import cli
 from tools import examples
 
-#: The eigenvalues of eq. (11) with Table 1, 1/s, those with positive imaginary parts for their pairs.
+#: Eigenvalues of eq. (11) with Table 1, 1/s. Of each complex pair, only the one with a positive imaginary part is listed.
 POLES = np.array([-174.87270665, -174.36733032, -18.94465405 + 32.14568305j, -9.68285129 + 34.67786598j])
 
 
@@ -60,7 +60,7 @@ def test_lqr_follows_closer_than_pi(lqr: Any) -> None:
     assert len(figure.axes) == 2
 
 
-def test_lqr_and_filter_are_stable_and_know_the_wrist(lqr: Any) -> None:
+def test_lqr_and_filter_are_stable_and_have_the_poles_of_the_wrist(lqr: Any) -> None:
     A, B, C, feedback, gain = lqr.design()
     found = np.log(np.linalg.eigvals(A[:6, :6])) / lqr.STEP
     upper = found[found.imag >= 0]
@@ -75,7 +75,7 @@ def quiet() -> Any:
 
 
 def vibration(quiet: Any, rates: np.ndarray, **changed: float) -> float:
-    """The largest error after the move, deg, from the exact solution of the Lagrange equations."""
+    """Returns the largest error after the move, deg, in the exact solution of the Lagrange equations. changed: parameters."""
     still = np.zeros((round(quiet.AFTER / quiet.STEP) + 1, 2))
     slope = np.vstack([rates, still])
     theta = np.vstack([np.zeros(2), np.cumsum(quiet.STEP * slope[:-1], axis=0)])
@@ -130,7 +130,7 @@ def test_blame_is_the_variance_due_to_one_parameter(tolerances: Any, monkeypatch
             assert shares[axis][name] == pytest.approx(variance / total[axis], abs=0.1), (axis, name)
 
 
-def test_tuned_gains_serve_more_wrists() -> None:
+def test_tuned_gains_settle_faster_on_most_wrists() -> None:
     gains = importlib.import_module("gains")
     figure, found = gains.main(wrists=6)
     most = {name: np.percentile(times, 95) for name, times in found.items()}
@@ -138,7 +138,7 @@ def test_tuned_gains_serve_more_wrists() -> None:
     assert len(figure.axes) == 3
 
 
-def test_identify_finds_the_pretended_rig(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_identify_finds_the_parameters_of_the_simulated_rig(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = importlib.import_module("identify").main(tmp_path)
     truth = {
         name: text.split()[0]

@@ -10,7 +10,7 @@ from lagrange import linear_model, table_1
 
 @pytest.fixture(scope="session")
 def description(fmu):
-    """FMPy's model description, checked against the XSD as it is read."""
+    """The model description as FMPy reads it, validated against the XSD."""
     return fmpy.read_model_description(str(fmu), validate=True)
 
 
@@ -22,7 +22,7 @@ def unpacked(fmu, unpack):
 
 @pytest.fixture
 def make_instance(unpacked, description):
-    """Makes Co-Simulation instances; frees them all when the test ends."""
+    """Returns a function that makes Co-Simulation instances. All are freed when the test ends."""
     instances = []
 
     def make(name: str = "testbed") -> Instance:

@@ -21,7 +21,7 @@ STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
 INPUTS = ("theta1", "theta2", "omega1", "omega2")
 
 
-#: Starts with twisted couplings and moving carriers, while both motors turn.
+#: Start values with twisted couplings and moving carriers. MOTORS are the inputs.
 START = {
     "start_at_rest": False, "theta3_start": 0.5, "theta4_start": -0.3, "theta5_start": 0.1, "theta6_start": 0.4,
     "omega5_start": 3.0, "omega6_start": -2.0, "k1": 130.0,
@@ -127,7 +127,7 @@ def test_the_variables_are_the_same(fmu, fmu3):
     ],
     ids=["co-simulation", "euler", "cvode"],
 )
-def test_results_are_the_same_bits(fmu, fmu3, options):
+def test_results_are_bit_identical(fmu, fmu3, options):
     def run(path):
         return simulate_fmu(
             str(path), stop_time=0.3, output_interval=1e-3, start_values=START, input=MOTORS,
@@ -136,7 +136,7 @@ def test_results_are_the_same_bits(fmu, fmu3, options):
 
     two, three = run(fmu), run(fmu3)
     assert np.ptp(two[OUTPUTS[0]]) > 0.1
-    # In Co-Simulation of FMI 3.0, step sizes of FMPy before 0.3.22 differ in the last digits.
+    # In Co-Simulation of FMI 3.0, FMPy before 0.3.22 uses step sizes that differ in the last digits.
     same_steps = "CoSimulation" not in options.values() or Version(fmpy.__version__) >= Version("0.3.22")
     for name in ("time", *OUTPUTS):
         if same_steps:
@@ -161,7 +161,7 @@ def test_dependencies_are_the_sparsity_of_the_equations(description, model):
         name = unknown.variable.name
         expected = {known for known, value in zip(knowns, rows.pop(name)) if abs(value) > 1e-12}
         assert {v.name for v in unknown.dependencies} == expected, name
-        # In Co-Simulation, the factors of angles and rates also depend on the source of the rates and on the step size.
+        # The factors of inputs are not constant, because in Co-Simulation they depend on the source of the rates and the step size.
         for known, kind in zip(unknown.dependencies, unknown.dependenciesKind, strict=True):
             assert kind in (["dependent"] if known.causality == "input" else ["fixed", "constant"]), name
     assert rows == {}

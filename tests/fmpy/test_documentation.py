@@ -28,10 +28,10 @@ from tools.figures.gallery import figures
 from tools.figures.results import numbers, results
 from tools.figures.writing import write_for_page, write_small_png
 
-#: The motors turn by two sines and start at rest.
+#: Motion of the motors in the test of errors, from rest: AMPLITUDE * (1 - cos(FREQUENCY * t)).
 END, AMPLITUDE, FREQUENCY = 0.5, np.array([0.3, -0.2]), np.array([14.0, 23.0])
 EPSILON = np.finfo(float).eps
-#: SVG needs neither a space before a minus nor a zero before a decimal point.
+#: A number in an SVG file, in which the space before a minus and the zero before a decimal point may be missing.
 NUMBER = re.compile(r"-?(?:\d+(?:\.\d+)?|\.\d+)")
 
 
@@ -45,7 +45,7 @@ def page() -> str:
     return text_of(TESTBED)
 
 
-#: Runs a test for both pages.
+#: Runs a test for each page.
 both = pytest.mark.parametrize("page", [pytest.param(text_of(page), id=page.text) for page in PAGES])
 
 
@@ -63,7 +63,7 @@ def test_the_pages_are_up_to_date(which):
 def test_the_fmu_contains_page_and_icons(which):
     path, page = built(f"prw_{which.text}.fmu"), text_of(which)
     with zipfile.ZipFile(path) as archive:
-        # build_fmu adds the scripts that run the FMU: test_page.py.
+        # build_fmu adds the scripts that run the FMU; test_page.py tests them.
         main = page[page.index("<main>") + len("<main>") : page.index("</body>")]
         assert main in archive.read("documentation/index.html").decode()
         for icon in ("model.png", "documentation/model.svg"):
@@ -107,7 +107,7 @@ def run(text: str, fmu: Path, directory: Path) -> np.ndarray:
 
 
 def roll_at_2(model, time=2.0) -> float:
-    """Roll at 2 s if the motors turn by sin(t) and -sin(t). Transients have decayed, so this is the forced response."""
+    """Returns the roll at 2 s if the motors turn by sin(t) and -sin(t). Transients have decayed, so this is the forced response."""
     b = (model.b_angle + 1j * model.b_rate) @ np.array([1, -1])
     theta5, theta6 = (np.linalg.solve(1j * np.eye(6) - model.a, b) * np.exp(1j * time)).imag[2:4]
     return 7 / 8 * (theta5 - theta6)
@@ -156,7 +156,7 @@ def test_reported_errors_of_model_exchange_in_fmpy(fmu, model):
 
 
 def test_numbers_are_up_to_date(found):
-    """The page states two digits of deviations and more of other numbers. The last digit may differ between machines."""
+    """Numbers may differ by 5 %, because deviations are stated with two digits, and the last digit may depend on the machine."""
     committed, fresh = (
         json.loads((ROOT / COMMITTED / "numbers.json").read_text(encoding="utf-8")),
         json.loads(numbers(found)),
@@ -193,7 +193,7 @@ def written(found, tmp_path_factory):
 
 
 def test_figures_are_up_to_date(written):
-    """Coordinates in the committed figures differ by at most a fiftieth of a point from figures of the present FMU."""
+    """Coordinates in the committed figures differ by at most a fiftieth of a point from figures drawn with the current FMU."""
     made_with = json.loads((ROOT / COMMITTED / "numbers.json").read_text(encoding="utf-8"))["made_with"]
     if made_with != f"matplotlib {matplotlib.__version__}":
         pytest.skip(f"the figures were drawn by {made_with}")

@@ -1,5 +1,5 @@
-"""A step of the FMU is exact within 1e-11 for any parameters and step sizes. If only the angles are set, every output converges with
-the second order of the step size."""
+"""A step of the FMU is exact within 1e-11 for any parameters and step sizes. If only the angles are set, the error of
+every output is second order in the step size."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ def check(instance, parameters, t, theta, slope, expected):
     found = instance.run(t, theta, derivative=slope)
     for values, true_values in zip(found, expected):
         assert_close(values, true_values, 1e-11)
-    assert not instance.complaints()
+    assert not instance.unexpected_messages()
 
 
 @pytest.mark.parametrize("seed", range(12))
 def test_random_parameters_paths_and_steps(instance, seed):
-    # Further from Table 1, an oracle with doubles loses digits. test_extremes.py calculates with more digits there.
+    # Further from Table 1, an oracle with doubles loses digits, so test_extremes.py calculates with more digits.
     parameters, t, theta, slope = random_case(seed, points=200, decades=0.3)
     model = linear_model({name: float(value) for name, value in parameters.items()})
     check(instance, parameters, t, theta, slope, follow(model, t, theta, slope))
@@ -81,7 +81,7 @@ def test_rates_from_omega(instance, model):
 
 
 def test_rates_from_angles(instance, model):
-    """By default the slope is the slope of the parabola through the last three samples, whether they are evenly spaced or not."""
+    """By default the rate is the slope of the parabola through the last three samples, whether they are evenly spaced or not."""
     rng = np.random.default_rng(4)
     t = np.cumsum(rng.uniform(0.002, 0.02, 100))
     theta = np.cumsum(rng.normal(0, 0.02, (100, 2)), axis=0)
@@ -89,7 +89,7 @@ def test_rates_from_angles(instance, model):
     at, after = instance.run(t, theta)
     expected_at, expected_after = follow(model, t, theta, backward_slope(t, theta))
     assert_close(at, expected_at, 1e-11)
-    # After a step, the torques use the rate that the parabola predicts. The tests of second order below check them.
+    # Right after a step, torques use the rate that the parabola predicts. The tests of second order below check them instead.
     assert_close({**after, "tau1": expected_after["tau1"], "tau2": expected_after["tau2"]}, expected_after, 1e-11)
 
 
@@ -151,7 +151,7 @@ def order_error(make_instance, model, spacing, steps, reading):
 @pytest.mark.parametrize("spacing", SPACING)
 @pytest.mark.parametrize("reading", ["at", "after"])
 def test_second_order_with_angles_only(make_instance, model, spacing, reading):
-    """Outputs read with the new angles set ("at") and right after the step, as most importers do ("after")."""
+    """Outputs are read after the new angles are set ("at"), and right after the step, as most importers do ("after")."""
     errors = [order_error(make_instance, model, SPACING[spacing], steps, reading) for steps in (200, 400, 800)]
     orders = {
         name: [float(np.log2(coarse[name] / fine[name])) for coarse, fine in zip(errors, errors[1:])]

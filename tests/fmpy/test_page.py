@@ -47,13 +47,13 @@ def page(testbed) -> str:
 
 @pytest.fixture(scope="module")
 def packed(page) -> list[bytes]:
-    """Returns the description and the module of the testbed, then those of the controller, as the page contains them."""
+    """The files that the page contains: description and module of the testbed, then description and module of the controller."""
     pairs = PACKED.findall(script_of(page))
     return [zlib.decompress(base64.b64decode(part), wbits=-15) for pair in pairs for part in pair]
 
 
 class WebAssembly:
-    """The module's functions of FMI 2.0, called as the page calls them."""
+    """Calls the module's functions of FMI 2.0 as the page does."""
 
     def __init__(self, module: bytes, guid: str):
         engine = Engine()
@@ -89,7 +89,8 @@ class WebAssembly:
 
 
 def test_the_page_equals_sources_and_fmus(testbed, page, packed):
-    """Except for the added parts, the page in the FMU is the page in the sources. It runs the module for FMI 2.0, also in the FMU for FMI 3.0."""
+    """Except for the added parts, the page in the FMU equals the page in the sources. It runs the module for FMI 2.0,
+    also in the FMU for FMI 3.0."""
     assert LIVE.sub("", page) == (ROOT / TESTBED.path).read_text(encoding="utf-8")
     directory = testbed.parents[testbed.parent.name == "fmi3"]
     for offset, name in enumerate([testbed.name, "prw_controller.fmu"]):

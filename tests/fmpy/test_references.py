@@ -1,7 +1,5 @@
-"""Compares the packed FMUs with their reference experiments in several importers, with a margin.
-
-The tolerances detect a testbed whose stiffness is wrong by 1 %.
-"""
+"""In several importers, the packed FMUs agree with their reference experiments, and a testbed whose stiffness is wrong by 1 %
+does not."""
 
 from __future__ import annotations
 
@@ -27,7 +25,7 @@ def known(testbed):
     return {experiment.name: experiment for experiment in read_experiments(testbed)}
 
 
-def test_the_fmu_contains_them(testbed, known):
+def test_the_fmu_contains_the_experiments(testbed, known):
     assert list(known) == NAMES
     with zipfile.ZipFile(testbed) as archive:
         inside = {name.removeprefix(f"{DIRECTORY}/") for name in archive.namelist() if name.startswith(DIRECTORY)}

@@ -1,6 +1,6 @@
-"""Errors that the documents state for importers, from the order in which these importers call the FMU.
+"""Errors that the documents state for importers are repeated by calling the FMU in the same order as these importers.
 
-The motion is the motion of Fig. 4, the step 1 ms, and the errors are in percent of the peak."""
+The motors move as in Fig. 4, the step is 1 ms, and the errors are in percent of the peak."""
 
 from __future__ import annotations
 
@@ -32,21 +32,21 @@ def exact() -> dict[str, np.ndarray]:
 
 
 def shares(exact, torque, roll) -> tuple[float, float]:
-    """Largest errors of torque and roll in percent of the peaks."""
+    """Returns the largest errors of torque and roll in percent of the peaks."""
     found = zip((torque, roll), (exact["tau1"], exact["roll"]))
     torque, roll = (100 * np.abs(values - true).max() / np.abs(true).max() for values, true in found)
     return torque, roll
 
 
-def states(name: str, *parts: str) -> None:
-    """Checks that the document contains the parts, in this order and in one paragraph; spaces may be narrow or line ends."""
+def check_stated(name: str, *parts: str) -> None:
+    """Checks that the document contains the parts in this order and close together. Any kind of white space matches a space."""
     text = re.sub(r"&#8239;|&#160;|\s", " ", (ROOT / name).read_text(encoding="utf-8"))
     text = re.sub(r"<[^>]*>|`", "", text).replace("  ", " ")
     assert re.search(".{0,160}?".join(map(re.escape, parts)), text), parts
 
 
 def test_outputs_that_are_read_before_inputs_are_set(fmu, exact):
-    """FMIKit in Co-Simulation."""
+    """FMIKit calls the FMU in this order in Co-Simulation."""
     known = dict(zip(MOTORS, np.array([[*angles(t), *rates(t)] for t in TIME]).T))
     found = {}
     with Fmu(fmu) as testbed:
@@ -58,13 +58,17 @@ def test_outputs_that_are_read_before_inputs_are_set(fmu, exact):
             found[use_omega] = shares(exact, run["tau1"][0], run["roll"][0])
     with_rates, without = (f"{found[use_omega][0]:.1f} %" for use_omega in (True, False))
     assert max(roll for _, roll in found.values()) < 0.01
-    states("docs/compatibility.md", f"torques are off by {with_rates} of their peak", f"by {without} with angles only")
-    states("docs/fmu-page/text/testbed/3_loading.html", f"off by {with_rates}", f"{without} with angles only")
+    check_stated(
+        "docs/compatibility.md", f"torques are off by {with_rates} of their peak", f"by {without} with angles only"
+    )
+    check_stated("docs/fmu-page/text/testbed/3_loading.html", f"off by {with_rates}", f"{without} with angles only")
 
 
-def in_model_exchange(fmu, nodes, weights, moved: float = 1.0, held: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Integrates with an explicit method of Runge and Kutta, of which each stage needs the one before. `moved` multiplies the rates.
-    Inputs that are `held` are set once for each step, after the outputs are read. Returns torque and roll."""
+def in_model_exchange(
+    fmu, nodes, weights, rate_factor: float = 1.0, held: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """Integrates with an explicit Runge-Kutta method in which each stage needs the slope of the stage before. Returns torque and roll.
+    rate_factor: multiplies the rates. held: sets inputs once for each step, after the outputs are read."""
     with Fmu(fmu) as testbed:
         instance = testbed.instances(interface="model-exchange")
 
@@ -72,14 +76,14 @@ def in_model_exchange(fmu, nodes, weights, moved: float = 1.0, held: bool = Fals
             instance.set_time(t)
             instance.set_continuous_states(x)
             if not held:
-                instance.set(MOTORS, [[*angles(t), *(moved * rates(t))]])
+                instance.set(MOTORS, [[*angles(t), *(rate_factor * rates(t))]])
 
         x, rows = instance.get_continuous_states(), []
         for t in TIME:
             at(t, x)
             rows.append(instance.get(["tau1", "roll"])[0])
             if held:
-                instance.set(MOTORS, [[*angles(t), *(moved * rates(t))]])
+                instance.set(MOTORS, [[*angles(t), *(rate_factor * rates(t))]])
             slope, total = 0 * x, 0 * x
             for node, weight in zip(nodes, weights):
                 at(t + node * H, x + node * H * slope)
@@ -94,24 +98,28 @@ ODE4 = (0, 0.5, 0.5, 1), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 
 
 def test_fixed_steps_in_model_exchange(fmu, exact):
-    """Explicit Euler in OpenModelica, and Simulink's ode4 with FMIKit."""
+    """Integrates with explicit Euler as OpenModelica, and with ode4 as Simulink with FMIKit."""
     torque, roll = shares(exact, *in_model_exchange(fmu, (0,), (1,)))
-    states("docs/compatibility.md", f"off by {roll:.1f} % in roll and", f"{torque:.1f} % in torque")
-    states("docs/fmu-page/text/testbed/3_loading.html", f"is {roll:.1f} % off in roll", f"{torque:.1f} % in torque")
+    check_stated("docs/compatibility.md", f"off by {roll:.1f} % in roll and", f"{torque:.1f} % in torque")
+    check_stated(
+        "docs/fmu-page/text/testbed/3_loading.html", f"is {roll:.1f} % off in roll", f"{torque:.1f} % in torque"
+    )
     torque, roll = shares(exact, *in_model_exchange(fmu, *ODE4))
     assert roll < torque
     for name in ("docs/compatibility.md", "docs/fmu-page/text/testbed/3_loading.html"):
-        states(name, "ode4 at 1 ms", f"{torque:.0e} %".replace("e-0", "e-"))
+        check_stated(name, "ode4 at 1 ms", f"{torque:.0e} %".replace("e-0", "e-"))
 
 
 def test_inputs_that_are_held_over_a_step(fmu, exact):
-    """FMIKit in Model Exchange of FMI 3.0, whose dependencies it ignores."""
+    """In Model Exchange of FMI 3.0, FMIKit ignores dependencies and sets the inputs once for each step."""
     torque, roll = shares(exact, *in_model_exchange(fmu, *ODE4, held=True))
-    states("docs/compatibility.md", "with ode4 at 1 ms", f"torques are off by {torque:.1f} % and roll by {roll:.1f} %")
-    states("docs/importers-known-faults.md", "holds the inputs over a step", f"torques are {torque:.1f} % off")
+    check_stated(
+        "docs/compatibility.md", "with ode4 at 1 ms", f"torques are off by {torque:.1f} % and roll by {roll:.1f} %"
+    )
+    check_stated("docs/importers-known-faults.md", "holds the inputs over a step", f"torques are {torque:.1f} % off")
 
 
 def test_rates_of_zero_in_model_exchange(fmu, exact):
-    torque, roll = shares(exact, *in_model_exchange(fmu, *ODE4, moved=0.0))
+    torque, roll = shares(exact, *in_model_exchange(fmu, *ODE4, rate_factor=0.0))
     for name in ("docs/importers-known-faults.md", "docs/fmu-page/text/testbed/3_loading.html"):
-        states(name, "Fig. 4", f"roll is {roll:.0f} %", f"{torque:.0f} %")
+        check_stated(name, "Fig. 4", f"roll is {roll:.0f} %", f"{torque:.0f} %")

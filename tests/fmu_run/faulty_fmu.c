@@ -1,5 +1,5 @@
-/* An FMU for Co-Simulation whose parameter selects its behaviour. It has no optional functions, unless it is compiled with
- * COMPLETE, because FMPy loads only FMUs with all functions. With logging on, it logs more reasons. */
+/* An FMU for Co-Simulation whose parameter `behaviour` selects how it misbehaves. It lacks the optional functions. COMPLETE adds
+ * them for FMPy, which only loads FMUs with all functions. Some behaviours only log the reason of an error if logging is on. */
 #define _POSIX_C_SOURCE 199309L
 #include <stdlib.h>
 #include <string.h>
@@ -18,6 +18,7 @@ typedef struct {
     char label[64];
 } Instance;
 
+/* Instances that exist now, the most that existed at a time, and steps with logging on. */
 static int alive, most, logged_steps;
 
 const char *fmi2GetTypesPlatform(void) { return "default"; }
@@ -30,7 +31,7 @@ static void set_defaults(Instance *i) {
 
 static void log_message(const Instance *i, fmi2Status status, const char *text) {
 #ifdef COMPLETE
-    if (status == fmi2OK) return; /* FMPy prints it. */
+    if (status == fmi2OK) return; /* FMPy would print it. */
 #endif
     i->callbacks.logger(i->callbacks.componentEnvironment, "faulty_fmu", status, "logAll", text, "half");
 }

@@ -1,4 +1,4 @@
-"""Packs the FMUs in C with the manners of other producers, which crates/fmu-run/tests/foreign/foreign.c names."""
+"""Packs FMUs in C that behave like FMUs of other producers. MANNERS in crates/fmu-run/tests/foreign/foreign.c lists how."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SOURCE = Path(__file__).parents[2] / "crates" / "fmu-run" / "tests" / "foreign"
 
 @functools.cache
 def library() -> bytes:
-    """The library, compiled once."""
+    """Returns the library, which is compiled once."""
     headers = Path(fmpy.__file__).parent / "c-code"
     with tempfile.TemporaryDirectory() as directory:
         to = Path(directory) / "foreign.so"

@@ -1,4 +1,4 @@
-"""A model with arrays, which are scalars in FMI 2.0. One program runs both FMUs; results are bit-identical and equal FMPy's."""
+"""A model with arrays, which are scalars in FMI 2.0. The same program runs both FMUs. Results are bit-identical, also in FMPy."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def test_runs_equal_fmpy(rods, kind) -> None:
 
 
 def heated(rod: Path, switches: list[tuple[float, int, int]], **options) -> np.ndarray:
-    """FMPy's results in Model Exchange, with times and values of both switches."""
+    """Returns FMPy's results in Model Exchange. switches: times, each with the values of both switches."""
     kinds = [("time", float), ("switches[1]", np.int32), ("switches[2]", np.int32)]
     return fmpy.simulate_fmu(
         str(rod),
@@ -104,7 +104,7 @@ def heated(rod: Path, switches: list[tuple[float, int, int]], **options) -> np.n
 
 
 def exact(time: np.ndarray, parts: list[tuple[float, float, list[float]]]) -> np.ndarray:
-    """Temperatures (8, times): in each part, from its begin to its end, the heaters have the given powers."""
+    """Returns the exact temperatures (8, times). parts: begin, end and the powers of both heaters."""
     capacities, temperatures, found = 2.0 + 0.125 * np.arange(8), 20.0 + np.arange(8.0), []
 
     def rates(_: float, at: np.ndarray, heat: np.ndarray) -> np.ndarray:
@@ -122,14 +122,15 @@ def exact(time: np.ndarray, parts: list[tuple[float, float, list[float]]]) -> np
 
 def test_discrete_inputs_that_fmpy_sets_in_continuous_time_mode(rods) -> None:
     """While CVode looks for roots of the indicators, FMPy sets all inputs, also the discrete ones."""
-    result = heated(rods[0], [(0.0, 3, 0), (2.0, 3, 0)], solver="CVode", output_interval=0.1, relative_tolerance=1e-8)
+    result = heated(rods[0], [(0.0, 3, 0), (2.0, 3, 0)], solver="CVode", output_interval=0.1, relative_tolerance=1e-9)
     found = np.array([result[name] for name in TEMPERATURES])
     np.testing.assert_allclose(found, exact(result["time"], [(0.0, 2.0, [10.0, 0.0])]), rtol=1e-6)
     assert len(np.unique(result["hot[4]"])) == 2, "an indicator changes its sign"
 
 
 def test_a_switch_in_fmpy(rods) -> None:
-    """FMPy's Euler method ends at the event. CVode steps beyond it, and FMPy then sets the other value outside of Event Mode."""
+    """Uses FMPy's Euler method, which ends at the event. CVode steps beyond it, and FMPy then sets the new value outside of Event
+    Mode."""
     switches = [(0.0, 3, 0), (0.6, 3, 0), (0.6, 0, 3), (2.0, 0, 3)]
     result = heated(rods[0], switches, solver="Euler", output_interval=1e-3)
     time = result["time"]
@@ -168,7 +169,8 @@ def test_elements_of_stateful_instances(rods) -> None:
     assert of_fmi3[0][1].tolist() == [20.0, 2.0, 22.0, 23.0, 3.0, 25.0, 26.0, 27.0]
     assert of_fmi3[3].tolist() == [[10.0, 5.0, 3.0, 3.0], [10.0, 6.0, 3.0, 3.0]]
     assert of_fmi3[-1][:2] == ["the near half"] * 2 and of_fmi3[-1][2].startswith("zwei is ")
-    # der(T[2]) depends on T[2] by -2 times, der(T[3]) by +1 times the conductance between neighbours divided by the capacity.
+    # The derivative of der(T[2]) with respect to T[2] is -2 times the conductance between neighbours divided by the capacity, and
+    # the derivative of der(T[3]) is +1 times this quotient.
     assert np.allclose(of_fmi3[6], [[-1.0 / 2.125, 0.5 / 2.25, 1 / 8]] * 2)
 
 
@@ -187,7 +189,7 @@ def test_states_and_indicators(rods) -> None:
 
 
 def test_whole_arrays_in_runs(rods) -> None:
-    """Whole arrays have the results of their elements: FMI 2.0 has only the elements, FMI 3.0 the arrays."""
+    """Runs with whole arrays equal runs with their elements, although FMI 2.0 has only the elements and FMI 3.0 only the arrays."""
     time = np.linspace(0.0, 1.0, 11)
     limits, power = np.array([[10.0, 20.5], [11.0, 21.0]]), np.stack([3 + np.sin(time), np.cos(time)], axis=1)
     capacities = np.stack([np.linspace(1.0, 2.0, 8), np.linspace(2.0, 4.0, 8), np.full(8, 3.0)])

@@ -11,7 +11,7 @@ from faulty_fmu import repacked
 
 TIME = np.arange(11) / 10
 
-# By the value of `behaviour`: the number of rows (of 11), the error, and the note.
+# Expected number of rows (of 11), error and note. The position in the table is the value of `behaviour`.
 BEHAVIOURS = {
     "good": (11, None, None),
     "silent error": (6, "at 0.5 s: fmi2DoStep returned Error without a message", None),

@@ -88,7 +88,7 @@ def test_rejected_runs_do_not_affect_the_others(fmu):
     angle = np.where(TIME > 0.45, np.inf, 0.0)
     one = fmu.run(TIME, inputs={"theta1": angle}, outputs=["roll"])
     assert re.match(r"at 0\.5 s: .*theta1", one.errors[0]), one.errors
-    # At the last time, all outputs have been read.
+    # At the last time, all outputs are read before the input is rejected.
     angle = np.where(TIME > 0.95, np.inf, 0.0)
     one = fmu.run(TIME, inputs={"theta1": angle}, outputs=["roll"], read_before_set=True)
     assert re.match(r"at 1 s: .*theta1", one.errors[0]) and np.isfinite(one["roll"]).all()
@@ -109,7 +109,7 @@ def test_rejected_runs_do_not_affect_the_others(fmu):
         ("text", "is not an FMU, which is a zip file"),
     ],
 )
-def test_files_that_are_no_fmu(tmp_path, content, message):
+def test_files_that_are_not_an_fmu(tmp_path, content, message):
     path = tmp_path / "some.fmu"
     if isinstance(content, str):
         path.write_text(content)
@@ -133,7 +133,7 @@ def test_no_library_for_this_platform(tmp_path, testbed):
         fmu_run.Fmu(path)
 
 
-# FMPy contains libraries for other systems. The field e_machine of an ELF header names the processor.
+# FMPy contains libraries for other systems. Bytes 18 and 19 of an ELF header, e_machine, select the processor.
 FMPY = Path(fmpy.__file__).parent
 FOREIGN_LIBRARIES = {
     "Windows on x86_64": lambda _: (FMPY / "logging/win64/logging.dll").read_bytes(),
@@ -337,14 +337,14 @@ def test_the_interface_type_must_exist(tmp_path, faulty_fmu):
                 fmu_run.FmuError, match="no Co-Simulation, only Model Exchange; `run` of this FMU integrates it"
             ):
                 call()
-        # The guid belongs to the other description.
+        # The run fails, because the library itself only supports Co-Simulation.
         assert list(fmu.run([0.0, 1.0], outputs=["y"]).errors) == [0]
     with fmu_run.Fmu(faulty_fmu) as fmu, pytest.raises(fmu_run.FmuError, match="has no Model Exchange"):
         fmu.run([0.0, 1.0], outputs=["y"], interface="model_exchange")
 
 
 def test_arguments_of_wrong_types_are_named(fmu, testbed):
-    """Each argument of each function, with objects that it cannot be."""
+    """Passes values of wrong types as each argument of each function."""
     one, continuous = fmu.instances(3), fmu.instances(2, interface="model-exchange")
     system = {"source": {"wrist": fmu}, "connections": {}, "order": "jacobi"}
     nothing = object()

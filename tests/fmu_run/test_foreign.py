@@ -1,5 +1,5 @@
-"""FMUs with the manners of other producers: messages, values of all types, inputs with their own times. The Rust tests of the crate
-cover the manners one by one."""
+"""FMUs that behave like FMUs of other producers: messages, values of all types, inputs with their own times. The Rust tests of fmu-run
+test each `manner` separately."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ VERSIONS = ["2.0", "3.0"]
 
 @pytest.fixture(params=VERSIONS)
 def made(request, tmp_path):
-    """Opens FMUs of both versions."""
+    """Returns a function that opens the FMU with a manner, for FMI 2.0 and then for FMI 3.0."""
     opened = []
 
     def make(manner, version=request.param):
@@ -76,7 +76,7 @@ def test_a_function_receives_messages(made):
     greetings = []
     stranger = made("null_environment").instances(2, log=lambda *message: greetings.append(message))
     assert {message[1:] for message in greetings} == {("Warning", "greeting", "my environment is not yours")}
-    # It may use the instances, and its exceptions reach the caller.
+    # The function may use instances, and its exceptions reach the caller.
     times = []
     made("chatty").instances(log=lambda *_: times.append(stranger.time[0])).step(0.5)
     assert times == [0.0]
@@ -151,7 +151,7 @@ def test_exact_values(made, tmp_path):
         if not isinstance(value, list):
             with pytest.raises(ValueError, match=re.escape(why)):
                 fmu.run(TIME, outputs=["y"], start={name: value})
-    # A failed run has no values: objects instead of integers.
+    # A failed run lacks values, so the array has None in place of integers.
     failed = made("discard", "3.0").run(TIME, start={"wide": wide[0]}, outputs=["wide_out", "echo"])
     assert failed.errors and failed["wide_out"][0].tolist() == [wide[0]] * 6 + [None] * 5
     assert failed["echo"][0].tolist() == ["none"] * 6 + [None] * 5
@@ -170,7 +170,7 @@ def test_inputs_with_their_own_times(made):
     )
     np.testing.assert_allclose(runs["u"], [[0, 0.2, 0.4, 0.6, 0.8, 3, 3, 3, 3, 3, 3], [5] * 11])
     np.testing.assert_array_equal(runs["valve"], [[1, 1, 1, 4, 4, 4, 4, 4, 4, 4, 4]] * 2)
-    # A tuple of numbers is an input for each time, a list of rows an input for each run.
+    # A tuple of numbers has a value for each time; a list of rows has a row for each run.
     two = fmu.run(TIME[:2], inputs={"u": (1.0, 2.0)}, outputs=["u"])
     assert two["u"].tolist() == [[1.0, 2.0]]
     assert fmu.run(TIME[:2], inputs={"u": [[1.0, 2.0], [3.0, 4.0]]}, outputs=["u"])["u"].tolist() == [[1, 2], [3, 4]]
@@ -234,7 +234,7 @@ print("alive")
 
 
 def test_python_survives(tmp_path):
-    """None of the manners ends the process, also while instances are freed and the library is unloaded."""
+    """No manner ends the process, not even while instances are freed and the library is unloaded."""
     manners = [
         "unchecked_memory",
         "other_environment",

@@ -9,7 +9,7 @@ import sys
 import fmu_run
 import numpy as np
 
-#: Longer than any of these programs takes, but they must not hang for ever.
+#: Seconds after which a program has failed, because it hangs.
 LIMIT = 60
 
 FORKED = """
@@ -99,7 +99,7 @@ def test_threads_in_forked_processes(testbed) -> None:
 
 
 def test_instances_in_use_by_another_thread(testbed) -> None:
-    """Only the forking thread is in the child. Instances that another thread used are out of reach; an error says so."""
+    """A forked child only has the thread that forked. Instances that another thread used at that time are lost; an error reports it."""
     assert printed(LOCKED, testbed) == "0\n"
 
 

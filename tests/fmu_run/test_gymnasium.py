@@ -38,8 +38,8 @@ def task(testbed) -> Task:
     )
 
 
-def played(envs, steps, seed=5):
-    """Returns all results of random actions."""
+def play_randomly(envs, steps, seed=5):
+    """Plays random actions, and returns the observations, rewards and ends of episodes."""
     envs.action_space.seed(seed)
     found = [envs.reset(seed=seed)[0]]
     for _ in range(steps):
@@ -95,7 +95,7 @@ def test_environments_equal_instances(task, mode) -> None:
     count, envs = 4, VectorEnv(task, 4, autoreset_mode=mode)
     rng, actions = np.random.default_rng(3), np.random.default_rng(4).uniform(-1, 1, (50, count, 2))
 
-    def begun():
+    def begin_episode():
         drawn = {"k1": rng.uniform(100.0, 140.0, count), "J3": 0.0127 * rng.lognormal(0.0, 0.1, count)}
         wrists.reset(start=drawn)
         assert np.array_equal(envs._instances.get(("k1", "J3")).T, [*drawn.values()])
@@ -104,12 +104,12 @@ def test_environments_equal_instances(task, mode) -> None:
     with fmu_run.Fmu(task.fmu) as fmu:
         wrists = fmu.instances(count)
         observed, _ = envs.reset(seed=3)
-        expected, k = begun(), 0
+        expected, k = begin_episode(), 0
         assert np.array_equal(observed, expected)
         for action in actions:
             observed, rewards, terminated, truncated, infos = envs.step(action)
             if k == task.length and mode is AutoresetMode.NEXT_STEP:
-                expected, k = begun(), 0
+                expected, k = begin_episode(), 0
                 assert not (rewards.any() or truncated.any())
             else:
                 before, k = expected, k + 1
@@ -120,25 +120,25 @@ def test_environments_equal_instances(task, mode) -> None:
                 assert truncated.all() == truncated.any() == (k == task.length)
             if k == task.length and mode is AutoresetMode.SAME_STEP:
                 assert infos["_final_obs"].all() and same(infos["final_obs"], expected)
-                expected, k = begun(), 0
+                expected, k = begin_episode(), 0
             elif k == task.length and mode is AutoresetMode.DISABLED:
                 with pytest.raises(gymnasium.error.ResetNeeded, match=r"\[0, 1, 2, 3\] are over"):
                     envs.step(action)
                 assert np.array_equal(observed, expected)
                 observed, _ = envs.reset(options={"reset_mask": np.ones(count, dtype=bool)})
-                expected, k = begun(), 0
+                expected, k = begin_episode(), 0
             assert np.array_equal(observed, expected) and not terminated.any()
-            observed[:] = np.nan  # The caller owns the array.
+            observed[:] = np.nan  # The caller owns the array, so overwriting it must not affect the environments.
     envs.close()
     with pytest.raises(fmu_run.FmuError, match="closed"):
         envs._own.instances()
 
 
 def test_env_equals_vector_env_and_seeds_are_reproducible(task) -> None:
-    one, many = played(SyncVectorEnv([lambda: Env(task)]), 50), played(VectorEnv(task, 1), 50)
+    one, many = play_randomly(SyncVectorEnv([lambda: Env(task)]), 50), play_randomly(VectorEnv(task, 1), 50)
     assert same(one, many)
-    assert same(many, played(VectorEnv(task, 1), 50))
-    assert not same(many, played(VectorEnv(task, 1), 50, seed=6))
+    assert same(many, play_randomly(VectorEnv(task, 1), 50))
+    assert not same(many, play_randomly(VectorEnv(task, 1), 50, seed=6))
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])

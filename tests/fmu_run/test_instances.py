@@ -21,7 +21,7 @@ STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
 
 
 def angles(time: np.ndarray, count: int) -> np.ndarray:
-    """(times, count, 2) rad: a different motion for each instance."""
+    """Returns angles (times, count, 2) rad, with a different motion for each instance."""
     _, moves = motion(len(time))
     scale = np.linspace(0.5, 1.5, count)
     return np.stack([np.multiply.outer(moves[name], scale) for name in MOTORS], axis=2)
@@ -60,7 +60,7 @@ def test_advance_equals_three_calls(testbed) -> None:
 
 
 def test_derivatives_of_inputs_and_outputs(fmu) -> None:
-    """With input derivatives, linear inputs give the results of a run. Output derivatives equal difference quotients."""
+    """With linear inputs and their derivatives, instances equal a run. Output derivatives agree with difference quotients."""
     time = np.arange(30) * 1e-3
     with fmu_run.Fmu(fmu) as loaded:
         slopes = {"theta1": 3.0, "theta2": -2.0}

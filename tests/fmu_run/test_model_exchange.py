@@ -1,4 +1,4 @@
-"""Model Exchange: the testbed against Co-Simulation, the oracle and FMPy. The Rust tests of the crate have models with events."""
+"""Compares the testbed in Model Exchange with Co-Simulation, the oracle and FMPy. The Rust tests of fmu-run have models with events."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def model():
 
 
 def sines(time):
-    """Angles, rates and accelerations of both motors, (times, 2) each."""
+    """Returns angles, rates and accelerations of both motors, (times, 2) each."""
     a, w = np.array(list(MOTORS.values())).T
     phase = np.multiply.outer(time, w)
     return a * np.sin(phase), a * w * np.cos(phase), -a * w**2 * np.sin(phase)
@@ -52,7 +52,7 @@ def test_motors_at_constant_rates_agree_with_co_simulation_and_the_oracle(wrist,
     given = dict(zip(("omega1", "omega2"), slopes.T))
     stepped = wrist.run(time, inputs=inputs | given, outputs=OUTPUTS, start={"use_omega": True}).check()
     within(exchanged, {name: stepped[name][0] for name in OUTPUTS}, 1e-8)
-    # The corners are between samples of another grid.
+    # On a coarser grid, the corners of the angles are between samples.
     own = {name: ([0.0, 0.2, 0.34, 0.6], corner) for name, corner in zip(ANGLES, corners.T)}
     few = wrist.run(time[::7], inputs=own | rates, outputs=OUTPUTS, interface="model-exchange", rtol=1e-10).check()
     within(few, {name: signal[::7] for name, signal in expected.items()}, 1e-8)
@@ -87,7 +87,7 @@ def test_moving_motors_agree_with_the_oracle_where_fmpy_has_the_error_of_held_in
 
 
 def test_free_vibrations_agree_with_fmpy(wrist, testbed):
-    """Without moving inputs, both integrate the same equations."""
+    """If no input moves, fmu_run and FMPy integrate the same equations."""
     start = {"start_at_rest": False, "theta5_start": 0.3, "omega6_start": -2.0, "k1": 100.0}
     time = np.arange(51) * 1e-2
     found = wrist.run(time, outputs=OUTPUTS, start=start, interface="model_exchange", rtol=1e-10).check()

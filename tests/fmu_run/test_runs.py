@@ -27,7 +27,7 @@ def motion(samples: int = 400, scale: float = 1.0) -> tuple[np.ndarray, dict[str
 
 
 def by_fmpy(path, time, inputs, start, outputs, slopes=None, read_before_set=False) -> dict[str, np.ndarray]:
-    """Simulates with direct calls of the C functions, by the classes of FMPy."""
+    """Simulates with direct calls of the C functions through the classes of FMPy."""
     description = fmpy.read_model_description(str(path))
     by_name = {v.name: v for v in description.modelVariables}
     directory = fmpy.extract(str(path))
@@ -214,7 +214,7 @@ def test_results_that_are_not_a_number_are_reported(testbed, faulty_fmu):
 
 
 def test_statistics_of_outputs_that_are_not_a_number(faulty_fmu):
-    """Runs with NaN at the end, and everywhere, between runs without: no statistic of theirs is a number, and the others are right."""
+    """One run has NaN at its end and one has only NaN. Their statistics are NaN, and the runs before and after them are not affected."""
     time, measures = np.arange(11) / 10, ["min", "max", "peak", "time_of_peak", "mean", "rms", "end"]
     slopes = np.array([np.ones(11), np.where(time < 0.35, -1.0, np.nan), np.full(11, np.nan), 2.0 * np.ones(11)])
     with fmu_run.Fmu(faulty_fmu) as fmu:
@@ -223,7 +223,7 @@ def test_statistics_of_outputs_that_are_not_a_number(faulty_fmu):
         with pytest.warns(RuntimeWarning, match="is not a number in 2 finished runs, run 1 among them"):
             found = runs["slope", measure]
         assert np.isnan(found[1:3]).all() and np.isfinite(found[[0, 3]]).all(), measure
-        # The first output of the third run, 4, precedes the first step.
+        # In the third run, y is 4 before the first step and NaN from then on.
         with pytest.warns(RuntimeWarning, match="is not a number in 2 finished runs"):
             found = runs["y", measure]
         assert np.isnan(found[1:3]).all() and np.isfinite(found[[0, 3]]).all(), measure

@@ -62,7 +62,7 @@ def test_a_system_equals_connected_instances(fmus, order) -> None:
     for k in range(150):
         assert np.array_equal(pairs.get(SHOWN), [run[k] for run in expected]), k
         pairs.step(1e-3)
-    # Times that are exact multiples of the step.
+    # These times are exact multiples of the step, so runs and instances have the same times.
     time = np.arange(100) / 1024
     runs = loop.run(time, start=GOAL | {"testbed.k1": stiffness}, outputs=SHOWN, measures=["end"], every=1)
     again = loop.instances(2, start=GOAL | {"testbed.k1": stiffness})
@@ -148,7 +148,7 @@ def test_connected_inputs_cannot_be_set() -> None:
 
 
 def test_algebraic_loops(faulty_fmu) -> None:
-    """The model description permits that each output depends on every input."""
+    """The model description lists no dependencies, so each output may depend on every input."""
     with fmu_run.Fmu(faulty_fmu) as fmu:
         with pytest.raises(ValueError, match="an algebraic loop: a.instances -> a.count; .* Order Jacobi"):
             fmu_run.System({"a": fmu}, {"a.instances": "a.count"})
@@ -190,7 +190,7 @@ def test_an_ssp_is_the_same_system(order, tmp_path) -> None:
     other = ssp.run(time, start={"pitch_ref": (10.0, "deg")}, inputs={"roll_ref": 0.0}, outputs=["pitch", "roll"])
     assert abs(np.rad2deg(other["pitch"][0, -1]) - 10.0) < 0.2 and np.abs(other["roll"][0, -1]) < 1e-3
 
-    # The controller in a nested system.
+    # Moves the controller into a nested system.
     def nested(text: str) -> str:
         begin, end = text.index('<ssd:Component name="controller"'), text.index('<ssd:Component name="testbed"')
         connectors = re.search(r"<ssd:Connectors>.*?</ssd:Connectors>", text[begin:end], re.S)

@@ -32,7 +32,7 @@ def closed_loop() -> Path:
 
 @pytest.fixture
 def record(request):
-    """Records the result of a test: tool, pip package of the tool, FMU, run, result."""
+    """Returns a function that records the result of a test and checks that docs/compatibility.md contains it."""
 
     def record(tool: str, package: str, fmu: str, run: str, seen: str) -> None:
         RESULTS.mkdir(parents=True, exist_ok=True)

@@ -54,7 +54,7 @@ def test_values_and_jacobians(testbed, version, unpack, model, record):
 
 
 def test_cvodes(testbed, version, unpack, model, record):
-    """The testbed starts with twisted couplings and fixed motors."""
+    """The testbed starts with twisted couplings, and the motors do not turn."""
     dae = casadi.DaeBuilder("testbed", unpack(testbed))
     x, u = casadi.MX.sym("x", 6), casadi.MX.sym("u", 4)
     equations = {"x": x, "u": u, "ode": dae.create("f", ["x", "u"], ["ode"])(x, u)}
@@ -74,7 +74,7 @@ def test_cvodes(testbed, version, unpack, model, record):
 
 
 def test_derivatives_with_respect_to_parameters(tunable, version, unpack, record):
-    """CasADi treats `fixed` parameters as constants. The parameters of the FMU built with `--tunable` are its `p`."""
+    """CasADi treats `fixed` parameters as constants. For the FMU built with `--tunable`, they are the input `p` of its functions."""
     dae = casadi.DaeBuilder("testbed", unpack(tunable))
     physical = np.array([name in REAL for name in dae.p()])
     assert {name for name, real in zip(dae.p(), physical) if real} == set(REAL)
@@ -100,8 +100,8 @@ def test_derivatives_with_respect_to_parameters(tunable, version, unpack, record
                 columns.append((4 * narrow - wide) / 3)
             expected = np.column_stack(columns)
             found = np.array(found)
-            # Differences have rounding errors also where a parameter has no effect. So an error is a share of the column, or
-            # of a thousandth of the largest effect of any parameter.
+            # Differences have rounding errors even where a parameter has no effect. So an error is divided by the effect of its
+            # parameter, but at least by a thousandth of the largest effect.
             effects = np.abs(expected * p).max(axis=0)
             sizes = np.maximum(effects, 1e-3 * effects.max())
             worst = max(worst, *(np.abs((found - expected) * p).max(axis=0) / sizes)[physical])

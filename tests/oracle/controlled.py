@@ -41,7 +41,7 @@ class Law:
         return np.array([[0.5, 0.5], [ratio, -ratio]])
 
     def braking_curve(self) -> tuple[Any, Any]:
-        """Returns rates from which a motor brakes in a whole number of samples, and a distance for each rate.
+        """Returns the rates from which a motor brakes in an integer number of samples, and a distance for each rate.
 
         A motor at rest covers this distance if it accelerates to the rate within one sample and then brakes. Between
         the rates, the distance is linear in the rate.

@@ -1,7 +1,8 @@
 """The reference experiments: motion of the motors, parameters, and response of the testbed.
 
 The oracle calculates the response. If the motors turn at constant rates, the FMU is exact in Co-Simulation at any step size, and in
-Model Exchange up to the solver's tolerance. Other motions are given by samples, and the tolerances allow for the interpolation of importers between them.
+Model Exchange up to the solver's tolerance. Other motions are given by samples, between which importers interpolate linearly; the
+tolerances allow for this error.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from lagrange import OUTPUTS, REAL, linear_model, table_1, varied
 from reference import follow, integrate
 
 #: Tolerances of angles, rates and torques, as fractions of the largest value of the variables of the same kind. In
-#: Co-Simulation, the rates of the motors are constant during a step. Many importers read torques before they set the next
-#: rates, so torques lag one step.
+#: Co-Simulation, torques have wider tolerances, because many importers read them before they set the next rates of the
+#: motors, which are constant during a step. So the torques of these importers lag one step.
 RelativeTolerances = Mapping[str, tuple[float, float, float]]
 STEP_SIZES = {"CoSimulation": 1e-3, "ModelExchange": 1e-3}
 FAST_MOTION: RelativeTolerances = {"CoSimulation": (5e-4, 1e-3, 2e-2), "ModelExchange": (5e-4, 1e-3, 2e-3)}
@@ -109,7 +110,7 @@ def inverse_kinematics(wrist: Any) -> Any:
 
 
 def fig4(name: str, description: str, sign: int) -> Experiment:
-    """The paper's experiment (Sec. 4), its first second."""
+    """Returns the first second of the paper's experiment (Sec. 4)."""
     frequency, sides = 10 * np.pi, np.array([1, sign])
     return experiment_from_motion(
         name,
@@ -121,7 +122,7 @@ def fig4(name: str, description: str, sign: int) -> Experiment:
 
 
 def point_to_point(start: Any, end: Any, duration: float) -> tuple[Function, Function]:
-    """Angles and rates (2,) of a move of `duration` s with continuous acceleration: a polynomial of degree 5."""
+    """Returns functions for the angles and rates (2,) of a move of `duration` s: a polynomial of degree 5 with continuous acceleration."""
 
     def angle(t: float) -> Any:
         s = min(t / duration, 1.0)
@@ -135,7 +136,7 @@ def point_to_point(start: Any, end: Any, duration: float) -> tuple[Function, Fun
 
 
 def sines(amplitude: Any, frequency: Any) -> tuple[Function, Function]:
-    """Angles and rates (2,) that start at rest at 0; frequency (2,) in rad/s."""
+    """Returns functions for angles and rates (2,) that start at rest at 0; frequency (2,) in rad/s."""
     return (
         lambda t: amplitude * (1 - np.cos(frequency * t)),
         lambda t: amplitude * frequency * np.sin(frequency * t),
@@ -201,5 +202,5 @@ def closed_loop(parameters: dict[str, Any]) -> Experiment:
 
 
 def times(stop: float, step: float) -> Any:
-    """0, step, ... stop."""
+    """Returns 0, step, ... stop."""
     return np.arange(round(stop / step) + 1) * step

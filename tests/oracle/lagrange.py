@@ -34,8 +34,8 @@ REAL = tuple(name for name in TABLE_1 if name not in ("M", "N"))
 
 
 def varied(factors) -> dict[str, Any]:
-    """Other parameters: Table 1 in SI units, each measured value times the next of `factors`. The value 0 would stay 0, so
-    the largest value of its kind takes its place. M and N have the values of Table 1."""
+    """Returns Table 1 in SI units with each measured value multiplied by its factor; M and N are unchanged. A value of 0 would stay
+    0, so it is first replaced by the largest value of its kind."""
     table = table_1()
     largest = {name: max(table[other] for other in REAL if other[0] == name[0]) for name in REAL}
     return {
@@ -50,7 +50,7 @@ MOTOR, SHAFT, CARRIER = slice(0, 2), slice(2, 4), slice(4, 6)
 
 
 def table_1(number=float, pi=np.pi) -> dict[str, Any]:
-    """Table 1 by symbol, in SI units (kg.m2, N.m.s/rad, N.m/rad); `number` turns the printed text into a number."""
+    """Returns Table 1 by symbol, in SI units (kg.m2, N.m.s/rad, N.m/rad); `number` turns the printed text into a number."""
     si = {name: number(text) for name, text in TABLE_1.items()}
     for name in PER_DEGREE:
         si[name] = si[name] * 180 / pi
@@ -58,18 +58,18 @@ def table_1(number=float, pi=np.pi) -> dict[str, Any]:
 
 
 def pitch_roll(th5, th6, p):
-    """theta7 (pitch) and theta8 (roll) of the output shaft; eq. (1), also for the rates."""
+    """Returns theta7 (pitch) and theta8 (roll) of the output shaft by eq. (1), or their rates from rates."""
     return (th5 + th6) / 2, p["N"] * (th5 - th6) / (2 * p["M"])
 
 
 def kinetic_energy(w, p):
-    """T in J from the six rates w (rad/s); eqs. (3)-(5) without the motors, whose motion is prescribed."""
+    """Returns T in J from the six rates w (rad/s); eqs. (3)-(5) without the motors, whose motion is prescribed."""
     w7, w8 = pitch_roll(w[TH5], w[TH6], p)
     return (p["J2"] * w[TH5] ** 2 + p["J2"] * w[TH6] ** 2 + p["H3"] * w7**2 + p["J3"] * w8**2) / 2
 
 
 def potential_energy(th, p):
-    """V in J from the six angles th (rad); eq. (6) with k2 in its last term."""
+    """Returns V in J from the six angles th (rad); eq. (6) with k2 in its last term."""
     return (
         p["k1"] * (th[TH1] - th[TH3]) ** 2
         + p["k1"] * (th[TH2] - th[TH4]) ** 2
@@ -79,7 +79,7 @@ def potential_energy(th, p):
 
 
 def dissipation(w, p):
-    """Rayleigh's function in W from the six rates w (rad/s); eq. (7)."""
+    """Returns Rayleigh's function in W from the six rates w (rad/s); eq. (7)."""
     w7, w8 = pitch_roll(w[TH5], w[TH6], p)
     return (
         p["c1"] * (w[TH1] - w[TH3]) ** 2
@@ -92,7 +92,7 @@ def dissipation(w, p):
 
 
 def hessian(form, p):
-    """Second derivatives (6, 6) of a quadratic form of six variables, exactly: Q(e_i + e_j) - Q(e_i) - Q(e_j)."""
+    """Returns the exact second derivatives (6, 6) of a quadratic form Q of six variables: Q(e_i + e_j) - Q(e_i) - Q(e_j)."""
     zero = p["J2"] * 0
     e = [[zero + (i == j) for j in range(6)] for i in range(6)]
     q = [form(ei, p) for ei in e]
@@ -101,7 +101,7 @@ def hessian(form, p):
 
 
 def inverse2(a):
-    """Inverse of a (2, 2) array of any number type."""
+    """Returns the inverse of a (2, 2) array of any number type."""
     det = a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0]
     return np.array([[a[1, 1], -a[0, 1]], [-a[1, 0], a[0, 0]]]) / det
 
@@ -123,10 +123,11 @@ class LinearModel:
     parameters: dict
 
     def impulse(self, jump):
-        """Change of x when the motor angles jump by `jump` (2,) rad.
+        """Returns the change of x when the motor angles jump by `jump` (2,) rad.
 
-        Lagrange's equation is integrated over the instant of the jump. Terms with angles vanish. theta5 and theta6 do
-        not jump, because they have inertia. The result is Delta [q] + M [q'] = -(dissipative coupling) jump.
+        Lagrange's equation is integrated over the instant of the jump, where terms with angles vanish. theta5 and theta6 do
+        not jump, because they have inertia. For the jumps [q] and [q'], this leaves Delta [q] + M [q'] =
+        -(dissipative coupling) jump.
         """
         h_d, h_t = hessian(dissipation, self.parameters), hessian(kinetic_energy, self.parameters)
         jump_shaft = -inverse2(h_d[SHAFT, SHAFT]) @ (h_d[SHAFT, MOTOR] @ jump)
@@ -134,7 +135,7 @@ class LinearModel:
         return np.concatenate([jump_shaft, 0 * jump, jump_rate])
 
     def outputs(self, x, theta, rate) -> dict[str, Any]:
-        """All outputs of the FMU by name, at state x (6,), motor angles theta (2,) and their rates (2,)."""
+        """Returns all outputs of the FMU by name, at state x (6,), motor angles theta (2,) and their rates (2,)."""
         tau = self.c @ x + self.d_angle @ theta + self.d_rate @ rate
         pitch, roll = pitch_roll(x[2], x[3], self.parameters)
         pitch_rate, roll_rate = pitch_roll(x[4], x[5], self.parameters)
@@ -146,7 +147,7 @@ OUTPUTS = ("tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3",
 
 
 def linear_model(p) -> LinearModel:
-    """The testbed as a first-order linear system, by Lagrange's equation for each of theta3 ... theta6.
+    """Returns the testbed as a first-order linear system, by Lagrange's equation for each of theta3 ... theta6.
 
     d/dt dT/dq' + dV/dq + dDelta/dq' = 0. The rows of the massless shafts (theta3, theta4) give their rates; the rows of
     the carriers (theta5, theta6) give the accelerations. The torque on a sensor is the torque of its coupling:

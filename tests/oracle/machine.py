@@ -1,4 +1,4 @@
-"""The testbed between two motors with inertia, from energies and Lagrange's equation; scipy integrates it.
+"""The testbed between two motors with inertia, from energies and Lagrange's equation. SciPy integrates it.
 
 The motors' angles are coordinates here, not inputs: the kinetic energy contains J1/2 (theta1'^2 + theta2'^2) of eq. (3), and the
 generalized forces are the motors' torques. So neither eq. (9) nor the sign of its torques is used, although the results show both.
@@ -16,12 +16,12 @@ from scipy.integrate import solve_ivp
 #: Data of a motor and gains of its loops, as in examples/openmodelica/TorqueDriven.mo, in SI units.
 MOTOR_DATA = {"J1": 2e-3, "friction": 0.05, "creep": 0.02, "damping": 2e-3, "R": 1.0, "L": 2e-3, "k": 0.5}
 GAINS = {"stiffness": 40.0, "damping": 0.6, "proportional": 2.0, "integral": 1000.0}
-#: 30 and 60 degrees, in 0.6 s.
+#: Goal of the move in rad, and its duration in s.
 PITCH, ROLL, DURATION = np.pi / 6, np.pi / 3, 0.6
 
 
 def reference(t: float) -> tuple[np.ndarray, np.ndarray]:
-    """Motor angles (rad) and rates (rad/s), (2,) each, for a wrist that moves on half a cosine and stays."""
+    """Motor angles (rad) and rates (rad/s), (2,) each, for a wrist that moves to the goal along half a cosine and stays there."""
     goal = np.array([PITCH + 4 / 7 * ROLL, PITCH - 4 / 7 * ROLL])
     if t >= DURATION:
         return goal, 0 * goal
@@ -44,6 +44,7 @@ class Trajectory:
 class Mechanics:
     """The equations of motion. The state is (theta1..theta6, theta1', theta2', theta5', theta6'), in rad and rad/s."""
 
+    #: Indices of the angles of parts with inertia.
     HEAVY = (0, 1, 4, 5)
 
     def __init__(self, parameters: Mapping[str, float], inertia: float):
@@ -54,28 +55,28 @@ class Mechanics:
         self.shafts = np.linalg.inv(self.damp[SHAFT, SHAFT])
 
     def rates(self, x: np.ndarray) -> np.ndarray:
-        """All six rates. The massless shafts turn so that their torques add up to zero."""
+        """Returns all six rates. The massless shafts turn so that the torques on each of them add up to zero."""
         rate = np.zeros(6)
         rate[list(self.HEAVY)] = x[6:10]
         rate[SHAFT] = -self.shafts @ (self.stiff[SHAFT] @ x[:6] + self.damp[SHAFT] @ rate)
         return rate
 
     def slope(self, x: np.ndarray, torque: np.ndarray) -> np.ndarray:
-        """The derivative of the state, while torques (2,) N.m act on the motors."""
+        """Returns the derivative of the state while torques (2,) N.m act on the motors."""
         rate = self.rates(x)
         force = -(self.stiff @ x[:6] + self.damp @ rate)
         force[MOTOR] += torque
         return np.concatenate([rate, self.inverse_mass @ force[list(self.HEAVY)]])
 
     def torques(self, x: np.ndarray) -> np.ndarray:
-        """The wrist's torques (2,) N.m on the motors: the generalized forces on them, without the forces of the motors themselves."""
+        """Returns the torques (2,) N.m of the wrist on the motors: the generalized forces without the torques of the motors."""
         return -(self.stiff @ x[:6] + self.damp @ self.rates(x))[MOTOR]
 
 
 def pushed(
     time: np.ndarray, parameters: Mapping[str, float], inertia: float, torque: Callable[[float], np.ndarray]
 ) -> Trajectory:
-    """Integrate from rest, while given torques (2,) N.m, a smooth function of time, act on the motors; there is no current."""
+    """Integrates from rest, while the smooth function `torque` of time drives the motors with (2,) N.m. The currents are 0."""
     mechanics = Mechanics(parameters, inertia)
     found = solve_ivp(
         lambda t, x: mechanics.slope(x, torque(t)), time[[0, -1]], np.zeros(10), "DOP853", time, rtol=1e-12, atol=1e-14
@@ -96,17 +97,18 @@ def simulate(
     parameters: Mapping[str, float],
     motor: Mapping[str, float] = MOTOR_DATA,
     gains: Mapping[str, float] = GAINS,
-    moved: Callable[[float], tuple[np.ndarray, np.ndarray]] = reference,
+    references: Callable[[float], tuple[np.ndarray, np.ndarray]] = reference,
     breaks: tuple[float, ...] = (DURATION,),
 ) -> Trajectory:
-    """Integrate the machine from rest at zero angles to the times (n,) s; `moved` is smooth between `breaks`.
+    """Integrates the machine from rest at zero angles to the times (n,) s. The angles and rates of `references` are smooth between
+    `breaks`.
 
     The state is (theta1..theta6, theta1', theta2', theta5', theta6', both currents, both integral parts)."""
     mechanics = Mechanics(parameters, motor["J1"])
 
     def slope(t: float, x: np.ndarray) -> np.ndarray:
         theta, rate, current, integral = x[MOTOR], x[6:8], x[10:12], x[12:14]
-        theta_ref, omega_ref = moved(t)
+        theta_ref, omega_ref = references(t)
         wanted = gains["stiffness"] * (theta_ref - theta) + gains["damping"] * (omega_ref - rate)
         error = wanted / motor["k"] - current
         voltage = gains["proportional"] * error + integral

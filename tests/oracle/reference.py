@@ -1,6 +1,6 @@
 """Exact and independently integrated responses of the testbed, with which the FMU is compared.
 
-`follow` is exact for motor angles that are linear between communication points, with jumps allowed at the points; it
+`follow` is exact for motor angles that are linear between communication points, with jumps allowed at the points. It
 exponentiates the system augmented by the motion of the motors, in doubles (scipy) or to any precision (mpmath).
 `integrate` takes any smooth motion of the motors and uses scipy's DOP853. The two functions share only the linear model.
 """
@@ -15,12 +15,12 @@ from scipy.linalg import expm
 
 
 def at_rest(theta) -> np.ndarray:
-    """State x (6,) of the testbed at rest with the motors at the angles theta (2,) in rad."""
+    """Returns the state x (6,) of the testbed at rest with the motors at the angles theta (2,) in rad."""
     return np.array([theta[0], theta[1], theta[0], theta[1], 0 * theta[0], 0 * theta[1]])
 
 
 def augmented(model: LinearModel) -> np.ndarray:
-    """Generator (10, 10) of z = (x, theta, slope) while the motors turn at the constant rate `slope`."""
+    """Returns g (10, 10) in z' = g z, with z = (x, theta, slope), while the motors turn at the constant rate `slope`."""
     g = np.zeros((10, 10), dtype=model.a.dtype) + model.a[0, 0] * 0
     g[:6, :6], g[:6, 6:8], g[:6, 8:10] = model.a, model.b_angle, model.b_rate
     g[6, 8] = g[7, 9] = g[6, 8] + 1

@@ -65,7 +65,7 @@ def test_both_oracles_agree(found):
 
 
 def test_the_parameter_sets_are_valid_and_complete(texts):
-    """The sets contain all parameters, including the start values of states, so that none keeps an earlier value."""
+    """The sets contain all parameters, including start values of states, so that no parameter keeps an earlier value."""
     schema = Path(fmpy.__file__).parent / "ssp" / "schema" / "SystemStructureParameterValues.xsd"
     valid = etree.XMLSchema(etree.parse(schema))
     variables = etree.parse(COMMITTED / "modelDescription.xml").iter("ScalarVariable")

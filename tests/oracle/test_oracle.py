@@ -33,7 +33,8 @@ def test_dc_gain_and_equilibrium():
 
 
 def test_pitch_and_roll_subsystems():
-    """Sum and difference of the two sides: inertias 2 J2 + H3 and 2 J2 + J3 N^2/M^2 for (theta5 +- theta6)/2."""
+    """The sum and the difference of the two sides are independent: (theta5 +- theta6)/2 have inertias of 2 J2 + H3 and
+    2 J2 + J3 N^2/M^2."""
     p = table_1()
     m = hessian(kinetic_energy, p)[4:, 4:]
     np.testing.assert_allclose([m[0, 0] + m[0, 1]], p["J2"] + p["H3"] / 2, rtol=1e-14)
@@ -112,7 +113,9 @@ def test_rest_stays_at_rest():
     at, after = follow(MODEL, np.array([0, 0.1, 5.0]), theta, 0 * theta)
     for values in (at, after):
         for name, expected in {"tau1": 0, "roll_rate": 0, "pitch": theta[0, 0], "theta3": theta[0, 0]}.items():
-            np.testing.assert_allclose(values[name], expected, atol=1e-10)  # k1 theta is 84 N.m
+            np.testing.assert_allclose(
+                values[name], expected, atol=1e-10
+            )  # The torque k1 theta of one spring is 84 N.m.
 
 
 def test_backward_slope_of_a_parabola_is_exact():

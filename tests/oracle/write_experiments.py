@@ -25,11 +25,11 @@ LS = "http://fmi-standard.org/fmi-ls-manifest"
 SSV, SSC = (f"http://ssp-standard.org/SSP1/SystemStructure{kind}" for kind in ("ParameterValues", "Common"))
 #: Decimals of all numbers. The last one is at most a hundredth of the smallest tolerance.
 DECIMALS = 8
-#: Every experiment starts at rest. The start values of states, which are then ignored, are the FMU's.
+#: Every experiment starts at rest, so start values of states are ignored. They equal the defaults of the FMU.
 START = {"start_at_rest": True} | {
     f"{state}_start": 0.0 for state in ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
 }
-#: Relative tolerance of solvers to which the tolerances in Model Exchange apply.
+#: Largest relative tolerance of a solver for which the tolerances in Model Exchange apply.
 SOLVER = 1e-7
 
 
@@ -89,7 +89,7 @@ def entry(experiment: Experiment) -> dict[str, Any]:
 
 
 def manifest(found: list[Experiment]) -> str:
-    """fmi-ls-manifest.xml."""
+    """Returns the content of fmi-ls-manifest.xml."""
     root = etree.Element("fmiReferences", nsmap={"fmi-ls": LS})
     root.set(f"{{{LS}}}fmi-ls-name", LAYER)
     root.set(f"{{{LS}}}fmi-ls-version", "1.0.0-alpha.1")
@@ -113,7 +113,7 @@ def manifest(found: list[Experiment]) -> str:
 
 
 def about(found: list[Experiment]) -> str:
-    """documentation/fmi-ls-ref.txt."""
+    """Returns the content of documentation/fmi-ls-ref.txt."""
     listed = "\n".join(f"  {e.name:<17} {e.description}" for e in found)
     kinds = ", ".join(" ".join(names) for names in TOLERANCE_GROUPS)
     return f"""Reference experiments
@@ -136,8 +136,8 @@ between communication points cause a first-order error that exceeds the toleranc
 {kinds}. In Co-Simulation the tolerance of torques is wider, because many
 importers read outputs before they set the next inputs: torques then belong to the last rates.
 
-rate_step is exact in both interface types at any step size, because its motors turn at constant rates. The motors of
-the other experiments are sampled every {SAMPLE_TIME * 1e3:g} ms.
+In rate_step the motors turn at constant rates, so Co-Simulation is exact at any step size, and Model Exchange is exact up to
+the solver's tolerance. The motors of the other experiments are sampled every {SAMPLE_TIME * 1e3:g} ms.
 
 `prw check RESULT` compares a table of any tool with an experiment.
 """

@@ -1,4 +1,4 @@
-"""Fixtures of the tests of pages: a browser, and a visit that may request nothing but the page."""
+"""Fixtures for tests of pages in a browser. During a visit, only the page itself may be requested."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def address(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 @pytest.fixture(scope="session")
-def controllers(tmp_path_factory: pytest.TempPathFactory) -> str:
+def controller_address(tmp_path_factory: pytest.TempPathFactory) -> str:
     """The address of the controller's page."""
     return page_of(built("prw_controller.fmu"), tmp_path_factory.mktemp("controllers"))
 
@@ -39,7 +39,7 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture
 def visit(browser: Browser, address: str) -> Iterator[Any]:
-    """Opens the page in a context with these settings. Only the page may be requested, and no script may fail."""
+    """Returns a function that opens the page in a new context. The test fails if the page requests anything else or a script fails."""
     requested: list[str] = []
     contexts = []
     expected: set[str] = set()
@@ -50,7 +50,7 @@ def visit(browser: Browser, address: str) -> Iterator[Any]:
         page.route("**/*", lambda route: route.continue_())
         page.on("request", lambda request: requested.append(request.url))
         page.on("pageerror", lambda error: requested.append(f"error: {error}"))
-        # The browser reports violations of the page's policy there.
+        # In the console, the browser reports violations of the page's content security policy.
         page.on("console", lambda message: requested.append(message.text) if message.type == "error" else None)
         if script:
             page.add_init_script(script)

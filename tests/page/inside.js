@@ -1,4 +1,4 @@
-// Script that test_browsers.py adds to a copy of the page: acts like a visitor and reports the results.
+// test_browsers.py adds this script to a copy of the page. It acts like a visitor and reports the results.
 (async () => {
   const report = { agent: navigator.userAgent, runs: {}, errors: [], requests: 0 };
   addEventListener("error", (event) => report.errors.push(event.message));
@@ -14,7 +14,7 @@
   };
   const find = (selector) => document.querySelector(selector);
   const button = (text) => [...document.querySelectorAll(".live button")].find((one) => one.textContent === text);
-  // Saved files are kept here, not downloaded: a browser that asks for a location stops drawing.
+  // Keeps saved files instead of downloading them, because a browser that asks where to save a file stops drawing.
   let saved = null;
   HTMLAnchorElement.prototype.click = () => {};
   URL.createObjectURL = (blob) => ((saved = blob), "data:,");
@@ -61,7 +61,7 @@
         report.runs[value] = { parameters: { use_omega: true }, csv: await csv() };
       }
     }
-    // Sets a motor angle during a motion, then a parameter; the inputs stay the same.
+    // Sets a motor angle during a motion, and then a parameter, which does not change the inputs.
     await go({ motion: "tour", speed: "1" });
     await until(() => parseFloat(clock.textContent) > 0.2 && parseFloat(clock.textContent) < 0.9);
     change(find("#live-theta1"), "30");

@@ -1,4 +1,4 @@
-"""The page in the FMU, opened from a file in real browsers: results are bit-identical to the library, without network requests."""
+"""Opens the page in the FMU from a file in real browsers. Results are bit-identical to the library, and nothing is requested."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def with_visitor(fmu: Path, address: str) -> str:
     """Returns the page with the reference experiments as motions, and with the script of a visitor."""
     with zipfile.ZipFile(fmu) as archive:
         page = archive.read("documentation/index.html").decode()
-    # The page's policy admits the page's own scripts only.
+    # The content security policy is removed, because it only allows the page's own scripts.
     page, count = re.subn(r'<meta http-equiv="Content-Security-Policy"[^>]*>', "", page)
     assert count == 1
     experiments = read_experiments(fmu)

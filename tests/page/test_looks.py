@@ -1,4 +1,4 @@
-"""What visitors see: order and space in windows of all sizes, on paper, and colours that everyone can tell from their ground."""
+"""The layout of the pages in windows of all sizes and on paper, and the contrast of their colours."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from playwright.sync_api import Page, expect
 from visiting import button, drawn
 
 SIZES = [(320, 640), (360, 740), (683, 384), (768, 1024), (1366, 768), (1920, 1080)]
-#: Reports the shifts of the layout from the start.
+#: Adds up the layout shifts since the page was opened.
 SHIFTS = """window.shift = 0; new PerformanceObserver((list) => list.getEntries().forEach((entry) => window.shift += entry.value))
 .observe({ type: "layout-shift", buffered: true });"""
 
@@ -25,11 +25,13 @@ def box(page: Page, selector: str) -> dict[str, float]:
 @pytest.mark.parametrize(("width", "height"), SIZES)
 @pytest.mark.parametrize("which", ["testbed", "controller"])
 def test_the_machine_comes_first(
-    visit: Any, address: str, controllers: str, which: str, width: int, height: int
+    visit: Any, address: str, controller_address: str, which: str, width: int, height: int
 ) -> None:
-    """The machine is in the first window, its plots are next to it or below, and nothing moves or scrolls to the side."""
+    """The machine is visible without scrolling, its plots are next to it or below, and nothing shifts or is wider than the window."""
     page = visit(
-        at=address if which == "testbed" else controllers, script=SHIFTS, viewport={"width": width, "height": height}
+        at=address if which == "testbed" else controller_address,
+        script=SHIFTS,
+        viewport={"width": width, "height": height},
     )
     button(page, "Pause").wait_for()
     page.wait_for_timeout(1200)
@@ -46,7 +48,7 @@ def test_the_machine_comes_first(
         assert control["bottom"] < height and scene["y"] + 0.5 * scene["height"] < height
     assert scene["y"] < 0.75 * height
     if width < 832:
-        # The bar of the time and one row of buttons are between the machine and its plots.
+        # The time slider and one row of buttons are between the machine and its plots.
         assert 0 < plots["y"] - scene["bottom"] < 130
     else:
         assert abs(plots["y"] - scene["y"]) < 5 and plots["x"] > scene["right"]
@@ -54,8 +56,8 @@ def test_the_machine_comes_first(
         assert box(page, later)["y"] > plots["bottom"], later
 
 
-def test_nothing_moves_while_numbers_are_dragged(visit: Any) -> None:
-    """On a phone a number of the step, the machine and the first plot are in one window."""
+def test_number_machine_and_plot_fit_on_a_phone(visit: Any) -> None:
+    """On a phone, the number that a visitor drags, the machine and the first plot fit into one window."""
     page = visit("#try", viewport={"width": 360, "height": 740}, reduced_motion="reduce")
     for number in range(5):
         page.locator(".live-steps button").nth(number).click()
@@ -66,7 +68,7 @@ def test_nothing_moves_while_numbers_are_dragged(visit: Any) -> None:
 
 
 def test_without_scripts_and_on_paper(visit: Any) -> None:
-    """Without the program the page has no gap; on paper it has no controls, and code wraps."""
+    """Without scripts the page has no gap. On paper it has no controls, and long lines of code wrap."""
     page = visit(java_script_enabled=False)
     first = box(page, "main section h2")
     assert first["y"] < 500
@@ -85,7 +87,7 @@ def test_without_scripts_and_on_paper(visit: Any) -> None:
 
 
 def luminance(colour: str) -> float:
-    """The relative luminance of WCAG 2.2."""
+    """Returns the relative luminance of WCAG 2.2."""
     numbers = [int(part) for part in re.findall(r"\d+", colour)[:3]]
     linear = [value / 3294.6 if value <= 10 else ((value / 255 + 0.055) / 1.055) ** 2.4 for value in numbers]
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
@@ -107,8 +109,9 @@ CanvasRenderingContext2D.prototype.fillText = function (text, ...more) {
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_colours_differ_from_their_ground(visit: Any, scheme: str) -> None:
-    """Labels reach a contrast of 4.5, borders of controls and curves one of 3 (WCAG 2.2, 1.4.3 and 1.4.11)."""
+def test_colours_contrast_with_their_background(visit: Any, scheme: str) -> None:
+    """The contrast with the background is at least 4.5 for labels, and 3 for borders of controls and for curves (WCAG 2.2, 1.4.3
+    and 1.4.11)."""
     page = visit("#try&motion=shake", script=RECORD, color_scheme=scheme, reduced_motion="reduce")
     page.wait_for_timeout(300)
     button(page, "Look inside").click()

@@ -1,4 +1,4 @@
-"""The steps of the page: each number in a sentence is the FMU's, as FMPy calculates it, at all values that a visitor can set."""
+"""Each number in the sentences of the page's steps equals the result of the FMU in FMPy, at several values that a visitor can set."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ from playwright.sync_api import Page, expect
 from visiting import button, clock, drawn, field, saved, until
 
 STEPS = ["1. One motor", "2. Both motors", "3. Resonance", "4. Stop dead", "5. Controller"]
-#: Resolution of the frequency, Hz.
-RESOLUTION = 0.05
 
 
 def step(page: Page, number: int) -> None:
@@ -23,13 +21,13 @@ def step(page: Page, number: int) -> None:
 
 
 def text(page: Page, part: str = "what") -> str:
-    """The paragraph that explains the step, or the paragraph with the reason, after the run is calculated."""
+    """Returns the paragraph that explains the step ("what") or gives the reason ("why"), after the run is calculated."""
     for _ in range(5):
         drawn(page)
     return str(page.locator(f".live-{part} p.live-chosen").inner_text()).replace("\u00a0", " ").replace("\u2212", "-")
 
 
-def dial(page: Page, name: str, value: float) -> None:
+def set_number(page: Page, name: str, value: float) -> None:
     """Sets a number of the paragraph with the keyboard."""
     number = page.locator(".live-what p.live-chosen").get_by_role("slider", name=name)
     for _ in range(400):
@@ -65,7 +63,7 @@ def replayed(fmu: Path, csv: str, **start: float) -> Any:
 
 
 def gain(fmu: Path, frequency: float, **start: float) -> float:
-    """How far the wrist swings, as a multiple of the swing of both motors, in FMPy."""
+    """Returns how far the wrist swings in FMPy, as a multiple of the swing of both motors."""
     turn = 2 * np.pi * frequency
     time = np.arange(0, 3 + 4 / frequency, 1e-3)
     theta, omega = 0.02 * (1 - np.cos(turn * time)), 0.02 * turn * np.sin(turn * time)
@@ -74,7 +72,7 @@ def gain(fmu: Path, frequency: float, **start: float) -> float:
 
 
 def test_one_motor_does_both(visit: Any, fmu: Path) -> None:
-    """The page opens with the surprise, and says by which angles the wrist pitches and rolls."""
+    """The page opens with this step, and says by which angles the wrist pitches and rolls."""
     page = visit()
     expect(page.locator(".lead")).to_have_text(
         "Two motors turn one shaft: together they pitch it, against each other they roll it."
@@ -85,7 +83,7 @@ def test_one_motor_does_both(visit: Any, fmu: Path) -> None:
             page.locator(".live-parameters").evaluate("e => e.open = true")
             field(page, name).fill(str(count))
             field(page, name).press("Enter")
-        dial(page, "Angle of motor 1", angle)
+        set_number(page, "Angle of motor 1", angle)
         found, rows = replayed(fmu, saved(page), **counts)
         numbers = [float(one) for one in re.findall(r"(-?[\d.]+)°", text(page))]
         assert numbers[0] == angle and not rows["theta2"].any()
@@ -101,14 +99,14 @@ def test_mean_and_difference(visit: Any, fmu: Path) -> None:
         page.locator(".live-parameters").evaluate("e => e.open = true")
         field(page, "M").fill(str(lobes))
         field(page, "M").press("Enter")
-        dial(page, "Angle of the motors", angle)
+        set_number(page, "Angle of the motors", angle)
         assert f"roll is {ratio} times their difference" in text(page)
         found, rows = replayed(fmu, saved(page), M=lobes)
         together = rows["time"] < 2.5
         assert np.abs(found["roll"][together]).max() < 1e-9 and np.abs(found["pitch"][~together]).max() < 1e-2
         roll = float(re.findall(r"by ([\d.]+)°\.$", text(page))[0])
         assert roll == pytest.approx(angle * 7 / lobes, abs=0.06)
-        # A slow motion follows the ratio of the rigid wrist.
+        # The motion is slow, so the wrist turns like a rigid one.
         assert np.rad2deg(np.abs(found["roll"]).max()) == pytest.approx(roll, rel=0.05)
         assert f"7 rollers each, which push the {lobes} lobes" in text(page, "why")
 
@@ -120,7 +118,7 @@ def test_resonance(visit: Any, fmu: Path) -> None:
     expect(field(page, "k2")).to_have_value("0.76")
     assert "at 1.00 Hz" in text(page)
     for softness, peak in [(0.76, (5.35, 2.04)), (0.3, (3.31, 1.375)), (1.5, (6.85, 2.70))]:
-        dial(page, "Stiffness k2", softness)
+        set_number(page, "Stiffness k2", softness)
         height, place = map(float, re.findall(r"([\d.]+) times as far, at ([\d.]+) Hz", text(page))[0])
         k2 = np.rad2deg(softness)
         assert (place, height) == pytest.approx(peak, abs=0.06)
@@ -130,7 +128,7 @@ def test_resonance(visit: Any, fmu: Path) -> None:
         assert ("the peak is lower" in text(page, "why")) == (softness < 0.76)
         assert ("the peak is higher" in text(page, "why")) == (softness > 0.76)
     for frequency in (5.0, 6.85):
-        dial(page, "Frequency", frequency)
+        set_number(page, "Frequency", frequency)
         says = float(re.findall(r"The wrist swings ([\d.]+) times", text(page))[0])
         assert says == pytest.approx(gain(fmu, frequency, k2=np.rad2deg(1.5)), abs=0.006)
         assert ("This is the peak" in text(page)) == (frequency == 6.85)
@@ -141,12 +139,12 @@ def test_resonance(visit: Any, fmu: Path) -> None:
 
 
 def test_stop_dead(visit: Any, fmu: Path) -> None:
-    """The vibrating move first, then the move in two parts of 14.1 and 5.9 degrees; both overshoots are FMPy's."""
+    """The move in one go comes first, then the move in two parts of 14.1 and 5.9 degrees. Both overshoots equal FMPy's."""
     page = visit(reduced_motion="reduce")
     step(page, 4)
     assert "two parts, 14.1° and, half a swing later, 5.9°" in text(page)
     for softness in (0.76, 0.4, 2.0, 0.1):
-        dial(page, "Stiffness k2", softness)
+        set_number(page, "Stiffness k2", softness)
         found, rows = replayed(fmu, saved(page), k2=np.rad2deg(softness))
         first = np.searchsorted(rows["time"], 1.9 + 0.095)
         assert np.rad2deg(rows["theta1"][first]) == pytest.approx(14.1, abs=0.2)
@@ -165,7 +163,7 @@ def test_stop_dead(visit: Any, fmu: Path) -> None:
 
 
 def test_the_comparison_stays_while_a_number_is_dragged(visit: Any) -> None:
-    """The grey curve is always the other motion with the same parameters, and its label is at the curve."""
+    """In this step the grey curve is always the other motion with the same parameters. In others it is the run before the change."""
     page = visit("#try&motion=shaped", reduced_motion="reduce")
     page.wait_for_timeout(300)
     labels = (
@@ -193,8 +191,8 @@ def test_the_controller(visit: Any) -> None:
     page = visit(reduced_motion="reduce")
     step(page, 5)
     for pitch, roll in [(25, 50), (-10, 50), (-10, -7)]:
-        dial(page, "Pitch wanted", pitch)
-        dial(page, "Roll wanted", roll)
+        set_number(page, "Pitch wanted", pitch)
+        set_number(page, "Roll wanted", roll)
         rows = np.genfromtxt(io.StringIO(saved(page)), delimiter=",", names=True, skip_header=2)
         late = np.searchsorted(rows["time"], 1.65 - 1e-9)
         numbers = [float(one) for one in re.findall(r"(-?[\d.]+)°", text(page))]

@@ -209,7 +209,7 @@ def test_a_field_can_be_filled_in_while_a_motion_plays(visit: Any) -> None:
     ],
 )
 def test_an_impossible_value(visit: Any, name: str, value: str, message: str) -> None:
-    """The field says its name, its unit and its range, and the run goes on with the value before."""
+    """The message states the name, the unit and the range of the field, and the run continues with the previous value."""
     page = visit("#try&motion=chirp&speed=0.2", viewport={"width": 1300, "height": 900})
     page.locator(".live-parameters").evaluate("e => e.open = true")
     before = saved(page).splitlines()[1]
@@ -253,7 +253,7 @@ def test_an_impossible_value_in_a_link(visit: Any, setting: str, message: str) -
     assert saved(page).count("\n") > 1000
 
 
-#: The module rejects motor angles above 1 rad.
+#: Changes the module, so that it rejects motor angles above 1 rad.
 REJECTING = """
 const { Instance } = WebAssembly;
 WebAssembly.Instance = function (...all) {
@@ -267,7 +267,7 @@ WebAssembly.Instance = function (...all) {
 
 
 def test_a_value_that_the_fmu_rejects(visit: Any) -> None:
-    """The run stops until another value is set, and continues from there."""
+    """The run stops until another value is set, and then continues from there."""
     page = visit("#try&motion=hand&theta1=0.5&speed=1", script=REJECTING)
     page.locator(".live-clock").wait_for()
     until(page, "parseFloat(document.querySelector('.live-clock').textContent) > 0.1")
@@ -298,7 +298,7 @@ def test_the_cam_has_as_many_lobes_as_the_fmu(visit: Any) -> None:
 
 
 def motors_and_wrist(page: Page) -> tuple[float, float, float, float]:
-    """Motor angles of the sliders, and pitch and roll at the end of the run, deg."""
+    """Returns the motor angles of the sliders, and pitch and roll at the end of the run, in deg."""
     rows = np.genfromtxt(io.StringIO(saved(page)), delimiter=",", names=True, skip_header=2)
     motors = (float(field(page, name).input_value()) for name in ("theta1", "theta2"))
     return (*motors, *(float(np.rad2deg(rows[name][-1])) for name in ("pitch", "roll")))
@@ -322,7 +322,7 @@ def test_the_gripper_follows_the_hand(visit: Any) -> None:
         drag(page, gripper, (gripper[0], gripper[1] + 30))
         page.wait_for_timeout(2500)
         theta1, theta2, pitch, roll_after = motors_and_wrist(page)
-        # From the front the gripper comes towards the viewer, and from behind, too.
+        # The gripper comes towards the viewer, so in the view from behind the pitch is negative.
         assert (pitch > 10) if turns == 0 else (pitch < -10)
         assert roll_after == pytest.approx(roll, abs=0.5)
         says = page.locator(".live-what p.live-chosen").inner_text().replace("−", "-")
@@ -331,7 +331,7 @@ def test_the_gripper_follows_the_hand(visit: Any) -> None:
         )
 
 
-def test_a_run_by_hand_goes_on(visit: Any) -> None:
+def test_a_run_by_hand_continues(visit: Any) -> None:
     """After two minutes a new run begins where the last one ended, and the page says so."""
     page = visit("#try&motion=hand&theta1=0.3&speed=100")
     expect(page.locator(".live-status")).to_contain_text("a new one has begun where the last one ended", timeout=60000)
@@ -343,7 +343,7 @@ def test_a_run_by_hand_goes_on(visit: Any) -> None:
 
 
 def test_the_address_and_back(visit: Any) -> None:
-    """Each address shows what it says; a link to the run does not restart it."""
+    """Each address in the history shows its own motion and parameters. Making a link does not restart the run."""
     page = visit("#try&motion=chirp&speed=0.2")
     button(page, "Pause").wait_for()
     until(page, "parseFloat(document.querySelector('.live-clock').textContent) > 0.1")
@@ -372,9 +372,9 @@ def test_the_address_and_back(visit: Any) -> None:
     expect(frequency).to_have_text("1.05\u00a0Hz")
 
 
-def test_the_controllers_page_runs_the_loop(visit: Any, controllers: str) -> None:
-    """The testbed runs next to the controller: the wrist goes where it is wanted, also by hand."""
-    page = visit(at=controllers)
+def test_the_controllers_page_runs_the_loop(visit: Any, controller_address: str) -> None:
+    """The testbed runs next to the controller, and the wrist reaches its goals, also goals that are set by hand."""
+    page = visit(at=controller_address)
     button(page, "Pause").click()
     rows = np.genfromtxt(io.StringIO(saved(page)), delimiter=",", names=True, skip_header=2)
     late = np.searchsorted(rows["time"], 1.85)
@@ -418,7 +418,7 @@ def test_a_motor_follows_the_hand(visit: Any) -> None:
 
 
 def test_the_depth_buffer_draws_the_same_wrist(visit: Any) -> None:
-    """The images with WebGL, even if WebGL is slow, and without WebGL differ only at edges."""
+    """Images with WebGL, even if it is slow, and images without WebGL only differ at edges."""
     slow = "const get = HTMLCanvasElement.prototype.getContext; HTMLCanvasElement.prototype.getContext = function (kind, options) { return "
     images = []
     for context in (
@@ -434,7 +434,7 @@ def test_the_depth_buffer_draws_the_same_wrist(visit: Any) -> None:
     assert drawn > 0.05 and differs < 0.1 * drawn
 
 
-#: The module ends its run at 0.5 s.
+#: Changes the module, so that it ends its run at 0.5 s.
 ENDING = """
 const { Instance } = WebAssembly;
 WebAssembly.Instance = function (...all) {
@@ -448,7 +448,7 @@ WebAssembly.Instance = function (...all) {
 
 
 def test_a_run_that_the_fmu_ends(visit: Any) -> None:
-    """The end of a run is not an error, and the time stays at the last result."""
+    """If the FMU ends the run, this is not an error, and the time stays at the last result."""
     page = visit("#try&motion=tour&speed=2", script=ENDING)
     expect(page.locator(".live-status")).to_have_text("The FMU has ended the run at 0.5 s.")
     expect(page.locator(".live-error")).to_have_count(0)
@@ -465,7 +465,7 @@ def make_model(directory: Path, name: str) -> Path:
     return directory / name / "target/fmu" / f"{name}.fmu"
 
 
-#: Counts the lines of the kept canvas that are neither level nor upright, in a colour of a curve.
+#: Counts the line segments of curves on the canvas `window.kept`: slanted ones, and level or vertical ones.
 LINES = """
 const { moveTo, lineTo, stroke } = CanvasRenderingContext2D.prototype;
 let path = [];
@@ -503,7 +503,7 @@ def test_a_model_reads_its_resources(browser: Browser, tmp_path: Path) -> None:
 
 
 def test_a_link_in_the_page_leads_there(visit: Any) -> None:
-    """The browser lays out lower sections only when they become visible."""
+    """The link finds its section, although the browser lays out lower sections only when they become visible."""
     page = visit()
     button(page, "Pause").click()
     page.get_by_role("link", name="The equations").click()
@@ -527,7 +527,7 @@ def test_time_goes_on_while_a_motor_is_dragged(visit: Any) -> None:
 
 
 def test_generated_pages(browser: Browser, tmp_path: Path) -> None:
-    """Signals that switch are drawn as steps, parameters are in one grid with inputs, steps and ranges are round, and a table lists the variables."""
+    """Signals that switch are drawn as steps, a table lists the variables, and fields show the inputs at the current time."""
     pages = {}
     for name in ("ball", "lag"):
         address = page_of(make_model(tmp_path, name), tmp_path / name)

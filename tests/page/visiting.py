@@ -20,7 +20,7 @@ def drawn(page: Page) -> None:
 
 
 def until(page: Page, condition: str) -> None:
-    """Waits for a condition; the page's policy forbids Playwright to do that in the page."""
+    """Waits for a condition. Playwright cannot wait in the page, because the page's content security policy forbids it."""
     for _ in range(1500):
         if page.evaluate(condition):
             return
@@ -67,8 +67,8 @@ def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> No
 
 
 def find_part(page: Page, cursor: str = "ns-resize") -> tuple[float, float]:
-    """Returns the position of motor 1 (or of the gripper, with the cursor "move") in the image, found by the cursor's shape. The
-    mouse stays there."""
+    """Returns a position in the image at which the mouse cursor has this shape, and leaves the mouse there. Motor 1 has the cursor
+    "ns-resize", the gripper "move"."""
     scene = page.locator(".live-scene")
     box = scene.bounding_box()
     assert box

@@ -26,33 +26,33 @@ def pytest_configure() -> None:
 
 
 def names(archive: Path) -> set[str]:
-    """The names of the files in an archive that is intact."""
+    """Checks that an archive is intact, and returns the names of its files."""
     with zipfile.ZipFile(archive) as content:
         assert content.testzip() is None
         return set(content.namelist())
 
 
 def binaries(fmu: Path) -> dict[str, bytes]:
-    """The libraries of an FMU by the name of the directory in `binaries/`."""
+    """Returns the libraries of an FMU by the name of the directory in `binaries/`."""
     with zipfile.ZipFile(fmu) as archive:
         return {name.split("/")[1]: archive.read(name) for name in archive.namelist() if name.startswith("binaries/")}
 
 
 def wheel(target: Target) -> Path:
-    """The wheel of fmu-run for a target."""
+    """Returns the wheel of fmu-run for a target."""
     (path,) = DIST.glob(f"fmu_run-*{target.wheel}*.whl")
     return path
 
 
 def prw_wheel() -> Path:
-    """The wheel of prw."""
+    """Returns the wheel of prw."""
     (path,) = DIST.glob("prw-*-py3-none-any.whl")
     return path
 
 
 @pytest.fixture(scope="session")
 def wine(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The environment of programs for Windows: an empty Windows, without a display."""
+    """The environment variables of programs for Windows, which run in an empty Windows without a display."""
     toolchain.need(toolchain.WINE)
     environment = toolchain.windows(tmp_path_factory.mktemp("wine"))
     subprocess.run([toolchain.WINE, "wineboot", "--init"], env=environment, capture_output=True, timeout=300)

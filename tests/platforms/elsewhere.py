@@ -1,4 +1,4 @@
-"""Runs the FMUs in any Python from 3.11 on, and prints the bits of all results:
+"""Runs the FMUs in any Python from 3.11 on, and prints all results exactly, as hexadecimal numbers:
 
     python elsewhere.py RECORDING FMU...
 
@@ -25,7 +25,7 @@ def show(name, values) -> None:
 
 
 def batch(path) -> None:
-    """Two runs, which must differ, and the derivatives and the state of an instance."""
+    """Prints two runs, which must differ, and derivatives of an instance. Checks that a restored state gives the same outputs."""
     with fmu_run.Fmu(path) as fmu:
         start = {"k1": np.array([60.0, 240.0])}
         runs = fmu.run(TIME, inputs=MOTORS, start=start, outputs=OUTPUTS, every=25).check()
@@ -48,11 +48,11 @@ def batch(path) -> None:
 
 
 def importer(path, kind) -> None:
-    """FMPy, which finds the library and calls it without fmu_run."""
+    """Prints the results of FMPy, which finds the library and calls it without fmu_run."""
     motors = {"time": TIME, **MOTORS, **RATES}
     table = np.array(list(zip(*motors.values())), dtype=[(name, float) for name in motors])
     start = {"k1": 250.0, "use_omega": True}
-    # CVode is not in FMPy for ARM.
+    # FMPy for ARM does not contain CVode.
     given = {"fmi_type": kind, "solver": "Euler", "step_size": 1e-3, "input": table, "output": OUTPUTS}
     rows = fmpy.simulate_fmu(path, stop_time=0.5, output_interval=0.01, start_values=start, **given)
     for name in OUTPUTS:

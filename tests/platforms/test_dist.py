@@ -29,8 +29,8 @@ SYSTEM = "prw_closed_loop.ssp"
 CRATE = ROOT / "crates" / "fmu-run"
 
 
-def others(name: str) -> dict[str, bytes]:
-    """The files of an FMU except binaries and sources."""
+def files_except_binaries(name: str) -> dict[str, bytes]:
+    """Returns the files of an FMU except binaries and sources."""
     with zipfile.ZipFile(DIST / name) as archive:
         kept = (file for file in archive.namelist() if not file.startswith(("binaries/", "sources/")))
         return {file: archive.read(file) for file in kept}
@@ -48,7 +48,7 @@ def test_all_files_of_one_version() -> None:
     for path in DIST.glob("*.whl"):
         assert path.name.split("-")[1] == version
     for name in MODEL_FMUS:
-        assert f'version="{version}"'.encode() in others(name)["modelDescription.xml"], name
+        assert f'version="{version}"'.encode() in files_except_binaries(name)["modelDescription.xml"], name
     compilers = (DIST / "compilers.txt").read_text(encoding="utf-8")
     assert [line.split(": ")[0] for line in compilers.splitlines()] == ["rustc", "python-zig", "wasm2c"]
 
@@ -75,11 +75,11 @@ def test_fmus_for_fmi_3_have_the_same_libraries_and_documents(model: str) -> Non
     in_fmi2 = {targets: directory for directory, targets in DIRECTORIES.items()}
     for directory, targets in FMI3_DIRECTORIES.items():
         if directory == "x86_64-darwin":
-            # The Intel half of the universal library.
+            # This library is the Intel half of the universal library.
             assert three[directory] in two["darwin64"]
         else:
             assert three[directory] == two[in_fmi2[targets]], directory
-    documents3, documents2 = others(f"{model}-fmi3.fmu"), others(f"{model}.fmu")
+    documents3, documents2 = files_except_binaries(f"{model}-fmi3.fmu"), files_except_binaries(f"{model}.fmu")
     assert documents3["terminalsAndIcons/icon.png"] == documents2["model.png"]
     for name in {*documents2, *documents3}:
         assert not name.startswith("documentation/") or documents2[name] == documents3[name]
@@ -89,9 +89,9 @@ def test_the_variants_of_the_fmu() -> None:
     """One variant is for importers on ARM, which look in linux64. Another contains C sources, which tests/source_fmu compiles."""
     fmu = DIST / f"{MODEL}.fmu"
     assert binaries(DIST / ARM)["linux64"] == binaries(fmu)["aarch64-linux"]
-    assert others(ARM) == others(fmu.name)
-    source = others(SOURCE)
-    for name, content in others(fmu.name).items():
+    assert files_except_binaries(ARM) == files_except_binaries(fmu.name)
+    source = files_except_binaries(SOURCE)
+    for name, content in files_except_binaries(fmu.name).items():
         # The page contains the model description, which lists the source files.
         assert name in ("modelDescription.xml", "documentation/index.html") or source[name] == content, name
     sources = {f"sources/{MODEL}{end}" for end in (".c", "_fmi2.c", ".h", "_runtime.h")}
@@ -102,7 +102,7 @@ def test_the_variants_of_the_fmu() -> None:
 def test_the_page_and_the_fmus_in_other_files() -> None:
     page = (DIST / f"{MODEL}.html").read_text(encoding="utf-8")
     assert "\nlive([\n{ description: " in script_of(page)
-    assert others(f"{MODEL}.fmu")["documentation/index.html"].decode() == page
+    assert files_except_binaries(f"{MODEL}.fmu")["documentation/index.html"].decode() == page
     with zipfile.ZipFile(DIST / SYSTEM) as system:
         fmus = {name: system.read(name) for name in system.namelist() if name.endswith(".fmu")}
     assert fmus == {f"resources/{model}.fmu": (DIST / f"{model}.fmu").read_bytes() for model in MODELS}
@@ -120,7 +120,9 @@ def test_the_bills_of_materials(product: Product) -> None:
     if product in (FMU, CONTROLLER_FMU):
         # These packages are used to pack FMUs, and are not in their libraries.
         assert not {"clap", "zip", "serde_json", "anyhow"} & components
-        assert others(f"{product.name}.fmu")[f"documentation/licenses/{product.bill.name}"].decode() == text
+        assert (
+            files_except_binaries(f"{product.name}.fmu")[f"documentation/licenses/{product.bill.name}"].decode() == text
+        )
 
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.triple)

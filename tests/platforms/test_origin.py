@@ -13,14 +13,14 @@ from pathlib import Path
 import pytest
 from conftest import DIST, ROOT
 
-#: Directories of this machine, and patterns of directories of others.
+#: Directories of this machine, and a pattern for directories of other machines.
 DIRECTORIES = {str(ROOT), str(Path.home()), f"{tempfile.gettempdir()}/", "/.cargo/", "/.rustup/", "rustlib", "/usr/src"}
 DIRECTORIES |= {os.environ[name] for name in ("CARGO_HOME", "CARGO_TARGET_DIR") if os.environ.get(name)}
 OTHERS = re.compile(rb"/home/\w+/|/Users/\w+/|[A-Z]:\\(?:Users|a)\\", re.IGNORECASE)
 
 
 def contents(name: str, content: bytes) -> Iterator[tuple[str, bytes]]:
-    """Yields a file and all files in nested archives; of C sources also the strings that are written as numbers."""
+    """Yields a file and all files in nested archives, and for C sources also the bytes that are written as numbers."""
     yield name, content
     if name.endswith(".c"):
         yield name, bytes(int(number, 16) for number in re.findall(rb"\b0x([0-9a-f]{2})\b", content))
@@ -35,7 +35,7 @@ def origins(name: str, content: bytes) -> list[str]:
     found = []
     for path, text in contents(name, content):
         for directory in DIRECTORIES:
-            # Windows has strings with two bytes per character.
+            # Strings in Windows may have two bytes per character.
             if any(directory.encode(encoding) in text for encoding in ("utf-8", "utf-16-le")):
                 found.append(f"{directory} in {path}")
         found += [f"{match.decode()} in {path}" for match in OTHERS.findall(text)]

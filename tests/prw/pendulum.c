@@ -1,6 +1,6 @@
-/* A damped pendulum as an FMU: angle'' = torque - k sin(angle) - angle'. Not linear, so that what its linear model is
- * depends on where it hangs. Of FMI 2.0 for Model Exchange alone, or with FMI3 of FMI 3.0 for Co-Simulation alone; it has only
- * the functions that a linear model takes. */
+/* A damped pendulum as an FMU: angle'' = torque - k sin(angle) - angle'. It is nonlinear, so its linear model depends on the angle.
+ * The FMU supports only Model Exchange of FMI 2.0 or, if FMI3 is defined, only Co-Simulation of FMI 3.0. It only has the functions
+ * that linearization needs. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -93,7 +93,7 @@ Status fmi2SetupExperiment(Instance i, fmi2Boolean b, fmi2Real t, fmi2Real s, fm
 }
 Status fmi2EnterInitializationMode(Instance i) { return (void)i, OK; }
 Status fmi2ExitInitializationMode(Instance i) { return (void)i, OK; }
-/* The second round is the last. */
+/* The event iteration takes two calls. */
 Status fmi2NewDiscreteStates(Instance i, fmi2EventInfo *info) {
     Pendulum *p = i;
     *info = (fmi2EventInfo){.newDiscreteStatesNeeded = !p->ready};

@@ -41,7 +41,7 @@ def test_import_loads_nothing(tmp_path: Path) -> None:
 
 
 def test_all_names_are_there(tmp_path: Path) -> None:
-    """After any imports, no module of the package replaces a function."""
+    """Importing all modules replaces no function of the package by a module with the same name."""
     program = (
         "import prw, pkgutil, importlib\n"
         "for module in pkgutil.walk_packages(prw.__path__, 'prw.'):\n"
@@ -105,7 +105,7 @@ def test_a_run_is_written_converted_and_drawn(testbed: Path, tmp_path: Path) -> 
 
 
 def test_numbers_are_read_back_unchanged(tmp_path: Path) -> None:
-    """Short and long ones, neighbours of powers of ten and two, and numbers with an exponent."""
+    """Tests short and long numbers, neighbours of powers of ten and two, and numbers with an exponent."""
     draws, path = np.random.default_rng(2), tmp_path / "motion.csv"
     powers = np.concatenate([10.0 ** np.arange(-6, 20), 2.0 ** np.arange(-16, 60)])
     near = np.concatenate(
@@ -121,7 +121,7 @@ def test_numbers_are_read_back_unchanged(tmp_path: Path) -> None:
 
 
 def test_where_the_fmu_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """PRW_FMU first, then the FMU in an installed package, then the clone's; the working directory does not matter."""
+    """PRW_FMU comes first, then the FMU in an installed package, then the FMU in the clone. The working directory does not matter."""
     own, here = tmp_path / "site" / "prw", tmp_path / "work" / "target" / "fmu"
     shutil.copytree(Path(prw.__path__[0]), own, ignore=shutil.ignore_patterns("__pycache__"))
     here.mkdir(parents=True)
@@ -157,7 +157,7 @@ def test_where_the_fmu_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 @pytest.mark.parametrize("rates", [False, True])
 def test_coarse_sampling_is_reported(testbed: Path, rates: bool) -> None:
-    """A sine of 3 Hz, compared with its samples at 20 kHz."""
+    """The reported error of a coarsely sampled sine of 3 Hz agrees with its difference from the same sine sampled at 20 kHz."""
 
     def motion(rate: int, with_rates: bool) -> prw.Motion:
         time = np.arange(rate + 1) / rate
@@ -188,7 +188,7 @@ def test_the_rates_of_coarse_sampling() -> None:
 
 
 def test_two_times(testbed: Path) -> None:
-    """Two rows are enough, as the error for a single row says. They are too few for an estimate of the sampling error."""
+    """Two rows are enough for a simulation, but too few for an estimate of the sampling error."""
     run = prw.simulate({"time": [0.0, 1e-3], "theta1": [0.0, 1e-4], "theta2": [0.0, -1e-4]}, fmu=testbed)
     assert len(run["roll"]) == 2 and run.sampling_errors == {} and run.doubt == ""
     assert (
@@ -203,7 +203,7 @@ def test_two_times(testbed: Path) -> None:
 
 def test_wrong_motions() -> None:
     time, theta = [0.0, 1.0], [[0.0, 0.0], [1.0, 1.0]]
-    for arguments, complaint in [
+    for arguments, message in [
         ((None, theta), "motion: time is None; it must be an array"),
         (([0.0], [[0.0, 0.0]]), r"time has the shape \(1,\); it must be \(n,\), with at least two times"),
         ((time, [0.0, 1.0]), r"theta has the shape \(2,\); it must be \(2, 2\), a column each motor"),
@@ -212,12 +212,12 @@ def test_wrong_motions() -> None:
         (([0.0, float("nan")], theta), "time must increase"),
         ((["now", "then"], theta), "time does not consist of numbers"),
     ]:
-        with pytest.raises(prw.UserError, match=complaint):
+        with pytest.raises(prw.UserError, match=message):
             prw.Motion(*arguments)  # type: ignore[arg-type]
 
 
 def test_wrong_simulations(testbed: Path, tmp_path: Path) -> None:
-    for arguments, complaint in [
+    for arguments, message in [
         ({"parameters": {"k9": 1.0}}, "parameters: k9 is not known; there are J2, J3, H3"),
         ({"parameters": {"k1": -1.0}}, "the FMU stopped: .*k1 must not be below 1e-300"),
         ({"parameters": {"N": 7.5}}, "N.* 7.5"),
@@ -229,7 +229,7 @@ def test_wrong_simulations(testbed: Path, tmp_path: Path) -> None:
         ({"fmu": tmp_path / "absent.fmu"}, "absent.fmu: no such FMU$"),
         ({"motion": tmp_path / "absent.csv"}, "absent.csv: cannot be read"),
     ]:
-        with pytest.raises(prw.UserError, match=complaint) as caught:
+        with pytest.raises(prw.UserError, match=message) as caught:
             prw.simulate(**{"fmu": testbed, **dict(arguments)})  # type: ignore[call-overload]
         assert "\n" not in str(caught.value)
 
@@ -246,7 +246,7 @@ def test_sweep_draws(testbed: Path) -> None:
 
 
 def test_wrong_sweeps(testbed: Path) -> None:
-    for arguments, complaint in [
+    for arguments, message in [
         ({}, "nothing varies; give values of a parameter"),
         ({"grid": {"k9": [1.0]}}, "k9 is not known; there are J2"),
         ({"grid": {"k1": []}}, "k1: .* are not the values of a parameter"),
@@ -263,7 +263,7 @@ def test_wrong_sweeps(testbed: Path) -> None:
         ({"random": {"k1": 0.1}, "threads": 0}, "threads 0: at least 1"),
         ({"grid": {"k1": np.ones(4000), "k2": np.ones(4000)}}, "16000000 runs are more than"),
     ]:
-        with pytest.raises(prw.UserError, match=complaint):
+        with pytest.raises(prw.UserError, match=message):
             prw.sweep(fmu=testbed, **arguments)  # type: ignore[arg-type]
 
 
@@ -286,12 +286,12 @@ def test_the_command_linearize(testbed: Path, tmp_path: Path) -> None:
     written = json.loads((tmp_path / "out" / "linear.json").read_text())
     np.testing.assert_array_equal(written["A"], prw.linearize({"k1": 90.0}, fmu=testbed).A)
     assert written["outputs"][0] == "tau1" and written["units"]["tau1"] == "N.m"
-    for wrong, complaint in (
+    for wrong, message in (
         ("k1", "--set k1: write NAME=VALUE"),
         ("k1=stiff", "--set k1=stiff: 'stiff' is not a number"),
     ):
         result = command("--set", wrong)
-        assert result.returncode == 1 and complaint in result.stderr and result.stderr.count("\n") == 1
+        assert result.returncode == 1 and message in result.stderr and result.stderr.count("\n") == 1
 
 
 def blocks(page: str) -> list[tuple[str, str]]:

@@ -1,4 +1,4 @@
-"""`prw.linearize` on FMUs of every kind, compared with the oracle, and with pen and paper for a pendulum."""
+"""Compares `prw.linearize` with the oracle for the testbed, and with derivatives by hand for a pendulum."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from tools.modes import pitch_and_roll
 STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
 INPUTS = ("theta1", "theta2", "omega1", "omega2")
 RATES = {"omega1": "theta1", "omega2": "theta2"}
-#: q of H(s), and the torques.
+#: The angles q in H(s) of eq. (15), and the torques.
 MEASURED = ("theta3", "theta4", "theta5", "theta6", "tau1", "tau2")
 
 
 def expected(model: Any, n_over_2m: Any = 7 / 8) -> Any:
-    """A, B, C, D of the oracle, for the outputs MEASURED + pitch ... roll_rate."""
+    """Returns A, B, C, D of the oracle for the outputs MEASURED, pitch, roll, pitch_rate and roll_rate."""
     mean, ratio = [0.5, 0.5], [n_over_2m, -n_over_2m]
     pitch_roll = np.zeros((4, 6))
     pitch_roll[0, 2:4], pitch_roll[1, 2:4], pitch_roll[2, 4:], pitch_roll[3, 4:] = mean, ratio, mean, ratio
@@ -68,8 +68,8 @@ def test_the_point_of_operation_does_not_matter(testbed: Path) -> None:
         np.testing.assert_array_equal(getattr(here, name), getattr(there, name))
 
 
-def test_given_flags_count(testbed: Path) -> None:
-    """At the first sample the estimated rates are 0. While the testbed starts at rest, the states follow the motors."""
+def test_flags_that_are_given_have_an_effect(testbed: Path) -> None:
+    """If use_omega is false, the rates are 0 at the first sample. If start_at_rest is true, the states follow the motors."""
     model = prw.linearize(
         {"use_omega": False, "start_at_rest": True}, fmu=testbed, fmi_type="CoSimulation", outputs=["pitch"]
     )
@@ -104,7 +104,8 @@ def test_pitch_and_roll_are_separate(testbed: Path) -> None:
         (1, 7 / 4),
     ):
         assert mode.mixing < 1e-10 * np.abs(mode.A).max()
-        # det of [c1 + c2, -c2; -c2, c2 + load] s + [k1 + k2, -k2; -k2, k2] with inertia s^2 in the last entry
+        # The poles are the roots of det([c1 + c2, -c2; -c2, c2 + load] s + [k1 + k2, -k2; -k2, k2]), with inertia s^2 in the last
+        # entry.
         first, second = np.poly1d([p["c1"] + p["c2"], p["k1"] + p["k2"]]), np.poly1d([p["c2"], p["k2"]])
         poles = (first * (np.poly1d([inertia, p["c2"] + load, p["k2"]])) - second * second).roots
         np.testing.assert_allclose(np.sort_complex(mode.poles()), np.sort_complex(poles), rtol=1e-10)
@@ -131,7 +132,7 @@ def test_the_response_to_sines(pendulum: Path) -> None:
 
 
 def test_one_instance_for_many(pendulum: Path) -> None:
-    """An instance is also used after an error, and returns to the start values if none are given."""
+    """An instance can be used after an error, and returns to its start values if none are given."""
     with prw.Linearizer(pendulum, outputs=["rate"]) as linearizer:
         for k in (1.0, 16.0):
             assert linearizer.at({"stiffness": k, "angle": 0.0}).A[1, 0] == -k
@@ -189,7 +190,7 @@ def _description(fmu: Path) -> str:
         ({"fmi_type": "ScheduledExecution"}, "offers no directional derivatives for ScheduledExecution"),
     ],
 )
-def test_complaints(testbed: Path, arguments: Any, message: Any) -> None:
+def test_errors(testbed: Path, arguments: Any, message: Any) -> None:
     with pytest.raises(prw.UserError) as caught:
         prw.linearize(fmu=testbed, **arguments)
     assert message in str(caught.value) and "\n" not in str(caught.value)
@@ -210,7 +211,8 @@ def test_an_fmu_in_place_of_the_parameters(testbed: Path) -> None:
 
 
 def test_each_one_gets_the_messages_of_its_own_fmu(testbed: Path, tmp_path: Path) -> None:
-    """Also after others are closed. In a separate process, which a message to a closed one would end."""
+    """A Linearizer gets its messages also after others are closed. A message to a closed one would end the process, so the test runs in
+    a separate one."""
     program = f"""
 import gc, prw
 first = prw.Linearizer({str(testbed)!r})

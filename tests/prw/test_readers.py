@@ -1,4 +1,4 @@
-"""Files that may hurt: recordings and parameters that are malformed, endless or not files."""
+"""Recordings and parameters that are malformed, endless or not files give an error of one line."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from prw.errors import LONGEST, UserError, one_line
 from prw.recording import read
 
 GOOD = "time,theta1,theta2\n0,0.1,0.2\n0.001,0.1,0.2\n0.002,0.1,0.2\n"
-#: Parts of tables, of which most combinations are malformed.
+#: Parts of tables; most combinations are malformed.
 PARTS = st.sampled_from(
     [
         *"0123456789-+.eE_;,\t#\"' \n\r",
@@ -37,12 +37,12 @@ PARTS = st.sampled_from(
     + ["\u0665", "\u202e", "\ufeff", "\n0.003,0.1,0.2\n", "time,theta1,theta2\n", "9" * 400]
 )
 TABLES = st.one_of(st.binary(max_size=200), st.lists(PARTS, max_size=60).map(lambda parts: "".join(parts).encode()))
-#: The same search in each run, without a database of earlier ones and without a limit of time.
+#: The search is the same in each run, without a database of earlier runs and without a time limit.
 SEARCH = settings(max_examples=300, deadline=None, database=None, suppress_health_check=list(HealthCheck))
 
 
 def message(path: Path, **options: Any) -> str:
-    """Reads a recording; the message if that fails."""
+    """Reads a recording. Returns the error message, or an empty string if there is no error."""
     try:
         read(path, **options)
     except UserError as error:
@@ -51,7 +51,7 @@ def message(path: Path, **options: Any) -> str:
 
 
 def is_one_line(text: str, path: Path) -> bool:
-    """Whether it names the file and a terminal shows it as it is."""
+    """Returns whether a message starts with the path, is not too long, and has only characters that a terminal prints."""
     return (
         text.startswith(str(path)) and all(c.isprintable() or c == "\u3000" for c in text) and len(text) < LONGEST + 10
     )
@@ -85,7 +85,7 @@ def test_changed_tables_are_read_or_explained(
 
 
 def limited(code: str, directory: Path) -> str:
-    """Runs Python with a gigabyte of memory; the output."""
+    """Runs Python with at most a gigabyte of memory, and returns its output."""
     resource = pytest.importorskip("resource", reason="POSIX has limits on memory")
     limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30))  # noqa: E731
     done = subprocess.run(

@@ -85,11 +85,11 @@ BAD = {
 
 @pytest.mark.parametrize("case", BAD)
 def test_recordings_that_cannot_be_read(file: Any, case: Any) -> None:
-    content, complaint = BAD[case]
+    content, message = BAD[case]
     path = file(content)
     with pytest.raises(UserError) as error:
         read(path)
-    assert str(error.value).startswith(str(path)) and complaint in str(error.value) and "\n" not in str(error.value)
+    assert str(error.value).startswith(str(path)) and message in str(error.value) and "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize(
@@ -137,7 +137,7 @@ def test_numbers_of_many_rows(tmp_path: Path, delimiter: Any, end: Any) -> None:
     np.testing.assert_array_equal(recording["theta1"], expected[:, 0])
     np.testing.assert_array_equal(recording["tau1"], expected[:, 3])
     np.testing.assert_array_equal(recording["pitch"], expected[:, 4])
-    for column, cell, complaint in [
+    for column, cell, message in [
         (2, "", "row 402, column theta1: empty cell"),
         (2, "1_0", "row 402, column theta1: '1_0' is not a number"),
         (3, "inf", "row 402, column theta2: inf is not finite"),
@@ -146,7 +146,7 @@ def test_numbers_of_many_rows(tmp_path: Path, delimiter: Any, end: Any) -> None:
     ]:
         before, cells[400][column] = cells[400][column], cell
         write()
-        with pytest.raises(UserError, match=re.escape(complaint)):
+        with pytest.raises(UserError, match=re.escape(message)):
             read(path)
         cells[400][column] = before
 
@@ -175,7 +175,7 @@ def test_units_of_the_header_and_of_the_option(file: Any) -> None:
     ["t_ms,theta1_deg,theta2/deg,tau1_Nm,pitch_rate_wanted", "# Time (ms),THETA1 deg,theta2 [°],Tau1/N.m,tau1_raw"],
 )
 def test_headers_as_others_write_them(file: Any, header: Any) -> None:
-    """Units after `_`, `/` or a space, capitals, numpy's `#` before the header; a suffix that is not a unit is part of the name."""
+    """Units may follow `_`, `/` or a space; capitals and NumPy's `#` before the header are ignored. Other suffixes belong to the name."""
     path = file("# rig 2; 13 May\n\n" + lines(header, row="{t},0.1,0.2,{x},0"))
     measured = read(path)
     assert measured.time[-1] == pytest.approx(0.29e-3)
@@ -188,7 +188,7 @@ def test_headers_as_others_write_them(file: Any, header: Any) -> None:
 
 
 def test_headers_of_other_tools(tmp_path: Path) -> None:
-    """A preamble, other names with units, an encoder's counts, and the encoding that Excel writes."""
+    """Reads a file with a preamble, other names with units, counts of an encoder, and the encoding that Excel writes."""
     rows = "".join(f"{k / 100};{k};{2 * k};{k % 7}\n" for k in range(30))
     path = tmp_path / "run.csv"
     path.write_text("type;float\ncapture;2026\n\nX;Motor 1;Motor 2;T [mNm]\n" + rows, encoding="utf-16")
@@ -291,7 +291,7 @@ def test_a_recording_with_measurements(tmp_path: Path) -> None:
 
 
 def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
-    """A dict, a DataFrame and the CSV file that it writes are one recording, also with the time as index."""
+    """A dict, a DataFrame and the CSV file that it writes give the same recording, also with the time as index."""
     time = np.arange(4) * 1e-3
     table: dict[str, Any] = {
         "time": time,
@@ -325,6 +325,6 @@ def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
         ({**good, "theta1 [deg]": [0.0, 1.0]}, "recording, column theta1: appears twice"),
         (None, "None is not a recording: neither a file nor a DataFrame"),
     ]
-    for source, complaint in wrong:
-        with pytest.raises(UserError, match=complaint):
+    for source, message in wrong:
+        with pytest.raises(UserError, match=message):
             read(source)

@@ -22,9 +22,9 @@ from reference import backward_slope, follow
 from prw.recording import read_motion as read
 
 EXAMPLES = ROOT / "examples"
-#: A recording.
+#: A valid recording.
 GOOD = "time,theta1,theta2\n0,0.1,0.2\n0.001,0.1,0.2\n0.002,0.1,0.2\n"
-#: Bytes per file: enough for the unpacked FMU, too few for the table.
+#: Largest file size in bytes: enough for the unpacked FMU, but too small for the table.
 LIMIT = 4_000_000
 ROWS = 40_000
 
@@ -152,7 +152,7 @@ def test_the_script_writes_the_example_recordings(tmp_path: Path) -> None:
         assert (tmp_path / path.name).read_bytes() == path.read_bytes()
 
 
-def test_other_complaints(prw: Any, tmp_path: Path) -> None:
+def test_other_errors(prw: Any, tmp_path: Path) -> None:
     (tmp_path / "good.csv").write_text(GOOD)
     (tmp_path / "no.fmu").write_text("not a zip")
     (tmp_path / "taken").write_text("a file where a directory should be")
@@ -191,7 +191,7 @@ def test_results_have_usual_permissions(prw: Any, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("ended", [False, True], ids=["disk full", "killed"])
 def test_the_old_result_stays(tmp_path: Path, fmu: Path, ended: Any) -> None:
-    """A result that cannot be written completely is not written."""
+    """If the new result cannot be written completely, the old one is kept."""
     resource = pytest.importorskip("resource", reason="POSIX has limits on the size of files")
     recording = "".join(f"{k / 1000},{k / 7e6!r},{k / 3e6!r}\n" for k in range(ROWS))
     (tmp_path / "long.csv").write_text("time,theta1,theta2\n" + recording)
@@ -199,7 +199,7 @@ def test_the_old_result_stays(tmp_path: Path, fmu: Path, ended: Any) -> None:
     old.parent.mkdir()
     old.write_text("old")
 
-    # The signal that a file has become too large ends a process that does not ignore it, as Python does.
+    # SIGXFSZ, the signal for a file that is too large, ends a process unless it is ignored. Python ignores it by default.
     handler = "signal.signal(signal.SIGXFSZ, signal.SIG_DFL); " if ended else ""
     start = f"import signal, sys, prw.cli; {handler}sys.exit(prw.cli.main(sys.argv[1:]))"
     command = [sys.executable, "-c", start, "simulate", "--input", "long.csv", "--fmu", str(fmu)]

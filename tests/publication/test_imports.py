@@ -1,4 +1,4 @@
-"""Imports make no circles: every Python package and every Rust crate has an order in which it can be read."""
+"""Imports have no cycles, so the modules of every Python package and every Rust crate can be read in some order."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ PACKAGES = sorted({str(Path(name).parent) for name in FILES if name.endswith("__
 CRATES = sorted({name.split("/src/")[0] + "/src" for name in FILES if re.search(r"(?:^|/)src/.*\.rs$", f"/{name}")})
 
 
-def circle(graph: dict[str, set[str]]) -> list[str]:
-    """Returns modules of which each imports the next; empty if there is no circle."""
+def cycle(graph: dict[str, set[str]]) -> list[str]:
+    """Returns modules of which each imports the next; empty if there is no cycle."""
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
@@ -26,7 +26,7 @@ def circle(graph: dict[str, set[str]]) -> list[str]:
 
 
 def python_imports(name: str, is_package: bool, code: str) -> Iterator[str]:
-    """The absolute names that a module imports, also in functions and for type checkers only."""
+    """Yields the absolute names that a module imports, including imports in functions and imports for type checkers."""
     for node in ast.walk(ast.parse(code)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -56,7 +56,7 @@ def without_groups(names: str) -> list[str]:
 
 
 def rust_paths(code: str) -> Iterator[str]:
-    """The paths from `crate` and `super` outside of comments and tests."""
+    """Yields the paths that start with `crate` or `super`, except in comments and tests."""
     code = re.split(r"#\[cfg\(test\)\]\s*mod \w+ \{", re.sub(r"//.*", "", code))[0]
     for names in re.findall(r"\buse ((?:crate|super)\b[^;]*);", code):
         yield from without_groups(" ".join(names.split()))
@@ -64,8 +64,8 @@ def rust_paths(code: str) -> Iterator[str]:
 
 
 def rust_graph(source: Path) -> dict[str, set[str]]:
-    """The modules of a crate. Left out are the root, because it only lists them and exports their items, and paths from a module
-    to its submodules, because these belong together."""
+    """Returns the modules of a crate, each with the modules that it uses. The root is left out, because it only lists modules and
+    exports their items, and so are submodules that a module uses, because they belong together."""
     modules = {}
     for path in source.rglob("*.rs"):
         directories = path.relative_to(source).with_suffix("").parts
@@ -85,16 +85,16 @@ def rust_graph(source: Path) -> dict[str, set[str]]:
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_python_packages(package: str) -> None:
-    assert circle(python_graph(ROOT / package)) == []
+    assert cycle(python_graph(ROOT / package)) == []
 
 
 @pytest.mark.parametrize("source", CRATES)
 def test_rust_crates(source: str) -> None:
-    assert circle(rust_graph(ROOT / source)) == []
+    assert cycle(rust_graph(ROOT / source)) == []
 
 
-def test_circles_are_found(tmp_path: Path) -> None:
-    """One through a function and a type, one through a group, and none through a test."""
+def test_cycles_are_found(tmp_path: Path) -> None:
+    """There is a cycle through imports in a function and for types, and one through a group in braces, but none through a test."""
     files = {
         "p/__init__.py": "",
         "p/a.py": "def f():\n    from p.b import g\n",
@@ -111,8 +111,8 @@ def test_circles_are_found(tmp_path: Path) -> None:
         (tmp_path / name).write_text(text, encoding="utf-8")
     graph = python_graph(tmp_path / "p")
     assert graph == {"p": set(), "p.a": {"p.b"}, "p.b": {"p.a"}, "p.c": {"p.a", "p.b"}}
-    assert set(circle(graph)) == {"p.a", "p.b"}
+    assert set(cycle(graph)) == {"p.a", "p.b"}
     rust = rust_graph(tmp_path / "src")
     assert rust == {"a": {"b"}, "b": set(), "b::d": {"a"}, "c": {"a"}}
-    assert circle(rust) == []
-    assert set(circle(rust | {"b": {"b::d"}})) == {"a", "b", "b::d"}
+    assert cycle(rust) == []
+    assert set(cycle(rust | {"b": {"b::d"}})) == {"a", "b", "b::d"}

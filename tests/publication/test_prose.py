@@ -1,6 +1,6 @@
 """Checks the prose of the Markdown pages: words that only this project uses, and long sentences. Ordinary words are never forbidden,
-because authors would write around them. Pages that readers open first explain, so too few connecting words in them are a warning.
-In code, only one phrase is checked: “is no X”, where “is not an X” is meant."""
+because authors would write around them. Pages that readers open first should explain, so the test warns
+if they have too few connecting words. In code, only one phrase is checked: “is no X”, where “is not an X” is meant."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from test_readmes import FILES
 #: The rules of fmu-check, whose names contain such words.
 NOT_COVERED = {"crates/fmu-check/RULES.md"}
 COVERED = [name for name in FILES if name.endswith(".md") and name not in NOT_COVERED]
-#: Code with comments and messages; the messages of fmu-check are written in its own directory, with its rules.
+#: Code, whose comments and messages are checked.
 CODE = [name for name in FILES if name.endswith((".c", ".h", ".js", ".py", ".rs"))]
 IS_NO = r"(?<!there )(?:is|are|was|were) no(?! longer| more)(?= )"
 #: Patterns of private words and phrases, each with the usual word.
@@ -68,7 +68,7 @@ def paragraphs(page: str) -> list[str]:
 
 
 def sentences(paragraph: str) -> list[str]:
-    """Returns the sentences. The dot of an abbreviation ends none."""
+    """Returns the sentences. A dot after an abbreviation does not end a sentence."""
     text = re.sub(r"\b(eqs?|Figs?|Sec|e\.g|i\.e)\.", r"\1", paragraph.replace("**", ""))
     return re.split(r"(?<=[.!?])\s+", text)
 
@@ -95,7 +95,7 @@ def test_prose_is_plain(name: str) -> None:
 
 @pytest.mark.parametrize("name", FRONT_PAGES)
 def test_front_pages_explain(name: str) -> None:
-    """Warns and never fails, because no word is a reason by itself."""
+    """Warns but never fails, because a page can explain without these words."""
     text = without_code((ROOT / name).read_text(encoding="utf-8"))
     words = re.findall(r"[A-Za-z]+", text)
     found = 100 * len(re.findall(rf"\b(?:{CONNECTING})\b", text, re.IGNORECASE)) / len(words)

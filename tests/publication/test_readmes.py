@@ -67,7 +67,7 @@ def test_the_published_crates() -> None:
 def test_the_page_of_a_crate_is_complete(home: Path) -> None:
     readme = home / "README.md"
     package = tomllib.loads((home / "Cargo.toml").read_text(encoding="utf-8"))["package"]
-    # No address is written down before there is a page; the registry adds the one of the documentation itself.
+    # Manifests have no addresses before the pages exist; the registry itself adds the address of the documentation.
     assert not {"documentation", "homepage", "repository"} & package.keys() and package["readme"] == readme.name
     assert package["description"] and 0 < len(package["keywords"]) <= 5 and package["categories"]
     for name in ("LICENSE-MIT", "LICENSE-APACHE"):

@@ -47,14 +47,14 @@ def test_the_readme_names_the_command_of_the_continuous_integration() -> None:
 
 
 def test_the_numbers_of_the_readme() -> None:
-    """Accuracy, speed and importers are the numbers of the tests, of `make bench` and of the page about importers."""
+    """The numbers for accuracy, speed and importers come from the tests, from `make bench` and from docs/compatibility.md."""
     rows = dict(re.findall(r"^\| \*\*(\w+)\*\* \| (.*?) \| \[", text("README.md"), re.MULTILINE))
     tolerance = re.search(r"assert_close\(values, true_values, (\S+)\)", text("tests/fmpy/test_exactness.py"))
     assert tolerance and f"within {tolerance[1]} of" in rows["Exact"]
-    beside_fmpy = {name: ratios[4] for name, ratios in json.loads(text("dev/benches/ratios.json"))["runs"].items()}
-    assert f"takes 1/{beside_fmpy['testbed']:.0f} of the time" in rows["Fast"]
+    fmpy_ratios = {name: ratios[4] for name, ratios in json.loads(text("dev/benches/ratios.json"))["runs"].items()}
+    assert f"takes 1/{fmpy_ratios['testbed']:.0f} of the time" in rows["Fast"]
     bounds = re.search(r"run (\d+) to (\d+) times\s+as fast as with FMPy", text("crates/fmu-run/README.md"))
-    assert bounds and all(int(bounds[1]) <= ratio <= int(bounds[2]) for ratio in beside_fmpy.values()), beside_fmpy
+    assert bounds and all(int(bounds[1]) <= ratio <= int(bounds[2]) for ratio in fmpy_ratios.values()), fmpy_ratios
     ran = {row[0].split("]")[0].removesuffix("'s runtime") for row in AT_A_GLANCE if {"✓", "(✓)"} & {*row}}
     others = ran - {"[fmu_run", "[Programs in C"}
     assert f"{len(others)} other tools have run it" in rows["Portable"], others
@@ -86,20 +86,20 @@ def test_contributing_lists_every_directory_and_every_file_of_the_model() -> Non
     assert sources <= set(re.findall(r"`(\w+\.rs)`", tables))
 
 
-def test_the_picture_of_the_crates() -> None:
-    """docs/architecture.md has each dependency among the crates, dashed if it is optional."""
+def test_the_diagram_of_the_crates() -> None:
+    """The diagram in docs/architecture.md has an arrow for each dependency among the crates, dashed if the dependency is optional."""
     expected = set()
     for name, manifest in own_packages().items():
         for needed, how in read(manifest).get("dependencies", {}).items():
             if needed in own_packages():
                 arrow = "-.->" if isinstance(how, dict) and how.get("optional") else "-->"
                 expected.add(f"{name} {arrow} {needed}")
-    (picture,) = re.findall(r"^```mermaid\ngraph TD\n(.*?)^```", text("docs/architecture.md"), re.DOTALL | re.MULTILINE)
-    assert {line.strip() for line in picture.splitlines()} == expected
+    (diagram,) = re.findall(r"^```mermaid\ngraph TD\n(.*?)^```", text("docs/architecture.md"), re.DOTALL | re.MULTILINE)
+    assert {line.strip() for line in diagram.splitlines()} == expected
 
 
 def test_unsafe_code_is_where_the_page_states() -> None:
-    """Also checks that the model contains none."""
+    """The table lists the crates with unsafe code. The model in src/ has none, so it is not listed."""
     sources = [name for name in FILES if re.match(r"(?:src|crates/.*/src)/.*\.rs$", name)]
     code = re.compile(r"^(?!\s*//).*\bunsafe (?:\{|fn|extern|impl|trait)", re.MULTILINE)
     found = {re.sub(r"/src/.*", "/src", name) for name in sources if code.search(text(name))}
@@ -130,7 +130,7 @@ def test_dependencies_are_as_stated() -> None:
 
 @pytest.mark.skipif(released(), reason="the packages are in their registries")
 def test_no_package_of_the_project_is_installed_from_a_registry() -> None:
-    """Anyone can register a free name."""
+    """Before the project publishes its packages, anyone could register their names."""
     own = {*own_packages(), "fmu-run", "prw"}
     for name in TEXTS:
         for arguments in INSTALL.findall(text(name)):
@@ -142,7 +142,7 @@ def test_no_package_of_the_project_is_installed_from_a_registry() -> None:
 
 
 def test_docstrings_make_a_reference_without_warnings(tmp_path: Path) -> None:
-    """A warning is an unresolved link, an undocumented parameter or a missing section."""
+    """Sphinx warns of unresolved links, undocumented parameters and missing sections."""
     options = ["--quiet", "--fail-on-warning", "--keep-going", "--doctree-dir", str(tmp_path / "trees")]
     command = [sys.executable, "-m", "sphinx", *options, str(ROOT / "docs/reference"), str(tmp_path / "html")]
     finished = subprocess.run(command, capture_output=True, text=True)
@@ -158,7 +158,7 @@ def test_docstrings_make_a_reference_without_warnings(tmp_path: Path) -> None:
     ],
 )
 def test_messages_in_pages_are_in_the_sources(page: str, message: str, sources: str) -> None:
-    """At least two consecutive words of each message, or the whole message, are in the sources, which insert names and numbers."""
+    """Compares two consecutive words of each message, or its only word, because the sources insert names and numbers."""
     code = " ".join(text(name) for name in FILES if re.fullmatch(sources, name))
     # A string may continue on the next line.
     code = re.sub(r"\\\n\s*|\"\s*\n\s*f?\"|`", "", code)

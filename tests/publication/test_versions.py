@@ -51,7 +51,7 @@ def test_the_python_packages_have_this_version() -> None:
     prw = read("python/prw/pyproject.toml")["project"]
     assert prw["version"] == VERSION
     assert f"fmu-run~={VERSION}" in prw["dependencies"]
-    # maturin takes the version of python/Cargo.toml.
+    # maturin takes the version from python/Cargo.toml.
     assert "version" in read("crates/fmu-run/pyproject.toml")["project"]["dynamic"]
 
 
@@ -62,7 +62,7 @@ def test_the_changelog_and_the_citation_have_this_version_and_its_date() -> None
     form = r"(\d+\.\d+\.\d+)(?: \((?:unreleased|(\d{4}-\d\d-\d\d))\))?"
     days = {match[1]: match[2] for heading in headings if (match := re.fullmatch(form, heading))}
     assert len(days) == len(headings), headings
-    # The section of the next version may be above.
+    # Sections of later versions, which are unreleased, may be above.
     assert VERSION in days and all(days[version] is None for version in list(days)[: list(days).index(VERSION)])
     stated = dict(re.findall(r"^(version|date-released): (.*)$", citation, re.MULTILINE))
     assert stated == {"version": VERSION} | ({"date-released": days[VERSION]} if days[VERSION] else {})

@@ -16,7 +16,7 @@ from built import ROOT
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 #: Files of requirements that are installed with hashes.
 REQUIREMENTS = ["demo", "study", "tests", "importers", "examples", "release", "test-platforms", "uv"]
-#: A release is built on Linux and macOS.
+#: Requirements that must also be installable on Windows. A release is built on Linux and macOS.
 EVERYWHERE = [name for name in REQUIREMENTS if name not in ("release", "test-platforms")]
 OLDEST, NEWEST = "3.11", "3.14"
 #: An action pinned to a commit, with its version as a comment.
@@ -83,7 +83,7 @@ def test_crates_come_from_one_registry_under_allowed_licences() -> None:
     allowed = set(rules["licenses"]["allow"])
     for crate in json.loads(done.stdout)["packages"]:
         assert crate["source"] in (None, f"registry+{rules['sources']['allow-registry'][0]}"), crate["name"]
-        # Old crates write OR as a slash. An AND needs all of its parts.
+        # Old crates write OR as a slash. Each part of an AND must be allowed.
         needed = crate["license"].replace("/", " OR ").replace("(", "").replace(")", "").split(" AND ")
         assert all(allowed & {one.strip() for one in part.split(" OR ")} for part in needed), crate["license"]
 
@@ -95,7 +95,7 @@ def test_python_requirements_have_hashes(name: str) -> None:
     assert entries and all("==" in entry and "--hash=sha256:" in entry for entry in entries)
 
 
-# An environment that another file has filled before hides what is missing in this one.
+# The target directory is empty, because packages from another file would hide that this file lacks them.
 @pytest.mark.parametrize(
     "name, version, platform",
     [(name, OLDEST, "linux") for name in REQUIREMENTS]

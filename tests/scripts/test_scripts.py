@@ -55,7 +55,7 @@ def rows(page: str) -> dict[str, list[float]]:
     return {label: [float(figure.replace(",", "")) for figure in figures.split("|")[:-1]] for label, figures in found}
 
 
-@pytest.mark.skipif(platform.machine() != "x86_64", reason="the benchmarks take the library for linux64")
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="the benchmarks use the library for linux64")
 def test_the_benchmarks(fmu: Path) -> None:
     """One test, because the benchmarks share target/bench."""
     for name in ("prw_controller.fmu", "prw_closed_loop.ssp"):
@@ -66,7 +66,7 @@ def test_the_benchmarks(fmu: Path) -> None:
     assert all(figure > 0 for figures in found.values() for figure in figures), found
 
 
-@pytest.mark.skipif(platform.machine() != "x86_64", reason="the counts are those of linux64")
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="the counts are for linux64")
 def test_no_use_takes_more_instructions_than_before(fmu: Path) -> None:
     """Fails also if a use takes fewer, because the table would then hide a later rise."""
     if why := instructions.is_measurable():

@@ -1,4 +1,4 @@
-"""Fixtures: the FMUs of C sources, unpacked, and compilers for them."""
+"""Fixtures: the unpacked FMUs that contain C sources, and compilers for them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 @dataclass(frozen=True)
 class Compiler:
-    """A C compiler, and the command that runs its programs here; None if there is none."""
+    """A C compiler. `start` begins the command that runs its programs here; it is None if they cannot run here."""
 
     command: tuple[str, ...]
     start: tuple[str, ...] | None = ()
@@ -81,5 +81,5 @@ def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The environment of the programs, of which some run under Wine."""
+    """The environment variables for the programs, some of which run under Wine."""
     return toolchain.windows(tmp_path_factory.mktemp("wine"))

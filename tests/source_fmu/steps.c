@@ -52,7 +52,7 @@ static Instance *start(void) {
     return fmu;
 }
 
-/* The angles are polynomials of the time: the same bits with every C library. */
+/* The angles are polynomials of time, so they are bit-identical with every C library. */
 static uint64_t run(Instance *fmu) {
     uint64_t value = 0xcbf29ce484222325u;
     int i;
@@ -96,7 +96,7 @@ static void on_threads(void) {
 static void on_threads(void) {}
 #endif
 
-/* Saves states until the memory is full. The instance still works, and all states are freed. */
+/* Saves states until the memory is full, checks that the instance still works, and frees all states. */
 static void fill(Instance *fmu) {
     static fmi2FMUstate states[1000];
     int count = 0;
@@ -139,6 +139,7 @@ int main(int count, char **arguments) {
         return 1;
     }
     printf("allocations after fmi2Instantiate: %d\n", allocations - made);
+    /* The stack grows down from 64 KiB, so the first byte that is not 0 is the lowest one that was used. */
     memory = fmu->module.w2c_memory.data.bytes;
     while (memory[stack] == 0) {
         stack++;
@@ -150,7 +151,7 @@ int main(int count, char **arguments) {
     fill(fmu);
     fill(fmu);
 
-    /* Damages a module: its instance can only be freed; the other instance is not affected. */
+    /* Damages the module of one instance, which can then only be freed. The other instance must not be affected. */
     for (i = 0; i < FMU_TABLE; i++) {
         fmu->module.w2c_T0.data[i].func_type = NULL;
     }

@@ -19,7 +19,8 @@ from fmpy.fmi2 import FMU2Slave
 HERE = Path(__file__).parent
 OUTPUTS = ("tau1", "tau2", "pitch", "roll")
 STRICT = ("-std=c99", "-pedantic-errors", "-Wall", "-Wextra", "-Werror")
-#: Default of FMU_MEMORY_PAGES, the memory of an instance in units of 64 KiB: the testbed begins with two, and two are for saved states.
+#: Default of FMU_MEMORY_PAGES, the memory of an instance in units of 64 KiB: the testbed
+#: starts with two, and two are for saved states.
 MEMORY = 4
 
 
@@ -67,7 +68,7 @@ def run(
     description: fmpy.model_description.ModelDescription,
     environment: dict[str, str],
 ) -> Callable[..., dict[str, list[str]]]:
-    """Compiles steps.c with the sources and runs it; returns the printed lines by their first word."""
+    """Returns a function that compiles steps.c with the sources, runs it, and returns the printed lines by their first word."""
 
     def compile_and_run(name: str, *options: str, sources: Path = sources, code: int = 0) -> dict[str, list[str]]:
         compiler = COMPILERS[name]
@@ -95,7 +96,7 @@ def test_the_sources_are_strict_c99(name: str, sources: Path, tmp_path: Path) ->
         compiler.compile(sources, tmp_path / "object.o", *STRICT, "-O1", "-c", str(sources / file))
 
 
-#: Default options, and options that permit more optimization; in GNU mode gcc would fuse products and sums.
+#: Default options, and options that permit more optimization. In GNU mode, gcc fuses products and sums unless sources forbid it.
 OPTIONS = {
     "gcc": [("-std=c99", "-O0"), ("-O2",), ("-O3", "-march=native")],
     "clang": [("-O2",), ("-O3", "-march=native")],
@@ -275,7 +276,7 @@ def test_random_sessions_with_sanitizers(sources: Path, tmp_path: Path) -> None:
 
 
 def test_a_panic_ends_its_instance_only(tmp_path: Path) -> None:
-    """Runs the tests of a model that panics in each function that is called, on several threads."""
+    """Runs the tests of a model that panics in each of its functions, on several threads."""
     file = ROOT / "crates" / "fmu-export" / "tests" / "panics" / "library.rs"
     command = ["cargo", "run", "--locked", "--release", "--package", "fmu-package", "--example", "c_sources"]
     environment = {"WASM2C": str(ROOT / ".venv" / "bin" / "wasm2c"), **os.environ}

@@ -1,4 +1,4 @@
-/* What Rust's standard library takes from Windows' bcryptprimitives.dll, which Wine 8 does not have. */
+/* The function of bcryptprimitives.dll that Rust's standard library uses. Wine 8 does not have this library. */
 
 #include <windows.h>
 

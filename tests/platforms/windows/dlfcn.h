@@ -1,4 +1,4 @@
-/* What fmu.h needs of POSIX dlfcn.h, on Windows. */
+/* The part of POSIX dlfcn.h that fmu.h needs, for Windows. */
 #ifndef PRW_TEST_DLFCN_H
 #define PRW_TEST_DLFCN_H
 

@@ -8,15 +8,22 @@ use std::mem::size_of;
 #[derive(Debug)]
 pub(super) struct Handles<V> {
     slots: Vec<Slot<V>>,
-    /// Indices of empty slots.
-    empty: Vec<u32>,
+    /// First of the empty slots, which form a linked list, because removing must not need memory.
+    empty: Option<u32>,
     identity: Option<Box<u8>>,
 }
 
 #[derive(Debug)]
 struct Slot<V> {
     generation: usize,
-    value: Option<V>,
+    content: Content<V>,
+}
+
+#[derive(Debug)]
+enum Content<V> {
+    Value(V),
+    /// No object; the next empty slot.
+    Empty(Option<u32>),
 }
 
 /// Bits of the index in a handle; the others contain the generation.
@@ -28,7 +35,7 @@ pub(super) const NULL: usize = 0;
 
 impl<V> Handles<V> {
     pub const fn new() -> Self {
-        Self { slots: Vec::new(), empty: Vec::new(), identity: None }
+        Self { slots: Vec::new(), empty: None, identity: None }
     }
 
     /// Returns a number that differs in most bits from the number of another collection.
@@ -46,23 +53,28 @@ impl<V> Handles<V> {
     }
 
     pub fn get_mut(&mut self, handle: usize) -> Option<&mut V> {
-        self.slot(handle)?.1.value.as_mut()
+        match &mut self.slot(handle)?.1.content {
+            Content::Value(value) => Some(value),
+            Content::Empty(_) => None,
+        }
     }
 
     /// Inserts an object and returns its handle. Returns `None` if there are too many for the bits of a handle.
     pub fn insert(&mut self, value: V) -> Option<usize> {
         self.identity.get_or_insert_with(|| Box::new(0));
-        let index = match self.empty.pop() {
+        let index = match self.empty {
             Some(index) => index as usize,
             None if self.slots.len() <= INDEX_MASK => {
-                self.slots.push(Slot { generation: 0, value: None });
+                self.slots.push(Slot { generation: 0, content: Content::Empty(None) });
                 self.slots.len() - 1
             }
             None => return None,
         };
         let secret = self.secret();
         let slot = &mut self.slots[index];
-        slot.value = Some(value);
+        if let Content::Empty(next) = std::mem::replace(&mut slot.content, Content::Value(value)) {
+            self.empty = next;
+        }
         let handle = |generation: usize| (generation << INDEX_BITS | index) ^ secret;
         if handle(slot.generation) == NULL {
             slot.generation = next(slot.generation);
@@ -71,19 +83,24 @@ impl<V> Handles<V> {
     }
 
     pub fn remove(&mut self, handle: usize) -> Option<V> {
+        self.get_mut(handle)?;
+        let empty = self.empty;
         let (index, slot) = self.slot(handle)?;
-        let value = slot.value.take()?;
         slot.generation = next(slot.generation);
-        self.empty.push(index);
-        Some(value)
+        let removed = std::mem::replace(&mut slot.content, Content::Empty(empty));
+        self.empty = Some(index);
+        match removed {
+            Content::Value(value) => Some(value),
+            Content::Empty(_) => None,
+        }
     }
 
     /// Removes any object. All handles are invalid then.
     pub fn pop(&mut self) -> Option<V> {
         while let Some(slot) = self.slots.pop() {
-            self.empty.clear();
-            if slot.value.is_some() {
-                return slot.value;
+            self.empty = None;
+            if let Content::Value(value) = slot.content {
+                return Some(value);
             }
         }
         None

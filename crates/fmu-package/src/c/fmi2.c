@@ -422,17 +422,23 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     END
 }
 
-/* Returns the address in the module of a saved state, which the module allocates: 0 for NULL, and UINT32_MAX for a
-   pointer outside of the module's memory, so that the module rejects it. */
+/* The module's handles of saved states are numbers, and equal numbers in different instances are different states. So the
+   importer's handle is the sum of the number and the instance's address; it is never dereferenced.
+
+   Returns the module's handle: 0 for NULL, and UINT32_MAX for a handle that cannot be valid, so that the module rejects it. */
 static u32 to_module(const Instance *instance, fmi2FMUstate state) {
-    uintptr_t offset = (uintptr_t)state - (uintptr_t)instance->module.w2c_memory.data.bytes;
+    uintptr_t handle = (uintptr_t)state - (uintptr_t)instance;
     if (state == NULL) {
         return 0;
     }
-    return offset != 0 && offset < FMU_MEMORY ? (u32)offset : UINT32_MAX;
+    return handle != 0 && (u32)handle == handle ? (u32)handle : UINT32_MAX;
 }
 
-/* Copies the importer's pointer to a state into the module, unless the argument is NULL or unaligned. */
+static fmi2FMUstate to_importer(const Instance *instance, u32 handle) {
+    return handle == 0 ? NULL : (fmi2FMUstate)((uintptr_t)instance + handle);
+}
+
+/* Copies the importer's handle of a state into the module, unless the pointer to it is NULL or unaligned. */
 #define STATE_IN(name, state, n)                                                   \
     u32 state_address;                                                             \
     ROOM(name, n, 1, 64)                                                           \
@@ -442,11 +448,11 @@ static u32 to_module(const Instance *instance, fmi2FMUstate state) {
         memcpy(at(&call, state_address), &in_module, sizeof in_module);            \
     }
 
-#define STATE_OUT(state)                                                       \
-    if (status == fmi2OK && (state) != NULL) {                                 \
-        u32 in_module;                                                         \
-        memcpy(&in_module, at(&call, state_address), sizeof in_module);        \
-        *(state) = in_module == 0 ? NULL : (fmi2FMUstate)at(&call, in_module); \
+#define STATE_OUT(state)                                                \
+    if (status == fmi2OK && (state) != NULL) {                          \
+        u32 in_module;                                                  \
+        memcpy(&in_module, at(&call, state_address), sizeof in_module); \
+        *(state) = to_importer(instance, in_module);                    \
     }
 
 #define STATE_HANDLE(name)                                  \
