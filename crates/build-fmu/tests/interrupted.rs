@@ -13,11 +13,13 @@ use zip::ZipArchive;
 
 const OLD: &[u8] = b"the FMU of yesterday";
 
+/// Largest size of a file that a limited process can write, bytes. The FMU is larger.
 const LIMIT: libc::rlim_t = 50_000;
 
+/// Number of builds that are killed, each at another time.
 const ROUNDS: u32 = 20;
 
-/// Returns a library of the FMU.
+/// Builds the FMU and returns the path of the library in it.
 fn library(directory: &Path) -> PathBuf {
     let out = directory.join("whole");
     let mut command = Command::new(env!("CARGO_BIN_EXE_build_fmu"));
@@ -34,7 +36,7 @@ fn platform() -> &'static str {
     Platform::host().unwrap().directory(Standard::Fmi2)
 }
 
-/// Packs a library. The compiler does not work within the limits of this test.
+/// Returns the command that packs a compiled library. It does not compile, because the compiler would exceed [`LIMIT`].
 fn build_fmu(library: &Path, out: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_build_fmu"));
     command.args(["--no-page", "--fmi", "2", "--out"]).arg(out);
@@ -42,8 +44,8 @@ fn build_fmu(library: &Path, out: &Path) -> Command {
     command
 }
 
-/// Runs the command with a limit on the size of files. The signal ends the process or, if it is ignored, writing fails as on a full
-/// disk.
+/// Runs the command with a limit on the size of files. A write beyond the limit raises SIGXFSZ. With `SIG_DFL` as `signal`, this ends
+/// the process; with `SIG_IGN`, the write fails as on a full disk.
 fn limited(mut command: Command, signal: libc::sighandler_t) -> Output {
     let limit = libc::rlimit { rlim_cur: LIMIT, rlim_max: LIMIT };
     let restrict = move || {
@@ -61,7 +63,7 @@ fn limited(mut command: Command, signal: libc::sighandler_t) -> Output {
     command.output().unwrap()
 }
 
-/// The last line on stderr, after the lines that report the progress of cargo.
+/// Returns the error message: the last line on stderr, after the lines that report the progress of cargo.
 fn error(output: &Output) -> String {
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     let last = text.lines().last().unwrap_or_default();

@@ -23,7 +23,7 @@ fn errors(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// The description that `build_fmu` writes with these arguments.
+/// Returns the description that `build_fmu` writes with these arguments.
 fn description(arguments: &[&str]) -> String {
     let directory = tempfile::tempdir().unwrap();
     let output = build_fmu(&[&["--describe"], arguments].concat(), directory.path());
@@ -31,7 +31,7 @@ fn description(arguments: &[&str]) -> String {
     fs::read_to_string(directory.path().join("modelDescription.xml")).unwrap()
 }
 
-/// Writes Table 1 with a string replaced.
+/// Writes a parameter file: Table 1 with `old` replaced by `new`. Returns its path.
 fn parameter_file(directory: &Path, old: &str, new: &str) -> String {
     let table = fs::read_to_string(PARAMETERS_JSON).unwrap();
     assert!(table.contains(old));
@@ -52,7 +52,7 @@ fn the_committed_description_is_up_to_date() {
 #[test]
 fn it_reads_back_as_the_model_that_was_compiled() {
     let read = Fmi2ModelDescription::deserialize(&description(&[])).unwrap();
-    // The description that is kept with the sources has no guid, which would change with them.
+    // The description that is kept with the sources has no guid, because the guid changes whenever they do.
     assert_eq!(read.guid, fmu_package::NO_GUID);
     assert_eq!(read.model_name, "PitchRollWristTestbed");
     assert_eq!(read.num_states(), 6);
@@ -110,7 +110,8 @@ const INITIAL_DEPENDENCIES: [(&str, &[&str]); 11] = [
     ("der(theta5)", &["omega5_start"]),
 ];
 
-/// The dependencies are found from the model's partial derivatives; independent code calculates the matrices of eq. (11).
+/// Compares the dependencies, which the build finds from the model's partial derivatives, with the matrices of eq. (11), which
+/// independent code calculates.
 #[test]
 fn dependencies_are_the_sparsity_of_the_matrices() {
     let read = Fmi2ModelDescription::deserialize(&description(&[])).unwrap();
@@ -205,7 +206,7 @@ fn wrong_requests_are_rejected_in_one_line() {
     let file = parameter_file(directory.path(), "\"value\": 2.11", "\"value\": -2.11");
     let extreme = tempfile::tempdir().unwrap();
     let extreme = parameter_file(extreme.path(), "\"value\": 2.11", "\"value\": 1e306");
-    // The header of a universal library of macOS, only for Intel, with or without a function of FMI.
+    // Two universal libraries for macOS that are only for Intel: their header, without and with the name of an FMI function.
     let header = [0xcafe_babe_u32, 1, 0x0100_0007, 3, 0x1000, 0, 12].map(u32::to_be_bytes).concat();
     let [empty, library] = [("empty", &b""[..]), ("a", b"fmi2Instantiate")].map(|(name, content)| {
         let library = directory.path().join(name).with_extension("dylib");
@@ -295,7 +296,7 @@ fn the_licenses_of_all_packages_are_listed() {
         .unwrap();
     assert!(output.status.success(), "{output:?}");
     let tree = String::from_utf8(output.stdout).unwrap();
-    // In parentheses: the path of a package of this project, or the mark of one that was listed before.
+    // Parentheses mark a package of this project, by its path, or a package that was listed before.
     let compiled: BTreeSet<&str> =
         tree.lines().filter(|line| !line.contains('(')).filter_map(|line| line.split(' ').next()).collect();
     let list = include_str!("../../../modelDescription/licenses/third-party.txt");

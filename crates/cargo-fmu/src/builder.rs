@@ -13,16 +13,16 @@ use std::process::Command;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Purpose {
     /// For users: the library is compiled with the author's profile `release`.
-    Use,
-    /// For the author during development: the library is compiled with fast settings.
-    Trial,
+    Release,
+    /// For the author: the library is compiled with settings for a short compile time.
+    Development,
 }
 
 /// Cargo settings for a short compile time.
 const FAST: [&str; 2] = ["profile.release.lto=\"off\"", "profile.release.incremental=true"];
 
-/// Builds the FMUs in the directory of the options, or in `target/fmu` of the workspace. If the package has its own program, starts it
-/// with these arguments. Returns false if that program failed and printed the reason.
+/// Builds the FMUs in the directory of the options, or in `target/fmu` of the workspace. If the package has its own build program,
+/// starts it with `arguments` instead. Returns false if that program failed, because it then has printed the reason.
 pub fn build(
     project: &Project,
     options: &BuildOptions,
@@ -38,12 +38,12 @@ pub fn build(
     }
     let builder = Builder {
         command: "cargo fmu build",
-        settings: if purpose == Purpose::Trial { FAST.map(str::to_owned).to_vec() } else { Vec::new() },
+        settings: if purpose == Purpose::Development { FAST.map(str::to_owned).to_vec() } else { Vec::new() },
         ..Builder::new(&project.name, &project.directory)
     };
     let begin = std::time::SystemTime::now();
     builder.run(options)?;
-    if purpose == Purpose::Use {
+    if purpose == Purpose::Release {
         let directory = options.out.clone().unwrap_or_else(|| project.workspace.join("target/fmu"));
         crate::compare::warn(&directory, begin);
     }
@@ -59,7 +59,7 @@ pub fn arguments_of_build() -> Vec<OsString> {
             Some("--package" | "-p" | "--manifest-path") => drop(arguments.next()),
             Some(option)
                 if ["--package=", "-p", "--manifest-path="].iter().any(|name| option.starts_with(name)) => {}
-            // Options of the program follow.
+            // The options of the package's own build program follow.
             Some("--") => return kept.into_iter().chain(arguments).collect(),
             _ => kept.push(argument),
         }
@@ -67,13 +67,13 @@ pub fn arguments_of_build() -> Vec<OsString> {
     kept
 }
 
-/// Returns the `Cargo.lock` that this command was tested with, if it comes from a clone.
-pub fn tested() -> String {
+/// Returns the content of the `Cargo.lock` that this command was tested with. It is empty if this command was not compiled in a clone.
+pub fn tested_lock() -> String {
     let lock = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).map(|root| root.join("Cargo.lock"));
     lock.and_then(|lock| fs::read_to_string(lock).ok()).unwrap_or_default()
 }
 
-/// Writes a file, unless it is up to date: cargo then sees no change.
+/// Writes a file unless it is up to date, so that cargo does not see a changed file.
 pub fn write(path: &Path, text: &str) -> Result<()> {
     if fs::read_to_string(path).ok().as_deref() == Some(text) {
         return Ok(());

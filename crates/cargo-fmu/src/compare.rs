@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::time::SystemTime;
 
-/// Prints a warning for each FMU in a directory, and in its directory for FMI 3.0, that was written since `begin` and whose
-/// Co-Simulation and Model Exchange have different results.
+/// Compares the FMUs that were written since `begin` in a directory or in its subdirectory `fmi3`. Prints a warning if an FMU has
+/// different results in Co-Simulation and Model Exchange.
 pub fn warn(directory: &Path, begin: SystemTime) {
     let directories = [directory.to_owned(), directory.join("fmi3")];
     let entries = directories.iter().filter_map(|of| std::fs::read_dir(of).ok()).flatten().flatten();

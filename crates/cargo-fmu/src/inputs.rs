@@ -1,4 +1,4 @@
-//! Inputs over time, from a table (CSV), and values that are written in an argument.
+//! Reads inputs over time from a table (CSV), and values from an argument.
 
 use anyhow::{Context, Result, bail, ensure};
 use fmu_package::terminal::short;
@@ -10,14 +10,14 @@ use std::path::Path;
 /// other is held, and two rows with the same time are a step.
 pub struct Table {
     pub time: Vec<f64>,
-    /// The inputs; all elements of an array have the same values.
+    /// The columns. A column for an array has the names of all its elements, which all get the same values.
     inputs: Vec<(Vec<String>, Column)>,
 }
 
 /// The values of an input.
 enum Column {
     Numbers(Vec<f64>),
-    /// Values that `f64` does not have: strings, integers of 64 bits.
+    /// Values that an `f64` cannot hold: strings and 64-bit integers.
     Values(Vec<Value>),
 }
 
@@ -115,30 +115,30 @@ fn delimiter(text: &[u8]) -> u8 {
     [b';', b'\t'].into_iter().find(|separator| count(*separator) > 0 && count(b',') == 0).unwrap_or(b',')
 }
 
-/// Returns the value that is written for a variable. A number is a [`Value::Real`], except for integers of 64 bits; so are the
-/// item of an enumeration and a Boolean.
+/// Parses a value of a variable. The result is a [`Value::Real`] for numbers, items of enumerations and Booleans, but not for strings
+/// and 64-bit integers.
 pub fn value(description: &Description, variable: &Variable, text: &str) -> Result<Value> {
     match variable.base {
         BaseType::String => Ok(Value::from(text)),
-        BaseType::Binary => bail!("it has bytes, which cannot be written here"),
+        BaseType::Binary => bail!("bytes cannot be written here"),
         BaseType::Int64 | BaseType::UInt64 => {
-            Ok(Value::Integer(text.parse().ok().context("it is an integer")?))
+            Ok(Value::Integer(text.parse().ok().context("it must be an integer")?))
         }
         BaseType::Boolean => match text.to_ascii_lowercase().as_str() {
             "true" | "1" => Ok(Value::Real(1.0)),
             "false" | "0" => Ok(Value::Real(0.0)),
-            _ => bail!("it is true or false"),
+            _ => bail!("it must be true or false"),
         },
         BaseType::Enumeration => {
             let items = description.items(variable).unwrap_or_default();
             let found = items.iter().find(|(name, number)| name == text || number == text);
             let names = || items.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
-            let (_, item) = found.with_context(|| format!("it is one of {}", names()))?;
+            let (_, item) = found.with_context(|| format!("it must be one of {}", names()))?;
             number(item).map(Value::Real)
         }
         _ => {
             let value = number(text)?;
-            ensure!(variable.base.is_float() || value.fract() == 0.0, "it is an integer");
+            ensure!(variable.base.is_float() || value.fract() == 0.0, "it must be an integer");
             Ok(Value::Real(value))
         }
     }
@@ -147,17 +147,17 @@ pub fn value(description: &Description, variable: &Variable, text: &str) -> Resu
 fn number(text: &str) -> Result<f64> {
     let value: Option<f64> = text.parse().ok();
     if value.is_none() && text.contains(',') && text.replace(',', ".").parse::<f64>().is_ok() {
-        bail!("a number has a decimal point");
+        bail!("write numbers with a decimal point");
     }
-    value.filter(|value| value.is_finite()).context("it is a finite number")
+    value.filter(|value| value.is_finite()).context("it must be a finite number")
 }
 
-/// Returns whether the variable has values that `f64` does not have. The runner returns them separately.
+/// Returns whether the variable has values that an `f64` cannot hold. The runner returns these values separately.
 pub fn is_exact(variable: &Variable) -> bool {
     matches!(variable.base, BaseType::String | BaseType::Binary | BaseType::Int64 | BaseType::UInt64)
 }
 
-/// Returns the variable of this name, or the elements of the array.
+/// Returns the variable of this name, or all elements of the array of this name. `purpose` is a verb for the error message.
 pub fn named<'a>(description: &'a Description, name: &str, purpose: &str) -> Result<Vec<&'a Variable>> {
     if let Some(variable) = description.variable(name) {
         return Ok(vec![variable]);
@@ -200,7 +200,7 @@ mod tests {
         Table::read(&path, &Description::parse(MODEL).map_err(anyhow::Error::msg)?)
     }
 
-    /// Returns the numbers of an input, and the values that are not numbers.
+    /// Returns the values of an input.
     fn values(table: &Table, name: &str) -> Vec<Value> {
         let inputs = table.trajectories();
         match inputs.iter().find(|(of, _)| *of == name).unwrap().1 {
@@ -236,16 +236,16 @@ mod tests {
             ("time,sped\n0,1\n", "there is no variable sped to set; did you mean speed?"),
             ("time,speed,speed\n0,1,1\n", "has two columns speed"),
             ("time,speed\n", "has no values"),
-            ("time,speed\n0,1\n1,x\n", "line 3: speed cannot be \"x\": it is a finite number"),
-            ("time,speed\n0,inf\n", "line 2: speed cannot be \"inf\": it is a finite number"),
-            ("time,speed\n0,\n", "line 2: speed cannot be \"\": it is a finite number"),
-            ("time;speed\n0,5;1\n", "line 2: time cannot be \"0,5\": a number has a decimal point"),
+            ("time,speed\n0,1\n1,x\n", "line 3: speed cannot be \"x\": it must be a finite number"),
+            ("time,speed\n0,inf\n", "line 2: speed cannot be \"inf\": it must be a finite number"),
+            ("time,speed\n0,\n", "line 2: speed cannot be \"\": it must be a finite number"),
+            ("time;speed\n0,5;1\n", "line 2: time cannot be \"0,5\": write numbers with a decimal point"),
             ("time,speed\n0,1\n0.5\n", "record 2 (line: 3"),
-            ("time,mode\n0,opem\n", "line 2: mode cannot be \"opem\": it is one of closed, open"),
-            ("time,mode\n0,2\n", "line 2: mode cannot be \"2\": it is one of closed, open"),
-            ("time,gear\n0,2.5\n", "line 2: gear cannot be \"2.5\": it is an integer"),
-            ("time,count\n0,2.5\n", "line 2: count cannot be \"2.5\": it is an integer"),
-            ("time,on\n0,2\n", "line 2: on cannot be \"2\": it is true or false"),
+            ("time,mode\n0,opem\n", "line 2: mode cannot be \"opem\": it must be one of closed, open"),
+            ("time,mode\n0,2\n", "line 2: mode cannot be \"2\": it must be one of closed, open"),
+            ("time,gear\n0,2.5\n", "line 2: gear cannot be \"2.5\": it must be an integer"),
+            ("time,count\n0,2.5\n", "line 2: count cannot be \"2.5\": it must be an integer"),
+            ("time,on\n0,2\n", "line 2: on cannot be \"2\": it must be true or false"),
             ("time,speed\n1,1\n0,1\n", "line 3: the time 0 follows 1; times must not decrease"),
         ] {
             let error = read(text).err().map(|error| format!("{error:#}")).unwrap_or_default();

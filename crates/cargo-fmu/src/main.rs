@@ -1,9 +1,10 @@
 #![doc = include_str!("../README.md")]
 //!
-//! ## Inside
+//! ## Structure of the crate
 //!
-//! `new` writes a new model, `project` gets the metadata of the package from cargo, `builder` builds the FMUs, `run` simulates an
-//! FMU with the `inputs` of a table, `results` writes its table, and `plot` draws it.
+//! `new` creates a model, `project` gets the metadata of a package from cargo, and `builder` builds the FMUs, whose interface types
+//! `compare` compares. `run` simulates an FMU with the inputs that `inputs` reads, `results` writes the table of results, and `plot`
+//! draws it.
 
 mod builder;
 mod compare;
@@ -76,7 +77,7 @@ fn carry_out(command: &Command) -> Result<bool> {
     match command {
         Command::New(options) => new::new(options).map(|()| true),
         Command::Build { package, build, .. } => {
-            builder::build(&Project::find(package)?, build, Purpose::Use, &builder::arguments_of_build())
+            builder::build(&Project::find(package)?, build, Purpose::Release, &builder::arguments_of_build())
         }
         Command::Run(options) => run::run(options),
         Command::Check { package, fmu, check } => run::check(package, fmu, check),

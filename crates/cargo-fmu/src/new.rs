@@ -1,6 +1,6 @@
 //! Creates a crate from one of the models that this command contains.
 
-use crate::builder::{tested, write};
+use crate::builder::{tested_lock, write};
 use anyhow::{Context, Result, bail, ensure};
 use fmu_package::cargo;
 use fmu_package::terminal::short;
@@ -20,7 +20,7 @@ pub struct Options {
     /// house (a file, strings, units with an offset), tank (the model of the guide: enumeration, array, events)
     #[arg(long, value_enum, value_name = "MODEL", default_value_t, hide_possible_values = true)]
     from: Begin,
-    /// Take fmu-export from this git repository, a URL, so that others can build the model
+    /// Take fmu-export from the git repository at this URL, so that others can build the model
     #[arg(long, value_name = "URL")]
     git: Option<String>,
 }
@@ -36,7 +36,7 @@ enum Begin {
     Tank,
 }
 
-/// The files of a model, except the files that every crate has.
+/// The files of a model, except `Cargo.toml` and `Cargo.lock`, which are written for each crate.
 macro_rules! files {
     ($model:literal: $($file:literal)+) => {
         ($model, &[$(($file, include_str!(concat!("../models/", $model, "/", $file)))),+])
@@ -94,11 +94,11 @@ pub fn new(options: &Options) -> Result<()> {
     let in_workspace = in_workspace(directory);
     let export = Dependency::of(directory, options.git.as_deref())?;
     write(&directory.join("Cargo.toml"), &manifest(&name, &export, !in_workspace))?;
-    let lock = tested();
+    let lock = tested_lock();
     if !lock.is_empty() && !in_workspace {
         write(&directory.join("Cargo.lock"), &lock)?;
     }
-    // The new names change line lengths. Without rustfmt, the lines keep their breaks.
+    // The new names change line lengths, so the code is formatted again, unless rustfmt is not installed.
     let _ = Command::new(&cargo).args(["fmt", "--quiet"]).current_dir(directory).output();
     println!(
         "{0} begins with {model}: change {0}/src/{1}, then\n  cd {0}\n  cargo test        # the model before changes\n  {2:<16}  # the FMU, a table and a plot",
@@ -118,7 +118,7 @@ pub fn new(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// Returns whether cargo uses the `Cargo.lock` of another directory.
+/// Returns whether the crate is a member of a workspace in another directory, so that cargo uses the `Cargo.lock` there.
 fn in_workspace(directory: &Path) -> bool {
     let mut command = Command::new(cargo());
     command.args(["locate-project", "--workspace", "--message-format", "plain"]).current_dir(directory);
@@ -140,7 +140,7 @@ enum Dependency {
 }
 
 impl Dependency {
-    /// Returns the source of fmu-export in the version of this command.
+    /// Returns the source of fmu-export, in the version of this command, for a model in a directory.
     fn of(directory: &Path, repository: Option<&str>) -> Result<Self> {
         let package = Path::new(env!("CARGO_MANIFEST_DIR")).with_file_name("fmu-export");
         let is_there = package.join("Cargo.toml").is_file();
@@ -177,8 +177,8 @@ impl Dependency {
     }
 }
 
-/// Returns the directory of fmu-export in a repository, which may have these crates as a submodule: others then have the same
-/// version at the same relative path.
+/// Returns the directory of fmu-export in a repository, which may have these crates as a submodule. In each clone of the repository,
+/// the same version is then at the same relative path.
 fn package_in(root: &Path) -> Option<PathBuf> {
     let names = ["fmu-export/Cargo.toml", "*/fmu-export/Cargo.toml"];
     let files = git(root, &[&["ls-files", "--recurse-submodules", "--"], &names[..]].concat())?;
@@ -206,11 +206,9 @@ fn relative(from: &Path, to: &Path) -> String {
 
 fn manifest(name: &str, export: &Dependency, with_profile: bool) -> String {
     let export = export.in_manifest();
-    // A workspace has profiles in its own Cargo.toml only.
+    // In a workspace, cargo ignores the profiles of its members.
     let profile = match with_profile {
-        true => {
-            "# A small library, which needs little of the system.\n[profile.release]\nlto = true\nstrip = true\n\n"
-        }
+        true => "# Makes the library in the FMU small.\n[profile.release]\nlto = true\nstrip = true\n\n",
         false => "",
     };
     format!(
@@ -233,7 +231,7 @@ unsafe_code = "deny"
     )
 }
 
-/// Replaces whole words.
+/// Replaces a word where it is not part of a longer one.
 fn renamed(text: &str, word: &str, replacement: &str) -> String {
     let mut result = String::new();
     let mut rest = text;

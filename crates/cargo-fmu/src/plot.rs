@@ -18,7 +18,7 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 
-/// Draws the variables. Variables of one unit share a panel, as do those with the same labels.
+/// Draws the variables. Variables share a panel if both their units and their labels are equal.
 pub fn plot(path: &Path, title: &str, time: &[f64], columns: &[Column]) -> Result<()> {
     let mut svg = String::new();
     let drawn: Vec<_> = columns.iter().filter(|column| is_drawn(column)).collect();
@@ -26,7 +26,7 @@ pub fn plot(path: &Path, title: &str, time: &[f64], columns: &[Column]) -> Resul
         bail!("there are only strings and bytes");
     }
     draw(&mut svg, title, time, &drawn).map_err(|error| anyhow!("{error}"))?;
-    // The backend has integer coordinates: it draws a large image, which the SVG then scales down.
+    // The backend has integer coordinates, so it draws a large image, which the SVG scales down.
     let (begin, rest) = svg.split_once('>').unwrap_or_default();
     let size = |name: &str| {
         let (_, value) = begin.split_once(&format!(" {name}=\""))?;
@@ -89,7 +89,7 @@ fn draw(
             };
         let mut mesh = chart.configure_mesh();
         if !labels.is_empty() {
-            // One line for each label, not for fractions.
+            // The grid has one line for each label, and none in between.
             mesh.y_labels((high - low) as usize + 1);
         }
         mesh.light_line_style(TRANSPARENT)
@@ -130,7 +130,7 @@ fn draw(
     Ok(())
 }
 
-/// Returns whether a variable is drawn: numbers, and strings of which there are few.
+/// Returns whether a variable is drawn: numbers always, strings only if they have few different values, and bytes never.
 fn is_drawn(column: &Column) -> bool {
     const MOST: usize = 12;
     let is_text = column.base == BaseType::String;

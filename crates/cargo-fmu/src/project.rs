@@ -1,4 +1,4 @@
-//! The metadata of the package that makes an FMU, from cargo.
+//! Gets the metadata of a package that makes an FMU from cargo.
 
 use anyhow::{Context, Result, anyhow, bail};
 use fmu_package::metadata;
@@ -75,8 +75,8 @@ fn nearest_manifest() -> Option<PathBuf> {
     directory.ancestors().map(|directory| directory.join("Cargo.toml")).find(|path| path.is_file())
 }
 
-/// Explains what to do if the path of fmu-export in a `Cargo.toml` does not exist. Cargo's own message names only the file that it
-/// cannot read.
+/// Explains what to do if the path of fmu-export in a `Cargo.toml` does not exist; returns `None` if it exists. Cargo's own message
+/// names only the file that it cannot read.
 fn missing_path(manifest: &Path) -> Option<String> {
     let content = fs::read_to_string(manifest).ok()?;
     let mut lines = content.lines().filter(|line| line.trim_start().starts_with("fmu-export"));

@@ -12,11 +12,11 @@ pub struct Column<'a> {
     pub base: BaseType,
     /// Whether the variable is constant between jumps.
     pub jumps: bool,
-    /// The values, or the number of the label of each value; NaN where there is none.
+    /// The values; for a variable with labels, the number of the label of each value. NaN where there is no value.
     pub values: Vec<f64>,
     /// The labels of the values of a Boolean, an enumeration or a string: names, each with its number.
     pub labels: Vec<(f64, String)>,
-    /// The values of an integer of 64 bits or bytes.
+    /// The exact values of strings, bytes or 64-bit integers; empty for other variables.
     exact: Vec<Option<Value>>,
 }
 
@@ -76,7 +76,7 @@ impl<'a> Column<'a> {
         (0..self.values.len()).rev().take_while(is_missing).count()
     }
 
-    /// Removes all values but the first.
+    /// Keeps only this number of values from the start.
     pub fn truncate(&mut self, length: usize) {
         self.values.truncate(length);
         self.exact.truncate(length);
@@ -142,7 +142,7 @@ fn number(value: f64) -> String {
     }
 }
 
-/// Returns a number with six digits.
+/// Returns a number with six significant digits.
 fn rounded(value: f64) -> String {
     let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
     // Turns -0.0 into 0.0.

@@ -53,7 +53,8 @@ fn assignment(argument: &str) -> Result<(String, String), String> {
     Ok((name.trim().to_owned(), value.trim().to_owned()))
 }
 
-/// Builds and simulates. Returns false if the build or the run failed.
+/// Builds and simulates the FMU. Returns false if the build or the run failed. With `--watch`, repeats this after each change and never
+/// returns.
 pub fn run(options: &Options) -> Result<bool> {
     if !options.watch {
         return once(options);
@@ -74,16 +75,16 @@ pub fn run(options: &Options) -> Result<bool> {
         while changes(watched.clone()) == before {
             sleep(Duration::from_millis(300));
         }
-        // An editor may write several files.
+        // An editor may still be writing other files.
         sleep(Duration::from_millis(100));
     }
 }
 
-/// Returns files and the files in directories, each with the time of its last change.
-fn changes(mut open: Vec<PathBuf>) -> BTreeMap<PathBuf, Option<SystemTime>> {
+/// Returns the time of the last change of each path and, for a directory, of everything in it.
+fn changes(mut pending: Vec<PathBuf>) -> BTreeMap<PathBuf, Option<SystemTime>> {
     let mut found = BTreeMap::new();
-    while let Some(path) = open.pop() {
-        open.extend(fs::read_dir(&path).into_iter().flatten().flatten().map(|entry| entry.path()));
+    while let Some(path) = pending.pop() {
+        pending.extend(fs::read_dir(&path).into_iter().flatten().flatten().map(|entry| entry.path()));
         let time = fs::metadata(&path).and_then(|data| data.modified()).ok();
         found.insert(path, time);
     }
@@ -99,7 +100,7 @@ pub fn check(package: &Package, given: &[PathBuf], options: &fmu_check::Options)
         let directory = project.workspace.join("target/fmu");
         let begin = SystemTime::now();
         let build = BuildOptions { out: Some(directory.clone()), ..BuildOptions::default() };
-        if !builder::build(&project, &build, Purpose::Use, &["--out".into(), directory.clone().into()])? {
+        if !builder::build(&project, &build, Purpose::Release, &["--out".into(), directory.clone().into()])? {
             return Ok(false);
         }
         fmus.extend(
@@ -108,7 +109,7 @@ pub fn check(package: &Package, given: &[PathBuf], options: &fmu_check::Options)
                 .filter_map(|directory| newest(directory, begin)),
         );
     }
-    // All FMUs are checked, regardless of the findings in the first.
+    // All FMUs are checked, even if the first one has findings.
     let mut good = true;
     for fmu in &fmus {
         let directory = fmu.parent().and_then(Path::file_name).unwrap_or_default();
@@ -134,7 +135,7 @@ fn once(options: &Options) -> Result<bool> {
     if let Some(fmi) = options.fmi {
         arguments.extend(["--fmi".into(), if fmi == Standard::Fmi2 { "2" } else { "3" }.into()]);
     }
-    if !builder::build(&project, &build, Purpose::Trial, &arguments)? {
+    if !builder::build(&project, &build, Purpose::Development, &arguments)? {
         return Ok(false);
     }
     let fmu = newest(&directory, begin).or_else(|| newest(&directory.join("fmi3"), begin));
@@ -161,7 +162,7 @@ fn newest(directory: &Path, since: SystemTime) -> Option<PathBuf> {
 fn simulate(options: &Options, path: &Path, directory: &Path) -> Result<bool> {
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let (csv, svg) = (directory.join(format!("{name}.csv")), directory.join(format!("{name}.svg")));
-    // A run that fails leaves no results of an earlier run.
+    // Removes the results of an earlier run, which would be wrong if this run fails.
     [&csv, &svg].iter().for_each(|old| drop(fs::remove_file(old)));
     // SAFETY: the FMU is the user's own model, which was just compiled.
     #[allow(unsafe_code)]
@@ -194,7 +195,7 @@ fn simulate(options: &Options, path: &Path, directory: &Path) -> Result<bool> {
         time.push(end);
         let mut values = values.into_iter();
         for (column, variable) in columns.iter_mut().zip(&shown) {
-            // The end has no strings, bytes and integers of 64 bits.
+            // The values at the end do not include strings, bytes and 64-bit integers.
             column.push(if is_exact(variable) { f64::NAN } else { values.next().unwrap_or(f64::NAN) });
         }
     }
@@ -219,7 +220,7 @@ fn simulate(options: &Options, path: &Path, directory: &Path) -> Result<bool> {
     Ok(!failed)
 }
 
-/// Returns the results of a run with this number of times, in the order of the variables.
+/// Returns the results of a run as columns, in the order of the variables. `times` is the number of times in the run.
 fn columns<'a>(
     description: &Description,
     shown: &[&'a Variable],
@@ -234,7 +235,7 @@ fn columns<'a>(
     shown.iter().map(column).collect()
 }
 
-/// Runs the FMU over these times. The watch contains the messages of the FMU.
+/// Runs the FMU over these times. Returns the results, and the watch that has collected the messages of the FMU.
 fn follow(
     fmu: &Fmu,
     time: &[f64],
@@ -259,7 +260,7 @@ fn follow(
 /// Prints the warnings of the FMU, or all its messages.
 fn print_messages(watch: &Watch, all: bool) {
     for Logged { time, message, .. } in watch.take_messages() {
-        // Errors are not warnings: `simulate` prints the reason of a failure.
+        // Errors are left out here, because `simulate` prints the reason of a failure.
         if all || message.status == Status::Warning {
             let time = time.map_or_else(String::new, |time| format!("t = {time} s, "));
             println!("{time}{}: {}", message.category, message.text.trim());

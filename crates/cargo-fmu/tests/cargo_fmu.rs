@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tempfile::TempDir;
 
-/// A directory for models. They share a target directory with the Makefile.
+/// A temporary directory for models. They are compiled in `target/models`, as in the Makefile.
 struct Directory(TempDir);
 
 impl Directory {
@@ -57,7 +57,7 @@ impl Directory {
     }
 }
 
-/// Makes, tests, simulates and checks a model.
+/// Creates, tests, simulates and checks a model.
 fn develop(from: &str, arguments: &[&str], columns: &str, trajectory: &str) -> Directory {
     let directory = Directory::new();
     let name = format!("my-{from}");
@@ -86,14 +86,14 @@ fn develop(from: &str, arguments: &[&str], columns: &str, trajectory: &str) -> D
             (&"Co-Simulation".into(), &Value::Array(vec![]))
         );
         assert_eq!(findings(&report), listed(from), "{path}");
-        exchanges(&directory.path(&format!("{name}/{path}")), from);
+        compare_interfaces(&directory.path(&format!("{name}/{path}")), from);
     }
     directory
 }
 
-/// Model Exchange gives the same results as Co-Simulation, whose steps are independent of it. Tolerances are relative to the peak of
-/// an output; the steps of the motor and of the house are approximations.
-fn exchanges(fmu: &Path, from: &str) {
+/// Asserts that Model Exchange has the same results as Co-Simulation, whose steps are separate code. Tolerances are relative to the
+/// peak of an output. They are larger for the motor and the house, whose steps are approximations.
+fn compare_interfaces(fmu: &Path, from: &str) {
     let (outputs, end, tolerance) = match from {
         "ball" => (vec!["height", "velocity"], 3.0, 1e-8),
         "motor" => (vec!["current", "speed"], 0.05, 1e-5),
@@ -149,7 +149,7 @@ fn findings(report: &Value) -> BTreeSet<String> {
         .collect()
 }
 
-/// The notes on a model that the documentation lists.
+/// Returns the notes on a model that docs/checking.md lists.
 fn listed(model: &str) -> BTreeSet<String> {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/checking.md");
     let page = fs::read_to_string(page).unwrap();
@@ -211,7 +211,7 @@ fn house() {
     let read = "logEvents: read 9 temperatures from winter.csv";
     assert!(directory.prints("my-house", &["run", "--log"]).contains(read));
     assert!(!directory.prints("my-house", &["run"]).contains(read));
-    // A run needs no page. A build makes it, with the resources that the model reads.
+    // A run leaves out the page. A build adds it, with the resources that the model reads.
     let page = || {
         let fmu = fs::File::open(directory.path("my-house/target/fmu/my_house.fmu")).unwrap();
         let mut fmu = zip::ZipArchive::new(fmu).unwrap();
@@ -237,7 +237,7 @@ fn a_failed_run_fails(directory: &Directory) {
     }
 }
 
-/// Without `--fmu`, the check makes both FMUs.
+/// Without `--fmu`, the check builds both FMUs.
 fn check_makes_the_fmus(directory: &Directory) {
     let output = directory.prints("my-lag", &["check", "--only", "dependencies", "--out", "report"]);
     assert!(
@@ -272,7 +272,7 @@ fn inputs_come_from_a_table(directory: &Directory) {
     }
 }
 
-/// The options of a build in another directory than the package.
+/// Builds from another directory than the package's.
 fn options_reach_the_program_that_packs(directory: &Directory) {
     let manifest = "my-lag/Cargo.toml";
     let output = directory
@@ -328,7 +328,8 @@ fn other_packages_are_rejected() {
     assert!(output.contains("could not find `Cargo.toml`"), "{output}");
 }
 
-/// Within one repository, the model has a relative path; with `--git`, a commit. Both are valid in another directory.
+/// Within one repository, the model names fmu-export by a relative path; with `--git`, by a commit. Both are still valid after the
+/// repository or the model was moved to another directory.
 #[test]
 #[cfg(unix)]
 fn a_model_is_built_in_another_directory() {
@@ -345,12 +346,12 @@ fn a_model_is_built_in_another_directory() {
     git(&["clone", "--quiet", "--bare", root, "origin.git"]);
     git(&["clone", "--quiet", "origin.git", "second"]);
     let second = fs::canonicalize(directory.path("second")).unwrap();
-    // Clones of cargo are temporary; crates of the registry are shared.
+    // Cargo gets a temporary home, so that its clones are temporary, too. Crates of the registry are shared.
     let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
     let home = home.unwrap_or_else(|| Path::new(&std::env::var_os("HOME").unwrap()).join(".cargo"));
     fs::create_dir(directory.path("home")).unwrap();
     std::os::unix::fs::symlink(home.join("registry"), directory.path("home/registry")).unwrap();
-    // The manifest of fmu-export that cargo resolves in a directory.
+    // Returns the manifest of fmu-export that cargo resolves in a directory.
     let source = |path: &str| {
         let mut cargo = Command::new(env!("CARGO"));
         cargo.args(["metadata", "--format-version", "1"]).current_dir(directory.path(path));
@@ -375,7 +376,7 @@ fn a_model_is_built_in_another_directory() {
         manifest.contains("path = \"../../../crates/fmu-export\"") && !manifest.contains(root),
         "{manifest}"
     );
-    // The profile is in the workspace; cargo would warn of another one.
+    // The member has no profile, because cargo ignores it and prints a warning.
     assert!(!manifest.contains("[profile"), "{manifest}");
     let copy = second.join("target").join(name);
     fs::create_dir_all(second.join("target")).unwrap();
@@ -403,7 +404,7 @@ fn a_model_is_built_in_another_directory() {
         "{error}"
     );
 
-    // A repository that has the crates as a submodule, as colleagues clone it.
+    // In a repository that has the crates as a submodule, the path is relative, too.
     fs::create_dir(directory.path("plant")).unwrap();
     let git_in = |arguments: &[&str]| {
         git(&[&["-C", "plant", "-c", "protocol.file.allow=always"], arguments].concat());
@@ -429,7 +430,7 @@ fn the_readme_shows_a_complete_fmu() {
     assert!(readme.contains(&format!("```rust,ignore\n{code}```")), "{readme}");
 }
 
-/// The fenced blocks of a page, in their order: the comment in the line before, the language, and the content.
+/// Returns the fenced blocks of a page in their order: the comment in the line before, the language, and the content.
 fn blocks(page: &str) -> Vec<(&str, &str, &str)> {
     let mut found = Vec::new();
     let mut rest = page;
@@ -456,8 +457,8 @@ fn is_up_to_date(path: &Path, content: &str) {
     assert!(found == content, "{}: {difference:?} (UPDATE_EXPECTED=1 writes it)", path.display());
 }
 
-/// The code in the guide for authors is written into the package, stage after stage. Its commands have the output in the guide; the
-/// last stage is also the model of `cargo fmu new --from tank`.
+/// Writes the code in the guide for authors into the package, stage by stage, and runs the guide's commands. Their output must be as in
+/// the guide, and the last stage must equal the model of `cargo fmu new --from tank`.
 fn follow_the_guide(directory: &Directory, guide: &Path) {
     let page = fs::read_to_string(guide).unwrap().replace("\r\n", "\n");
     let all = blocks(&page);
@@ -523,7 +524,7 @@ fn the_guide_leads_to_a_checked_fmu() {
         );
     }
 
-    // An array is set as a whole, in both versions; single values would not rise.
+    // An array is set as a whole in both FMI versions, because `levels` would not always rise if its elements were set one by one.
     for fmi in ["2", "3"] {
         let run = ["run", "--fmi", fmi, "--set", "levels=0,2,4,6", "--show", "level,pumping,switches,flows"];
         let output = directory.prints("tank", &run);
@@ -548,14 +549,16 @@ fn the_guide_leads_to_a_checked_fmu() {
     let fmus = ["--fmu", "target/fmu/tank.fmu", "--fmu", "target/fmu/fmi3/tank.fmu"];
     let options = ["check", "--fail-on", "fragile", "--no-shrink", "--repeat", "0.3"];
     let output = directory.prints("tank", &[&options[..], &fmus].concat());
-    [fmus[1], fmus[3]].iter().for_each(|fmu| exchanges(&directory.path(&format!("tank/{fmu}")), "tank"));
+    for fmu in [fmus[1], fmus[3]] {
+        compare_interfaces(&directory.path(&format!("tank/{fmu}")), "tank");
+    }
     assert!(output.contains("(FMI 2.0,") && output.contains("(FMI 3.0,"), "{output}");
 }
 
-/// Checks that the build fails with the place of the first panic, or with the name of a call that does not return, and
-/// writes no FMU.
+/// Checks that the build fails with the source location of the first panic, or with the name of a call that does not return, and
+/// that it does not write an FMU.
 #[test]
-fn trials_that_panic_or_do_not_return() {
+fn models_that_panic_or_do_not_return_are_rejected() {
     let directory = Directory::new();
     directory.prints("", &["new", "ball", "--from", "ball"]);
     let source = directory.read("ball/src/ball.rs");

@@ -1,5 +1,5 @@
-//! Makes the C sources of a model in one file, which only uses fmu-export, for tests: c_sources FILE.rs IDENTIFIER DIRECTORY.
-//! The variable WASM2C names wasm2c.
+//! Generates the C sources of a model, for tests: `c_sources FILE.rs IDENTIFIER DIRECTORY`. The model is a single file that uses only
+//! fmu-export. The environment variable `WASM2C` is the path of wasm2c.
 
 use anyhow::{Context, Result, bail, ensure};
 use fmu_package::{LINKING, WEBASSEMBLY, c_sources, check_tools};

@@ -1,4 +1,4 @@
-//! Makes the FMUs of a library that describes itself, for tests: rod LIBRARY DIRECTORY.
+//! Packs a compiled library into FMUs for FMI 2.0 and FMI 3.0, for tests: `rod LIBRARY DIRECTORY`.
 #![allow(unsafe_code)]
 
 use anyhow::{Result, bail};
@@ -8,7 +8,7 @@ use std::path::Path;
 fn main() -> Result<()> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
     let [library, directory] = arguments.as_slice() else { bail!("usage: rod LIBRARY DIRECTORY") };
-    // SAFETY: the library is made by the test with fmu-export.
+    // SAFETY: the test has compiled the library with fmu-export.
     let model = unsafe { LoadedModel::load(Path::new(library), None) }?;
     let libraries = [Library { platform: Platform::host()?, path: library.into() }];
     let (changes, identifier) = (Changes::default(), model.identifier());

@@ -1,6 +1,6 @@
 "use strict";
 
-/** The space that the page has for the section that runs the FMU. */
+/** Returns the placeholder for the section that runs the FMU, and adds it to a page that has none. */
 function space() {
   const found = document.getElementById("live") || document.createElement("div");
   if (!found.isConnected) {

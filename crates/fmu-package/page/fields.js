@@ -1,21 +1,21 @@
 // Sliders and number fields for variables.
 
-/** A unit as it is printed: N·m/° for N.m/deg. @param {string} unit */
+/** Returns a unit as it is printed: N·m/° for N.m/deg. @param {string} unit */
 function printed(unit) {
   return unit.replaceAll(".", "\u00b7").replace(/\bdeg(?=C?\b)/g, "\u00b0").replace(/(?<=[a-z])2\b/g, "\u00b2");
 }
 
-/** A number with its unit: 1.4 N·m/°, 20°. @param {number} value @param {string} unit */
+/** Returns a number with its unit: 1.4 N·m/°, 20°. @param {number} value @param {string} unit */
 function quantity(value, unit) {
   const short = Number(value.toPrecision(6));
   const [number, text] = [(Math.abs(short) >= 1e6 ? short.toExponential().replace("e+", "e") : String(short)).replace("-", "\u2212"), printed(unit)];
   return text ? `${number}${text === "\u00b0" ? "" : "\u00a0"}${text}` : number;
 }
 
-/** The values that a variable can have, in the unit of the page, after "must be"; "" if all numbers are possible. @param {Variable} one */
+/** Returns the range of a variable in the unit of the page, to be put after "must be"; "" if all numbers are possible. @param {Variable} one */
 function rangeOf(one) {
   const [least, most] = [one.min, one.max].map((value) => value * one.factor + one.offset);
-  // A tiny minimum stands for a positive number.
+  // A tiny minimum means that the number must be positive.
   const isPositive = least > 0 && least < 1e-200;
   const low = isPositive ? `greater than ${quantity(0, one.unit)}` : `at least ${quantity(least, one.unit)}`;
   if (Number.isFinite(most)) {
@@ -24,7 +24,7 @@ function rangeOf(one) {
   return Number.isFinite(least) ? low : "";
 }
 
-/** The reason why a variable cannot have a value; "" if it can. @param {Variable} one @param {number | string} value @param {string} [label] of its field */
+/** Returns the reason why a variable cannot have a value; "" if it can. @param {Variable} one @param {number | string} value @param {string} [label] of its field */
 function problem(one, value, label = one.name) {
   if (one.type === "String") {
     return "";
@@ -37,12 +37,12 @@ function problem(one, value, label = one.name) {
   if (one.type !== "Real" && !(Number.isInteger(number) && Math.abs(number) < 2 ** 31)) {
     return `${label} must be an integer below 2\u00b3\u00b9, but it is ${given}`;
   }
-  // A minimum in the unit of the page may differ in the last digit.
+  // The user sees the limits in the unit of the page, whose conversion may change the last digit.
   const tolerance = 1e-12 * Math.abs(number);
   return number < one.min - tolerance || number > one.max + tolerance ? `${label} must be ${rangeOf(one)}, but it is ${given}` : "";
 }
 
-/** The smallest of 1, 2 and 5 times a power of ten that is not below a positive number. @param {number} value */
+/** Rounds a positive number up to 1, 2 or 5 times a power of ten. @param {number} value */
 function roundAbove(value) {
   const power = 10 ** Math.floor(Math.log10(value) + 1e-12);
   return power * ([1, 2, 5].find((factor) => factor * power >= value * (1 - 1e-9)) || 10);
@@ -63,7 +63,7 @@ class Fields {
     this.reaches = new Map();
   }
 
-  /** Calls `changed`, or marks the field of an impossible value. @param {Variable} one @param {number | string} value */
+  /** Calls `changed`, or marks the field as invalid if the value is impossible. @param {Variable} one @param {number | string} value */
   change(one, value) {
     const reason = this.problem(one, value);
     this.mark.get(one.name)?.(reason);
@@ -72,7 +72,7 @@ class Fields {
     }
   }
 
-  /** The reason why a field cannot have a value, with the label of the field. @param {Variable} one @param {number | string} value */
+  /** Returns the reason why a field cannot have a value, with the label of the field; "" if it can. @param {Variable} one @param {number | string} value */
   problem(one, value) {
     const label = this.labels.get(one.name) || one.name;
     const reach = this.reaches.get(one.name);
@@ -80,7 +80,7 @@ class Fields {
     return reason || !reach || Math.abs(Number(value)) <= reach ? reason : `${label} must be from ${quantity(-reach * one.factor, "")} to ${quantity(reach * one.factor, one.unit)}, but it is ${quantity(Number(value) * one.factor, one.unit)}`;
   }
 
-  /** An element below a field for its message. @param {Variable} one @param {HTMLElement} field @returns {HTMLElement} */
+  /** Returns the element below a field that shows why its value is invalid. @param {Variable} one @param {HTMLElement} field @returns {HTMLElement} */
   message(one, field) {
     const id = `${field.id}-message`;
     const message = element("span", { id, class: "live-message", role: "alert" });
@@ -96,7 +96,7 @@ class Fields {
     return message;
   }
 
-  /** A row. @param {Variable} one @param {string} label @param {[number, number] | null} ends of the slider; `null` derives them from min, max and start @param {string} [about] */
+  /** Returns the row of a variable. @param {Variable} one @param {string} label @param {[number, number] | null} ends of the slider; `null` derives them from min, max and start @param {string} [about] */
   row(one, label, ends, about = one.description) {
     const id = `live-${one.name.replace(/\W/g, "-")}`;
     this.labels.set(one.name, label);

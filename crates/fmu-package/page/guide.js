@@ -3,12 +3,12 @@
 /**
  * A number in a paragraph: a parameter of the FMU in the unit of the page, or a number that motions read.
  * @typedef {{name: string, label: string, low: number, high: number, step: number, unit: string}} Dial
- * The values that a sentence is written by. `value` returns a parameter or a number that motions read, `preset` its value as the page opens.
- * `table` has all results of the run, or is `null` while the run is calculated; `motion` is the chosen motion.
+ * The values from which a sentence is written. `value` returns a parameter or a number that motions read, `preset` its value when the page opens.
+ * `table` has all results of the chosen motion; in a run by hand, `table` and `motion` are `null`.
  * @typedef {{value(name: string): number, preset(name: string): number, table: Table | null, motion: Motion | null, response: ResponsePlot | null}} Facts
  * A part of a paragraph: plain text, a number to drag, or text that depends on values.
  * @typedef {string | Dial | ((facts: Facts) => string)} Part
- * A step: its motions, the first of which is played, the explanation, the reason, and the settings of its run as in a link.
+ * A step: its title, the explanation, the reason, and the settings of its run as in a link.
  * @typedef {{title: string, parts: Part[], why: Part[], settings: Record<string, string> & {motion: string}}} Chapter
  */
 
@@ -72,7 +72,7 @@ class Guide {
     return target;
   }
 
-  /** A number that can be dragged. @param {Dial} dial */
+  /** Returns the element of a number that can be dragged. @param {Dial} dial */
   dial({ name, label, low, high, step, unit }) {
     const made = element("span", { class: "live-dial", role: "slider", tabindex: "0", "aria-label": label, "aria-valuemin": String(low), "aria-valuemax": String(high) });
     let [value, valueAtPress, pressedX] = [low, 0, 0];

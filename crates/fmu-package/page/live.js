@@ -4,7 +4,7 @@
  * What a model adds to the page. `label` is the label of the list of motions. The table contains the outputs, the variables `recorded` and the columns `written`
  * by motions. `follow` moves inputs towards the sliders; `move` of a view moves sliders by increments. Motions read `numbers`, and paragraphs of the guide change
  * them within `limits`. The parameters `near`, each with a short description, are next to the sliders. `response` is drawn above the plots. If `isAtRest`, a run by
- * hand starts at rest with any inputs, so it can go on after its last row.
+ * hand starts at rest with any inputs, so a new run can continue after its last row.
  * @typedef {{
  *   label: string, start: Record<string, number>, sliders: {name: string, label: string, reach: number}[], recorded: string[], written: string[], motions: Motion[],
  *   lead: Part[], guide: Chapter[], numbers: Record<string, number>, limits?: Dial[], near: Record<string, string>, panels: Panel[], isMinor(name: string): boolean,
@@ -13,9 +13,10 @@
  *   view(move: (increments: Record<string, number>) => void, value: (name: string) => number, pace: (speed: number) => void): View & {controls?: HTMLElement[], settings?: Map<string, Setting>},
  *   response?(change: (name: string, value: number) => void): ResponsePlot,
  * }} AddOn
- * A setting of the view in a link: its value, its value as the page opens, and a function that sets it and returns whether the value is possible.
+ * A setting of the view in a link: its value, its value when the page opens, and a function that sets it and returns whether the value is possible.
  * @typedef {{value(): string, preset: string, set(value: string): boolean}} Setting
- * A plot above the others, the value of its curve at a frequency, and the highest point of its curve now and with the values as the page opens.
+ * A plot above the others. `at` returns the value of its curve at a frequency, `peaks` the highest points of its curve with the current values and
+ * with the values when the page opens.
  * @typedef {{element: HTMLElement, draw(motion: Motion | null, time: number, start: Map<Variable, number | string>): void,
  *   update(start: Map<Variable, number | string>): void, at(frequency: number): number, peaks(): {now: number[], preset: number[]} | null}} ResponsePlot
  */
@@ -26,7 +27,7 @@ const addOns = {};
 /** Time span of the plots of a run by hand, s. */
 const WINDOW = 8;
 const BY_HAND = "hand";
-/** Largest angle of a slider's field, as a multiple of the slider's reach. */
+/** Largest value in the number field of a slider, as a multiple of the slider's reach. */
 const FARTHEST = 400;
 
 /** The section *Try it*: a run of the FMU and its controls. */
@@ -39,19 +40,19 @@ class Trial {
     this.addOn = (addOns[description.identifier] || plain)(own, others);
     this.session = new Session(own, this.addOn);
     this.motions = new Map(this.addOn.motions.map((motion) => [motion.id, motion]));
-    /** The numbers that motions read, as the page opens. */
+    /** The numbers that motions read, with their values when the page opens. */
     this.numbers = { ...this.addOn.numbers };
     this.settable = description.variables.filter((one) => one.causality === "parameter" && one.variability !== "constant" && one.start !== null);
-    /** The last change, which is undone if the FMU rejects it; `rows` and `targets` are those before a change by hand. @type {{fields: Fields, one: Variable, rows: number, targets: Map<string, number>} | null} */
+    /** The last change, which is undone if the FMU rejects it. For a change by hand, `rows` and `targets` are the run's before the change. @type {{fields: Fields, one: Variable, rows: number, targets: Map<string, number>} | null} */
     this.latest = null;
     /** A run for comparison, and the time of the last change, ms. @type {Comparison | null} */
     this.other = null;
     this.changedAt = -Infinity;
     this.isTouched = false;
     this.shownError = "";
-    /** Settings in the address of the page, as far as they were applied. @type {string | null} */
+    /** The settings in the address of the page that were applied last. @type {string | null} */
     this.applied = null;
-    /** Speed as the page opens. */
+    /** The speed when the page opens. */
     this.pace = 1;
     this.status = element("p", { class: "live-status", role: "status" });
     this.choice = element("select", { id: "live-motion" }, ...this.addOn.motions.map(({ id, title }) => element("option", { value: id }, title)));
@@ -76,7 +77,7 @@ class Trial {
     return /** @type {Variable} */ (this.description.byName.get(name));
   }
 
-  /** A parameter, the position of a slider, or a number that motions read, in the unit of the page. @param {string} name */
+  /** Returns a parameter, the position of a slider, or a number that motions read, in the unit of the page. @param {string} name */
   value(name) {
     const one = this.description.byName.get(name);
     if (!one) {
@@ -167,7 +168,7 @@ class Trial {
     });
   }
 
-  /** Goes on with a run by hand after its last row, if the model is at rest there; otherwise reports why the run stops. */
+  /** Continues a run by hand after its last row, if the add-on is `isAtRest`; otherwise shows why the run stops. Returns whether it continues. */
   goesOn() {
     const { session, addOn, player, description } = this;
     if (session.motion || session.error) {
@@ -285,7 +286,7 @@ class Trial {
     player.setPlaying(false);
     player.now = this.description.startTime;
     if (motion && this.guide.isWritten) {
-      // The sentences have their numbers from the first moment.
+      // The whole run is calculated now, so that the sentences have their numbers from the first moment.
       session.finish(this.end, this.move);
     }
     this.write();
@@ -365,7 +366,7 @@ class Trial {
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
   }
 
-  /** The settings for a link: everything that differs from the page as it opens. */
+  /** Returns the settings for a link: everything that differs from the page when it opens. */
   settings() {
     const { session, addOn, player } = this;
     const settings = new URLSearchParams({ motion: this.choice.value });
@@ -394,7 +395,7 @@ class Trial {
     return settings;
   }
 
-  /** Puts the settings into the address of the page, and copies it. The run goes on. */
+  /** Puts the settings into the address of the page, and copies the address. The run continues. */
   share() {
     this.remember(true);
     this.status.classList.remove("live-error");
@@ -405,7 +406,7 @@ class Trial {
     navigator.clipboard?.writeText(location.href).then(() => (this.status.textContent += " The address is copied."), () => {});
   }
 
-  /** Applies the settings in the address of the page if they are others than the last ones. Addresses of other sections have none. */
+  /** Applies the settings in the address of the page if they differ from the last ones. The address of another section has none. */
   settle() {
     const settings = /^#try&?(.*)$/.exec(location.hash)?.[1] ?? (location.hash ? null : "");
     if (settings !== null && settings !== this.applied) {
@@ -414,7 +415,7 @@ class Trial {
     }
   }
 
-  /** Applies the settings of a link or a step. All other settings are those of the page as it opens. @param {URLSearchParams} settings */
+  /** Applies the settings of a link or a step. All other settings get their values from the opening of the page. @param {URLSearchParams} settings */
   apply(settings) {
     const { session, addOn, player } = this;
     Object.assign(addOn.numbers, this.numbers);
@@ -452,7 +453,7 @@ class Trial {
     return speed === Infinity || (speed >= 1e-3 * this.pace && speed <= 100 * this.pace);
   }
 
-  /** Applies a setting except motion, speed and sliders; returns why it is impossible, or "". @param {string} name @param {string} value @param {boolean} isByHand */
+  /** Applies a setting, but only checks motion, speed and sliders. Returns why the setting is impossible, or "". @param {string} name @param {string} value @param {boolean} isByHand */
   applyOne(name, value, isByHand) {
     const { session, addOn, parameters, description } = this;
     const one = description.byName.get(name);
@@ -521,7 +522,7 @@ class Trial {
     );
   }
 
-  /** Whether all parameters are in one grid with the inputs: those of a small model without its own add-on. */
+  /** Whether all parameters are in one grid with the inputs, as for a small model without its own add-on. */
   get isShort() {
     return addOns[this.description.identifier] === undefined && this.settable.length <= 12;
   }
@@ -569,7 +570,7 @@ class Trial {
   }
 }
 
-/** The note of a motion that is nearest to a time, s. @param {Motion | null} motion @param {number} time */
+/** Returns the note of a motion that is nearest to a time, s. @param {Motion | null} motion @param {number} time */
 function captionAt(motion, time) {
   const notes = motion?.notes ?? [];
   return notes.reduce((best, note) => (Math.abs(note[0] - time) < Math.abs(best[0] - time) ? note : best), notes[0] ?? [0, ""])[1];
@@ -586,7 +587,7 @@ async function decompressPackage(packed, resources) {
 }
 
 /**
- * Puts the section into the space that the page has for it.
+ * Replaces the placeholder in the page with the section.
  * @param {{description: string, module: string}[]} packed the FMU of this page, and those that its add-on runs
  * @param {Record<string, string>} resources of the FMU of this page @param {string[]} missing resources that are not in the page
  */

@@ -10,7 +10,7 @@ function plain({ description }) {
     return Number.isFinite(below + above) ? Math.max(below, above) : roundAbove(Math.max(3 * Math.abs(startOf(one)), 3 * one.nominal) * one.factor) / one.factor;
   };
   const motions = real.filter((one) => one.type === "Real").slice(0, 6).flatMap((one) => {
-    // A round part of what the slider reaches.
+    // About a fifth of the slider's range, as a round number.
     const [start, size] = [startOf(one), roundAbove((reach(one) * one.factor) / 5) / one.factor];
     const end = start + size > one.max ? start - size : start + size;
     return [
@@ -45,7 +45,7 @@ function plainPanels(description) {
     const numbers = description.numbers(causality);
     for (const unit of new Set(numbers.map((one) => one.unit))) {
       const curves = numbers.filter((one) => one.unit === unit).map(({ name, factor, offset, type, variability }, index) => ({
-        // A variable that changes at events only keeps its value in between.
+        // A variable that changes only at events is constant in between.
         name, label: name, colour: `curve-${(index % 6) + 1}`, factor, offset, isInteger: type !== "Real", isStepwise: type !== "Real" || variability === "discrete",
       }));
       for (let first = 0; first < curves.length; first += 6) {
@@ -56,7 +56,7 @@ function plainPanels(description) {
   return panels;
 }
 
-/** The variables of a model whose page does not describe them. @param {Description} description */
+/** Returns the table of variables, for a model whose page does not describe them. @param {Description} description */
 function tableOfVariables({ variables }) {
   const cells = (/** @type {"th" | "td"} */ tag, /** @type {string[]} */ texts) => element("tr", {}, ...texts.map((text) => element(tag, {}, text)));
   const start = (/** @type {Variable} */ one) =>

@@ -14,8 +14,8 @@ const SPEEDS = new Map([["2", "2 × real time"], ["1", "real time"], ["0.5", "1/
 class Player {
   /**
    * `span` returns the time span of the plots. `advance` calculates the run until a time and returns the time that it reached.
-   * `recorded` returns the end of the time slider, `limit` the end of the run. `other` is a run for comparison. At the end of a run that plays,
-   * `goesOn` starts another one and returns true, or returns false.
+   * `recorded` returns the end of the time slider, `limit` the end of the run. `other` is a run for comparison. When the end of the run was
+   * played, `goesOn` may start another one, and returns whether it has.
    * @param {{plots: (seek: (time: number) => void) => Plots, view: View | null, begin: number, isLooping?(): boolean, table: Table,
    *   span(now: number): [number, number], recorded(): number, limit(): number, advance?(now: number): number, other?(): Comparison | null,
    *   notes?(): Note[], goesOn?(): boolean}} options
@@ -73,7 +73,7 @@ class Player {
       this.now = this.options.begin;
     }
     if (isPlaying === this.isPlaying) {
-      // A run that is moved by hand goes on.
+      // A slider that was moved must be drawn, even if the run was playing already.
       this.requestFrame();
       return;
     }

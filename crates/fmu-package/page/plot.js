@@ -1,7 +1,7 @@
 // A table of results, and plots on canvas.
 
 /**
- * A curve of a plot: the name of its column, its label, the name of a colour, and `factor` and `offset` to the unit of the plot.
+ * A curve of a plot: the name of its column, its label, the name of a colour, and `factor` and `offset`, which convert to the unit of the plot.
  * NaN is not drawn. A stepwise curve is constant from row to row. A goal is drawn dotted, with its label next to it.
  * @typedef {{name: string, label: string, colour: string, factor: number, offset?: number, isInteger?: boolean, isStepwise?: boolean, isGoal?: boolean}} Curve
  * A panel. `isNoted` panels show the notes of a motion.
@@ -75,7 +75,7 @@ class Table {
   }
 }
 
-/** Multiples of 1, 2 or 5 times a power of ten, at most about `count` of them. @param {number} low @param {number} high @param {number} count */
+/** Returns tick marks: multiples of 1, 2 or 5 times a power of ten, at most about `count` of them. @param {number} low @param {number} high @param {number} count */
 function ticks(low, high, count) {
   const raw = (high - low) / count;
   const power = 10 ** Math.floor(Math.log10(raw));
@@ -135,7 +135,7 @@ function clear(canvas) {
   return { pen, width, height };
 }
 
-/** The colours of the style sheet, until light or dark changes. @type {Map<string, string>} */
+/** The colours of the style sheet, cached until the colour scheme changes. @type {Map<string, string>} */
 const COLOURS = new Map();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => COLOURS.clear());
 
@@ -282,7 +282,7 @@ class Plots {
     }
     const apart = other && table.count ? farthest(panel, table, other.table, begin, end) : null;
     if (other && apart && Math.abs(apart.value - apart.own) > 0.03 * (high - low)) {
-      // On the side of the grey curve that is away from the run's own curve.
+      // Puts the label on the side of the grey curve that is away from the run's own curve.
       say(other.label, x(apart.time), Math.max(area.top + 10, Math.min(area.bottom - 4, y(apart.value) + (apart.value > apart.own ? -5 : 14))), "soft");
     }
     notes.forEach(([time, text]) => say(text, x(time), 13, "ink"));
@@ -321,7 +321,8 @@ function isDashed(panel, index) {
 }
 
 /**
- * The point at which the curves of another run are farthest from those of a run: its time, its value, and the value of the run; `null` if none is comparable.
+ * Returns the point at which the curves of another run are farthest from this run: the time, the other run's value, and this run's value; `null` if
+ * they are equal or cannot be compared.
  * @param {Panel} panel @param {Table} table @param {Table} other @param {number} begin @param {number} end
  */
 function farthest(panel, table, other, begin, end) {

@@ -6,8 +6,8 @@
  * `notes` are drawn in the plots.
  * @typedef {{id: string, title: string, length: number, other?: {id: string, label: string}, notes?: Note[], frequency?(time: number): number, begin?(): void,
  *   inputs(time: number, inputs: Record<string, number>, table: Table): void}} Motion
- * A second FMU that runs next to that of the page, from the first row: `step` moves it to a time with the last row of the table, and sets
- * inputs and columns of the new row.
+ * A second FMU that runs together with the FMU of the page, from the first row: `step` simulates it up to a time with the values in the last
+ * row of the table, and sets inputs and columns of the new row.
  * @typedef {{begin(start: Map<Variable, number | string>): void, step(time: number, inputs: Record<string, number>, table: Table): void}} Companion
  */
 
@@ -29,13 +29,13 @@ class Session {
     this.written = written;
     this.companion = companion;
     this.table = new Table([...[...this.inputs, ...this.outputs].map((one) => one.name), ...written]);
-    /** Start values that differ from those of the FMU. @type {Map<Variable, number | string>} */
+    /** Start values that differ from the FMU's own. @type {Map<Variable, number | string>} */
     this.start = new Map();
     /** @type {Motion | null} */
     this.motion = null;
     /** Positions of the sliders in a run by hand. @type {Map<string, number>} */
     this.targets = new Map();
-    /** Number of rows whose inputs are known. */
+    /** Number of rows whose inputs are kept when the run is calculated again. */
     this.known = 0;
     this.error = "";
     /** Time at which the FMU terminated the run, s. */
@@ -145,12 +145,12 @@ class Session {
     table.count = row + 1;
   }
 
-  /** The value that a parameter has in this run. @param {Variable} one */
+  /** Returns the value that a parameter has in this run. @param {Variable} one */
   parameter(one) {
     return this.start.get(one) ?? (one.type === "String" ? one.start || "" : startOf(one));
   }
 
-  /** All rows in the units of the FMU, with all digits, after comments that name the FMU and its parameters. */
+  /** Returns a CSV file: comments that name the FMU and its parameters, then all rows in the units of the FMU and with all digits. */
   csv() {
     const { identifier, version, guid, variables } = this.description;
     const parameters = variables.filter((one) => one.causality === "parameter").map((one) => `${one.name} = ${JSON.stringify(this.parameter(one))}`);

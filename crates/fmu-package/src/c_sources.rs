@@ -1,4 +1,4 @@
-//! An FMU's sources in C: wasm2c translates the library from WebAssembly to C, and C functions of FMI call it.
+//! C sources of an FMU: wasm2c translates the library from WebAssembly to C, and the FMI functions in `c/fmi2.c` call that code.
 
 use crate::cross::check_targets;
 use anyhow::{Context, Result, bail, ensure};
@@ -9,23 +9,24 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// The target of a library that is translated to C.
+/// The Rust target of a library that is translated to C or runs in a browser.
 pub const WEBASSEMBLY: &str = "wasm32-unknown-unknown";
 
-/// Arguments of its linker. The stack of an instance has 64 KiB, and is first in memory, so that an overflow is detected.
+/// Linker arguments for this target. The stack of an instance has 64 KiB and comes first in memory, so an overflow traps instead of
+/// overwriting data.
 pub const LINKING: [&str; 2] = ["-Clink-arg=-zstack-size=65536", "-Clink-arg=--stack-first"];
 
-/// The version of wasm2c whose output is known here.
+/// The only supported version of wasm2c, because this file edits its output as text.
 const WASM2C: &str = "1.0.42";
 
 const RUNTIME: &str = include_str!("c/runtime.h");
 const FMI2: &str = include_str!("c/fmi2.c");
 
-/// Turns off warnings about unused code, because parts of the generated code are unused.
+/// Turns off warnings about unused parameters and constants, which occur in the generated code.
 const UNUSED: &str = "#ifdef __GNUC__\n#pragma GCC diagnostic ignored \"-Wunused-parameter\"\n\
                       #pragma GCC diagnostic ignored \"-Wunused-const-variable\"\n#endif\n";
 
-/// The files in the FMU's directory `sources`; the files to compile are first.
+/// The files in the FMU's directory `sources`: names and contents. The first [`COMPILED`] files are to be compiled.
 pub type CSources = Vec<(String, Vec<u8>)>;
 
 /// Number of files to compile.
@@ -34,7 +35,7 @@ pub const COMPILED: usize = 2;
 /// Translates a WebAssembly module to C.
 ///
 /// # Errors
-/// When wasm2c is missing or has another version, or its output has an unknown form.
+/// When wasm2c cannot be started or fails, or when its output has an unknown form.
 pub fn c_sources(wasm2c: &OsStr, module: &Path, identifier: &str) -> Result<CSources> {
     let directory = tempfile::tempdir().context("cannot make a temporary directory")?;
     let output = directory.path().join("module.c");
@@ -67,10 +68,10 @@ pub fn c_sources(wasm2c: &OsStr, module: &Path, identifier: &str) -> Result<CSou
     ])
 }
 
-/// Checks that `wasm2c`, of the version whose output is known here, and Rust's library for WebAssembly are installed.
+/// Checks that the supported version of wasm2c and Rust's standard library for WebAssembly are installed.
 ///
 /// # Errors
-/// The missing tool, and how to install it.
+/// When one of them is missing. The message says how to install it.
 pub fn check_tools(wasm2c: &OsStr) -> Result<()> {
     check_version(wasm2c)?;
     check_targets(&[WEBASSEMBLY.to_owned()], false)
@@ -86,10 +87,10 @@ fn check_version(wasm2c: &OsStr) -> Result<()> {
     Ok(())
 }
 
-/// The names of the module's functions and types.
+/// Names of functions and types in the generated code.
 struct Names<'a> {
     identifier: &'a str,
-    /// The identifier in the names that wasm2c generates.
+    /// The identifier as part of a generated name: wasm2c doubles each underscore.
     prefix: String,
 }
 
@@ -107,37 +108,39 @@ impl Names<'_> {
             start += line.len();
         }
         let code = &code[start..];
-        ensure!(!code.is_empty(), "{} no declaration of a function", unknown());
+        ensure!(!code.is_empty(), "{}: no declaration of a function", unknown_form());
         let types = format!("\nwasm_rt_func_type_t wasm2c_{prefix}_get_func_type(");
-        let (before, after) =
-            code.split_once(&types).with_context(|| format!("{} no function get_func_type", unknown()))?;
-        let (_, after) = after.split_once("\n}\n").with_context(unknown)?;
-        let code = checked_by_the_base(&strict(&format!("{before}{after}")))?;
-        let lacking = used(&code).find(|name| !is_known(name, &code));
+        let (before, after) = code
+            .split_once(&types)
+            .with_context(|| format!("{}: no function get_func_type", unknown_form()))?;
+        let (_, after) = after.split_once("\n}\n").with_context(unknown_form)?;
+        let code = with_split_addresses(&without_void_returns(&format!("{before}{after}")))?;
+        let lacking = called_names(&code).find(|name| !is_known(name, &code));
         if let Some(name) = lacking {
             bail!("the model needs the instruction {name}, which the runtime of C sources lacks");
         }
         Ok(format!(
-            "/* {identifier} as C, made by wasm2c {WASM2C} of a WebAssembly module that Rust was compiled to.\n   \
-             Not to be read or changed: the source is the Rust. */\n{UNUSED}#include \"{identifier}.h\"\n\n{code}"
+            "/* {identifier} in C: Rust was compiled to WebAssembly, which wasm2c {WASM2C} translated.\n   \
+             This file is generated; change the Rust code instead. */\n{UNUSED}#include \"{identifier}.h\"\n\n{code}"
         ))
     }
 
-    /// Returns the generated header, with names for the items that the functions of FMI use.
+    /// Returns the generated header after adding macros, through which `c/fmi2.c` uses the generated functions and types.
     fn header(&self, header: &str, code: &str) -> Result<String> {
         let Names { identifier, prefix } = self;
         for expected in ["u32 w2c_g0;", "wasm_rt_memory_t w2c_memory;", "wasm_rt_funcref_table_t w2c_T0;"] {
-            ensure!(header.contains(expected), "{} no {expected}", unknown());
+            ensure!(header.contains(expected), "{}: no {expected}", unknown_form());
         }
         let number = |call: &str| -> Result<u32> {
-            let (_, after) = code.split_once(call).with_context(|| format!("{} no {call}", unknown()))?;
+            let (_, after) =
+                code.split_once(call).with_context(|| format!("{}: no {call}", unknown_form()))?;
             let digits = after.split(|c: char| !c.is_ascii_digit()).next().unwrap_or_default();
-            digits.parse().with_context(|| format!("{} no number in {call}", unknown()))
+            digits.parse().with_context(|| format!("{}: no number in {call}", unknown_form()))
         };
         let pages = number("wasm_rt_allocate_memory(&instance->w2c_memory, ")?;
         let functions = number("wasm_rt_allocate_funcref_table(&instance->w2c_T0, ")?;
         let mut names = String::new();
-        // Additional memory for saved states.
+        // Two more pages for saved states.
         let memory = pages + 2;
         writeln!(names, "#ifndef FMU_MEMORY_PAGES\n#define FMU_MEMORY_PAGES {memory}\n#endif")?;
         let mut define = |name: &str, value: &str| writeln!(names, "#define {name} {value}");
@@ -161,11 +164,11 @@ impl Names<'_> {
         ];
         for (name, of_module) in functions.chain(others) {
             let of_module = format!("w2c_{prefix}_{of_module}");
-            ensure!(header.contains(&format!(" {of_module}(")), "{} no {of_module}", unknown());
+            ensure!(header.contains(&format!(" {of_module}(")), "{}: no {of_module}", unknown_form());
             define(&format!("FMU_{name}"), &of_module)?;
         }
         let include = "#include \"wasm-rt.h\"\n";
-        ensure!(header.contains(include), "{} no {include}", unknown());
+        ensure!(header.contains(include), "{}: no {include}", unknown_form());
         let types = format!("wasm_rt_func_type_t wasm2c_{prefix}_get_func_type(");
         let lines = header.lines().filter(|line| !line.starts_with(&types));
         let header = lines.fold(String::new(), |text, line| text + line + "\n");
@@ -173,8 +176,8 @@ impl Names<'_> {
     }
 }
 
-/// Removes `return` before calls of void functions, which strict C forbids.
-fn strict(code: &str) -> String {
+/// Removes `return` before a call in a void function, because strict C forbids it.
+fn without_void_returns(code: &str) -> String {
     let mut in_void = false;
     let lines = code.lines().map(|line| {
         let line = if in_void { line.replacen("return ", "", 1) } else { line.to_owned() };
@@ -184,17 +187,17 @@ fn strict(code: &str) -> String {
     lines.collect()
 }
 
-/// Splits the address of each instruction into base and offset: fewer checks are needed, as several instructions share a base.
-/// Removes the variables for the position and size of the memory, which are constants here.
-fn checked_by_the_base(code: &str) -> Result<String> {
+/// Passes the base and the offset of each memory access separately, so that the compiler can check a base once for several accesses.
+/// Also removes the variables for the address and the size of the memory, because both are constant in this runtime.
+fn with_split_addresses(code: &str) -> Result<String> {
     let call =
         "_default32(wasm_rt_local_memory_base, wasm_rt_local_memory_size, &instance->w2c_memory, (u64)(";
     let mut parts = code.split(call);
     let mut checked = parts.next().unwrap_or_default().to_owned();
     for part in parts {
-        let (base, rest) = part.split_once(')').with_context(unknown)?;
+        let (base, rest) = part.split_once(')').with_context(unknown_form)?;
         let (offset, rest) = match rest.strip_prefix(" + ") {
-            Some(rest) => rest.split_at(rest.find([',', ')']).with_context(unknown)?),
+            Some(rest) => rest.split_at(rest.find([',', ')']).with_context(unknown_form)?),
             None => ("0u", rest),
         };
         write!(checked, "(&instance->w2c_memory, {base}, {offset}{rest}")?;
@@ -210,16 +213,16 @@ fn checked_by_the_base(code: &str) -> Result<String> {
             || declares.iter().any(|start| line.starts_with(start))
     };
     let lines: String = checked.split_inclusive('\n').filter(|line| !is_removed(line)).collect();
-    ensure!(!lines.contains("wasm_rt_local_memory"), "{} another use of its memory", unknown());
+    ensure!(!lines.contains("wasm_rt_local_memory"), "{}: another use of its memory", unknown_form());
     Ok(lines)
 }
 
-fn unknown() -> String {
-    format!("wasm2c {WASM2C} has made something unknown of the module, with")
+fn unknown_form() -> String {
+    format!("the output of wasm2c {WASM2C} has an unknown form")
 }
 
-/// Returns the names that are called in C code.
-fn used(code: &str) -> impl Iterator<Item = &str> {
+/// Returns the names before an opening parenthesis in C code: functions, macros, keywords and types.
+fn called_names(code: &str) -> impl Iterator<Item = &str> {
     let part = |c: char| c.is_ascii_alphanumeric() || c == '_';
     code.match_indices('(').filter_map(move |(end, _)| {
         let start = code[..end].rfind(|c| !part(c)).map_or(0, |position| position + 1);
@@ -265,7 +268,7 @@ mod tests {
         assert!(text.ends_with("or name one in WASM2C"), "{text}");
     }
 
-    /// Rust has no compiled library for this target to install.
+    /// Rustup cannot install a standard library for this target, so it is always missing.
     #[test]
     fn a_missing_target_is_named() {
         assert_eq!(
@@ -278,7 +281,7 @@ mod tests {
 
     const NAMES: fn() -> Names<'static> = || Names { identifier: "m_m", prefix: "m__m".to_owned() };
 
-    /// The parts of the output of wasm2c that are read, for a module with one function.
+    /// The lines of wasm2c's output that are edited, for a module with one function.
     const CODE: &str = "#include \"module.h\"\n\
         static u32 w2c_m__m_f1(w2c_m__m*, u32);\n\
         \nwasm_rt_func_type_t wasm2c_m__m_get_func_type(u32 count) {\n  return NULL;\n}\n\
@@ -293,7 +296,7 @@ mod tests {
         \x20 return var_i0;\n}\n";
 
     #[test]
-    fn addresses_are_checked_by_their_base() {
+    fn addresses_are_split_into_base_and_offset() {
         let code = NAMES().code(CODE).unwrap();
         let (_, function) = code.split_once("var_p0) {\n").unwrap();
         assert_eq!(
@@ -321,7 +324,7 @@ mod tests {
         }
     }
 
-    /// The names in a header, and the errors if one is missing.
+    /// Checks the macros that are added to a header, and the error if a name is missing in it.
     #[test]
     fn a_header_that_lacks_a_name_is_rejected() {
         let names = ["fmi2Instantiate", "fmi2FreeInstance", "fmu_argument_buffer", "fmu_broken"];
@@ -349,7 +352,7 @@ mod tests {
             ("#include", "no #include"),
         ] {
             let text = error(NAMES().header(&header.replace(lacking, "u32 nothing("), code));
-            assert!(text.starts_with(&unknown()) && text.contains(message), "{text}");
+            assert!(text.starts_with(&unknown_form()) && text.contains(message), "{text}");
         }
         let text = error(NAMES().header(&header, &code.replace("T0", "T1")));
         assert!(text.ends_with("no wasm_rt_allocate_funcref_table(&instance->w2c_T0, "), "{text}");

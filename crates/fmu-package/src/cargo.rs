@@ -9,10 +9,10 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// The cargo profile of every library: what users run is optimized.
+/// The cargo profile of every library, so that users always get an optimized one.
 pub const PROFILE: &str = "release";
 
-/// A run of cargo that makes a package's shared library.
+/// The settings of a cargo run that compiles the shared library of a package.
 #[derive(Clone, Debug)]
 pub struct LibraryBuild<'a> {
     /// The directory with the `Cargo.toml` of the package or its workspace.
@@ -21,7 +21,7 @@ pub struct LibraryBuild<'a> {
     pub package: &'a str,
     /// The target; `None` for this machine.
     pub target: Option<&'a str>,
-    /// Settings of cargo, such as `profile.release.lto=false`.
+    /// Values for cargo's option `--config`, such as `profile.release.lto=false`.
     pub settings: Vec<String>,
     /// Arguments for the compiler.
     pub arguments: &'a [&'a str],
@@ -32,7 +32,7 @@ pub struct LibraryBuild<'a> {
 impl LibraryBuild<'_> {
     /// Runs cargo, which shows its progress, and returns the path of the library.
     ///
-    /// The package is built without its default features and exactly as `Cargo.lock` says.
+    /// The package is built without its default features and with exactly the versions in `Cargo.lock`.
     ///
     /// # Errors
     /// When cargo cannot be started or fails, or the package has no shared library.
@@ -53,7 +53,7 @@ impl LibraryBuild<'_> {
         if self.target == Some(WEBASSEMBLY) {
             command.args(["--config", &remap_standard_library(&self.directory)?]);
         }
-        // The library needs no debug information. cargo-zigbuild cannot strip libraries for macOS.
+        // The library needs no debug information, but cargo-zigbuild cannot strip libraries for macOS.
         if cargo == ZIGBUILD {
             let strip = !target.is_some_and(|target| target.contains("-apple-"));
             command.env(format!("CARGO_PROFILE_{}_STRIP", PROFILE.to_uppercase()), strip.to_string());
@@ -96,8 +96,8 @@ impl LibraryBuild<'_> {
     }
 }
 
-/// Returns the configuration that gives the sources of the standard library the same paths on every machine. If the component
-/// rust-src is installed, a module would contain the path of rustup's directory.
+/// Returns the cargo configuration that gives the sources of the standard library the same paths on every machine. Without it, a
+/// module contains the path of rustup's directory if the component rust-src is installed.
 fn remap_standard_library(directory: &Path) -> Result<String> {
     let output = |arguments: &[&str]| {
         let done = Command::new("rustc").args(arguments).current_dir(directory).output();

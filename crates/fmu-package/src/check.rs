@@ -1,4 +1,4 @@
-//! Rejects malformed models before they are tried and described.
+//! Rejects malformed models before they are evaluated and described.
 //!
 //! The compiler has already checked the causality, variability and field of each variable.
 
@@ -127,7 +127,7 @@ fn check_info(info: &Info) -> Result<()> {
     );
     ensure!(
         is_identifier(&info.identifier),
-        "the identifier '{}' must be one of C: letters, digits and underscores, no digit first",
+        "the identifier '{}' must be a C identifier: letters, digits and underscores, and not a digit first",
         info.identifier.escape_debug()
     );
     ensure!(is_text(&info.guid), "{} has no guid", info.name);
@@ -208,7 +208,7 @@ fn check_type(variable_type: &Type) -> Result<()> {
     }
 }
 
-/// The number in the precision of the type.
+/// Rounds a number to the precision of the type.
 pub(crate) fn rounded(base: BaseType, number: f64) -> f64 {
     match base {
         BaseType::Float32 => f64::from(number as f32),
@@ -235,7 +235,7 @@ fn check_unit(unit: &Unit) -> Result<()> {
     Ok(())
 }
 
-/// Checks the variables that the variable differentiates and depends on.
+/// Checks the variables that a variable refers to: the state whose derivative it is, and the variables in its `depends_on`.
 fn check_references(table: &Table, variable: &Variable) -> Result<()> {
     let name = &variable.name;
     if let Some(index) = variable.differentiates {
@@ -253,11 +253,11 @@ fn check_references(table: &Table, variable: &Variable) -> Result<()> {
         let known = &table.variables[*known as usize];
         ensure!(
             known.is_known(),
-            "{name} depends on {}, which is calculated or constant; name the inputs, states and parameters that it \
-             follows from",
+            "{name} depends on {}, which is calculated or constant; name the inputs, states and parameters from which it \
+             is calculated",
             known.name
         );
-        ensure!(before.insert(&known.name), "{name} names {} twice among what it depends on", known.name);
+        ensure!(before.insert(&known.name), "{name} names {} twice in its depends_on", known.name);
     }
     Ok(())
 }
@@ -311,7 +311,7 @@ fn check_starts(table: &Table) -> Result<Starts> {
             }
         }
     }
-    // The event of an indicator that is never written would never occur.
+    // An indicator that `indicators()` never writes would never cause an event.
     if let Some(number) = forgotten {
         bail!("{}: indicators() does not fill in indicator {number}", table.info.name);
     }
@@ -354,14 +354,16 @@ fn check_value(label: &str, variable_type: &Type, value: &Value) -> Result<()> {
     Ok(())
 }
 
-/// Checks that the model accepts its start values. Otherwise, every instantiation would fail.
+/// Checks that the model accepts its start values when an importer sets them.
 fn check_model(model: &LoadedModel, starts: &Starts) -> Result<()> {
     for interface in model.table.interfaces() {
         let mut instance =
             Instance::new(model, interface, Standard::Fmi3, false).map_err(|error| anyhow!("{error}"))?;
         let is_set =
             |variable: &Variable| variable.has_start() && variable.variability != Variability::Constant;
-        instance.set(starts, is_set).map_err(|error| anyhow!("these start values make no model: {error}"))?;
+        instance
+            .set(starts, is_set)
+            .map_err(|error| anyhow!("the model rejects its start values: {error}"))?;
     }
     Ok(())
 }

@@ -27,7 +27,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 use zip::ZipArchive;
 
-/// The options that every `build_fmu` has. A program with more options flattens these into its own.
+/// The options that every `build_fmu` has. A program with more options includes them with `#[command(flatten)]`.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct BuildOptions {
     /// Declare the parameters tunable instead of fixed (OpenModelica does not let users change tunable parameters)
@@ -60,10 +60,10 @@ pub struct BuildOptions {
     /// Leave out the page documentation/index.html that runs the FMU in a browser (as with --c-sources)
     #[arg(long)]
     pub no_page: bool,
-    /// Time that the model may take for one call while the build tries it [default: 60]
+    /// Time that the model may take for one call while the build checks it [default: 60]
     #[arg(long, value_name = "SECONDS")]
     pub time_limit: Option<u64>,
-    /// Accept a library for another processor than that of its platform (in FMI 2.0, importers on ARM look in linux64)
+    /// Accept a library whose processor differs from its platform (in FMI 2.0, importers on ARM look in linux64)
     #[arg(long, requires = "binary")]
     pub any_processor: bool,
 }
@@ -90,7 +90,7 @@ pub fn build(builder: &Builder) -> ExitCode {
     exit(options.and_then(|options| builder.run(&options)))
 }
 
-/// The settings with which a model's FMU is built.
+/// The settings for building a model's FMUs.
 #[derive(Clone, Debug)]
 pub struct Builder {
     /// The package of the model: `env!("CARGO_PKG_NAME")`.
@@ -107,22 +107,22 @@ pub struct Builder {
     pub settings: Vec<String>,
     /// Start values that the library reads from another file when it is compiled, see [`Variant::start`].
     pub start: Vec<(String, String)>,
-    /// Label of a build with other values than the default ones, for messages. `None` stands for the default, whose
+    /// Label in messages for a build with other parameter values than the default ones. `None` for the default values, whose
     /// description is kept with the sources.
     pub variant: Option<String>,
     /// Additions to the page that runs the FMU.
     pub page: Page,
-    /// Environment variables for the compilation of the library; a variable without value is removed.
+    /// Environment variables for the compilation of the library; a variable whose value is `None` is removed.
     pub environment: Vec<(&'static str, Option<OsString>)>,
 }
 
-/// The files that the model reads.
+/// The directory of the files that the model reads.
 const RESOURCES: &str = "modelDescription/resources";
 
 impl Builder {
-    /// The settings for a package in the usual layout, whose program is started with `cargo run --bin build_fmu`.
+    /// Returns the settings for a package in the usual layout, whose program is started with `cargo run --bin build_fmu`.
     ///
-    /// The arguments are `env!("CARGO_PKG_NAME")` and `env!("CARGO_MANIFEST_DIR")`.
+    /// Pass `env!("CARGO_PKG_NAME")` and `env!("CARGO_MANIFEST_DIR")`.
     pub fn new(package: impl Into<String>, directory: impl Into<PathBuf>) -> Self {
         Self {
             package: package.into(),
@@ -162,7 +162,7 @@ impl Builder {
         self.check_versions(options)?;
         let content = self.sources.content_files()?;
         let workspace = Neighbourhood::of(&self.sources.directory)?.workspace;
-        // Another build would overwrite the library of this one.
+        // Without the lock, another build could overwrite the library of this one.
         let _lock = lock(&workspace.join("target"));
         let mut libraries = self.libraries(options, &guid)?;
         let time_limit = options.time_limit.map_or(TIME_LIMIT, Duration::from_secs);
@@ -180,7 +180,7 @@ impl Builder {
         let versions = self.versions(options, &model);
         if let Some(path) = described_in {
             let fmi = versions.first().context("there is no version to describe it for")?;
-            // The description that is kept with the sources has no guid, which would change with them.
+            // The description that is kept with the sources has no guid, because the guid changes whenever they do.
             return write_description(&path, &describe(*fmi, NO_GUID)?);
         }
         let mut descriptions = Vec::new();
@@ -190,7 +190,7 @@ impl Builder {
         if versions.contains(&Standard::Fmi2) {
             join_for_macos(&mut libraries)?;
         }
-        // The page runs the FMU for FMI 2.0.
+        // The page runs the FMU for FMI 2.0, so all variables must have types of FMI 2.0.
         let can_have_page = model.table.variables.iter().all(|variable| variable.base().is_in_fmi2());
         let with_page = match options.no_page || options.c_sources || !can_have_page {
             true => None,
@@ -202,7 +202,7 @@ impl Builder {
         let content = with_page.as_ref().map_or(&content, |(_, content)| content);
         let out = options.out.clone().unwrap_or_else(|| workspace.join("target/fmu"));
         for (fmi, description) in &descriptions {
-            // FMI Library reports terminals in an FMU of FMI 2.0 as a fatal mismatch (and goes on).
+            // If an FMU for FMI 2.0 has terminals, FMI Library reports a fatal mismatch, although it continues.
             let terminals = terminals.as_deref().filter(|_| *fmi == Standard::Fmi3);
             let (identifier, libraries, sources) = (model.identifier(), &libraries[..], &sources[..]);
             let parts = Parts { fmi: *fmi, identifier, description, terminals, libraries, sources, content };
@@ -223,9 +223,9 @@ impl Builder {
         describe(model, fmi, changes).with_context(|| label.to_owned())
     }
 
-    /// Prints a note if the library for this machine needs a newer glibc than a library for a named target.
+    /// Prints a note if the library for this machine needs a newer glibc than a library that is compiled with `--target`.
     fn warn_of_glibc(&self, options: &BuildOptions, libraries: &[Library]) {
-        // A library that is compiled with other settings is only for trials on this machine.
+        // A library with additional cargo settings is only for development on this machine.
         let is_shipped = self.settings.is_empty() && options.target.is_empty() && options.binary.is_empty();
         let needed = |library: &Library| needed_glibc(&fs::read(&library.path).ok()?);
         if let Some((major, minor)) = libraries.first().filter(|_| is_shipped).and_then(needed)
@@ -253,7 +253,7 @@ impl Builder {
         }
     }
 
-    /// Checks that the options fit the versions that FMUs are made for.
+    /// Checks that the options are possible for the FMI versions of the FMUs.
     fn check_versions(&self, options: &BuildOptions) -> Result<()> {
         let only_fmi2 = options.fmi.map_or(self.fmi == [Standard::Fmi2], |fmi| fmi == Standard::Fmi2);
         ensure!(
@@ -267,7 +267,7 @@ impl Builder {
         Ok(())
     }
 
-    /// The version in the options, or the default versions that have all types of the model's variables.
+    /// Returns the FMI version in the options. Without one, returns the default versions that have all types of the model's variables.
     fn versions(&self, options: &BuildOptions, model: &LoadedModel) -> Vec<Standard> {
         if let Some(fmi) = options.fmi.or(options.c_sources.then_some(Standard::Fmi2)) {
             return vec![fmi];
@@ -280,7 +280,8 @@ impl Builder {
         vec![Standard::Fmi3]
     }
 
-    /// The libraries that are packed.
+    /// Returns the libraries to pack: those of `--binary`, and one compiled for each target. If there are neither, compiles one for
+    /// this machine, unless only a description or C sources are requested.
     fn libraries(&self, options: &BuildOptions, guid: &str) -> Result<Vec<Library>> {
         let mut libraries = Vec::new();
         for (platform, path) in &options.binary {
@@ -333,7 +334,7 @@ impl Builder {
         Ok(model)
     }
 
-    /// Extracts the library for a platform from an FMU.
+    /// Extracts the library for a platform from an FMU and returns its path.
     fn unpack_library(&self, fmu: &Path, platform: Platform) -> Result<PathBuf> {
         let failed = || format!("cannot take the library for {platform} out of {}", fmu.display());
         let mut archive = ZipArchive::new(fs::File::open(fmu).with_context(failed)?).with_context(failed)?;
@@ -351,13 +352,13 @@ impl Builder {
         Ok(path)
     }
 
-    /// Makes the C sources, which are for every platform.
+    /// Generates the C sources, which an importer can compile for any platform.
     fn c_sources(&self, guid: &str, identifier: &str) -> Result<CSources> {
         let build = LibraryBuild { target: Some(WEBASSEMBLY), arguments: &LINKING, ..self.build(guid) };
         c_sources(&wasm2c(), &build.run()?, identifier)
     }
 
-    /// The build of the library for this machine. The library gets the guid.
+    /// Returns the settings for compiling a library with this guid for this machine.
     fn build(&self, guid: &str) -> LibraryBuild<'_> {
         let mut environment = self.environment.clone();
         environment.push(("FMU_GUID", Some(guid.into())));
@@ -372,7 +373,7 @@ impl Builder {
     }
 }
 
-/// Writes an FMU into the directory of its version, and reports it.
+/// Writes an FMU into the directory of its FMI version, and prints its path, size and platforms.
 fn pack_in(out: &Path, parts: &Parts) -> Result<()> {
     let directory = match parts.fmi {
         Standard::Fmi2 if !parts.sources.is_empty() => out.join("source"),
@@ -391,7 +392,8 @@ fn pack_in(out: &Path, parts: &Parts) -> Result<()> {
     Ok(())
 }
 
-/// Waits until no other build of the same workspace runs, unless the lock file cannot be created.
+/// Waits until no other build runs in the same workspace, and returns a lock that lasts until the file is closed. Returns `None` if
+/// the lock file cannot be created; the build then continues without a lock.
 fn lock(directory: &Path) -> Option<fs::File> {
     fs::create_dir_all(directory).ok()?;
     let file = fs::File::create(directory.join(".fmu-package.lock")).ok()?;
@@ -403,8 +405,8 @@ fn wasm2c() -> OsString {
     std::env::var_os("WASM2C").unwrap_or_else(|| "wasm2c".into())
 }
 
-/// Checks that a library is for its platform and from these sources. Otherwise, it would fail to load or reject every
-/// instantiation.
+/// Checks that a library is for its platform and was compiled from these sources, because any other library would fail to load or
+/// would reject every instantiation.
 fn check_library(library: &Library, guid: &str, any_processor: bool) -> Result<()> {
     let Library { platform, path } = library;
     let bytes = fs::read(path)
@@ -413,7 +415,7 @@ fn check_library(library: &Library, guid: &str, any_processor: bool) -> Result<(
     check_guid(&bytes, guid, path)
 }
 
-/// Writes a description, unless the file is up to date: cargo then sees no change.
+/// Writes a description unless the file is up to date, so that cargo does not see a changed file.
 fn write_description(path: &Path, description: &str) -> Result<()> {
     if fs::read(path).ok().as_deref() == Some(description.as_bytes()) {
         println!("{} is up to date", short(path));

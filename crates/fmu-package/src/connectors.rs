@@ -43,7 +43,7 @@ impl Terminal {
         Self::new(name, "plug")
     }
 
-    /// A terminal whose members are connected by name to those members that another terminal has.
+    /// A terminal whose members are connected by name to the members of another terminal, as far as both have them.
     pub fn bus(name: &'static str) -> Self {
         Self::new(name, "bus")
     }
@@ -57,7 +57,7 @@ impl Terminal {
         Self { name, rule, kind: "", description: "", members: Vec::new(), icon: None }
     }
 
-    /// Sets the kind, which third parties may define: a reversed domain name, such as `org.example.Shaft`.
+    /// Sets the kind. Anyone may define one; its name is a reversed domain name, such as `org.example.Shaft`.
     #[must_use]
     pub fn kind(self, kind: &'static str) -> Self {
         Self { kind, ..self }
@@ -94,8 +94,8 @@ impl Terminal {
         self
     }
 
-    /// Sets the icon: the image `terminalsAndIcons/NAME.png` in the FMU, and `NAME.svg` if that exists. Its corners x1, y1, x2, y2 are
-    /// in the coordinates of the icon of the FMU, which reaches from -100 to 100.
+    /// Sets the icon: the image `terminalsAndIcons/NAME.png` in the FMU, and `NAME.svg` if it exists. The corners x1, y1, x2, y2 are
+    /// coordinates in the icon of the FMU, which extends from -100 to 100 in both directions.
     #[must_use]
     pub fn icon(self, name: &'static str, corners: [f64; 4]) -> Self {
         Self { icon: Some((name, corners)), ..self }

@@ -4,7 +4,7 @@ use crate::directory::{files, names};
 use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
 
-/// The entries of a directory of content, and their paths in the FMU (section 2.3 of FMI 2.0).
+/// The possible entries of a directory of content, each with its path in the FMU (section 2.3 of FMI 2.0).
 const LOCATIONS: [(&str, &str); 6] = [
     ("documentation", "documentation"),
     ("extra", "extra"),
@@ -17,9 +17,9 @@ const LOCATIONS: [(&str, &str); 6] = [
 /// A file that an FMU contains unchanged.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ContentFile {
-    /// Its name in the FMU, with forward slashes.
+    /// Its path in the FMU, with forward slashes.
     pub name: String,
-    /// The file.
+    /// Its path on this machine.
     pub path: PathBuf,
 }
 
@@ -29,7 +29,7 @@ pub struct ContentFile {
 /// Hidden files are left out, and so are the top-level entries named in `except`.
 ///
 /// # Errors
-/// When a top-level entry has another name, a file cannot be found, or a name is not UTF-8.
+/// When a top-level entry has another name, two files have the same path in the FMU, a file cannot be read, or a name is not UTF-8.
 pub fn content_files(directory: &Path, except: &[&str]) -> Result<Vec<ContentFile>> {
     let mut content = Vec::new();
     for top in names(directory)?.into_iter().filter(|top| !except.contains(&top.as_str())) {
@@ -61,7 +61,7 @@ mod tests {
     use std::fs;
 
     #[test]
-    fn files_find_their_location_and_others_are_rejected() {
+    fn known_files_get_their_path_and_others_are_rejected() {
         let directory = tempfile::tempdir().unwrap();
         let path = |name: &str| directory.path().join(name);
         fs::create_dir_all(path("documentation/img")).unwrap();

@@ -7,10 +7,10 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// The program that is cargo with a linker for every system.
+/// A wrapper for cargo that brings a linker for every system.
 pub const ZIGBUILD: &str = "cargo-zigbuild";
 
-/// The linker for Windows that Debian and others have.
+/// The MinGW linker for Windows, which Linux distributions such as Debian offer.
 const MINGW: &str = "x86_64-w64-mingw32-gcc";
 
 /// The targets of `--all-targets`.
@@ -22,11 +22,11 @@ pub const TARGETS: [&str; 5] = [
     "aarch64-apple-darwin",
 ];
 
-/// The glibc that libraries for Linux need: the version of Enterprise Linux 7, which all later systems have.
+/// The glibc version that libraries for Linux require. Enterprise Linux 7 has this version, and later systems have newer ones.
 pub const GLIBC: &str = "2.17";
 
-/// Checks that the tools for these targets are installed; the error names all missing tools and their sources. Only
-/// `all` requires cargo-zigbuild, because cargo's configuration may have a linker for a named target.
+/// Checks that the tools for these targets are installed; the error lists all missing tools and how to install them. cargo-zigbuild
+/// is required only with `all`, because the user's cargo configuration may have a linker for a single target.
 pub fn check_targets(targets: &[String], all: bool) -> Result<()> {
     let mut missing = Vec::new();
     for target in targets.iter().filter(|target| !has_std(target)) {
@@ -45,9 +45,10 @@ pub fn check_targets(targets: &[String], all: bool) -> Result<()> {
     Ok(())
 }
 
-/// Returns the cargo that compiles for this target, and its name of the target.
+/// Returns the program that compiles for this target, and the name by which it calls the target.
 ///
-/// Without cargo-zigbuild, this is the plain cargo, whose configuration may have a linker for the target.
+/// The program is cargo-zigbuild if the target needs it and it is installed. Otherwise it is cargo, whose configuration may have a
+/// linker for the target.
 pub fn rustc_for(target: Option<&str>) -> (OsString, Option<String>) {
     match target.filter(|target| needs_zigbuild(target) && runs(ZIGBUILD)) {
         Some(target) if target.contains("-linux-gnu") => (ZIGBUILD.into(), Some(format!("{target}.{GLIBC}"))),
@@ -56,8 +57,8 @@ pub fn rustc_for(target: Option<&str>) -> (OsString, Option<String>) {
     }
 }
 
-/// Whether a target needs cargo-zigbuild: targets for another system or processor, or for an old glibc. WebAssembly needs no other
-/// linker. MinGW is preferred for Windows, because its libraries need less of the system.
+/// Whether a target needs cargo-zigbuild to link for another system or processor, or with an old glibc. WebAssembly does not need it.
+/// Windows needs it only if MinGW is missing, which is preferred because its libraries need less of the system.
 fn needs_zigbuild(target: &str) -> bool {
     match target {
         "x86_64-pc-windows-gnu" => !runs(MINGW),
@@ -67,7 +68,8 @@ fn needs_zigbuild(target: &str) -> bool {
     }
 }
 
-/// Whether the compiler has the standard library of a target. If this is unknown, cargo will report it.
+/// Whether the compiler has the standard library of a target. Returns true if the compiler cannot be asked, because cargo then
+/// reports why.
 pub fn has_std(target: &str) -> bool {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let output = Command::new(rustc).args(["--print", "target-libdir", "--target", target]).output();

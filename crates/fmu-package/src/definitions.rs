@@ -5,7 +5,7 @@ use crate::xml::Element;
 use anyhow::{Result, ensure};
 use fmi_abi::Value;
 
-/// Returns the units of these types, in the order of their first use.
+/// Returns the element with the units of these types, in the order of their first use; `None` if there are none.
 ///
 /// # Errors
 /// When two different units share a name.
@@ -40,7 +40,7 @@ fn not_zero(offset: f64) -> Option<f64> {
     (offset != 0.0).then_some(offset)
 }
 
-/// Returns the types that have a name, in the order of their first use.
+/// Returns the element with the types that have a name, in the order of their first use; `None` if there are none.
 ///
 /// # Errors
 /// When two different types share a name, or a type and a variable do.
@@ -75,7 +75,7 @@ pub(crate) fn items(definition: &Type) -> impl Iterator<Item = Element> {
     })
 }
 
-/// Adds the attributes of a type: quantity, unit, range, nominal value, kind of bytes.
+/// Adds the attributes of a type: quantity, unit, range and nominal value, or MIME type and size.
 pub(crate) fn with_attributes(element: Element, definition: &Type) -> Element {
     let Attributes::Real { quantity, unit, nominal, .. } = &definition.attributes else {
         return with_range(element, definition);
@@ -87,7 +87,7 @@ pub(crate) fn with_attributes(element: Element, definition: &Type) -> Element {
     with_range(element, definition).with_some("nominal", *nominal)
 }
 
-/// Adds the range of a type, or the kind of bytes.
+/// Adds the range of a type, or the MIME type and the maximum size of a Binary.
 pub(crate) fn with_range(element: Element, definition: &Type) -> Element {
     let range = definition.base.range();
     match &definition.attributes {
@@ -109,7 +109,7 @@ pub(crate) fn filled(string: &str) -> Option<&str> {
     Some(string).filter(|string| !string.is_empty())
 }
 
-/// Returns an element with children; `None` if there are none, as the schema has no empty lists.
+/// Returns an element with children; `None` if there are none, because the schema does not allow empty lists.
 pub(crate) fn list(name: &str, elements: impl IntoIterator<Item = Element>) -> Option<Element> {
     Some(Element::new(name).containing(elements)).filter(|list| !list.children.is_empty())
 }

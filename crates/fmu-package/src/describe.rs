@@ -1,7 +1,7 @@
 //! The model description (section 2.2 of FMI 2.0, 2.4 of FMI 3.0).
 //!
-//! Variables that only FMI 3.0 needs follow the table: the time, if it is not a variable of the model, and the event indicators.
-//! Value references of FMI 3.0 count from 1 in this order, and an array takes as many as it has elements.
+//! The variables of the table are followed by variables that only FMI 3.0 needs: the time, unless the model declares it, and the
+//! event indicators. In FMI 3.0, value references count from 1 in this order, and an array occupies as many as it has elements.
 
 use crate::definitions::{
     filled, items, list, type_definitions, unit_definitions, with_attributes, with_range,
@@ -16,7 +16,7 @@ use fmi_abi::{BaseType, Category, Causality, Standard, Value, Variability};
 /// Values of the description that differ from the compiled model.
 #[derive(Clone, Debug, Default)]
 pub struct Changes {
-    /// The guid, if it is not the compiled one.
+    /// The guid, if it differs from the compiled one.
     pub guid: Option<String>,
     /// Whether parameters are `tunable` instead of `fixed`.
     pub tunable_parameters: bool,
@@ -29,7 +29,7 @@ pub struct Changes {
 /// # Errors
 /// When the model contradicts itself: two variables have one name, a range is empty, a start value is outside its range or differs
 /// between Co-Simulation and Model Exchange, or a dependency is not declared. Also when FMI 2.0 does not have the type of a variable,
-/// or when a variable has a name that FMI 3.0 reserves for a generated one.
+/// or when a variable has the same name as one that is generated for FMI 3.0.
 pub fn describe(model: &LoadedModel, fmi: Standard, changes: &Changes) -> Result<String> {
     let table = &model.table;
     let lacking = table.variables.iter().find(|variable| !variable.base().is_in_fmi2());
@@ -45,9 +45,9 @@ pub fn describe(model: &LoadedModel, fmi: Standard, changes: &Changes) -> Result
         Ok((starts, ModelStructure::of(model, fmi, changes.tunable_parameters)?))
     };
     let tried: Result<_> = try_model();
-    model.trials.end();
-    // A panic is checked first, because later errors may only be its consequences.
-    model.trials.check()?;
+    model.monitor.end();
+    // A panic is reported first, because other errors may only be its consequences.
+    model.monitor.check()?;
     let (starts, structure) = tried?;
     Description { table, fmi, changes }.document(starts, &structure)
 }
@@ -75,8 +75,7 @@ impl Description<'_> {
         for name in generated.iter().filter_map(|variable| variable.attribute("name")) {
             ensure!(
                 !names.contains(&name),
-                "{name} is the name of a variable that FMI 3.0 needs; declare the time as independent, rename any other \
-                 variable of this name"
+                "{name} is the name of a variable that FMI 3.0 needs; declare it as independent if it is the time, else rename it"
             );
         }
         let variables = described
@@ -157,7 +156,7 @@ impl Description<'_> {
         Element::new(name).with("modelIdentifier", &self.table.info.identifier)
     }
 
-    /// Adds the capabilities that both interface types have to the element of one.
+    /// Adds the capabilities that are the same for both interface types.
     fn with_capabilities(&self, element: Element) -> Element {
         let file = |name: &String| Element::new("File").with("name", name);
         match self.fmi {
@@ -175,7 +174,7 @@ impl Description<'_> {
         }
     }
 
-    /// The name of the element of a type.
+    /// Returns the name of the XML element for a base type.
     fn name_of_type(&self, base: BaseType) -> String {
         match (base, self.fmi) {
             (BaseType::Real, Standard::Fmi3) => "Float64".to_owned(),
@@ -203,12 +202,13 @@ impl Description<'_> {
         }
     }
 
-    /// The name of a variable: of an element in FMI 2.0, of the whole array in FMI 3.0.
+    /// Returns the name of a variable. For an element of an array, this is the name of the whole array in FMI 3.0.
     fn name<'v>(&self, variable: &'v Variable) -> &'v str {
         if self.fmi == Standard::Fmi2 { &variable.name } else { &variable.name_of_array }
     }
 
-    /// The element of a variable; in FMI 3.0, of an array with the start values of its elements.
+    /// Returns the XML element of a variable. In FMI 3.0, the first element of an array gives the XML element of the whole array, with
+    /// the start values of all elements.
     fn variable(&self, index: u32, variable: &Variable, starts: &[Option<Value>]) -> Element {
         let Self { table, fmi, changes } = self;
         // A parameter that is calculated from tunable parameters is tunable.
@@ -261,8 +261,8 @@ impl Description<'_> {
             .containing(children.into_iter().map(|start| Element::new("Start").with("value", start)))
     }
 
-    /// The variables of FMI 3.0 that are not in the table. Every FMU has a time (section 2.4.7.4), and every event indicator
-    /// is a variable (section 2.4.8 of FMI 3.0).
+    /// Returns the variables that FMI 3.0 requires in addition to the table: an independent variable (section 2.4.7.4 of FMI 3.0), and a
+    /// variable for each event indicator (section 2.4.8).
     fn generated(&self) -> Vec<Element> {
         let table = self.table;
         if self.fmi == Standard::Fmi2 {
@@ -307,7 +307,7 @@ impl Description<'_> {
     }
 }
 
-/// The element of an unknown. Empty lists state that it depends on nothing; without a list it would depend on everything.
+/// Returns the XML element of an unknown. Empty lists state that it depends on nothing; without a list it would depend on everything.
 fn with_dependencies(name: &str, reference: &str, unknown: &Unknown) -> Element {
     let (known, kinds): (Vec<_>, Vec<_>) = unknown
         .dependencies

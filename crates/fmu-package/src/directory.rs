@@ -4,8 +4,8 @@ use anyhow::{Context, Result, bail};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Returns a file, or all files in a directory and its subdirectories except hidden files. The name of each file begins after the
-/// name of the directory, with forward slashes.
+/// Returns all files in a directory and its subdirectories, except hidden files: the path relative to the directory, which begins with
+/// a slash, and the full path. For the path of a file, returns this file with an empty relative path.
 pub(crate) fn files(path: &Path) -> Result<Vec<(String, PathBuf)>> {
     if !fs::metadata(path).with_context(|| format!("cannot read {}", path.display()))?.is_dir() {
         return Ok(vec![(String::new(), path.to_owned())]);

@@ -37,7 +37,7 @@ pub fn zip(entries: &[(String, Vec<u8>)]) -> Result<Vec<u8>> {
 /// Returns the content of an entry of a zip file.
 ///
 /// # Errors
-/// When it is not a zip file, or lacks the entry.
+/// When it is not a zip file, or when the entry is missing.
 pub fn unzip(zip: &[u8], name: &str) -> Result<Vec<u8>> {
     let mut archive = ZipArchive::new(Cursor::new(zip))?;
     let mut content = Vec::new();
@@ -48,7 +48,8 @@ pub fn unzip(zip: &[u8], name: &str) -> Result<Vec<u8>> {
 /// Beginning of the names of temporary files.
 const UNFINISHED: &str = ".unfinished-";
 
-/// Removes the temporary files of killed processes, which no process has locked. Any failure only means that a file stays.
+/// Removes the temporary files that no process has locked, because their processes were killed. Failures are ignored: they only leave
+/// a file behind.
 fn remove_abandoned(directory: &Path) {
     for entry in fs::read_dir(directory).into_iter().flatten().flatten() {
         let is_temporary = entry.file_name().to_string_lossy().starts_with(UNFINISHED);
@@ -87,7 +88,7 @@ pub fn write_atomically(destination: &Path, write: impl FnOnce(&mut File) -> Res
     };
     let failed = || format!("cannot write in the directory {}", directory.display());
     let mut file = create().with_context(failed)?;
-    // Another process may have locked the file before, and removed it.
+    // Before this process locked the file, another one may have removed it as abandoned.
     while !file.path().exists() {
         file = create().with_context(failed)?;
     }

@@ -61,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn names_and_borders_count() {
+    fn the_guid_depends_on_the_boundaries_between_names_and_contents() {
         let all = [
             guid(&[("a", "bc")]),
             guid(&[("ab", "c")]),

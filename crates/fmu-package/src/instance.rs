@@ -1,13 +1,13 @@
-//! An instance of a model, used as an importer does.
+//! An instance of a model, called as an importer calls it.
 //!
-//! Instances are of FMI 3.0, which has all types. Only derivatives of inputs, which FMI 3.0 lacks, need an instance of FMI 2.0.
+//! Instances use FMI 3.0, because it has all types. Only derivatives of inputs need FMI 2.0, because FMI 3.0 does not have them.
 
 use crate::model::{Group, LoadedModel};
 use crate::table::Variable;
 use fmi_abi::{BaseType, Interface, Standard, Value};
 use fmi_client::{Continuous, Rejection, Settings};
 
-/// The result of a call, with the message of the model if it rejects the call.
+/// The result of a call; the error is the message of the model.
 pub(crate) type Outcome<T = ()> = Result<T, String>;
 
 /// An instance, which owns its saved states.
@@ -28,7 +28,7 @@ pub(crate) struct Saved {
 }
 
 impl<'a> Instance<'a> {
-    /// Makes an instance. In Co-Simulation of FMI 3.0, it may have an event mode.
+    /// Creates an instance. `event_mode` enables Event Mode in Co-Simulation of FMI 3.0.
     pub fn new(
         model: &'a LoadedModel,
         interface: Interface,
@@ -42,7 +42,7 @@ impl<'a> Instance<'a> {
             early_return: true,
             ..Settings::new(interface)
         };
-        model.trials.begin("the instantiation");
+        model.monitor.begin("the instantiation");
         let client = fmi_client::Instance::new(model.functions(standard), &settings).map_err(message)?;
         Ok(Self { model, client, interface, standard, event_mode, time: 0.0 })
     }
@@ -57,9 +57,9 @@ impl<'a> Instance<'a> {
         self.model.table.co_simulation.as_ref().is_none_or(|offer| offer.variable_step_size)
     }
 
-    /// Returns the client for a call, which has this name in messages.
+    /// Returns the client for a call, and records the call, which has this name in messages.
     fn client(&mut self, call: &'static str) -> &mut fmi_client::Instance {
-        self.model.trials.begin(call);
+        self.model.monitor.begin(call);
         &mut self.client
     }
 
@@ -72,7 +72,7 @@ impl<'a> Instance<'a> {
         self.client("exit_initialization_mode").exit_initialization_mode().map_err(message)
     }
 
-    /// Leaves Event Mode after the initialization, without an event, which would change discrete variables.
+    /// Leaves Event Mode after the initialization without iterating an event, because an event would change discrete variables.
     pub fn run(&mut self) -> Outcome {
         match self.interface {
             Interface::ModelExchange => {
@@ -96,7 +96,7 @@ impl<'a> Instance<'a> {
         self.client("enter_continuous_time_mode").enter_continuous_time_mode().map_err(message)
     }
 
-    /// Records a fault if an event has changed states without saying so: importers then go on with the values before.
+    /// Records a fault if an event has changed states but has not reported it, because importers then continue with the old values.
     fn check_states(&mut self, before: &[f64], declared: bool) -> Outcome {
         let after = self.states()?;
         let table = &self.model.table;
@@ -104,9 +104,9 @@ impl<'a> Instance<'a> {
         if let Some(((state, _), (before, after))) = pairs.find(|(_, (before, after))| before != after)
             && !declared
         {
-            self.model.trials.fail(format!(
-                "an event changes {} from {before} to {after}, but its result does not have `states_changed: true`, so importers go on \
-                 with the value before",
+            self.model.monitor.fail(format!(
+                "an event changes {} from {before} to {after}, but its result does not have `states_changed: true`, so importers \
+                 continue with the old value",
                 table.name(*state)
             ));
         }
@@ -123,7 +123,7 @@ impl<'a> Instance<'a> {
         Ok(())
     }
 
-    /// Makes a step of Co-Simulation. Returns false if the model ends the simulation.
+    /// Does a step of Co-Simulation. Returns false if the model ends the simulation.
     pub fn step(&mut self, size: f64) -> Outcome<bool> {
         let time = self.time;
         match self.client("step").step(time, size) {
@@ -155,8 +155,8 @@ impl<'a> Instance<'a> {
             .map_err(message)
     }
 
-    /// Sets the variables that are selected and have a value, arrays as a whole. Variables of a type are set together. Values must
-    /// fit together after each call, so a type that the model rejects is set again after the others.
+    /// Sets the selected variables that have a value, arrays as a whole, with one call for each type. The model must accept the values
+    /// after each call, so the values of a type that it rejects are set again after the values of the other types.
     pub fn set(&mut self, values: &[Option<Value>], is_selected: impl Fn(&Variable) -> bool) -> Outcome {
         let variables = &self.model.table.variables;
         let mut chosen: Vec<bool> = variables
@@ -174,12 +174,12 @@ impl<'a> Instance<'a> {
             array.fill(any);
         }
         let is_set = |index: &u32| chosen[*index as usize];
-        let mut open: Vec<_> =
+        let mut remaining: Vec<_> =
             self.model.groups.iter().filter(|group| group.indices.iter().any(&is_set)).collect();
         loop {
-            let before = open.len();
+            let before = remaining.len();
             let mut rejected = None;
-            open.retain(|group| {
+            remaining.retain(|group| {
                 let indices: Vec<u32> = group.indices.iter().copied().filter(&is_set).collect();
                 let values: Vec<Value> =
                     indices.iter().flat_map(|index| values[*index as usize].clone()).collect();
@@ -195,7 +195,7 @@ impl<'a> Instance<'a> {
             });
             match rejected {
                 None => return Ok(()),
-                Some(message) if open.len() == before => return Err(message),
+                Some(message) if remaining.len() == before => return Err(message),
                 Some(_) => {}
             }
         }
@@ -249,7 +249,7 @@ impl<'a> Instance<'a> {
         Ok(())
     }
 
-    /// The variables that are read and set together: the elements of an array in FMI 3.0.
+    /// Returns the variables that must be read and set together with this one: in FMI 3.0, all elements of its array.
     fn array(&self, index: u32) -> Vec<u32> {
         match self.standard {
             Standard::Fmi2 => vec![index],
@@ -259,14 +259,14 @@ impl<'a> Instance<'a> {
 
     fn get_values(&mut self, base: BaseType, vr: &[u32], count: usize) -> Outcome<Vec<Value>> {
         if !self.client.has_type(base) {
-            // Constant, as FMI 2.0 lacks the type.
+            // FMI 2.0 does not have this type. A constant stands in for the values.
             return Ok(vec![Value::Boolean(false); count]);
         }
         self.client("get_values").get_values(base, vr, count).map_err(message)
     }
 
-    /// Returns the partial derivatives of Reals, arrays as a whole, with respect to one Real: `None` if the model provides none, NaN
-    /// if it returns no finite number.
+    /// Returns the partial derivatives of Reals, arrays as a whole, with respect to one Real: `None` for a derivative that the model
+    /// does not provide, NaN for one that is not finite.
     pub fn partials(&mut self, unknowns: &[u32], known: u32) -> Vec<Option<f64>> {
         if let Ok(all) = self.all_partials(unknowns, known) {
             return all.into_iter().map(Some).collect();
@@ -277,7 +277,7 @@ impl<'a> Instance<'a> {
             match self.all_partials(&array, known) {
                 Ok(all) => found.extend(all.into_iter().map(Some)),
                 Err(message) => {
-                    // FMI 2.0 gives no message.
+                    // In FMI 2.0, a missing derivative has no message.
                     let has_none = message.is_empty() || message.ends_with("is not provided");
                     found.extend(array.iter().map(|_| (!has_none).then_some(f64::NAN)));
                 }
@@ -286,7 +286,7 @@ impl<'a> Instance<'a> {
         found
     }
 
-    /// Returns the partial derivatives of unknowns, which have all elements of their arrays.
+    /// Returns the partial derivatives of unknowns, which must include all elements of their arrays; fails if one is not provided.
     fn all_partials(&mut self, unknowns: &[u32], known: u32) -> Outcome<Vec<f64>> {
         let (length, element) = match self.model.table.variable(known) {
             Some(variable) if self.standard == Standard::Fmi3 => (variable.length(), variable.element),

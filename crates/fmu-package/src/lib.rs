@@ -1,24 +1,26 @@
 #![doc = include_str!("../README.md")]
 //!
-//! ## Inside
+//! ## Structure of the crate
 //!
-//! * [`LoadedModel`] is a library that describes itself; [`describe`] checks its model and returns the description;
-//!   [`structure`] has the dependencies.
-//! * [`LibraryBuild`] compiles the library with cargo, [`pack()`] makes the FMU, [`Builder`] does both.
-//! * [`Fingerprint`], [`Sources`] and [`Variant`] are for the guid.
+//! * [`LoadedModel`] is the model of a loaded library, which describes itself. [`describe`] checks the model and returns its model
+//!   description; [`structure`] finds the dependencies between its variables.
+//! * [`LibraryBuild`] compiles the library with cargo, [`pack()`] writes the FMU, and [`Builder`] does both.
+//! * [`Fingerprint`], [`Sources`] and [`Variant`] compute the guid.
 //!
-//! Each file uses only those before it:
+//! A file uses only files that come before it in this table:
 //!
-//! | for | files |
+//! | purpose | files |
 //! |---|---|
 //! | the guid | `fingerprint`, `directory`, `content`, `packages`, `sources`, `variant` |
 //! | files | `xml`, `files` |
-//! | the model | `table`, `model`, `instance` |
-//! | the description | `check`, `sample`, `memory`, `rates`, `derivatives`, `structure`, `definitions`, `describe` |
+//! | the model | `table`, `call_monitor`, `model`, `instance` |
+//! | checks of the model | `check`, `sample`, `saved_states`, `state_derivatives`, `partial_derivatives` |
+//! | the description | `structure`, `definitions`, `describe` |
 //! | the FMU | `connectors`, `platform`, `pack` |
-//! | the command | `cross`, `c_sources`, `cargo`, `library`, `universal`, `live`, `page`, `terminal`, `command` |
+//! | the command | `cross`, `c_sources`, `cargo`, `library`, `universal`, `page_html`, `page`, `terminal`, `command` |
 
 mod c_sources;
+mod call_monitor;
 mod cargo;
 mod check;
 mod command;
@@ -26,27 +28,26 @@ mod connectors;
 mod content;
 mod cross;
 mod definitions;
-mod derivatives;
 mod describe;
 mod directory;
 pub mod files;
 mod fingerprint;
 mod instance;
 mod library;
-mod live;
-mod memory;
 mod model;
 mod pack;
 mod packages;
 mod page;
+mod page_html;
+mod partial_derivatives;
 mod platform;
-mod rates;
 mod sample;
+mod saved_states;
 mod sources;
+mod state_derivatives;
 pub mod structure;
 mod table;
 pub mod terminal;
-mod trials;
 mod universal;
 mod variant;
 pub mod xml;

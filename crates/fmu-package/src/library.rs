@@ -1,4 +1,4 @@
-//! The platforms of a compiled library, which its headers name.
+//! Reads a compiled library: its platforms, its guid and the version of glibc that it needs.
 
 use crate::platform::Platform;
 use crate::variant::NO_GUID;
@@ -7,7 +7,7 @@ use object::read::macho::{FatArch, MachOFatFile32};
 use object::{Architecture, BinaryFormat, File, FileKind, Object, ObjectKind, ObjectSection};
 use std::path::Path;
 
-/// The platforms of a library: one, or several if it is a universal library of macOS.
+/// Returns the platforms of a library: one, or several if it is a universal library for macOS.
 fn platforms(library: &[u8]) -> Result<Vec<Platform>> {
     const NONE: &str = "it is not a shared library";
     match FileKind::parse(library).context(NONE)? {
@@ -45,7 +45,7 @@ fn platform(architecture: Architecture, format: BinaryFormat) -> Result<Platform
     Platform::of(architecture, system)
 }
 
-/// Checks that a library runs on the platform; with `any_processor`, on the operating system of the platform.
+/// Checks that a library is for this platform; with `any_processor`, only that it is for the operating system of the platform.
 pub fn check_platform(library: &[u8], wanted: Platform, any_processor: bool) -> Result<()> {
     let found = platforms(library)?;
     let names = || found.iter().map(Platform::to_string).collect::<Vec<_>>().join(" and ");
@@ -59,7 +59,7 @@ pub fn check_platform(library: &[u8], wanted: Platform, any_processor: bool) -> 
     Ok(())
 }
 
-/// Checks that a library is an FMU's and was compiled with this guid.
+/// Checks that a library has FMI functions and was compiled with this guid.
 pub fn check_guid(library: &[u8], guid: &str, path: &Path) -> Result<()> {
     let has = |part: &str| library.windows(part.len()).any(|window| window == part.as_bytes());
     let path = path.display();
@@ -78,7 +78,7 @@ pub fn check_guid(library: &[u8], guid: &str, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Returns the newest version of glibc that a library for Linux needs, if it needs any.
+/// Returns the oldest version of glibc with which a library for Linux loads; `None` if it does not use glibc.
 pub fn needed_glibc(library: &[u8]) -> Option<(u32, u32)> {
     let file = File::parse(library).ok().filter(|file| file.format() == BinaryFormat::Elf)?;
     let strings = file.section_by_name(".dynstr")?.data().ok()?;
@@ -94,7 +94,7 @@ mod tests {
     use super::{check_platform, needed_glibc};
     use crate::platform::Platform;
 
-    /// A universal library of macOS with empty parts.
+    /// Returns a universal library for macOS with empty parts.
     fn universal(processors: &[u32]) -> Vec<u8> {
         let mut numbers = vec![0xcafe_babe, processors.len() as u32];
         for &processor in processors {

@@ -1,8 +1,8 @@
 //! A model with its functions, which are in a shared library or in this program.
 #![allow(unsafe_code, reason = "C functions of a library are found by their names")]
 
+use crate::call_monitor::CallMonitor;
 use crate::table::Table;
-use crate::trials::Trials;
 use anyhow::{Context, Result, ensure};
 use fmi_abi::c_types::{c_char, c_void};
 use fmi_abi::{BaseType, Standard, Value, fmi2, fmi3};
@@ -15,25 +15,25 @@ use std::time::Duration;
 
 /// The function of a library that describes its model; `fmu-export` declares it.
 const DESCRIPTION: &str = "fmu_export_describe";
-/// The function of a library that reports panics with their places.
+/// The function of a library that reports panics with their source locations.
 const PANICS: &str = "fmu_export_report_panics";
 type ReportPanics = unsafe extern "C" fn(receive: Receive, context: *mut c_void);
 type Describe = unsafe extern "C" fn(resources: *const c_char, receive: Receive, context: *mut c_void);
 type Receive = unsafe extern "C" fn(context: *mut c_void, text: *const u8, length: usize);
 
-/// A model that describes itself, with its functions of both FMI versions.
+/// A model that describes itself, and its functions for both FMI versions.
 #[derive(Debug)]
 pub struct LoadedModel {
     pub(crate) table: Table,
     /// The functions of FMI 2.0 and FMI 3.0.
     functions: [Arc<Library>; 2],
-    /// The variables by their types.
+    /// The variables, grouped by type.
     pub(crate) groups: Vec<Group>,
-    /// The start values by variable, once the model has been checked.
+    /// The start values by index of the variable, once the model has been checked.
     pub(crate) starts: OnceLock<Vec<Option<Value>>>,
     /// The directory with the files that the model reads.
     resources: Option<CString>,
-    pub(crate) trials: Arc<Trials>,
+    pub(crate) monitor: Arc<CallMonitor>,
     _library: Option<libloading::Library>,
 }
 
@@ -45,7 +45,7 @@ pub(crate) struct Group {
 }
 
 impl LoadedModel {
-    /// A model in this program: the result of `fmu_export::describe`, and its functions.
+    /// Creates a model from functions in this program and the result of `fmu_export::describe`.
     ///
     /// # Safety
     /// The functions belong to the model that is described.
@@ -61,7 +61,7 @@ impl LoadedModel {
     /// if it exists.
     ///
     /// # Safety
-    /// The file is the library of an FMU that was made with `fmu-export`, or no library. It is sound to load the library and to
+    /// The file is the library of an FMU that was made with `fmu-export`, or not a library. It is sound to load the library and to
     /// call its functions.
     ///
     /// # Errors
@@ -83,9 +83,9 @@ impl LoadedModel {
         resources: Option<&Path>,
         limit: Option<Duration>,
     ) -> Result<Self> {
-        let trials = Arc::<Trials>::default();
+        let monitor = Arc::<CallMonitor>::default();
         if let Some(limit) = limit {
-            trials.watch(path.display().to_string(), limit);
+            monitor.watch(path.display().to_string(), limit);
         }
         let path_of = || path.display().to_string();
         // SAFETY: the caller guarantees it, here and below.
@@ -96,7 +96,7 @@ impl LoadedModel {
             .transpose()
             .with_context(path_of)?;
         let mut description = Vec::new();
-        // SAFETY: the functions have the types of the standards, and the function that describes has its type in fmu-export;
+        // SAFETY: the FMI functions have the types of the standard, and `describe` has the type that fmu-export declares;
         // `keep` receives a pointer to a vector, which exists during the call; `directory` is a string or NULL.
         let (fmi2, fmi3) = unsafe {
             let symbol = |name: &str| library.get::<*const c_void>(name).ok().map(|found| *found);
@@ -116,20 +116,21 @@ impl LoadedModel {
             })?;
             if let Ok(report_panics) = library.get::<ReportPanics>(PANICS) {
                 // The library may report a panic at any time, so this value is never freed.
-                let context = Arc::into_raw(Arc::clone(&trials)).cast_mut().cast();
-                report_panics(Trials::receive, context);
+                let context = Arc::into_raw(Arc::clone(&monitor)).cast_mut().cast();
+                report_panics(CallMonitor::receive, context);
             }
             let directory = resources.as_ref().map_or(null(), |path| path.as_ptr());
             let call = "its description (new, start values, indicators)";
-            trials.begin(call);
+            monitor.begin(call);
             describe(directory, keep, (&raw mut description).cast());
-            trials.end();
-            trials.check()?;
+            monitor.end();
+            monitor.check()?;
             (fmi2, fmi3)
         };
         let description = std::str::from_utf8(&description)?;
         // SAFETY: the functions belong to the library, and so does the description.
-        unsafe { Self::with(description, fmi2, fmi3, resources, Some(library), trials) }.with_context(path_of)
+        unsafe { Self::with(description, fmi2, fmi3, resources, Some(library), monitor) }
+            .with_context(path_of)
     }
 
     /// # Safety
@@ -140,7 +141,7 @@ impl LoadedModel {
         fmi3: fmi3::Functions,
         resources: Option<CString>,
         library: Option<libloading::Library>,
-        trials: Arc<Trials>,
+        monitor: Arc<CallMonitor>,
     ) -> Result<Self> {
         let table = Table::read(description)?;
         let functions = [Functions::Fmi2(Box::new(fmi2)), Functions::Fmi3(Box::new(fmi3))];
@@ -149,7 +150,7 @@ impl LoadedModel {
         let functions = functions.map(|functions| Arc::new(unsafe { Library::of(functions) }));
         let group = |base| Group { base, indices: table.find(|variable| variable.base() == base) };
         let groups = BaseType::ALL.into_iter().map(group).filter(|group| !group.indices.is_empty()).collect();
-        Ok(Self { table, functions, groups, starts: OnceLock::new(), resources, trials, _library: library })
+        Ok(Self { table, functions, groups, starts: OnceLock::new(), resources, monitor, _library: library })
     }
 
     /// Returns the directory of resources, if there is one.

@@ -40,7 +40,7 @@ pub struct Parts<'a> {
 /// Writes the FMU to `destination` and returns its size in bytes. If anything fails, an existing file does not change.
 ///
 /// # Errors
-/// When there is neither library nor sources, there are two for one platform, a file cannot be read, or the destination
+/// When there is neither a library nor sources, two libraries are for one platform, a file cannot be read, or the destination
 /// cannot be written.
 pub fn pack(destination: &Path, parts: &Parts) -> Result<u64> {
     let Parts { fmi, identifier, description, terminals, libraries, sources, content } = *parts;
@@ -56,7 +56,7 @@ pub fn pack(destination: &Path, parts: &Parts) -> Result<u64> {
     let has_icon = content.iter().any(|file| file.name == ICON);
     for ContentFile { name, path } in content {
         let name = match (fmi, name.as_str()) {
-            // In FMI 3.0, the icon has another name.
+            // In FMI 3.0, `model.png` is stored under another name, unless the content already has that file.
             (Standard::Fmi3, "model.png") if has_icon => continue,
             (Standard::Fmi3, "model.png") => ICON,
             (_, name) => name,

@@ -1,4 +1,4 @@
-//! The packages that a package uses by path, from the metadata of cargo.
+//! Finds the packages that a package uses by path, with `cargo metadata`.
 
 use anyhow::{Context, Result, ensure};
 use serde_json::Value;
@@ -23,7 +23,7 @@ pub(crate) struct LocalPackage {
 pub(crate) struct Neighbourhood {
     /// The directory of the workspace, or of the package if there is none.
     pub workspace: PathBuf,
-    /// The packages that this one uses by path, directly or through each other, without development dependencies; by name.
+    /// The packages that this one uses by path, directly or indirectly, except development dependencies; sorted by name.
     pub used: Vec<LocalPackage>,
 }
 
@@ -33,11 +33,11 @@ impl Neighbourhood {
         let mut known = BTreeMap::new();
         let own = find(&mut known, directory)?;
         let mut used: Vec<LocalPackage> = Vec::new();
-        let mut open = own.dependencies;
-        while let Some(directory) = open.pop() {
+        let mut pending = own.dependencies;
+        while let Some(directory) = pending.pop() {
             if directory != own.directory && used.iter().all(|package| package.directory != directory) {
                 let package = find(&mut known, &directory)?;
-                open.extend(package.dependencies.iter().cloned());
+                pending.extend(package.dependencies.iter().cloned());
                 used.push(package);
             }
         }
@@ -46,7 +46,7 @@ impl Neighbourhood {
     }
 }
 
-/// Returns the package in this directory. One call of cargo returns all packages of a workspace.
+/// Returns the package in this directory. A call of cargo describes all packages of a workspace, so they are all added to `known`.
 fn find(known: &mut BTreeMap<PathBuf, LocalPackage>, directory: &Path) -> Result<LocalPackage> {
     if !known.contains_key(directory) {
         let failed = || format!("cannot find the packages that {} uses", directory.display());
@@ -113,7 +113,7 @@ mod tests {
 
     /// The FMU of a member of a workspace goes into the `target` of the workspace.
     #[test]
-    fn a_member_knows_its_workspace() {
+    fn the_workspace_of_a_member_is_found() {
         let directory = tempfile::tempdir().unwrap();
         let model = directory.path().join("models/model");
         fs::create_dir_all(model.join("src")).unwrap();

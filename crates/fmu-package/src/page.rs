@@ -5,7 +5,7 @@ use crate::cargo::{LibraryBuild, PROFILE};
 use crate::content::ContentFile;
 use crate::cross::has_std;
 use crate::library::check_guid;
-use crate::live::{Runnable, with_page};
+use crate::page_html::{Runnable, with_page};
 use crate::sources::{DESCRIPTION, Sources};
 use crate::table::Info;
 use crate::variant::{NO_GUID, Variant};
@@ -14,7 +14,7 @@ use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
 
-/// Additions to the page that runs an FMU in a browser: a view of the model instead of plots and sliders only.
+/// Additions to the page that runs an FMU in a browser. Without them, the page has plots and sliders, but not a view of the model.
 ///
 /// ```
 /// # use fmu_package::{Builder, Page};
@@ -38,13 +38,13 @@ pub struct Page {
 pub struct Companion {
     /// The package of its model, which is in the same workspace.
     pub package: &'static str,
-    /// The files that it is made from. Its description is the one that is kept with them.
+    /// The files that it is made from. The page uses the model description that is kept with them.
     pub sources: Sources,
 }
 
 impl Page {
-    /// Compiles the model and its companions for WebAssembly. Returns the content with the page, and the directory of that page.
-    /// Returns `None`, with a note, if the model cannot be compiled for WebAssembly.
+    /// Compiles the model and its companions for WebAssembly. Returns the content with the page, and the temporary directory of the
+    /// page. If the model cannot be compiled for WebAssembly, prints a note and returns `None`.
     pub(crate) fn with_model(
         &self,
         build: &LibraryBuild,
@@ -75,7 +75,7 @@ impl Page {
 }
 
 impl Companion {
-    /// Compiles the library with the settings of the model's.
+    /// Compiles the library of the companion with the settings of the model's library.
     fn runnable(&self, build: &LibraryBuild) -> Result<Runnable> {
         let Self { package, sources } = self;
         let guid = Variant { sources: sources.fingerprint()?, start: Vec::new(), tunable: false }.guid();

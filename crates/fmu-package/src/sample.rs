@@ -1,4 +1,4 @@
-//! Points at which a model is evaluated.
+//! Draws the random points at which a model is evaluated.
 
 use crate::check::{Starts, rounded};
 use crate::instance::{Instance, Outcome};
@@ -17,7 +17,8 @@ pub(crate) struct Point {
     pub interface: Interface,
 }
 
-/// An instance at a point. Samples with the same number have the same parameters of that variability.
+/// An instance at a point. Samples with the same number `fixed` have the same fixed parameters. If the number `tunable` is the same,
+/// too, they also have the same tunable parameters.
 pub(crate) struct FactorSample<'a> {
     pub fixed: usize,
     pub tunable: usize,
@@ -33,19 +34,19 @@ struct Draw<'d> {
 
 /// Draws points.
 pub(crate) struct Sampler<'a> {
-    /// Whether the instances are at a communication point or in Continuous-Time Mode, not in Initialization Mode.
+    /// Whether the instances are at a communication point or in Continuous-Time Mode rather than in Initialization Mode.
     pub running: bool,
     pub model: &'a LoadedModel,
     random: fastrand::Rng,
     starts: Starts,
     tunable_parameters: bool,
-    /// The messages on the variables that could not be moved from a point, by index.
+    /// The variables of which the model rejects every new value, by index, each with the model's message.
     pub stuck: BTreeMap<u32, String>,
 }
 
-/// The number of attempts with one reach.
+/// The number of points that are drawn with each [`Reach`].
 const ATTEMPTS: usize = 10;
-/// The number of reaches.
+/// The number of reaches, each smaller than the one before.
 const REACHES: usize = 10;
 
 /// The largest change of a variable, as a fraction of the usual change.
@@ -70,7 +71,7 @@ impl Reach {
 impl<'a> Sampler<'a> {
     /// Creates a sampler of points near these start values.
     pub fn new(model: &'a LoadedModel, starts: Starts, tunable_parameters: bool) -> Self {
-        // The seed is fixed: the same model always gets the same description.
+        // The seed is fixed, so that the same model always gets the same description.
         let random = fastrand::Rng::with_seed(2);
         Self { running: false, model, random, starts, tunable_parameters, stuck: BTreeMap::new() }
     }
@@ -98,8 +99,9 @@ impl<'a> Sampler<'a> {
         Ok(samples)
     }
 
-    /// Draws new values for some variables, and with `time` a new time, until the model accepts them. The other variables keep their
-    /// values. If the model accepts no new value of a variable, the variable keeps its value and is [`stuck`](Self::stuck).
+    /// Draws new values for some variables, and a new time if `time` is true, until the model accepts them. The other variables keep
+    /// their values. A variable of which the model rejects every new value also keeps its value, and is added to
+    /// [`stuck`](Self::stuck).
     pub fn draw(
         &mut self,
         before: Option<&Point>,
@@ -131,7 +133,7 @@ impl<'a> Sampler<'a> {
         let table = &self.model.table;
         let values = match draw.before {
             Some(before) => before.values.clone(),
-            // Strings and bytes are not moved.
+            // Strings and bytes are not changed.
             None => {
                 let is_moved = |value: &&Value| !matches!(value, Value::String(_) | Value::Binary(_));
                 let starts = table.variables.iter().zip(&self.starts);
@@ -195,7 +197,7 @@ impl<'a> Sampler<'a> {
         for (index, variable) in
             table.variables.iter().enumerate().filter(|(_, variable)| which(variable) && variable.is_moved())
         {
-            // States of a running model have been set, whether or not they have start values.
+            // In a running model, states can be set even if they have no start values. Zero then replaces the start value.
             let zero = (self.running && variable.state).then_some(&Value::Real(0.0));
             let Some(start) = self.starts[index].as_ref().or(zero) else { continue };
             let before = draw.before.and_then(|before| before.values[index].as_ref());
@@ -217,7 +219,8 @@ impl<'a> Sampler<'a> {
 
     /// Returns an instance at a point, if the model accepts the point.
     fn accepted(&self, point: &Point, draw: &Draw) -> Outcome<Instance<'a>> {
-        // No function sets states in Co-Simulation, so they must not depend there on the values that change.
+        // No function sets states in Co-Simulation. So the new values are set only after the first step, when they can no longer
+        // change the states.
         let is_held = self.running && !draw.time && point.interface == Interface::CoSimulation;
         match draw.before.filter(|_| is_held) {
             Some(before) => {
@@ -229,13 +232,14 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    /// Draws an interface type: the dependencies hold for both.
+    /// Draws one of the interface types, because the dependencies must be correct in both.
     fn draw_interface(&mut self) -> Interface {
         let offered: Vec<Interface> = self.model.table.interfaces().collect();
         offered[self.random.usize(..offered.len())]
     }
 
-    /// Makes steps in Co-Simulation, and sets derivatives of the inputs after the first step: factors may depend on both.
+    /// Does this number of steps in Co-Simulation and, after a single step, sets derivatives of the inputs, because factors may
+    /// depend on both.
     fn make_steps(&self, mut instance: Instance<'a>, point: &Point, steps: usize) -> Instance<'a> {
         if point.interface != Interface::CoSimulation {
             return instance;
@@ -261,8 +265,8 @@ impl<'a> Sampler<'a> {
     }
 }
 
-/// Returns an instance at a point. An importer may set values before it enters Initialization Mode and in it, and sets states
-/// later.
+/// Returns an instance at a point. Sets values before Initialization Mode and in it, and states in Continuous-Time Mode, as an importer
+/// may do.
 pub(crate) fn model_at<'a>(
     model: &'a LoadedModel,
     point: &Point,
@@ -274,7 +278,7 @@ pub(crate) fn model_at<'a>(
     let mut instance = Instance::new(model, point.interface, standard, event_mode)?;
     instance.set(&point.values, Variable::has_start)?;
     instance.initialize(point.time, None, None)?;
-    // Variables that are approx have been calculated now.
+    // Variables whose `initial` is `approx` have been calculated now, so they are not set again.
     instance.set(&point.values, |variable| variable.causality == Causality::Input || variable.is_exact())?;
     if !running {
         return Ok(instance);
@@ -282,7 +286,8 @@ pub(crate) fn model_at<'a>(
     instance.initialized()?;
     instance.run()?;
     if point.interface == Interface::CoSimulation {
-        // Before the first step, states may depend on inputs and parameters. A model that rejects the step is unchanged.
+        // Before the first step, states may depend on inputs and parameters, so one step is done. A model that rejects it is
+        // unchanged.
         let _ = instance.step(model.table.info.step_size);
     } else {
         let mut states = instance.states()?;
@@ -301,7 +306,8 @@ pub(crate) fn is_finite(value: &Value) -> bool {
     !matches!(value, Value::Real(value) if !value.is_finite())
 }
 
-/// Returns an element of an array that is scaled by a common factor, or, for integers, shifted by a common number.
+/// Changes an element of an array together with the others: `share`, which is the same for all elements, gives the factor of a Real, or
+/// the number that is added to an integer.
 fn moved_in_common(variable_type: &Type, value: &Value, share: f64) -> Value {
     match (&variable_type.attributes, value) {
         (Attributes::Real { .. }, &Value::Real(value)) => Value::Real(value * (1.0 + 0.5 * share)),

@@ -13,22 +13,22 @@ pub(crate) const DESCRIPTION: &str = "modelDescription/modelDescription.xml";
 
 /// The files that an FMU is made from.
 ///
-/// In addition to the files that are named here, these always count: the `Cargo.lock` in force, the `Cargo.toml` of the
-/// workspace, and the packages that are used by path, directly or through each other, each with its `Cargo.toml`, its build script
-/// and the directory of its library's sources.
+/// The guid depends on the files that are named here, and always on the `Cargo.lock` in use and on the `Cargo.toml` of the workspace.
+/// From each package that is used by path, directly or indirectly, it depends on the `Cargo.toml`, the build script and the directory
+/// of the library's sources.
 ///
-/// These do not count: the compiler, the target and the profile; flags and other variables of the environment; packages that
-/// `[patch]` replaces; files that code includes from elsewhere. Files that make a difference must be named here, and values must be
-/// in [`Variant::start`](crate::Variant::start).
+/// The guid does not depend on the compiler, the target and the profile, on environment variables such as compiler flags, on packages
+/// that `[patch]` replaces, or on files that code includes from other directories. So if another file changes the library, name it
+/// here; if a value does, add it to [`Variant::start`](crate::Variant::start).
 #[derive(Clone, Debug)]
 pub struct Sources {
     /// The directory of the model's `Cargo.toml`, to which the other paths are relative.
     pub directory: PathBuf,
-    /// Files, and directories, of which all files count except hidden files.
+    /// Files and directories that the guid depends on. Hidden files in the directories are ignored.
     pub code: Vec<&'static str>,
     /// The directory of the files that the FMU contains unchanged, see [`content_files`].
     pub content: Option<&'static str>,
-    /// Other entries in that directory.
+    /// Entries of that directory that are not put into the FMU.
     pub not_content: Vec<&'static str>,
     /// Files that the FMU contains in `documentation/licenses`.
     pub licenses: Vec<&'static str>,
@@ -66,7 +66,7 @@ impl Sources {
         Ok(files)
     }
 
-    /// Returns a hash of all these files.
+    /// Returns a hash of all files that the guid depends on.
     ///
     /// # Errors
     /// When a file cannot be read, or cargo does not return the packages that are used.

@@ -1,23 +1,23 @@
 //! The dependencies between variables, and their kinds (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
 //!
-//! A model is evaluated at points near its start values, always the same ones. If its equations are smooth, an unknown that does
-//! not react to a known at any point does not depend on it, and a factor that never changes is constant. For other models, this
-//! proves nothing: there, an unknown depends on the variables that it declares (`depends_on`), or on all. The trials then only
-//! find wrong declarations.
+//! The model is evaluated at points near its start values, which are the same in every build. If its equations are `smooth`, an unknown
+//! that does not react to a known at any point does not depend on it, and a factor that is the same at all points is constant. For
+//! other models this proves nothing, so an unknown depends on the variables in its `depends_on`, or on every known if it has no
+//! `depends_on`. The evaluations then only find wrong declarations.
 
 use crate::check::{Starts, check};
-use crate::derivatives::check as check_derivatives;
-use crate::memory;
 use crate::model::LoadedModel;
-use crate::rates;
+use crate::partial_derivatives::check as check_derivatives;
 use crate::sample::{Point, Sampler, is_finite};
+use crate::saved_states;
+use crate::state_derivatives;
 use crate::table::{Table, Variable};
 use anyhow::{Result, bail, ensure};
 use fmi_abi::{BaseType, Causality, Initial, Standard, Value, Variability};
 use std::collections::{HashMap, HashSet};
 use std::fmt;
 
-/// The start values of a model, which the first call checks.
+/// Returns the start values of a model. The first call checks the model.
 ///
 /// # Errors
 /// When the model contradicts itself, or its saved states are incomplete.
@@ -26,8 +26,8 @@ pub(crate) fn checked_starts(model: &LoadedModel) -> Result<&Starts> {
         return Ok(starts);
     }
     let starts = check(model)?;
-    rates::check(model, &starts)?;
-    memory::check(model, &starts)?;
+    state_derivatives::check(model, &starts)?;
+    saved_states::check(model, &starts)?;
     Ok(model.starts.get_or_init(|| starts))
 }
 
@@ -54,11 +54,11 @@ pub struct Unknown {
 /// The kind of a dependency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DependencyKind {
-    /// The known has a factor that never changes.
+    /// The known is multiplied by a factor that never changes.
     Constant,
-    /// The known has a factor that does not change after the initialization.
+    /// The known is multiplied by a factor that does not change after the initialization.
     Fixed,
-    /// The known has a factor that changes with tunable parameters.
+    /// The known is multiplied by a factor that changes only with tunable parameters.
     Tunable,
     /// Any other dependency.
     Dependent,
@@ -77,10 +77,10 @@ impl fmt::Display for DependencyKind {
 }
 
 impl ModelStructure {
-    /// The structure of a model, whose parameters are `tunable` or have the variability in its table.
+    /// Finds the structure of a model. All its parameters are taken as tunable if `tunable_parameters` is true.
     ///
-    /// In FMI 3.0, unknowns also depend on parameters, and on the time even if it is not a variable of the model. An array is one
-    /// unknown or known there, with the index of its first element, and has the dependencies of all its elements.
+    /// In FMI 3.0, unknowns also depend on parameters, and on the time even if the model does not declare it. An array is one unknown
+    /// or known in FMI 3.0: it has the index of its first element and the dependencies of all its elements.
     ///
     /// # Errors
     /// When the model contradicts itself, reacts to a variable that it has not declared, or rejects its start values; if it is
@@ -99,7 +99,7 @@ impl ModelStructure {
         sampler.running = false;
         let initial = found(&mut sampler, &initial_unknowns, &initial_knowns)?;
         let running = running.into_iter().enumerate().map(|(number, unknown)| {
-            // As an output, a state has the value that was set, or that the last step has calculated.
+            // An output that is a state depends only on itself, because its value was set or calculated by the last step.
             if number < outputs.len() && table.variables[unknown.index as usize].state {
                 let itself = knowns.iter().filter(|known| **known == unknown.index);
                 let dependencies = itself.map(|known| (*known, DependencyKind::Constant)).collect();
@@ -157,7 +157,7 @@ impl Lists {
     }
 }
 
-/// The list with each array instead of its elements.
+/// Merges the elements of each array into one unknown.
 fn of_arrays(table: &Table, unknowns: Vec<Unknown>) -> Vec<Unknown> {
     let first = |index: u32| table.variable(index).map_or(index, |variable| index - variable.element as u32);
     let mut list: Vec<Unknown> = Vec::new();
@@ -179,7 +179,7 @@ fn of_arrays(table: &Table, unknowns: Vec<Unknown>) -> Vec<Unknown> {
     list
 }
 
-/// Adds the dependencies that the model declares, or that the trials cannot rule out.
+/// Adds the dependencies that the model declares, or that the evaluations cannot rule out.
 fn with_declared(table: &Table, found: Unknown, knowns: &[u32]) -> Result<Unknown> {
     let unknown = &table.variables[found.index as usize];
     let declared: Option<HashSet<u32>> =
@@ -194,7 +194,7 @@ fn with_declared(table: &Table, found: Unknown, knowns: &[u32]) -> Result<Unknow
     if unknown.variability == Variability::Constant {
         return Ok(found);
     }
-    // Strings and bytes are not tried.
+    // Strings and bytes are not changed in the evaluations.
     let is_tried = |index: u32| {
         table.variable(index).is_none_or(|known| !matches!(known.base(), BaseType::String | BaseType::Binary))
     };
@@ -209,7 +209,8 @@ fn with_declared(table: &Table, found: Unknown, knowns: &[u32]) -> Result<Unknow
     Ok(Unknown { dependencies, ..found })
 }
 
-/// Returns the unknowns with the dependencies that trials find: from the partial derivatives while running, else from the values.
+/// Returns the unknowns with the dependencies that the evaluations find: from the partial derivatives if the model provides them and
+/// is running, else from changes of the values.
 fn found(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<Unknown>> {
     let table = &sampler.model.table;
     let is_real =
@@ -218,7 +219,7 @@ fn found(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<
     // During initialization, the kinds `fixed` and `tunable` are not allowed.
     let with_partials = table.partials && sampler.running;
     let mut samples = if with_partials { sampler.factor_samples()? } else { Vec::new() };
-    // Derivatives with respect to parameters are available in Initialization Mode.
+    // Derivatives with respect to parameters are available only in Initialization Mode, which is not sampled here.
     let is_differentiable = |index: u32| {
         let causality = table.variable(index).map(|variable| variable.causality);
         is_real(index) && !matches!(causality, Some(Causality::Independent | Causality::Parameter))
@@ -259,8 +260,8 @@ fn found(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<
     Ok(list)
 }
 
-/// The kind of a dependency with these factors; `None` if they are all zero. Each factor has the numbers of its sample's fixed and
-/// tunable parameters.
+/// Returns the kind of a dependency with these factors; `None` if they are all zero. Each factor is given with the numbers `fixed` and
+/// `tunable` of its sample.
 fn factor_kind(factors: &[((usize, usize), f64)]) -> Option<DependencyKind> {
     if factors.iter().all(|(_, factor)| *factor == 0.0) {
         return None;
@@ -283,7 +284,7 @@ fn factor_kind(factors: &[((usize, usize), f64)]) -> Option<DependencyKind> {
     })
 }
 
-/// Changes of unknowns when a known was changed, at several points.
+/// The changes of unknowns after a known was changed, at several points.
 struct Reactions {
     /// The change of the known; `None` unless it is a Real that is set.
     changes: Vec<Option<f64>>,
@@ -292,8 +293,8 @@ struct Reactions {
 }
 
 impl Reactions {
-    /// Returns `None` if the unknown with this number did not react, else its change divided by the change of the known at each
-    /// point, if both are Reals.
+    /// Returns `None` if the unknown with this number did not react, and `Some(None)` if it did but is not a Real or the known is not.
+    /// If both are Reals, returns the change of the unknown divided by the change of the known at each point.
     fn of(&self, number: usize) -> Option<Option<Vec<f64>>> {
         let pairs = || self.values.iter().map(|values| &values[number]);
         let real = |pair: &[Value; 2]| match *pair {
@@ -304,7 +305,7 @@ impl Reactions {
             return pairs().any(|[before, after]| before != after).then_some(None);
         };
         let scale = reals.iter().flatten().fold(0.0, |scale: f64, value| scale.max(value.abs()));
-        // A smaller change is rounding: a model may calculate with terms that cancel.
+        // A smaller change is a rounding error, which occurs if the model adds terms that cancel.
         if reals.iter().all(|[before, after]| (after - before).abs() <= 1e-10 * scale) {
             return None;
         }
@@ -321,7 +322,7 @@ struct Base {
 }
 
 impl Sampler<'_> {
-    /// The points around which each known is changed.
+    /// Draws the points around which each known is changed.
     fn bases(&mut self) -> Result<Vec<Base>> {
         let mut base = || {
             let (point, mut instance) = self.draw(None, true, |_| true)?;
@@ -366,7 +367,7 @@ impl Sampler<'_> {
     }
 }
 
-/// The change of a Real that is set.
+/// Returns the change of a variable between two points, if it is a Real and set at both.
 fn difference(before: &Point, after: &Point, index: u32) -> Option<f64> {
     match (before.values.get(index as usize)?, after.values.get(index as usize)?) {
         (Some(Value::Real(before)), Some(Value::Real(after))) => Some(after - before),

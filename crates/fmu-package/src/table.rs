@@ -1,4 +1,4 @@
-//! The description of a model that its library returns: the facts, the variables, the start values.
+//! Reads the description of a model that its library returns: general information, the variables and their start values.
 
 use anyhow::{Context, Result, anyhow, ensure};
 use fmi_abi::{BaseType, Causality, Initial, Interface, Value, Variability};
@@ -12,7 +12,7 @@ const VERSION: u64 = 1;
 #[derive(Debug)]
 pub(crate) struct Table {
     pub info: Info,
-    /// Whether there is an array among the variables.
+    /// Whether any variable is an array.
     pub arrays: bool,
     pub co_simulation: Option<CoSimulation>,
     pub model_exchange: Option<ModelExchange>,
@@ -22,13 +22,13 @@ pub(crate) struct Table {
     pub output_derivatives: u32,
     /// The states and their derivatives, as indices in the list of variables.
     pub states: Vec<(u32, u32)>,
-    /// The variables, and each element of an array. The index of a variable is its value reference in FMI 2.0.
+    /// The variables; an array has one entry for each element. The index of a variable is its value reference in FMI 2.0.
     pub variables: Vec<Variable>,
     /// The start values for each interface type that the model offers.
     pub starts: Vec<(Interface, Start)>,
 }
 
-/// The facts about a model (section 2.2.1 of FMI 2.0).
+/// General information about a model (section 2.2.1 of FMI 2.0).
 #[derive(Debug)]
 pub(crate) struct Info {
     pub name: String,
@@ -177,19 +177,19 @@ impl Table {
         self.variables.get(index as usize)
     }
 
-    /// The index of the independent variable, which follows the list if it is not a variable of the model.
+    /// Returns the index of the time; the index after the last variable if the model does not declare the time.
     pub fn time(&self) -> u32 {
         let is_time = |variable: &Variable| variable.causality == Causality::Independent;
         self.variables.iter().position(is_time).unwrap_or(self.variables.len()) as u32
     }
 
-    /// The indices of all elements of the array that has this element; of a scalar, its index.
+    /// Returns the indices of all elements of the array that this element belongs to; for a scalar, only its own index.
     pub fn array(&self, index: u32) -> Vec<u32> {
         let variable = &self.variables[index as usize];
         (index - variable.element as u32..).take(variable.length()).collect()
     }
 
-    /// The name of a variable of the list, or of the time.
+    /// Returns the name of a variable, or `time` for an undeclared time.
     pub fn name(&self, index: u32) -> &str {
         self.variable(index).map_or("time", |variable| variable.name.as_str())
     }
@@ -199,7 +199,7 @@ impl Table {
         self.model_exchange.as_ref().map_or(0, |offer| offer.indicators)
     }
 
-    /// The index of an event indicator, counted from 0: the indicators follow the list and the time.
+    /// Returns the index of the event indicator with this number, counted from 0. The indicators follow the variables and the time.
     pub fn indicator(&self, number: usize) -> u32 {
         (self.variables.len() as u32).max(self.time() + 1) + number as u32
     }
@@ -234,13 +234,13 @@ impl Variable {
         self.variability != Variability::Constant
     }
 
-    /// Whether it begins with exactly its start value, and the importer may change that.
+    /// Whether it begins with exactly its start value, which the importer may change.
     pub fn is_exact(&self) -> bool {
         self.initial == Some(Initial::Exact) && self.variability != Variability::Constant
     }
 
-    /// Whether others may depend on it (section 2.2.8 of FMI 2.0): inputs, states, the time, and variables with an exact start
-    /// value.
+    /// Whether other variables may depend on it (section 2.2.8 of FMI 2.0): inputs, states, the time, and variables with an exact
+    /// start value.
     pub fn is_known(&self) -> bool {
         matches!(self.causality, Causality::Input | Causality::Independent) || self.state || self.is_exact()
     }

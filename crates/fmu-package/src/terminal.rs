@@ -18,7 +18,7 @@ pub fn fmi_version(argument: &str) -> Result<Standard, String> {
     }
 }
 
-/// The path relative to the current directory.
+/// Returns the path relative to the current directory, or the given path if it is not in the current directory.
 pub fn short(path: &Path) -> String {
     let current = env::current_dir().unwrap_or_default();
     path.strip_prefix(current).unwrap_or(path).display().to_string()
@@ -29,7 +29,7 @@ pub fn exit(result: Result<()>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // Messages contain names from files, which the terminal must not obey.
+            // Messages contain names from files, whose control characters must not reach the terminal.
             let lines = format!("error: {error:#}");
             lines.lines().for_each(|line| eprintln!("{}", fmi_abi::one_line(line)));
             ExitCode::FAILURE

@@ -1,4 +1,5 @@
-//! Libraries of macOS for several processors in one file: in FMI 2.0, importers look for both in one directory.
+//! Joins the macOS libraries for Intel and ARM in one file, because importers on both processors look in the same directory of an FMU
+//! for FMI 2.0.
 
 use crate::pack::Library;
 use crate::platform::Platform;
@@ -8,11 +9,11 @@ use object::read::macho::MachHeader;
 use object::{BigEndian, Endianness, U32};
 use std::fs;
 
-/// Alignment of a part, as a power of 2: the size of the largest pages.
+/// Binary logarithm of the alignment of each part. 16 KiB is the largest page size.
 const ALIGNMENT: u32 = 14;
 
-/// Joins the two libraries of macOS, if there are two. The result replaces the library for Intel, where importers on ARM also
-/// look. A library for Intel that is already universal is kept.
+/// Joins the two libraries for macOS, if there are two. The result replaces the library for Intel, because importers on ARM also look
+/// in its directory. A library for Intel that is already universal is kept.
 pub fn join_for_macos(libraries: &mut [Library]) -> Result<()> {
     let find = |architecture| {
         let platform = Platform::of(architecture, "macos").ok()?;
@@ -34,7 +35,7 @@ pub fn join_for_macos(libraries: &mut [Library]) -> Result<()> {
     Ok(())
 }
 
-/// Returns a header with the processor and the position of each part, and the parts.
+/// Returns a universal library: a header with the processor and the position of each part, followed by the parts.
 fn joined(parts: &[Vec<u8>]) -> Result<Vec<u8>> {
     let mut header = vec![FAT_MAGIC, parts.len() as u32];
     let mut file = vec![0; 1 << ALIGNMENT];

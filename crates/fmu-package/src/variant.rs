@@ -1,11 +1,11 @@
-//! The guid of an FMU: the same sources make several FMUs.
+//! The guid of an FMU. It depends on more than the sources, because several FMUs can be built from the same sources.
 
 use crate::fingerprint::Fingerprint;
 
 /// The guid of libraries that were compiled without a guid, and of descriptions that are kept with the sources.
 pub const NO_GUID: &str = "{00000000-0000-0000-0000-000000000000}";
 
-/// The facts that the library and the description must share.
+/// The information from which a guid is computed, so that the library and the description belong together.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Variant {
     /// The fingerprint of the sources.

@@ -8,6 +8,7 @@ use std::io::{Cursor, Read, Write};
 use std::path::{Path, PathBuf};
 use zip::{CompressionMethod, ZipArchive};
 
+/// A directory with the files to pack.
 struct Sources {
     directory: tempfile::TempDir,
 }
@@ -59,7 +60,7 @@ impl Sources {
 }
 
 #[test]
-fn it_is_the_zip_that_importers_want() {
+fn the_zip_file_has_the_form_that_fmi_requires() {
     let sources = Sources::new();
     let fmu = sources.path("out/deep/model.fmu");
     let size = sources.pack_both(&fmu);

@@ -1,4 +1,4 @@
-//! The guid covers the package and the packages that it uses by path, but not their locations.
+//! The guid depends on the package and on the packages that it uses by path, but not on their locations.
 
 use fmu_package::Sources;
 use std::fs;
@@ -66,7 +66,7 @@ fn any_compiled_file_changes_the_guid() {
 }
 
 #[test]
-fn the_location_does_not_count() {
+fn the_guid_does_not_depend_on_the_location() {
     let (one, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     project(one.path());
     project(&other.path().join("deep"));

@@ -1,4 +1,4 @@
-//! Data of an FMU that a system needs.
+//! Reads the data of an FMU that a system needs.
 
 use anyhow::{Result, anyhow, bail, ensure};
 use fmu_package::files::unzip;
@@ -21,19 +21,19 @@ impl Fmu {
     }
 
     /// Returns a variable of the FMU.
-    pub fn variable(&self, name: &str) -> Option<Own<'_>> {
-        Some(Own { fmu: self, variable: self.description.variable(name)? })
+    pub fn variable(&self, name: &str) -> Option<FmuVariable<'_>> {
+        Some(FmuVariable { fmu: self, variable: self.description.variable(name)? })
     }
 }
 
 /// A variable of an FMU.
 #[derive(Clone, Copy)]
-pub struct Own<'a> {
+pub struct FmuVariable<'a> {
     fmu: &'a Fmu,
     pub variable: &'a Variable,
 }
 
-impl<'a> Own<'a> {
+impl<'a> FmuVariable<'a> {
     /// Returns the type name that SSP 1.0 and OSP use.
     pub fn kind(self) -> &'static str {
         self.variable.kind()
@@ -44,14 +44,14 @@ impl<'a> Own<'a> {
         self.fmu.description.connects(self.variable, &input.fmu.description, input.variable)
     }
 
-    /// Returns name and items of its enumeration, if it has one.
+    /// Returns the name and the items of its enumeration, if it has one.
     pub fn items(self) -> Option<(&'a str, &'a Items)> {
         let name = self.variable.declared_type.as_deref()?;
         let (name, items) = self.fmu.description.enumerations.get_key_value(name)?;
         Some((name, items))
     }
 
-    /// Returns the number of an item.
+    /// Returns the number of an item of its enumeration.
     pub fn number_of(self, item: &str) -> Option<&'a str> {
         let (_, items) = self.items()?;
         items.iter().find(|(name, _)| name == item).map(|(_, number)| number.as_str())

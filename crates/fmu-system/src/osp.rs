@@ -59,7 +59,7 @@ impl CheckedSystem<'_> {
         ]))
     }
 
-    /// Returns the initial value; items of enumerations are written as numbers.
+    /// Returns the element of an initial value. An item of an enumeration is written as its number.
     fn initial_value(&self, name: &str, start: &str) -> Result<Element> {
         let variable = self.variable(name)?;
         Ok(match variable.number_of(start) {

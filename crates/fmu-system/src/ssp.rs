@@ -1,6 +1,6 @@
 //! Output as SSP: System Structure and Parameterization 1.0.
 
-use crate::fmu::{Items, Own};
+use crate::fmu::{FmuVariable, Items};
 use crate::system::{CheckedSystem, System, file_name, split};
 use anyhow::{Result, ensure};
 use fmu_package::files::{write_atomically, zip};
@@ -14,9 +14,9 @@ const COMMON: &str = "http://ssp-standard.org/SSP1/SystemStructureCommon";
 impl CheckedSystem<'_> {
     /// Writes the SSP file and returns its size in bytes.
     ///
-    /// The directory `resources` contains the FMUs, and a file of start values for each component that has
-    /// some. The file `resources/experiment.ssv` contains the start values of the system's inputs. All sets
-    /// of start values are named `default`.
+    /// The directory `resources` contains the FMUs, and a file with start values for each component that has
+    /// any. The file `resources/experiment.ssv` contains the start values of the system's inputs. In each of
+    /// these files, the parameter set is named `default`.
     ///
     /// # Errors
     /// Fails if the file cannot be written.
@@ -41,7 +41,7 @@ impl CheckedSystem<'_> {
         let mut elements = Vec::new();
         for (component, path) in components {
             let own = |end: &str| split(end).0 == *component;
-            // Writes only connectors with a connection, because importers fail on others.
+            // Writes only connectors that are connected, because some importers fail on others.
             let mut connectors = Vec::new();
             let to = inputs.iter().map(|(_, to, _)| *to).chain(connections.iter().map(|(_, to)| *to));
             for to in to.filter(|to| own(to)) {
@@ -93,8 +93,8 @@ impl CheckedSystem<'_> {
             .containing([experiment]))
     }
 
-    /// Returns the annotation for the kind of importer, which OMSimulator requires and other importers
-    /// ignore. The tolerances are OMSimulator's defaults, which it requires even for fixed steps.
+    /// Returns the annotation with simulation settings that OMSimulator requires and other importers
+    /// ignore. The tolerances are OMSimulator's defaults; it requires them even for fixed steps.
     fn omsimulator(&self) -> Element {
         let master = Element::new("oms:FixedStepMaster")
             .with("description", "oms-ma")
@@ -112,16 +112,17 @@ impl CheckedSystem<'_> {
         Element::new("ssd:Annotations").containing([annotation])
     }
 
-    /// Returns the variables that have connectors.
-    fn connected(&self) -> Result<Vec<Own<'_>>> {
+    /// Returns the connected inputs, and the variables of the system's outputs. Their units and enumerations
+    /// are defined in the file.
+    fn connected(&self) -> Result<Vec<FmuVariable<'_>>> {
         let System { inputs, outputs, connections, .. } = self.system;
         let ends = connections.iter().map(|(_, to)| *to).chain(inputs.iter().map(|(_, to, _)| *to));
         let ends = ends.chain(outputs.iter().map(|(_, from)| *from));
         ends.map(|end| self.variable(end)).collect()
     }
 
-    /// Returns only the units that the variables use.
-    fn units_of(&self, variables: &[Own]) -> Vec<Element> {
+    /// Returns the definitions of the units that the variables use.
+    fn units_of(&self, variables: &[FmuVariable]) -> Vec<Element> {
         let used: HashSet<_> = variables.iter().map(|of| of.variable.unit.as_deref()).collect();
         let units = self.units.keys().filter(|name| used.contains(&Some(name.as_str())));
         units.filter_map(|name| self.unit(name)).collect()
@@ -142,7 +143,8 @@ impl CheckedSystem<'_> {
         Ok(Element::new("ssd:Connector").with("name", name).with("kind", kind).containing([base_type]))
     }
 
-    /// Returns the file with start values of a component; each has a name, a variable and a value.
+    /// Returns name and content of the file with the start values of a component; `None` if it has none. Each
+    /// start value is given as its name in the file, the full name of the variable, and the value.
     fn ssv<'b>(
         &self,
         component: &str,
@@ -175,7 +177,7 @@ impl CheckedSystem<'_> {
 }
 
 /// Returns the enumerations of variables, if there are any.
-fn enumerations(variables: &[Own]) -> Result<Option<Element>> {
+fn enumerations(variables: &[FmuVariable]) -> Result<Option<Element>> {
     let mut known: BTreeMap<&str, &Items> = BTreeMap::new();
     for (name, items) in variables.iter().filter_map(|of| of.items()) {
         let before = known.entry(name).or_insert(items);

@@ -1,6 +1,6 @@
 //! A system, and the checks of its consistency.
 
-use crate::fmu::{Fmu, Own};
+use crate::fmu::{Fmu, FmuVariable};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use std::collections::BTreeMap;
 use std::fs;
@@ -17,7 +17,7 @@ pub struct System<'a> {
     pub description: &'a str,
     /// Components: name and file of the FMU.
     pub components: Vec<(&'a str, PathBuf)>,
-    /// Inputs of the system: name, connected input of a component, start value in that input's unit.
+    /// Inputs of the system: name, connected input of a component, start value in the unit of the component's input.
     pub inputs: Vec<(&'a str, &'a str, String)>,
     /// Outputs of the system: name, connected output of a component.
     pub outputs: Vec<(&'a str, &'a str)>,
@@ -95,7 +95,7 @@ impl CheckedSystem<'_> {
         let fmu = Fmu::read(fs::read(path).context("it cannot be read")?)?;
         for (name, unit) in &fmu.description.units {
             let before = self.units.entry(name.clone()).or_insert_with(|| unit.clone());
-            ensure!(before == unit, "its unit {name} differs from that of another FMU");
+            ensure!(before == unit, "its unit {name} differs from the unit of this name in another FMU");
         }
         self.fmus.push(fmu);
         Ok(())
@@ -116,27 +116,27 @@ impl CheckedSystem<'_> {
         Ok(())
     }
 
-    /// Returns file name and content of each FMU, without duplicates.
+    /// Returns the file name and the content of each FMU, without duplicates.
     pub(crate) fn files(&self) -> Result<BTreeMap<&str, &[u8]>> {
         let fmus = self.system.components.iter().zip(&self.fmus);
         fmus.map(|((_, path), fmu)| Ok((file_name(path)?, fmu.bytes.as_slice()))).collect()
     }
 
-    fn find(&self, name: &str, wanted: &str) -> Result<Own<'_>> {
+    fn find(&self, name: &str, wanted: &str) -> Result<FmuVariable<'_>> {
         let found = self.variable(name)?;
         let causality = &found.variable.causality;
         ensure!(causality == wanted, "{name} is {causality}, not {wanted}");
         Ok(found)
     }
 
-    pub(crate) fn variable(&self, name: &str) -> Result<Own<'_>> {
+    pub(crate) fn variable(&self, name: &str) -> Result<FmuVariable<'_>> {
         let (component, own) = split(name);
         let index = self.system.components.iter().position(|(known, _)| *known == component);
         let variable = index.and_then(|index| self.fmus[index].variable(own));
         variable.with_context(|| format!("no FMU has a variable {name}"))
     }
 
-    /// Returns the start values of a component's variables: full name and value.
+    /// Returns the start values of a component: the full name of each variable, and its value.
     pub(crate) fn own_start(&self, component: &str) -> Vec<(&str, &str)> {
         let start = self.system.start.iter().filter(|(name, _)| split(name).0 == component);
         start.map(|(name, start)| (*name, start.as_str())).collect()

@@ -47,7 +47,7 @@ fn variable(name: &str, causality: &str, kind: &str) -> String {
     )
 }
 
-/// Returns two FMUs. One angle has its unit at the variable, one at the declared type.
+/// Returns two FMUs. Some angles have their unit at the variable, others at the declared type.
 fn fmus(directory: &Path) -> Vec<(&'static str, PathBuf)> {
     let plant = [
         variable("u", "input", r#"Real unit="rad""#),
@@ -145,7 +145,7 @@ fn wrong_systems_are_rejected() {
     ] {
         assert_eq!(rejection(change).split(": No such file").next(), Some(message));
     }
-    // An output with a start value accepts another one.
+    // An output with a start value accepts another start value.
     let mut other_start = system(directory.path());
     other_start.start.push(("plant.angle", "0.5".into()));
     other_start.check().unwrap();
@@ -189,13 +189,13 @@ fn the_ssp_is_complete_and_reproducible() {
     let annotations: String = ssd.lines().map(str::trim).collect();
     let last = r#"<oms:SimulationInformation><oms:FixedStepMaster description="oms-ma" stepSize="0.001" absoluteTolerance="0.0001" relativeTolerance="0.0001"/></oms:SimulationInformation></oms:Annotations></ssc:Annotation></ssd:Annotations></ssd:System>"#;
     assert!(annotations.contains(last), "{ssd}");
-    // Only the used units.
+    // Only the units in use are defined.
     assert!(ssd.contains(r#"<ssc:Unit name="rad">"#) && !ssd.contains(r#"<ssc:Unit name="s">"#), "{ssd}");
     assert!(entry(&one, "resources/plant.ssv").contains(r#"<ssv:Boolean value="true"/>"#));
     assert!(entry(&one, "resources/experiment.ssv").contains(r#"<ssv:Real value="0.5" unit="rad"/>"#));
 }
 
-/// The schema permits no empty list of connectors.
+/// The schema does not allow an empty list of connectors.
 #[test]
 fn a_component_that_is_not_connected_has_no_connectors() {
     let directory = tempfile::tempdir().unwrap();

@@ -1,10 +1,10 @@
-/* The functions of FMI 2.0 of a model that was compiled to WebAssembly and translated to C.
+/* The FMI 2.0 functions of a model that was compiled to WebAssembly and translated to C.
 
-   An instance is one block of memory, which contains a separate module. The module has functions with the same names,
-   which accept or reject each call and write the log. The functions here copy the importer's arrays and strings into
-   the module's memory and out of it, and report traps to the module. */
+   Each instance is one block of memory with its own copy of the module. The module has functions with the same names as
+   FMI, which accept or reject each call and write the log. The functions here copy the importer's arrays and strings
+   into the module's memory and results out of it, and they report traps to the module. */
 
-/* The name of the module, and the size of its memory. */
+/* Defines the name of the module and the size of its memory. */
 #include "module.h"
 
 #if !defined(FMI2_FUNCTION_PREFIX) && !defined(FMI2_OVERRIDE_FUNCTION_PREFIX)
@@ -19,9 +19,9 @@ typedef struct {
     fmi2ComponentEnvironment environment;
     char *name;
     u32 component; /* the instance in the module */
-    u32 buffer;    /* memory of the module for arguments */
+    u32 buffer;    /* address of the module's memory for arguments */
     u32 buffer_size;
-    bool dead; /* after a failure that the module cannot report */
+    bool dead; /* whether a call has failed so that the module could not report it */
 } Instance;
 
 /* A running call. */
@@ -31,7 +31,7 @@ typedef struct {
     jmp_buf trap;
     volatile u32 stack; /* stack pointer before the call; set after setjmp, read after longjmp (C99 7.13.2.1) */
     u32 next;  /* address of the next argument */
-    bool endless;
+    bool endless; /* whether an array is longer than any array can be */
 } Call;
 
 static void log_error(const Instance *instance, fmi2Status status, fmi2String message) {
@@ -66,13 +66,13 @@ static fmi2Status end(Call *call, fmi2Status status) {
     return status;
 }
 
-/* Returns the length of an array for the module. */
+/* Returns the length of an array as the module receives it. */
 static u32 count(const Call *call, size_t n) {
     return call->endless ? UINT32_MAX : (u32)n;
 }
 
-/* Allocates `n` times `each` bytes for arguments, and `more` bytes for gaps and other arguments. The module rejects a
-   length that no array can have. */
+/* Allocates `n` times `each` bytes for arguments, and `more` bytes for gaps and other arguments. Returns false if the
+   memory is used up. If no array can have the length `n`, allocates nothing for it, because the module rejects it. */
 static inline bool reserve(Call *call, size_t n, size_t each, size_t more) {
     Instance *instance = call->instance;
     size_t size;
@@ -101,11 +101,11 @@ static fmi2Status reject(Call *call, fmi2String message) {
     return end(call, fmi2Error);
 }
 
-/* The alignment of types here. */
-#define ALIGNED(type)   \
-    typedef struct {    \
-        char byte;      \
-        type value;     \
+/* The alignment of types on this machine. */
+#define ALIGNED(type) \
+    typedef struct {  \
+        char byte;    \
+        type value;   \
     } Aligned_##type;
 ALIGNED(fmi2Real)
 ALIGNED(fmi2Integer)
@@ -119,7 +119,8 @@ ALIGNED(fmi2EventInfo)
 ALIGNED(size_t)
 #define ALIGNMENT(type) offsetof(Aligned_##type, value)
 
-/* Returns the address in the module for an array of the importer: 0 for NULL, unaligned for an unaligned array. */
+/* Returns the address in the module for an array of the importer: 0 for NULL, and an unaligned address for an unaligned
+   array, so that the module can check both. */
 static inline u32 output(Call *call, const void *array, size_t n, size_t size, size_t alignment) {
     u32 address = call->next;
     if (array == NULL) {
@@ -148,9 +149,9 @@ static inline u32 input(Call *call, const void *array, size_t n, size_t size, si
 
 #define IN(array, n, type) input(&call, array, n, sizeof(type), ALIGNMENT(type))
 #define OUT(array, n, type) output(&call, array, n, sizeof(type), ALIGNMENT(type))
-#define COPY_OUT(array, address, n)                                        \
-    if (status == fmi2OK && (n) != 0) {                                    \
-        memcpy(array, at(&call, address), (n) * sizeof *(array));          \
+#define COPY_OUT(array, address, n)                               \
+    if (status == fmi2OK && (n) != 0) {                           \
+        memcpy(array, at(&call, address), (n) * sizeof *(array)); \
     }
 
 static size_t length(fmi2String text) {
@@ -161,7 +162,8 @@ static u32 string(Call *call, fmi2String text) {
     return input(call, text, length(text), 1, 1);
 }
 
-/* Copies the importer's strings behind an array of their addresses. */
+/* Copies the importer's strings into the module. Returns the address of an array of their addresses; 0 for
+   NULL. */
 static u32 strings(Call *call, const fmi2String texts[], size_t n) {
     u32 array = output(call, texts, n, sizeof(u32), ALIGNMENT(fmi2String));
     size_t i;
@@ -192,7 +194,8 @@ static const char *reason(const wasm_rt_memory_t *memory) {
     return memory->reason == WASM_RT_TRAP_OOB ? "stack overflow" : "no message";
 }
 
-/* Ends a call that has trapped. */
+/* Ends a call that has trapped. The module logs the reason and returns the status; if that traps, too, the instance
+   cannot be used any more. */
 static fmi2Status broken(Call *call) {
     Instance *instance = call->instance;
     instance->module.FMU_STACK = call->stack;
@@ -212,7 +215,7 @@ static fmi2Status broken(Call *call) {
     return end(call, fmi2Fatal);
 }
 
-/* Begins a function of an instance. It rejects calls during another call, which the log callback could make. */
+/* Begins a function of an instance. Rejects a call during another call, which the log callback could make. */
 #define BEGIN(name)                                                     \
     Instance *instance = (Instance *)c;                                 \
     fmi2Status status;                                                  \
@@ -228,13 +231,13 @@ static fmi2Status broken(Call *call) {
         return broken(&call);                                           \
     }
 
-#define RESERVE(name, n, each, more)                                                            \
-    if (!reserve(&call, n, each, more)) {                                                       \
+#define RESERVE(name, n, each, more)                                                              \
+    if (!reserve(&call, n, each, more)) {                                                         \
         return reject(&call, name ": the instance has no memory for so many values; compile the " \
-                                  "FMU with a larger FMU_MEMORY_PAGES");                        \
+                                  "FMU with a larger FMU_MEMORY_PAGES");                          \
     }
 
-/* Calls a function of the module, whose first argument is the instance. */
+/* Calls a function of the module. Its first FMI argument is the instance in the module. */
 #define CALL(function, ...) status = (fmi2Status)function(&instance->module, instance->component, __VA_ARGS__)
 #define END return end(&call, status);
 
@@ -246,7 +249,7 @@ fmi2String fmi2GetVersion(void) {
     return fmi2Version;
 }
 
-/* fmi2CallbackFunctions of the module, which only checks whether there is a logger. */
+/* fmi2CallbackFunctions as the module reads it: it only checks whether there is a logger. */
 typedef struct {
     u32 logger, allocate_memory, free_memory, step_finished, environment;
 } Callbacks;
@@ -270,7 +273,7 @@ static Instance *allocate(fmi2String name, const fmi2CallbackFunctions *function
     return instance;
 }
 
-/* Makes the instance in its module. */
+/* Initializes the module and creates the instance in it. Returns false if the module rejects the arguments. */
 static bool make(Instance *instance, fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                  fmi2Boolean visible, fmi2Boolean logging_on) {
     Call call;
@@ -295,7 +298,7 @@ static bool make(Instance *instance, fmi2String name, fmi2Type type, fmi2String 
     return instance->component != 0;
 }
 
-/* Whether the compiler fuses products and sums, although the runtime forbids it: its options can override that. */
+/* Whether the compiler fuses products and sums. The runtime forbids it, but compiler options can override that. */
 static bool fuses(void) {
     volatile double factor = 1 + DBL_EPSILON;
     double product = factor * factor;
@@ -359,13 +362,13 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real point, fmi2Real size, fmi2Boolea
     END
 }
 
-/* Functions that differ only in their names, which are macros in FMI's headers: `#` and `##` do not expand them. */
+/* Functions that differ only in their names, which are macros in the headers of FMI: `#` and `##` do not expand those. */
 
-#define WITHOUT_ARGUMENTS(name)                                                        \
-    fmi2Status name(fmi2Component c) {                                                 \
-        BEGIN(#name)                                                                   \
-        status = (fmi2Status)FMU_##name(&instance->module, instance->component);       \
-        END                                                                            \
+#define WITHOUT_ARGUMENTS(name)                                                  \
+    fmi2Status name(fmi2Component c) {                                           \
+        BEGIN(#name)                                                             \
+        status = (fmi2Status)FMU_##name(&instance->module, instance->component); \
+        END                                                                      \
     }
 
 WITHOUT_ARGUMENTS(fmi2EnterInitializationMode)
@@ -376,21 +379,21 @@ WITHOUT_ARGUMENTS(fmi2CancelStep)
 WITHOUT_ARGUMENTS(fmi2EnterEventMode)
 WITHOUT_ARGUMENTS(fmi2EnterContinuousTimeMode)
 
-#define GET_AND_SET(get, set, type)                                                                       \
-    fmi2Status get(fmi2Component c, const fmi2ValueReference vr[], size_t n, type value[]) {              \
-        u32 values;                                                                                       \
-        BEGIN(#get)                                                                                       \
-        RESERVE(#get, n, sizeof *vr + sizeof *value, 64)                                                  \
-        values = OUT(value, n, type);                                                                     \
-        CALL(FMU_##get, IN(vr, n, fmi2ValueReference), count(&call, n), values);                          \
-        COPY_OUT(value, values, n)                                                                        \
-        END                                                                                               \
-    }                                                                                                     \
-    fmi2Status set(fmi2Component c, const fmi2ValueReference vr[], size_t n, const type value[]) {        \
-        BEGIN(#set)                                                                                       \
-        RESERVE(#set, n, sizeof *vr + sizeof *value, 64)                                                  \
-        CALL(FMU_##set, IN(vr, n, fmi2ValueReference), count(&call, n), IN(value, n, type));              \
-        END                                                                                               \
+#define GET_AND_SET(get, set, type)                                                                \
+    fmi2Status get(fmi2Component c, const fmi2ValueReference vr[], size_t n, type value[]) {       \
+        u32 values;                                                                                \
+        BEGIN(#get)                                                                                \
+        RESERVE(#get, n, sizeof *vr + sizeof *value, 64)                                           \
+        values = OUT(value, n, type);                                                              \
+        CALL(FMU_##get, IN(vr, n, fmi2ValueReference), count(&call, n), values);                   \
+        COPY_OUT(value, values, n)                                                                 \
+        END                                                                                        \
+    }                                                                                              \
+    fmi2Status set(fmi2Component c, const fmi2ValueReference vr[], size_t n, const type value[]) { \
+        BEGIN(#set)                                                                                \
+        RESERVE(#set, n, sizeof *vr + sizeof *value, 64)                                           \
+        CALL(FMU_##set, IN(vr, n, fmi2ValueReference), count(&call, n), IN(value, n, type));       \
+        END                                                                                        \
     }
 
 GET_AND_SET(fmi2GetReal, fmi2SetReal, fmi2Real)
@@ -419,8 +422,10 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     END
 }
 
-/* The module's handles of saved states are numbers, and equal numbers in different instances are different states. So the importer's
-   handle is the sum of the number and the instance's address; it is never dereferenced. */
+/* The module's handles of saved states are numbers, and equal numbers in different instances are different states. So the
+   importer's handle is the sum of the number and the instance's address; it is never dereferenced.
+
+   Returns the module's handle: 0 for NULL, and UINT32_MAX for a handle that cannot be valid, so that the module rejects it. */
 static u32 to_module(const Instance *instance, fmi2FMUstate state) {
     uintptr_t handle = (uintptr_t)state - (uintptr_t)instance;
     if (state == NULL) {
@@ -433,30 +438,30 @@ static fmi2FMUstate to_importer(const Instance *instance, u32 handle) {
     return handle == 0 ? NULL : (fmi2FMUstate)((uintptr_t)instance + handle);
 }
 
-/* Copies the handle of a state, if the argument is a valid pointer. */
-#define STATE_IN(name, place, n)                                         \
-    u32 in_place;                                                           \
-    RESERVE(name, n, 1, 64)                                                 \
-    in_place = output(&call, place, 1, sizeof(u32), ALIGNMENT(fmi2FMUstate)); \
-    if (in_place != 0 && in_place % sizeof(u32) == 0) {                     \
-        u32 in_module = to_module(instance, *place);                   \
-        memcpy(at(&call, in_place), &in_module, sizeof in_module);          \
+/* Copies the importer's handle of a state into the module, unless the pointer to it is NULL or unaligned. */
+#define STATE_IN(name, state, n)                                                   \
+    u32 state_address;                                                             \
+    RESERVE(name, n, 1, 64)                                                        \
+    state_address = output(&call, state, 1, sizeof(u32), ALIGNMENT(fmi2FMUstate)); \
+    if (state_address != 0 && state_address % sizeof(u32) == 0) {                  \
+        u32 in_module = to_module(instance, *state);                               \
+        memcpy(at(&call, state_address), &in_module, sizeof in_module);            \
     }
 
-#define STATE_OUT(place)                                           \
-    if (status == fmi2OK && (place) != NULL) {                     \
-        u32 in_it;                                                 \
-        memcpy(&in_it, at(&call, in_place), sizeof in_it);         \
-        *(place) = to_importer(instance, in_it);                   \
+#define STATE_OUT(state)                                                \
+    if (status == fmi2OK && (state) != NULL) {                          \
+        u32 in_module;                                                  \
+        memcpy(&in_module, at(&call, state_address), sizeof in_module); \
+        *(state) = to_importer(instance, in_module);                    \
     }
 
-#define STATE_HANDLE(name)                                   \
-    fmi2Status name(fmi2Component c, fmi2FMUstate *state) {  \
-        BEGIN(#name)                                         \
-        STATE_IN(#name, state, 0)                         \
-        CALL(FMU_##name, in_place);                          \
-        STATE_OUT(state)                                     \
-        END                                                  \
+#define STATE_HANDLE(name)                                  \
+    fmi2Status name(fmi2Component c, fmi2FMUstate *state) { \
+        BEGIN(#name)                                        \
+        STATE_IN(#name, state, 0)                           \
+        CALL(FMU_##name, state_address);                    \
+        STATE_OUT(state)                                    \
+        END                                                 \
     }
 
 STATE_HANDLE(fmi2GetFMUstate)
@@ -494,7 +499,7 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte b
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte byte[], size_t n, fmi2FMUstate *state) {
     BEGIN("fmi2DeSerializeFMUstate")
     STATE_IN("fmi2DeSerializeFMUstate", state, n)
-    CALL(FMU_fmi2DeSerializeFMUstate, IN(byte, n, fmi2Byte), count(&call, n), in_place);
+    CALL(FMU_fmi2DeSerializeFMUstate, IN(byte, n, fmi2Byte), count(&call, n), state_address);
     STATE_OUT(state)
     END
 }
@@ -534,25 +539,25 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
     END
 }
 
-#define STATUS(name, type)                                                               \
-    fmi2Status name(fmi2Component c, const fmi2StatusKind kind, type *value) {           \
-        u32 place;                                                                       \
-        BEGIN(#name)                                                                     \
-        RESERVE(#name, 0, 1, 64)                                                         \
-        place = OUT(value, 1, type);                                                     \
-        CALL(FMU_##name, (u32)kind, place);                                              \
-        COPY_OUT(value, place, 1)                                                        \
-        END                                                                              \
+#define STATUS(name, type)                                                     \
+    fmi2Status name(fmi2Component c, const fmi2StatusKind kind, type *value) { \
+        u32 address;                                                           \
+        BEGIN(#name)                                                           \
+        RESERVE(#name, 0, 1, 64)                                               \
+        address = OUT(value, 1, type);                                         \
+        CALL(FMU_##name, (u32)kind, address);                                  \
+        COPY_OUT(value, address, 1)                                            \
+        END                                                                    \
     }
 
-/* The module returns no value for a status and a string. */
+/* The module never returns a value of type fmi2Status or fmi2String, so these types need no conversion. */
 STATUS(fmi2GetStatus, fmi2Status)
 STATUS(fmi2GetRealStatus, fmi2Real)
 STATUS(fmi2GetIntegerStatus, fmi2Integer)
 STATUS(fmi2GetBooleanStatus, fmi2Boolean)
 STATUS(fmi2GetStringStatus, fmi2String)
 
-/* fmi2EventInfo of the module. */
+/* fmi2EventInfo as the module writes it. */
 typedef struct {
     u32 flags[6];
     double next_event_time;
@@ -560,13 +565,13 @@ typedef struct {
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
     EventInfo event;
-    u32 place;
+    u32 address;
     BEGIN("fmi2NewDiscreteStates")
     RESERVE("fmi2NewDiscreteStates", 0, 1, 64)
-    place = output(&call, info, 1, sizeof event, ALIGNMENT(fmi2EventInfo));
-    CALL(FMU_fmi2NewDiscreteStates, place);
+    address = output(&call, info, 1, sizeof event, ALIGNMENT(fmi2EventInfo));
+    CALL(FMU_fmi2NewDiscreteStates, address);
     if (status == fmi2OK) {
-        memcpy(&event, at(&call, place), sizeof event);
+        memcpy(&event, at(&call, address), sizeof event);
         info->newDiscreteStatesNeeded = (fmi2Boolean)event.flags[0];
         info->terminateSimulation = (fmi2Boolean)event.flags[1];
         info->nominalsOfContinuousStatesChanged = (fmi2Boolean)event.flags[2];
@@ -579,14 +584,14 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
 
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set_state_prior, fmi2Boolean *enter_event_mode,
                                        fmi2Boolean *terminate) {
-    u32 enter_place, terminate_place;
+    u32 enter_address, terminate_address;
     BEGIN("fmi2CompletedIntegratorStep")
     RESERVE("fmi2CompletedIntegratorStep", 0, 1, 64)
-    enter_place = OUT(enter_event_mode, 1, fmi2Boolean);
-    terminate_place = OUT(terminate, 1, fmi2Boolean);
-    CALL(FMU_fmi2CompletedIntegratorStep, (u32)no_set_state_prior, enter_place, terminate_place);
-    COPY_OUT(enter_event_mode, enter_place, 1)
-    COPY_OUT(terminate, terminate_place, 1)
+    enter_address = OUT(enter_event_mode, 1, fmi2Boolean);
+    terminate_address = OUT(terminate, 1, fmi2Boolean);
+    CALL(FMU_fmi2CompletedIntegratorStep, (u32)no_set_state_prior, enter_address, terminate_address);
+    COPY_OUT(enter_event_mode, enter_address, 1)
+    COPY_OUT(terminate, terminate_address, 1)
     END
 }
 
@@ -597,15 +602,15 @@ fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n
     END
 }
 
-#define GET_VECTOR(name)                                          \
-    fmi2Status name(fmi2Component c, fmi2Real x[], size_t n) {    \
-        u32 values;                                               \
-        BEGIN(#name)                                              \
-        RESERVE(#name, n, sizeof *x, 64)                          \
-        values = OUT(x, n, fmi2Real);                             \
-        CALL(FMU_##name, values, count(&call, n));                \
-        COPY_OUT(x, values, n)                                    \
-        END                                                       \
+#define GET_VECTOR(name)                                       \
+    fmi2Status name(fmi2Component c, fmi2Real x[], size_t n) { \
+        u32 values;                                            \
+        BEGIN(#name)                                           \
+        RESERVE(#name, n, sizeof *x, 64)                       \
+        values = OUT(x, n, fmi2Real);                          \
+        CALL(FMU_##name, values, count(&call, n));             \
+        COPY_OUT(x, values, n)                                 \
+        END                                                    \
     }
 
 GET_VECTOR(fmi2GetDerivatives)

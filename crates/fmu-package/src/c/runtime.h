@@ -1,5 +1,5 @@
-/* The memory and the instructions of C code that wasm2c makes from a WebAssembly module.
-   Unlike the runtime of wasm2c, it has no signals, no mmap and no allocation, and a trap only ends its call. */
+/* Runtime for C code that wasm2c generates from a WebAssembly module: its memory and its instructions.
+   Unlike wasm2c's own runtime, it does not use signals, mmap or allocation, and a trap ends only the call in which it occurs. */
 #ifndef FMU_RUNTIME_H
 #define FMU_RUNTIME_H
 
@@ -12,7 +12,7 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Results are bit-identical everywhere: each operation rounds to double, in the order of the code. */
+/* Results are bit-identical everywhere, because operations keep the order of the code and each one rounds to double. */
 #if defined(__FAST_MATH__) || defined(_M_FP_FAST) || defined(__ASSOCIATIVE_MATH__) || \
     defined(__RECIPROCAL_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
 #error "compile without -ffast-math (/fp:fast): the results would differ from the model's"
@@ -53,8 +53,8 @@ enum {
     WASM_RT_TRAP_CALL_INDIRECT
 };
 
-/* An instance has the maximum memory that its module can request. Unused bytes follow it, so that for small offsets only
-   the base is checked. */
+/* An instance contains all memory that its module can request. FMU_SMALL unused bytes follow it, so that for smaller
+   offsets only the base must be checked. */
 #define FMU_PAGE 65536u
 #define FMU_MEMORY (FMU_MEMORY_PAGES * FMU_PAGE)
 #define FMU_SMALL 4096u
@@ -63,7 +63,7 @@ enum {
 #error "FMU_MEMORY_PAGES, the memory of an instance in units of 64 KiB, is less than the module needs or over 1 GiB"
 #endif
 
-/* Files that were compiled with different memories do not link. */
+/* Adds the memory size to the name of a function, so that files that were compiled with different sizes do not link. */
 #define FMU_JOIN(name, number) name##_##number
 #define FMU_WITH_MEMORY(name, pages) FMU_JOIN(name, pages)
 
@@ -116,7 +116,7 @@ FMU_NO_RETURN static inline void wasm_rt_trap(wasm_rt_memory_t *memory, int reas
 #define TRAP(why) (wasm_rt_trap(&instance->w2c_memory, WASM_RT_TRAP_##why), 0)
 #define UNREACHABLE wasm_rt_trap(&instance->w2c_memory, WASM_RT_TRAP_UNREACHABLE)
 
-/* Memory and tables are part of an instance, which is initialized with zeros. */
+/* Memory and tables are parts of the instance, which calloc fills with zeros, so they need no allocation here. */
 
 #define wasm_rt_is_initialized() true
 
@@ -160,7 +160,7 @@ static inline void funcref_table_init(wasm_rt_funcref_table_t *table, const wasm
     }
 }
 
-/* Two functions have the same type if the name of the type is the same, as there is only one module. */
+/* Function types are compared by pointer, because there is only one module and it has one string for each type. */
 #define CALL_INDIRECT(table, function, type, i, ...)                                        \
     ((void)(UNLIKELY((i) >= FMU_TABLE || (table).data[i].func_type != (type)) ? TRAP(CALL_INDIRECT) : 0), \
      ((function)(table).data[i].func)(__VA_ARGS__))
@@ -185,7 +185,7 @@ static inline void memory_copy(wasm_rt_memory_t *memory, const wasm_rt_memory_t 
     memmove(&memory->data.bytes[to], &memory->data.bytes[from], count);
 }
 
-/* Returns a pointer to `length` bytes. The compiler evaluates conditions on `offset`, which is a constant. */
+/* Returns a pointer to `length` bytes. `offset` is a constant, so the compiler evaluates the conditions on it. */
 static inline uint8_t *fmu_at(wasm_rt_memory_t *memory, uint32_t base, uint32_t offset, uint32_t length) {
     if (UNLIKELY(offset <= FMU_SMALL - length ? base >= FMU_MEMORY : (uint64_t)base + offset + length > FMU_MEMORY)) {
         wasm_rt_trap(memory, WASM_RT_TRAP_OOB);
@@ -306,11 +306,12 @@ FMU_REINTERPRET(f64_reinterpret_i64, uint64_t, double)
 #define wasm_quiet(x) (x)
 #define wasm_quietf(x) (x)
 
-/* The result is NaN if an argument is NaN, and -0 is less than 0. */
+/* Minimum and maximum of WebAssembly: NaN if an argument is NaN, and -0 is less than 0. */
 #define FMIN(x, y) ((x) != (x) || (y) != (y) ? NAN : (x) == (y) ? (signbit(x) ? (x) : (y)) : (x) < (y) ? (x) : (y))
 #define FMAX(x, y) ((x) != (x) || (y) != (y) ? NAN : (x) == (y) ? (signbit(x) ? (y) : (x)) : (x) > (y) ? (x) : (y))
 
-/* Conversions to integers. The range is open at both ends if its limits are not numbers of the type. */
+/* Conversions to integers. The lower limit of a range is the number below the smallest integer, which is excluded. If the
+   floating-point type cannot represent that number, the limit is the smallest integer itself. */
 #define FMU_TRUNC(u, i, x, in_range) \
     ((x) != (x) ? (u)TRAP(INVALID_CONVERSION) : (in_range) ? (u)(i)(x) : (u)TRAP(INT_OVERFLOW))
 #define FMU_TRUNC_SAT(u, i, x, in_range, least, most) \

@@ -4,9 +4,9 @@
 #![allow(missing_docs, unsafe_code)]
 
 mod malformed;
-mod memory;
 mod models;
-mod rates;
+mod saved_states;
+mod state_derivatives;
 mod terminals;
 
 use fmi_abi::Category;
@@ -26,8 +26,8 @@ fn model<M: Exported>() -> LoadedModel {
     changed::<M>("")
 }
 
-/// The model with other values in its description: `PATH=JSON; PATH=JSON`. A list is entered by index, or by the name of an
-/// item.
+/// Returns the model with changes in its description, written as `PATH=JSON; PATH=JSON`. A path selects an item of a list by its index
+/// or by its name.
 fn changed<M: Exported>(changes: &str) -> LoadedModel {
     let mut description: Value = serde_json::from_str(&fmu_export::describe::<M>()).unwrap();
     for (path, value) in changes.split("; ").filter_map(|change| change.split_once('=')) {
@@ -78,7 +78,7 @@ fn read_expected(file: &str) -> String {
 #[track_caller]
 fn is_expected(file: &str, text: &str) {
     assert!(EXPECTED.contains(&file));
-    // A new version of this crate, or another text in fmi-abi, changes no file.
+    // The version and the texts of fmi-abi are replaced, so that the files stay the same when these change.
     let mut text = text.replace(concat!("fmu-package ", env!("CARGO_PKG_VERSION")), "fmu-package");
     for category in Category::ALL {
         text = text.replace(category.description(), &category.name().to_string_lossy());
@@ -101,7 +101,7 @@ fn every_expected_file_is_compared() {
     assert_eq!(files, EXPECTED);
 }
 
-/// Also reads the description with another library.
+/// Compares the descriptions for both FMI versions. Also reads the one for FMI 2.0 with another library.
 fn is_expected_in_both<M: Exported>(name: &str) {
     let model = model::<M>();
     for fmi in BOTH {
@@ -137,7 +137,7 @@ fn types_that_fmi_2_lacks() {
     assert_eq!(error, "single is Float32, which FMI 2.0 lacks; add --fmi 3 to make an FMU for FMI 3.0 only");
 }
 
-/// The structures of models that differ from others in little else.
+/// Compares only the model structure, because these models differ from others in little else.
 #[test]
 fn structures() {
     let mut text = "<structures>\n".to_owned();
@@ -183,7 +183,7 @@ fn variables_that_cannot_change_separately() {
     }
 }
 
-/// Values that follow from tunable parameters are tunable, and so are factors.
+/// Values and factors that are calculated from tunable parameters are tunable.
 #[test]
 fn changes() {
     let changes =

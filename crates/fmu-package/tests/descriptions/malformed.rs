@@ -1,4 +1,4 @@
-//! Malformed models are rejected with a message that names the fault. The compiler rejects others already: see the tests of
+//! Malformed models are rejected with a message that names the fault. Models that the compiler already rejects are in the tests of
 //! fmu-export.
 
 use crate::models::faulty::{FAULT, Faulty};
@@ -7,13 +7,13 @@ use crate::{BOTH, changed, is_expected, read_expected};
 use fmu_export::Exported;
 use fmu_package::{Changes, Standard, describe};
 
-/// Returns the message on a model with changes, which is empty if the model is accepted.
+/// Returns the error message for a changed model; empty if the model is accepted.
 fn message<M: Exported>(changes: &str, fmi: Standard) -> String {
     let error = describe(&changed::<M>(changes), fmi, &Changes::default()).err();
     error.map(|error| format!("{error:#}")).unwrap_or_default()
 }
 
-/// Returns the message on a model with changes, which must be the same in both FMI versions.
+/// Returns the error message for a changed model, which must be the same in both FMI versions.
 fn message_in_both<M: Exported>(changes: &str) -> String {
     let [one, other] = BOTH.map(|fmi| message::<M>(changes, fmi));
     assert_eq!(one, other, "{changes}");
@@ -40,7 +40,7 @@ fn changed_descriptions() {
         }
     }
     is_expected("malformed.txt", &text);
-    // Only FMI 3.0 needs this name.
+    // Only FMI 3.0 needs a variable of this name.
     assert_eq!(message::<Factors>("variables/u/name=\"time\"", Standard::Fmi2), "");
 }
 
@@ -51,7 +51,7 @@ fn models_that_cannot_be_made() {
         ("panic", "the model cannot be made for Co-Simulation: it panics"),
         ("two-faced", "u starts with 1 in Co-Simulation and with 0 in Model Exchange"),
         ("unwritable", "the start value of label has a character that XML lacks: \"a\\u{1}\""),
-        ("rejects itself", "these start values make no model: no is no"),
+        ("rejects itself", "the model rejects its start values: no is no"),
         (
             "unreadable",
             "y cannot be read from a new model: the code behind its `in` or `by` panics, for example because of an index out \

@@ -1,9 +1,9 @@
-//! The test models. Together they use everything that a description can contain.
+//! The test models. Together they use everything that a model description can contain.
 
 use fmu_export::*;
 use std::cell::RefCell;
 
-/// The steps of Co-Simulation, which change the states by the rule of Euler.
+/// Implements the steps of Co-Simulation with Euler's method: `$change` adds the step size times the derivatives to the states.
 macro_rules! step {
     ($change:expr; $($fact:ident: $type:ty = $value:expr;)*) => {
         $(const $fact: $type = $value;)*
@@ -375,7 +375,7 @@ pub mod factors {
     offer!(Factors: CoSimulation + ModelExchange + Partials);
 }
 
-/// Arrays of every kind, whose elements have different dependencies: an array depends as the least constant of its elements.
+/// Arrays of every kind, whose elements have different dependencies. In FMI 3.0, the dependencies of the elements are merged.
 pub mod chain {
     use super::*;
 
@@ -489,7 +489,7 @@ pub mod chain {
     offer!(Chain: ModelExchange + CoSimulation + Partials);
 }
 
-/// Branches and memory, which no trial near the start values can find.
+/// Dependencies through branches and memory, which no evaluation near the start values can find.
 pub mod branches {
     use super::*;
 
@@ -608,7 +608,7 @@ pub mod breakpoints {
     offer!(Breakpoints: CoSimulation);
 }
 
-/// Faults that a description in JSON cannot contain, one at a time.
+/// A model with one of several faults that a change of its description cannot cause.
 pub mod faulty {
     use super::*;
 

@@ -1,4 +1,4 @@
-//! The terminals of FMI 3.0, and the errors on those that cannot be.
+//! The terminals of FMI 3.0, and the errors for invalid ones.
 
 use crate::models::{chain::Chain, room::Room};
 use crate::{is_expected, model};
@@ -26,7 +26,7 @@ fn terminals_are_written() {
 }
 
 #[test]
-fn terminals_that_cannot_be_are_rejected() {
+fn invalid_terminals_are_rejected() {
     let door = || Terminal::plug("door");
     for (all, message) in [
         (vec![door(), door()], "there are two terminals with the name door"),

@@ -1,4 +1,4 @@
-//! The ball: events where an indicator changes its sign, states that events change, and an end.
+//! A ball with events at which an indicator changes its sign and a state jumps. The model ends the simulation itself.
 
 use fmu_export::*;
 

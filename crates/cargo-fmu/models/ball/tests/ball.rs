@@ -3,7 +3,7 @@
 use ball::Ball;
 use fmu_export::*;
 
-/// The fall from 1 m, and four flights, each shorter by the restitution.
+/// The fifth bounce ends the fall from 1 m and four flights, each shorter by the factor `restitution`.
 #[test]
 fn it_bounces_when_it_should() {
     let fall = (2.0_f64 / 9.81).sqrt();

@@ -1,4 +1,4 @@
-//! The house: a table in a file in the FMU, strings, units with an offset.
+//! A house with a table that is read from a file in the FMU, with strings, and with units that have an offset.
 
 use fmu_export::*;
 
@@ -12,7 +12,7 @@ pub struct House {
     weather: String,
     /// Outside temperatures in degC over the hours of a day.
     table: LookupTable,
-    /// Name of the file of the table.
+    /// Name of the file from which the table was read.
     read: String,
     outside: f64,
     setup: Setup,
@@ -118,7 +118,7 @@ impl Model for House {
 }
 
 impl CoSimulation for House {
-    /// The weather is constant in intervals of at most five minutes; the equation is solved exactly in each.
+    /// Solves the equation exactly in intervals of at most five minutes, in which the weather is taken as constant.
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         let mut room = self.room;
         for part in step.parts(300.0)? {
@@ -127,7 +127,7 @@ impl CoSimulation for House {
             room = end + (room - end) * (-part.size * self.loss / self.capacity).exp();
         }
         if !room.is_finite() {
-            return Err(Error::new("no house gets as warm as that"));
+            return Err(Error::new("the temperature is out of the range of numbers; look at the heating"));
         }
         self.room = room;
         Ok(Stepped::Done)

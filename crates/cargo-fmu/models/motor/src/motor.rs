@@ -1,4 +1,4 @@
-//! The motor: its voltage is switched on and off at times that are known in advance (time events).
+//! A motor whose voltage is switched on and off at times that are known in advance (time events).
 
 use fmu_export::*;
 
@@ -20,7 +20,7 @@ pub struct Motor {
     next: f64,
     /// Whether the next switching begins a period.
     rises: bool,
-    /// Begin of the last period, s.
+    /// Start of the current period, s.
     begin: f64,
 }
 
@@ -66,7 +66,7 @@ variables! { for Motor, memory in next, rises, begin;
     constant = parameter(&CONSTANT) in constant;
     /// Inertia of the shaft and the load
     inertia = parameter(&INERTIA) in inertia;
-    /// Time between the begins of two periods
+    /// Time between the starts of two periods
     period = parameter(&PERIOD) in period;
 }
 
@@ -143,10 +143,12 @@ impl CoSimulation for Motor {
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         const MOST: f64 = 10_000.0;
         let end = step.time + step.size;
-        // A period that begins at the end belongs to the next step, even if rounding puts its begin just before the end.
+        // A period that begins at the end belongs to the next step, even if rounding puts its start just before the end.
         let last = end - 1e-9 * self.period;
         if (end - self.next) / self.period > MOST || end + self.period == end {
-            return Err(Error::new(format!("a step may have {MOST} periods, and they must not vanish")));
+            return Err(Error::new(format!(
+                "a step may have at most {MOST} periods, and a period must not vanish when it is added to the time"
+            )));
         }
         let mut time = step.time;
         while self.next < last {

@@ -8,7 +8,7 @@ fn speed(duty: f64, step_size: f64, time: f64) -> f64 {
     motor.step_size(step_size).set("duty", duty).unwrap().run(time).unwrap().get("speed").unwrap()
 }
 
-/// Always on, it is linear: with s1 and s2 the roots of L J s^2 + R J s + k^2 = 0, the speed is
+/// If the supply is always on, the motor is linear. With the roots s1 and s2 of L J s^2 + R J s + k^2 = 0, the speed is
 /// (1 + (s2 e^(s1 t) - s1 e^(s2 t)) / (s1 - s2)) U / k.
 #[test]
 fn always_on_it_follows_the_exact_solution() {

@@ -1,8 +1,8 @@
 //! Checks that the continuous states of a model follow their derivatives, and that reading values changes nothing.
 //!
-//! The steps of Co-Simulation and the derivatives of Model Exchange are different code of the author, and the compiler cannot
-//! detect that one of them has a wrong sign, a factor or another state. So the change of each state in short steps is compared
-//! with its derivative.
+//! The author writes the steps of Co-Simulation and the derivatives of Model Exchange separately, and the compiler cannot detect that
+//! one of them has a wrong sign or factor, or uses the wrong state. So the change of each state in short steps is compared with its
+//! derivative.
 
 use crate::check::Starts;
 use crate::instance::{Instance, Saved};
@@ -12,15 +12,17 @@ use crate::table::{Table, Unit, Variable};
 use anyhow::{Result, bail, ensure};
 use fmi_abi::{Causality, Interface, Value};
 
-/// Number of models with random values that are tried, and the steps after which each of them is tried.
-const MODELS: usize = 8;
-const AFTER: [usize; 3] = [0, 1, 4];
-/// Sizes of steps, as fractions of the default size. The smallest are for models with very fast states, and the second is for
-/// models that do not use the size of the step but a size that happens to be the default.
+/// Number of instances with random values that are checked.
+const INSTANCES: usize = 8;
+/// Numbers of steps after which each instance is checked.
+const CHECKED_AFTER: [usize; 3] = [0, 1, 4];
+/// Sizes of steps, as fractions of the default step size. The smallest are for models with very fast states. The second one detects a
+/// model that ignores the size of the step and always uses the default step size.
 const SIZES: [f64; 8] = [1.0, 0.618, 0.25, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8];
-/// A change of a state agrees with the derivative if their relative difference is smaller in the shortest or in two of the steps.
+/// Largest relative difference at which the change of a state agrees with its derivative. They must agree in the shortest step or in
+/// two others.
 const TOLERANCE: f64 = 0.01;
-/// Number of disagreements that is an error, if nothing agrees.
+/// Number of points at which a state must disagree to be rejected. It is accepted if it agrees at any point.
 const DISAGREEMENTS: usize = 3;
 
 /// Rejects a model whose states do not follow their derivatives, or change when they are read.
@@ -30,7 +32,7 @@ pub(crate) fn check(model: &LoadedModel, starts: &Starts) -> Result<()> {
     let (states, rates): (Vec<u32>, Vec<u32>) = table.states.iter().copied().unzip();
     let mut found = vec![Found::default(); states.len()];
     let mut sampler = Sampler::new(model, starts.clone(), false);
-    for _ in 0..MODELS {
+    for _ in 0..INSTANCES {
         // A model that rejects its start values is reported later.
         let Ok((point, mut instance)) = sampler.draw(None, true, |_| true) else { return Ok(()) };
         if instance.initialized().and_then(|()| instance.run()).is_err() {
@@ -41,8 +43,8 @@ pub(crate) fn check(model: &LoadedModel, starts: &Starts) -> Result<()> {
             check_reading(table, &mut instance)?;
             continue;
         }
-        for steps in 0..=AFTER[AFTER.len() - 1] {
-            if AFTER.contains(&steps) {
+        for steps in 0..=CHECKED_AFTER[CHECKED_AFTER.len() - 1] {
+            if CHECKED_AFTER.contains(&steps) {
                 check_reading(table, &mut instance)?;
                 let Ok(saved) = instance.save() else { break };
                 compare(&mut instance, saved, [&states, &rates], &mut found);
@@ -68,7 +70,7 @@ pub(crate) fn check(model: &LoadedModel, starts: &Starts) -> Result<()> {
     Ok(())
 }
 
-/// Comparisons of a state with its derivative.
+/// Results of the comparisons of a state with its derivative.
 #[derive(Clone, Default)]
 struct Found {
     agreed: usize,
@@ -77,11 +79,12 @@ struct Found {
     example: [f64; 2],
 }
 
-/// Compares the changes of the states in steps of several sizes with their derivatives before and after the step.
+/// Compares the change of each state in steps of several sizes with the mean of its derivatives before and after the step. Adds the
+/// results to `found`.
 fn compare(instance: &mut Instance, saved: Saved, [states, rates]: [&[u32]; 2], found: &mut [Found]) {
     let default = instance.default_step_size();
     let sizes = &SIZES[..if instance.has_variable_step_size() { SIZES.len() } else { 1 }];
-    // In the shortest step that can be compared, which decides for very fast states.
+    // Whether the shortest step that can be compared agrees. It decides for very fast states.
     let mut shortest = vec![false; states.len()];
     let [before, slopes] = [states, rates].map(|of| instance.reals(of));
     let mut agreed = vec![0; states.len()];
@@ -90,7 +93,7 @@ fn compare(instance: &mut Instance, saved: Saved, [states, rates]: [&[u32]; 2], 
         if instance.restore(saved).is_err() || !matches!(instance.step(size), Ok(true)) {
             continue;
         }
-        // The step may have been rounded by the time.
+        // The sum of time and step size is rounded, so the step may have another size.
         let size = instance.time - saved.time;
         let [after, later] = [states, rates].map(|of| instance.reals(of));
         for number in 0..states.len() {
@@ -98,7 +101,7 @@ fn compare(instance: &mut Instance, saved: Saved, [states, rates]: [&[u32]; 2], 
             let rate = 0.5 * (slopes[number] + later[number]);
             let scale = change.abs().max(slopes[number].abs()).max(later[number].abs());
             let rounding = 8.0 * f64::EPSILON * before[number].abs().max(after[number].abs()) / size;
-            // False for NaN as well. Where nothing happens, nothing can be compared.
+            // Rounding errors hide very small changes, so these cannot be compared. The negation also skips NaN.
             if !(rounding < 0.1 * TOLERANCE * scale && scale.is_finite()) {
                 continue;
             }
@@ -152,7 +155,7 @@ fn is_nan(value: &Value) -> bool {
 /// Rejects a model whose states, inputs, parameters or exact outputs change when values are calculated again.
 fn check_reading(table: &Table, instance: &mut Instance) -> Result<()> {
     let before = instance.values();
-    // A value that is set again is calculated again.
+    // The model calculates its values again after any value is set, even to the same value.
     let is_input = |variable: &Variable| variable.causality == Causality::Input;
     let values: Vec<_> = before.iter().cloned().map(Some).collect();
     if instance.interface == Interface::CoSimulation {
@@ -172,8 +175,8 @@ fn check_reading(table: &Table, instance: &mut Instance) -> Result<()> {
     Ok(())
 }
 
-/// Rejects a derivative whose unit is not the unit of its state per second. Without a unit, anything is possible; the radian may be
-/// left out.
+/// Rejects a derivative whose unit is not the unit of its state per second. A variable without a unit is not checked, and the radian
+/// may be left out.
 fn check_units(table: &Table) -> Result<()> {
     for &(state, rate) in &table.states {
         let of = |index: u32| table.variable(index).and_then(|variable| variable.variable_type.unit());
@@ -184,7 +187,8 @@ fn check_units(table: &Table) -> Result<()> {
         }
         let mut expected = unit.exponents.clone();
         expected[2] -= 1;
-        let [expected, found] = [&expected, &unit_of_rate.exponents].map(|exponents| in_words(exponents));
+        let [expected, found] =
+            [&expected, &unit_of_rate.exponents].map(|exponents| with_exponents(exponents));
         let [name, name_of_rate] = [state, rate].map(|index| table.name(index));
         ensure!(
             expected == found,
@@ -206,7 +210,7 @@ fn check_units(table: &Table) -> Result<()> {
 }
 
 /// Returns exponents as they are written in a unit, without the radian: `kg.m2.s-2`.
-fn in_words(exponents: &[i64]) -> String {
+fn with_exponents(exponents: &[i64]) -> String {
     let names = ["kg", "m", "s", "A", "K", "mol", "cd"];
     let factors = names.iter().zip(exponents).filter(|(_, exponent)| **exponent != 0);
     let factors = factors.map(|(name, exponent)| match exponent {

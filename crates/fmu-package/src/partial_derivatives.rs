@@ -1,4 +1,4 @@
-//! The partial derivatives that a model provides, compared with differences of its values.
+//! Compares the partial derivatives that a model provides with difference quotients of its values.
 
 use crate::check::Starts;
 use crate::instance::{Instance, Saved};
@@ -8,12 +8,12 @@ use crate::table::Attributes;
 use anyhow::{Result, bail};
 use fmi_abi::{BaseType, Interface, Standard};
 
-/// Number of points that are tried. A derivative is rejected if it is wrong at two of them, because one may lie at a
-/// kink.
+/// Number of points at which derivatives are compared. A derivative is rejected only if it is wrong at two of them, because one
+/// point may happen to be next to a kink.
 const POINTS: usize = 16;
 
-/// Rejects a model whose partial derivatives differ from differences of its values: at communication points and in
-/// Continuous-Time Mode if `running`, else in Initialization Mode.
+/// Rejects a model whose partial derivatives differ from difference quotients of its values. They are compared at communication
+/// points and in Continuous-Time Mode if `running`, else in Initialization Mode.
 pub(crate) fn check(
     model: &LoadedModel,
     starts: &Starts,
@@ -30,7 +30,7 @@ pub(crate) fn check(
     let mut points = Vec::new();
     for _ in 0..POINTS {
         let (mut point, mut instance) = sampler.draw(None, true, |_| true)?;
-        // A value that is set in Co-Simulation may take effect only in the next step.
+        // In Co-Simulation, a value that is set may take effect only in the next step, so Model Exchange is preferred.
         if running && table.model_exchange.is_some() && point.interface != Interface::ModelExchange {
             point.interface = Interface::ModelExchange;
             let Ok(same) = model_at(model, &point, running, Standard::Fmi3) else { continue };
@@ -79,7 +79,7 @@ struct Base<'a> {
     saved: Saved,
 }
 
-/// The largest absolute value of each unknown.
+/// Returns the largest absolute value of each unknown at the points, or its nominal value if that is larger.
 fn sizes(model: &LoadedModel, unknowns: &[u32], points: &mut [Base]) -> Vec<f64> {
     let nominal = |index: &u32| match model.table.variables[*index as usize].variable_type.attributes {
         Attributes::Real { nominal, .. } => nominal.unwrap_or_default(),
@@ -93,7 +93,7 @@ fn sizes(model: &LoadedModel, unknowns: &[u32], points: &mut [Base]) -> Vec<f64>
     sizes
 }
 
-/// The derivatives with respect to one known.
+/// The comparison of the derivatives with respect to one known.
 struct Check<'a> {
     model: &'a LoadedModel,
     running: bool,
@@ -102,15 +102,19 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    /// Returns for each unknown the derivative that the model provides, and the difference quotient of its values, if they differ.
+    /// Returns for each unknown the derivative that the model provides and the difference quotient of its values; `None` if they agree
+    /// or cannot be compared.
     fn wrong(&self, points: &mut [Base], sizes: &[f64]) -> Vec<Option<(f64, f64)>> {
         let mut wrong: Vec<Vec<(f64, f64)>> = vec![Vec::new(); self.unknowns.len()];
-        let mut always = vec![true; self.unknowns.len()];
+        let mut is_provided = vec![true; self.unknowns.len()];
         let variable =
             self.model.table.variable(self.known).filter(|_| self.known != self.model.table.time());
         for base in points {
             let partials = base.instance.partials(self.unknowns, self.known);
-            always.iter_mut().zip(&partials).for_each(|(always, partial)| *always &= partial.is_some());
+            is_provided
+                .iter_mut()
+                .zip(&partials)
+                .for_each(|(is_provided, partial)| *is_provided &= partial.is_some());
             if partials.iter().all(Option::is_none) {
                 continue;
             }
@@ -125,7 +129,7 @@ impl Check<'_> {
                 0.0 => variable.map_or(1.0, |known| known.variable_type.nominal_or_one()),
                 size => size,
             };
-            // Central differences of two widths. Their distance is a bound for their error.
+            // Central differences with two widths. How much they differ shows how inaccurate they are.
             let mut slopes = |width: f64| -> Option<Vec<f64>> {
                 let pairs = self.values(base, at + width)?.into_iter().zip(self.values(base, at - width)?);
                 Some(pairs.map(|(above, below)| (above - below) / (2.0 * width)).collect())
@@ -135,7 +139,8 @@ impl Check<'_> {
                 let (Some(partial), wide, narrow) = (*partial, wide[number], narrow[number]) else {
                     continue;
                 };
-                // In Co-Simulation, the start time is varied. Some models depend only on the time since the start.
+                // In Co-Simulation, only the start time can be varied. If a model depends on the time since the start, this
+                // difference is zero, so it proves nothing.
                 let is_unknown =
                     variable.is_none() && base.point.interface == Interface::CoSimulation && narrow == 0.0;
                 if !(wide - narrow).is_finite() || is_unknown {
@@ -149,16 +154,17 @@ impl Check<'_> {
                 }
             }
         }
-        let first =
-            |(wrong, always): (Vec<_>, bool)| wrong.first().copied().filter(|_| always && wrong.len() > 1);
-        wrong.into_iter().zip(always).map(first).collect()
+        let first = |(wrong, is_provided): (Vec<_>, bool)| {
+            wrong.first().copied().filter(|_| is_provided && wrong.len() > 1)
+        };
+        wrong.into_iter().zip(is_provided).map(first).collect()
     }
 
-    /// The unknowns at a point where the known has another value; `None` if the model rejects it.
+    /// Returns the unknowns at a point after setting the known to another value; `None` if the model rejects that value.
     fn values(&self, base: &mut Base, value: f64) -> Option<Vec<f64>> {
         let is_time = self.known == self.model.table.time();
         if is_time && base.point.interface == Interface::CoSimulation {
-            // No function of Co-Simulation sets the time. If the FMU also offers Model Exchange, the time is varied there.
+            // No function of Co-Simulation sets the time, so it is varied in Model Exchange if the FMU offers that.
             if self.model.table.model_exchange.is_some() {
                 return None;
             }
@@ -180,7 +186,7 @@ impl Check<'_> {
         let table = &self.model.table;
         let variable = table.variable(self.known)?;
         if self.running && instance.interface == Interface::ModelExchange {
-            // Any known can be set there.
+            // In Event Mode, any known can be set.
             instance.enter_event_mode().ok()?;
         }
         if self.running && variable.state {

@@ -1,11 +1,12 @@
-//! A field that is missing in the `memory` of a model would be missing in saved states: the model is rejected.
+//! A model is rejected if its `memory` lacks a field, because the field would be missing in saved states.
 
 use crate::{BOTH, described, model};
 use fmu_export::*;
 use fmu_package::{Changes, describe};
 
-/// A model that remembers the integral of its input, the last input, its output, the step size and the number of events. It also
-/// has a copy of the gain, which `update` restores.
+/// Declares models that differ only in the fields of their `memory`. Each model remembers the integral of its input, the last input,
+/// its output, the step size and the number of events. It also has a copy of the gain, which needs no memory because `update`
+/// restores it.
 macro_rules! models {
     ($($case:ident: $($memory:ident),*;)+) => { $(
         mod $case {
@@ -82,12 +83,12 @@ models! {
     without_ticks: sum, last, shown, size;
 }
 
-/// The beginning and the end of the message on a model.
+/// Asserts that a model is rejected with this consequence of the missing field.
 fn rejected<M: Exported>(consequence: &str) {
     for fmi in BOTH {
         let text = describe(&model::<M>(), fmi, &Changes::default()).unwrap_err().to_string();
         let remedy =
-            "; name every field that initialize, a step or an event changes behind `memory in` of variables!";
+            "; name every field that initialize, a step or an event changes after `memory in` of variables!";
         assert!(text.starts_with("saved states lack something that Memory remembers: "), "{text}");
         assert!(text.ends_with(&format!("{consequence}{remedy}")), "{text}");
     }
@@ -103,7 +104,8 @@ fn missing_fields_are_found() {
     rejected::<without_ticks::Memory>("Model Exchange, values differ immediately: n");
 }
 
-/// A model that differs from itself: each throw of the dice is random, which proves nothing about saved states.
+/// A model whose repetitions differ: each step takes the next number of a counter that all instances share, as if it were random.
+/// Such differences prove nothing about saved states.
 mod dice {
     use super::*;
     use std::sync::atomic::{AtomicI32, Ordering};

@@ -1,4 +1,4 @@
-//! The HTML of the page that runs the FMU: `documentation/index.html` with the library as WebAssembly, and the scripts in the
+//! Writes the page that runs the FMU: `documentation/index.html`, which contains the library as WebAssembly and the scripts in the
 //! directory `page`.
 
 use crate::content::ContentFile;
@@ -16,13 +16,13 @@ use tempfile::TempDir;
 /// Name of the page in an FMU.
 const PAGE: &str = "documentation/index.html";
 
-/// The page of a model without page.
+/// The page for a model that does not have one.
 const PLAIN: &str = include_str!("../page/page.html");
-/// Space for the section that runs the FMU, which the scripts put there. It is as high as the window, so that the rest of the page does
-/// not move when the section appears. Without scripts it has only a note.
+/// Placeholder for the section that runs the FMU, which the scripts insert. It is as high as the window, so that the rest of the page
+/// does not move when the section appears. If scripts are disabled, it is only a note.
 const SPACE: &str = concat!(
     "<div id=\"live\" style=\"min-height:100vh\"><noscript><style>#live{min-height:0!important}</style>",
-    "<p class=\"note\">With scripts, this page runs the FMU here. All else on it is complete.</p></noscript></div>",
+    "<p class=\"note\">If you enable scripts, this page runs the FMU here. The rest of the page is complete.</p></noscript></div>",
 );
 const BEGIN: &str = include_str!("../page/begin.js");
 const STYLE: &str = include_str!("../page/live.css");
@@ -37,8 +37,8 @@ const SCRIPTS: [&str; 8] = [
     include_str!("../page/live.js"),
 ];
 
-/// Largest sum of the sizes of the resources that a page contains, bytes.
-const MOST_OF_RESOURCES: u64 = 4 << 20;
+/// Largest total size of the resources in a page, bytes.
+const RESOURCE_LIMIT: u64 = 4 << 20;
 
 /// The parts of an FMU that a browser runs.
 pub(crate) struct Runnable {
@@ -65,7 +65,7 @@ pub(crate) fn with_page(
     let directory = tempfile::tempdir().context("cannot make a temporary directory")?;
     let path = directory.path().join("index.html");
     let script = script(runnables, &Resources::of(content)?, scripts)?;
-    fs::write(&path, live(&page, &script)?).context("cannot write the page")?;
+    fs::write(&path, with_script(&page, &script)?).context("cannot write the page")?;
     let mut content: Vec<_> = content.iter().filter(|file| file.name != PAGE).cloned().collect();
     content.push(ContentFile { name: PAGE.to_owned(), path });
     Ok((directory, content))
@@ -74,14 +74,14 @@ pub(crate) fn with_page(
 /// The files in the FMU's directory `resources`.
 #[derive(Default)]
 struct Resources {
-    /// Names and contents of the files that the page contains, for the model to read.
+    /// The files in the page, which the model can read: names, and contents that are compressed and in base 64.
     packed: BTreeMap<String, String>,
     /// Names of the files that are too large for the page.
     missing: Vec<String>,
 }
 
 impl Resources {
-    /// Reads the files, the smallest first, until the page is full.
+    /// Reads the files, the smallest first, up to [`RESOURCE_LIMIT`].
     fn of(content: &[ContentFile]) -> Result<Self> {
         let mut files = Vec::new();
         for file in content {
@@ -92,13 +92,13 @@ impl Resources {
         }
         files.sort();
         let mut resources = Self::default();
-        let mut room = MOST_OF_RESOURCES;
+        let mut space_left = RESOURCE_LIMIT;
         for (size, name, path) in files {
-            match room.checked_sub(size) {
+            match space_left.checked_sub(size) {
                 Some(left) => {
                     let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
                     resources.packed.insert(name, base64(&deflated(&bytes)?));
-                    room = left;
+                    space_left = left;
                 }
                 None => resources.missing.push(name),
             }
@@ -107,7 +107,7 @@ impl Resources {
     }
 }
 
-/// Returns the script that runs the FMU, and the FMUs that the model's scripts run next to it.
+/// Returns the script that runs the first FMU. It also contains the other FMUs, which the model's own `scripts` run.
 fn script(runnables: &[Runnable], resources: &Resources, scripts: &[&str]) -> Result<String> {
     let mut text = "(() => {\n\"use strict\";\n".to_owned();
     for script in SCRIPTS.iter().chain(scripts) {
@@ -125,7 +125,7 @@ fn script(runnables: &[Runnable], resources: &Resources, scripts: &[&str]) -> Re
 }
 
 /// Adds a script to the page, in compressed form.
-fn live(page: &str, script: &str) -> Result<String> {
+fn with_script(page: &str, script: &str) -> Result<String> {
     let packed = base64(&deflated(script.as_bytes())?);
     let text = format!(
         "<style>\n{STYLE}</style>\n<script>\n{BEGIN}begin(\"{packed}\").catch(showFailure);\n</script>\n"
@@ -137,8 +137,8 @@ fn live(page: &str, script: &str) -> Result<String> {
     Ok(with_policy(&format!("{head}{SPACE}{content}{text}{tail}"), script))
 }
 
-/// Adds a Content-Security-Policy to the page. It allows the scripts and style sheets of the page and the compressed script, by their
-/// hashes. Only images next to the page are loaded.
+/// Adds a Content-Security-Policy to the page. It allows the scripts and style sheets of the page and the compressed script, which it
+/// identifies by their hashes. Apart from these, the page can only load images.
 fn with_policy(page: &str, compressed: &str) -> String {
     let hashes = |tag: &str, others: &[&str]| {
         let elements = elements(page, tag);
@@ -233,20 +233,20 @@ mod tests {
         assert_eq!(script.matches("\n{ description: \"").count(), 2);
         assert!(script.contains("\n], ...[{\"a.csv\":\"AA\"},[\"b\"]]).catch("));
 
-        let page = live("<body><p>text</p></body></html>", &script).unwrap();
+        let page = with_script("<body><p>text</p></body></html>", &script).unwrap();
         assert!(page.contains(&format!("<body>{SPACE}<p>text</p><style>")));
         assert!(page.ends_with(".catch(showFailure);\n</script>\n</body></html>"));
     }
 
     #[test]
-    fn names_of_files_end_no_script() {
+    fn file_names_cannot_end_the_script() {
         let missing = vec!["</script><img src=x onerror=alert(8)>".to_owned()];
         let script = script(&[], &Resources { missing, ..Default::default() }, &[]).unwrap();
-        let page = live("<body></body>", &script).unwrap();
+        let page = with_script("<body></body>", &script).unwrap();
         assert_eq!(page.matches("</script").count(), 1);
     }
 
-    /// Each block by the hash of its bytes (Content Security Policy Level 3, section 2.3.1).
+    /// Each block is allowed by the hash of its bytes (Content Security Policy Level 3, section 2.3.1).
     #[test]
     fn the_policy_has_a_hash_for_each_block() {
         let page =
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_contains_the_resources_that_are_small() {
+    fn large_resources_are_left_out_of_the_page() {
         let directory = tempfile::tempdir().unwrap();
         let file = |name: &str, size: u64| {
             let path = directory.path().join(name.replace('/', "-"));
@@ -274,7 +274,7 @@ mod tests {
             ContentFile { name: name.to_owned(), path }
         };
         let content = [
-            file("resources/large", MOST_OF_RESOURCES),
+            file("resources/large", RESOURCE_LIMIT),
             file("resources/deep/small", 1),
             file("documentation/other", 1),
         ];

@@ -13,7 +13,7 @@ fn case() -> &'static str {
     CASE.get()
 }
 
-/// A cart on a spring, x' = v, v' = (u - k x - d v) / m, with mistakes.
+/// A cart on a spring, x' = v, v' = (u - k x - d v) / m. [`case`] selects a mistake or another difference.
 #[derive(Clone)]
 struct Cart {
     u: f64,
@@ -64,7 +64,7 @@ variables! { for Cart;
 impl Cart {
     fn rates(&self, [x, v]: [f64; 2]) -> [f64; 2] {
         let (force, mass) = match case() {
-            // The force has a dead zone; the mass is very small, so the speed follows within a nanosecond.
+            // A very small mass with strong damping: the time constant of the speed, m / d, is a nanosecond.
             "stiff" => (self.u - self.k * x - 1e3 * v, 1e-6),
             // Coulomb friction.
             "friction" => (self.u - self.k * x - self.d * v - 3.0 * v.signum(), 1.0),
@@ -78,7 +78,6 @@ impl Model for Cart {
     const INFO: Info = Info::new("Cart", "cart", "{cart}");
 
     fn new(_: &Setup) -> Result<Self, Error> {
-        // At rest if "at rest".
         let (x, k) = if case() == "at rest" { (0.0, 100.0) } else { (0.2, 40.0) };
         Ok(Self { u: 0.0, x, v: 0.0, k, d: 0.5, hits: 0 })
     }
@@ -96,7 +95,7 @@ impl Model for Cart {
 impl CoSimulation for Cart {
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         if case() == "stiff" {
-            // The speed is where the forces are equal, after an exponential transition.
+            // The speed decays exponentially to the value at which the forces balance.
             let end = (self.u - self.k * self.x) / 1e3;
             self.v = end + (self.v - end) * (-step.size * 1e3 / 1e-6).exp();
             self.x += step.size * self.v;
@@ -122,7 +121,7 @@ impl ModelExchange for Cart {
     fn event(&mut self, time: f64) -> Result<Event, Error> {
         let is_hit = case().starts_with("hit") && time > 2e-3;
         self.v *= if is_hit { -0.5 } else { 1.0 };
-        Ok(Event { states_changed: case() == "hit and said", ..Event::default() })
+        Ok(Event { states_changed: case() == "hit and reported", ..Event::default() })
     }
 }
 
@@ -165,13 +164,13 @@ fn reading_changes_nothing() {
             ["", "the importer sets "].iter().any(|begin| message.starts_with(&format!("{begin}{name} ")));
         assert!(is_named && message.contains(REMEDY), "{of}: {message}");
     }
-    // A model without Model Exchange.
+    // Without Model Exchange, the fault is found in Co-Simulation.
     assert!(message("calculate", "modelExchange=null", Standard::Fmi3).starts_with("x is "));
 }
 
 #[test]
 fn events_declare_that_they_change_states() {
-    assert_eq!(message("hit and said", "", Standard::Fmi3), "");
+    assert_eq!(message("hit and reported", "", Standard::Fmi3), "");
     let message = message("hit", "", Standard::Fmi3);
     assert!(
         message.starts_with("an event changes v from ") && message.contains("`states_changed: true`"),
@@ -188,7 +187,7 @@ fn derivatives_have_the_unit_of_the_state_per_second() {
         with(&format!("der(x)/{unit}"), "[0,1,-2,0,0,0,0,0]"),
         "der(x) is in m/s (m.s-2), but x is in m, so the unit of its derivative has the exponents m.s-1"
     );
-    // A radian may be left out.
+    // The radian may be left out.
     assert_eq!(with(&format!("x/{unit}"), "[0,1,0,0,0,0,0,1]"), "");
     let text = with("der(x)/type/unit/factor", "\"0.001\"");
     assert!(

@@ -1,4 +1,4 @@
-//! Watches a model while it is tried: its first panic, and calls that do not return.
+//! Monitors the calls of a model while it is evaluated: records its first panic or fault, and ends the process if a call does not return.
 #![allow(unsafe_code, reason = "the library reports panics to a C function")]
 
 use anyhow::{Result, bail};
@@ -8,32 +8,32 @@ use std::time::{Duration, Instant};
 
 /// The call in progress, and the first panic or fault of a model.
 #[derive(Debug, Default)]
-pub(crate) struct Trials {
+pub(crate) struct CallMonitor {
     call: Mutex<Option<(&'static str, Instant)>>,
-    panic: Mutex<Option<String>>,
+    fault: Mutex<Option<String>>,
 }
 
 /// How often the time of the call in progress is checked.
 const INTERVAL: Duration = Duration::from_millis(200);
 
-impl Trials {
-    /// Begins a call, which has this name in messages. It ends when another one begins.
+impl CallMonitor {
+    /// Records that a call begins, which has this name in messages. The call ends when another one begins.
     pub fn begin(&self, call: &'static str) {
         *lock(&self.call) = Some((call, Instant::now()));
     }
 
-    /// Ends the last call.
+    /// Records that the last call has ended.
     pub fn end(&self) {
         *lock(&self.call) = None;
     }
 
-    /// Ends this process with an error if a call takes longer than the limit, because nothing else can end a loop of the
+    /// Ends this process with an error if a call takes longer than the limit, because nothing else can end an endless loop in the
     /// model.
     pub fn watch(self: &Arc<Self>, model: String, limit: Duration) {
         let watched = Arc::downgrade(self);
         std::thread::spawn(move || {
-            while let Some(trials) = Weak::upgrade(&watched) {
-                if let Some((call, since)) = *lock(&trials.call)
+            while let Some(monitor) = Weak::upgrade(&watched) {
+                if let Some((call, since)) = *lock(&monitor.call)
                     && since.elapsed() > limit
                 {
                     eprintln!(
@@ -43,7 +43,7 @@ impl Trials {
                     );
                     std::process::exit(1);
                 }
-                drop(trials);
+                drop(monitor);
                 std::thread::sleep(INTERVAL);
             }
         });
@@ -51,27 +51,27 @@ impl Trials {
 
     /// Returns the first panic or fault as an error.
     pub fn check(&self) -> Result<()> {
-        match &*lock(&self.panic) {
-            Some(panic) => bail!("{panic}"),
+        match &*lock(&self.fault) {
+            Some(fault) => bail!("{fault}"),
             None => Ok(()),
         }
     }
 
     /// Records a fault, unless there was one before.
     pub fn fail(&self, fault: String) {
-        lock(&self.panic).get_or_insert(fault);
+        lock(&self.fault).get_or_insert(fault);
     }
 
-    /// Receives the place and the message of a panic from the library.
+    /// Receives the source location and the message of a panic from the library.
     ///
     /// # Safety
-    /// The context is a `Trials` that is never freed, and the text is UTF-8 of this length.
+    /// The context is a `CallMonitor` that is never freed, and the text is UTF-8 of this length.
     pub unsafe extern "C" fn receive(context: *mut c_void, text: *const u8, length: usize) {
         // SAFETY: the caller guarantees it.
-        let (trials, text) = unsafe { (&*context.cast::<Self>(), std::slice::from_raw_parts(text, length)) };
-        let call = lock(&trials.call).map_or("a call", |(call, _)| call);
+        let (monitor, text) = unsafe { (&*context.cast::<Self>(), std::slice::from_raw_parts(text, length)) };
+        let call = lock(&monitor.call).map_or("a call", |(call, _)| call);
         let text = String::from_utf8_lossy(text);
-        lock(&trials.panic).get_or_insert_with(|| format!("the model panics in {call}: {text}"));
+        lock(&monitor.fault).get_or_insert_with(|| format!("the model panics in {call}: {text}"));
     }
 }
 

@@ -1,8 +1,8 @@
 //! Checks that saved states are complete.
 //!
-//! The compiler cannot detect that a field is missing in the `memory` of `variables!` of fmu-export: saved states would silently
-//! lack it. So the model is simulated, some of its saved states are read into another instance, and both go on with the same
-//! inputs.
+//! A model lists the fields that saved states must contain after `memory in` of `variables!`. The compiler cannot detect that a field
+//! is missing there. So the model is simulated, some of its saved states are read into another instance, and this instance must have
+//! the same results as the first one when both continue with the same inputs.
 
 use crate::check::Starts;
 use crate::instance::{Instance, Outcome, Saved};
@@ -12,13 +12,15 @@ use crate::table::Variable;
 use anyhow::{Result, bail};
 use fmi_abi::{BaseType, Causality, Interface, Standard, Value, Variability};
 
-/// The steps, counted from 0, before which states are saved, and the number of steps that follow each of them.
+/// The steps, counted from 0, before which states are saved.
 const SAVED_BEFORE: [usize; 5] = [0, 1, 2, 5, 12];
+/// Number of steps that are compared after each saved state.
 const FOLLOWED: usize = 8;
-/// Number of steps: a simulation has the default step size, another one reaches the end of the default experiment.
+/// Number of steps in a simulation. One simulation uses the default step size; the steps of another one are longer, so that it reaches
+/// the end of the default experiment.
 const STEPS: usize = SAVED_BEFORE[SAVED_BEFORE.len() - 1] + FOLLOWED;
-/// Tolerance relative to the largest value of a variable. A smaller difference may be rounding, if the model calculates in another
-/// way after it was read.
+/// Tolerance relative to the largest value of a variable. A smaller difference may be a rounding error, because a model may calculate
+/// differently after its state was read.
 const TOLERANCE: f64 = 1e-6;
 
 /// Rejects a model whose saved states are incomplete.
@@ -29,7 +31,7 @@ pub(crate) fn check(model: &LoadedModel, starts: &Starts) -> Result<()> {
     let size_to_end = (info.stop_time - info.start_time) / STEPS as f64;
     let sizes = [Some(info.step_size), Some(size_to_end).filter(|size| *size > info.step_size && variable)];
     let inputs = inputs(model, starts);
-    // Both differ from the times of a new instance.
+    // Both times differ from the defaults of a new instance, so that a saved state without them is detected.
     let start_time = info.start_time + info.step_size;
     let stop_time = start_time + f64::max(size_to_end, info.step_size) * STEPS as f64;
     for interface in table.interfaces() {
@@ -37,15 +39,15 @@ pub(crate) fn check(model: &LoadedModel, starts: &Starts) -> Result<()> {
         for size in sizes.into_iter().flatten() {
             for rates in [false, true].into_iter().take(1 + usize::from(with_rates)) {
                 let times = [start_time, stop_time];
-                Rehearsal { model, interface, times, size, variable, inputs: &inputs, rates }.run()?;
+                Simulation { model, interface, times, size, variable, inputs: &inputs, rates }.run()?;
             }
         }
     }
     Ok(())
 }
 
-/// The values that are set before each step, by index. They are near the start values, the same in every run, and constant after
-/// the first steps.
+/// The input values that are set before each step, by index. They are near the start values, the same in every simulation, and
+/// constant after the first steps.
 type Inputs = Vec<Starts>;
 
 fn inputs(model: &LoadedModel, starts: &Starts) -> Inputs {
@@ -68,7 +70,7 @@ fn inputs(model: &LoadedModel, starts: &Starts) -> Inputs {
     all
 }
 
-/// The values of all variables; in Model Exchange, then the event indicators and the nominal values of the states.
+/// The values of all variables; in Model Exchange, followed by the event indicators and the nominal values of the states.
 type Values = Vec<Value>;
 
 fn values(instance: &mut Instance) -> Values {
@@ -79,8 +81,8 @@ fn values(instance: &mut Instance) -> Values {
     values
 }
 
-/// A simulation.
-struct Rehearsal<'a> {
+/// A simulation whose saved states are checked.
+struct Simulation<'a> {
     model: &'a LoadedModel,
     interface: Interface,
     /// Start and stop time.
@@ -93,31 +95,31 @@ struct Rehearsal<'a> {
     rates: bool,
 }
 
-/// The state before a step, and the values that were read there.
+/// A state that was saved before a step, and the values that were read then.
 struct Point {
     step: usize,
     saved: Saved,
     values: Values,
 }
 
-impl<'a> Rehearsal<'a> {
+impl<'a> Simulation<'a> {
     fn run(&self) -> Result<()> {
         // A rejected call is not an error here.
-        let Ok(mut trial) = self.initialized() else { return Ok(()) };
+        let Ok(mut instance) = self.initialized() else { return Ok(()) };
         let mut points: Vec<Point> = Vec::new();
-        let mut path: Vec<Values> = Vec::new();
+        let mut trajectory: Vec<Values> = Vec::new();
         for step in 0..STEPS {
-            let _ = self.set(&mut trial, step);
+            let _ = self.set(&mut instance, step);
             if SAVED_BEFORE.contains(&step)
-                && let Ok(saved) = trial.save()
+                && let Ok(saved) = instance.save()
             {
-                points.push(Point { step, saved, values: values(&mut trial) });
+                points.push(Point { step, saved, values: values(&mut instance) });
             }
-            let Some(values) = self.step(&mut trial, step) else { break };
-            path.push(values);
+            let Some(values) = self.step(&mut instance, step) else { break };
+            trajectory.push(values);
         }
-        let mut scales = vec![0.0; values(&mut trial).len()];
-        for values in points.iter().map(|point| &point.values).chain(&path) {
+        let mut scales = vec![0.0; values(&mut instance).len()];
+        for values in points.iter().map(|point| &point.values).chain(&trajectory) {
             for (scale, value) in scales.iter_mut().zip(values) {
                 if let Value::Real(value) = value {
                     *scale = f64::max(*scale, value.abs());
@@ -125,16 +127,16 @@ impl<'a> Rehearsal<'a> {
             }
         }
         for point in &points {
-            let Ok(bytes) = trial.serialize(point.saved) else { continue };
+            let Ok(bytes) = instance.serialize(point.saved) else { continue };
             let Ok(mut other) = self.instance() else { continue };
             let consequence = match other.deserialize(&bytes, point.saved.time) {
-                Ok(()) => self.difference(point, &mut trial, &mut other, &path, &scales),
+                Ok(()) => self.difference(point, &mut instance, &mut other, &trajectory, &scales),
                 Err(message) => Some(format!("it is rejected: {message}")),
             };
             if let Some(consequence) = consequence {
                 bail!(
                     "saved states lack something that {} remembers: read into another instance after {} steps of {} s \
-                     in {}, {consequence}; name every field that initialize, a step or an event changes behind `memory \
+                     in {}, {consequence}; name every field that initialize, a step or an event changes after `memory \
                      in` of variables!",
                     self.model.table.info.name,
                     point.step,
@@ -146,13 +148,13 @@ impl<'a> Rehearsal<'a> {
         Ok(())
     }
 
-    /// Makes an instance: of FMI 2.0 if it gets derivatives of inputs, which FMI 3.0 lacks.
+    /// Creates an instance. It is one of FMI 2.0 if derivatives of inputs are set, because FMI 3.0 does not have them.
     fn instance(&self) -> Outcome<Instance<'a>> {
         let standard = if self.rates { Standard::Fmi2 } else { Standard::Fmi3 };
         Instance::new(self.model, self.interface, standard, false)
     }
 
-    /// An instance before the first step.
+    /// Creates an instance and initializes it, up to the first step.
     fn initialized(&self) -> Outcome<Instance<'a>> {
         let mut instance = self.instance()?;
         let [start, stop] = self.times;
@@ -161,7 +163,7 @@ impl<'a> Rehearsal<'a> {
         Ok(instance)
     }
 
-    /// The name of a value.
+    /// Returns the name of a value in [`Values`].
     fn name(&self, number: usize) -> String {
         let table = &self.model.table;
         match number.checked_sub(table.variables.len()) {
@@ -174,23 +176,23 @@ impl<'a> Rehearsal<'a> {
         }
     }
 
-    /// Returns how another instance differs from the one whose state it has read.
+    /// Describes how the instance `other` differs from the instance whose state it has read; `None` if they agree.
     fn difference(
         &self,
         point: &Point,
         own: &mut Instance,
         other: &mut Instance,
-        path: &[Values],
+        trajectory: &[Values],
         scales: &[f64],
     ) -> Option<String> {
         let read = other.save().ok()?;
-        // Importers set the inputs of the next step before they save a state, or after they restore it.
-        [false, true].into_iter().find_map(|again| {
+        // An importer may set the inputs of the next step only before it saves the state, or also after it restores the state.
+        [false, true].into_iter().find_map(|sets_again| {
             other.restore(read).ok()?;
-            let (steps, numbers) = self.first_difference(other, point, again, path, scales)?;
+            let (steps, numbers) = self.first_difference(other, point, sets_again, trajectory, scales)?;
             own.restore(point.saved).ok()?;
-            // A model with random results also differs from its own repetition.
-            if self.first_difference(own, point, again, path, scales).is_some() {
+            // A model with random results differs even if the same instance repeats the steps.
+            if self.first_difference(own, point, sets_again, trajectory, scales).is_some() {
                 return None;
             }
             let names: Vec<_> = numbers.into_iter().map(|number| self.name(number)).collect();
@@ -199,24 +201,25 @@ impl<'a> Rehearsal<'a> {
         })
     }
 
-    /// Returns the number of steps after which values first differ from the path, and the numbers of these values.
+    /// Continues from a point. Returns the number of steps after which values first differ from the trajectory, and the indices of
+    /// these values; `None` if they agree. With `sets_again`, also sets the inputs of the first step.
     fn first_difference(
         &self,
-        trial: &mut Instance,
+        instance: &mut Instance,
         point: &Point,
-        again: bool,
-        path: &[Values],
+        sets_again: bool,
+        trajectory: &[Values],
         scales: &[f64],
     ) -> Option<(usize, Vec<usize>)> {
-        let path = path.iter().skip(point.step).take(FOLLOWED);
-        for (steps, expected) in std::iter::once(&point.values).chain(path).enumerate() {
-            if steps > usize::from(!again) {
-                let _ = self.set(trial, point.step + steps - 1);
+        let trajectory = trajectory.iter().skip(point.step).take(FOLLOWED);
+        for (steps, expected) in std::iter::once(&point.values).chain(trajectory).enumerate() {
+            if steps > usize::from(!sets_again) {
+                let _ = self.set(instance, point.step + steps - 1);
             }
             if steps > 0 {
-                self.step(trial, point.step + steps - 1);
+                self.step(instance, point.step + steps - 1);
             }
-            let found = values(trial);
+            let found = values(instance);
             let pairs = expected.iter().zip(&found).zip(scales).enumerate();
             let different = pairs.filter(|(_, ((expected, found), scale))| differ(expected, found, **scale));
             let different: Vec<_> = different.map(|(number, _)| number).collect();
@@ -227,13 +230,13 @@ impl<'a> Rehearsal<'a> {
         None
     }
 
-    /// Sets the inputs before a step, in Model Exchange at an event. Inputs that the model rejects keep their values.
-    fn set(&self, trial: &mut Instance, step: usize) -> Outcome {
+    /// Sets the inputs before a step; in Model Exchange, in Event Mode. Inputs that the model rejects keep their values.
+    fn set(&self, instance: &mut Instance, step: usize) -> Outcome {
         let inputs = &self.inputs[step];
         if self.interface == Interface::ModelExchange {
-            trial.enter_event_mode()?;
+            instance.enter_event_mode()?;
         }
-        trial.set(inputs, |_| true)?;
+        instance.set(inputs, |_| true)?;
         let variables = &self.model.table.variables;
         let rate = |(index, variable): (u32, &Variable)| match inputs[index as usize] {
             Some(Value::Real(value)) if variable.variability == Variability::Continuous => {
@@ -244,33 +247,34 @@ impl<'a> Rehearsal<'a> {
         let is_set = |variable: &Variable| self.rates && variable.base() == BaseType::Real;
         let rates = (0..).zip(variables).filter(|(_, variable)| is_set(variable)).filter_map(rate);
         let (indices, rates): (Vec<u32>, Vec<f64>) = rates.unzip();
-        trial.set_input_derivatives(&indices, &rates)
+        instance.set_input_derivatives(&indices, &rates)
     }
 
-    /// Returns the values after a step; `None` if the model rejects the step, or ends the simulation.
-    fn step(&self, trial: &mut Instance, step: usize) -> Option<Values> {
+    /// Does a step and returns the values after it; `None` if the model rejects the step or ends the simulation, or if a value is not
+    /// finite.
+    fn step(&self, instance: &mut Instance, step: usize) -> Option<Values> {
         let size = if self.variable && step % 3 == 1 { 0.5 * self.size } else { self.size };
-        let goes_on = match self.interface {
-            Interface::CoSimulation => trial.step(size),
-            Interface::ModelExchange => integrate(trial, size),
+        let continues = match self.interface {
+            Interface::CoSimulation => instance.step(size),
+            Interface::ModelExchange => integrate(instance, size),
         };
-        if !goes_on.ok()? {
+        if !continues.ok()? {
             return None;
         }
-        let values = values(trial);
+        let values = values(instance);
         values.iter().all(is_finite).then_some(values)
     }
 }
 
-/// Makes a step by Euler's rule, with an event at its begin.
-fn integrate(trial: &mut Instance, size: f64) -> Outcome<bool> {
-    trial.enter_event_mode()?;
-    trial.handle_event()?;
-    let states = trial.states()?.into_iter().zip(trial.derivatives()?);
+/// Handles an event, then does a step with Euler's method.
+fn integrate(instance: &mut Instance, size: f64) -> Outcome<bool> {
+    instance.enter_event_mode()?;
+    instance.handle_event()?;
+    let states = instance.states()?.into_iter().zip(instance.derivatives()?);
     let states: Vec<f64> = states.map(|(state, derivative)| state + size * derivative).collect();
-    trial.set_time(trial.time + size)?;
-    trial.set_states(&states)?;
-    trial.step_completed()?;
+    instance.set_time(instance.time + size)?;
+    instance.set_states(&states)?;
+    instance.step_completed()?;
     Ok(true)
 }
 
