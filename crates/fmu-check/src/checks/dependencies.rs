@@ -1,4 +1,4 @@
-//! Checks that ModelStructure lists the dependencies that the FMU has, and that their kinds are true.
+//! Checks that ModelStructure lists the dependencies that the FMU has, and that the declared kinds of dependencies are right.
 
 use super::derivatives::{middle_values, set_known};
 use crate::call_sequence::{Run, Values};
@@ -9,35 +9,37 @@ use crate::writer::Part::{Begin, Enter, Make};
 use crate::writer::{Read, Trajectory, Writer, value_of};
 use std::collections::HashSet;
 
-/// Returns the variables of the unknowns whose `dependencies` attribute contains neither the known nor an alias of it.
+/// Returns the variables of the unknowns whose `dependencies` attribute lists neither the known nor an alias of it. An unknown without the
+/// attribute is left out, because it is declared to depend on every known.
 fn undeclared<'a>(
     checker: &Checker,
     unknowns: impl IntoIterator<Item = &'a Unknown>,
     known: usize,
 ) -> Vec<usize> {
     let aliases: HashSet<usize> = checker.description.aliases(known).collect();
-    let silent = |unknown: &&Unknown| {
+    let omits_known = |unknown: &&Unknown| {
         let lists = |list: &Vec<usize>| list.iter().any(|index| aliases.contains(index));
         unknown.dependencies.as_ref().is_some_and(|list| !lists(list))
     };
-    let silent = unknowns.into_iter().filter(silent).map(|unknown| unknown.variable);
-    silent.filter(|index| !aliases.contains(index)).collect()
+    let variables = unknowns.into_iter().filter(omits_known).map(|unknown| unknown.variable);
+    variables.filter(|index| !aliases.contains(index)).collect()
 }
 
-/// Reads of unknowns with a value of a known, with another value and with the first value again.
-struct Moved([Vec<Read>; 3]);
+/// Reads of unknowns while a known has a value, another value, and the first value again.
+struct Perturbed([Vec<Read>; 3]);
 
-impl Moved {
-    fn new(writer: &mut Writer, unknowns: &[usize], mut set: impl FnMut(&mut Writer, usize)) -> Self {
+impl Perturbed {
+    /// Writes the calls. `set` sets the known to the first value if its argument is 0, and to the other value if it is 1.
+    fn write(writer: &mut Writer, unknowns: &[usize], mut set: impl FnMut(&mut Writer, usize)) -> Self {
         Self([0, 1, 0].map(|which| {
             set(writer, which);
             writer.read_these(0, unknowns)
         }))
     }
 
-    /// Describes the first unknown that changes with the known and returns to its first value when the known does. So the known is the
-    /// cause of the change, not the passing of time.
-    fn depends(
+    /// Describes the first unknown that changes with the known and regains its first value together with the known. An unknown that does
+    /// not regain it may have changed for another reason.
+    fn dependency(
         &self,
         run: &Run,
         description: &Description,
@@ -48,46 +50,52 @@ impl Moved {
             let [one, other, again] = [0, 1, 2].map(|which| value_of(run, &self.0[which], *unknown));
             let (one, other, again) = (one?, other?, again?);
             let at = one.differ(&other)?;
-            let [name, of] = [*unknown, known].map(|index| &description.variables[index].name);
-            let (is, becomes) = (one.show(at), other.show(at));
+            let [name, known] = [*unknown, known].map(|index| &description.variables[index].name);
+            let (from, to) = (one.show(at), other.show(at));
             let message =
-                || format!("{name} goes from {is} to {becomes} when {of} changes, and does not list it");
+                || format!("{name} goes from {from} to {to} when {known} changes, and does not list it");
             one.differ(&again).is_none().then(message)
         })
     }
 }
 
-/// Returns the indices of points at which dependencies are tried: the second, the middle and the last. Before the first step, the
-/// initialization may still follow the inputs. States of Model Exchange are those of the middle at each of these times.
-fn places(checker: &Checker, trajectory: &Trajectory) -> Vec<usize> {
+/// Returns the indices of the points before which dependencies are tried: the second, the middle and the last point. The first point is
+/// not tried, because before the first step the initialization may still depend on the inputs.
+fn tried_points(checker: &Checker, trajectory: &Trajectory) -> Vec<usize> {
     let count = trajectory.points.len();
-    let mut places = vec![1.min(count), count / 2, count.saturating_sub(1)];
-    places.sort_unstable();
-    places.dedup();
+    let mut indices = vec![1.min(count), count / 2, count.saturating_sub(1)];
+    indices.sort_unstable();
+    indices.dedup();
     if checker.quick {
-        places = vec![count / 2];
+        indices = vec![count / 2];
     }
-    places
+    indices
 }
 
-/// Writes a simulation that stops at some points.
-fn visit(writer: &mut Writer, trajectory: &Trajectory, places: &[usize], mut at: impl FnMut(&mut Writer)) {
+/// Writes a simulation, and calls `body` before each of the points with these indices.
+fn simulate_with(
+    writer: &mut Writer,
+    trajectory: &Trajectory,
+    indices: &[usize],
+    mut body: impl FnMut(&mut Writer),
+) {
     writer.write(0, &[Begin]);
     let mut next = 0;
-    for place in places {
-        trajectory.points[next..*place].iter().for_each(|point| drop(writer.point(0, point)));
-        next = *place;
-        at(writer);
+    for index in indices {
+        trajectory.points[next..*index].iter().for_each(|point| drop(writer.point(0, point)));
+        next = *index;
+        body(writer);
     }
 }
 
-/// Returns the outputs and, in Model Exchange, the derivatives.
+/// Returns the outputs and, in Model Exchange, the state derivatives.
 fn unknowns<'a>(checker: &'a Checker, trajectory: &Trajectory) -> impl Iterator<Item = &'a Unknown> {
     let derivatives = if trajectory.is_stepped() { &[][..] } else { &checker.description.derivatives };
     checker.description.outputs.iter().chain(derivatives)
 }
 
-/// Checks the dependencies of outputs and derivatives on inputs and, in Model Exchange, on states.
+/// Checks the dependencies of outputs and state derivatives on inputs and, in Model Exchange, on states. The states are set to their values
+/// in the middle of the simulation, also at the other points.
 pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let (knowns, states) = continuous_knowns(checker, trajectory);
     let (values, vector) = middle_values(checker, trajectory, &knowns, &states)?;
@@ -98,21 +106,22 @@ pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
         }
         let variable = &checker.description.variables[known];
         let other: Vec<f64> = value.iter().map(|value| near(variable, *value, 1.0 / 16.0)).collect();
-        let (mut writer, mut moved) = (checker.writer(trajectory), Vec::new());
-        visit(&mut writer, trajectory, &places(checker, trajectory), |writer| {
-            moved.push(Moved::new(writer, &unknowns, |writer, which| {
+        let (mut writer, mut perturbed) = (checker.writer(trajectory), Vec::new());
+        simulate_with(&mut writer, trajectory, &tried_points(checker, trajectory), |writer| {
+            perturbed.push(Perturbed::write(writer, &unknowns, |writer, which| {
                 set_known(writer, &states, &vector, known, [&value, &other][which]);
             }));
         });
         let description = checker.description.clone();
         checker.check("dependencies.missing", writer.sequence, move |run| {
-            moved.iter().find_map(|moved| moved.depends(run, &description, &unknowns, known))
+            perturbed.iter().find_map(|perturbed| perturbed.dependency(run, &description, &unknowns, known))
         })?;
     }
     discrete(checker, trajectory)
 }
 
-/// Returns the continuous inputs and, in Model Exchange, the states, and the list of the states.
+/// Returns the continuous knowns, which are inputs and, in Model Exchange, states; then only the states. States are left out if one of them
+/// is an array, so that each state is an element of the state vector.
 fn continuous_knowns(checker: &Checker, trajectory: &Trajectory) -> (Vec<usize>, Vec<usize>) {
     let description = &checker.description;
     let scalar = !trajectory.is_stepped() && description.states_count() == Some(description.states().len());
@@ -128,7 +137,7 @@ fn continuous_knowns(checker: &Checker, trajectory: &Trajectory) -> (Vec<usize>,
     (inputs.chain(states.iter().copied()).take(checker.at_most(60)).collect(), states)
 }
 
-/// Checks the dependencies of outputs on discrete inputs of any type. In Model Exchange they are set in Event Mode.
+/// Checks the dependencies on discrete inputs of any type. They are set in Event Mode, except in Co-Simulation without Event Mode.
 fn discrete(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let inputs = (0..description.variables.len()).filter(|index| {
@@ -139,14 +148,16 @@ fn discrete(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     });
     for known in inputs.take(checker.at_most(60)) {
         let unknowns = undeclared(checker, unknowns(checker, trajectory), known);
-        let Some(values) = both_values(description, known).filter(|_| !unknowns.is_empty()) else { continue };
-        let (mut writer, mut moved) = (checker.writer(trajectory), Vec::new());
+        let Some(values) = start_and_other_values(description, known).filter(|_| !unknowns.is_empty()) else {
+            continue;
+        };
+        let (mut writer, mut perturbed) = (checker.writer(trajectory), Vec::new());
         let events = !trajectory.is_stepped() || description.event_mode();
-        visit(&mut writer, trajectory, &places(checker, trajectory), |writer| {
+        simulate_with(&mut writer, trajectory, &tried_points(checker, trajectory), |writer| {
             if events {
                 writer.call(0, "EnterEventMode", vec![]);
             }
-            moved.push(Moved::new(writer, &unknowns, |writer, which| {
+            perturbed.push(Perturbed::write(writer, &unknowns, |writer, which| {
                 writer.set(0, &[(known, values[which].clone())]);
             }));
             if events {
@@ -155,14 +166,14 @@ fn discrete(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         });
         let description = checker.description.clone();
         checker.check("dependencies.missing", writer.sequence, move |run| {
-            moved.iter().find_map(|moved| moved.depends(run, &description, &unknowns, known))
+            perturbed.iter().find_map(|perturbed| perturbed.dependency(run, &description, &unknowns, known))
         })?;
     }
     Ok(())
 }
 
-/// Returns the start values of a variable and other values.
-fn both_values(description: &Description, index: usize) -> Option<[Values; 2]> {
+/// Returns the start values of a variable, and values that differ from them; `None` if its range has no other values.
+fn start_and_other_values(description: &Description, index: usize) -> Option<[Values; 2]> {
     let variable = &description.variables[index];
     let other = other_values(description, index)?;
     let start = match &other {
@@ -176,7 +187,7 @@ fn both_values(description: &Description, index: usize) -> Option<[Values; 2]> {
     Some([start, other])
 }
 
-/// Checks the dependencies of initial unknowns on inputs and exact start values, such as parameters, in Initialization Mode.
+/// Checks the dependencies of initial unknowns on inputs and on variables with `initial` = `exact`, such as parameters.
 pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let knowns = (0..description.variables.len()).filter(|index| {
@@ -187,7 +198,9 @@ pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     });
     for known in knowns.take(checker.at_most(100)) {
         let unknowns = undeclared(checker, &description.initial_unknowns, known);
-        let Some([value, other]) = both_values(description, known).filter(|_| !unknowns.is_empty()) else {
+        let Some([value, other]) =
+            start_and_other_values(description, known).filter(|_| !unknowns.is_empty())
+        else {
             continue;
         };
         let other = match &value {
@@ -200,25 +213,27 @@ pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
         };
         let mut writer = checker.writer(trajectory);
         writer.write(0, &[Make, Enter]);
-        let moved = Moved::new(&mut writer, &unknowns, |writer, which| {
+        let perturbed = Perturbed::write(&mut writer, &unknowns, |writer, which| {
             writer.set(0, &[(known, [&value, &other][which].clone())]);
         });
         let description = checker.description.clone();
         checker.check("dependencies.initial", writer.sequence, move |run| {
-            moved.depends(run, &description, &unknowns, known)
+            perturbed.dependency(run, &description, &unknowns, known)
         })?;
     }
     Ok(())
 }
 
-/// Values of an unknown for three equidistant values of a known, at one point.
+/// Reads of unknowns at one point for three equidistant values of a known.
 struct Line {
     reads: [Vec<Read>; 3],
+    /// Distance between adjacent values of the known.
     distance: f64,
 }
 
 impl Line {
-    /// Returns the factors of both parts of the line, and the size of their rounding errors.
+    /// Returns the factor of the known in both intervals, and the size of their rounding errors. Returns `None` if a value was not read or
+    /// is not finite.
     fn factors(&self, run: &Run, unknown: usize) -> Option<([f64; 2], f64)> {
         let value = |which: usize| value_of(run, &self.reads[which], unknown)?.numbers().first().copied();
         let values = [value(0)?, value(1)?, value(2)?];
@@ -228,13 +243,14 @@ impl Line {
     }
 }
 
-/// Checks that a known enters an unknown with a factor that does not change, if `dependenciesKind` declares it as constant, fixed or
-/// tunable: along a line at one point, and from point to point while no tunable parameter changes. A factor that is declared as discrete
-/// may change at events and communication points, so that only the line of Model Exchange is straight.
+/// Checks the kinds in `dependenciesKind`, which declare when the factor of a known in an unknown may change. If the kind is constant,
+/// fixed or tunable, the factor must be equal for all values of the known and at all points, because the check changes no tunable
+/// parameter. If the kind is discrete, the factor may change at events and communication points, so it must only be equal for all values of
+/// the known at one point of Model Exchange.
 pub fn kinds(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let (mut knowns, states) = continuous_knowns(checker, trajectory);
-    let of = |unknown: &Unknown, known: usize| {
+    let declared_kind = |unknown: &Unknown, known: usize| {
         let list = unknown.dependencies.as_ref()?;
         let kind = *unknown.kinds.get(list.iter().position(|index| *index == known)?)?;
         let scalar = description.variables[unknown.variable].size == Some(1);
@@ -242,7 +258,7 @@ pub fn kinds(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         (scalar && real && kind != DependencyKind::Dependent).then_some((unknown.variable, kind))
     };
     let declared = |known: usize| -> Vec<(usize, DependencyKind)> {
-        unknowns(checker, trajectory).filter_map(|unknown| of(unknown, known)).collect()
+        unknowns(checker, trajectory).filter_map(|unknown| declared_kind(unknown, known)).collect()
     };
     knowns.retain(|known| description.variables[*known].size == Some(1) && !declared(*known).is_empty());
     let (values, vector) = middle_values(checker, trajectory, &knowns, &states)?;
@@ -256,7 +272,7 @@ pub fn kinds(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         let declared = declared(known);
         let indices: Vec<usize> = declared.iter().map(|(index, _)| *index).collect();
         let (mut writer, mut lines) = (checker.writer(trajectory), Vec::new());
-        visit(&mut writer, trajectory, &places(checker, trajectory), |writer| {
+        simulate_with(&mut writer, trajectory, &tried_points(checker, trajectory), |writer| {
             let reads = [0.0, 1.0, 2.0].map(|times| {
                 set_known(writer, &states, &vector, known, &[value + times * distance]);
                 writer.read_these(0, &indices)
@@ -267,11 +283,11 @@ pub fn kinds(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         let (description, stepped) = (checker.description.clone(), trajectory.is_stepped());
         checker.check("dependencies.kind", writer.sequence, move |run| {
             declared.iter().find_map(|(unknown, kind)| {
-                let [name, of] = [*unknown, known].map(|index| &description.variables[index].name);
-                let [is, becomes] = other_factors(run, &lines, *unknown, *kind, stepped)?;
+                let [name, known] = [*unknown, known].map(|index| &description.variables[index].name);
+                let [one, other] = unequal_factors(run, &lines, *unknown, *kind, stepped)?;
                 let kind = format!("{kind:?}").to_lowercase();
                 Some(format!(
-                    "{of} enters {name} with a factor of {is:?} and of {becomes:?}, which is declared as {kind}"
+                    "{known} enters {name} with a factor of {one:?} and of {other:?}, which is declared as {kind}"
                 ))
             })
         })?;
@@ -279,8 +295,8 @@ pub fn kinds(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Returns two factors that should be equal and are not.
-fn other_factors(
+/// Returns two factors that must be equal but differ.
+fn unequal_factors(
     run: &Run,
     lines: &[Line],
     unknown: usize,
@@ -292,8 +308,8 @@ fn other_factors(
     let found: Vec<_> = lines.iter().filter_map(|line| line.factors(run, unknown)).collect();
     let is_discrete = kind == DependencyKind::Discrete;
     if !(is_discrete && stepped) {
-        let bent = found.iter().find(|([one, other], error)| differ(*one, *other, *error));
-        if let Some((factors, _)) = bent {
+        let not_straight = found.iter().find(|([one, other], error)| differ(*one, *other, *error));
+        if let Some((factors, _)) = not_straight {
             return Some(*factors);
         }
     }

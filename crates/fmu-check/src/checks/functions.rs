@@ -1,6 +1,6 @@
 //! Checks the exported functions, the version, and the functions of declared capabilities.
 
-use super::derivatives::{derivative, pair, references};
+use super::derivatives::{references, request_derivatives, unknown_and_known};
 use crate::call_sequence::{End, Run, Setting, Step};
 use crate::checker::Checker;
 use crate::finding::fails;
@@ -9,21 +9,23 @@ use fmi_abi::calls::{fmi2, fmi3, signatures};
 use fmi_abi::{Interface, Mode, Standard};
 use std::sync::Arc;
 
-/// Checks that the loader resolves all symbols that the library needs, including those with lazy binding.
+/// Checks that the loader can resolve all symbols when it loads the library. By default, it resolves a function when the
+/// function is first called.
 fn symbols(checker: &Checker) -> anyhow::Result<()> {
     let sequence = checker.step(checker.version(), false);
-    let [late, now] = [false, true].map(|now| {
+    let [lazy, immediate] = [false, true].map(|now| {
         let setting = Setting { now, ..checker.setting.clone() };
         checker.workers.execute(&setting, &sequence, checker.limit)
     });
-    if let (End::Done, End::Unloadable(why)) = (late?.end, now?.end) {
+    if let (End::Done, End::Unloadable(why)) = (lazy?.end, immediate?.end) {
         let criterion = Arc::new(|_: &Run| -> Option<String> { None });
         checker.add(checker.broken("package.symbols", why).shown_by(sequence, criterion));
     }
     Ok(())
 }
 
-/// Checks that the library exports all functions of its interface types.
+/// Checks that the library exports all functions of its interface types, that its own symbols can be resolved, and that it returns the
+/// right version.
 pub fn present(checker: &Checker) -> anyhow::Result<()> {
     let modes: Vec<Mode> = (0..9).filter_map(|bit| Mode::from_number(1 << bit)).collect();
     let standard = checker.description.standard;
@@ -31,18 +33,18 @@ pub fn present(checker: &Checker) -> anyhow::Result<()> {
     for (index, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
         let Some(path) = &checker.setting.libraries[index] else { continue };
         let Some(symbols) = super::package::exported(path) else { continue };
-        let free = if standard == Standard::Fmi2 { fmi2::FREE } else { fmi3::FREE };
-        let wanted = free.iter().copied().filter(|name| match *name {
+        let without_instance = if standard == Standard::Fmi2 { fmi2::FREE } else { fmi3::FREE };
+        let wanted = without_instance.iter().copied().filter(|name| match *name {
             "fmi3InstantiateModelExchange" => interface == Interface::ModelExchange,
             "fmi3InstantiateCoSimulation" => interface == Interface::CoSimulation,
             name => name != "fmi3InstantiateScheduledExecution",
         });
-        let on_instances = signatures(standard).iter().map(|signature| signature.rule).filter(|rule| {
-            // fmi2CancelStep belongs to Co-Simulation; the table allows it in no state.
+        let with_instance = signatures(standard).iter().map(|signature| signature.rule).filter(|rule| {
+            // The table allows fmi2CancelStep in no state, but Co-Simulation must export it.
             rule.name == "fmi2CancelStep" && interface == Interface::CoSimulation
                 || modes.iter().any(|mode| rule.standard.contains(standard, interface, *mode))
         });
-        for name in wanted.chain(on_instances.map(|rule| rule.name)) {
+        for name in wanted.chain(with_instance.map(|rule| rule.name)) {
             if !symbols.iter().any(|symbol| symbol == name) && !missing.contains(&name) {
                 missing.push(name);
             }
@@ -56,6 +58,7 @@ pub fn present(checker: &Checker) -> anyhow::Result<()> {
     version(checker)
 }
 
+/// Checks the version and, in FMI 2.0, the platform.
 fn version(checker: &Checker) -> anyhow::Result<()> {
     let mut sequence = checker.step(checker.version(), false);
     if !checker.fmi3() {
@@ -66,19 +69,19 @@ fn version(checker: &Checker) -> anyhow::Result<()> {
     let name = if checker.fmi3() { "fmi3GetVersion" } else { "fmi2GetVersion" };
     let declared = checker.description.version.clone();
     checker.check("functions.version", sequence, move |run| {
-        // "NULL" for a null pointer, None if the library lacks the function.
-        let text = |id: u32| {
+        // Is "NULL" if the function returned NULL, and `None` if the library lacks the function.
+        let string = |id: u32| {
             let outcome = run.outcome(id).filter(|outcome| !outcome.missing)?;
             let text = outcome.text.as_ref().map(|text| String::from_utf8_lossy(text).into_owned());
             Some(text.unwrap_or_else(|| "NULL".to_owned()))
         };
-        if let Some(version) = text(0)
+        if let Some(version) = string(0)
             && version != declared
             && !(declared.starts_with("3.") && version.starts_with("3."))
         {
             return Some(format!("{name} returns {version}, and fmiVersion is {declared}"));
         }
-        let platform = text(1)?;
+        let platform = string(1)?;
         (platform != "default").then(|| format!("fmi2GetTypesPlatform returns {platform}"))
     })
 }
@@ -96,7 +99,7 @@ pub fn capabilities(checker: &Checker, trajectory: &Trajectory) -> anyhow::Resul
         ids.extend(writer.write(0, &[Part::Drop(0)]).ids);
         calls.push(("canGetAndSetFMUstate and canSerializeFMUstate", ids, writer.sequence));
     }
-    let pair = pair(&checker.description, interface);
+    let pair = unknown_and_known(&checker.description, interface);
     for (name, flags, function) in [
         (
             "providesDirectionalDerivatives",
@@ -109,12 +112,19 @@ pub fn capabilities(checker: &Checker, trajectory: &Trajectory) -> anyhow::Resul
         let mut writer = checker.writer(trajectory);
         let mut ids = writer.begin(0);
         let size = |index: usize| checker.description.variables[index].size.unwrap_or(1);
-        let (seed, results) = match function {
+        let (seed_size, count) = match function {
             "GetAdjointDerivative" => (size(unknown), size(known)),
             _ => (size(known), size(unknown)),
         };
         let [unknowns, knowns] = [unknown, known].map(|index| references(&checker.description, &[index]));
-        ids.push(derivative(&mut writer, function, &unknowns, &knowns, &vec![1.0; seed], results));
+        ids.push(request_derivatives(
+            &mut writer,
+            function,
+            &unknowns,
+            &knowns,
+            &vec![1.0; seed_size],
+            count,
+        ));
         calls.push((name, ids, writer.sequence));
     }
     for (flag, ids, sequence) in calls {

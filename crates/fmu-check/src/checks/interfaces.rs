@@ -1,4 +1,4 @@
-//! Compares Co-Simulation with Model Exchange, which an FMU offers for the same model.
+//! Compares Co-Simulation with Model Exchange, if an FMU offers both.
 
 use crate::call_sequence::{Integration, Run, Step, Values};
 use crate::checker::Checker;
@@ -9,30 +9,44 @@ use crate::values::near;
 use crate::writer::Part::{Enter, Free, Leave, Make};
 use crate::writer::{Read, Trajectory, Writer, value_of};
 
-/// Number of communication points that are compared.
-const POINTS: usize = 40;
+/// Maximum number of communication steps.
+const MAX_STEPS: usize = 40;
 
-/// Number of Runge-Kutta steps between two communication points; a second integration with twice as many shows their error.
-const STEPS: usize = 4;
+/// Number of Runge-Kutta steps in a communication step. Another integration has twice as many, to estimate the error.
+const INTEGRATION_STEPS: usize = 4;
 
-/// Difference that is not a finding, relative to the change of an output.
+/// Largest difference that is not a finding, relative to the range of the values of an output.
 const TOLERANCE: f64 = 5e-3;
 
-/// Values after each step of a simulation, and the results of the integrations.
+/// Index of the simulation in Co-Simulation. One input may differ from its start value.
+const STEPPED: usize = 0;
+/// Index of the simulation in Co-Simulation with the start values of all inputs.
+const AT_START: usize = 1;
+/// Index of the integration of Model Exchange with `INTEGRATION_STEPS` Runge-Kutta steps in a communication step, and the inputs of
+/// `STEPPED`.
+const FINE: usize = 2;
+/// Index of the integration with twice as many steps.
+const FINER: usize = 3;
+/// Index of the integration with one step of Euler's method in a communication step.
+const EULER: usize = 4;
+
+/// Calls of a simulation.
 struct Simulation {
+    /// Reads after each communication step.
     reads: Vec<Vec<Read>>,
+    /// Numbers of the integrations; empty in Co-Simulation.
     integrations: Vec<u32>,
 }
 
-/// Compares a simulation of Co-Simulation with an integration of Model Exchange, with constant inputs: once with their start values, and
-/// with another value of each of at most four inputs.
+/// Compares Co-Simulation with an integration of Model Exchange for constant inputs: first with the start values of all inputs, then with
+/// another value of one input, for at most four inputs.
 pub fn compare(checker: &Checker) -> anyhow::Result<()> {
     let [Some(stepped), Some(integrated)] = [true, false]
         .map(|stepped| checker.trajectories.iter().find(|trajectory| trajectory.is_stepped() == stepped))
     else {
         return Ok(());
     };
-    // The program that shows a finding loads one library.
+    // The program that reproduces a finding loads only one library.
     if checker.setting.libraries[0] != checker.setting.libraries[1] || checker.description.event_mode() {
         return Ok(());
     }
@@ -52,7 +66,7 @@ pub fn compare(checker: &Checker) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Compares the simulations, in which this input has another value than its start value.
+/// Compares the simulations in which this input, if there is one, has a value other than its start value.
 fn with_input(
     checker: &Checker,
     [stepped, integrated]: [&Trajectory; 2],
@@ -62,32 +76,26 @@ fn with_input(
     let mut outputs = checker.outputs_and_states();
     outputs.truncate(200);
     let size = step_size(description);
-    let count = (range(description) / size + 1e-9).floor().clamp(1.0, POINTS as f64) as usize;
+    let count = (range(description) / size + 1e-9).floor().clamp(1.0, MAX_STEPS as f64) as usize;
     let times: Vec<f64> = (0..=count).map(|index| description.start_time + index as f64 * size).collect();
     let mut all = Writer::new(description, stepped, &outputs);
     let mut simulations = Vec::new();
-    // Co-Simulation with the input and, to see whether the input matters there, without it; then the integrations.
-    let kinds = [
-        (true, 0, false),
-        (true, 0, true),
-        (false, STEPS, false),
-        (false, 2 * STEPS, false),
-        (false, 1, false),
-    ];
-    for (instance, (is_stepped, steps, at_start)) in kinds.into_iter().enumerate() {
+    // Number of integration steps, or `None` for Co-Simulation.
+    let integration_steps = [None, None, Some(INTEGRATION_STEPS), Some(2 * INTEGRATION_STEPS), Some(1)];
+    for (instance, steps) in integration_steps.into_iter().enumerate() {
+        let is_stepped = steps.is_none();
         let mut writer = Writer::new(description, if is_stepped { stepped } else { integrated }, &outputs);
         writer.next = all.next;
         writer.write(instance, &[Make]);
-        if let Some(input) = input.filter(|_| !at_start) {
+        if let Some(input) = input.filter(|_| instance != AT_START) {
             let variable = &description.variables[input];
             let value = near(variable, variable.starts().first().copied().unwrap_or_default(), 0.5);
             writer.set_numbers(instance, input, &[value]);
         }
         writer.write(instance, &[Enter, Leave]);
-        let simulation = if is_stepped {
-            in_steps(&mut writer, instance, &times, size)
-        } else {
-            integrate(&mut writer, instance, &times, steps)
+        let simulation = match steps {
+            None => in_steps(&mut writer, instance, &times, size),
+            Some(steps) => integrate(&mut writer, instance, &times, steps),
         };
         writer.write(instance, &[Free]);
         simulations.push(simulation);
@@ -97,10 +105,11 @@ fn with_input(
     checker.check(
         "results.interfaces",
         all.sequence,
-        differs(description.clone(), simulations, outputs, times, input),
+        equal_results(description.clone(), simulations, outputs, times, input),
     )
 }
 
+/// Writes the steps of Co-Simulation from each time to the next.
 fn in_steps(writer: &mut Writer, instance: usize, times: &[f64], size: f64) -> Simulation {
     let read = |time: &f64| {
         writer.step(instance, *time, size);
@@ -109,7 +118,7 @@ fn in_steps(writer: &mut Writer, instance: usize, times: &[f64], size: f64) -> S
     Simulation { reads: times[..times.len() - 1].iter().map(read).collect(), integrations: Vec::new() }
 }
 
-/// Integrates with this number of steps between communication points; one step is by Euler's method.
+/// Writes the integrations of Model Exchange from each time to the next. A single step is a step of Euler's method.
 fn integrate(writer: &mut Writer, instance: usize, times: &[f64], steps: usize) -> Simulation {
     let states = writer.description.states_count().unwrap_or(0);
     let indicators = writer.description.event_indicators.unwrap_or(0);
@@ -122,99 +131,107 @@ fn integrate(writer: &mut Writer, instance: usize, times: &[f64], steps: usize) 
     simulation
 }
 
-/// A run of the simulations.
+/// Run of the simulations.
 struct Compared<'a> {
     run: &'a Run,
     description: &'a Description,
-    /// Co-Simulation with and without the input, Model Exchange with `STEPS` and twice as many steps, and with Euler's method.
+    /// Simulations in the order of the indices above.
     simulations: &'a [Simulation],
-    /// Number of points that all simulations have reached.
+    /// Number of communication steps that succeeded in all simulations.
     count: usize,
 }
 
 impl Compared<'_> {
-    /// Returns the values of a variable at a point in all simulations.
-    fn values(&self, point: usize, variable: usize) -> Option<[Values; 5]> {
-        let value = |simulation: &Simulation| value_of(self.run, simulation.reads.get(point)?, variable);
+    /// Returns the values of a variable after a step in all simulations.
+    fn values(&self, step: usize, variable: usize) -> Option<[Values; 5]> {
+        let value = |simulation: &Simulation| value_of(self.run, simulation.reads.get(step)?, variable);
         let all: Vec<Values> = self.simulations.iter().map_while(value).collect();
         all.try_into().ok()
     }
 
-    /// Returns the number of state events, and whether there is an event, between a point and the one before.
-    fn events(&self, point: usize) -> Option<(f64, bool)> {
-        let id = self.simulations[3].integrations.get(point)?;
+    /// Returns the number of state events in a step of Model Exchange, and whether the step has any event.
+    fn events(&self, step: usize) -> Option<(f64, bool)> {
+        let id = self.simulations[FINER].integrations.get(step)?;
         let numbers = self.run.written(*id)?.numbers();
         Some((*numbers.get(2)?, numbers[0].is_finite()))
     }
 
-    /// Returns whether there is no event near a point: Co-Simulation may handle an event somewhat earlier or later.
-    fn is_quiet(&self, point: usize) -> bool {
-        let from = point.saturating_sub(1);
-        (from..=point + 1).all(|point| self.events(point).is_some_and(|(_, event)| !event))
+    /// Returns whether a step, the one before and the one after have no event. Results near events may differ, because Co-Simulation may
+    /// handle an event somewhat earlier or later than Model Exchange.
+    fn is_quiet(&self, step: usize) -> bool {
+        let from = step.saturating_sub(1);
+        (from..=step + 1).all(|step| self.events(step).is_some_and(|(_, event)| !event))
     }
 
-    /// Returns the point and the values of an element of a discrete variable where they differ.
+    /// Returns the first step after which an element of a discrete variable differs, and its values in Co-Simulation and Model Exchange.
     fn discrete(&self, variable: usize) -> Option<(usize, String, String)> {
-        let quiet = (0..self.count).filter(|point| self.is_quiet(*point)).find_map(|point| {
-            let [stepped, _, fine, finer, euler] = self.values(point, variable)?;
-            let certain = fine == finer && euler == finer;
-            let index = stepped.differ_beyond(&finer, 1e-6, |_| 0.0).filter(|_| certain)?;
-            Some((point, stepped.show(index), finer.show(index)))
+        let quiet = (0..self.count).filter(|step| self.is_quiet(*step)).find_map(|step| {
+            let [stepped, _, fine, finer, euler] = self.values(step, variable)?;
+            let integrations_agree = fine == finer && euler == finer;
+            let index = stepped.differ_beyond(&finer, 1e-6, |_| 0.0).filter(|_| integrations_agree)?;
+            Some((step, stepped.show(index), finer.show(index)))
         });
-        quiet.or_else(|| self.amid_events(variable))
+        quiet.or_else(|| self.discrete_near_events(variable))
     }
 
-    /// Returns the point and the values of an element of a discrete variable that differs from its values at this and the adjacent
-    /// points in Model Exchange, if that holds at three points at least. Co-Simulation may handle an event earlier or later than Model
-    /// Exchange, but by no more than a step.
-    fn amid_events(&self, variable: usize) -> Option<(usize, String, String)> {
-        let single = |point: usize| {
-            let numbers = self.run.written(*self.simulations[3].integrations.get(point)?)?.numbers();
+    /// Returns the first step after which a discrete variable has a value that Model Exchange has neither after this step, nor after the
+    /// two steps before and the next one. Also returns the values of both. Co-Simulation may handle an event up to a step earlier or later
+    /// than Model Exchange, so such a difference must occur after at least three steps.
+    fn discrete_near_events(&self, variable: usize) -> Option<(usize, String, String)> {
+        let has_one_event = |step: usize| {
+            let numbers = self.run.written(*self.simulations[FINER].integrations.get(step)?)?.numbers();
             Some(numbers[0] == *numbers.get(1)? || numbers[0].is_infinite())
         };
-        let elsewhere = (2..self.count.saturating_sub(1)).filter_map(|point| {
-            let near = point - 2..=point + 1;
-            let is_single = near.clone().all(|point| single(point) == Some(true));
+        let differing = (2..self.count.saturating_sub(1)).filter_map(|step| {
+            let near = step - 2..=step + 1;
+            let has_single_events = near.clone().all(|step| has_one_event(step) == Some(true));
             let near: Vec<[Values; 5]> =
-                near.map(|point| self.values(point, variable)).collect::<Option<_>>()?;
-            let certain =
-                is_single && near.iter().all(|[_, _, fine, finer, euler]| fine == finer && euler == finer);
-            let stepped = &near[2][0];
-            let index = stepped.differ_beyond(&near[2][3], 1e-6, |_| 0.0).filter(|_| certain)?;
-            let is_known =
-                near.iter().any(|values| stepped.differ_beyond(&values[3], 1e-6, |_| 0.0).is_none());
-            (!is_known).then(|| (point, stepped.show(index), near[2][3].show(index)))
+                near.map(|step| self.values(step, variable)).collect::<Option<_>>()?;
+            let integrations_agree = has_single_events
+                && near.iter().all(|[_, _, fine, finer, euler]| fine == finer && euler == finer);
+            let stepped = &near[2][STEPPED];
+            let index =
+                stepped.differ_beyond(&near[2][FINER], 1e-6, |_| 0.0).filter(|_| integrations_agree)?;
+            let occurs =
+                near.iter().any(|values| stepped.differ_beyond(&values[FINER], 1e-6, |_| 0.0).is_none());
+            (!occurs).then(|| (step, stepped.show(index), near[2][FINER].show(index)))
         });
-        let found: Vec<_> = elsewhere.collect();
+        let found: Vec<_> = differing.collect();
         if found.len() < 3 { None } else { found.into_iter().next() }
     }
 
-    /// Returns the point and the values of an element of a continuous variable where they differ by more than a solver's error.
+    /// Returns the step after which an element of a continuous variable differs most, and its values in Co-Simulation and Model Exchange,
+    /// if the error of a solver does not explain the difference. Compares only the steps before the first state event.
     fn continuous(&self, variable: usize) -> Option<(usize, String, String)> {
-        let until = (0..self.count).find(|point| self.events(*point).is_none_or(|(states, _)| states > 0.0));
-        let points = (0..until.unwrap_or(self.count)).filter(|point| {
-            self.is_quiet(*point) || self.events(*point).is_some_and(|(_, event)| !event) && *point == 0
+        let first_state_event =
+            (0..self.count).find(|step| self.events(*step).is_none_or(|(states, _)| states > 0.0));
+        let steps = (0..first_state_event.unwrap_or(self.count)).filter(|step| {
+            self.is_quiet(*step) || self.events(*step).is_some_and(|(_, event)| !event) && *step == 0
         });
         let all: Vec<(usize, [Values; 5])> =
-            points.filter_map(|point| Some((point, self.values(point, variable)?))).collect();
+            steps.filter_map(|step| Some((step, self.values(step, variable)?))).collect();
         let size = all.first()?.1[0].numbers().len();
         (0..size).find_map(|element| {
             let series: Vec<(usize, [f64; 5])> = all
                 .iter()
-                .map(|(point, values)| {
+                .map(|(step, values)| {
                     let number = |of: &Values| of.numbers().get(element).copied().unwrap_or(f64::NAN);
-                    (*point, values.each_ref().map(number))
+                    (*step, values.each_ref().map(number))
                 })
                 .collect();
-            let (point, [stepped, .., finer, _]) = unlike(&series, self.description)?;
-            Some((point, format!("{stepped:?}"), format!("{finer:?}")))
+            let (step, [stepped, .., finer, _]) = unexplained_difference(&series, self.description)?;
+            Some((step, format!("{stepped:?}"), format!("{finer:?}")))
         })
     }
 }
 
-/// Returns the point with the largest difference between Co-Simulation and Model Exchange, if no error of a solver explains it. A solver
-/// of first order has an error that is proportional to that of Euler's method; any other is smaller.
-fn unlike(series: &[(usize, [f64; 5])], description: &Description) -> Option<(usize, [f64; 5])> {
+/// Returns the step with the largest difference between Co-Simulation and Model Exchange, unless the error of a solver explains it. The
+/// error of a first-order solver is proportional to the error of Euler's method, so a proportional part of the difference is subtracted.
+/// The error of any other solver is smaller.
+fn unexplained_difference(
+    series: &[(usize, [f64; 5])],
+    description: &Description,
+) -> Option<(usize, [f64; 5])> {
     let all = |of: fn(&[f64; 5]) -> f64| series.iter().map(move |(_, values)| of(values));
     let most = |numbers: &mut dyn Iterator<Item = f64>| {
         numbers.fold(0.0, |most: f64, number| most.max(number.abs()))
@@ -222,25 +239,30 @@ fn unlike(series: &[(usize, [f64; 5])], description: &Description) -> Option<(us
     if series.iter().flat_map(|(_, values)| values).any(|number| !number.is_finite()) {
         return None;
     }
-    let (low, high) = all(|values| values[3])
+    let (low, high) = all(|values| values[FINER])
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), number| (low.min(number), high.max(number)));
-    let magnitude = most(&mut all(|values| values[3]));
+    let magnitude = most(&mut all(|values| values[FINER]));
     let scale = (high - low).max(1e-3 * magnitude);
-    let own_error = most(&mut all(|values| values[3] - values[2]));
-    let euler = most(&mut all(|values| values[4] - values[3]));
-    let (above, below) = all(|values| values[4] - values[3])
-        .zip(all(|values| values[0] - values[3]))
+    let integration_error = most(&mut all(|values| values[FINER] - values[FINE]));
+    let euler_error = most(&mut all(|values| values[EULER] - values[FINER]));
+    // The factor of the error of Euler's method that fits the differences best.
+    let (numerator, denominator) = all(|values| values[EULER] - values[FINER])
+        .zip(all(|values| values[STEPPED] - values[FINER]))
         .fold((0.0, 0.0), |(above, below), (euler, off)| (above + euler * off, below + euler * euler));
-    let part = if below > 0.0 { (above / below).clamp(-1.0, 2.0) } else { 0.0 };
-    let remaining = |values: &[f64; 5]| (values[0] - values[3] - part * (values[4] - values[3])).abs();
+    let factor = if denominator > 0.0 { (numerator / denominator).clamp(-1.0, 2.0) } else { 0.0 };
+    let remaining = |values: &[f64; 5]| {
+        (values[STEPPED] - values[FINER] - factor * (values[EULER] - values[FINER])).abs()
+    };
     let largest = series.iter().max_by(|one, other| remaining(&one.1).total_cmp(&remaining(&other.1)))?;
-    let allowed =
-        0.5 * euler + TOLERANCE * scale + 4.0 * own_error + 2.0 * description.tolerance() * magnitude;
+    let allowed = 0.5 * euler_error
+        + TOLERANCE * scale
+        + 4.0 * integration_error
+        + 2.0 * description.tolerance() * magnitude;
     (remaining(&largest.1) > allowed.max(1e-9)).then_some(*largest)
 }
 
 /// Returns the criterion that Co-Simulation and Model Exchange have the same results.
-fn differs(
+fn equal_results(
     description: std::sync::Arc<Description>,
     simulations: Vec<Simulation>,
     outputs: Vec<usize>,
@@ -248,17 +270,20 @@ fn differs(
     input: Option<usize>,
 ) -> impl Criterion {
     move |run: &Run| {
-        let done = |point: &usize| {
-            let integrated = simulations[2..].iter().all(|of| run.status(of.integrations[*point]) == Some(0));
-            let read = simulations.iter().all(|of| of.reads[*point].iter().all(|read| run.succeeds(read.id)));
+        let succeeded = |step: &usize| {
+            let integrated =
+                simulations[FINE..].iter().all(|of| run.status(of.integrations[*step]) == Some(0));
+            let read = simulations.iter().all(|of| of.reads[*step].iter().all(|read| run.succeeds(read.id)));
             integrated && read
         };
-        let count = (0..times.len() - 1).take_while(done).count();
+        let count = (0..times.len() - 1).take_while(succeeded).count();
         let compared = Compared { run, description: &description, simulations: &simulations, count };
-        // Co-Simulation may ignore an input that Model Exchange needs, for example a derivative that it estimates itself.
+        // Co-Simulation may ignore an input that Model Exchange needs, for example the derivative of another input, which it may estimate.
         let reacts = |variable: &usize| {
-            (0..count).any(|point| {
-                compared.values(point, *variable).is_some_and(|[one, other, ..]| one.differ(&other).is_some())
+            (0..count).any(|step| {
+                compared
+                    .values(step, *variable)
+                    .is_some_and(|[changed, at_start, ..]| changed.differ(&at_start).is_some())
             })
         };
         if input.is_some() && !outputs.iter().any(reacts) {
@@ -269,8 +294,8 @@ fn differs(
             let is_continuous = of.is_float() && of.variability == "continuous";
             let found =
                 if is_continuous { compared.continuous(*variable) } else { compared.discrete(*variable) };
-            let (point, stepped, integrated) = found?;
-            let (name, time) = (&of.name, times[point + 1]);
+            let (step, stepped, integrated) = found?;
+            let (name, time) = (&of.name, times[step + 1]);
             Some(format!(
                 "{name} is {stepped} in Co-Simulation at {time:?}, integrated in Model Exchange {integrated}"
             ))

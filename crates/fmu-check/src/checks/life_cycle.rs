@@ -1,4 +1,4 @@
-//! Checks that instances accept the call sequences that the standard allows.
+//! Checks that instances accept the call sequences that the standard allows, and reject a wrong token and a step beyond the stop time.
 
 use super::Fits::{self, Always, Integrated, Several, Stepped};
 use crate::call_sequence::{Arg, NULL_INSTANCE, Step};
@@ -10,9 +10,10 @@ use crate::writer::Part::{
 };
 use crate::writer::{LONG_NAME, Point, Trajectory, Writer};
 
+/// Checks that all calls of a sequence succeed.
 fn check_sequence(checker: &Checker, writer: Writer) -> anyhow::Result<()> {
     let copy = writer.sequence.clone();
-    // Discard is allowed: the FMU may need a smaller step.
+    // The FMU may return Discard (2), because it may need a smaller step.
     checker.check("life_cycle.rejected", writer.sequence, move |run| first_failure(&copy, run, 2))
 }
 
@@ -29,10 +30,10 @@ const SEQUENCES: &[&[Part]] = &[
     &[Make, RESET, Enter, RESET, RESET, Enter, Leave, RESET, Enter, Leave, Points(2), Free],
 ];
 
-/// Writes a call sequence that cannot be expressed as a list of `Part`.
+/// Function that writes a call sequence that cannot be expressed as a list of `Part`.
 type WriteSequence = fn(&mut Writer, &Trajectory);
 
-/// Call sequences that a function writes, each with the condition on the simulation.
+/// Functions that write call sequences, each with the condition that the simulation must meet.
 const WRITTEN_SEQUENCES: &[(Fits, WriteSequence)] = &[
     (Several, many),
     (Always, long_name),
@@ -42,7 +43,8 @@ const WRITTEN_SEQUENCES: &[(Fits, WriteSequence)] = &[
     (Fits::EventMode, event_mode),
 ];
 
-/// Makes twenty instances, more than a fixed pool may have. Four of them run and are freed in a different order.
+/// Makes twenty instances, because some FMUs have only a fixed number of them. Four are simulated, and freed in another order than they
+/// were made.
 fn many(writer: &mut Writer, _: &Trajectory) {
     (4..20).for_each(|instance| drop(writer.write(instance, &[Make])));
     (0..4).for_each(|instance| drop(writer.write(instance, &[Begin])));
@@ -53,15 +55,15 @@ fn many(writer: &mut Writer, _: &Trajectory) {
     }
 }
 
-/// Runs an instance whose name has spaces and characters beyond ASCII, with a stop time and a tolerance.
+/// Simulates an instance whose name has spaces and characters beyond ASCII, with a stop time and a tolerance.
 fn long_name(writer: &mut Writer, trajectory: &Trajectory) {
-    writer.make_with(0, |how| how.name = LONG_NAME.to_owned());
+    writer.make_with(0, |make| make.name = LONG_NAME.to_owned());
     let stop = trajectory.end + 1.0 + trajectory.end.abs();
     writer.enter_with(0, Some(1e-6), writer.description.start_time, Some(stop));
     writer.write(0, &[Leave, Points(3), Free]);
 }
 
-/// Runs up to the stop time, where the last step ends.
+/// Simulates up to the stop time, where the last step ends.
 fn up_to_the_stop(writer: &mut Writer, trajectory: &Trajectory) {
     writer.make(0);
     writer.enter_with(0, None, writer.description.start_time, Some(trajectory.end));
@@ -76,15 +78,15 @@ fn logging(writer: &mut Writer, _: &Trajectory) {
         writer.write(0, &[part]);
         writer.call(0, "SetDebugLogging", vec![Arg::Integer(1), Arg::Integer(0), Arg::Null]);
         let all = std::iter::once(categories.clone()).filter(|all| !all.is_empty());
-        for some in all.chain(categories.iter().map(|category| vec![category.clone()])) {
-            let count = Arg::Integer(some.len() as i64);
-            writer.call(0, "SetDebugLogging", vec![Arg::Integer(1), count, Arg::Strings(some)]);
+        for enabled in all.chain(categories.iter().map(|category| vec![category.clone()])) {
+            let count = Arg::Integer(enabled.len() as i64);
+            writer.call(0, "SetDebugLogging", vec![Arg::Integer(1), count, Arg::Strings(enabled)]);
         }
     }
     writer.free(0);
 }
 
-/// Enters Event Mode at every point, which importers may do at any time.
+/// Enters Event Mode at every point, because importers may enter it at any time.
 fn events_everywhere(writer: &mut Writer, trajectory: &Trajectory) {
     writer.begin(0);
     for point in &trajectory.points {
@@ -96,8 +98,9 @@ fn events_everywhere(writer: &mut Writer, trajectory: &Trajectory) {
     writer.write(0, &[ReadAll, Free]);
 }
 
+/// Enters Event Mode after a step, with `eventModeUsed`.
 fn event_mode(writer: &mut Writer, trajectory: &Trajectory) {
-    writer.make_with(0, |how| how.event_mode = true);
+    writer.make_with(0, |make| make.event_mode = true);
     writer.write(0, &[Enter, Call("ExitInitializationMode"), Part::Update, Call("EnterStepMode")]);
     let size = trajectory.points.first().map_or(1e-3, |point| point.size);
     writer.step(0, writer.description.start_time, size);
@@ -105,8 +108,8 @@ fn event_mode(writer: &mut Writer, trajectory: &Trajectory) {
     writer.write(0, &[ReadAll, TERMINATE, Free]);
 }
 
-/// Checks the call sequences of `SEQUENCES` and `WRITTEN_SEQUENCES`, a wrong token, unloading the library, the exit of the process
-/// and a step beyond the stop time.
+/// Checks the call sequences of `SEQUENCES` and `WRITTEN_SEQUENCES`, then a wrong token, the unloading of the library, the exit of the
+/// process, and a step beyond the stop time.
 pub fn sequences(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for parts in SEQUENCES {
         let mut writer = checker.writer(trajectory);
@@ -120,7 +123,7 @@ pub fn sequences(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<(
     }
     token(checker, trajectory)?;
     unload(checker, trajectory)?;
-    beyond(checker, trajectory)
+    beyond_stop_time(checker, trajectory)
 }
 
 /// Checks that FreeInstance ignores NULL.
@@ -129,7 +132,7 @@ pub fn free_null(checker: &Checker) -> anyhow::Result<()> {
 }
 
 /// Checks that a step beyond the stop time fails.
-fn beyond(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+fn beyond_stop_time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let Some(last) = trajectory.points.last().filter(|_| trajectory.is_stepped()) else { return Ok(()) };
     let mut writer = checker.writer(trajectory);
     writer.make(0);
@@ -144,7 +147,7 @@ fn beyond(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     })
 }
 
-/// Checks that the library can be unloaded and loaded again, and the process can exit, after all instances were freed.
+/// Checks that, after all instances were freed, the library can be unloaded and loaded again, and the process can exit.
 fn unload(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for (name, step, times) in [("life_cycle.unload", Step::Unload, 2), ("life_cycle.exit", Step::Quit, 1)] {
         let mut writer = checker.writer(trajectory);
@@ -161,59 +164,83 @@ fn unload(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
 fn token(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.forbidden = true;
-    let id = writer.make_with(0, |how| how.token = "no token of this FMU".to_owned());
+    let id = writer.make_with(0, |make| make.token = "no token of this FMU".to_owned());
     checker.check("life_cycle.token", writer.sequence, move |run| {
         (run.status(id) == Some(1))
             .then(|| "instantiation succeeds with the token \"no token of this FMU\"".to_owned())
     })
 }
 
+/// State of an instance in a random call sequence.
+#[derive(Clone, Copy)]
+enum State {
+    Instantiated,
+    Initializing,
+    /// Before the point of the trajectory with this index, or after the last one.
+    AtPoint(usize),
+    Terminated,
+}
+
+/// State of the instance, and the state that was last saved.
+struct RandomCalls {
+    state: State,
+    saved: Option<State>,
+}
+
+impl RandomCalls {
+    /// Adds a random part that the state allows, or nothing.
+    fn add(&mut self, writer: &mut Writer, random: &mut Random, can_save: bool) {
+        let trajectory = writer.trajectory;
+        let part = match (self.state, random.below(10)) {
+            (State::Instantiated, 0..=6) => {
+                self.state = State::Initializing;
+                Enter
+            }
+            (State::Initializing, 0..=4) => {
+                self.state = State::AtPoint(0);
+                Leave
+            }
+            (State::AtPoint(index), 0..=4) if index < trajectory.points.len() => {
+                self.state = State::AtPoint(index + 1);
+                writer.point(0, &trajectory.points[index]);
+                return;
+            }
+            (State::AtPoint(_), 5) => {
+                self.state = State::Terminated;
+                TERMINATE
+            }
+            (_, 6) if random.below(3) == 0 => {
+                self.state = State::Instantiated;
+                RESET
+            }
+            (_, 7) if can_save => {
+                self.saved = Some(self.state);
+                Save(0)
+            }
+            (_, 8) if self.saved.is_some() => {
+                self.state = self.saved.unwrap_or(self.state);
+                Restore(0)
+            }
+            (State::Instantiated, _) => return,
+            _ => ReadAll,
+        };
+        writer.write(0, &[part]);
+    }
+}
+
 /// Checks random sequences of allowed calls.
 pub fn random(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut random = Random::new(checker.seed);
+    let can_save = checker.saves(trajectory.interface);
     for _ in 0..checker.at_most(20) {
         let mut writer = checker.writer(trajectory);
-        // Mode: 0 instantiated, 1 initialization, 2 at a point of the trajectory, 3 terminated.
-        let (mut mode, mut at) = (0, 0);
-        let mut saved: Option<(i32, usize)> = None;
+        let mut calls = RandomCalls { state: State::Instantiated, saved: None };
         writer.make(0);
         for _ in 0..40 {
-            let part = match (mode, random.below(10)) {
-                (0, 0..=6) => {
-                    mode = 1;
-                    Enter
-                }
-                (1, 0..=4) => {
-                    (mode, at) = (2, 0);
-                    Leave
-                }
-                (2, 0..=4) if at < trajectory.points.len() => {
-                    writer.point(0, &trajectory.points[at]);
-                    at += 1;
-                    continue;
-                }
-                (2, 5) => {
-                    mode = 3;
-                    TERMINATE
-                }
-                (_, 6) if random.below(3) == 0 => {
-                    (mode, at) = (0, 0);
-                    RESET
-                }
-                (_, 7) if checker.saves(trajectory.interface) => {
-                    saved = Some((mode, at));
-                    Save(0)
-                }
-                (_, 8) if saved.is_some() => {
-                    (mode, at) = saved.unwrap_or((mode, at));
-                    Restore(0)
-                }
-                (1..=3, _) => ReadAll,
-                _ => continue,
-            };
-            writer.write(0, &[part]);
+            calls.add(&mut writer, &mut random, can_save);
         }
-        if saved.is_some() && random.below(2) == 0 {
+        // In the other half of these sequences, the instance is freed although it has a saved state.
+        if calls.saved.is_some() && random.below(2) == 0 {
             writer.write(0, &[Drop(0)]);
         }
         writer.free(0);
@@ -222,10 +249,16 @@ pub fn random(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     Ok(())
 }
 
-/// Checks that the next time event is in the future, also if the importer has skipped time events; that event iterations end; and
-/// that changed states are reported.
+/// Checks events of Model Exchange: changed states are reported, the next time event is in the future, and event iterations end.
 pub fn events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     changed_states(checker, trajectory)?;
+    next_event_time(checker, trajectory)?;
+    late_event(checker, trajectory)?;
+    event_iteration(checker, trajectory)
+}
+
+/// Checks that the next time event is in the future after Event Mode at each point.
+fn next_event_time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let fmi3 = checker.fmi3();
     let mut writer = checker.writer(trajectory);
     let ids = writer.begin(0);
@@ -241,11 +274,15 @@ pub fn events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
         let mut all = points.iter().flat_map(|(ids, time)| ids.iter().map(move |id| (*id, *time)));
         all.find_map(|(id, time)| {
             let event = event(run, id, fmi3)?;
-            let past = !event.again && event.next? <= time;
-            past.then(|| format!("at {time:?} the next event is at {:?}", event.next.unwrap_or_default()))
+            let is_past = !event.again && event.next? <= time;
+            is_past.then(|| format!("at {time:?} the next event is at {:?}", event.next.unwrap_or_default()))
         })
-    })?;
-    // The importer has skipped time events.
+    })
+}
+
+/// Checks that the next time event is in the future after an importer has skipped time events, which the standard forbids.
+fn late_event(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let fmi3 = checker.fmi3();
     let late = trajectory.end.abs() * 10.0 + 10.0;
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
@@ -256,7 +293,12 @@ pub fn events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
         let event = event(run, *ids.last()?, fmi3)?;
         let next = event.next.filter(|next| !event.again && *next <= late)?;
         Some(format!("after time events were skipped, at {late:?} the next event is at {next:?}"))
-    })?;
+    })
+}
+
+/// Checks that the event iteration after the initialization ends.
+fn event_iteration(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let fmi3 = checker.fmi3();
     let mut writer = checker.writer(trajectory);
     writer.write(0, &[Make, Enter, Call("ExitInitializationMode")]);
     let id = writer.update(0);
@@ -266,7 +308,7 @@ pub fn events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     })
 }
 
-/// Checks that an event that changes states reports it; otherwise importers continue with the old states.
+/// Checks that an event that changes states reports the change, because importers otherwise continue with the old states.
 fn changed_states(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let count = checker.description.states_count().unwrap_or(0);
     if count == 0 {
@@ -278,7 +320,7 @@ fn changed_states(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<
     for point in &trajectory.points {
         writer.point(0, &Point { event: false, ..point.clone() });
         let before = writer.vector(0, "GetContinuousStates", count);
-        // Event Mode may be entered without an event.
+        // Importers may enter Event Mode without an event.
         let updates = writer.event(0);
         let after = writer.vector(0, "GetContinuousStates", count);
         points.push((point.time, before, updates, after));
@@ -286,7 +328,7 @@ fn changed_states(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<
     let fmi3 = checker.fmi3();
     checker.check("life_cycle.states-changed", writer.sequence, move |run| {
         points.iter().find_map(|(time, before, updates, after)| {
-            // A call that fails is a separate finding.
+            // The first and the last call enter and leave Event Mode. A failed update counts as reported, because it is another finding.
             let updates = &updates[1..updates.len() - 1];
             let is_reported = |id: &u32| event(run, *id, fmi3).is_none_or(|event| event.states_changed);
             let (was, is) = (run.written(*before)?, run.written(*after)?);

@@ -6,11 +6,11 @@ use crate::finding::failure;
 use crate::writer::Part::{Begin, ReadAll, Run as RunFrom};
 use crate::writer::Trajectory;
 
-/// Names of directories: a space, then characters that a URI encodes and a literal `%`, which a path of FMI 3.0 does not encode.
+/// Names of directories: one with a space, and one with other characters that a URI must encode, among them `%`.
 const NAMES: [&str; 2] = ["two words", "Größe+#%41"];
 
-/// Checks that a simulation in a directory of another name has the results of the same simulation in the usual one. FMI 2.0 passes a
-/// URI to the FMU, in which bytes are percent-encoded, and FMI 3.0 a path.
+/// Checks that a simulation has the same results if the FMU is in a directory of another name. FMI 2.0 passes the location of the resources
+/// as a URI, which the FMU must decode, and FMI 3.0 passes a path, which it must not decode.
 pub fn location(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for name in NAMES {
         let mut writer = checker.writer(trajectory);

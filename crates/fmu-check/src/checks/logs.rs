@@ -5,14 +5,15 @@ use crate::checker::Checker;
 use crate::writer::Part::{Call, Enter, Free, Leave, Points, ReadAll};
 use crate::writer::Trajectory;
 
-/// Checks that no message is logged if logging is off from the start or was switched off.
+/// Checks that no message is logged if logging is off at the instantiation, or was switched off by `SetDebugLogging`.
 pub fn switches(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let fmi3 = checker.fmi3();
     for by_call in [false, true] {
         let mut writer = checker.writer(trajectory);
-        let mut ids = vec![writer.make_with(0, |how| how.logging = by_call)];
+        let mut ids = vec![writer.make_with(0, |make| make.logging = by_call)];
         if by_call {
             writer.call(0, "SetDebugLogging", vec![Arg::Integer(0), Arg::Integer(0), Arg::Null]);
+            // Messages are allowed until logging is switched off.
             ids.clear();
         }
         let calls = writer.write(0, &[Enter, Leave, Points(usize::MAX), ReadAll, Call("Terminate"), Free]);
@@ -20,10 +21,10 @@ pub fn switches(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()
         ids.extend(calls.reads.iter().map(|read| read.id));
         checker.check("logs.off", writer.sequence, move |run| {
             let message = ids.iter().find_map(|id| {
-                // For a rejected call, one section of FMI 3.0 requires a message and another forbids it.
+                // For a rejected call, one section of FMI 3.0 requires a message, and another section forbids it.
                 let outcome =
                     run.outcome(*id).filter(|outcome| outcome.status.is_none_or(|status| status < 2))?;
-                // FMI 2.0 switches off only debug messages.
+                // In FMI 2.0, errors may still be logged, because `loggingOn` switches off only debug messages.
                 outcome.log.iter().find(|message| fmi3 || message.status < 2)
             })?;
             let text = String::from_utf8_lossy(message.text.as_deref().unwrap_or_default()).into_owned();

@@ -1,4 +1,4 @@
-//! Malformed calls, as a faulty importer may make them. A crash or a hang is a finding of the severity fragile.
+//! Writes malformed calls, which a faulty importer may make. A crash or a hang is a finding with the severity fragile.
 
 use super::rejections::unknown_reference;
 use crate::call_sequence::{Arg, CallSequence, End, Kind, Values};
@@ -13,9 +13,10 @@ const CRASHES: usize = 40;
 /// Number of hangs after which no further call sequence of a rule is executed.
 const HANGS: usize = 2;
 
+/// Call sequences for one rule.
 type Sequences = anyhow::Result<Vec<CallSequence>>;
 
-/// Executes call sequences until `CRASHES` of them have crashed or exited, or `HANGS` have hung.
+/// Executes call sequences, until `CRASHES` of them have crashed or ended the process, or `HANGS` have hung.
 pub fn all(checker: &Checker, name: &str, sequences: Vec<CallSequence>) -> anyhow::Result<()> {
     let (mut crashes, mut hangs) = (0, 0);
     for sequence in sequences {
@@ -31,7 +32,7 @@ pub fn all(checker: &Checker, name: &str, sequences: Vec<CallSequence>) -> anyho
     Ok(())
 }
 
-/// Returns a call sequence of allowed parts followed by the calls of `write`, which are marked as forbidden.
+/// Returns a call sequence of allowed parts (`legal`), then the calls that `write` adds, which are marked as forbidden.
 fn after(
     checker: &Checker,
     trajectory: &Trajectory,
@@ -45,8 +46,8 @@ fn after(
     writer.sequence
 }
 
-/// Returns the signature of each function that the interface type allows, its name without prefix, and the parts that lead to
-/// the first of `MODES` in which the function is allowed.
+/// Returns, for each function that the interface type allows, its signature, its name without prefix, and the parts that lead to the first
+/// of `MODES` in which it is allowed.
 fn callable(
     checker: &Checker,
     trajectory: &Trajectory,
@@ -68,10 +69,10 @@ fn callable(
     })
 }
 
-/// Passes NULL as the instance, and zero or NULL as every argument.
+/// Passes NULL as the instance, and zero or NULL as every other argument.
 pub fn null_instances(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let sequences = callable(checker, trajectory).map(|(signature, name, _)| {
-        let args = signature.arguments.iter().map(|argument| harmless(argument.of)).collect();
+        let args = signature.arguments.iter().map(|argument| zero_or_null(argument.of)).collect();
         after(checker, trajectory, &[], |writer| {
             writer.forbidden(None, name, args);
         })
@@ -79,7 +80,7 @@ pub fn null_instances(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     Ok(sequences.collect())
 }
 
-/// Passes NULL for one array of a call at a time.
+/// Passes NULL for each array of a call, one array in each call sequence.
 pub fn nulls(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let sequences = callable(checker, trajectory).flat_map(|(signature, name, parts)| {
         let arrays = signature.arguments.iter().filter(|argument| argument.of.starts_with('*')).count();
@@ -93,8 +94,8 @@ pub fn nulls(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     Ok(sequences.collect())
 }
 
-/// Returns zero or NULL as an argument of a type.
-fn harmless(name: &str) -> Arg {
+/// Returns zero or NULL as an argument of this type.
+fn zero_or_null(name: &str) -> Arg {
     match name.trim_start_matches("fmi2").trim_start_matches("fmi3") {
         "Real" | "Float64" => Arg::real(0.0),
         name if name.starts_with('*') || name.to_lowercase().contains("state") || name == "String" => {
@@ -104,21 +105,21 @@ fn harmless(name: &str) -> Arg {
     }
 }
 
-/// Returns the arguments of a call for one value, with NULL for the array at the index `null`.
+/// Returns the arguments of a call that reads or sets one value, with NULL for the array at the index `null`.
 fn with_null(checker: &Checker, signature: &Signature, null: usize) -> Vec<Arg> {
     let standard = checker.description.standard;
     let name = &signature.rule.name[4..];
-    let mut at = 0;
+    let mut array = 0;
     let args = signature.arguments.iter().map(|argument| {
         if argument.of == "usize" {
             return Arg::Integer(1);
         }
         if !argument.of.starts_with('*') {
-            return if argument.of.contains("FMU") { Arg::Null } else { harmless(argument.of) };
+            return if argument.of.contains("FMU") { Arg::Null } else { zero_or_null(argument.of) };
         }
-        at += 1;
+        array += 1;
         match argument.pointee() {
-            _ if at - 1 == null => Arg::Null,
+            _ if array - 1 == null => Arg::Null,
             Some(("ValueReference", true)) => {
                 let variable = checker.description.variables.iter().find(|variable| {
                     variable.size == Some(1)
@@ -134,7 +135,7 @@ fn with_null(checker: &Checker, signature: &Signature, null: usize) -> Vec<Arg> 
     args.collect()
 }
 
-/// Passes value references that no variable has to all getters and setters except those of Binary.
+/// Passes value references that no variable has to all getters and setters, except the getter and the setter of Binary.
 pub fn references(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let description = &checker.description;
     let standard = description.standard;
@@ -143,7 +144,7 @@ pub fn references(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     types.retain(|(name, _)| *name != "Binary");
     types.sort_unstable_by_key(|(name, _)| *name);
     types.dedup();
-    let mut wrong = Vec::new();
+    let mut sequences = Vec::new();
     for reference in [unknown_reference(checker), u64::from(u32::MAX), 1 << 31, 1 << 20] {
         if description.variables.iter().any(|variable| u64::from(variable.reference) == reference) {
             continue;
@@ -155,21 +156,21 @@ pub fn references(checker: &Checker, trajectory: &Trajectory) -> Sequences {
                     (false, Kind::Pointer) => Arg::Strings(vec![Some(b"text".to_vec())]),
                     (false, _) => Arg::In(*kind, vec![0]),
                 };
-                wrong.push(after(checker, trajectory, &[Part::Begin], |writer| {
+                sequences.push(after(checker, trajectory, &[Part::Begin], |writer| {
                     let args = access(standard, vec![reference], [values], 1);
                     writer.call(0, &format!("{}{name}", if get { "Get" } else { "Set" }), args);
                 }));
             }
         }
     }
-    Ok(wrong)
+    Ok(sequences)
 }
 
-/// Passes wrong sizes for the values of variables in FMI 3.0, and in Model Exchange for the vectors of states, derivatives,
-/// nominal values and event indicators.
+/// Passes wrong array sizes: in FMI 3.0 for the values of variables, and in Model Exchange for the vectors of states, derivatives, nominal
+/// values and event indicators.
 pub fn sizes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let description = &checker.description;
-    let mut sizes = Vec::new();
+    let mut sequences = Vec::new();
     let values = |get: bool, kind: Kind, count: usize| match get {
         true => Arg::Out(kind, count),
         false => Arg::In(kind, vec![0; count]),
@@ -178,12 +179,12 @@ pub fn sizes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
         let variable = &description.variables[*index];
         let (Some(base), Some(size)) = (variable.base, variable.size) else { continue };
         let (name, kind) = (type_name(description.standard, base), kind_of(description.standard, base));
-        if kind == Kind::Pointer || sizes.len() > 60 {
+        if kind == Kind::Pointer || sequences.len() > 60 {
             continue;
         }
         for count in [0, size - 1, size + 1] {
             for (verb, get) in [("Get", true), ("Set", false)] {
-                sizes.push(after(checker, trajectory, &[Part::Make, Part::Enter], |writer| {
+                sequences.push(after(checker, trajectory, &[Part::Make, Part::Enter], |writer| {
                     let reference = vec![u64::from(variable.reference)];
                     let args = access(description.standard, reference, [values(get, kind, count)], count);
                     writer.call(0, &format!("{verb}{name}"), args);
@@ -199,20 +200,20 @@ pub fn sizes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
         (checker.writer(trajectory).derivatives_name(), states),
         ("GetEventIndicators", description.event_indicators.unwrap_or(0)),
     ];
-    for (function, right) in vectors.into_iter().filter(|_| !trajectory.is_stepped()) {
-        for count in [right.checked_sub(1), Some(right + 1)].into_iter().flatten() {
+    for (function, size) in vectors.into_iter().filter(|_| !trajectory.is_stepped()) {
+        for count in [size.checked_sub(1), Some(size + 1)].into_iter().flatten() {
             let args =
                 vec![values(function.starts_with("Get"), Kind::F64, count), Arg::Integer(count as i64)];
-            sizes.push(after(checker, trajectory, &[Part::Begin], |writer| {
+            sequences.push(after(checker, trajectory, &[Part::Begin], |writer| {
                 writer.call(0, function, args);
             }));
         }
     }
-    Ok(sizes)
+    Ok(sequences)
 }
 
-/// Returns extreme values of a type that is not floating-point. Unsigned 64-bit values stay below 2^32: an FMU may allocate
-/// as many elements.
+/// Returns extreme values of a type that is not floating-point. Unsigned 64-bit values stay below 2^32, because an FMU may allocate as many
+/// elements.
 fn extreme_values(name: &str, kind: Kind, size: usize) -> Vec<Values> {
     let numbers: &[f64] = match kind {
         Kind::Pointer => {
@@ -232,7 +233,7 @@ fn extreme_values(name: &str, kind: Kind, size: usize) -> Vec<Values> {
     numbers.iter().map(|number| Values::new(kind, vec![*number; size])).collect()
 }
 
-/// Sets NaN, infinite, extreme and malformed values of inputs and of variables with `initial` = `exact`.
+/// Sets inputs and variables with `initial` = `exact` to NaN and to infinite, extreme and malformed values.
 pub fn values(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let (description, mut sequences) = (&checker.description, Vec::new());
     let mut settable = checker.readable.clone();
@@ -244,13 +245,13 @@ pub fn values(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     });
     let is_input = |index: usize| description.variables[index].causality == "input";
     let size = |index: usize| description.variables[index].size.unwrap_or(1);
-    // If `again` is true, the values are set again at every point.
-    let mut add = |values: Vec<(usize, Values)>, again: bool| {
+    // Adds a call sequence that sets the values in Initialization Mode and, if `at_points` is true, at every point.
+    let mut add = |values: Vec<(usize, Values)>, at_points: bool| {
         sequences.push(after(checker, trajectory, &[Part::Make, Part::Enter], |writer| {
             writer.set(0, &values);
             writer.leave(0);
             for point in trajectory.points.iter().take(3) {
-                let inputs = if again { values.clone() } else { Vec::new() };
+                let inputs = if at_points { values.clone() } else { Vec::new() };
                 writer.point(0, &Point { inputs, ..point.clone() });
                 writer.read_all(0);
             }
@@ -286,7 +287,7 @@ pub fn times(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let start = checker.description.start_time;
     let size = trajectory.points.first().map_or(1e-3, |point| point.size).max(1e-9);
     let mut sequences = Vec::new();
-    // 2e3: an importer that confuses milliseconds and seconds requests a step of 2000 s.
+    // An importer that confuses milliseconds and seconds requests a step of 2e3 s.
     let numbers = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308, 1e12 * size, -size, 0.0, 5e-324, 2e3];
     for number in numbers {
         sequences.push(after(checker, trajectory, &[Part::Begin], |writer| {
@@ -310,14 +311,14 @@ pub fn times(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     Ok(sequences)
 }
 
-/// Passes malformed bytes as a serialized state: none, constant bytes, and a state that is truncated, doubled or damaged.
+/// Passes malformed bytes as a serialized state: no bytes, equal bytes, and a state that is truncated, repeated or damaged.
 pub fn bytes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let mut writer = checker.writer(trajectory);
     writer.write(0, &[Part::Begin, Part::Save(0)]);
     let [_, saved] = writer.serialize(0, 0);
     let run = checker.execute(&writer.sequence)?;
     let Some(Values::Numbers(_, bytes)) = run.written(saved) else { return Ok(Vec::new()) };
-    let mut tries: Vec<Vec<u64>> = vec![
+    let mut malformed: Vec<Vec<u64>> = vec![
         Vec::new(),
         vec![0; 8],
         vec![0; bytes.len()],
@@ -332,7 +333,7 @@ pub fn bytes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
             let at = random.below(damaged.len());
             damaged[at] = random.below(256) as u64;
         }
-        tries.push(damaged);
+        malformed.push(damaged);
     }
     let sequence = |bytes: Vec<u64>| {
         after(checker, trajectory, &[Part::Begin], |writer| {
@@ -346,5 +347,5 @@ pub fn bytes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
             writer.free(0);
         })
     };
-    Ok(tries.into_iter().map(sequence).collect())
+    Ok(malformed.into_iter().map(sequence).collect())
 }

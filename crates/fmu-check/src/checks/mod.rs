@@ -1,12 +1,14 @@
-//! Checks, in a module for each topic.
+//! Checks of the library and of the files of an FMU, with a module for each subject.
 
 pub mod dependencies;
 pub mod derivatives;
+pub mod differences;
+pub mod directional;
 pub mod early_returns;
-pub mod event_modes;
-pub mod excited;
+pub mod event_inputs;
 pub mod functions;
 pub mod hidden_events;
+pub mod integration;
 pub mod interfaces;
 pub mod late_outputs;
 pub mod life_cycle;
@@ -21,12 +23,15 @@ pub mod results;
 pub mod several;
 pub mod single_precision;
 pub mod small_steps;
+pub mod snapshots;
+pub mod stale;
 pub mod start_times;
 pub mod start_values;
 pub mod state_values;
 pub mod states;
 pub mod status;
 pub mod strings;
+pub mod vectors;
 
 use crate::call_sequence::CallSequence;
 use crate::checker::Checker;
@@ -34,17 +39,18 @@ use crate::writer::Trajectory;
 use Check::{Each, Malformed, Once};
 use Fits::{Always, Integrated, Saves, Serializes, Several, Stepped, Stepped3};
 
-/// Function of a check.
+/// Function of a check, and the simulations for which it is called.
 #[derive(Clone, Copy)]
 pub enum Check {
+    /// Called once for the FMU.
     Once(fn(&Checker) -> anyhow::Result<()>),
-    /// Checks each simulation that fits.
+    /// Called for each simulation that meets the condition.
     Each(Fits, fn(&Checker, &Trajectory) -> anyhow::Result<()>),
-    /// Executes the malformed call sequences of this rule for each simulation that fits.
+    /// Called for each simulation that meets the condition; returns malformed call sequences, whose findings belong to this rule.
     Malformed(&'static str, Fits, fn(&Checker, &Trajectory) -> anyhow::Result<Vec<CallSequence>>),
 }
 
-/// Condition on the simulations for which a check or a call sequence is executed.
+/// Condition that a simulation must meet for a check or a call sequence.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Fits {
     Always,
@@ -65,7 +71,7 @@ pub enum Fits {
 }
 
 impl Fits {
-    /// Returns whether a simulation fits.
+    /// Returns whether a simulation meets the condition.
     pub fn fit(self, checker: &Checker, trajectory: &Trajectory) -> bool {
         let (interface, stepped) = (trajectory.interface, trajectory.is_stepped());
         match self {
@@ -97,10 +103,10 @@ pub const ALL: &[(&str, Check)] = &[
     ("states", Each(Serializes, states::serialized)),
     ("states", Each(Saves, state_values::restore)),
     ("reset", Each(Always, reset::reset)),
-    ("derivatives", Each(Always, derivatives::directional)),
-    ("derivatives", Each(Integrated, derivatives::after_events)),
-    ("derivatives", Each(Always, derivatives::initial)),
-    ("derivatives", Each(Integrated, derivatives::vectors)),
+    ("derivatives", Each(Always, directional::directional)),
+    ("derivatives", Each(Integrated, differences::after_events)),
+    ("derivatives", Each(Always, differences::initial)),
+    ("derivatives", Each(Integrated, vectors::vectors)),
     ("dependencies", Each(Always, dependencies::missing)),
     ("dependencies", Each(Always, dependencies::initial)),
     ("dependencies", Each(Always, dependencies::kinds)),
@@ -121,9 +127,9 @@ pub const ALL: &[(&str, Check)] = &[
     ("results", Each(Stepped3, results::last_successful)),
     ("dynamics", Each(Stepped, small_steps::small_steps)),
     ("dynamics", Each(Stepped, late_outputs::late)),
-    ("dynamics", Each(Integrated, event_modes::stale)),
-    ("dynamics", Each(Integrated, event_modes::inputs)),
-    ("dynamics", Each(Fits::EventMode, event_modes::stepped_inputs)),
+    ("dynamics", Each(Integrated, stale::stale)),
+    ("dynamics", Each(Integrated, event_inputs::integrated)),
+    ("dynamics", Each(Fits::EventMode, event_inputs::stepped)),
     ("dynamics", Each(Integrated, hidden_events::unannounced)),
     ("dynamics", Each(Integrated, hidden_events::repeated)),
     ("dynamics", Each(Always, start_times::starts)),

@@ -1,4 +1,4 @@
-//! Checks the ZIP file, its directories, and the names and requirements of the libraries.
+//! Checks the ZIP file, its directories, and the names, architectures and dependencies of the libraries.
 
 use crate::description::{Description, Offer};
 use crate::rules::Observation;
@@ -10,16 +10,16 @@ use std::collections::{BTreeSet, HashSet};
 use std::env::consts::{ARCH, DLL_SUFFIX, OS};
 use std::path::{Path, PathBuf};
 
-/// Unpacks an FMU and returns the findings in its ZIP file.
+/// Unpacks an FMU, and returns the findings in its ZIP file.
 ///
 /// # Errors
-/// Fails if the FMU cannot be unpacked or has more than `max_bytes` when it is unpacked.
+/// Fails if the FMU cannot be unpacked, or if its files have more than `max_bytes`.
 pub fn unpack(path: &Path, directory: &Path, max_bytes: u64) -> anyhow::Result<Vec<Observation>> {
     let mut found = Vec::new();
     let mut names = HashSet::new();
     let mut limits = Limits { bytes: max_bytes, ..Limits::default() };
     let unpacked = files::unpack(path, "an FMU", directory, &mut limits, &mut |entry| {
-        look_at(entry, &mut names, &mut found);
+        check_entry(entry, &mut names, &mut found);
         if crate::worker::interrupted() { Err("interrupted".to_owned()) } else { Ok(true) }
     });
     if crate::worker::interrupted() {
@@ -34,8 +34,8 @@ pub fn unpack(path: &Path, directory: &Path, max_bytes: u64) -> anyhow::Result<V
     }
 }
 
-/// Inspects an entry of a ZIP file.
-fn look_at(entry: &Entry, names: &mut HashSet<String>, found: &mut Vec<Observation>) {
+/// Checks an entry of a ZIP file. `names` are the names of the earlier entries, in lower case.
+fn check_entry(entry: &Entry, names: &mut HashSet<String>, found: &mut Vec<Observation>) {
     let name = entry.name;
     let mut add = |rule: &'static str, observed: String| found.push((rule, observed));
     if !entry.is_inside || name.contains('\\') {
@@ -49,7 +49,7 @@ fn look_at(entry: &Entry, names: &mut HashSet<String>, found: &mut Vec<Observati
     }
 }
 
-/// Returns the names of the directories in `binaries/` for this platform.
+/// Returns the names that the directory of this platform in `binaries/` may have, the usual name first.
 fn directories(standard: Standard) -> Vec<String> {
     let system = if OS == "macos" { "darwin" } else { OS };
     let tuple = format!("{ARCH}-{system}");
@@ -64,20 +64,20 @@ fn directories(standard: Standard) -> Vec<String> {
 /// Returns the path of the library for this platform.
 ///
 /// # Errors
-/// Fails with the reason if there is none.
+/// Fails if the FMU has no library for this platform, or one for another processor.
 pub fn library(directory: &Path, standard: Standard, offer: &Offer) -> Result<PathBuf, String> {
     let name = format!("{}{DLL_SUFFIX}", offer.identifier);
-    let wanted = directories(standard);
+    let expected = directories(standard);
     let library =
-        wanted.iter().map(|of| directory.join("binaries").join(of).join(&name)).find(|path| path.is_file());
+        expected.iter().map(|of| directory.join("binaries").join(of).join(&name)).find(|path| path.is_file());
     let Some(library) = library else {
         let binaries = std::fs::read_dir(directory.join("binaries")).into_iter().flatten().flatten();
         let mut others: Vec<String> =
             binaries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
         others.sort_unstable();
         let others = if others.is_empty() { "nothing".to_owned() } else { others.join(", ") };
-        let wanted = wanted.join(" nor in binaries/");
-        return Err(format!("there is no {name} in binaries/{wanted}; binaries has {others}"));
+        let expected = expected.join(" nor in binaries/");
+        return Err(format!("there is no {name} in binaries/{expected}; binaries has {others}"));
     };
     let bytes = std::fs::read(&library).map_err(|error| error.to_string())?;
     match object::File::parse(bytes.as_slice()).ok().and_then(|file| machine(&file)) {
@@ -99,7 +99,7 @@ fn machine(file: &object::File) -> Option<&'static str> {
     })
 }
 
-/// Returns the names that a library exports.
+/// Returns the names that a library exports; `None` if the library cannot be parsed.
 pub fn exported(library: &Path) -> Option<Vec<String>> {
     let bytes = std::fs::read(library).ok()?;
     let file = object::File::parse(bytes.as_slice()).ok()?;
@@ -115,7 +115,8 @@ pub fn exported(library: &Path) -> Option<Vec<String>> {
 pub fn look(directory: &Path, description: &Description) -> Vec<Observation> {
     let mut found = Vec::new();
     let mut add = |name: &'static str, observed: String| found.push((name, observed));
-    let known: &[&str] = match description.standard {
+    // Names of directories that only FMI 2.0 defines.
+    let fmi2_names: &[&str] = match description.standard {
         Standard::Fmi2 => &["win32", "win64", "linux32", "linux64", "darwin32", "darwin64"],
         Standard::Fmi3 => &[],
     };
@@ -126,20 +127,21 @@ pub fn look(directory: &Path, description: &Description) -> Vec<Observation> {
         if description.standard == Standard::Fmi3 && tuple.is_none() {
             add("package.platforms", format!("binaries/{name}"));
         }
-        let ends = [("darwin", ".dylib"), ("win", ".dll"), ("", ".so")];
-        let end = ends.into_iter().find(|(system, _)| name.contains(system)).map_or("", |(_, end)| end);
-        let is_fmi2 = known.contains(&name.as_str());
+        let extensions = [("darwin", ".dylib"), ("win", ".dll"), ("", ".so")];
+        let extension = extensions.into_iter().find(|(system, _)| name.contains(system));
+        let extension = extension.map_or("", |(_, extension)| extension);
+        let is_fmi2 = fmi2_names.contains(&name.as_str());
         let standard_directory =
             (tuple.is_some() || is_fmi2) && (description.standard == Standard::Fmi2) == is_fmi2;
         for offer in [&description.co_simulation, &description.model_exchange].into_iter().flatten() {
-            let file = platform.path().join(format!("{}{end}", offer.identifier));
+            let file = platform.path().join(format!("{}{extension}", offer.identifier));
             if standard_directory && !file.is_file() {
-                let observed = format!("binaries/{name} has no {}{end}", offer.identifier);
+                let observed = format!("binaries/{name} has no {}{extension}", offer.identifier);
                 add("package.library", observed);
             }
         }
         for file in std::fs::read_dir(platform.path()).into_iter().flatten().flatten() {
-            needs(&file.path(), &name, &mut add);
+            check_library(&file.path(), &name, &mut add);
         }
     }
     found.dedup();
@@ -151,8 +153,8 @@ const SYSTEM_LIBRARIES: &str = "libc.so libm.so libdl.so libpthread.so librt.so 
     kernel32 kernelbase ntdll msvcrt api-ms-win user32 advapi32 ws2_32 shell32 ole32 bcrypt shlwapi ucrtbase \
     /usr/lib/ /system/library/";
 
-/// Checks the architecture of a library and the libraries, symbols and glibc version that it needs.
-fn needs(path: &Path, platform: &str, add: &mut impl FnMut(&'static str, String)) {
+/// Checks the architecture of a library, and the libraries, symbols and glibc version that it needs.
+fn check_library(path: &Path, platform: &str, add: &mut impl FnMut(&'static str, String)) {
     let Ok(bytes) = std::fs::read(path) else { return };
     let Ok(file) = object::File::parse(bytes.as_slice()) else { return };
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -162,12 +164,13 @@ fn needs(path: &Path, platform: &str, add: &mut impl FnMut(&'static str, String)
         "linux32" | "win32" => &["x86", "aarch32"],
         other => &[other.split('-').next().unwrap_or_default()],
     };
-    let universal = platform.contains("darwin");
-    if !universal && !wanted.contains(&machine) && platform.contains(['-', '6', '3']) {
+    // A library for macOS may be universal, and a directory with a non-standard name may have libraries for any architecture.
+    let may_be_universal = platform.contains("darwin");
+    if !may_be_universal && !wanted.contains(&machine) && platform.contains(['-', '6', '3']) {
         add("package.machine", format!("binaries/{platform}/{name} is for {machine}"));
     }
     if matches!(file, object::File::Elf64(_) | object::File::Elf32(_)) {
-        glibc(&bytes, platform, &name, add);
+        check_glibc(&bytes, platform, &name, add);
     }
     let libraries: BTreeSet<String> = file
         .import_libraries()
@@ -182,9 +185,9 @@ fn needs(path: &Path, platform: &str, add: &mut impl FnMut(&'static str, String)
     };
     let foreign: Vec<&String> =
         libraries.iter().filter(|library| !is_system(library) && !directory.join(library).exists()).collect();
-    let unlinked = unlinked(&bytes).unwrap_or_default();
-    if libraries.iter().all(|library| is_system(library)) && !unlinked.is_empty() {
-        let list = unlinked.join(", ");
+    let unversioned = unversioned_symbols(&bytes).unwrap_or_default();
+    if libraries.iter().all(|library| is_system(library)) && !unversioned.is_empty() {
+        let list = unversioned.join(", ");
         let observed =
             format!("binaries/{platform}/{name} needs {list}, which none of the libraries that it names has");
         add("package.symbols", observed);
@@ -195,9 +198,9 @@ fn needs(path: &Path, platform: &str, add: &mut impl FnMut(&'static str, String)
     }
 }
 
-/// Returns the undefined symbols without a version of a library for Linux, if other symbols have a version. No library provides
-/// them, but the program that loads the library may.
-fn unlinked(bytes: &[u8]) -> object::Result<Vec<String>> {
+/// Returns the undefined symbols of a library for Linux that have no version, if other symbols have one. The linker has found them in no
+/// library, so only the program that loads the library can provide them.
+fn unversioned_symbols(bytes: &[u8]) -> object::Result<Vec<String>> {
     use object::read::elf::{FileHeader as _, Sym as _};
     let header = object::elf::FileHeader64::<object::Endianness>::parse(bytes)?;
     let endian = header.endian()?;
@@ -220,8 +223,8 @@ fn unlinked(bytes: &[u8]) -> object::Result<Vec<String>> {
     Ok(found)
 }
 
-/// Reports the version of glibc that a library needs, from 2.29 on.
-fn glibc(bytes: &[u8], platform: &str, name: &str, add: &mut impl FnMut(&'static str, String)) {
+/// Reports the version of glibc that a library needs, if it is 2.29 or later.
+fn check_glibc(bytes: &[u8], platform: &str, name: &str, add: &mut impl FnMut(&'static str, String)) {
     let marker = b"GLIBC_2.";
     let markers = bytes.windows(marker.len()).enumerate().filter(|(_, window)| window == marker);
     let minors = markers.map(|(index, _)| {

@@ -1,4 +1,4 @@
-//! Checks that invalid calls are rejected and that a rejected call changes nothing.
+//! Checks that invalid calls are rejected, and that a rejected call changes nothing.
 
 use crate::call_sequence::{Arg, Kind, Run};
 use crate::checker::Checker;
@@ -9,14 +9,23 @@ use crate::writer::{Calls, Part, Point, Read, Trajectory, Writer, access, differ
 use fmi_abi::Interface;
 use std::sync::Arc;
 
-/// Invalid call: the function, its arguments, a description, and the rule that the FMU breaks if it accepts the call.
-type Attack = (String, Vec<Arg>, String, Option<&'static str>);
+/// Call that an FMU should reject. A rejected call must change nothing.
+struct InvalidCall {
+    function: String,
+    args: Vec<Arg>,
+    /// Description of the arguments or of the call in messages.
+    what: String,
+    /// Rule that the FMU breaks if it accepts the call; `None` if it may accept the call.
+    rule: Option<&'static str>,
+}
 
+/// Rule for impossible requests.
 const TOLERATED: Option<&str> = Some("rejections.tolerated");
+/// Rule for unknown value references.
 const ACCEPTED: Option<&str> = Some("rejections.accepted");
 
-fn attack(function: &str, args: Vec<Arg>, what: &str, rule: Option<&'static str>) -> Attack {
-    (function.to_owned(), args, what.to_owned(), rule)
+fn invalid_call(function: &str, args: Vec<Arg>, what: &str, rule: Option<&'static str>) -> InvalidCall {
+    InvalidCall { function: function.to_owned(), args, what: what.to_owned(), rule }
 }
 
 /// Returns a value reference that no variable has.
@@ -34,11 +43,20 @@ fn set(checker: &Checker, references: Vec<u64>, kind: Kind, bits: Vec<u64>) -> V
     access(checker.description.standard, references, [Arg::In(kind, bits)], total)
 }
 
-/// Returns calls that set variables that cannot be set, separately or together with an input.
-fn variable_attacks(checker: &Checker, interface: Interface) -> Vec<Attack> {
+/// Returns calls that set variables that cannot be set, and calls that set an input or tunable parameter together with an unknown
+/// reference.
+fn variable_calls(checker: &Checker, interface: Interface) -> Vec<InvalidCall> {
     let description = &checker.description;
     let unknown = unknown_reference(checker);
-    let (mut attacks, mut observed, mut inputs_tried) = (Vec::new(), Vec::new(), 0);
+    let (mut calls, mut groups, mut inputs_tried) = (Vec::new(), Vec::new(), 0);
+    // Of each group of similar variables, only the first is tried.
+    let mut is_first = |group: &'static str| {
+        let is_new = !groups.contains(&group);
+        if is_new {
+            groups.push(group);
+        }
+        is_new
+    };
     for index in &checker.readable {
         let variable = &description.variables[*index];
         let (Some(base), Some(1)) = (variable.base, variable.size) else { continue };
@@ -53,60 +71,62 @@ fn variable_attacks(checker: &Checker, interface: Interface) -> Vec<Attack> {
             false => 1.0 - start.clamp(0.0, 1.0),
         });
         let stepped = interface == Interface::CoSimulation;
-        let is = |causality: &str, variability: &str| {
-            variable.causality == causality && variable.variability == variability
-        };
-        let input = variable.causality == "input"
+        let is_input = variable.causality == "input"
             && !variable.clocked
             && (stepped || variable.variability == "continuous");
-        let mut once = |group: &'static str| {
-            !observed.contains(&group) && {
-                observed.push(group);
-                true
-            }
-        };
-        if (input || is("parameter", "tunable") && stepped) && once(name) {
+        let is_tunable_parameter =
+            variable.causality == "parameter" && variable.variability == "tunable" && stepped;
+        if (is_input || is_tunable_parameter) && is_first(name) {
             let what = format!("a value for {} and one for a reference that no variable has", variable.name);
             let args = set(checker, vec![reference, unknown], kind, vec![other; 2]);
-            attacks.push((function.clone(), args, what, None));
+            calls.push(invalid_call(&function, args, &what, None));
         }
-        if input && kind.is_float() && inputs_tried < 3 {
+        if is_input && kind.is_float() && inputs_tried < 3 {
             inputs_tried += 1;
-            attacks.extend(input_attacks(checker, variable, &function, kind, other));
+            calls.extend(input_calls(checker, variable, &function, kind, other));
         }
-        let (group, rule, what) = if variable.variability == "constant" {
-            ("constant", Some("rejections.constant"), format!("a value for the constant {}", variable.name))
-        } else if variable.causality == "output" && variable.initial == "calculated" {
-            ("output", TOLERATED, format!("a value for the output {}", variable.name))
-        } else if is("parameter", "fixed") {
-            let what = format!("a value for the fixed parameter {} after the initialization", variable.name);
-            let group = match name {
-                "Real" | "Float64" => "fixed",
-                "Integer" | "Int32" => "fixed integer",
-                _ => "fixed other",
-            };
-            (group, TOLERATED, what)
-        } else {
-            continue;
-        };
-        if once(group) {
-            let first = input_of(checker, kind).filter(|_| group != "constant");
-            let references: Vec<u64> = first.into_iter().chain([reference]).collect();
+        let Some((group, rule, what)) = not_settable(variable, name) else { continue };
+        if is_first(group) {
+            let input = input_of(checker, kind).filter(|_| group != "constant");
+            let references: Vec<u64> = input.into_iter().chain([reference]).collect();
             let bits = vec![other; references.len()];
-            attacks.push((function, set(checker, references, kind, bits), what, rule));
+            calls.push(invalid_call(&function, set(checker, references, kind, bits), &what, rule));
         }
     }
-    attacks
+    calls
 }
 
-/// Returns calls that set one input to a valid value and another input to NaN or a value beyond its maximum.
-fn input_attacks(
+/// If a variable cannot be set after the initialization, returns the group of similar variables, the rule that the FMU breaks if it accepts
+/// a value, and a description.
+fn not_settable(
+    variable: &Variable,
+    type_name: &str,
+) -> Option<(&'static str, Option<&'static str>, String)> {
+    let name = &variable.name;
+    if variable.variability == "constant" {
+        Some(("constant", Some("rejections.constant"), format!("a value for the constant {name}")))
+    } else if variable.causality == "output" && variable.initial == "calculated" {
+        Some(("output", TOLERATED, format!("a value for the output {name}")))
+    } else if variable.causality == "parameter" && variable.variability == "fixed" {
+        let group = match type_name {
+            "Real" | "Float64" => "fixed",
+            "Integer" | "Int32" => "fixed integer",
+            _ => "fixed other",
+        };
+        Some((group, TOLERATED, format!("a value for the fixed parameter {name} after the initialization")))
+    } else {
+        None
+    }
+}
+
+/// Returns calls that set one input to a valid value, and another one to NaN or beyond its maximum.
+fn input_calls(
     checker: &Checker,
     variable: &Variable,
     function: &str,
     kind: Kind,
     other: u64,
-) -> Vec<Attack> {
+) -> Vec<InvalidCall> {
     let reference = u64::from(variable.reference);
     let another = checker.description.variables.iter().find(|other| {
         other.causality == "input"
@@ -119,13 +139,13 @@ fn input_attacks(
     let values = [([reference, second], f64::NAN, "and NaN for a second")].into_iter().chain(beyond);
     let invalid = |(references, number, what): ([u64; 2], f64, &str)| {
         let args = set(checker, references.to_vec(), kind, vec![other, kind.bits(number)]);
-        attack(function, args, &format!("a value for {} {what}", variable.name), None)
+        invalid_call(function, args, &format!("a value for {} {what}", variable.name), None)
     };
     values.map(invalid).collect()
 }
 
-/// Returns calls with unknown value references, calls that only another mode allows, and a malformed serialized state.
-fn call_attacks(checker: &Checker, interface: Interface, time: f64) -> Vec<Attack> {
+/// Returns calls with unknown value references, calls that are allowed only in other modes, and a malformed serialized state.
+fn forbidden_calls(checker: &Checker, interface: Interface, time: f64) -> Vec<InvalidCall> {
     let (unknown, fmi3) = (unknown_reference(checker), checker.fmi3());
     let (get_float, set_float) = if fmi3 { ("GetFloat64", "SetFloat64") } else { ("GetReal", "SetReal") };
     let get = access(checker.description.standard, vec![unknown], [Arg::Out(Kind::F64, 1)], 1);
@@ -134,28 +154,28 @@ fn call_attacks(checker: &Checker, interface: Interface, time: f64) -> Vec<Attac
         vec![Arg::Integer(0), Arg::real(0.0), Arg::real(time + 7.0), Arg::Integer(0), Arg::real(0.0)];
     let (experiment, nothing) = if fmi3 { (vec![], experiment) } else { (experiment, vec![]) };
     let (exit, enter) = ("ExitInitializationMode", "EnterInitializationMode");
-    let mut attacks = vec![
-        attack(get_float, get, "the value of a reference that no variable has", ACCEPTED),
-        attack(set_float, set, "a value for a reference that no variable has", ACCEPTED),
-        attack(exit, vec![], "leaving Initialization Mode, which it is not in", TOLERATED),
-        attack(enter, nothing, "entering Initialization Mode during the simulation", TOLERATED),
+    let mut calls = vec![
+        invalid_call(get_float, get, "the value of a reference that no variable has", ACCEPTED),
+        invalid_call(set_float, set, "a value for a reference that no variable has", ACCEPTED),
+        invalid_call(exit, vec![], "leaving Initialization Mode, which it is not in", TOLERATED),
+        invalid_call(enter, nothing, "entering Initialization Mode during the simulation", TOLERATED),
     ];
     if !fmi3 {
         let what = "another experiment during the simulation";
-        attacks.push(attack("SetupExperiment", experiment, what, TOLERATED));
+        calls.push(invalid_call("SetupExperiment", experiment, what, TOLERATED));
     }
     if checker.serializes(interface) {
         let bytes = Arg::In(Kind::U8, (0..64).map(|byte| byte * 37 % 256).collect());
         let bytes = vec![bytes, Arg::Integer(64), Arg::StateOut(90)];
-        attacks.push(attack("DeserializeFMUState", bytes, "bytes that are not a state", TOLERATED));
+        calls.push(invalid_call("DeserializeFMUState", bytes, "bytes that are not a state", TOLERATED));
     }
-    attacks
+    calls
 }
 
 /// Returns steps with invalid times or sizes, and invalid derivatives of inputs.
-fn step_attacks(checker: &Checker, time: f64, size: f64) -> Vec<Attack> {
+fn step_calls(checker: &Checker, time: f64, size: f64) -> Vec<InvalidCall> {
     let step = |(time, size, what): (f64, f64, &str)| {
-        attack("DoStep", step_args(checker.description.standard, time, size), what, TOLERATED)
+        invalid_call("DoStep", step_args(checker.description.standard, time, size), what, TOLERATED)
     };
     let steps = [
         (time, 0.0, "a step of no size"),
@@ -182,18 +202,18 @@ fn step_attacks(checker: &Checker, time: f64, size: f64) -> Vec<Attack> {
                 Arg::In(Kind::I32, vec![1, order]),
                 Arg::In(Kind::F64, vec![3_f64.to_bits(); 2]),
             ];
-            attack("SetRealInputDerivatives", args, what, None)
+            invalid_call("SetRealInputDerivatives", args, what, None)
         })
     });
     steps.map(step).into_iter().chain(derivatives).collect()
 }
 
 /// Returns calls of Model Exchange with invalid times and states.
-fn integration_attacks(states: &[f64]) -> Vec<Attack> {
+fn integration_calls(states: &[f64]) -> Vec<InvalidCall> {
     let mode = "entering Continuous-Time Mode, which it is in";
-    let mut attacks = vec![
-        attack("SetTime", vec![Arg::real(f64::NAN)], "a time of NaN", None),
-        attack("EnterContinuousTimeMode", vec![], mode, TOLERATED),
+    let mut calls = vec![
+        invalid_call("SetTime", vec![Arg::real(f64::NAN)], "a time of NaN", None),
+        invalid_call("EnterContinuousTimeMode", vec![], mode, TOLERATED),
     ];
     if let Some(last) = states.len().checked_sub(1) {
         let other: Vec<u64> = states.iter().map(|state| (state + 0.125).to_bits()).collect();
@@ -203,13 +223,19 @@ fn integration_attacks(states: &[f64]) -> Vec<Attack> {
             [(more, "one state too many", TOLERATED), (bad, "states one of which is NaN", None)]
         {
             let count = Arg::Integer(states.len() as i64);
-            attacks.push(attack("SetContinuousStates", vec![Arg::In(Kind::F64, states), count], what, rule));
+            calls.push(invalid_call(
+                "SetContinuousStates",
+                vec![Arg::In(Kind::F64, states), count],
+                what,
+                rule,
+            ));
         }
     }
-    attacks
+    calls
 }
 
-/// Returns an input of this type. A call that is not atomic sets it before it reaches the invalid value.
+/// Returns the reference of an input of this type. An invalid call lists it first, so an FMU that does not set values atomically sets the
+/// input before it reaches the invalid value.
 fn input_of(checker: &Checker, kind: Kind) -> Option<u64> {
     let input = checker.description.variables.iter().find(|variable| {
         variable.causality == "input"
@@ -221,48 +247,48 @@ fn input_of(checker: &Checker, kind: Kind) -> Option<u64> {
     input.map(|variable| u64::from(variable.reference))
 }
 
-/// Writes a simulation with or without an attack in its middle. Returns the number of the attack, the reads after it, and the
-/// calls and reads of the remaining points.
+/// Writes a simulation, with the invalid call in its middle if there is one. Returns the number of this call, the reads directly after it,
+/// and the calls and reads of the remaining points.
 fn write_simulation(
     writer: &mut Writer,
     instance: usize,
-    attack: Option<&Attack>,
+    invalid: Option<&InvalidCall>,
 ) -> (Option<u32>, Vec<Read>, Calls) {
     let trajectory = writer.trajectory;
-    let to = trajectory.points.len() / 2;
-    writer.write(instance, &[Part::Begin, Part::Points(to)]);
-    let attack = attack.map(|(function, args, ..)| writer.forbidden(Some(instance), function, args.clone()));
-    let at_once = writer.read_all(instance);
+    let middle = trajectory.points.len() / 2;
+    writer.write(instance, &[Part::Begin, Part::Points(middle)]);
+    let id = invalid.map(|call| writer.forbidden(Some(instance), &call.function, call.args.clone()));
+    let directly_after = writer.read_all(instance);
     let mut later = Calls::default();
-    for (number, point) in trajectory.points[to..].iter().enumerate() {
-        // The first two steps set no inputs, so that a value that the attack has set takes effect.
+    for (number, point) in trajectory.points[middle..].iter().enumerate() {
+        // The first two points set no inputs, because these would replace a value that the invalid call may have set.
         let inputs = if number < 2 { Vec::new() } else { point.inputs.clone() };
         later.ids.extend(writer.point(instance, &Point { inputs, ..point.clone() }));
         later.reads.extend(writer.read_all(instance));
     }
     writer.free(instance);
-    (attack, at_once, later)
+    (id, directly_after, later)
 }
 
-/// Checks attacks in the middle of a simulation, and a value for an input after Terminate.
+/// Checks invalid calls in the middle of a simulation, and a value for an input after Terminate.
 pub fn change_nothing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let interface = trajectory.interface;
-    let to = trajectory.points.len() / 2;
-    let Some(here) = trajectory.points.get(to) else { return Ok(()) };
-    let before = trajectory.points[..to].last();
-    let mut attacks = variable_attacks(checker, interface);
+    let middle = trajectory.points.len() / 2;
+    let Some(here) = trajectory.points.get(middle) else { return Ok(()) };
+    let before = trajectory.points[..middle].last();
+    let mut calls = variable_calls(checker, interface);
     if trajectory.is_stepped() {
-        attacks.extend(call_attacks(checker, interface, here.time));
-        attacks.extend(step_attacks(checker, here.time, here.size));
+        calls.extend(forbidden_calls(checker, interface, here.time));
+        calls.extend(step_calls(checker, here.time, here.size));
     } else {
-        attacks.extend(call_attacks(checker, interface, before.unwrap_or(here).time));
-        attacks.extend(integration_attacks(before.map_or(&[], |point| &point.states)));
+        calls.extend(forbidden_calls(checker, interface, before.unwrap_or(here).time));
+        calls.extend(integration_calls(before.map_or(&[], |point| &point.states)));
     }
-    attacks.into_iter().try_for_each(|attack| attacked(checker, trajectory, attack))?;
+    calls.into_iter().try_for_each(|call| check_invalid_call(checker, trajectory, call))?;
     after_end(checker, trajectory)
 }
 
-/// Checks that an input is not set after Terminate, where neither FMI version allows it.
+/// Checks that an FMU rejects a value for an input after Terminate, which neither FMI version allows.
 fn after_end(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let is_input = |index: &&usize| {
@@ -285,36 +311,42 @@ fn after_end(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     })
 }
 
-/// Checks that an attack is rejected and that the simulation continues as without it.
-fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyhow::Result<()> {
+/// Checks that an invalid call is rejected, and that the simulation continues as if the call had not been made.
+fn check_invalid_call(
+    checker: &Checker,
+    trajectory: &Trajectory,
+    invalid: InvalidCall,
+) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let (_, single_at_once, single) = write_simulation(&mut writer, 0, None);
-    let (Some(id), at_once, later) = write_simulation(&mut writer, 1, Some(&attack)) else { return Ok(()) };
-    let (function, _, what, accepted) = attack;
+    let (_, reads_without, without) = write_simulation(&mut writer, 0, None);
+    let (Some(id), reads, later) = write_simulation(&mut writer, 1, Some(&invalid)) else { return Ok(()) };
+    let InvalidCall { function, what, rule: accepted, .. } = invalid;
     let call = format!("{function} with {what} returns");
-    let named = call.clone();
+    let same_call = call.clone();
     let description = checker.description.clone();
     let changed = Arc::new(move |run: &Run, rejected: i32| -> Option<String> {
         let status = run.status(id).filter(|status| *status == rejected)?;
-        // After Error, an instance may reject all calls.
-        let rejects = |reads: &[Read]| !reads.iter().all(|read| run.succeeds(read.id));
-        if rejects(&at_once) {
+        // An instance that has returned Error may reject all later calls.
+        let fail = |reads: &[Read]| !reads.iter().all(|read| run.succeeds(read.id));
+        if fail(&reads) {
             return None;
         }
-        let ends = rejects(&later.reads) || !later.ids.iter().all(|id| run.succeeds(*id));
-        let at_once = difference(&description, run, &single_at_once, &at_once, 0.0);
-        let later = || difference(&description, run, &single.reads, &later.reads, 0.0).filter(|_| !ends);
-        let [variable, was, is] = at_once.or_else(later)?;
-        Some(format!("{named} {}, and {variable} is {is} after it instead of {was}", status_name(status)))
+        let later_fail = fail(&later.reads) || !later.ids.iter().all(|id| run.succeeds(*id));
+        let directly_after = difference(&description, run, &reads_without, &reads, 0.0);
+        let later =
+            || difference(&description, run, &without.reads, &later.reads, 0.0).filter(|_| !later_fail);
+        let [variable, was, is] = directly_after.or_else(later)?;
+        Some(format!("{same_call} {}, and {variable} is {is} after it instead of {was}", status_name(status)))
     });
     // In FMI 2.0, a discarded step may have advanced the time.
-    let discarded = match checker.fmi3() {
+    let rule_for_discard = match checker.fmi3() {
         true => Some("rejections.discarded"),
         false => Some("rejections.changed").filter(|_| function != "DoStep"),
     };
-    let error = Arc::clone(&changed);
-    let run = checker.evaluate("rejections.changed", writer.sequence.clone(), move |run| error(run, 3))?;
-    if let Some(rule) = discarded {
+    let changed_by_error = Arc::clone(&changed);
+    let run = checker
+        .evaluate("rejections.changed", writer.sequence.clone(), move |run| changed_by_error(run, 3))?;
+    if let Some(rule) = rule_for_discard {
         checker.record(rule, &run, &writer.sequence, move |run| changed(run, 2));
     }
     if let Some(rule) = accepted {

@@ -1,4 +1,4 @@
-//! Checks for leaks of memory, threads and files, and for changed settings of the process.
+//! Checks that an FMU leaks no memory, threads or files, and changes no settings of the process.
 
 use crate::call_sequence::{End, Measured, Run, Step, Values};
 use crate::checker::Checker;
@@ -8,18 +8,18 @@ use crate::writer::Part::{Begin, Call, Drop, Enter, Free, Leave, Make, Points, R
 use crate::writer::{Part, Trajectory, Writer};
 use fmi_abi::BaseType;
 
-/// Checks for leaks after repeated simulations, string setters, resets and saved states. Then checks the settings of the process.
+/// Checks for leaks by repeating simulations, string setters, resets and saved states. Then checks the settings of the process.
 pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let measured = |what: &'static str, before: &[Part], cycle: &dyn Fn(&mut Writer)| {
+    let repeat = |what: &'static str, before: &[Part], cycle: &dyn Fn(&mut Writer)| {
         let mut writer = checker.writer(trajectory);
         writer.write(0, before);
-        measured(checker, writer, what, cycle)
+        check_leaks(checker, writer, what, cycle)
     };
-    measured("instances made, run and freed", &[], &|writer| {
+    repeat("instances made, run and freed", &[], &|writer| {
         writer.write(0, &[Begin, Points(3), ReadAll, Call("Terminate"), Free]);
     })?;
     let variables = checker.description.variables.iter().enumerate();
-    let texts: Vec<(usize, Values)> = variables
+    let strings: Vec<(usize, Values)> = variables
         .filter(|(_, variable)| {
             variable.base == Some(BaseType::String) && variable.size == Some(1) && !variable.clocked
         })
@@ -28,16 +28,16 @@ pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
         })
         .filter_map(|(index, variable)| Some((index, Values::strings(variable.start.first()?.as_bytes(), 1))))
         .collect();
-    if !texts.is_empty() {
-        measured("strings set", &[Make], &|writer| {
-            writer.set(0, &texts);
+    if !strings.is_empty() {
+        repeat("strings set", &[Make], &|writer| {
+            writer.set(0, &strings);
         })?;
     }
-    measured("resets", &[Make], &|writer| {
+    repeat("resets", &[Make], &|writer| {
         writer.write(0, &[Enter, Leave, Points(2), ReadAll, Call("Reset")]);
     })?;
     if checker.saves(trajectory.interface) {
-        measured("states saved and freed", &[Begin, Points(2)], &|writer| {
+        repeat("states saved and freed", &[Begin, Points(2)], &|writer| {
             writer.write(0, &[Save(0), Save(0), Restore(0)]);
             if checker.serializes(trajectory.interface) {
                 writer.serialize(0, 0);
@@ -50,8 +50,34 @@ pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     settings(checker, trajectory)
 }
 
-/// Repeats a cycle of calls and compares memory, threads and open files before and after the repetitions.
-fn measured(
+/// Number of repetitions before the first measurement, because the first cycles may allocate memory that later ones use.
+const WARM_UP: usize = 200;
+
+/// Maximum number of repetitions between the measurements.
+const REPETITIONS: usize = 10_000;
+
+/// Numbers of the steps of a check for leaks.
+#[derive(Clone, Copy)]
+struct Measurements {
+    warm_up: u32,
+    before: u32,
+    repetitions: u32,
+    after: u32,
+}
+
+impl Measurements {
+    /// Returns both measurements, and the number of repetitions between them; `None` if there were too few repetitions.
+    fn results(self, run: &Run) -> Option<(Measured, Measured, usize)> {
+        let measured = |id| run.outcome(id)?.measured.clone();
+        let (warm_up, times) = (measured(self.warm_up)?.times, measured(self.repetitions)?.times);
+        let is_enough = warm_up >= EVALUATED && times >= EVALUATED;
+        is_enough.then_some((measured(self.before)?, measured(self.after)?, times))
+    }
+}
+
+/// Repeats a cycle of calls, and compares memory, threads and open files before and after the repetitions. `what` names the objects of the
+/// cycles in messages.
+fn check_leaks(
     checker: &Checker,
     mut writer: Writer,
     what: &'static str,
@@ -60,30 +86,20 @@ fn measured(
     let begin = writer.sequence.len();
     cycle(&mut writer);
     let steps = writer.sequence.split_off(begin);
-    let warm = writer.add(Step::Repeat(200, steps.clone()));
-    let first = writer.add(Step::Measure);
-    let many = writer.add(Step::Repeat(10_000, steps.clone()));
-    let last = writer.add(Step::Measure);
+    let measurements = Measurements {
+        warm_up: writer.add(Step::Repeat(WARM_UP, steps.clone())),
+        before: writer.add(Step::Measure),
+        repetitions: writer.add(Step::Repeat(REPETITIONS, steps.clone())),
+        after: writer.add(Step::Measure),
+    };
     let sequence = writer.sequence;
     let run = checker.execute_for(&sequence, checker.setting.repetitions * 8.0 + checker.limit)?;
     if run.end != End::Done {
         return checker.check("resources.cycles", sequence, |_| None);
     }
     checker.record_always(&sequence, &run);
-    // Measurements before and after the repetitions, and the number of repetitions; `None` if there were too few.
-    let done = move |run: &Run| -> Option<(Measured, Measured, usize)> {
-        let measured = |id| run.outcome(id)?.measured.clone();
-        let (before, times) = (measured(warm)?.times, measured(many)?.times);
-        (before >= EVALUATED && times >= EVALUATED).then_some((measured(first)?, measured(last)?, times))
-    };
     checker.record("resources.memory", &run, &sequence, move |run| {
-        let (one, two, times) = done(run)?;
-        let grown = two.memory.saturating_sub(one.memory);
-        // The smallest block of glibc is 32 bytes, and glibc may keep a few blocks. With other C libraries, the resident
-        // memory is measured, in pages.
-        let enough = if one.exact { 16 * times as u64 + 4096 } else { 64 * times as u64 + (4 << 20) };
-        (grown > enough)
-            .then(|| format!("{grown} bytes remain after {times} {what}: {} for each", grown / times as u64))
+        leaked_memory(measurements.results(run)?, what)
     });
     type Count = fn(&Measured) -> usize;
     let counts: [(&str, Count, &str); 2] = [
@@ -92,24 +108,35 @@ fn measured(
     ];
     for (name, count, are_left) in counts {
         checker.record(name, &run, &sequence, move |run| {
-            let (one, two, times) = done(run)?;
-            let more = count(&two).checked_sub(count(&one)).filter(|more| *more > 2)?;
+            let (before, after, times) = measurements.results(run)?;
+            let more = count(&after).checked_sub(count(&before)).filter(|more| *more > 2)?;
             Some(format!("{more} {are_left} after {times} {what}"))
         });
     }
     let ids: Vec<u32> = steps.iter().map(|numbered| numbered.id).collect();
     checker.record("resources.cycles", &run, &sequence, move |run| {
-        let times = run.outcome(many)?.measured.as_ref()?.times;
+        let times = run.outcome(measurements.repetitions)?.measured.as_ref()?.times;
         let why = failure(&steps, run, &ids)?;
         (times > 1).then(|| format!("after {} {what}: {why}", times - 1))
     });
     Ok(())
 }
 
-/// Files of the working directory, which an FMU may have there until its instance is freed.
+/// Describes memory that remains after the repetitions.
+fn leaked_memory((before, after, times): (Measured, Measured, usize), what: &str) -> Option<String> {
+    let grown = after.memory.saturating_sub(before.memory);
+    // The smallest block of glibc is 32 bytes, and glibc may keep a few blocks. With other C libraries, the resident memory is measured,
+    // which consists of pages.
+    let allowed = if before.exact { 16 * times as u64 + 4096 } else { 64 * times as u64 + (4 << 20) };
+    (grown > allowed)
+        .then(|| format!("{grown} bytes remain after {times} {what}: {} for each", grown / times as u64))
+}
+
+/// Setting that may differ while an instance exists, because the instance may have files in the working directory.
 const FILES: &str = "files in the working directory";
 
-/// Describes the first setting that is not in both measurements.
+/// Describes the first setting that differs between two measurements. Settings that begin with `ignored` are not compared. If `ignored` is
+/// empty, all settings are compared.
 fn changed(before: &Measured, after: &Measured, ignored: &str) -> Option<String> {
     let only_in = |one: &Measured, other: &Measured| {
         let is_other = |setting: &&String| {
@@ -117,7 +144,7 @@ fn changed(before: &Measured, after: &Measured, ignored: &str) -> Option<String>
         };
         one.settings.iter().find(is_other).cloned()
     };
-    // The environment may have more or fewer variables than before.
+    // A setting may be missing in one measurement, because the number of environment variables may change.
     match (only_in(before, after), only_in(after, before)) {
         (None, None) => None,
         (Some(was), Some(is)) => Some(format!("{was} has become {is}")),
@@ -126,7 +153,7 @@ fn changed(before: &Measured, after: &Measured, ignored: &str) -> Option<String>
     }
 }
 
-/// Checks that a simulation does not change settings of the process and prints nothing, until the library is unloaded.
+/// Checks that a simulation changes no settings of the process, and that nothing is printed until the library is unloaded.
 fn settings(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.add(checker.version());
@@ -139,8 +166,8 @@ fn settings(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let run = checker.evaluate("resources.settings", writer.sequence.clone(), move |run| {
         let measured = |id| run.outcome(id)?.measured.as_ref();
         let before = measured(first)?;
-        let meanwhile = measured(alive).and_then(|alive| changed(before, alive, FILES));
-        meanwhile.or_else(|| changed(before, measured(freed)?, ""))
+        let while_alive = measured(alive).and_then(|alive| changed(before, alive, FILES));
+        while_alive.or_else(|| changed(before, measured(freed)?, ""))
     })?;
     checker.record("logs.printed", &run, &writer.sequence, |run| {
         let line = run.output.lines().find(|line| !line.trim().is_empty())?;

@@ -1,4 +1,5 @@
-//! Checks that results do not depend on the process, the instance name, other instances, threads or reads, and checks times.
+//! Checks that results do not depend on the process, the instance name, other instances, threads, reads or the step size, and that the FMU
+//! returns the right times.
 
 use crate::call_sequence::{Arg, Kind, Numbered, Run, Step};
 use crate::checker::Checker;
@@ -9,24 +10,24 @@ use crate::values::is_other_time;
 use crate::writer::Part::{Begin, Points, ReadAll, Run as RunFrom};
 use crate::writer::{Part, Point, Read, Trajectory, Writer, access, value_of};
 
-/// Complete simulation, with all variables and vectors read at every point.
-const WHOLE: &[Part] = &[Begin, ReadAll, RunFrom(0)];
+/// Complete simulation that reads all variables and vectors at every point.
+const COMPLETE: &[Part] = &[Begin, ReadAll, RunFrom(0)];
 
-/// Checks that another process, with other addresses and memory contents, has the same results.
+/// Checks that a simulation has the same results in another process, where addresses and the contents of uninitialized memory differ.
 pub fn repeat(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let one = writer.write(0, WHOLE).reads;
+    let one = writer.write(0, COMPLETE).reads;
     writer.add(Step::FreshProcess);
-    let other = writer.write(0, WHOLE).reads;
+    let other = writer.write(0, COMPLETE).reads;
     let criterion = checker.differ(&one, &other, "{} is {}, in another process {}");
     checker.check("results.process", writer.sequence, criterion)
 }
 
-/// Checks that an instance with another name has the same results, except strings, which may contain the name.
+/// Checks that an instance with another name has the same results. Strings are not compared, because they may contain the name.
 pub fn name(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let mut runs = ["instance", "an instance of another name"].map(|name| {
-        writer.make_with(0, |how| how.name = name.to_owned());
+        writer.make_with(0, |make| make.name = name.to_owned());
         let reads = writer.write(0, &[Part::Enter, Part::Leave, ReadAll, RunFrom(0)]).reads;
         writer.free(0);
         reads
@@ -38,13 +39,13 @@ pub fn name(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     checker.check("results.name", writer.sequence, criterion)
 }
 
-/// Checks that two instances that are called in turns have the results of a single instance.
+/// Checks that two instances that are called in turns have the same results as a single instance.
 pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let single = writer.write(0, WHOLE).reads;
+    let single = writer.write(0, COMPLETE).reads;
     writer.free(0);
     let (mut one, mut other) = (writer.write(1, &[Begin, ReadAll]).reads, Vec::new());
-    // The second instance is two points behind, so that the states of both differ.
+    // The second instance is two points behind the first, so that their states differ.
     let count = trajectory.points.len();
     for number in 0..count + 2 {
         if number == 1 {
@@ -70,8 +71,9 @@ pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<(
     checker.check("results.instances", writer.sequence, any(criteria))
 }
 
-/// Returns the criterion that each variable has the same value read separately and read with others.
-fn unlike(
+/// Returns the criterion that each variable has the same value if it is read separately (`singly`) and with others (`together`). The
+/// message is made of the name and both values.
+fn same_value(
     checker: &Checker,
     singly: Vec<(usize, Vec<Read>)>,
     together: Vec<Read>,
@@ -87,10 +89,10 @@ fn unlike(
     })
 }
 
-/// Checks that results do not depend on the variables that are read, their grouping and the number of reads.
+/// Checks that results do not depend on how many variables are read, how they are grouped, and how often they are read.
 pub fn reading(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let silent = writer.write(0, &[Begin, Points(usize::MAX), ReadAll, Part::Free]).reads;
+    let read_at_end = writer.write(0, &[Begin, Points(usize::MAX), ReadAll, Part::Free]).reads;
     let all = &checker.readable;
     writer.write(1, &[Begin, ReadAll]);
     for point in &trajectory.points {
@@ -105,18 +107,18 @@ pub fn reading(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     let singly: Vec<_> = all.iter().take(400).map(&mut single).collect();
     let criteria = [
         checker.differ(&read, &again, "{} is {}, read a second time {}"),
-        unlike(checker, singly, read.clone(), |name, one, together| {
+        same_value(checker, singly, read.clone(), |name, one, together| {
             format!("{name} is {together} read with others and {one} read separately")
         }),
-        checker.differ(&silent, &read, "{} is {}, after more was read meanwhile {}"),
+        checker.differ(&read_at_end, &read, "{} is {}, after more was read meanwhile {}"),
     ];
     checker.check("results.reading", writer.sequence, any(criteria))?;
-    repeated(checker, trajectory, all)?;
-    first(checker, trajectory)
+    read_twice(checker, trajectory, all)?;
+    read_first(checker, trajectory)
 }
 
-/// Checks that each output has the same value if it is the first variable that is read.
-fn first(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+/// Checks that each output has the same value whether it is read first or after others.
+fn read_first(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let variables = &checker.description.variables;
     let outputs = checker.readable.iter().copied();
     let outputs = outputs.filter(|index| variables[*index].causality == "output").take(checker.at_most(16));
@@ -128,19 +130,19 @@ fn first(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         single.push((output, writer.read_these(0, &[output])));
         writer.free(0);
     }
-    let criterion = unlike(checker, single, together, |name, one, other| {
+    let criterion = same_value(checker, single, together, |name, one, other| {
         format!("{name} is {one} read first and {other} read after others")
     });
     checker.check("results.reading", writer.sequence, criterion)
 }
 
-/// Checks a call that reads each variable twice, and a call that reads none.
-fn repeated(checker: &Checker, trajectory: &Trajectory, all: &[usize]) -> anyhow::Result<()> {
+/// Checks that a call that reads each variable twice returns equal values, and that a call that reads no variable succeeds.
+fn read_twice(checker: &Checker, trajectory: &Trajectory, all: &[usize]) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
     let singly = writer.read_these(0, all);
     let indices: Vec<usize> = all.iter().flat_map(|index| [*index, *index]).collect();
-    let doubly = writer.read_these(0, &indices);
+    let twice = writer.read_these(0, &indices);
     let nothing = access(checker.description.standard, Vec::new(), [Arg::Out(Kind::F64, 0)], 0);
     let none = writer.call(0, if checker.fmi3() { "GetFloat64" } else { "GetReal" }, nothing);
     let description = checker.description.clone();
@@ -148,7 +150,7 @@ fn repeated(checker: &Checker, trajectory: &Trajectory, all: &[usize]) -> anyhow
         if let Some(status) = run.status(none).filter(|status| *status > 1) {
             return Some(format!("a call that queries no variable returns {}", status_name(status)));
         }
-        singly.iter().zip(&doubly).find_map(|(single, double)| {
+        singly.iter().zip(&twice).find_map(|(single, double)| {
             if [single, double].iter().any(|read| !run.succeeds(read.id)) {
                 return None;
             }
@@ -164,18 +166,18 @@ fn repeated(checker: &Checker, trajectory: &Trajectory, all: &[usize]) -> anyhow
     })
 }
 
-/// Checks that simulations on four threads have the results of a single simulation.
+/// Checks that simulations on four threads have the same results as a single simulation.
 pub fn threads(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
-    let single = writer.write(0, WHOLE).reads;
+    let single = writer.write(0, COMPLETE).reads;
     writer.free(0);
     let mut sequences: Vec<Vec<Numbered>> = Vec::new();
     let mut criteria = Vec::new();
     for number in 1..=4 {
         let mut thread = Writer { next: writer.next, ..checker.writer(trajectory) };
-        // Twenty simulations for each thread, so that simulations overlap.
+        // Each thread executes twenty simulations, so that simulations on different threads overlap.
         for _ in 0..20 {
-            let reads = thread.write(number, WHOLE).reads;
+            let reads = thread.write(number, COMPLETE).reads;
             criteria.push(checker.differ(
                 &single,
                 &reads,
@@ -190,7 +192,7 @@ pub fn threads(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     checker.check("results.threads", writer.sequence, any(criteria))
 }
 
-/// Checks that simulations to the same time with different step sizes and constant inputs have similar results.
+/// Checks that simulations to the same time have similar results with different step sizes. The inputs are constant.
 pub fn cut(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     if !checker.can(trajectory.interface, &["canHandleVariableCommunicationStepSize"])
         || trajectory.points.len() < 4
@@ -198,7 +200,7 @@ pub fn cut(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     {
         return Ok(());
     }
-    // With a fixed internal step size, half a step must still be a multiple of it.
+    // If the internal step size is fixed, half a step must still be a multiple of it, so the steps are twice as long.
     let offer = checker.description.co_simulation.as_ref();
     let fixed = offer.and_then(|offer| offer.number("fixedInternalStepSize"));
     let Point { time: start, size, .. } = trajectory.points[0];
@@ -219,39 +221,40 @@ pub fn cut(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         (0..description.variables.len()).find_map(|index| {
             let value = |end: &Vec<Read>| value_of(run, end, index).map(|value| value.numbers());
             let values: Vec<Vec<f64>> = ends.iter().map(|end| value(end).unwrap_or_default()).collect();
-            unlike_in_steps(&description, index, &values)
+            different_in_steps(&description, index, &values)
         })
     })
 }
 
-/// Returns a message if the values of a variable after 8, 4, 16 and 24 steps to the same time are not similar.
-fn unlike_in_steps(description: &Description, index: usize, values: &[Vec<f64>]) -> Option<String> {
+/// Describes values of a variable that are not similar. `values` has the values after 8, 4, 16 and, if the step size is free, 24 steps to
+/// the same time.
+fn different_in_steps(description: &Description, index: usize, values: &[Vec<f64>]) -> Option<String> {
     let variable = &description.variables[index];
     let name = &variable.name;
-    // An error that each step adds is proportional to the number of steps; the error of a solver is not.
+    // If each step adds the same error, the error is proportional to the number of steps. The error of a solver is not.
     if let [eight, four, sixteen, more] = values
         && variable.is_float()
         && let ([eight, ..], [four, ..], [sixteen, ..], [more, ..]) =
             (&eight[..], &four[..], &sixteen[..], &more[..])
     {
         let (first, second, third) = (eight - four, sixteen - eight, more - sixteen);
-        let like = |one: f64, other: f64| (one - other).abs() < 0.02 * other.abs();
+        let is_like = |one: f64, other: f64| (one - other).abs() < 0.02 * other.abs();
         let scale = eight.abs().max(1e-3 * variable.nominal);
-        if like(second, 2.0 * first) && like(third, second) && first.abs() > 1e-10 * scale {
+        if is_like(second, 2.0 * first) && is_like(third, second) && first.abs() > 1e-10 * scale {
             return Some(format!(
                 "{name} is {four:?} after 4 steps, {eight:?} after 8, {sixteen:?} after 16 and {more:?} after 24 to the \
                  same time: each adds something"
             ));
         }
     }
-    let hows = ["half as many steps", "twice as many steps"];
-    values[1..].iter().zip(hows).find_map(|(others, how)| {
+    let comparisons = ["half as many steps", "twice as many steps"];
+    values[1..].iter().zip(comparisons).find_map(|(others, comparison)| {
         let off = |(one, other): &(&f64, &f64)| {
             let scale = one.abs().max(other.abs()).max(1e-3 * variable.nominal);
             (*one - *other).abs() > 1e-2 * scale
         };
         let (one, other) = values[0].iter().zip(others).find(off)?;
-        Some(format!("{name} is {one:?}, with {how} {other:?}"))
+        Some(format!("{name} is {one:?}, with {comparison} {other:?}"))
     })
 }
 
@@ -262,7 +265,7 @@ pub fn time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let Some(index) = (0..description.variables.len()).find(is_time) else { return Ok(()) };
     let mut runs = vec![(0.0, trajectory.points.clone())];
     if let (true, Some(first)) = (trajectory.is_stepped(), trajectory.points.first()) {
-        // From another start time, which an FMU may reject, and with a step size that is not a multiple of the solver's.
+        // Another start time, which an FMU may reject, and a step size that is not a multiple of the solver's step size.
         runs.push((trajectory.end - description.start_time, trajectory.points.clone()));
         let offer = description.co_simulation.as_ref();
         if offer.is_some_and(|offer| {
@@ -289,7 +292,7 @@ pub fn time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         checker.check("results.time", writer.sequence, move |run| {
             reads.iter().find_map(|(reads, time, step)| {
                 let value = *value_of(run, reads, index)?.numbers().first()?;
-                // Section 4.2.1 of FMI 3.0: a step may end early and returns lastSuccessfulTime.
+                // A step may end early, and returns lastSuccessfulTime (section 4.2.1 of FMI 3.0).
                 let reached = step.and_then(|id| run.outcome(id)?.written.get(3)?.numbers().first().copied());
                 let time = reached.unwrap_or(*time);
                 is_other_time(value, time)

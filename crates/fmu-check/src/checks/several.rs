@@ -1,4 +1,4 @@
-//! Checks instances that are freed next to others, and the unloading of the library afterwards.
+//! Checks that freeing an instance does not affect others, and that the library can be unloaded and loaded again.
 
 use crate::call_sequence::Step;
 use crate::checker::Checker;
@@ -6,8 +6,8 @@ use crate::finding::any;
 use crate::writer::Part::{Begin, Call, Free, ReadAll, Run};
 use crate::writer::Trajectory;
 
-/// Checks that an instance continues as a single one does after others were freed: one that was made before and one that was made
-/// after it. Then the library is unloaded and loaded again.
+/// Checks that an instance has the same results as a single one although two others are freed during its simulation. Instance 1 was made
+/// before it, and instance 3 after it. Then checks a simulation after the library was unloaded and loaded again.
 pub fn freed(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let points = &trajectory.points;
     let half = points.len() / 2;
@@ -21,7 +21,6 @@ pub fn freed(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for (number, point) in points.iter().enumerate() {
         writer.point(2, point);
         middle.extend(writer.read_all(2));
-        // The older one in a third of the simulation, the newer one in the middle.
         if number == half / 2 {
             writer.write(1, &[Free]);
         }
@@ -30,11 +29,12 @@ pub fn freed(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
             writer.write(3, &[Free]);
         }
     }
-    let mut left: Vec<usize> = Vec::new();
-    left.extend((half / 2 >= points.len()).then_some(1));
-    left.extend((half >= points.len()).then_some(3));
-    left.push(2);
-    left.into_iter().for_each(|instance| drop(writer.write(instance, &[Free])));
+    // A simulation without points has freed neither of the two.
+    let mut remaining: Vec<usize> = Vec::new();
+    remaining.extend((half / 2 >= points.len()).then_some(1));
+    remaining.extend((half >= points.len()).then_some(3));
+    remaining.push(2);
+    remaining.into_iter().for_each(|instance| drop(writer.write(instance, &[Free])));
     writer.add(Step::Unload);
     let again = writer.write(0, &[Begin, ReadAll, Run(0), Free]).reads;
     writer.add(Step::Unload);
@@ -46,7 +46,7 @@ pub fn freed(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     quit(checker, trajectory)
 }
 
-/// Checks the exit of the process while two instances exist, which an importer that fails may leave.
+/// Checks that the process exits after two instances were freed.
 fn quit(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.write(1, &[Begin]);

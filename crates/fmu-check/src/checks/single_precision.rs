@@ -1,24 +1,42 @@
-//! Checks that numbers of double precision are not stored with single precision.
+//! Checks that an FMU does not store numbers of double precision with single precision.
 
 use crate::call_sequence::{Run, Values};
 use crate::checker::Checker;
-use crate::finding::any;
+use crate::finding::{Criterion, any};
 use crate::values::near;
 use crate::writer::Part::{Begin, Enter, Free, Make, Points};
-use crate::writer::{Part, Read, Trajectory, value_of};
+use crate::writer::{Part, Read, Trajectory, Writer, value_of};
 use fmi_abi::BaseType;
 
-/// Minimum number of different values of an output: with fewer, single precision may be a coincidence.
-const VALUES: usize = 8;
+/// Minimum number of different values of an output. Fewer values may have single precision by coincidence.
+const MIN_VALUES: usize = 8;
 
-fn single(number: f64) -> f64 {
+/// Changes of the values that are set. There are two, because a getter may return one rounded value by coincidence.
+const CHANGES: [f64; 2] = [1.0 / 7.0, 1.0 / 11.0];
+
+/// Rounds a number to single precision.
+fn rounded(number: f64) -> f64 {
     f64::from(number as f32)
 }
 
-/// Checks values that are set: if a getter returns two values of a variable exactly as rounded to single precision, they are stored so. A
-/// conversion of units changes only the last digits of double precision, so it is not mistaken for that.
+/// Values that were set, and the reads of their variables.
+struct SetAndRead {
+    values: Vec<(usize, Values)>,
+    reads: Vec<Read>,
+}
+
+impl SetAndRead {
+    /// Returns the number that was set and the number that was read, if a number of this variable was rounded.
+    fn rounded(&self, run: &Run, variable: usize) -> Option<(f64, f64)> {
+        let (_, set) = self.values.iter().find(|(index, _)| *index == variable)?;
+        first_rounded(&set.numbers(), &value_of(run, &self.reads, variable)?.numbers())
+    }
+}
+
+/// Checks numbers that are set. A variable is stored with single precision if a getter returns two of its values rounded to single
+/// precision. A conversion of units is not mistaken for this, because it changes only the last digits of double precision.
 pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let description = &checker.description;
+    let description = checker.description.clone();
     let mut indices = checker.readable.clone();
     indices.retain(|index| {
         let of = &description.variables[*index];
@@ -26,11 +44,32 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         settable && !of.clocked && of.base == Some(BaseType::Real) && !of.start.is_empty()
     });
     let mut writer = checker.writer(trajectory);
+    let all = write_values(&mut writer, &indices);
+    let of_variables = move |run: &Run| {
+        indices.iter().find_map(|variable| {
+            let found: Vec<(f64, f64)> = all.iter().filter_map(|of| of.rounded(run, *variable)).collect();
+            let (set, read) = *found.first().filter(|_| found.len() > 1)?;
+            let name = &description.variables[*variable].name;
+            Some(format!(
+                "{name} was set to {set:?} and reads {read:?}, the same number with single precision"
+            ))
+        })
+    };
+    let criteria =
+        std::iter::once(Box::new(of_variables) as Box<_>).chain(states(checker, trajectory, &mut writer));
+    checker.check("start_values.single", writer.sequence, any(criteria.collect::<Vec<_>>()))?;
+    outputs(checker, trajectory)
+}
+
+/// Sets variables to numbers that single precision cannot represent: all of them in Initialization Mode, and continuous inputs after two
+/// points.
+fn write_values(writer: &mut Writer, indices: &[usize]) -> Vec<SetAndRead> {
+    let description = writer.description;
     let mut all = Vec::new();
-    for by in [1.0 / 7.0, 1.0 / 11.0] {
+    for by in CHANGES {
         let value = |index: &usize| {
             let of = &description.variables[*index];
-            let number = |start: f64| Some(near(of, start, by)).filter(|number| single(*number) != *number);
+            let number = |start: f64| Some(near(of, start, by)).filter(|number| rounded(*number) != *number);
             let numbers: Vec<f64> = of.starts().into_iter().map(number).collect::<Option<_>>()?;
             Some((*index, Values::new(description.kind(*index), numbers)))
         };
@@ -45,47 +84,29 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
             writer.set(0, &values);
             let reads = writer.read_anyway(0, &values.iter().map(|(index, _)| *index).collect::<Vec<_>>());
             writer.write(0, &[Free]);
-            all.push((values, reads));
+            all.push(SetAndRead { values, reads });
         }
     }
-    let model = description.clone();
-    let of_variables = move |run: &Run| {
-        let is_single = |(values, reads): &(Vec<(usize, Values)>, Vec<Read>), variable: usize| {
-            let (_, set) = values.iter().find(|(index, _)| *index == variable)?;
-            is_rounded(&set.numbers(), &value_of(run, reads, variable)?.numbers())
-        };
-        indices.iter().find_map(|variable| {
-            let found: Vec<(f64, f64)> = all.iter().filter_map(|of| is_single(of, *variable)).collect();
-            let (set, read) = *found.first().filter(|_| found.len() > 1)?;
-            let name = &model.variables[*variable].name;
-            Some(format!(
-                "{name} was set to {set:?} and reads {read:?}, the same number with single precision"
-            ))
-        })
-    };
-    let criteria =
-        std::iter::once(Box::new(of_variables) as Box<_>).chain(states(checker, trajectory, &mut writer));
-    checker.check("start_values.single", writer.sequence, any(criteria.collect::<Vec<_>>()))?;
-    outputs(checker, trajectory)
+    all
 }
 
-/// Returns the number that was set and the number that was read, if the latter is the former, rounded to single precision.
-fn is_rounded(set: &[f64], read: &[f64]) -> Option<(f64, f64)> {
-    let rounded = |(set, read): &(f64, f64)| *read == single(*set) && read != set;
-    set.iter().copied().zip(read.iter().copied()).find(rounded)
+/// Finds the first number that is read rounded to single precision. Returns the number that was set, and the number that was read.
+fn first_rounded(set: &[f64], read: &[f64]) -> Option<(f64, f64)> {
+    set.iter().copied().zip(read.iter().copied()).find(is_rounded)
 }
 
-/// Writes states that are set in Model Exchange; returns the criterion for them.
-fn states(
-    checker: &Checker,
-    trajectory: &Trajectory,
-    writer: &mut crate::writer::Writer,
-) -> Option<Box<dyn crate::finding::Criterion>> {
+/// Returns whether the second number is the first one rounded to single precision, and differs from it.
+fn is_rounded((set, read): &(f64, f64)) -> bool {
+    *read == rounded(*set) && read != set
+}
+
+/// Sets and reads the states of Model Exchange. Returns the criterion that they are not rounded; `None` if there are no states.
+fn states(checker: &Checker, trajectory: &Trajectory, writer: &mut Writer) -> Option<Box<dyn Criterion>> {
     let count = checker.description.states_count().filter(|count| *count > 0)?;
     let point =
         trajectory.points.get(1).filter(|point| !trajectory.is_stepped() && point.states.len() == count)?;
     writer.write(0, &[Begin, Points(2)]);
-    let vectors = [1.0 / 7.0, 1.0 / 11.0].map(|by| {
+    let vectors = CHANGES.map(|by| {
         let vector: Vec<f64> =
             point.states.iter().map(|state| state + by * 1e-3 * state.abs().max(1.0)).collect();
         writer.set_states(0, &vector);
@@ -100,8 +121,7 @@ fn states(
             .collect::<Option<_>>()?;
         (0..count).find_map(|index| {
             let [one, other] = [pairs[0].get(index)?, pairs[1].get(index)?];
-            let rounded = |(set, read): &(f64, f64)| *read == single(*set) && read != set;
-            (rounded(one) && rounded(other)).then(|| {
+            (is_rounded(one) && is_rounded(other)).then(|| {
                 let number = index + 1;
                 format!(
                     "state {number} was set to {:?} and is {:?}, the same number with single precision",
@@ -112,12 +132,12 @@ fn states(
     }))
 }
 
-/// Returns whether a number is exact in single precision, although it has more digits than a number that people choose.
-fn is_long_single(number: f64) -> bool {
-    number.is_finite() && single(number) == number && number.to_bits().trailing_zeros() < 40
+/// Returns whether a number is exact in single precision, but has more digits than numbers that people choose.
+fn is_unusual_single(number: f64) -> bool {
+    number.is_finite() && rounded(number) == number && number.to_bits().trailing_zeros() < 40
 }
 
-/// Checks that outputs have digits beyond single precision.
+/// Checks that an output has values with more digits than single precision.
 fn outputs(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let mut indices = checker.readable.clone();
@@ -128,7 +148,7 @@ fn outputs(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
             && of.variability == "continuous"
             && !of.clocked
     });
-    let mut writer = crate::writer::Writer::new(description, trajectory, &indices);
+    let mut writer = Writer::new(description, trajectory, &indices);
     writer.begin(0);
     let mut reads = Vec::new();
     for point in &trajectory.points {
@@ -140,12 +160,16 @@ fn outputs(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         indices.iter().find_map(|variable| {
             let numbers = |reads: &Vec<Read>| value_of(run, reads, *variable).map(|value| value.numbers());
             let all: Vec<f64> = reads.iter().filter_map(numbers).flatten().collect();
-            let mut long: Vec<u64> =
-                all.iter().filter(|number| is_long_single(**number)).map(|number| number.to_bits()).collect();
-            long.sort_unstable();
-            long.dedup();
-            let only = all.iter().all(|number| single(*number) == *number);
-            let number = f64::from_bits(*long.first().filter(|_| only && long.len() >= VALUES)?);
+            let mut unusual: Vec<u64> = all
+                .iter()
+                .filter(|number| is_unusual_single(**number))
+                .map(|number| number.to_bits())
+                .collect();
+            unusual.sort_unstable();
+            unusual.dedup();
+            let all_single = all.iter().all(|number| rounded(*number) == *number);
+            let number =
+                f64::from_bits(*unusual.first().filter(|_| all_single && unusual.len() >= MIN_VALUES)?);
             let name = &description.variables[*variable].name;
             Some(format!("all values of {name} have single precision, for example {number:?}"))
         })

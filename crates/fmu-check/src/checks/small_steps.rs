@@ -11,18 +11,19 @@ use crate::writer::{Read, Trajectory, Writer, value_of};
 /// Number of small steps that are compared with one step.
 const STEPS: usize = 8;
 
-/// Number of usual steps before the small ones, so that the state is moving by then.
+/// Number of usual steps before the small ones, after which the states are likely to move.
 const BEFORE: usize = 4;
 
-/// Small step sizes, relative to the usual one. They are irrational, so that they are not multiples of the step size of a solver. Because
-/// the factor between them is less than `STEPS`, one of them is shorter than the step size of the solver, while `STEPS` of its steps are at
-/// least as long, unless the solver's steps are shorter than all of them.
+/// Returns small step sizes for a usual step size. They contain an irrational factor, so that they are not multiples of the step size of a
+/// solver. Each size is less than `STEPS` times the next one. So one of them is shorter than the solver's step although `STEPS` such steps
+/// are longer, unless all sizes are longer than the solver's step.
 fn sizes(usual: f64) -> impl Iterator<Item = f64> {
     (1..=6).map(move |number| 0.618_033_988_749_895 * usual * 10_f64.powf(-0.5 * f64::from(number)))
 }
 
-/// Reads before, after small steps, and after one step of the same duration.
+/// Reads before small steps, after them, and after one step of the same duration.
 struct Compared {
+    /// Size of the small steps.
     size: f64,
     before: Vec<Read>,
     small: Vec<Read>,
@@ -30,7 +31,7 @@ struct Compared {
 }
 
 /// Compares small steps with one step of the same duration, for several sizes. The results of a solver with variable steps may differ
-/// slightly, so only two observations count: small steps do not change a single bit of any variable, or each of them advances as far as a
+/// slightly, so only two observations are findings: no variable changes at all in small steps, or each small step advances as far as a
 /// longer one.
 pub fn small_steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
@@ -67,14 +68,14 @@ pub fn small_steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
     }
     let description = description.clone();
     checker.check("dynamics.small-steps", writer.sequence, move |run| {
-        let moved: Vec<(f64, Vec<Moved>)> =
-            all.iter().filter_map(|of| Some((of.size, of.moved(run, &variables)?))).collect();
-        stands(&description, &moved).or_else(|| runs_away(&description, &moved))
+        let changes: Vec<(f64, Vec<Change>)> =
+            all.iter().filter_map(|of| Some((of.size, of.changes(run, &variables)?))).collect();
+        unchanged(&description, &changes).or_else(|| too_far(&description, &changes))
     })
 }
 
-/// Values of an element of a variable that one step changes: before, after small steps and after one step.
-struct Moved {
+/// Values of an element of a variable that one step changes: before, after small steps, and after one step.
+struct Change {
     variable: usize,
     before: f64,
     small: f64,
@@ -82,9 +83,9 @@ struct Moved {
 }
 
 impl Compared {
-    /// Returns the elements that one step changes; `None` if a variable could not be read.
-    fn moved(&self, run: &Run, variables: &[usize]) -> Option<Vec<Moved>> {
-        let mut moved = Vec::new();
+    /// Returns the elements that one step changes; `None` if there are none, or if a value was not read or is not finite.
+    fn changes(&self, run: &Run, variables: &[usize]) -> Option<Vec<Change>> {
+        let mut changes = Vec::new();
         for variable in variables {
             let numbers = |reads: &[Read]| value_of(run, reads, *variable).map(|value| value.numbers());
             let [before, small, one] = [numbers(&self.before)?, numbers(&self.small)?, numbers(&self.one)?];
@@ -94,34 +95,34 @@ impl Compared {
                     return None;
                 }
                 if (one - before).abs() > 1e-12 * before.abs().max(one.abs()) {
-                    moved.push(Moved { variable: *variable, before, small, one });
+                    changes.push(Change { variable: *variable, before, small, one });
                 }
             }
         }
-        (!moved.is_empty()).then_some(moved)
+        (!changes.is_empty()).then_some(changes)
     }
 }
 
-/// Returns a description of small steps after which no variable has changed, although one step changes some.
-fn stands(description: &Description, sizes: &[(f64, Vec<Moved>)]) -> Option<String> {
-    let stand = |moved: &[Moved]| moved.iter().all(|of| of.small == of.before);
-    let (size, moved) = sizes.iter().find(|(_, moved)| stand(moved))?;
-    let of = &moved[0];
+/// Describes small steps after which no variable has changed, although one step changes some.
+fn unchanged(description: &Description, sizes: &[(f64, Vec<Change>)]) -> Option<String> {
+    let are_unchanged = |changes: &[Change]| changes.iter().all(|of| of.small == of.before);
+    let (size, changes) = sizes.iter().find(|(_, changes)| are_unchanged(changes))?;
+    let of = &changes[0];
     Some(format!(
         "{} is {:?} before and after {STEPS} steps of {size:?}, after one step of the same duration {:?}",
         description.variables[of.variable].name, of.before, of.one
     ))
 }
 
-/// Returns a description of small steps of two sizes, all of which advance the variables equally far and about `STEPS` times as far as
-/// one step of the same duration.
-fn runs_away(description: &Description, sizes: &[(f64, Vec<Moved>)]) -> Option<String> {
+/// Describes small steps that advance too far: with two sizes, all variables advance equally far, and about `STEPS` times as far as in one
+/// step of the same duration.
+fn too_far(description: &Description, sizes: &[(f64, Vec<Change>)]) -> Option<String> {
     sizes.windows(2).find_map(|pair| {
         let [(_, larger), (size, smaller)] = pair else { return None };
         let alike = |one: f64, other: f64| (one - other).abs() < 0.01 * one.abs();
-        let overshoots = |(one, other): (&Moved, &Moved)| {
+        let overshoots = |(one, other): (&Change, &Change)| {
             let [far, further] = [one, other].map(|of| of.small - of.before);
-            let ratio = |of: &Moved| (of.small - of.before) / (of.one - of.before);
+            let ratio = |of: &Change| (of.small - of.before) / (of.one - of.before);
             let repeats = [one, other].iter().all(|of| (0.75..1.25).contains(&(ratio(of) / STEPS as f64)));
             one.variable == other.variable && alike(far, further) && repeats
         };

@@ -1,4 +1,4 @@
-//! Checks start values, values that are read after they were set, types and ranges of values, and constants.
+//! Checks start values, values that are read after they were set, value ranges, and that constants and inputs keep their values.
 
 use crate::call_sequence::{Run, Values};
 use crate::checker::Checker;
@@ -11,20 +11,20 @@ use crate::writer::{Part, Read, Trajectory, Writer, sample, value_of, values_of}
 use fmi_abi::BaseType;
 use std::sync::Arc;
 
-/// Checks the start values of the variables, then the values along the simulation and the constants.
+/// Checks the start values of variables, then the values during the simulation and the constants.
 pub fn starts(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let model = Arc::clone(&checker.description);
     // FMI 2.0 forbids getters before Initialization Mode. FMI 3.0 allows them in the Instantiated state, where they return
     // the start values (section 2.3.2).
-    let situations = [&[Make, Enter][..], &[Make]];
-    for parts in situations.into_iter().take(if checker.fmi3() { 2 } else { 1 }) {
+    let states = [&[Make, Enter][..], &[Make]];
+    for parts in states.into_iter().take(if checker.fmi3() { 2 } else { 1 }) {
         let (model, mut writer) = (Arc::clone(&model), checker.writer(trajectory));
         writer.write(0, parts);
-        // A value that cannot be read here is not a finding.
-        let (first, others) = sample(&model, 10_000)
+        // FMI 2.0 allows an FMU to reject getters of some variables in Initialization Mode, so these are read separately.
+        let (readable, others) = sample(&model, 10_000)
             .into_iter()
             .partition::<Vec<_>, _>(|index| model.is_readable_while_initializing(*index));
-        let mut reads = writer.read_anyway(0, &first);
+        let mut reads = writer.read_anyway(0, &readable);
         reads.extend(writer.read_anyway(0, &others));
         checker.check("start_values.start", writer.sequence, move |run| {
             values_of(run, &reads).find_map(|(index, value)| {
@@ -39,10 +39,10 @@ pub fn starts(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     constants(checker, trajectory)
 }
 
-/// Returns false if a variable that must have its start value has another value.
+/// Returns whether a value equals the start value. Returns true for a variable that may have other values.
 fn is_start(variable: &Variable, value: &Values) -> bool {
-    let fixed = variable.initial == "exact" || variable.causality == "input";
-    if !fixed || variable.start.is_empty() || variable.clocked || variable.base.is_none() {
+    let must_be_start = variable.initial == "exact" || variable.causality == "input";
+    if !must_be_start || variable.start.is_empty() || variable.clocked || variable.base.is_none() {
         return true;
     }
     match value {
@@ -55,23 +55,24 @@ fn is_start(variable: &Variable, value: &Values) -> bool {
         Values::Numbers(kind, bits) => {
             let starts = variable.starts();
             let wrong = |(bits, start): (&u64, &f64)| {
-                let (is, must) = (kind.number(*bits), kind.number(kind.bits(*start)));
+                let (actual, expected) = (kind.number(*bits), kind.number(kind.bits(*start)));
                 // The model description may have fewer digits than the value.
-                (is - must).abs() > 1e-9 * must.abs() || is.is_nan() != must.is_nan()
+                (actual - expected).abs() > 1e-9 * expected.abs() || actual.is_nan() != expected.is_nan()
             };
             starts.len() != bits.len() || !bits.iter().zip(&starts).any(wrong)
         }
     }
 }
 
-/// Test of a value of a variable; returns a description of the error.
+/// Tests a value of a variable. Returns a description of the error, which continues a sentence after the name of the variable.
 type ValueTest = fn(&Variable, &Values) -> Option<String>;
 
-/// Rules for each value that is read.
+/// Rules for values that are read, each with its test.
 const VALUE_TESTS: [(&str, ValueTest); 5] = [
     ("start_values.unwritten", |_, value| {
         let Values::Numbers(kind, bits) = value else { return None };
         let untouched = u64::from_ne_bytes([FILL; 8]) >> (64 - 8 * kind.size());
+        // A valid value of fewer bytes may equal the fill bytes.
         (kind.size() >= 4 && bits.contains(&untouched)).then(|| "has not been written".to_owned())
     }),
     ("start_values.boolean", |variable, value| {
@@ -97,7 +98,7 @@ const VALUE_TESTS: [(&str, ValueTest); 5] = [
     }),
 ];
 
-/// Checks each value that is read along the trajectory by `VALUE_TESTS`.
+/// Applies `VALUE_TESTS` to the values at each point of the simulation.
 fn values(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
@@ -120,33 +121,33 @@ fn values(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Checks that constants and parameters do not change while time advances. Fixed variables are included only if the model has no
+/// Checks that constants and parameters do not change while time advances. Other fixed variables are checked only if the model has no
 /// tunable variables.
 fn constants(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let variables = &checker.description.variables;
     let tunable = variables.iter().any(|other| {
         other.variability == "tunable" || other.causality == "input" && other.variability == "fixed"
     });
-    let mut fixed = checker.readable.clone();
-    fixed.retain(|index| {
+    let mut unchanging = checker.readable.clone();
+    unchanging.retain(|index| {
         let variable = &variables[*index];
         variable.variability == "constant"
             || !tunable && variable.variability == "fixed" && variable.causality != "input"
             || variable.causality == "parameter"
     });
-    if fixed.is_empty() || trajectory.points.is_empty() {
+    if unchanging.is_empty() || trajectory.points.is_empty() {
         return Ok(());
     }
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
-    let first = writer.read_these(0, &fixed);
+    let first = writer.read_these(0, &unchanging);
     writer.write(0, &[Points(usize::MAX)]);
-    let last = writer.read_these(0, &fixed);
+    let last = writer.read_these(0, &unchanging);
     let criterion = checker.differ(&first, &last, "{} was {} and has become {}");
     checker.check("start_values.fixed", writer.sequence, criterion)
 }
 
-/// Returns the variables that can be set before the initialization, without those that have aliases.
+/// Returns the variables that can be set before the initialization and have no aliases.
 pub fn settable(checker: &Checker) -> Vec<usize> {
     let description = &checker.description;
     let mut indices = checker.readable.clone();
@@ -167,37 +168,37 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let (floats, others): (Vec<usize>, Vec<usize>) =
         indices.iter().partition(|index| variable(index).is_float());
     let near: Vec<(usize, Values)> = floats.iter().filter_map(with_other).collect();
-    // Floating-point variables get values near their start values, all in one group. A model may reject new values of
-    // integers, Booleans and strings, so these variables are set one at a time.
+    // Floating-point variables are set together, to values near their start values. A model may reject new values of integers, Booleans and
+    // strings, so these variables are set one at a time.
     let separate = others.iter().take(checker.at_most(40)).flat_map(|index| {
-        // 500 bytes, longer than usual buffers.
+        // The string has 500 bytes, so it is longer than usual buffers.
         let long = Values::strings(&b"long ".repeat(100), variable(index).starts_count());
         let long = (variable(index).base == Some(BaseType::String)).then_some((*index, long));
         with_other(index).into_iter().chain(long).map(|value| vec![value])
     });
     if !near.is_empty() {
-        when(checker, trajectory, &near)?;
+        same_effect(checker, trajectory, &near)?;
     }
     for values in std::iter::once(near.clone()).filter(|near| !near.is_empty()).chain(separate) {
         for (before, after) in [(&[Make, Enter][..], &[][..]), (&[Make][..], &[Enter][..])] {
             read_back(checker, trajectory, before, values.clone(), after)?;
         }
     }
-    // Only variables that can be set without Event Mode are set at a communication point.
+    // At a communication point, only variables that can be set outside of Event Mode are set.
     for index in indices.iter().take(checker.at_most(400)) {
         let of = variable(index);
-        let late = of.causality == "input" || of.variability == "tunable" && trajectory.is_stepped();
-        let late = late && (of.is_float() || of.variability != "discrete" && trajectory.is_stepped());
-        if let Some(value) = with_other(index).filter(|_| late && !of.once_per_instant) {
+        let may_change = of.causality == "input" || of.variability == "tunable" && trajectory.is_stepped();
+        let without_event = of.is_float() || of.variability != "discrete" && trajectory.is_stepped();
+        let is_settable = may_change && without_event && !of.once_per_instant;
+        if let Some(value) = with_other(index).filter(|_| is_settable) {
             read_back(checker, trajectory, &[Begin, Points(2)], vec![value], &[])?;
         }
     }
     inputs(checker, trajectory)
 }
 
-/// Checks that values have the same effect whether they are set before Initialization Mode, or in Initialization Mode after a getter
-/// call.
-fn when(checker: &Checker, trajectory: &Trajectory, values: &[(usize, Values)]) -> anyhow::Result<()> {
+/// Checks that values have the same effect whether they are set before Initialization Mode, or in it after getters were called.
+fn same_effect(checker: &Checker, trajectory: &Trajectory, values: &[(usize, Values)]) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let mut sets = Vec::new();
     let [before, within] =
@@ -215,7 +216,7 @@ fn when(checker: &Checker, trajectory: &Trajectory, values: &[(usize, Values)]) 
     })
 }
 
-/// Returns the criterion that getters return the values that were set.
+/// Returns the criterion that `reads` have the values that were set, if the calls `ids` succeeded. `has` is the verb of the message.
 pub fn values_are_kept(
     checker: &Checker,
     ids: Vec<u32>,
@@ -227,7 +228,7 @@ pub fn values_are_kept(
     Box::new(move |run: &Run| {
         let succeeded = ids.iter().all(|id| run.succeeds(*id));
         values.iter().filter(|_| succeeded).find_map(|(index, value)| {
-            // Models that convert units round the last digit.
+            // A model that converts units may round the last digit.
             let read = value_of(run, &reads, *index)?;
             read.differ_beyond(value, 1e-13, |_| 0.0)?;
             let name = &description.variables[*index].name;
@@ -236,6 +237,7 @@ pub fn values_are_kept(
     })
 }
 
+/// Checks that getters return values that were set between the parts `before` and `after`.
 fn read_back(
     checker: &Checker,
     trajectory: &Trajectory,
@@ -247,12 +249,12 @@ fn read_back(
     writer.write(0, before);
     let sets = writer.set(0, &values);
     writer.write(0, after);
-    let reads = read_again(&mut writer, &values);
+    let reads = read_variables(&mut writer, &values);
     checker.check("start_values.set", writer.sequence, values_are_kept(checker, sets, reads, values, "reads"))
 }
 
-/// Reads the variables of `values`.
-fn read_again(writer: &mut Writer, values: &[(usize, Values)]) -> Vec<Read> {
+/// Reads the variables of these values.
+fn read_variables(writer: &mut Writer, values: &[(usize, Values)]) -> Vec<Read> {
     writer.read_anyway(0, &values.iter().map(|(index, _)| *index).collect::<Vec<_>>())
 }
 
@@ -263,7 +265,7 @@ fn inputs(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut criteria = Vec::new();
     for point in &trajectory.points {
         let ids = writer.point(0, point);
-        let reads = read_again(&mut writer, &point.inputs);
+        let reads = read_variables(&mut writer, &point.inputs);
         criteria.push(values_are_kept(checker, ids, reads, point.inputs.clone(), "has become"));
     }
     checker.check("start_values.inputs", writer.sequence, any(criteria))

@@ -1,4 +1,4 @@
-//! Checks that saved states contain the values that were set: parameters, strings and inputs (section 2.1.8 of FMI 2.0.5).
+//! Checks that saved states contain the parameters, strings and inputs that were set (section 2.1.8 of FMI 2.0.5).
 
 use super::start_values::settable;
 use crate::call_sequence::{Step, Values};
@@ -13,7 +13,7 @@ use fmi_abi::BaseType;
 /// Variables, by index, with their values.
 type Assigned = Vec<(usize, Values)>;
 
-/// Returns the start values of a variable.
+/// Returns the start values of a variable; `None` if it is a clock or binary, or has fewer start values than elements.
 fn starts(description: &Description, index: usize) -> Option<Values> {
     let variable = &description.variables[index];
     match variable.base? {
@@ -30,17 +30,18 @@ fn starts(description: &Description, index: usize) -> Option<Values> {
     }
 }
 
-/// Returns groups of variables with other values and with their start values. A model may reject new values of integers, Booleans and
-/// strings, so that these variables are also set without the others.
+/// Returns groups of variables. Each group has values that differ from the start values, and the start values. The first group has all
+/// variables. A model may reject new values of integers, Booleans and strings, so the other groups are the floating-point variables, and
+/// single variables of other types.
 fn groups(checker: &Checker) -> Vec<(Assigned, Assigned)> {
     let description = &checker.description;
     let indices: Vec<usize> = settable(checker);
     let is_float = |index: &usize| description.variables[*index].is_float();
     let (floats, others): (Vec<usize>, Vec<usize>) = indices.iter().partition(|index| is_float(index));
-    let mut sets = vec![indices.clone()];
+    let mut groups = vec![indices.clone()];
     if !floats.is_empty() && !others.is_empty() {
-        sets.push(floats);
-        sets.extend(others.chunks(1).take(checker.at_most(16)).map(<[usize]>::to_vec));
+        groups.push(floats);
+        groups.extend(others.chunks(1).take(checker.at_most(16)).map(<[usize]>::to_vec));
     }
     let assigned = |indices: Vec<usize>| -> (Assigned, Assigned) {
         let both = indices.into_iter().filter_map(|index| {
@@ -48,11 +49,11 @@ fn groups(checker: &Checker) -> Vec<(Assigned, Assigned)> {
         });
         both.unzip()
     };
-    sets.into_iter().map(assigned).filter(|(values, _)| !values.is_empty()).collect()
+    groups.into_iter().map(assigned).filter(|(values, _)| !values.is_empty()).collect()
 }
 
-/// Checks states of instances with other values than the start values. If the model accepts all variables together, the
-/// smaller groups are left out.
+/// Checks states of instances whose values differ from the start values. The smaller groups are checked only if the model rejects the
+/// values of all variables together.
 pub fn restore(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     if trajectory.points.is_empty() {
         return Ok(());
@@ -61,7 +62,7 @@ pub fn restore(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
         let accepted = while_initializing(checker, trajectory, &values, &starts)?;
         after_reset(checker, trajectory, &values)?;
         if checker.serializes(trajectory.interface) {
-            in_fresh_process(checker, trajectory, &values)?;
+            from_bytes(checker, trajectory, &values)?;
         }
         if accepted && number == 0 {
             break;
@@ -70,7 +71,8 @@ pub fn restore(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     Ok(())
 }
 
-/// Checks a state that is restored after the start values were set in Initialization Mode. Returns whether the model accepts the values.
+/// Checks that a state that was saved in Initialization Mode restores the values after the start values were set. Returns whether the model
+/// accepts the values.
 fn while_initializing(
     checker: &Checker,
     trajectory: &Trajectory,
@@ -86,7 +88,7 @@ fn while_initializing(
     ids.extend(writer.set(0, starts));
     ids.extend(writer.write(0, &[Restore(0)]).ids);
     let second = writer.read_anyway(0, &indices);
-    // The second restoration reveals memory that states and instances share.
+    // If the state shares memory with the instance, the start values have changed the state, which the second restoration reveals.
     ids.extend(writer.set(0, starts));
     ids.extend(writer.write(0, &[Restore(0)]).ids);
     let third = writer.read_anyway(0, &indices);
@@ -94,7 +96,7 @@ fn while_initializing(
     let message = "{} was {} when the state was saved; after other values were set and the state was restored, it is {}";
     let criterion = any([checker.differ(&first, &second, message), checker.differ(&first, &third, message)]);
     let (copy, all) = (sequence.clone(), ids.clone());
-    // A model may reject the values only when it calculates with them.
+    // Some models reject the values not when they are set, but when a getter calculates with them.
     ids.extend(first.iter().map(|read| read.id));
     let run = checker.evaluate("states.restore-values", sequence, move |run| {
         failure(&copy, run, &ids).is_none().then(|| criterion(run))?
@@ -102,7 +104,7 @@ fn while_initializing(
     Ok(all.iter().all(|id| run.status(*id).is_none_or(|status| status <= 1)))
 }
 
-/// Checks a state that is restored after a reset, and the simulation from it.
+/// Checks the values and the simulation from a state that is restored after a reset.
 fn after_reset(checker: &Checker, trajectory: &Trajectory, values: &Assigned) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let mut ids = writer.write(0, &[Make]).ids;
@@ -120,8 +122,8 @@ fn after_reset(checker: &Checker, trajectory: &Trajectory, values: &Assigned) ->
     })
 }
 
-/// Checks the bytes of a state, which are read by a new instance with the start values and in a new process.
-fn in_fresh_process(checker: &Checker, trajectory: &Trajectory, values: &Assigned) -> anyhow::Result<()> {
+/// Checks that the bytes of a state restore the values in a new instance, in the same and in a new process.
+fn from_bytes(checker: &Checker, trajectory: &Trajectory, values: &Assigned) -> anyhow::Result<()> {
     for fresh in [false, true] {
         let mut writer = checker.writer(trajectory);
         let mut ids = writer.write(0, &[Make]).ids;

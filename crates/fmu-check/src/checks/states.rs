@@ -1,5 +1,4 @@
-//! Checks that a simulation from a restored state equals the first one: in the same instance, in a new instance and in a new
-//! process.
+//! Checks that a simulation from a restored state equals the first one, in the same instance, in a new instance, and in a new process.
 
 use crate::call_sequence::{Step, Values};
 use crate::checker::Checker;
@@ -7,8 +6,9 @@ use crate::finding::{any, fails};
 use crate::writer::Part::{Begin, Call, Drop, Enter, Free, Leave, Make, Points, ReadAll, Restore, Run, Save};
 use crate::writer::Trajectory;
 
-/// Returns the numbers of points before a state is saved: 0, 1, half of them and all but two, if they are less than all.
-fn indices(trajectory: &Trajectory) -> Vec<usize> {
+/// Returns the numbers of points after which a state is saved: none, one, half of the points, and all but two. There is at least one point
+/// after each of them.
+fn saved_at(trajectory: &Trajectory) -> Vec<usize> {
     let count = trajectory.points.len();
     let mut indices = vec![0, 1, count / 2, count.saturating_sub(2)];
     indices.retain(|index| *index < count);
@@ -17,24 +17,24 @@ fn indices(trajectory: &Trajectory) -> Vec<usize> {
     indices
 }
 
-/// Checks that saving a state changes nothing, and that simulations after restoring it once and twice equal the first one.
+/// Checks that saving a state changes nothing. Then restores the state twice, and checks that both simulations from it equal the first one.
 pub fn restore(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    for index in indices(trajectory) {
+    for index in saved_at(trajectory) {
         let mut writer = checker.writer(trajectory);
         let [before, after, first] =
             writer.groups(0, &[Begin, Points(index), ReadAll, Save(0), ReadAll, Run(index)]);
-        let [at_once, second, again, third] =
+        let [restored, second, restored_again, third] =
             writer.groups(0, &[Restore(0), ReadAll, Run(index), Restore(0), ReadAll, Run(index)]);
         let sequence = writer.sequence;
         let saving = checker.differ(&before, &after, "{} was {}, after the state was saved it is {}");
         let run = checker.evaluate("states.changed-by-saving", sequence.clone(), saving)?;
         let values = "{} was {}, after the state was restored it is {}";
-        let values = checker.differ(&before, &at_once, values);
+        let values = checker.differ(&before, &restored, values);
         if checker.record("states.restore-values", &run, &sequence, values) {
             continue;
         }
         let values = "{} was {}, after the state was restored a second time it is {}";
-        if checker.record("states.twice", &run, &sequence, checker.differ(&before, &again, values)) {
+        if checker.record("states.twice", &run, &sequence, checker.differ(&before, &restored_again, values)) {
             continue;
         }
         let pairs = [
@@ -55,22 +55,26 @@ pub fn restore(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     free_null(checker, trajectory)
 }
 
-/// Checks states that are saved before and in Initialization Mode and restored after Terminate and while time advances.
+/// Checks states that were saved before and in Initialization Mode. The state of Initialization Mode is restored after Terminate, the other
+/// one while time advances.
 fn modes(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let first = writer.write(0, &[Make, Save(0), Enter, Save(1), Leave, Run(0), Call("Terminate")]).reads;
-    // Back to Initialization Mode, then to the new instance.
-    let back = writer.write(0, &[Restore(1), Leave, Run(0)]);
-    let again = writer.write(0, &[Restore(0), Enter, Leave, Run(0)]);
+    let from_initialization = writer.write(0, &[Restore(1), Leave, Run(0)]);
+    let from_new = writer.write(0, &[Restore(0), Enter, Leave, Run(0)]);
     let criteria = [
-        fails(&writer.sequence, [back.ids, again.ids].concat()),
-        checker.continued(&first, &back.reads, "{} was {}, from the state of Initialization Mode it is {}"),
-        checker.continued(&first, &again.reads, "{} was {}, from the state of the new instance it is {}"),
+        fails(&writer.sequence, [from_initialization.ids, from_new.ids].concat()),
+        checker.continued(
+            &first,
+            &from_initialization.reads,
+            "{} was {}, from the state of Initialization Mode it is {}",
+        ),
+        checker.continued(&first, &from_new.reads, "{} was {}, from the state of the new instance it is {}"),
     ];
     checker.check("states.modes", writer.sequence, any(criteria))
 }
 
-/// Checks a handle that is used for a second state, and switching between two saved states.
+/// Checks that a handle can be used for a second state, and that an instance can switch between two saved states.
 fn reused(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     if trajectory.points.len() < 3 {
         return Ok(());
@@ -82,10 +86,10 @@ fn reused(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let [again, second] = writer.groups(0, &[Restore(0), Restore(1), ReadAll, Run(2), Restore(0)]);
     writer.point(0, &trajectory.points[1]);
     let from_first = writer.write(0, &[ReadAll, Drop(0), Drop(1)]).reads;
-    let used = "{} was {}, from the state in a used handle it is {}";
+    let message = "{} was {}, from the state in a used handle it is {}";
     let criteria = [
-        checker.differ(&values, &again, used),
-        checker.continued(&first, &second, used),
+        checker.differ(&values, &again, message),
+        checker.continued(&first, &second, message),
         checker.continued(&values, &from_first, "{} was {}, from the other state it is {}"),
     ];
     checker.check("states.several", writer.sequence, any(criteria))
@@ -106,9 +110,9 @@ fn free_null(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     })
 }
 
-/// Checks that a simulation from a serialized state equals the first one, in a new instance and in a new process.
+/// Checks that a simulation from a serialized state equals the first one, in a new instance of the same process and of a new process.
 pub fn serialized(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    for (index, fresh) in indices(trajectory).into_iter().flat_map(|index| [(index, false), (index, true)]) {
+    for (index, fresh) in saved_at(trajectory).into_iter().flat_map(|index| [(index, false), (index, true)]) {
         let mut writer = checker.writer(trajectory);
         let before = writer.write(0, &[Begin, Points(index), ReadAll, Save(0)]).reads;
         let [size, bytes] = writer.serialize(0, 0);
@@ -118,7 +122,7 @@ pub fn serialized(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<
         } else {
             writer.write(0, &[Drop(0), Free]);
         }
-        // Importers set states after instantiation or after initialization.
+        // An importer may restore a state after the instantiation or after the initialization, so both are tried.
         writer.write(1, &[if index == 0 && fresh { Make } else { Begin }]);
         let read = writer.deserialize(1, 0, 1);
         let set = writer.write(1, &[Restore(1), ReadAll]);
@@ -134,11 +138,11 @@ pub fn serialized(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<
             [bytes, size].iter().all(|id| run.succeeds(*id)).then(|| criterion(run))?
         })?;
     }
-    again(checker, trajectory)
+    serialized_again(checker, trajectory)
 }
 
-/// Checks that a deserialized state is serialized to the same bytes again.
-fn again(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+/// Checks that a deserialized state is serialized to the same bytes.
+fn serialized_again(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.write(0, &[Begin, Points(trajectory.points.len() / 2), Save(0)]);
     let [_, first] = writer.serialize(0, 0);

@@ -1,5 +1,5 @@
-//! Checks that strings belong to their variable and their instance: several are set to different values and read in turns and on
-//! threads.
+//! Checks that each variable of each instance has a separate string. Two instances get different strings, which are read in turns and on
+//! two threads.
 
 use super::start_values::{settable, values_are_kept};
 use crate::call_sequence::{Numbered, Step, Values};
@@ -9,29 +9,29 @@ use crate::writer::Part::{Enter, Free, Leave, Make, Points};
 use crate::writer::{Part, Trajectory, Writer};
 use fmi_abi::BaseType;
 
-/// Number of reads on each thread, so that reads overlap.
+/// Number of reads on each thread. There are many, so that reads on different threads overlap.
 const READS: usize = 40;
 
-/// Returns different strings for the variables of an instance, longer than usual buffers in structures.
+/// Returns a different string for each settable string variable of an instance.
 fn strings(checker: &Checker, instance: usize) -> Vec<(usize, Values)> {
     let variables = &checker.description.variables;
     let mut indices = settable(checker);
     indices.retain(|index| variables[*index].base == Some(BaseType::String));
-    let text = |index: usize| format!("string {index} of instance {instance} {}", "xyz".repeat(instance));
+    let string = |index: usize| format!("string {index} of instance {instance} {}", "xyz".repeat(instance));
     let values = indices.into_iter().take(100);
     values
-        .map(|index| (index, Values::strings(text(index).as_bytes(), variables[index].starts_count())))
+        .map(|index| (index, Values::strings(string(index).as_bytes(), variables[index].starts_count())))
         .collect()
 }
 
-/// Checks that a simulation with these strings succeeds and that each is read as it was set, from two instances in turns: after the
-/// strings of the other one were set and read, after its initialization and steps, and after it was freed.
+/// Checks that getters return the strings that were set in two instances, which are called in turns. Both are read after each part of the
+/// simulation, and instance 1 also after instance 2 was freed.
 pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let of = [1, 2].map(|instance| strings(checker, instance));
-    if of[0].is_empty() {
+    let values = [1, 2].map(|instance| strings(checker, instance));
+    if values[0].is_empty() {
         return Ok(());
     }
-    let indices: Vec<usize> = of[0].iter().map(|(index, _)| *index).collect();
+    let indices: Vec<usize> = values[0].iter().map(|(index, _)| *index).collect();
     let mut writer = checker.writer(trajectory);
     let mut sets = Vec::new();
     let mut reads = [Vec::new(), Vec::new()];
@@ -40,7 +40,7 @@ pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<(
     };
     for instance in [1, 2] {
         writer.make(instance);
-        sets.extend(writer.set(instance, &of[instance - 1]));
+        sets.extend(writer.set(instance, &values[instance - 1]));
     }
     let parts: [&[Part]; 3] = [&[Enter], &[Leave], &[Points(2)]];
     for part in parts {
@@ -51,50 +51,51 @@ pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<(
     }
     writer.write(2, &[Free]);
     read(&mut writer, 1);
-    let kept = |instance: usize| {
+    let are_kept = |instance: usize| {
         let reads = reads[instance - 1].clone();
-        let (sets, values) = (sets.clone(), of[instance - 1].clone());
+        let (sets, values) = (sets.clone(), values[instance - 1].clone());
         let has = "reads, next to another instance,";
         let each = move |reads| values_are_kept(checker, sets.clone(), reads, values.clone(), has);
         reads.into_iter().map(each)
     };
-    let criteria = any(kept(1).chain(kept(2)).collect::<Vec<_>>());
+    let criteria = any(are_kept(1).chain(are_kept(2)).collect::<Vec<_>>());
     let sequence = writer.sequence.clone();
     let sets = sets.clone();
     checker.check("results.instances", writer.sequence, move |run| {
-        // A model may reject the strings.
+        // A model may reject the strings, which is not a finding.
         failure(&sequence, run, &sets).is_none().then(|| criteria(run))?
     })
 }
 
-/// Checks that two instances on different threads return their own strings, if each string is copied immediately, as importers do.
+/// Checks that two instances on different threads return the string that was set in them. The string is copied immediately, as importers
+/// do.
 pub fn threads(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let of = [1, 2].map(|instance| strings(checker, instance));
-    let Some((index, _)) = of[0].first().cloned() else { return Ok(()) };
+    let values = [1, 2].map(|instance| strings(checker, instance));
+    let Some((index, _)) = values[0].first().cloned() else { return Ok(()) };
     let mut writer = checker.writer(trajectory);
-    let begin = |writer: &mut Writer, instance: usize, reads: usize| {
+    let write_instance = |writer: &mut Writer, instance: usize, reads: usize| {
         writer.write(instance, &[Make]);
-        let mut ids = writer.set(instance, &of[instance - 1]);
+        let mut ids = writer.set(instance, &values[instance - 1]);
         ids.extend(writer.write(instance, &[Enter, Leave]).ids);
         let reads: Vec<_> = (0..reads).map(|_| writer.read_these(instance, &[index])).collect();
         writer.free(instance);
         (ids, reads)
     };
     let mut criteria = Vec::new();
-    let mut kept = |(ids, reads): (Vec<u32>, Vec<Vec<_>>), instance: usize| {
+    let mut expect_kept = |(ids, reads): (Vec<u32>, Vec<Vec<_>>), instance: usize| {
         let has = "reads, next to an instance on another thread,";
-        let values = vec![of[instance - 1][0].clone()];
+        let values = vec![values[instance - 1][0].clone()];
         criteria.extend(
             reads.into_iter().map(|read| values_are_kept(checker, ids.clone(), read, values.clone(), has)),
         );
     };
     for instance in [1, 2] {
-        begin(&mut writer, instance, 1);
+        write_instance(&mut writer, instance, 1);
     }
     let mut sequences: Vec<Vec<Numbered>> = Vec::new();
     for instance in [1, 2] {
         let mut thread = Writer { next: writer.next, ..checker.writer(trajectory) };
-        kept(begin(&mut thread, instance, READS), instance);
+        expect_kept(write_instance(&mut thread, instance, READS), instance);
         writer.next = thread.next;
         sequences.push(thread.sequence);
     }

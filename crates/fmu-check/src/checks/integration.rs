@@ -1,4 +1,4 @@
-//! An integration of Model Exchange with larger inputs and more events than the usual simulation.
+//! Integrates Model Exchange with larger inputs, which cause more events than the usual simulation.
 
 use crate::call_sequence::{Integration, Step, Values};
 use crate::checker::Checker;
@@ -7,10 +7,10 @@ use crate::values::inputs_by;
 use crate::writer::Part::{Enter, Leave, Make};
 use crate::writer::{Point, Trajectory};
 
-/// An integration and the indices of its points, at most `POINTS`, at which something happens.
-pub struct Excited {
+/// Integration, and the points at which checks compare values.
+pub struct Integrated {
     pub trajectory: Trajectory,
-    /// Points with state events first, then with time events and without events.
+    /// Indices of at most `POINTS` points: first points with state events, then one with a time event, then points without events.
     pub chosen: Vec<usize>,
 }
 
@@ -20,27 +20,28 @@ const POINTS: usize = 4;
 /// Number of intervals of the integration.
 const INTERVALS: usize = 40;
 
-/// Integrates Model Exchange from the start of the default experiment, and returns the states at the ends of intervals and at time events.
-/// A point has an event if the integration has handled one since the point before; a state event is then somewhat late, as with an
-/// importer that does not locate it. Returns the usual simulation if the integration fails.
-pub fn excited(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<Excited> {
+/// Integrates Model Exchange from the start of the default experiment. The points are the ends of the intervals and the time events. A
+/// point has an event if the integration has handled one since the point before. So state events come somewhat late, as in an importer that
+/// does not locate them. If the integration fails, returns the usual simulation.
+pub fn integrate_with_events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<Integrated> {
     let description = &checker.description;
     let size = step_size(description);
-    // The ends of the intervals are at no likely event.
-    let at = |number: usize| description.start_time + (number as f64 + 0.381_966) * size;
-    let grid: Vec<f64> = (0..INTERVALS).map(at).collect();
-    let first = integrate(checker, trajectory, &grid)?;
+    // Events are unlikely at these ends of intervals, because the fraction is unusual.
+    let end = |number: usize| description.start_time + (number as f64 + 0.381_966) * size;
+    let ends: Vec<f64> = (0..INTERVALS).map(end).collect();
+    let first = integrate(checker, trajectory, &ends)?;
     let time_events = first.iter().filter(|reached| reached.event.is_some() && !reached.is_state_event);
     let mut times: Vec<f64> =
-        grid.into_iter().take(first.len()).chain(time_events.filter_map(|of| of.event)).collect();
+        ends.into_iter().take(first.len()).chain(time_events.filter_map(|of| of.event)).collect();
     times.sort_by(f64::total_cmp);
+    // The second integration ends intervals at the time events, too.
     let second = integrate(checker, trajectory, &times)?;
     if second.len() < 2 {
         let chosen = (0..trajectory.points.len()).take(POINTS).collect();
-        return Ok(Excited { trajectory: trajectory.clone(), chosen });
+        return Ok(Integrated { trajectory: trajectory.clone(), chosen });
     }
-    let kinds = second.iter().map(|reached| (reached.event.is_some(), reached.is_state_event));
-    let kinds: Vec<(bool, bool)> = kinds.collect();
+    let kind = |reached: &Reached| (reached.event.is_some(), reached.is_state_event);
+    let kinds: Vec<(bool, bool)> = second.iter().map(kind).collect();
     let of_kind = |kind: (bool, bool), count: usize| {
         kinds.iter().enumerate().filter(move |(_, of)| **of == kind).map(|(index, _)| index).take(count)
     };
@@ -55,18 +56,20 @@ pub fn excited(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<Exc
         points.push(Point { time, size, inputs: inputs.clone(), states: reached.states, event });
     }
     let end = points.last().map_or(trajectory.end, |point| point.time);
-    Ok(Excited { trajectory: Trajectory { interface: trajectory.interface, points, end }, chosen })
+    Ok(Integrated { trajectory: Trajectory { interface: trajectory.interface, points, end }, chosen })
 }
 
-/// Result of an integration over an interval.
+/// Result of the integration of an interval.
 struct Reached {
+    /// States at the end of the interval.
     states: Vec<f64>,
     /// Time of the first event, if there is one.
     event: Option<f64>,
+    /// Whether the interval has a state event.
     is_state_event: bool,
 }
 
-/// Integrates up to each of these times; returns the results of the intervals before the first that fails.
+/// Integrates intervals that end at these times. Returns the results of the intervals before the first one that fails.
 fn integrate(checker: &Checker, trajectory: &Trajectory, times: &[f64]) -> anyhow::Result<Vec<Reached>> {
     let description = &checker.description;
     let states = description.states_count().unwrap_or(0);

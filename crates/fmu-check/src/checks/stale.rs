@@ -1,0 +1,213 @@
+//! Checks that Model Exchange returns values of the current discrete states and inputs, in Event Mode and after it.
+
+use super::integration::{Integrated, integrate_with_events};
+use super::snapshots::{Snapshot, Unknowns};
+use crate::call_sequence::{Arg, Kind, Run, Values};
+use crate::checker::Checker;
+use crate::description::Description;
+use crate::values::inputs_by;
+use crate::writer::{Point, Trajectory, Writer};
+use std::sync::Arc;
+
+/// Smallest difference that is a finding, relative to the largest magnitude of the number in the simulation. Smaller differences are
+/// normal, because FMUs solve algebraic loops by iteration.
+const TOLERANCE: f64 = 1e-3;
+
+/// Snapshots at a point, all at the same time. They have the states and inputs after the event, unless a comment says otherwise.
+struct PointSnapshots {
+    time: f64,
+    /// In Event Mode, after the last update.
+    in_event: Snapshot,
+    /// After Event Mode.
+    after: Snapshot,
+    /// After the time and the same states were set again.
+    set_again: Snapshot,
+    /// After other states and then the first states were set.
+    set_back: Snapshot,
+    /// With other inputs, before and after the time and the states were set again.
+    other_inputs: [Snapshot; 2],
+    /// After the first inputs were set, before and after the time and the states were set again.
+    first_inputs: [Snapshot; 2],
+    /// With other states, before and after CompletedIntegratorStep.
+    other_states: [Snapshot; 2],
+}
+
+/// Returns the states after an event at each of the points `at`; they are empty if they were not read.
+fn states_after(checker: &Checker, trajectory: &Trajectory, at: &[usize]) -> anyhow::Result<Vec<Vec<f64>>> {
+    let count = checker.description.states_count().unwrap_or(0);
+    let mut writer = checker.writer(trajectory);
+    writer.begin(0);
+    let mut ids = Vec::new();
+    for (index, point) in trajectory.points.iter().enumerate() {
+        writer.point(0, &Point { event: point.event || at.contains(&index), ..point.clone() });
+        if at.contains(&index) && count > 0 {
+            ids.push(writer.vector(0, "GetContinuousStates", count));
+        }
+    }
+    let run = checker.execute(&writer.sequence)?;
+    Ok(ids.into_iter().map(|id| run.written(id).map(Values::numbers).unwrap_or_default()).collect())
+}
+
+/// Checks that unknowns are a function of time, states, inputs and discrete states. Their values after an event, after inputs were set, and
+/// in Event Mode after the last update must equal their values after the same time, states and inputs were set again.
+pub fn stale(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let Integrated { trajectory, chosen: mut at } = integrate_with_events(checker, trajectory)?;
+    at.sort_unstable();
+    let states = states_after(checker, &trajectory, &at)?;
+    let mut unknowns = Unknowns::new(checker, &trajectory);
+    // An FMU that computes partial derivatives by differences may change other values, so partial derivatives are read separately.
+    if let directional @ Some(_) = unknowns.directional.take() {
+        let only_derivatives = Unknowns { variables: Vec::new(), states: 0, indicators: 0, directional };
+        depend_on_arguments(checker, &trajectory, &at, &states, only_derivatives)?;
+    }
+    depend_on_arguments(checker, &trajectory, &at, &states, unknowns)
+}
+
+/// Compares the snapshots at the points `at`. `states` are the states after an event at these points.
+fn depend_on_arguments(
+    checker: &Checker,
+    trajectory: &Trajectory,
+    at: &[usize],
+    states: &[Vec<f64>],
+    unknowns: Unknowns,
+) -> anyhow::Result<()> {
+    let description = &checker.description;
+    let mut writer = checker.writer(trajectory);
+    writer.begin(0);
+    let mut all = Vec::new();
+    for (index, point) in trajectory.points.iter().enumerate() {
+        let Some(position) = at.iter().position(|chosen| *chosen == index) else {
+            writer.point(0, point);
+            continue;
+        };
+        let states = states.get(position).map_or(&[][..], Vec::as_slice);
+        all.push(write_point(&mut writer, &unknowns, point, states));
+    }
+    let names = unknowns.names(description);
+    let compared = Arc::new(Compared { description: Arc::clone(description), unknowns, names, points: all });
+    let in_event = Arc::clone(&compared);
+    let run = checker.evaluate("dynamics.stale", writer.sequence.clone(), move |run| {
+        compared.first_difference(run, |point| {
+            let [other_inputs, other_inputs_again] = &point.other_inputs;
+            let [first_inputs, first_inputs_again] = &point.first_inputs;
+            let [before_completed, after_completed] = &point.other_states;
+            vec![
+                (&point.after, &point.set_again, "after an event"),
+                (&point.after, first_inputs_again, "after an event"),
+                (&point.set_back, &point.set_again, "after other states were set and set back"),
+                (other_inputs, other_inputs_again, "after inputs were set"),
+                (first_inputs, first_inputs_again, "after inputs were set"),
+                (before_completed, after_completed, "before CompletedIntegratorStep"),
+            ]
+        })
+    })?;
+    checker.record("dynamics.event-mode", &run, &writer.sequence, move |run| {
+        in_event.first_difference(run, |point| {
+            vec![(&point.in_event, &point.first_inputs[1], "in Event Mode after the last update")]
+        })
+    });
+    Ok(())
+}
+
+/// Writes an event at a point, and the snapshots there. `states` are the states after the event.
+fn write_point(writer: &mut Writer, unknowns: &Unknowns, point: &Point, states: &[f64]) -> PointSnapshots {
+    // Sets the time, and the states increased by `by` times their magnitude.
+    let set_states = |writer: &mut Writer, by: f64| {
+        writer.call(0, "SetTime", vec![Arg::real(point.time)]);
+        if !states.is_empty() {
+            let states: Vec<f64> = states.iter().map(|state| state + by * state.abs().max(1e-3)).collect();
+            writer.set_states(0, &states);
+        }
+    };
+    let is_set = |index: usize| point.inputs.iter().any(|(input, _)| *input == index);
+    let mut other_values = inputs_by(writer.description, 0.3);
+    other_values.retain(|(index, _)| is_set(*index));
+    writer.point(0, &Point { event: false, ..point.clone() });
+    writer.call(0, "EnterEventMode", vec![]);
+    writer.update(0);
+    let in_event = unknowns.read(writer);
+    writer.call(0, "EnterContinuousTimeMode", vec![]);
+    let after = unknowns.read(writer);
+    set_states(writer, 0.0);
+    let set_again = unknowns.read(writer);
+    set_states(writer, 1e-3);
+    unknowns.read(writer);
+    set_states(writer, 0.0);
+    let set_back = unknowns.read(writer);
+    let mut with_inputs = |values: &[(usize, Values)]| {
+        writer.set(0, values);
+        let before = unknowns.read(writer);
+        set_states(writer, 0.0);
+        [before, unknowns.read(writer)]
+    };
+    let other_inputs = with_inputs(&other_values);
+    let first_inputs = with_inputs(&point.inputs);
+    set_states(writer, 1e-3);
+    let before = unknowns.read(writer);
+    let flag = Arg::Out(if writer.fmi3() { Kind::U8 } else { Kind::I32 }, 1);
+    writer.call(0, "CompletedIntegratorStep", vec![Arg::Integer(0), flag.clone(), flag]);
+    let other_states = [before, unknowns.read(writer)];
+    let time = point.time;
+    PointSnapshots { time, in_event, after, set_again, set_back, other_inputs, first_inputs, other_states }
+}
+
+/// Snapshots at several points, and the names of their numbers.
+struct Compared {
+    description: Arc<Description>,
+    unknowns: Unknowns,
+    names: Vec<String>,
+    points: Vec<PointSnapshots>,
+}
+
+/// Two snapshots whose numbers must be equal, and when the first one was read.
+type Pair<'a> = (&'a Snapshot, &'a Snapshot, &'static str);
+
+impl Compared {
+    fn numbers(&self, run: &Run, snapshot: &Snapshot) -> Vec<Option<f64>> {
+        self.unknowns.numbers(&self.description, run, snapshot)
+    }
+
+    /// Returns the largest magnitude of each number in all snapshots.
+    fn magnitudes(&self, run: &Run) -> Vec<f64> {
+        let mut magnitudes = vec![0.0_f64; self.names.len()];
+        let snapshots = self.points.iter().flat_map(|point| {
+            let pairs = point.other_inputs.iter().chain(&point.first_inputs).chain(&point.other_states);
+            [&point.in_event, &point.after, &point.set_again, &point.set_back].into_iter().chain(pairs)
+        });
+        for snapshot in snapshots {
+            for (magnitude, number) in magnitudes.iter_mut().zip(self.numbers(run, snapshot)) {
+                *magnitude = number.map_or(*magnitude, |number| magnitude.max(number.abs()));
+            }
+        }
+        magnitudes
+    }
+
+    /// Describes the first number that differs between the snapshots of a pair.
+    fn first_difference(
+        &self,
+        run: &Run,
+        pairs: impl Fn(&PointSnapshots) -> Vec<Pair<'_>>,
+    ) -> Option<String> {
+        let magnitudes = self.magnitudes(run);
+        self.points.iter().find_map(|point| {
+            // These three snapshots have equal arguments, so their differences are the error of an iterative solver.
+            let repeated = [&point.set_again, &point.set_back, &point.first_inputs[1]]
+                .map(|snapshot| self.numbers(run, snapshot));
+            pairs(point).into_iter().find_map(|(one, other, when)| {
+                let (one, other) = (self.numbers(run, one), self.numbers(run, other));
+                (0..self.names.len()).find_map(|index| {
+                    let (is, must) = (one[index]?, other[index]?);
+                    let [again, back, fresh] = repeated.each_ref().map(|numbers| numbers[index]);
+                    let noise = (again? - fresh?).abs().min((back? - fresh?).abs());
+                    let allowed = TOLERANCE * magnitudes[index] + 100.0 * noise;
+                    ((is - must).abs() > allowed).then(|| {
+                        format!(
+                            "{} at {:?} is {is:?} {when}, and {must:?} with the same time, states and inputs later",
+                            self.names[index], point.time
+                        )
+                    })
+                })
+            })
+        })
+    }
+}
