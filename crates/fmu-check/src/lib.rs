@@ -6,8 +6,8 @@
 //! the results. The call sequence of a finding is shortened (`shrink`) within the limits of the standard (`legal`), and written as
 //! a program in C (`reproduce`). Only `worker` has `unsafe` code: an FMU may crash its process.
 //!
-//! Each module uses only modules before it: `call_sequence`, `finding`, `rules`, `description`, `values`, `legal`, `writer`,
-//! `shrink`, `worker`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`, `checks`, `baseline`, `report`.
+//! Each module uses only modules before it: `random`, `call_sequence`, `finding`, `rules`, `description`, `values`, `legal`,
+//! `writer`, `shrink`, `worker`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`, `checks`, `baseline`, `report`.
 
 mod always;
 mod baseline;
@@ -18,6 +18,7 @@ mod description;
 mod finding;
 mod legal;
 mod options;
+mod random;
 mod report;
 mod reproduce;
 mod rules;

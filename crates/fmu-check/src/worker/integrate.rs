@@ -1,6 +1,6 @@
 //! Integration of Model Exchange with steps of one size and events, as a simple importer does it.
 
-use super::Executor;
+use super::executor::Executor;
 use crate::call_sequence::{Arg, Integration, Kind, Outcome, Values};
 
 /// Maximum number of events in an integration; a model with more is not compared.

@@ -2,8 +2,10 @@
 //! The server adopts and ends the orphaned processes of a call sequence.
 
 use super::contain::{MOST_PROCESSES, abandoned, adopt_descendants, descendants, end_descendants, isolate};
+use super::job::{Ended, Program, SCRATCH, VARIABLE};
 use super::memory::calls_under_way;
-use super::{Ended, File, Program, SCRATCH, VARIABLE, work};
+use super::work::{end, limit, work};
+use std::fs::File;
 use std::io::{Read as _, Seek as _, Write as _};
 use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
 use std::path::Path;
@@ -72,15 +74,15 @@ fn execute(job: &str, [output, outcomes]: [File; 2]) -> ! {
     }
     drop((nothing, output));
     if let Ok(Program { program, fmu, memory }) = serde_json::from_str(job) {
-        super::limit(memory);
+        limit(memory);
         let mut command = std::process::Command::new(program);
         // The program's files are in the directory of this server, which clears it.
         let here = std::env::current_dir().unwrap_or_default();
         command.arg(fmu).env("TMPDIR", here).env_remove(VARIABLE).env_remove(SCRATCH);
-        super::end(Err(command.exec().to_string()));
+        end(Err(command.exec().to_string()));
     }
     let read = serde_json::from_str(job).map_err(|error| error.to_string());
-    super::end(read.map(|job| work(job, outcomes)))
+    end(read.map(|job| work(job, outcomes)))
 }
 
 /// Waits for a process for at most `limit` seconds. Returns its wait status if it ended, or the number of processes if there are

@@ -72,7 +72,7 @@ fn linux() -> Vec<String> {
 
 #[cfg(unix)]
 mod unix {
-    use crate::worker::text_at;
+    use crate::worker::logger::text_at;
     use fmi_abi::c_types::{c_char, c_int, c_uint};
     use std::sync::atomic::{AtomicPtr, Ordering};
 

@@ -1,7 +1,7 @@
 //! Event iteration: an update of the discrete states is repeated while the FMU needs another one, because no importer may leave
 //! Event Mode before.
 
-use super::{Content, Kept};
+use super::arrays::{Content, Kept};
 use crate::call_sequence::Values;
 
 /// Maximum number of updates in an event.

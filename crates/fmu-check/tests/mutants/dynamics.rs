@@ -1,7 +1,7 @@
 //! Faults in the behaviour in time, several at a time, because a check takes longer than their findings.
 
 use super::packing::{library, pack};
-use super::{UNLIMITED, check};
+use super::wagon::{UNLIMITED, check};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;

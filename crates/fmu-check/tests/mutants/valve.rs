@@ -1,7 +1,7 @@
 //! A second FMU with seeded faults, [valve.c](valve.c): several at a time, each of which is found under the name of its rule.
 
 use super::packing::{library, pack};
-use super::{UNLIMITED, check, reproduced, unpack};
+use super::wagon::{UNLIMITED, check, reproduced, unpack};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
