@@ -1,4 +1,4 @@
-//! Evaluates runs: violations of rules, and processes that end before the last step.
+//! Evaluates runs: finds violations of rules, and processes that ended before the last step.
 
 use super::{Checker, at};
 use crate::always;
@@ -53,11 +53,13 @@ impl Checker {
         self.evaluate(name, sequence, criterion).map(|_| ())
     }
 
-    /// Returns the criterion that reads are equal. The message has `{}` for the variable, its value and the other value.
+    /// Returns a criterion that is violated if corresponding reads differ. In the message, the three `{}` are replaced by the
+    /// variable, its value in `one` and its value in `other`.
     pub fn differ(&self, one: &[Read], other: &[Read], message: &'static str) -> Box<dyn Criterion> {
         self.differ_by(0.0, one, other, message)
     }
 
+    /// Returns a criterion like `differ`, which allows relative differences up to `tolerance`.
     fn differ_by(
         &self,
         tolerance: f64,
@@ -73,21 +75,21 @@ impl Checker {
         })
     }
 
-    /// Returns the criterion that reads are equal within 20 times the tolerance of the default experiment. A solver with variable steps
-    /// that continues from a restored state may differ by more than the tolerance, because the tolerance limits the error of a single step,
-    /// while the errors of several steps add up and derivatives amplify them.
+    /// Returns a criterion like `differ`, which allows differences up to 20 times the tolerance of the default experiment. A
+    /// solver with variable steps that continues from a restored state may differ by more than the tolerance, because the
+    /// tolerance limits the error of a single step, while the errors of several steps add up and derivatives amplify them.
     pub fn continued(&self, one: &[Read], other: &[Read], message: &'static str) -> Box<dyn Criterion> {
         self.differ_by(20.0 * self.description.tolerance(), one, other, message)
     }
 
-    /// Returns the reason for which this machine cannot load the library, if other machines can: a shared library that the FMU does
-    /// not contain, or a newer version of a system library, is missing.
+    /// Returns the reason why the library cannot be loaded, if this machine is the reason: it lacks a shared library that the FMU
+    /// does not contain, or one of its system libraries is too old.
     pub fn lacks(&self, run: &Run) -> Option<String> {
         let End::Unloadable(why) = &run.end else { return None };
         let missing = why.split_once(": cannot open shared object file").map(|(name, _)| name.trim());
         let missing = missing.map(|name| name.rsplit_once(": ").map_or(name, |(_, name)| name));
         let directory = self.setting.libraries.iter().flatten().find_map(|library| library.parent());
-        // An FMU that contains the missing library does not find it on any machine.
+        // If the FMU contains the missing library, no machine finds it, so the FMU is the reason.
         let is_missing = |name: &&str| {
             directory.is_some_and(|directory| !directory.join(name).exists() && !name.contains('/'))
         };
@@ -111,7 +113,8 @@ impl Checker {
             let at = name_at(run, &sequence);
             let floods = matches!(run.end, End::Flood(_));
             Arc::new(move |run: &Run| {
-                // How many processes are alive at a time depends on the scheduler.
+                // How many processes are alive at a time depends on the scheduler, so any remaining process reproduces the
+                // finding.
                 if floods && !run.orphans.is_empty() {
                     return Some(format!(
                         "{} processes are alive after the call sequence",
@@ -130,7 +133,8 @@ impl Checker {
             self.add(ended);
             Ok(())
         };
-        // A repetition with accessible memory after each array reveals an access beyond an array.
+        // If a repetition with accessible memory after each array does not crash, or changes that memory, the crash was an access
+        // beyond an array.
         if matches!(run.end, End::Crash(_)) && cfg!(unix) && !forbidden {
             let soft = Setting { soft: true, ..self.setting.clone() };
             let again = self.workers.execute(&soft, sequence, self.limit)?;
@@ -149,16 +153,18 @@ impl Checker {
             End::Exit(_) => "exit",
             _ => "crash",
         };
-        // An end that only this call sequence can reach is named after its rule, any other after the topic.
-        let own = ["fresh-process", "unload", "exit", "location"].iter().any(|name| rule.ends_with(name));
+        // The finding has the name of the rule if only its call sequence can end the process in this way, otherwise the name of
+        // the topic.
+        let has_own_name =
+            ["fresh-process", "unload", "exit", "location"].iter().any(|name| rule.ends_with(name));
         let name = match rule.split_once('.') {
-            Some((topic, _)) if !own && (!forbidden || topic == "rejections") => topic,
+            Some((topic, _)) if !has_own_name && (!forbidden || topic == "rejections") => topic,
             _ => rule,
         };
         record(&format!("{name}.{what}"), observed)
     }
 
-    /// Returns the result of a successful update of the discrete states.
+    /// Returns the result of an update of the discrete states; `None` if the update failed.
     pub fn event(&self, run: &Run, id: u32) -> Option<Event> {
         event(run, id, self.fmi3())
     }

@@ -10,7 +10,7 @@ use crate::finding::{Finding, step_name};
 use crate::legal::first_illegal;
 use crate::run::{Stop, Workers};
 use crate::worker::interrupted;
-use crate::writer::{READ, Trajectory, Writer, sample};
+use crate::writer::{MAX_READ, Trajectory, Writer, sample};
 use fmi_abi::{Interface, Standard};
 pub use records::Unchecked;
 use records::record;
@@ -18,13 +18,14 @@ use std::collections::HashSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::{Duration, Instant};
 
-/// Duration of a quick check in seconds.
+/// Maximum duration of a quick check in seconds.
 const QUICK: f64 = 30.0;
 
-/// Part of the duration for the checks. The rest is for shortening call sequences and for the programs that reproduce the findings.
+/// Fraction of the duration that is for the checks. The rest is for shortening call sequences and for the programs that reproduce
+/// the findings.
 const CHECKS: f64 = 0.8;
 
-/// Returns the step in which a process ended before the last step.
+/// Returns the step in which the process of a run ended; `None` if its last step returned.
 fn at<'s>(sequence: &'s CallSequence, run: &Run) -> Option<&'s Numbered> {
     step_of(sequence, run.at?)
 }
@@ -44,16 +45,17 @@ pub struct Checker {
     pub limit: f64,
     /// Instant after which no check starts a call sequence.
     pub deadline: Instant,
-    /// Instant at which the check ends.
+    /// Instant at which the check ends, including the programs that reproduce the findings.
     pub end: Instant,
-    /// Whether fewer values and call sequences are tried.
+    /// Whether this is a quick check, which tries fewer values and call sequences.
     pub quick: bool,
     found: Mutex<Vec<Finding>>,
     unchecked: Mutex<Vec<Unchecked>>,
     /// Lock that each call sequence holds for reading. A suspected hang is repeated with the lock held for writing, so that no
     /// other call sequence is executed at the same time.
     exclusive: RwLock<()>,
-    /// Functions that did not return in a repetition with three times the limit and no other call sequence.
+    /// Functions that did not return even when their call sequence was repeated with three times the limit and no other call
+    /// sequence was executed.
     hung: Mutex<HashSet<String>>,
     executed: Mutex<u64>,
 }
@@ -74,7 +76,7 @@ impl Checker {
         let time = if options.quick { QUICK } else { options.time.max(1.0) };
         let limit = if options.quick { options.limit.min(2.4) } else { options.limit };
         Self {
-            readable: sample(&description, READ),
+            readable: sample(&description, MAX_READ),
             description: Arc::new(description),
             setting,
             workers,
@@ -96,11 +98,12 @@ impl Checker {
         Writer::new(&self.description, trajectory, &self.readable)
     }
 
+    /// Returns a call sequence that has only this step.
     pub fn step(&self, step: Step, forbidden: bool) -> CallSequence {
         vec![Numbered { id: 0, forbidden, step }]
     }
 
-    /// Returns a step that calls the function for the version, which loads the library.
+    /// Returns a step that reads the FMI version, for which the library must be loaded.
     pub fn version(&self) -> Step {
         Step::Version(if self.fmi3() { "fmi3GetVersion" } else { "fmi2GetVersion" }.to_owned())
     }
@@ -131,6 +134,7 @@ impl Checker {
         self.readable.iter().copied().filter(is_one).collect()
     }
 
+    /// Returns whether an interface type can save and restore states.
     pub fn saves(&self, interface: Interface) -> bool {
         self.can(interface, &["canGetAndSetFMUstate", "canGetAndSetFMUState"])
     }
@@ -144,6 +148,7 @@ impl Checker {
         !self.can(interface, &["canBeInstantiatedOnlyOncePerProcess"])
     }
 
+    /// Executes a call sequence with the usual limit.
     pub fn execute(&self, sequence: &CallSequence) -> anyhow::Result<Run> {
         self.execute_for(sequence, self.limit)
     }
@@ -188,12 +193,13 @@ impl Checker {
         }
     }
 
-    /// Returns the first step that the standard does not allow, which is an error in fmu-check.
+    /// Describes the first step that the standard does not allow. Only a mistake in fmu-check leads to such a step.
     fn illegal(&self, sequence: &CallSequence) -> Option<String> {
         let id = first_illegal(&self.description, sequence)?;
         Some(format!("{id} {:?}", step_of(sequence, id)?.step))
     }
 
+    /// Returns the number of call sequences that were executed.
     pub fn executed(&self) -> u64 {
         *locked(&self.executed)
     }
@@ -203,12 +209,12 @@ impl Checker {
         locked(&self.found).clone()
     }
 
-    /// Returns what was not checked so far.
+    /// Returns the interfaces and topics that were not checked so far.
     pub fn all_unchecked(&self) -> Vec<Unchecked> {
         locked(&self.unchecked).clone()
     }
 
-    /// Records an interface or a topic that was not checked, with the first reason.
+    /// Records that an interface or a topic was not checked. If there are several reasons, the first is recorded.
     pub fn unchecked(&self, name: &str, why: String) {
         let mut unchecked = locked(&self.unchecked);
         if !unchecked.iter().any(|known| known.name == name) {
@@ -224,7 +230,7 @@ impl Checker {
         }
     }
 
-    /// Records that all checks of a topic have ended, unless one of them was stopped.
+    /// Removes a topic whose reason is still `unfinished`, because all its checks have ended and none was stopped.
     pub fn finished(&self, topic: &str, unfinished: &str) {
         locked(&self.unchecked).retain(|known| known.name != topic || known.why != unfinished);
     }

@@ -1,4 +1,4 @@
-//! Shortens the call sequence of a finding, and proves the finding by a program in C.
+//! Proves findings: shortens the call sequence of a finding, and runs a program in C that reproduces it.
 
 use super::Checker;
 use crate::call_sequence::{CallSequence, End, Setting};
@@ -32,7 +32,8 @@ const STATES: &[&str] = &[
 ];
 const STEPS: &[&str] = &["SetTime", "DoStep", "CompletedIntegratorStep"];
 
-/// Findings whose criterion compares no calls, so calls are removed separately.
+/// Findings whose criterion does not compare simulations, so each call may be removed without the corresponding calls of other
+/// simulations.
 #[rustfmt::skip]
 const REMOVED_SEPARATELY: [&str; 5] = [
     "life_cycle.rejected", "life_cycle.states-changed", "results.early-return", "results.early-unreported", "start_values.inputs",
@@ -45,14 +46,15 @@ fn outline(observed: &str) -> String {
 }
 
 impl Checker {
-    /// Returns the setting that reproduces a finding. For a crash or an access beyond an array, arrays end at a guard page.
-    fn hard(&self, finding: &Finding) -> Setting {
+    /// Returns the parameters with which a finding is reproduced. For a crash or an access beyond an array, arrays always end at
+    /// a guard page.
+    fn reproducing_setting(&self, finding: &Finding) -> Setting {
         let ends = ["read-beyond", "written-beyond", "crash"].iter().any(|end| finding.name.ends_with(end));
         Setting { soft: self.setting.soft && !ends, ..self.setting.clone() }
     }
 
-    /// Shortens the call sequence of a finding, writes the program that reproduces it, and runs the program. A finding that the program
-    /// does not show becomes a note. Ends at the instant `until`.
+    /// Shortens the call sequence of a finding, writes the program that reproduces the finding, and runs the program. A finding
+    /// that its program does not show becomes a note. Ends at the instant `until`.
     pub fn prove(&self, finding: &mut Finding, scratch: &Path, shortens: bool, until: Instant) {
         if finding.criterion.is_none() {
             return;
@@ -63,7 +65,7 @@ impl Checker {
             self.shorten(finding, begin + until.saturating_duration_since(begin) / 2);
         }
         let mut proof = self.proof(finding, scratch, until);
-        // A call that was removed may be necessary in another process.
+        // The program may need a call that was removed, so it is also tried with the original call sequence.
         if matches!(proof, Proof::NotShown(_)) && finding.sequence.len() < sequence.len() {
             finding.steps.1 = sequence.len();
             (finding.sequence, finding.observed) = (sequence, observed);
@@ -72,7 +74,7 @@ impl Checker {
         finding.judge(proof);
     }
 
-    /// Writes the program of a finding, and runs it.
+    /// Writes the program of a finding, and returns whether a run of it shows the finding.
     fn proof(&self, finding: &mut Finding, scratch: &Path, until: Instant) -> Proof {
         let over =
             |_| Proof::NotRun(if interrupted() { Stop::Interrupted } else { Stop::TimeOver }.to_string());
@@ -88,8 +90,8 @@ impl Checker {
         proving.prove(finding)
     }
 
-    /// Writes the program that reproduces a finding; returns whether a repetition of its calls shows it. The limit is ten times as long,
-    /// except for a hang: the machine may be busy.
+    /// Repeats the calls of a finding, at most three times. If a repetition shows the finding, writes its program and returns
+    /// true. The limit is ten times as long as in the check, because the machine may be busy; a hang keeps the usual limit.
     fn reproduce(&self, finding: &mut Finding, until: Instant) -> anyhow::Result<bool> {
         let Some(criterion) = finding.criterion.clone() else { return Ok(false) };
         let patience = if finding.name.ends_with("hang") { 1.0 } else { 10.0 };
@@ -99,7 +101,11 @@ impl Checker {
             if remaining <= 0.0 {
                 return Err(Stop::TimeOver.into());
             }
-            let run = self.workers.execute(&self.hard(finding), &finding.sequence, limit.min(remaining))?;
+            let run = self.workers.execute(
+                &self.reproducing_setting(finding),
+                &finding.sequence,
+                limit.min(remaining),
+            )?;
             let found = criterion(&run).is_some() || finding.name == "package.symbols";
             if matches!(run.end, End::Hang(seconds) if seconds < limit && !finding.name.ends_with("hang")) {
                 return Err(Stop::TimeOver.into());
@@ -116,7 +122,7 @@ impl Checker {
     fn shorten(&self, finding: &mut Finding, until: Instant) {
         finding.steps = (finding.sequence.len(), finding.sequence.len());
         let Some(criterion) = finding.criterion.clone() else { return };
-        let setting = self.hard(finding);
+        let setting = self.reproducing_setting(finding);
         let hangs = finding.name.ends_with("hang");
         let limit = if hangs { self.limit.min(1.5) } else { self.limit };
         let mut remaining = match finding.topic() {
@@ -124,13 +130,12 @@ impl Checker {
             "resources" => 15,
             _ => 400,
         };
-        // If the criterion compares no calls, calls are removed separately.
         let removes_separately = REMOVED_SEPARATELY.contains(&finding.name.as_str());
         let ends = ["crash", "hang", "exit"].iter().any(|end| finding.name.ends_with(end));
         let pinned =
             PINNED.iter().find(|(topic, _)| *topic == finding.topic() && !ends && !removes_separately);
         let pinned = pinned.map_or(&[][..], |(_, calls)| calls);
-        // The observation of a shorter sequence may differ only in its numbers.
+        // A shorter sequence is accepted only if its observation differs in nothing but numbers.
         let (same, mut observed) = (outline(&finding.observed), finding.observed.clone());
         let mut reproduces = |tried: &CallSequence| {
             let remaining = until.saturating_duration_since(Instant::now()).as_secs_f64();
@@ -145,7 +150,8 @@ impl Checker {
             remaining -= 1;
             remaining >= 0 && Instant::now() < until && !interrupted() && reproduces(tried)
         });
-        // A finding that is not reproduced by every run is not shortened.
+        // If a repetition does not reproduce the finding, the finding does not occur in every run, so its sequence is not
+        // shortened.
         if short.len() < finding.sequence.len() && !reproduces(&short) {
             (short, observed) = (finding.sequence.clone(), finding.observed.clone());
         }

@@ -7,14 +7,14 @@ use crate::finding::Finding;
 pub struct Unchecked {
     /// Name of the interface or topic.
     pub name: String,
-    /// Reason for which it was not checked.
+    /// Reason why it was not checked.
     pub why: String,
     /// Whether an option or the baseline allows it.
     pub allowed: bool,
 }
 
-/// Records a finding. Of several with one name, the most severe is kept, and of these the one with the shortest call sequence.
-/// Its field `more` lists the other observations.
+/// Records a finding. Of several findings with the same name, the most severe is kept, and of equally severe ones the one with
+/// the shortest call sequence. The field `more` of the kept finding lists the other observations.
 pub fn record(found: &mut Vec<Finding>, mut finding: Finding) {
     let Some(kept) = found.iter_mut().find(|kept| kept.name == finding.name) else {
         found.push(finding);
@@ -36,7 +36,8 @@ mod tests {
     use super::record;
     use crate::finding::{Finding, Severity};
 
-    /// Checks that a more severe finding replaces one of the same name, whose observation remains in the list.
+    /// Checks that a more severe finding replaces one of the same name, and that the observation of the replaced finding is still
+    /// listed.
     #[test]
     fn no_evidence_is_lost() {
         let finding = |name: &str, severity, observed: &str| Finding {

@@ -5,13 +5,13 @@ use super::memory::{FILL, Guarded};
 use crate::call_sequence::{Kind, Values};
 use fmi_abi::c_types::c_char;
 
-/// Array of a call, which is freed after the call.
-pub struct Kept {
+/// Array that is passed to a call, and freed after it.
+pub struct PassedArray {
     pub array: Guarded,
     pub content: Content,
 }
 
-/// Content of an array: input for the FMU, values, or the handle, size or bytes of the saved state at an index.
+/// Content of an array: input for the FMU, a number of results, or the handle, size or bytes of the saved state at an index.
 pub enum Content {
     Input,
     Output(Kind, usize),
@@ -20,10 +20,12 @@ pub enum Content {
     Saved(usize),
 }
 
+/// Returns the pointer or size that an array consists of.
 pub fn word_of(array: &Guarded) -> u64 {
     array.bytes().try_into().map(usize::from_ne_bytes).unwrap_or_default() as u64
 }
 
+/// Returns the values that a call wrote to an array. Strings are read only if the call succeeded.
 pub fn read(array: &Guarded, kind: Kind, count: usize, succeeded: bool) -> Values {
     let words = array.bytes().chunks_exact(kind.size()).take(count).map(|bytes| {
         let mut word = [0; 8];

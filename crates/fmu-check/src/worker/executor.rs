@@ -1,6 +1,6 @@
 //! Libraries, instances and saved states of a worker, and calls of the functions of the FMU.
 
-use super::arrays::{Content, Kept, blobs, read, word_of};
+use super::arrays::{Content, PassedArray, blobs, read, word_of};
 use super::job::{EXECUTED, Unloadable};
 use super::logger::{ENVIRONMENT_STEP, ENVIRONMENTS, log_of_fmi2, log_of_fmi3, messages};
 use super::memory::{Guarded, in_fmu};
@@ -18,13 +18,13 @@ use std::io::Write as _;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-/// Whether several threads are running.
+/// Whether call sequences are being executed on several threads.
 pub static THREADS: AtomicBool = AtomicBool::new(false);
 
 /// Identifier of the process that executes the call sequence.
 pub static PROCESS: AtomicU32 = AtomicU32::new(0);
 
-/// Instance: its handle and the environment pointer that it received.
+/// Instance of the FMU: its handle, and the environment pointer that was passed to its instantiation.
 pub struct Instance {
     pub handle: usize,
     pub environment: usize,
@@ -38,14 +38,19 @@ pub struct Instance {
 // SAFETY: the callbacks are only read.
 unsafe impl Send for Instance {}
 
+/// State of a process that executes a call sequence.
 pub struct Executor {
     pub setting: Setting,
     /// Loaded libraries of Co-Simulation and Model Exchange.
     pub libraries: Mutex<[Option<&'static libloading::Library>; 2]>,
     pub instances: Mutex<HashMap<usize, Instance>>,
+    /// Handles of the saved states, by index.
     pub states: Mutex<HashMap<usize, usize>>,
+    /// Serialized states, by index.
     pub bytes: Mutex<HashMap<usize, Vec<u8>>>,
+    /// Sizes of serialized states that the FMU has returned, by index.
     pub sizes: Mutex<HashMap<usize, usize>>,
+    /// File for the outcomes of the steps.
     pub file: Mutex<File>,
 }
 
@@ -55,25 +60,28 @@ unsafe extern "C" {
 }
 
 impl Executor {
+    /// Writes a line of JSON to the file.
     pub fn write(&self, line: &impl Serialize) {
         #[cfg(unix)]
         if std::process::id() != PROCESS.load(Ordering::Relaxed) {
             // The FMU has forked this process. The child process waits until the server ends it.
             loop {
-                // SAFETY: waits.
+                // SAFETY: only waits for a signal.
                 unsafe { libc::pause() };
             }
         }
         let mut line = serde_json::to_vec(line).unwrap_or_default();
         line.push(b'\n');
-        // If the disk is full, the results are lost, and the checker reports an end of the process.
+        // If the disk is full, results are lost, and the checker reports that the process has ended early.
         let _ = locked(&self.file).write_all(&line);
     }
 
+    /// Returns the name of a function with its prefix.
     pub fn named(&self, end: &str) -> String {
         format!("{}{end}", if self.setting.fmi3 { "fmi3" } else { "fmi2" })
     }
 
+    /// Returns the address of a function, and loads the library before if necessary. Ends the process if that is not possible.
     pub fn find(&self, co_simulation: bool, name: &str) -> Option<*const c_void> {
         let index = usize::from(!co_simulation);
         let mut libraries = locked(&self.libraries);
@@ -100,6 +108,7 @@ impl Executor {
         found.ok().map(|symbol| *symbol).filter(|address| !address.is_null())
     }
 
+    /// Instantiates the FMU, and stores the instance at an index.
     pub fn make(&self, index: usize, make: &Make, outcome: &mut Outcome) {
         // Strings are unmapped after the call: an FMU must copy the strings that it uses later.
         let text = |text: &str| Guarded::new(&CString::new(text).unwrap_or_default().into_bytes_with_nul());
@@ -108,7 +117,7 @@ impl Executor {
         let location = standard.resources(&self.setting.resources);
         let resources = Guarded::new(location.as_bytes_with_nul());
         let word = |text: &Guarded| text.address() as usize as *const c_char;
-        // Each instance has a different environment pointer, which the FMU must not dereference.
+        // Each instance gets a different environment pointer. It is not a valid address, because the FMU must not dereference it.
         let environment = ENVIRONMENTS.fetch_add(ENVIRONMENT_STEP, Ordering::Relaxed) as *mut c_void;
         let mut callbacks = None;
         let logger = log_of_fmi2 as *const ();
@@ -182,7 +191,8 @@ impl Executor {
         );
     }
 
-    /// Stores an instance. The callbacks of an earlier instance with this index, which was not freed, remain allocated.
+    /// Stores an instance. If an earlier instance with this index was not freed, its callbacks remain allocated, because the FMU
+    /// may still use them.
     fn store(&self, index: usize, instance: Instance) {
         let before = match instance.handle {
             0 => locked(&self.instances).remove(&index),
@@ -191,11 +201,12 @@ impl Executor {
         std::mem::forget(before);
     }
 
+    /// Calls a function, and stores the states that it writes; skips the call if its instance does not exist.
     pub fn call(&self, instance: Option<usize>, function: &str, args: &[Arg], outcome: &mut Outcome) {
         let (handle, environment, co_simulation) = match instance {
             Some(index) => match locked(&self.instances).get(&index) {
                 Some(instance) => (instance.handle, instance.environment, instance.co_simulation),
-                // Instantiation failed, so the call is skipped.
+                // The instantiation failed, so the call is skipped.
                 None => return,
             },
             None => (0, 0, self.setting.libraries[0].is_some()),
@@ -204,19 +215,20 @@ impl Executor {
             outcome.missing = true;
             return;
         };
-        let mut kept = Vec::new();
-        let words: Vec<u64> = args.iter().map(|arg| self.word(arg, &mut kept)).collect();
+        let mut arrays = Vec::new();
+        let words: Vec<u64> = args.iter().map(|arg| self.argument(arg, &mut arrays)).collect();
         // SAFETY: the words are the arguments of the function; the FMU may still crash this process.
         let call = || in_fmu(|| unsafe { calls::call(address, function, handle as *mut c_void, &words) });
-        let status = updates::iterate(function, call(), &kept, call);
+        let status = updates::iterate(function, call(), &arrays, call);
         outcome.status = Some(status);
-        let is_string = |kept: &Kept| matches!(kept.content, Content::Output(Kind::Pointer, _));
-        if THREADS.load(Ordering::Relaxed) && kept.iter().any(is_string) {
-            // Another thread may run before this one copies the strings.
+        let is_string = |array: &PassedArray| matches!(array.content, Content::Output(Kind::Pointer, _));
+        if THREADS.load(Ordering::Relaxed) && arrays.iter().any(is_string) {
+            // Gives other threads time to overwrite the strings before this one copies them, in case the FMU has one buffer for
+            // all instances.
             std::thread::sleep(std::time::Duration::from_micros(20));
         }
         let succeeded = status == 0 || status == 1;
-        for Kept { array, content } in &kept {
+        for PassedArray { array, content } in &arrays {
             outcome.damage.extend(array.damage(matches!(content, Content::Input)));
             let values = match content {
                 Content::Input => None,
@@ -256,13 +268,14 @@ impl Executor {
         locked(&self.instances).get(&instance).map_or(f64::INFINITY, |instance| instance.next_event)
     }
 
-    fn word(&self, arg: &Arg, kept: &mut Vec<Kept>) -> u64 {
-        let mut keep = |array: Guarded, content: Content| {
+    /// Returns an argument as 64 bits, and adds the arrays that it needs to `arrays`.
+    fn argument(&self, arg: &Arg, arrays: &mut Vec<PassedArray>) -> u64 {
+        let mut pass = |array: Guarded, content: Content| {
             let address = array.address();
-            kept.push(Kept { array, content });
+            arrays.push(PassedArray { array, content });
             address
         };
-        let mut input = |bytes: &[u8]| keep(Guarded::new(bytes), Content::Input);
+        let mut input = |bytes: &[u8]| pass(Guarded::new(bytes), Content::Input);
         let words = |words: Vec<u64>| -> Vec<u8> {
             words.into_iter().flat_map(|word| (word as usize).to_ne_bytes()).collect()
         };
@@ -290,15 +303,17 @@ impl Executor {
                 size.unwrap_or_else(|| locked(&self.bytes).get(slot).map_or(0, Vec::len)) as u64
             }
             Arg::State(slot) => locked(&self.states).get(slot).copied().unwrap_or(0) as u64,
-            Arg::Out(kind, count) => keep(Guarded::room(kind.size() * count), Content::Output(*kind, *count)),
+            Arg::Out(kind, count) => {
+                pass(Guarded::for_results(kind.size() * count), Content::Output(*kind, *count))
+            }
             Arg::StateOut(slot) => {
                 let handle = locked(&self.states).get(slot).copied().unwrap_or(0);
-                keep(Guarded::new(&handle.to_ne_bytes()), Content::State(*slot))
+                pass(Guarded::new(&handle.to_ne_bytes()), Content::State(*slot))
             }
-            Arg::SizeOut(slot) => keep(Guarded::new(&0_usize.to_ne_bytes()), Content::Size(*slot)),
+            Arg::SizeOut(slot) => pass(Guarded::new(&0_usize.to_ne_bytes()), Content::Size(*slot)),
             Arg::SavedOut(slot) => {
                 let size = locked(&self.sizes).get(slot).copied().unwrap_or(0);
-                keep(Guarded::room(size), Content::Saved(*slot))
+                pass(Guarded::for_results(size), Content::Saved(*slot))
             }
         }
     }

@@ -17,9 +17,10 @@ pub const OWN_FAULT: i32 = 97;
 /// Exit status of a worker that has executed its call sequence.
 pub const EXECUTED: i32 = 96;
 
-/// Number of repetitions from which on their measurements are evaluated.
+/// Least number of repetitions whose measurements are evaluated.
 pub const EVALUATED: usize = 50;
 
+/// Call sequence for a process.
 #[derive(Serialize, Deserialize)]
 pub struct Job {
     /// Parameters that all call sequences share.
@@ -29,7 +30,7 @@ pub struct Job {
     pub bytes: HashMap<usize, Vec<u8>>,
 }
 
-/// Program that is run in place of a call sequence, with the directory of the FMU as its argument.
+/// Program that is run instead of a call sequence, with the directory of the FMU as its argument.
 #[derive(Serialize, Deserialize)]
 pub struct Program {
     pub program: std::path::PathBuf,
@@ -49,11 +50,11 @@ pub struct Ended {
     pub output: String,
     /// Outcomes of the steps, a line of JSON for each.
     pub outcomes: String,
-    /// Names of the child processes that were alive after its end.
+    /// Names of the child processes that were alive after the process had ended.
     pub orphans: Vec<String>,
-    /// Number of processes, if it exceeded the maximum.
+    /// Number of processes at a time, if it exceeded the maximum.
     pub flood: Option<usize>,
-    /// Whether the process ended in code of the FMU.
+    /// Whether the process ended while it executed code of the FMU.
     pub inside: bool,
 }
 
@@ -67,13 +68,13 @@ impl From<ExitStatus> for Ended {
     }
 }
 
-/// Last line that a worker writes.
+/// Last line that a worker writes, after all steps. It has the serialized states by index.
 #[derive(Serialize, Deserialize)]
 pub struct Last {
     pub bytes: HashMap<usize, Vec<u8>>,
 }
 
-/// Line of a worker that cannot load the library: the message of the loader.
+/// Line that a worker writes if it cannot load the library, with the message of the loader.
 #[derive(Serialize, Deserialize)]
 pub struct Unloadable {
     pub unloadable: String,

@@ -1,4 +1,4 @@
-//! Loggers that the FMU calls, and the messages that it has logged.
+//! Loggers that are passed to the FMU, and the messages that it has logged.
 
 use super::locked;
 use crate::call_sequence::Message;
@@ -10,16 +10,18 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Messages, each with the environment pointer that the FMU passed to the logger.
 static MESSAGES: Mutex<Vec<(usize, Message)>> = Mutex::new(Vec::new());
 
-/// Environment pointer of the first instance, and the difference to the pointer of the next one.
+/// Environment pointer of the first instance, and the distance to the pointer of the next one.
 const FIRST_ENVIRONMENT: usize = 0x10_0000;
 pub const ENVIRONMENT_STEP: usize = 16;
 
 /// Environment pointer of the next instance.
 pub static ENVIRONMENTS: AtomicUsize = AtomicUsize::new(FIRST_ENVIRONMENT);
 
+/// Records a message, unless there are 1000 already.
+///
 /// # Safety
-/// Each string is NULL or ends with NUL.
-unsafe fn remember(environment: *mut c_void, status: c_int, category: *const c_char, text: *const c_char) {
+/// Each pointer is NULL or points to a string that ends with NUL.
+unsafe fn record(environment: *mut c_void, status: c_int, category: *const c_char, text: *const c_char) {
     // SAFETY: the caller's requirement.
     let [category, text] = [category, text].map(|pointer| unsafe { text_at(pointer) });
     let mut messages = locked(&MESSAGES);
@@ -28,9 +30,9 @@ unsafe fn remember(environment: *mut c_void, status: c_int, category: *const c_c
     }
 }
 
-/// Logger of FMI 2.0. Stable Rust cannot define variadic functions, so it has named arguments: integers and pointers, then
-/// floating-point numbers, which have separate registers. On Linux, and on macOS with Intel processors, variadic functions
-/// receive their arguments in these registers, too.
+/// Logger of FMI 2.0. Stable Rust cannot define variadic functions, so this one has fixed arguments: six integers or pointers,
+/// then four floating-point numbers, which have separate registers. On Linux, and on macOS with Intel processors, variadic
+/// arguments are in the same registers.
 #[allow(clippy::too_many_arguments, reason = "the values of the message")]
 pub unsafe extern "C" fn log_of_fmi2(
     environment: *mut c_void,
@@ -58,14 +60,15 @@ pub unsafe extern "C" fn log_of_fmi2(
             let print = |to: *mut c_char, size| libc::snprintf(to, size, text, a, b, c, d, e, f, x, y, z, w);
             let mut message = vec![0; usize::try_from(print(std::ptr::null_mut(), 0)).unwrap_or(0) + 1];
             print(message.as_mut_ptr(), message.len());
-            return remember(environment, status, category, message.as_ptr());
+            return record(environment, status, category, message.as_ptr());
         }
         #[cfg(not(all(unix, not(all(target_vendor = "apple", target_arch = "aarch64")))))]
         std::hint::black_box((a, b, c, d, e, f, x, y, z, w));
-        remember(environment, status, category, text);
+        record(environment, status, category, text);
     }
 }
 
+/// Logger of FMI 3.0.
 pub unsafe extern "C" fn log_of_fmi3(
     environment: *mut c_void,
     status: c_int,
@@ -73,11 +76,11 @@ pub unsafe extern "C" fn log_of_fmi3(
     text: *const c_char,
 ) {
     // SAFETY: section 2.3.1 of FMI 3.0: the strings end with NUL.
-    unsafe { remember(environment, status, category, text) }
+    unsafe { record(environment, status, category, text) }
 }
 
-/// Returns the new messages with this environment pointer, and separately those with a pointer that no instance has received, which are a
-/// fault of the FMU.
+/// Removes and returns the messages with this environment pointer, and separately the messages with a pointer that no instance
+/// has received, which is a fault of the FMU.
 pub fn messages(environment: usize) -> (Vec<Message>, Vec<Message>) {
     let mut messages = locked(&MESSAGES);
     let (mut own, mut strays) = (Vec::new(), Vec::new());
@@ -98,7 +101,7 @@ pub fn messages(environment: usize) -> (Vec<Message>, Vec<Message>) {
 /// Returns the bytes of a string; `None` for NULL.
 ///
 /// # Safety
-/// The string has a NUL at its end.
+/// The pointer is NULL or points to a string that ends with NUL.
 pub unsafe fn text_at(pointer: *const c_char) -> Option<Vec<u8>> {
     // SAFETY: the caller's requirement.
     (!pointer.is_null()).then(|| unsafe { CStr::from_ptr(pointer) }.to_bytes().to_vec())

@@ -12,6 +12,7 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 impl Executor {
+    /// Executes steps. Writes their outcomes to the file if `report` is set, otherwise returns them.
     pub fn execute(&self, sequence: &[Numbered], report: bool) -> Vec<Outcome> {
         let mut outcomes = Vec::new();
         for numbered in sequence {
@@ -21,7 +22,8 @@ impl Executor {
                     let begin = Instant::now();
                     memory::KEEP.store(true, Ordering::Relaxed);
                     let (mut done, mut last) = (0, Vec::new());
-                    // The first repetitions may take longer: fewer are not evaluated, and the machine may be busy.
+                    // The machine may be busy, so four times as much time is allowed for the repetitions without which nothing is
+                    // evaluated.
                     let patience = |done: usize| if done < EVALUATED { 4.0 } else { 1.0 };
                     let seconds = || begin.elapsed().as_secs_f64();
                     while done < *times && seconds() < patience(done) * self.setting.repetitions {
@@ -49,7 +51,7 @@ impl Executor {
                     THREADS.store(false, Ordering::Relaxed);
                     memory::KEEP.store(false, Ordering::Relaxed);
                 }
-                step => self.one(step, &mut outcome),
+                step => self.execute_step(step, &mut outcome),
             }
             if report {
                 self.write(&outcome);
@@ -60,7 +62,8 @@ impl Executor {
         outcomes
     }
 
-    fn one(&self, step: &Step, outcome: &mut Outcome) {
+    /// Executes a step that contains no other steps.
+    fn execute_step(&self, step: &Step, outcome: &mut Outcome) {
         match step {
             Step::Make(index, make) => self.make(*index, make, outcome),
             Step::Free(index) => {
@@ -109,7 +112,7 @@ impl Executor {
                     // SAFETY: made by Box::leak, and nothing else refers to it.
                     in_fmu(|| drop(unsafe { Box::from_raw(std::ptr::from_ref(library).cast_mut()) }));
                 }
-                // The standard output must not use memory of the library.
+                // Crashes if the library has left a buffer in its own memory as the buffer of the standard output.
                 #[cfg(unix)]
                 // SAFETY: writes an empty line, and the buffers of the C library.
                 in_fmu(|| unsafe {

@@ -1,4 +1,4 @@
-//! Executes a job, within limits of the process.
+//! Executes a job in a process with limited resources.
 
 use super::executor::{Executor, PROCESS};
 use super::job::{EXECUTED, Job, Last, OWN_FAULT};
@@ -9,7 +9,8 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::Ordering;
 
-/// Writes the buffered output, and ends the process without the exit handlers of the library, which are tested by `Step::Quit`.
+/// Writes the buffered output, and ends the process. The exit handlers of the library do not run, because only `Step::Quit` tests
+/// them.
 pub fn end(result: Result<(), String>) -> ! {
     let status = match result {
         Ok(()) => EXECUTED,
@@ -28,7 +29,7 @@ pub fn end(result: Result<(), String>) -> ! {
     std::process::exit(status)
 }
 
-/// Executes a call sequence, and writes a line to the file for the outcome of each step.
+/// Executes a call sequence, and writes the outcome of each step to the file, as a line of JSON.
 pub fn work(job: Job, file: File) {
     limit(job.setting.memory);
     PROCESS.store(std::process::id(), Ordering::Relaxed);
@@ -52,7 +53,8 @@ pub fn work(job: Job, file: File) {
     executor.write(&Last { bytes: std::mem::take(&mut locked(&executor.bytes)) });
 }
 
-/// Returns the setting with the FMU in a directory of this name, which is a link in the working directory.
+/// Makes a link of this name to the directory of the FMU in the working directory; returns the setting with the paths through the
+/// link.
 fn elsewhere(setting: &Setting, name: &str) -> Setting {
     let directory = setting.resources.parent().unwrap_or(&setting.resources);
     let there = std::env::current_dir().unwrap_or_default().join(name);
@@ -69,6 +71,7 @@ fn elsewhere(setting: &Setting, name: &str) -> Setting {
     }
 }
 
+/// Limits the memory and the size of files of this process, and ends it together with its parent process.
 pub fn limit(memory: u64) {
     #[cfg(unix)]
     {

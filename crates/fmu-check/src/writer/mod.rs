@@ -10,16 +10,16 @@ use crate::legal::Modes;
 use fmi_abi::calls::signatures;
 use fmi_abi::{Interface, Standard};
 pub use parts::{Calls, Part};
-pub use reads::{READ, Read, difference, sample, value_of, values_of};
+pub use reads::{MAX_READ, Read, difference, sample, value_of, values_of};
 
 /// Point of a trajectory.
 #[derive(Clone, Debug, Default)]
 pub struct Point {
     /// Time at which the step begins; in Model Exchange the time that is set.
     pub time: f64,
-    /// Step size; in Model Exchange the time since the point before.
+    /// Step size; in Model Exchange the time since the previous point.
     pub size: f64,
-    /// Inputs that are set before the step, by the indices of their variables.
+    /// Inputs that are set before the step: the index of each variable, and its values.
     pub inputs: Vec<(usize, Values)>,
     /// Continuous states that are set in Model Exchange.
     pub states: Vec<f64>,
@@ -43,10 +43,10 @@ impl Trajectory {
     }
 }
 
-/// Writer of a call sequence.
+/// Writes a call sequence step by step.
 pub struct Writer<'a> {
     pub description: &'a Description,
-    /// Simulation that the sequence varies.
+    /// Simulation on which the sequence is based.
     pub trajectory: &'a Trajectory,
     /// Indices of the variables that are read.
     pub readable: &'a [usize],
@@ -69,6 +69,7 @@ impl<'a> Writer<'a> {
         self.description.standard == Standard::Fmi3
     }
 
+    /// Adds a step; returns its number.
     pub fn add(&mut self, step: Step) -> u32 {
         let id = self.next;
         self.next += 1;
@@ -98,7 +99,7 @@ impl<'a> Writer<'a> {
         id
     }
 
-    /// Returns the usual arguments of an instantiation.
+    /// Returns the arguments of an instantiation, unless a check changes them.
     pub fn how(&self) -> Make {
         let stepped = self.trajectory.is_stepped();
         Make {
@@ -111,10 +112,12 @@ impl<'a> Writer<'a> {
         }
     }
 
+    /// Instantiates with the usual arguments.
     pub fn make(&mut self, instance: usize) -> u32 {
         self.make_with(instance, |_| {})
     }
 
+    /// Instantiates with arguments that `change` changes.
     pub fn make_with(&mut self, instance: usize, change: impl FnOnce(&mut Make)) -> u32 {
         let mut how = self.how();
         change(&mut how);
@@ -125,6 +128,7 @@ impl<'a> Writer<'a> {
         self.add(Step::Free(instance))
     }
 
+    /// Enters Initialization Mode at the start time of the default experiment.
     pub fn enter(&mut self, instance: usize) -> u32 {
         self.enter_with(instance, None, self.description.start_time, None)
     }
@@ -165,7 +169,7 @@ impl<'a> Writer<'a> {
         self.call(instance, name, args)
     }
 
-    /// Writes an event: enters Event Mode, updates the discrete states and returns to the mode before.
+    /// Writes an event: enters Event Mode, updates the discrete states and returns to the mode in which time advances.
     pub fn event(&mut self, instance: usize) -> Vec<u32> {
         let mut ids = vec![self.call(instance, "EnterEventMode", vec![])];
         ids.extend(self.leave_event(instance));
@@ -231,13 +235,14 @@ impl<'a> Writer<'a> {
         ]
     }
 
-    /// Deserializes the bytes at the index `bytes` to the saved state at the index `slot`.
+    /// Deserializes the bytes at the index `bytes` into the saved state at the index `slot`.
     pub fn deserialize(&mut self, instance: usize, bytes: usize, slot: usize) -> u32 {
         let args = vec![Arg::Saved(bytes), Arg::SavedSize(bytes), Arg::StateOut(slot)];
         self.call(instance, "DeserializeFMUState", args)
     }
 }
 
+/// Returns the arguments of a getter or setter that follow the instance.
 pub fn access(
     standard: Standard,
     references: Vec<u64>,
@@ -249,6 +254,7 @@ pub fn access(
     [Arg::In(Kind::U32, references), count].into_iter().chain(values).chain(sizes).collect()
 }
 
+/// Returns the arguments of fmi2DoStep or fmi3DoStep that follow the instance.
 pub fn step_args(standard: Standard, time: f64, size: f64) -> Vec<Arg> {
     let mut args = vec![Arg::real(time), Arg::real(size), Arg::Integer(0)];
     if standard == Standard::Fmi3 {
@@ -257,5 +263,6 @@ pub fn step_args(standard: Standard, time: f64, size: f64) -> Vec<Arg> {
     args
 }
 
-/// Name of an instance with spaces, characters beyond ASCII and a conversion of printf, which an FMU may repeat in its messages.
+/// Name of an instance, with spaces, characters beyond ASCII and a conversion of printf. An FMU may repeat the name in its
+/// messages.
 pub const LONG_NAME: &str = "a long name, with Gödel in it %s #1#";

@@ -6,7 +6,9 @@ use crate::call_sequence::{Arg, Kind};
 /// Part of a simulation.
 #[derive(Clone, Copy, Debug)]
 pub enum Part {
+    /// Instantiates.
     Make,
+    /// Enters Initialization Mode.
     Enter,
     /// Leaves Initialization Mode for the mode in which time advances.
     Leave,
@@ -14,10 +16,11 @@ pub enum Part {
     Begin,
     /// Simulates the first points of the trajectory, at most this many.
     Points(usize),
-    /// Simulates from this point to the end, and reads the variables and vectors after each point.
+    /// Simulates from this point to the end, with `ReadAll` after each point.
     Run(usize),
+    /// Reads the variables.
     Read,
-    /// Reads the variables and vectors.
+    /// Reads the variables and, in Model Exchange, the vectors: states, derivatives and event indicators.
     ReadAll,
     /// Calls a function without arguments.
     Call(&'static str),
@@ -25,22 +28,24 @@ pub enum Part {
     Update,
     /// Saves the state with this index.
     Save(usize),
+    /// Restores the saved state with this index.
     Restore(usize),
     /// Frees the saved state with this index.
     Drop(usize),
     Free,
 }
 
-/// Numbers of calls that were written, and the reads.
+/// Calls that were written.
 #[derive(Clone, Default)]
 pub struct Calls {
-    /// Numbers of the calls that read nothing.
+    /// Numbers of the calls that do not read variables.
     pub ids: Vec<u32>,
     /// Calls that read variables.
     pub reads: Vec<Read>,
 }
 
 impl Writer<'_> {
+    /// Writes parts of a simulation.
     pub fn write(&mut self, instance: usize, parts: &[Part]) -> Calls {
         let mut calls = Calls::default();
         let points = &self.trajectory.points;
@@ -78,7 +83,7 @@ impl Writer<'_> {
         calls
     }
 
-    /// Writes parts of a simulation, and returns the reads of each part that reads.
+    /// Writes parts of a simulation; returns the reads of each part that reads, of which there must be `N`.
     pub fn groups<const N: usize>(&mut self, instance: usize, parts: &[Part]) -> [Vec<Read>; N] {
         let groups = parts.iter().filter_map(|part| {
             let reads = self.write(instance, &[*part]).reads;
@@ -88,8 +93,8 @@ impl Writer<'_> {
         groups.try_into().unwrap_or_else(|_| panic!("the number of parts that read is not {N}"))
     }
 
-    /// Writes a point: in Co-Simulation sets inputs and advances a step; in Model Exchange sets time, states and inputs. Then writes
-    /// the event at the point.
+    /// Writes a point: in Co-Simulation sets inputs and advances a step; in Model Exchange sets time, states and inputs. If the
+    /// point has an event, the event follows.
     pub fn point(&mut self, instance: usize, point: &Point) -> Vec<u32> {
         let mut ids = Vec::new();
         if self.trajectory.is_stepped() {

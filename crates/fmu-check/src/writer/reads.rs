@@ -4,7 +4,7 @@ use crate::call_sequence::{Run, Values};
 use crate::description::Description;
 use crate::finding::status_name;
 
-/// Step that reads variables: its number, and the index and the number of values of each variable.
+/// Step that reads variables. For each variable, it has the index and the number of values.
 #[derive(Clone, Debug)]
 pub struct Read {
     pub id: u32,
@@ -22,11 +22,12 @@ impl Read {
 }
 
 /// Maximum number of variables that most checks read.
-pub const READ: usize = 1000;
+pub const MAX_READ: usize = 1000;
 
-/// Returns the indices of at most `max_count` variables that can be read: no clocks, no clocked variables, which can only be read while
-/// their clock is active (section 2.2.7 of FMI 3.0.2), and none of unknown size. If there are more, at most
-/// half are inputs, outputs, derivatives and the independent variable. All are taken at equal distances.
+/// Returns the indices of at most `max_count` variables to read. Clocks and variables of unknown size are left out, and so are
+/// clocked variables, because they can only be read while their clock is active (section 2.2.7 of FMI 3.0.2). If there are more
+/// variables, at most half of the sample are inputs, outputs, derivatives and the independent variable. Both parts are taken at
+/// equal distances.
 pub fn sample(description: &Description, max_count: usize) -> Vec<usize> {
     let known = |index: &usize| {
         let variable = &description.variables[*index];

@@ -6,7 +6,8 @@ use crate::call_sequence::{Arg, Kind, Values};
 use crate::description::{kind_of, type_name};
 
 impl Writer<'_> {
-    /// Returns the positions of the variables of each type in `indices`, with the name and the C type of the type.
+    /// Groups variables by type. Returns for each type its name in getters and setters, its C type, and the positions of its
+    /// variables in `indices`.
     fn by_type(&self, indices: &[usize]) -> Vec<(&'static str, Kind, Vec<usize>)> {
         let standard = self.description.standard;
         let mut groups: Vec<(&str, Kind, Vec<usize>)> = Vec::new();
@@ -26,7 +27,7 @@ impl Writer<'_> {
         u64::from(self.description.variables[index].reference)
     }
 
-    /// Sets values with a call for each type.
+    /// Sets the values of variables, with a call for each type.
     pub fn set(&mut self, instance: usize, values: &[(usize, Values)]) -> Vec<u32> {
         let indices: Vec<usize> = values.iter().map(|(index, _)| *index).collect();
         let mut ids = Vec::new();
@@ -60,7 +61,8 @@ impl Writer<'_> {
         self.set(instance, &[(index, Values::new(self.description.kind(index), numbers.iter().copied()))])
     }
 
-    /// Reads the variables at these indices with a call for each type. In Initialization Mode, reads only those that may be read there.
+    /// Reads the variables at these indices with a call for each type. In Initialization Mode, reads only the variables that may
+    /// be read there.
     pub fn read_these(&mut self, instance: usize, indices: &[usize]) -> Vec<Read> {
         if !self.modes.is_initializing(instance) {
             return self.read_anyway(instance, indices);
@@ -70,8 +72,8 @@ impl Writer<'_> {
         self.read_anyway(instance, &indices)
     }
 
-    /// Reads the variables at these indices with a call for each type. FMI 2.0 allows an FMU to reject some of the calls in Initialization
-    /// Mode, which is not a finding.
+    /// Reads all variables at these indices with a call for each type. In Initialization Mode, an FMU of FMI 2.0 may reject some
+    /// of these calls, which is not a finding.
     pub fn read_anyway(&mut self, instance: usize, indices: &[usize]) -> Vec<Read> {
         let mut reads = Vec::new();
         for (name, kind, positions) in self.by_type(indices) {
@@ -87,11 +89,12 @@ impl Writer<'_> {
         reads
     }
 
+    /// Reads the variables that most checks read.
     pub fn read(&mut self, instance: usize) -> Vec<Read> {
         self.read_these(instance, self.readable)
     }
 
-    /// Reads the variables and, in Model Exchange, the vectors.
+    /// Reads the variables and, in Model Exchange, the continuous states, their derivatives and the event indicators.
     pub fn read_all(&mut self, instance: usize) -> Vec<Read> {
         let mut reads = self.read(instance);
         if !self.trajectory.is_stepped() {
