@@ -1,11 +1,11 @@
-//! Containment of the processes of an FMU: no process and no file remains, and the caller of the check continues.
+//! FMUs that start processes or send signals, and checks that are interrupted: no process and no file may remain.
 
 use super::wagon::{UNLIMITED, check, fmu, library};
 use std::path::Path;
 use std::process::Command;
 use tempfile::TempDir;
 
-/// Faults that attack the processes around the FMU, with the name of the finding.
+/// Faults that start processes or send signals to other processes: FMI version, fault and name of the finding.
 pub const ATTACKS: [(u32, &str, &str); 8] = [
     (2, "forks", "resources.processes"),
     (3, "daemon_left", "resources.processes"),
@@ -17,7 +17,7 @@ pub const ATTACKS: [(u32, &str, &str); 8] = [
     (3, "stops_parent", "life_cycle.crash"),
 ];
 
-/// Returns the processes whose environment contains this mark.
+/// Returns the number of processes whose environment contains this mark.
 #[cfg(target_os = "linux")]
 fn marked(mark: &str) -> usize {
     let processes = std::fs::read_dir("/proc").expect("the processes").flatten();
@@ -25,7 +25,8 @@ fn marked(mark: &str) -> usize {
     environments.filter(|environment| String::from_utf8_lossy(environment).contains(mark)).count()
 }
 
-/// Returns the command of a check with its temporary files in a directory and a mark in the environment of its processes.
+/// Returns the command that checks the wagon with a fault. Its temporary files are in `directory`, and the environment of its
+/// processes contains the path of `directory` as a mark.
 #[cfg(target_os = "linux")]
 fn contained(directory: &Path, fmi: u32, fault: &str) -> Command {
     let path = fmu(directory, fmi, &library(fmi, ""), |text| text);
@@ -58,8 +59,8 @@ fn attacks_are_contained() {
     }
 }
 
-/// Asserts that no process and no file remains, regardless of the signal that ends the check, and that the report is complete as far as
-/// the check got.
+/// Asserts that no process and no file remains, regardless of the signal that ends the check. Unless the check was killed, the
+/// report must list what was interrupted.
 #[cfg(target_os = "linux")]
 #[test]
 fn interrupts_leave_nothing() {
@@ -76,7 +77,7 @@ fn interrupts_leave_nothing() {
             .spawn()
             .expect("runs");
         let mark = directory.path().to_string_lossy().into_owned();
-        // The checker, its server and the process that hangs.
+        // There are three: the checker, its server and the process that hangs.
         wait_until(|| marked(&mark) >= 3);
         let sent = Command::new("kill").args(["-s", signal, &child.id().to_string()]).status();
         assert!(sent.expect("kill").success());
@@ -95,7 +96,7 @@ fn interrupts_leave_nothing() {
     }
 }
 
-/// Waits for a condition, without a limit because the machine may be busy. A test that waits forever is ended by its runner.
+/// Waits for a condition, without a limit because the machine may be busy. The test runner ends a test that waits forever.
 #[cfg(target_os = "linux")]
 fn wait_until(holds: impl Fn() -> bool) {
     while !holds() {

@@ -1,19 +1,19 @@
-//! Correct FMUs, in which nothing is found.
+//! FMUs without a fault, in which fmu-check must find nothing.
 
 use super::wagon::{fmu, found, library};
 use std::process::Command;
 use tempfile::TempDir;
 
-/// Asserts that the wagon without a fault has only these findings, which are notes.
+/// Asserts that fmu-check finds only these notes in a variant of the wagon, and checks both interface types.
 fn clean(fmi: u32, variant: &str, notes: &[&str]) {
     let directory = TempDir::new().expect("a directory");
     let path = fmu(directory.path(), fmi, &library(fmi, ""), |text| text);
-    // The manners concern these topics.
+    // The unusual behaviour concerns these topics.
     let topics = ["--only", "life_cycle,states,start_values,results,reset"];
     let options = if variant == "none" { &[][..] } else { &topics };
     let (_, report) = found(&path, variant, &[&["--repeat", "0.3"][..], options].concat());
     let findings = report["findings"].as_array().expect("a list").iter();
-    // The note on glibc depends on the system of the compiler.
+    // Whether there is a note on glibc depends on the system on which the library was compiled.
     let found: Vec<_> = findings.filter(|finding| finding["name"] != "package.glibc").collect();
     let is_expected = |finding: &&serde_json::Value| {
         finding["severity"] == "note" && notes.iter().any(|name| finding["name"] == *name)
@@ -34,15 +34,16 @@ fn none_in_fmi3() {
     clean(3, "none", &[]);
 }
 
-/// Asserts that an FMU is not accused of what the standard allows: an event with several updates, local variables that cannot be read
-/// in Initialization Mode, and a solver that takes other steps after a restart.
+/// Asserts that unusual behaviour is not a violation if the standard allows it: an event needs several updates, a local variable
+/// cannot be read in Initialization Mode, and a solver takes other steps after a restart.
 #[test]
-fn manners_of_other_tools() {
-    clean(2, "manners", &["states.digits"]);
-    clean(3, "manners", &["states.digits"]);
+fn unusual_behaviour_is_accepted() {
+    clean(2, "unusual", &["states.digits"]);
+    clean(3, "unusual", &["states.digits"]);
 }
 
-/// Asserts that a library that this machine cannot load is not accused, but not checked.
+/// Asserts that there is no finding if this machine lacks a library that the FMU needs, but that the interface types are reported
+/// as not checked.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_missing_library_of_the_machine_is_not_a_fault() {

@@ -1,10 +1,11 @@
 //! Reports, options and exit statuses of checks.
 
-use super::wagon::{UNLIMITED, check, fmu, found, library, reproduced, unpack};
+use super::wagon::{UNLIMITED, check, fmu, found, library, not_shown_without_fault, unpack};
 use std::process::Command;
 use tempfile::TempDir;
 
-/// Asserts that every report lists the parts that were not checked, which fail the check unless an option allows them by name.
+/// Asserts that every report lists the interface types that were not checked, and that the check fails unless an option names
+/// them.
 #[test]
 fn nothing_passes_unchecked() {
     let both = "co-simulation,model-exchange";
@@ -58,7 +59,8 @@ fn nothing_passes_unchecked() {
     assert_eq!(names, ["co-simulation", "model-exchange"]);
 }
 
-/// Asserts that a finding that a baseline accepts does not fail in any report, and that one with another observation does.
+/// Asserts that a finding does not fail in any report if the baseline accepts it, but fails if the baseline accepts only another
+/// observation.
 #[test]
 fn a_baseline_accepts_with_a_reason() {
     let directory = TempDir::new().expect("a directory");
@@ -85,8 +87,8 @@ fn a_baseline_accepts_with_a_reason() {
     }
 }
 
-/// Asserts that a quick check executes few call sequences, so that its 30 seconds are enough, that it names the topics that it does
-/// not check, and that it passes. On a busy machine, the time may be over before all topics are checked, which the report states.
+/// Asserts that a quick check executes few enough call sequences for its 30 seconds, that it reports the topics that it leaves
+/// out, and that it passes. On a busy machine, the time may be over before all topics are checked; then the report says so.
 #[test]
 fn a_quick_check_is_quick() {
     let directory = TempDir::new().expect("a directory");
@@ -102,9 +104,9 @@ fn a_quick_check_is_quick() {
     assert_eq!(report["status"], if late.is_empty() { 0 } else { 2 });
 }
 
-/// Asserts that a check of 100,000 variables needs at most 1 GB, and processor time that is proportional to their number. The limit
-/// of processor time is ten times what the check needs; work that grows with the square of the number needs a thousand times as
-/// much.
+/// Asserts that a check of 100,000 variables needs at most 1 GB of memory, and that its processor time does not grow with the
+/// square of their number. The limit of processor time is ten times what the check needs, while quadratic work needs a thousand
+/// times as much.
 #[cfg(target_os = "linux")]
 #[test]
 fn many_variables_take_little_time_and_memory() {
@@ -135,7 +137,7 @@ fn many_variables_take_little_time_and_memory() {
     assert!(names.clone().all(|name| name == "package.glibc"), "{:?}", names.collect::<Vec<_>>());
 }
 
-/// Asserts that an FMU above the maximum size is not unpacked.
+/// Asserts that an FMU is not unpacked if it exceeds the maximum size.
 #[test]
 fn unpacking_has_a_limit() {
     let directory = TempDir::new().expect("a directory");
@@ -150,7 +152,7 @@ fn unpacking_has_a_limit() {
     assert_eq!(run("4").status.code(), Some(0));
 }
 
-/// Asserts that an FMU of a draft of FMI 3.0 is not checked by the rules of FMI 3.0.
+/// Asserts that an FMU of a draft of FMI 3.0 is rejected instead of being checked by the rules of FMI 3.0.
 #[test]
 fn drafts_are_not_checked() {
     let directory = TempDir::new().expect("a directory");
@@ -162,7 +164,7 @@ fn drafts_are_not_checked() {
     assert_eq!(output.status.code(), Some(2));
 }
 
-/// Asserts that the README has the output of a check: a wagon that rejects the step to the stop time.
+/// Asserts that the README shows the output of this check, in which the wagon rejects the step to the stop time.
 #[test]
 fn the_readme_shows_real_output() {
     let directory = TempDir::new().expect("a directory");
@@ -202,6 +204,6 @@ fn programs_show_it() {
         }
         let unpacked = directory.path().join("unpacked");
         unpack(&path, &unpacked);
-        reproduced(&out, name, &unpacked, mutant);
+        not_shown_without_fault(&out, name, &unpacked, mutant);
     }
 }

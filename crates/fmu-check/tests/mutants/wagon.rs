@@ -1,4 +1,4 @@
-//! The wagon FMU, and runs of fmu-check.
+//! Builds the wagon FMU, and runs fmu-check.
 
 use super::packing;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ pub fn fmu(directory: &Path, fmi: u32, library: &Path, change: impl Fn(String) -
     packing::pack(directory, ("wagon", fmi), &change(description(fmi)), library, &[])
 }
 
-/// Maximum duration of a check, which no check reaches: the machine may be busy.
+/// Options for a maximum duration that no check reaches, because the machine may be busy.
 pub const UNLIMITED: [&str; 2] = ["--time", "3600"];
 
 /// Returns the command that checks an FMU.
@@ -35,7 +35,7 @@ pub fn unpack(fmu: &Path, directory: &Path) {
     zip::ZipArchive::new(file).expect("a ZIP").extract(directory).expect("a directory");
 }
 
-/// Returns the names and observations of the findings in an FMU with a fault, and the report.
+/// Checks an FMU with a fault; returns the names and observations of the findings, and the report.
 pub fn found(fmu: &Path, fault: &str, options: &[&str]) -> (Vec<(String, String)>, serde_json::Value) {
     let unlimited = if options.contains(&"--quick") { &[][..] } else { &UNLIMITED };
     let mut command = check(fmu);
@@ -49,11 +49,12 @@ pub fn found(fmu: &Path, fault: &str, options: &[&str]) -> (Vec<(String, String)
     (findings.iter().map(|finding| (text(finding, "name"), text(finding, "observed"))).collect(), report)
 }
 
-/// Asserts that the program of a finding, which the check has run on the FMU with the fault, does not show it in the FMU without.
-pub fn reproduced(out: &Path, name: &str, unpacked: &Path, fault: &str) {
+/// Asserts that the program of a finding does not show the finding in the FMU without the fault. With the fault, the check has
+/// already run the program.
+pub fn not_shown_without_fault(out: &Path, name: &str, unpacked: &Path, fault: &str) {
     let program = out.join("repro");
     let source = out.join(format!("{name}.c"));
-    // Only the program of a hang waits until its limit.
+    // Only the program of a hang runs until this limit.
     let patience = if name.ends_with("hang") { "-DPATIENCE=5" } else { "-DPATIENCE=60" };
     let compiled = Command::new("cc")
         .args(["-w", patience, "-o"])
