@@ -100,7 +100,7 @@ fn show(text: &[u8]) -> String {
     format!("{:?}", String::from_utf8_lossy(text))
 }
 
-/// Conversions of printf. In FMI 3.0 a message is not a format, so such a conversion was left in it by mistake.
+/// Conversions of printf. In FMI 3.0 a message is not a format, so a conversion in it is a mistake.
 const CONVERSIONS: [&str; 14] =
     ["%s", "%d", "%i", "%u", "%g", "%f", "%e", "%x", "%lf", "%ld", "%lu", "%zu", "%.", "%p"];
 

@@ -91,8 +91,8 @@ impl Workers {
         Ok(run)
     }
 
-    /// Runs a program with the directory of the FMU as its argument, and contains it like a call sequence. Returns its exit
-    /// status, or 1 if it was ended by a signal or started too many processes. Returns `None` if it did not end within the limit.
+    /// Runs a program with the directory of the FMU as its argument, and confines it like a call sequence. Returns its exit
+    /// status, or 1 if a signal ended it or it started too many processes. Returns `None` if it did not end within the limit.
     pub fn program(
         &self,
         program: &Path,

@@ -77,8 +77,9 @@ fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
     groups.into_iter().map(|(_, ids)| ids).collect()
 }
 
-/// Returns a shorter sequence that still satisfies `reproduces` and, like the original one, is allowed by the standard. Calls of
-/// `pinned` functions are not removed. If `compared` is set, corresponding calls of compared simulations are removed together.
+/// Returns the shortest sequence found that still satisfies `reproduces` and, if the standard allows the original sequence, is
+/// allowed, too. Calls of `pinned` functions are not removed. If `compared` is set, corresponding calls of compared simulations
+/// are removed together.
 pub fn shrink(
     description: &Description,
     sequence: &CallSequence,

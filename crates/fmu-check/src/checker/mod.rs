@@ -222,7 +222,7 @@ impl Checker {
         }
     }
 
-    /// Records the reason for which a topic that has begun was not finished.
+    /// Records the reason why a topic that has begun was not finished.
     pub fn stopped(&self, topic: &str, why: String) {
         let mut unchecked = locked(&self.unchecked);
         if let Some(known) = unchecked.iter_mut().find(|known| known.name == topic) {

@@ -91,7 +91,8 @@ impl Checker {
     }
 
     /// Repeats the calls of a finding, at most three times. If a repetition shows the finding, writes its program and returns
-    /// true. The limit is ten times as long as in the check, because the machine may be busy; a hang keeps the usual limit.
+    /// true. The limit is ten times as long as in the check, because the machine may be busy; for a hang, it is not extended in
+    /// this way.
     fn reproduce(&self, finding: &mut Finding, until: Instant) -> anyhow::Result<bool> {
         let Some(criterion) = finding.criterion.clone() else { return Ok(false) };
         let patience = if finding.name.ends_with("hang") { 1.0 } else { 10.0 };

@@ -3,8 +3,8 @@
 
 use crate::finding::Finding;
 
-/// Rules whose violation may cause further findings, with patterns for the names of these: a prefix, or `*` and a suffix. A rule
-/// can only be caused by an earlier one.
+/// Rules whose violation may cause further findings, with patterns for the names of these: a prefix, or `*` and a suffix. The
+/// cause of a rule in this list can only be an earlier rule of the list.
 const CAUSES: [(&str, &[&str]); 6] = [
     ("arrays.written-beyond", &["*.crash", "results.", "states.", "reset."]),
     ("results.process", &["results.", "states.", "reset."]),
@@ -27,7 +27,7 @@ const CAUSES: [(&str, &[&str]); 6] = [
     ("resources.settings", &["results.", "states.", "reset.", "logs.printed"]),
 ];
 
-/// Sets the cause of each finding that may follow from another one, and moves the finding behind followers cause.
+/// Sets the cause of each finding that may follow from another one, and moves the finding behind its cause.
 pub fn explain(findings: &mut Vec<Finding>) {
     let found: Vec<String> = findings.iter().map(|finding| finding.name.clone()).collect();
     for finding in findings.iter_mut() {

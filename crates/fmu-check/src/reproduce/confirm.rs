@@ -1,4 +1,4 @@
-//! Compiles and runs the program of a finding. Only a finding that its program shows keeps its severity.
+//! Compiles and runs the program of a finding. A finding that its program does not show becomes a note.
 
 use crate::finding::{Finding, Proof};
 use crate::run::{Stop, Workers};

@@ -130,7 +130,7 @@ static void open_library(void) {
     if (!library) { print("%s\n", dlerror()); fflush(out); _exit(4); }
 }
 
-/* Unloads the library. The output that follows crashes if the library has left a buffer of the standard output in its memory. */
+/* Unloads the library. The output crashes if the library has set a buffer of the standard output that was unloaded with it. */
 static __attribute__((unused)) void close_library(void) {
     dlclose(library);
     putchar('\n');

@@ -1,4 +1,4 @@
-//! Contains the processes of an FMU: each call sequence runs in a separate session, cannot send signals to the processes of the
+//! Confines the processes of an FMU: each call sequence runs in a separate session, cannot send signals to the processes of the
 //! checker, and its descendants are ended after it.
 
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -81,7 +81,8 @@ impl Executor {
         format!("{}{end}", if self.setting.fmi3 { "fmi3" } else { "fmi2" })
     }
 
-    /// Returns the address of a function, and loads the library before if necessary. Ends the process if that is not possible.
+    /// Returns the address of a function, and loads the library first if necessary. Ends the process if the library cannot be
+    /// loaded.
     pub fn find(&self, co_simulation: bool, name: &str) -> Option<*const c_void> {
         let index = usize::from(!co_simulation);
         let mut libraries = locked(&self.libraries);

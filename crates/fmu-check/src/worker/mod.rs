@@ -31,8 +31,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub use updates::MOST_UPDATES;
 use work::{end, work};
 
-/// Returns immediately, unless this process was started as a worker: then executes call sequences and ends the process. A program
-/// that offers checks must call this function first in `main`, because a check starts the same program again as a worker.
+/// If this process was started as a worker, executes call sequences and ends the process. Otherwise returns immediately. A
+/// program that offers checks must call this function first in `main`, because a check starts the same program again as a worker.
 pub fn run_worker_if_requested() {
     let Some(job) = std::env::var_os(VARIABLE) else { return };
     #[cfg(target_os = "linux")]

@@ -22,8 +22,8 @@ impl Executor {
                     let begin = Instant::now();
                     memory::KEEP.store(true, Ordering::Relaxed);
                     let (mut done, mut last) = (0, Vec::new());
-                    // The machine may be busy, so four times as much time is allowed for the repetitions without which nothing is
-                    // evaluated.
+                    // Until there are enough repetitions for an evaluation, four times as much time is allowed, because the
+                    // machine may be busy.
                     let patience = |done: usize| if done < EVALUATED { 4.0 } else { 1.0 };
                     let seconds = || begin.elapsed().as_secs_f64();
                     while done < *times && seconds() < patience(done) * self.setting.repetitions {
@@ -112,7 +112,7 @@ impl Executor {
                     // SAFETY: made by Box::leak, and nothing else refers to it.
                     in_fmu(|| drop(unsafe { Box::from_raw(std::ptr::from_ref(library).cast_mut()) }));
                 }
-                // Crashes if the library has left a buffer in its own memory as the buffer of the standard output.
+                // Crashes if the library has set a buffer of the standard output that was unloaded with it.
                 #[cfg(unix)]
                 // SAFETY: writes an empty line, and the buffers of the C library.
                 in_fmu(|| unsafe {
