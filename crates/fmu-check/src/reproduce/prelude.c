@@ -57,6 +57,7 @@ static __thread char messages[1 << 16];
 
 #define print(...) (quiet ? 0 : fprintf(out ? out : stdout, __VA_ARGS__))
 
+/* Opens a file for results; ends the process if that is not possible. */
 static FILE *results(const char *kind, int number, const char *mode) {
     char path[5100];
     FILE *file;
@@ -66,6 +67,7 @@ static FILE *results(const char *kind, int number, const char *mode) {
     return file;
 }
 
+/* Returns the contents of a file for results. */
 static __attribute__((unused)) char *result(const char *kind, int number) {
     FILE *file = results(kind, number, "r");
     char *text = calloc(1, 1 << 24);
@@ -78,10 +80,12 @@ static __attribute__((unused)) bool begins(const char *text, const char *with) {
     return strncmp(text, with, strlen(with)) == 0;
 }
 
+/* Returns whether there is anything but white space. */
 static __attribute__((unused)) bool has_text(const char *text) {
     return text[strspn(text, " \t\r\n")] != 0;
 }
 
+/* Returns whether the results of at least one of these pairs of calls differ. */
 static __attribute__((unused)) bool any_differ(const int (*pairs)[2], size_t count) {
     size_t i;
     bool found = false;
@@ -125,6 +129,7 @@ static __attribute__((unused)) void put_strings(FILE *file, const char *const *a
     fprintf(file, ";");
 }
 
+/* Loads the library; ends the process with status 4 if that is not possible. */
 static void open_library(void) {
     library = dlopen(library_path, (bind_now ? RTLD_NOW : RTLD_LAZY) | RTLD_LOCAL);
     if (!library) { print("%s\n", dlerror()); fflush(out); _exit(4); }
@@ -191,6 +196,7 @@ static void check_environment(const void *environment) {
     fclose(results("stray", 0, "w"));
 }
 
+/* Adds a message to `messages`, if there is room. */
 static void record_message(int status, const char *category, const char *text) {
     size_t length = strlen(messages);
     if (length + 2 * (strlen(category ? category : "") + strlen(text ? text : "")) + 64 > sizeof messages) return;
