@@ -17,13 +17,13 @@ fn rule(name: &'static str, criterion: impl Criterion) -> Broken {
     (name, Arc::new(criterion))
 }
 
-/// Returns the findings in a run that ended after its last step.
+/// Returns the violations of these rules in a run whose last step has returned.
 pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -> Vec<Finding> {
     let all = all_steps(sequence);
     let mut broken: Vec<Broken> = processes(&all, run).into_iter().collect();
     for numbered in &all {
         if let Some(outcome) = run.outcome(numbered.id) {
-            broken.extend(call(numbered));
+            broken.extend(rules_of_call(numbered));
             broken.extend(messages(description, numbered.id).filter(|_| !outcome.log.is_empty()));
             broken.extend(silence(sequence, numbered));
             broken.extend(environment(numbered).filter(|_| !outcome.strays.is_empty()));
@@ -38,7 +38,7 @@ pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -
     found.filter(|finding| names.insert(finding.name.clone()) || finding.topic() == "arrays").collect()
 }
 
-/// Returns the rule that no process remains after all instances were freed; `None` if there is no orphaned process.
+/// Returns the rule that no process is alive after all instances were freed; `None` if the run left no process.
 fn processes(all: &[&Numbered], run: &Run) -> Option<Broken> {
     if run.orphans.is_empty() {
         return None;
@@ -69,7 +69,7 @@ fn lives(all: &[&Numbered]) -> Option<Vec<(u32, u32)>> {
 }
 
 /// Returns the rules for the arrays, the status and the strings of a call.
-fn call(numbered: &Numbered) -> Vec<Broken> {
+fn rules_of_call(numbered: &Numbered) -> Vec<Broken> {
     let (id, name) = (numbered.id, step_name(&numbered.step));
     let arrays = [("arrays.const", true), ("arrays.written-beyond", false)].map(|(of, constant)| {
         let name = name.clone();
@@ -100,13 +100,13 @@ fn show(text: &[u8]) -> String {
     format!("{:?}", String::from_utf8_lossy(text))
 }
 
-/// Conversions of printf that a message of FMI 3.0 does not contain.
+/// Conversions of printf. In FMI 3.0 a message is not a format, so a conversion in it is a mistake.
 const CONVERSIONS: [&str; 14] =
     ["%s", "%d", "%i", "%u", "%g", "%f", "%e", "%x", "%lf", "%ld", "%lu", "%zu", "%.", "%p"];
 
 /// Tests a message of an FMU with these log categories; returns a description of the error.
 type MessageTest = fn(&Message, &[String], Standard) -> Option<String>;
-/// Rules for messages.
+/// Rules for messages, each with its test.
 const MESSAGE_TESTS: [(&str, MessageTest); 4] = [
     ("logs.category", |message, categories, _| {
         let Some(category) = &message.category else {
@@ -137,6 +137,7 @@ const MESSAGE_TESTS: [(&str, MessageTest); 4] = [
     }),
 ];
 
+/// Returns the rules for the messages that a call logs.
 fn messages(description: &Description, id: u32) -> impl Iterator<Item = Broken> {
     MESSAGE_TESTS.into_iter().map(move |(name, test)| {
         let (categories, standard) = (description.log_categories.clone(), description.standard);
@@ -165,9 +166,11 @@ fn silence(sequence: &CallSequence, numbered: &Numbered) -> Option<Broken> {
         matches!(&numbered.step, Step::Make(_, make) if !make.logging)
             || matches!(&numbered.step, Step::Call { function, .. } if function.ends_with("SetDebugLogging"))
     });
-    // Section 4.2.3 of FMI 2.0.5: a status that the FMU does not have is answered with Discard, which is not a failure.
-    let asks = |function: &str| function.starts_with("fmi2Get") && function.ends_with("Status");
-    if off || !matches!(&numbered.step, Step::Call { instance: Some(_), function, .. } if !asks(function)) {
+    // Section 4.2.3 of FMI 2.0.5: the FMU returns Discard if it does not provide a status, which is not a failure.
+    let asks_status = |function: &str| function.starts_with("fmi2Get") && function.ends_with("Status");
+    if off
+        || !matches!(&numbered.step, Step::Call { instance: Some(_), function, .. } if !asks_status(function))
+    {
         return None;
     }
     let (id, name) = (numbered.id, step_name(&numbered.step));

@@ -4,7 +4,8 @@ use crate::finding::Finding;
 use anyhow::Context as _;
 use std::path::Path;
 
-/// Line of a baseline: accepts a rule, or the observations of the rule that contain `text`.
+/// Line of a baseline. It accepts all observations of a rule, or only those that contain `text`; it may also accept that an
+/// interface or a topic is not checked.
 struct Accepted {
     name: String,
     text: Option<String>,
@@ -13,11 +14,12 @@ struct Accepted {
 
 impl Accepted {
     /// Returns whether this line accepts an observation of a finding.
-    fn fits(&self, finding: &Finding, observed: &str) -> bool {
+    fn accepts(&self, finding: &Finding, observed: &str) -> bool {
         self.name == finding.name && self.text.as_ref().is_none_or(|text| observed.contains(text.as_str()))
     }
 }
 
+/// Accepted findings of a project; empty without a file.
 #[derive(Default)]
 pub struct Baseline {
     accepted: Vec<Accepted>,
@@ -67,11 +69,11 @@ impl Baseline {
         Ok(Self { accepted: accepted.collect::<Result<_, _>>()? })
     }
 
-    /// Returns the reasons if all observations of a finding are accepted.
+    /// Returns the reasons why all observations of a finding are accepted; `None` if one of them is not.
     pub fn reason(&self, finding: &Finding) -> Option<String> {
         let mut reasons: Vec<&str> = Vec::new();
         for observed in std::iter::once(&finding.observed).chain(&finding.more) {
-            let accepted = self.accepted.iter().find(|accepted| accepted.fits(finding, observed))?;
+            let accepted = self.accepted.iter().find(|accepted| accepted.accepts(finding, observed))?;
             if !reasons.contains(&accepted.reason.as_str()) {
                 reasons.push(&accepted.reason);
             }
@@ -79,18 +81,18 @@ impl Baseline {
         Some(reasons.join("; "))
     }
 
-    /// Returns the reason for which an interface or a topic need not be checked.
+    /// Returns the reason why an interface or a topic need not be checked; `None` if the baseline has none.
     pub fn unchecked_reason(&self, name: &str) -> Option<&str> {
         self.accepted.iter().find(|accepted| accepted.name == name).map(|accepted| accepted.reason.as_str())
     }
 
-    /// Returns the names that match no finding and no unchecked topic.
+    /// Returns the names in the lines that match no finding and no unchecked interface or topic.
     pub fn unused(&self, findings: &[Finding], unchecked: &[crate::checker::Unchecked]) -> Vec<String> {
         let used = |accepted: &&Accepted| {
             unchecked.iter().any(|unchecked| unchecked.name == accepted.name)
                 || findings.iter().any(|finding| {
                     let mut all = std::iter::once(&finding.observed).chain(&finding.more);
-                    all.any(|observed| accepted.fits(finding, observed))
+                    all.any(|observed| accepted.accepts(finding, observed))
                 })
         };
         self.accepted

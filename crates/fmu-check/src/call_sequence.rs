@@ -21,7 +21,7 @@ macro_rules! kinds {
                 match self { $(Self::$kind => $c),+ }
             }
 
-            /// Converts bits to the number.
+            /// Returns the number that these bits represent.
             #[allow(unreachable_patterns, reason = "floating-point numbers come first")]
             pub fn number(self, bits: u64) -> f64 {
                 match self {
@@ -31,7 +31,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// Converts a number to its bits.
+            /// Returns the bits that represent a number.
             #[allow(unreachable_patterns, reason = "floating-point numbers come first")]
             pub fn bits(self, number: f64) -> u64 {
                 match self {
@@ -81,7 +81,7 @@ pub enum Arg {
     Strings(Vec<Option<Vec<u8>>>),
     /// Array of pointers to bytes.
     Blobs(Vec<Vec<u8>>),
-    /// Array for this many results.
+    /// Array to which the FMU writes this many results.
     Out(Kind, usize),
     /// Handle of the saved state at this index.
     State(usize),
@@ -119,14 +119,14 @@ pub struct Make {
     pub early_return: bool,
 }
 
-/// Integration of Model Exchange.
+/// Integration of an FMU in Model Exchange.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Integration {
     pub begin: f64,
     pub end: f64,
-    /// Number of steps; events end some of them earlier.
+    /// Number of steps if there are no events. It defines the step size, but an event ends its step early.
     pub steps: usize,
-    /// Whether the method is Euler's, not the classical Runge-Kutta method.
+    /// Whether the method is Euler's method instead of the classical Runge-Kutta method.
     pub euler: bool,
     /// Number of continuous states.
     pub states: usize,
@@ -140,18 +140,18 @@ pub const NULL_INSTANCE: usize = 999;
 /// Step of a call sequence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Step {
-    /// Makes an instance with this index.
+    /// Instantiates the FMU; the instance gets this index.
     Make(usize, Make),
     Free(usize),
-    /// Calls a function of an instance, or of NULL, with the arguments after the instance.
+    /// Calls a function whose first argument is the instance, or NULL, followed by `args`.
     Call {
         instance: Option<usize>,
         function: String,
         args: Vec<Arg>,
     },
-    /// Calls a function without an instance, which returns a string: the version or the platform.
+    /// Calls a function that has no arguments and returns a string: the FMI version or the types platform.
     Version(String),
-    /// Integrates an instance of Model Exchange, with events.
+    /// Integrates an instance of Model Exchange and handles its events.
     Integrate(usize, Integration),
     /// Repeats steps this many times, or until the time limit.
     Repeat(usize, Vec<Numbered>),
@@ -159,7 +159,7 @@ pub enum Step {
     Parallel(Vec<Vec<Numbered>>),
     /// Measures memory, threads, open files and settings of the process.
     Measure,
-    /// Continues in a new process, which receives only the serialized states.
+    /// Continues in a new process. Only the serialized states are passed on to it.
     FreshProcess,
     /// Places the FMU in a directory with this name. It can only be the first step of a process, because the library is loaded from there.
     Elsewhere(String),
@@ -180,7 +180,7 @@ pub struct Numbered {
 /// Steps in the order of their execution.
 pub type CallSequence = Vec<Numbered>;
 
-/// Returns all steps of a sequence, including those of its repetitions and threads.
+/// Returns all steps of a sequence, including the steps within its repetitions and threads.
 pub fn all_steps(sequence: &[Numbered]) -> Vec<&Numbered> {
     let steps = sequence.iter().flat_map(|numbered| {
         let inner = match &numbered.step {
@@ -218,7 +218,7 @@ pub enum Values {
 }
 
 impl Values {
-    /// Returns numbers of a type.
+    /// Converts numbers to values of a type.
     pub fn new(kind: Kind, numbers: impl IntoIterator<Item = f64>) -> Self {
         Self::Numbers(kind, numbers.into_iter().map(|number| kind.bits(number)).collect())
     }
@@ -263,8 +263,8 @@ impl Values {
         self.differ_beyond(other, 0.0, |_| 1.0)
     }
 
-    /// Returns the first index at which the values differ, floating-point numbers by more than `tolerance` times the largest of both
-    /// magnitudes and the nominal value at the index.
+    /// Returns the first index at which the values differ. Floating-point numbers differ if their difference exceeds `tolerance`
+    /// times the largest of both magnitudes and the nominal value at the index.
     pub fn differ_beyond(
         &self,
         other: &Self,
@@ -307,7 +307,7 @@ pub struct Outcome {
     pub damage: Vec<String>,
     /// String that the function for the version or the platform returned.
     pub text: Option<Vec<u8>>,
-    /// Measurement, or the number of repetitions.
+    /// Measurement; for repetitions, only their number.
     pub measured: Option<Measured>,
 }
 
@@ -316,13 +316,13 @@ pub struct Outcome {
 pub struct Measured {
     /// Allocated bytes if `exact`, otherwise the resident memory of the process.
     pub memory: u64,
-    /// Whether the C library counts allocated bytes.
+    /// Whether the C library reports the number of allocated bytes.
     pub exact: bool,
     pub threads: usize,
     pub files: usize,
     /// Working directory, floating-point control word, locale and signal handlers.
     pub settings: Vec<String>,
-    /// Number of repetitions.
+    /// Number of repetitions; 0 for a measurement.
     pub times: usize,
 }
 
@@ -334,13 +334,13 @@ pub enum End {
     Done,
     /// The process crashed, for this reason.
     Crash(String),
-    /// The process exceeded the limit, which is given in seconds.
+    /// The process did not end within this limit in seconds.
     Hang(f64),
     /// The process exited before the last step, with this status.
     Exit(i32),
     /// The library cannot be loaded, for this reason.
     Unloadable(String),
-    /// The FMU started this many processes, more than the limit, and all were ended.
+    /// The FMU started this many processes, which is more than the limit, so all were ended.
     Flood(usize),
 }
 
@@ -381,14 +381,14 @@ impl Run {
 /// Parameters that all call sequences of an FMU share.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Setting {
-    /// Whether the FMI version is 3.0, not 2.0.
+    /// Whether the FMI version is 3.0 instead of 2.0.
     pub fmi3: bool,
     /// Paths of the libraries for Co-Simulation and for Model Exchange.
     pub libraries: [Option<std::path::PathBuf>; 2],
     pub resources: std::path::PathBuf,
     /// Maximum address space of a process in bytes.
     pub memory: u64,
-    /// Whether memory after each array is accessible, to detect writes instead of crashing.
+    /// Whether memory after each array is accessible, so that a write there is detected instead of crashing.
     pub soft: bool,
     /// Whether the loader resolves all symbols when it loads the library, as in some importers.
     pub now: bool,

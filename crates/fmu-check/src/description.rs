@@ -1,4 +1,4 @@
-//! Model description with its errors, which are findings.
+//! Model description of an FMU, with the rules that it breaks.
 
 use crate::call_sequence::Kind;
 use crate::rules::Observation;
@@ -8,6 +8,7 @@ use fmi_abi::{BaseType, Standard};
 use std::collections::HashSet;
 use std::ops::Deref;
 
+/// Model description, with values that the checks derive from it.
 #[derive(Clone, Debug)]
 pub struct Description {
     written: ModelDescription,
@@ -77,7 +78,7 @@ impl Description {
             wrong.push(("description.interfaces", "it offers no interface type".to_owned()));
         }
         for offer in [&self.co_simulation, &self.model_exchange].into_iter().flatten() {
-            // The reader rejects other names that are not identifiers of C.
+            // `ModelDescription::parse` rejects any other name that is not an identifier of C.
             if offer.identifier.is_empty() {
                 wrong.push(("description.identifier", "modelIdentifier is missing or empty".to_owned()));
             }
@@ -93,7 +94,7 @@ impl Description {
             }
             if self.standard == Standard::Fmi3 && !references.insert(variable.reference) {
                 let why =
-                    format!("value reference {} of {name} is that of another variable", variable.reference);
+                    format!("another variable has the value reference {} of {name}, too", variable.reference);
                 add("description.references", why);
             }
             if output && !listed && !variable.clocked {
@@ -101,7 +102,7 @@ impl Description {
                 add("description.structure", why);
             }
             if !output && listed {
-                let why = format!("{name} is not an output, and is among those of ModelStructure");
+                let why = format!("{name} is not an output, but is among the outputs of ModelStructure");
                 add("description.structure", why);
             }
             if let Some(unit) = variable.unit.as_ref().filter(|unit| !self.units.contains_key(&***unit)) {
@@ -110,17 +111,18 @@ impl Description {
             }
             let declared = variable.declared_type.as_ref();
             if let Some(declared) = declared.filter(|declared| !self.types.contains(*declared)) {
-                let why = format!("{name} is of type {declared:?}, which is none of TypeDefinitions");
+                let why = format!("{name} is of type {declared:?}, which is not among the TypeDefinitions");
                 add("description.types", why);
             }
             wrong.extend(faults(variable));
         }
-        // A variable with the attribute `derivative` is only listed if it is a state derivative (section 2.2.8 of FMI 2.0).
+        // The reverse is not required: a variable with the attribute `derivative` is listed only if it is a state derivative
+        // (section 2.2.8 of FMI 2.0).
         for unknown in &self.derivatives {
             let variable = &self.variables[unknown.variable];
             if variable.derivative_of.is_none() {
                 let why =
-                    format!("{} is among the derivatives, and is not declared to be one", variable.name);
+                    format!("{} is among the derivatives, but lacks the attribute derivative", variable.name);
                 wrong.push(("description.structure", why));
             }
         }
@@ -131,7 +133,8 @@ impl Description {
         wrong
     }
 
-    /// Returns whether Co-Simulation needs Event Mode, as FMUs with clocks do (section 2.3.1 of FMI 3.0, `eventModeUsed`).
+    /// Returns whether Co-Simulation is used with Event Mode, because the FMU has clocks and offers this mode (section 2.3.1 of
+    /// FMI 3.0, `eventModeUsed`).
     pub fn event_mode(&self) -> bool {
         let has_clocks = self.variables.iter().any(|variable| variable.base.is_none() || variable.clocked);
         has_clocks && self.co_simulation.as_ref().is_some_and(|offer| offer.can(&["hasEventMode"]))
@@ -153,14 +156,15 @@ impl Description {
         kind_of(self.standard, self.variables[index].base.unwrap_or(BaseType::Boolean))
     }
 
-    /// Returns whether a variable may be read in Initialization Mode. FMI 2.0 allows outputs, continuous states, their derivatives (note
-    /// 2 of the tables in sections 3.2.3 and 4.2.4 of FMI 2.0.5) and the initial unknowns, FMI 3.0 all variables.
+    /// Returns whether a variable may be read in Initialization Mode. FMI 2.0 allows outputs, continuous states, their
+    /// derivatives (note 2 of the tables in sections 3.2.3 and 4.2.4 of FMI 2.0.5) and the initial unknowns; FMI 3.0 allows all
+    /// variables.
     pub fn is_readable_while_initializing(&self, index: usize) -> bool {
         self.standard == Standard::Fmi3 || self.early.contains(&self.variables[index].reference)
     }
 
-    /// Returns the relative difference below which results of a solver with variable steps are equal: the tolerance of the default
-    /// experiment, or 1e-4.
+    /// Returns the relative difference up to which results of a solver with variable steps are regarded as equal: the tolerance
+    /// of the default experiment, or 1e-4.
     pub fn tolerance(&self) -> f64 {
         self.default_tolerance.unwrap_or(1e-4)
     }
@@ -220,7 +224,7 @@ fn faults(variable: &Variable) -> Vec<Observation> {
         Some(_) => {}
     }
     if variability == "continuous" && !variable.is_float() && variable.base.is_some() {
-        add("description.combination", format!("{name} is continuous and no floating-point number"));
+        add("description.combination", format!("{name} is continuous, but not a floating-point number"));
     }
     let needs_start =
         ["exact", "approx"].contains(&initial.as_str()) || causality == "input" && variable.base.is_some();
@@ -252,7 +256,7 @@ fn faults(variable: &Variable) -> Vec<Observation> {
     wrong
 }
 
-/// Returns the end of the names of the getter and setter of a type, for example `Float64`.
+/// Returns the type as it is written in the names of getters and setters, for example `Float64` for fmi3GetFloat64.
 pub fn type_name(standard: Standard, base: BaseType) -> &'static str {
     match (standard, base) {
         (Standard::Fmi2, BaseType::Enumeration) => "Integer",
@@ -261,7 +265,7 @@ pub fn type_name(standard: Standard, base: BaseType) -> &'static str {
     }
 }
 
-/// Returns the C type of the values of a type.
+/// Returns the C type of the values of an FMI type.
 pub fn kind_of(standard: Standard, base: BaseType) -> Kind {
     match type_name(standard, base) {
         "Real" | "Float64" => Kind::F64,

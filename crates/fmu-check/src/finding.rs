@@ -28,7 +28,7 @@ impl Severity {
     }
 }
 
-/// Criterion for runs: returns a description of the violation, `None` if the run fulfils the criterion.
+/// Criterion for runs: returns a description of the violation, or `None` if the run fulfils the criterion.
 pub trait Criterion: Fn(&Run) -> Option<String> + Send + Sync + 'static {}
 
 impl<T: Fn(&Run) -> Option<String> + Send + Sync + 'static> Criterion for T {}
@@ -36,13 +36,13 @@ impl<T: Fn(&Run) -> Option<String> + Send + Sync + 'static> Criterion for T {}
 /// Criterion that is shared by copies of a finding.
 pub type SharedCriterion = Arc<dyn Criterion>;
 
-/// Returns the criterion that all these criteria are fulfilled.
+/// Returns a criterion that is violated if any of these criteria is violated.
 pub fn any(criteria: impl IntoIterator<Item = Box<dyn Criterion>>) -> Box<dyn Criterion> {
     let criteria: Vec<_> = criteria.into_iter().collect();
     Box::new(move |run: &Run| criteria.iter().find_map(|criterion| criterion(run)))
 }
 
-/// Returns the criterion that these calls return OK or Warning.
+/// Returns a criterion that is violated if one of these calls fails.
 pub fn fails(sequence: &CallSequence, ids: Vec<u32>) -> Box<dyn Criterion> {
     let sequence = sequence.clone();
     Box::new(move |run: &Run| failure(&sequence, run, &ids))
@@ -52,7 +52,7 @@ pub fn fails(sequence: &CallSequence, ids: Vec<u32>) -> Box<dyn Criterion> {
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Proof {
-    /// The finding has no program: it is in the files of the FMU.
+    /// There is no program, because the finding concerns the files of the FMU.
     #[default]
     Files,
     /// The program shows the finding.
@@ -88,11 +88,11 @@ pub struct Finding {
     /// Criterion that a run violates if it reproduces the finding.
     #[serde(skip)]
     pub criterion: Option<SharedCriterion>,
-    /// Name of the finding from which this one may follow.
+    /// Name of the finding that may be the cause of this one.
     pub cause: Option<String>,
     /// Whether the finding fails the check.
     pub fails: bool,
-    /// Reason in the baseline for which the finding is accepted.
+    /// Reason in the baseline why the finding is accepted.
     pub accepted: Option<String>,
     /// Number of steps before and after shortening.
     pub steps: (usize, usize),
@@ -169,7 +169,7 @@ pub struct Event {
     pub next: Option<f64>,
 }
 
-/// Returns the result of a successful update of the discrete states.
+/// Returns the result of an update of the discrete states; `None` if the update failed.
 pub fn event(run: &Run, id: u32, fmi3: bool) -> Option<Event> {
     let outcome = run.outcome(id).filter(|outcome| outcome.status.is_some_and(|status| status <= 1))?;
     let (flags, time) = if fmi3 {
@@ -186,7 +186,7 @@ pub fn event(run: &Run, id: u32, fmi3: bool) -> Option<Event> {
     Some(Event { again, terminate, states_changed, next: defined.then_some(time) })
 }
 
-/// Describes the first of these calls that failed.
+/// Describes the first of these calls that failed; `None` if none failed.
 pub fn failure(sequence: &CallSequence, run: &Run, ids: &[u32]) -> Option<String> {
     ids.iter().find_map(|id| failure_of(sequence, run, *id))
 }
@@ -210,7 +210,8 @@ pub fn failure_of(sequence: &CallSequence, run: &Run, id: u32) -> Option<String>
     Some(format!("{name} returns {result}{why}"))
 }
 
-/// Describes the first failed instantiation, otherwise the first call that returned a status above `most`.
+/// Describes the first failed instantiation, otherwise the first call that returned a status above `max_status`. If `max_status`
+/// is at most 1, a missing function is a failure, too.
 pub fn first_failure(sequence: &CallSequence, run: &Run, max_status: i32) -> Option<String> {
     let made = |numbered: &&Numbered| matches!(numbered.step, Step::Make(..));
     let failed = |numbered: &&Numbered| {

@@ -7,14 +7,18 @@ use fmi_abi::calls::signature;
 use fmi_abi::{Interface, Mode, Standard};
 use std::collections::HashMap;
 
+/// State of an instance.
 #[derive(Clone, Copy)]
 struct State {
     interface: Interface,
     mode: Mode,
     time: f64,
+    /// Values of `eventModeUsed` and `earlyReturnAllowed`.
     event_mode: bool,
     early_return: bool,
+    /// Whether fmi2SetupExperiment was called; true for FMI 3.0, which does not have it.
     set_up: bool,
+    /// Whether the discrete states were updated since Event Mode was entered.
     updated: bool,
 }
 
@@ -23,7 +27,7 @@ pub fn first_illegal(description: &Description, sequence: &[Numbered]) -> Option
     walk(description, sequence, &mut Objects::default())
 }
 
-/// States of the instances after the steps of a call sequence that were added one after another.
+/// States of the instances while the steps of a call sequence are added one after another.
 #[derive(Default)]
 pub struct Modes(Objects);
 
@@ -65,9 +69,9 @@ fn walk(description: &Description, sequence: &[Numbered], objects: &mut Objects)
             Step::Call { instance, function, args } => {
                 instance.is_some_and(|index| objects.call(description.standard, index, function, args))
             }
-            // Steps that are allowed twice are allowed any number of times.
+            // If the steps are allowed twice in a row, they are allowed any number of times.
             Step::Repeat(_, steps) => (0..2).all(|_| walk(description, steps, objects).is_none()),
-            // Threads share no instances.
+            // Threads do not share instances, so each sequence is checked separately.
             Step::Parallel(sequences) => {
                 sequences.iter().all(|sequence| first_illegal(description, sequence).is_none())
             }
@@ -92,6 +96,7 @@ fn walk(description: &Description, sequence: &[Numbered], objects: &mut Objects)
 }
 
 impl Objects {
+    /// Adds an instance; returns whether it may be made.
     fn make(&mut self, description: &Description, index: usize, make: &Make) -> bool {
         let interface = if make.co_simulation { Interface::CoSimulation } else { Interface::ModelExchange };
         let once = description
@@ -162,7 +167,7 @@ impl State {
                 return self.updated;
             }
             "DoStep" => {
-                // After an early return, the time is not known before the run.
+                // A step that returns early ends at a time that is not known before the run.
                 let here = !is_other_time(real(0), self.time) || self.early_return && real(0) < self.time;
                 self.time = real(0) + real(1);
                 return here && real(1) > 0.0;
@@ -183,7 +188,7 @@ impl State {
     }
 }
 
-/// Updates the saved and serialized states for a call; returns whether those that the call uses exist.
+/// Updates the saved and serialized states for a call; returns whether the states that it uses exist.
 fn saved_states(
     slots: &mut HashMap<usize, SavedState>,
     bytes: &mut HashMap<usize, State>,

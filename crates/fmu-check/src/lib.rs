@@ -3,11 +3,12 @@
 //! ## Inside
 //!
 //! A check writes a call sequence (`writer`, `call_sequence`), which a separate process executes (`run`, `worker`), and evaluates
-//! the results. The call sequence of a finding is shortened (`shrink`) within the limits of the standard (`legal`), and written as
-//! a program in C (`reproduce`). Only `worker` has `unsafe` code: an FMU may crash its process.
+//! the results. The call sequence of a finding is shortened (`shrink`) so that the standard still allows it (`legal`), and
+//! written as a program in C (`reproduce`). All `unsafe` code is in `worker`, which loads and calls the library of the FMU in
+//! processes that may crash.
 //!
-//! Each module uses only modules before it: `call_sequence`, `finding`, `rules`, `description`, `values`, `legal`, `writer`,
-//! `shrink`, `worker`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`, `checks`, `baseline`, `report`.
+//! Each module uses only modules before it: `random`, `call_sequence`, `finding`, `rules`, `description`, `values`, `legal`,
+//! `writer`, `shrink`, `worker`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`, `checks`, `baseline`, `report`.
 
 mod always;
 mod baseline;
@@ -18,6 +19,7 @@ mod description;
 mod finding;
 mod legal;
 mod options;
+mod random;
 mod report;
 mod reproduce;
 mod rules;
@@ -50,16 +52,17 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 use trajectory::{NoTrajectory, find_trajectory};
 
-/// Reason for which a topic that has begun is in the report that is written meanwhile.
+/// Reason that the report states for a topic until all its checks have ended, because the report is written after every check.
 const UNFINISHED: &str = "it is not finished";
 
 /// Topics that are not part of a quick check.
 const LONG: [&str; 2] = ["malformed", "resources"];
 
-/// Checks an FMU, prints the findings and writes the reports. The exit status is 1 for findings of a severity that fails the
-/// check, otherwise 2 if the FMU, one of its interfaces or a topic was not checked, otherwise 0.
+/// Checks an FMU, prints the findings and writes the reports. Returns the exit status: 1 if a finding fails the check, otherwise
+/// 2 if the FMU, one of its interfaces or a topic was not checked, otherwise 0. After an interrupt it is 130.
 ///
-/// The program must call [`run_worker_if_requested`] first in `main`, because it is started again to execute call sequences.
+/// The program must call [`run_worker_if_requested`] first in `main`, because the check starts the same program again to execute
+/// call sequences.
 pub fn command(fmu: &Path, options: &Options) -> ExitCode {
     if let Some(rule) = &options.explain {
         return match rules::explain(rule) {
@@ -101,26 +104,27 @@ pub fn command(fmu: &Path, options: &Options) -> ExitCode {
     }
 }
 
-/// Findings that `--only` does not remove, besides the findings of the topics `arrays` and `logs`. Any call may have them, or they
-/// prevent other checks.
+/// Findings that are reported even if `--only` excludes their topic, because any call may reveal them or because they prevent
+/// other checks. The same holds for the topics `arrays` and `logs`.
 #[rustfmt::skip]
 const ALWAYS: [&str; 6] = [
     "functions.status", "package.unloadable", "package.symbols",
     "life_cycle.simulation", "life_cycle.crash", "life_cycle.hang",
 ];
 
-/// Returns the reason for which a part was not checked. After an interrupt, processes and files are missing that a check needs.
+/// Returns the reason why a part was not checked. After an interrupt it is never the error itself, which only says that a process
+/// or a file is missing.
 fn stop(error: &anyhow::Error) -> String {
     if worker::interrupted() { Stop::Interrupted.to_string() } else { error.to_string() }
 }
 
-/// Finds a trajectory for each interface type that has a library.
+/// Finds a successful simulation for each interface type that has a library; records the interface types without one.
 fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
     for (index, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
         if checker.setting.libraries[index].is_none() {
             continue;
         }
-        match reach(checker, interface) {
+        match simulation(checker, interface) {
             Ok(trajectory) => checker.trajectories.push(trajectory),
             Err(error) if error.is::<NoTrajectory>() => {
                 checker.unchecked(INTERFACES[index], format!("no simulation succeeds: {error}"));
@@ -134,32 +138,33 @@ fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Checks an FMU. With `progress`, a line on the standard error shows the progress.
+/// Checks an FMU. If `progress` is set, a line on the standard error shows the progress.
 ///
 /// # Errors
-/// Fails if the file is not an FMU of FMI 2.0 or 3.0.
+/// Fails if the file is not an FMU of FMI 2.0 or 3.0, if the baseline cannot be read, or if a report cannot be written.
 pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<Report> {
     let begin = Instant::now();
     let baseline = options.baseline.as_deref().map(baseline::Baseline::read).transpose()?.unwrap_or_default();
-    // The workers are dropped, and end, before the directory is removed.
+    // The checker is dropped before the directory is removed, because its processes use the directory until they end.
     let (scratch, mut checker) = opened(path, options, begin)?;
     simulate(&mut checker)?;
     let session = Session { path, options, baseline, begin };
-    // The report exists from the first check on, so that nothing is lost if the check is ended.
-    let written = || match &options.out {
-        Some(directory) => session.report(&checker, session.kept(&checker)).write(directory),
+    // The report is written after every check, so that the findings so far are not lost if this process is killed.
+    let write_report = || match &options.out {
+        Some(directory) => session.report(&checker, session.wanted_findings(&checker)).write(directory),
         None => Ok(()),
     };
-    attack(&checker, progress, &|topic| is_wanted(options, topic), &written)?;
-    let mut findings = session.kept(&checker);
+    execute_checks(&checker, progress, &|topic| is_wanted(options, topic), &write_report)?;
+    let mut findings = session.wanted_findings(&checker);
     if !worker::interrupted() {
         prove(&checker, &mut findings, scratch.path(), options, progress);
     }
     Ok(session.report(&checker, findings))
 }
 
-/// Compares Co-Simulation with Model Exchange of an FMU that offers both, by simulations of at most 40 steps. Returns a description of
-/// the first difference that no error of a solver explains; `None` if there is none, or if the comparison is not possible.
+/// Compares Co-Simulation with Model Exchange of an FMU that offers both, by simulations of at most 40 steps. Returns a
+/// description of the first difference that is too large to be an error of a solver; `None` if there is no such difference or the
+/// comparison is not possible.
 ///
 /// The program must call [`run_worker_if_requested`] first in `main`.
 ///
@@ -180,7 +185,7 @@ pub fn compare_interfaces(path: &Path) -> anyhow::Result<Option<String>> {
     Ok(found.map(|finding| finding.observed))
 }
 
-/// Unpacks an FMU; returns the directory and the state of the check with the findings in the files.
+/// Unpacks an FMU. Returns its temporary directory, and a checker that already has the findings in the files of the FMU.
 fn opened(
     path: &Path,
     options: &Options,
@@ -197,7 +202,7 @@ fn opened(
     let text = fmi_abi::files::read(&file, fmi_abi::files::MAX_XML)
         .map_err(|why| anyhow::anyhow!("{}: modelDescription.xml {why}", path.display()))?;
     let encoding = encoding(&text);
-    // For the further checks, a file that is not UTF-8 is decoded as Latin-1.
+    // A file that is not UTF-8 is a finding. It is decoded as Latin-1, so that the other checks can continue.
     let text = match std::str::from_utf8(&text) {
         Ok(text) => text.to_owned(),
         Err(_) => text.iter().map(|byte| char::from(*byte)).collect(),
@@ -229,7 +234,7 @@ fn is_wanted(options: &Options, topic: &str) -> bool {
     }
 }
 
-/// Arguments of a check that the report contains.
+/// Arguments of a check that decide what is reported.
 struct Session<'a> {
     path: &'a Path,
     options: &'a Options,
@@ -238,15 +243,15 @@ struct Session<'a> {
 }
 
 impl Session<'_> {
-    /// Returns the findings so far of the wanted topics, the most severe first.
-    fn kept(&self, checker: &Checker) -> Vec<Finding> {
+    /// Returns the findings so far that the options ask for, the most severe first.
+    fn wanted_findings(&self, checker: &Checker) -> Vec<Finding> {
         let mut findings = checker.findings();
-        let is_kept = |finding: &Finding| {
+        let is_wanted_finding = |finding: &Finding| {
             is_wanted(self.options, finding.topic())
                 || ["arrays", "logs"].contains(&finding.topic())
                 || ALWAYS.contains(&finding.name.as_str())
         };
-        findings.retain(|finding| self.options.only.is_empty() || is_kept(finding));
+        findings.retain(|finding| self.options.only.is_empty() || is_wanted_finding(finding));
         sort(&mut findings);
         findings
     }
@@ -271,7 +276,8 @@ fn sort(findings: &mut [Finding]) {
     findings.sort_by(|one, other| other.severity.cmp(&one.severity).then_with(|| one.name.cmp(&other.name)));
 }
 
-/// Returns the error in the encoding of a model description, which its XML declaration or its bytes have.
+/// Returns a finding if the XML declaration of a model description names another encoding than UTF-8, or if its bytes are not
+/// UTF-8.
 fn encoding(text: &[u8]) -> Option<rules::Observation> {
     let declaration = text.split(|byte| *byte == b'>').next().unwrap_or_default();
     let declaration = String::from_utf8_lossy(declaration);
@@ -289,8 +295,8 @@ fn encoding(text: &[u8]) -> Option<rules::Observation> {
     Some(("description.encoding", why))
 }
 
-/// Returns a successful simulation; records a finding if there is none.
-fn reach(checker: &mut Checker, interface: Interface) -> anyhow::Result<writer::Trajectory> {
+/// Returns a successful simulation. If there is none, records a finding and returns the error [`NoTrajectory`].
+fn simulation(checker: &mut Checker, interface: Interface) -> anyhow::Result<writer::Trajectory> {
     let trajectory = find_trajectory(checker, interface);
     let Some(NoTrajectory(_, sequence)) = trajectory.as_ref().err().and_then(|error| error.downcast_ref())
     else {
@@ -307,7 +313,7 @@ fn reach(checker: &mut Checker, interface: Interface) -> anyhow::Result<writer::
     trajectory
 }
 
-/// Returns the setting, and the interface types that cannot be checked with the reason for each.
+/// Returns the parameters that all call sequences share, and the interface types that cannot be checked, each with the reason.
 fn setting(
     options: &Options,
     directory: &Path,
@@ -342,12 +348,13 @@ fn setting(
     (setting, without)
 }
 
-/// Returns the number of threads.
+/// Returns the number of threads that execute checks: one for each processor, at most 8.
 fn threads() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from).min(8)
 }
 
-/// Calls `each` with each item and the number of items so far, on several threads. With `progress`, prints the line that it returns.
+/// Calls `each` on several threads with every item and the number of items that have begun. If `progress` is set, the line that
+/// `each` returns is printed.
 fn in_parallel<T: Sync>(items: &[T], progress: bool, each: impl Fn(&T, usize) -> String + Sync) {
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     std::thread::scope(|scope| {
@@ -368,8 +375,9 @@ fn in_parallel<T: Sync>(items: &[T], progress: bool, each: impl Fn(&T, usize) ->
     }
 }
 
-/// Executes a check if it fits the simulation.
-fn attack_with(
+/// Executes a check for a simulation if the check fits it. Without a simulation, only a check that is executed once per FMU is
+/// executed.
+fn execute_check(
     checker: &Checker,
     check: Check,
     trajectory: Option<&writer::Trajectory>,
@@ -386,12 +394,12 @@ fn attack_with(
     }
 }
 
-/// Executes all checks of the wanted topics on several threads, and calls `written` after each.
-fn attack(
+/// Executes all checks of the wanted topics on several threads, and calls `write_report` after each check.
+fn execute_checks(
     checker: &Checker,
     progress: bool,
     wanted: &(impl Fn(&str) -> bool + Sync),
-    written: &(impl Fn() -> anyhow::Result<()> + Sync),
+    write_report: &(impl Fn() -> anyhow::Result<()> + Sync),
 ) -> anyhow::Result<()> {
     let wanted_checks = checks::ALL.iter().filter(|(topic, _)| wanted(topic));
     let jobs: Vec<_> = wanted_checks
@@ -400,7 +408,7 @@ fn attack(
             std::iter::once(None).chain(each).map(move |trajectory| (*topic, *check, trajectory))
         })
         .collect();
-    // Topics that have begun are in the report as not checked until they are finished.
+    // The report lists a topic as not checked until all its checks have ended.
     let remaining: Vec<(&str, AtomicUsize)> = rules::TOPICS
         .into_iter()
         .map(|topic| (topic, AtomicUsize::new(jobs.iter().filter(|(of, ..)| *of == topic).count())))
@@ -409,7 +417,7 @@ fn attack(
     remaining.iter().for_each(|(topic, _)| checker.unchecked(topic, UNFINISHED.to_owned()));
     let (failure, writing) = (Mutex::new(None), Mutex::new(()));
     in_parallel(&jobs, progress, |(topic, check, trajectory), done| {
-        let result = match attack_with(checker, *check, *trajectory) {
+        let result = match execute_check(checker, *check, *trajectory) {
             Err(error) if error.is::<Stop>() || worker::interrupted() => {
                 checker.stopped(topic, stop(&error));
                 Ok(())
@@ -421,7 +429,7 @@ fn attack(
             checker.finished(topic, UNFINISHED);
         }
         let one_at_a_time = writing.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Err(error) = result.and_then(|()| written()) {
+        if let Err(error) = result.and_then(|()| write_report()) {
             *failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
         }
         drop(one_at_a_time);
@@ -432,7 +440,7 @@ fn attack(
     failure.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
 }
 
-/// Shortens the call sequences of all findings and runs their programs. Each finding has the same part of the remaining time.
+/// Shortens the call sequences of all findings and runs their programs. Each finding gets an equal share of the remaining time.
 fn prove(checker: &Checker, findings: &mut [Finding], scratch: &Path, options: &Options, progress: bool) {
     let count = findings.len();
     let slots: Vec<Mutex<&mut Finding>> = findings.iter_mut().map(Mutex::new).collect();

@@ -10,11 +10,12 @@ pub struct Options {
     /// states, derivatives, dependencies, dynamics, results, reset, rejections, logs, resources, malformed.
     #[arg(long, value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(rules::TOPICS))]
     pub only: Vec<String>,
-    /// Succeeds without these topics and interfaces (co-simulation, model-exchange, scheduled-execution), with commas between.
+    /// Does not fail if these topics or interfaces (co-simulation, model-exchange, scheduled-execution; with commas between) are
+    /// not checked.
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(
         rules::TOPICS.iter().chain(&INTERFACES)))]
     pub allow_unchecked: Vec<String>,
-    /// Maximum duration of the check in seconds, with everything that belongs to it.
+    /// Maximum duration of the check in seconds, including the programs that reproduce findings.
     #[arg(long, default_value_t = 120.0)]
     pub time: f64,
     /// Maximum duration of a call sequence in seconds; a longer one is a hang.
@@ -35,13 +36,13 @@ pub struct Options {
     /// Accepts the findings in this file, which has a line for each: NAME: REASON.
     #[arg(long, value_name = "FILE")]
     pub baseline: Option<PathBuf>,
-    /// Prints a rule, its severity and its section of the standard, or all rules as a page.
+    /// Prints a rule, its severity and its section of the standard; `all` prints all rules.
     #[arg(long, value_name = "RULE")]
     pub explain: Option<String>,
     /// Writes report.html, report.json, junit.xml, report.sarif and a program in C for each finding to this directory.
     #[arg(long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
-    /// Writes the report as JSON to the standard output.
+    /// Prints the report as JSON.
     #[arg(long)]
     pub json: bool,
     /// Fails for findings of this severity and worse.

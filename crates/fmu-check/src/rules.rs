@@ -1,5 +1,5 @@
-//! Rules: the sections of RULES.md, which users read, too. A section has the name of a finding, the requirement, and the
-//! severity and the section of the standard for FMI 2.0 and FMI 3.0.
+//! Rules, which are read from RULES.md, so that the program and its users read the same text. A section has the name of the
+//! findings, the requirement, and the severity and the section of the standard for FMI 2.0 and FMI 3.0.
 
 use crate::finding::{Finding, Severity};
 use fmi_abi::Standard;
@@ -42,7 +42,8 @@ impl Rule {
         self.text.lines().next().unwrap_or_default()
     }
 
-    /// Returns the severity of a finding and the section with its edition; no section if the rule is not part of the standard.
+    /// Returns the severity, and the section of the standard with its edition; the section is empty if the rule is not part of
+    /// the standard.
     fn severity(&self, standard: Standard) -> Option<(Severity, &'static str)> {
         let mut lines = self.text.lines().filter_map(|line| line.strip_prefix("* "));
         let line = lines.nth(usize::from(standard == Standard::Fmi3))?;
@@ -61,8 +62,8 @@ fn rules() -> impl Iterator<Item = Rule> {
     sections.map(|(name, text)| Rule { name, text })
 }
 
-/// Returns the rule of this name. The end of a process (`crash`, `exit`, `hang`) is an observation of the call sequence's rule,
-/// such as `states.fresh-process.crash`, or of its topic, such as `states.crash`.
+/// Returns the rule of this name. For the end of a process (`crash`, `exit`, `hang`), this is the rule of the call sequence (for
+/// `states.fresh-process.crash`, it is `states.fresh-process`), or the general rule (for `states.crash`, it is `*.crash`).
 fn find(name: &str) -> Option<Rule> {
     let same = |name: &str| rules().find(|rule| rule.name == name);
     let of_end = |(base, end): (&str, &str)| {
@@ -88,7 +89,7 @@ pub fn explain(name: &str) -> Option<String> {
 /// Returns the finding that an FMU breaks a rule.
 ///
 /// # Panics
-/// If there is no such rule. A test looks for such names.
+/// Panics if there is no such rule. A test checks all names in the sources.
 pub fn broken(standard: Standard, name: &str, observed: String) -> Finding {
     let rule = find(name).unwrap_or_else(|| panic!("no rule is called {name}"));
     let (severity, section) = rule.severity(standard).unwrap_or_default();
@@ -150,13 +151,13 @@ mod tests {
         assert!(explain("states.nothing").is_none());
     }
 
-    /// Checks that the sources of the checks name only rules of the page.
+    /// Checks that the sources name only rules that exist.
     #[test]
-    fn every_claim_is_a_rule() {
+    fn every_name_in_the_sources_is_a_rule() {
         let directory = concat!(env!("CARGO_MANIFEST_DIR"), "/src/checks");
         let paths = std::fs::read_dir(directory).expect("the checks").flatten().map(|entry| entry.path());
-        let others =
-            ["checker.rs", "lib.rs", "always.rs"].map(|name| format!("{directory}/../{name}").into());
+        let others = ["checker/evaluation.rs", "checker/proofs.rs", "lib.rs", "always.rs"];
+        let others = others.map(|name| format!("{directory}/../{name}").into());
         for path in paths.chain(others) {
             let source: String = std::fs::read_to_string(&path).expect("a source");
             // Names of rules; the end of a process, such as ".hang", is appended to them.

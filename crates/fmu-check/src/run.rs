@@ -13,20 +13,21 @@ use std::process::Command;
 pub struct Workers {
     /// Temporary directory of the check, for the files of the processes.
     scratch: PathBuf,
+    /// Servers that wait for a job.
     #[cfg(target_os = "linux")]
-    idle: std::sync::Mutex<HashMap<Situation, Vec<Server>>>,
+    idle: std::sync::Mutex<HashMap<WorkerKind, Vec<Server>>>,
 }
 
-/// Number of processes of the call sequence before this one, and whether the loader resolves all symbols when it loads a
-/// library. Both set environment variables of the process.
-type Situation = (usize, bool);
+/// Kind of worker: the number of earlier processes of the call sequence, and whether the loader resolves all symbols when it
+/// loads a library. Both decide which environment variables the process is started with.
+type WorkerKind = (usize, bool);
 
-/// Reason for which a check cannot continue.
+/// Reason why a check cannot continue.
 #[derive(Debug)]
 pub enum Stop {
     /// The deadline has passed.
     TimeOver,
-    /// fmu-check needs more memory than the limit for the FMU.
+    /// The memory that fmu-check itself needs in the process of the FMU exceeds the limit.
     OutOfMemory,
     /// The user has interrupted the check.
     Interrupted,
@@ -45,24 +46,25 @@ impl std::fmt::Display for Stop {
 impl std::error::Error for Stop {}
 
 /// Returns the command that starts this program as a worker.
-fn worker(job: &Path, scratch: &Path, (phase, now): Situation) -> anyhow::Result<Command> {
+fn worker(job: &Path, scratch: &Path, (phase, now): WorkerKind) -> anyhow::Result<Command> {
     let mut command = Command::new(std::env::current_exe()?);
     command
         .env(VARIABLE, job)
         .env(SCRATCH, scratch)
-        // The contents of uninitialized memory differ between the processes of a call sequence.
+        // Uninitialized memory differs between the processes of a call sequence, so that results that depend on it differ, too.
         .env("MALLOC_PERTURB_", (1 + phase * 90).to_string())
-        // mallinfo2 of glibc counts freed blocks in the cache of a thread as allocated.
+        // Switches off the cache of freed blocks for each thread, because mallinfo2 of glibc counts these blocks as allocated.
         .env("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0")
         .envs(now.then_some(("LD_BIND_NOW", "1")));
     Ok(command)
 }
 
 impl Workers {
-    /// Starts the first server. Others are started when they are needed.
+    /// Starts the first server, which removes the temporary directory if this process is killed. Other servers are started when
+    /// they are needed.
     ///
     /// # Errors
-    /// Fails if the server cannot be started. The server removes the temporary directory if this process is killed.
+    /// Fails if the server cannot be started.
     pub fn new(scratch: PathBuf) -> anyhow::Result<Self> {
         Ok(Self {
             #[cfg(target_os = "linux")]
@@ -81,7 +83,7 @@ impl Workers {
         for (phase, part) in sequence.split(|numbered| numbered.step == Step::FreshProcess).enumerate() {
             let job = Job { setting: setting.clone(), sequence: part.to_vec(), bytes };
             let ended = self.process(&job, (phase, setting.now), limit)?;
-            bytes = read(part, ended, limit, &mut run)?;
+            bytes = add_outcomes(part, ended, limit, &mut run)?;
             if run.end != End::Done {
                 break;
             }
@@ -89,8 +91,8 @@ impl Workers {
         Ok(run)
     }
 
-    /// Runs a program with the directory of the FMU as its argument, contained as a call sequence is. Returns its exit status, 1 if
-    /// the FMU ended it, and `None` after the limit.
+    /// Runs a program with the directory of the FMU as its argument, and confines it like a call sequence. Returns its exit
+    /// status, or 1 if a signal ended it or it started too many processes. Returns `None` if it did not end within the limit.
     pub fn program(
         &self,
         program: &Path,
@@ -102,9 +104,9 @@ impl Workers {
         {
             let program = Program { program: program.to_owned(), fmu: fmu.to_owned(), memory };
             let ended = self.process(&program, (0, false), limit)?;
-            // An FMU that starts too many processes or ends the program by a signal is at fault, too.
-            let is_attack = ended.flood.is_some() || ended.signal.is_some();
-            Ok(if is_attack { Some(1) } else { ended.code })
+            // If a signal or too many processes ended the program, the FMU is at fault, too.
+            let is_fault = ended.flood.is_some() || ended.signal.is_some();
+            Ok(if is_fault { Some(1) } else { ended.code })
         }
         #[cfg(not(target_os = "linux"))]
         {
@@ -119,40 +121,35 @@ impl Workers {
 
     /// Executes a job in a process that an idle server forks.
     #[cfg(target_os = "linux")]
-    fn process(
-        &self,
-        job: &impl serde::Serialize,
-        situation: Situation,
-        limit: f64,
-    ) -> anyhow::Result<Ended> {
+    fn process(&self, job: &impl serde::Serialize, kind: WorkerKind, limit: f64) -> anyhow::Result<Ended> {
         let idle = || self.idle.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let server = idle().get_mut(&situation).and_then(Vec::pop);
+        let server = idle().get_mut(&kind).and_then(Vec::pop);
         let mut server = match server {
             Some(server) => server,
-            None => Server::new(situation, &self.scratch)?,
+            None => Server::new(kind, &self.scratch)?,
         };
         let result = server.execute(&format!("{limit} {}\n", serde_json::to_string(job)?));
         match result {
             Ok(ended) => {
-                idle().entry(situation).or_default().push(server);
+                idle().entry(kind).or_default().push(server);
                 Ok(ended)
             }
-            // The server has ended.
+            // The server has ended, so it does not return a result.
             Err(_) if interrupted() => Err(Stop::Interrupted.into()),
             Err(_) => Ok(Ended::from(server.0.wait()?)),
         }
     }
 
-    /// Executes a job in a new process. Other systems than Linux cannot load every library after a fork.
+    /// Executes a job in a new process, because systems other than Linux cannot load every library after a fork.
     #[cfg(not(target_os = "linux"))]
-    fn process(&self, job: &Job, situation: Situation, limit: f64) -> anyhow::Result<Ended> {
+    fn process(&self, job: &Job, kind: WorkerKind, limit: f64) -> anyhow::Result<Ended> {
         use std::process::Stdio;
         let directory = tempfile::Builder::new().prefix("run-").tempdir_in(&self.scratch)?;
         let at = |name: &str| directory.path().join(name);
         std::fs::write(at("job"), serde_json::to_vec(job)?)?;
         std::fs::create_dir(at("here"))?;
         let output = std::fs::File::create(at("output"))?;
-        let mut command = worker(&at("job"), &self.scratch, situation)?;
+        let mut command = worker(&at("job"), &self.scratch, kind)?;
         command.current_dir(at("here")).stdin(Stdio::null()).stdout(output.try_clone()?).stderr(output);
         let ended = self.wait(&mut command, limit)?;
         let read =
@@ -194,10 +191,10 @@ struct Server(std::process::Child);
 
 #[cfg(target_os = "linux")]
 impl Server {
-    fn new(situation: Situation, scratch: &Path) -> anyhow::Result<Self> {
+    fn new(kind: WorkerKind, scratch: &Path) -> anyhow::Result<Self> {
         use std::process::Stdio;
         let here = tempfile::tempdir_in(scratch)?.keep();
-        let mut command = worker(Path::new(""), scratch, situation)?;
+        let mut command = worker(Path::new(""), scratch, kind)?;
         command.current_dir(here).stdin(Stdio::piped()).stdout(Stdio::piped());
         Ok(Self(command.spawn().context("a process for the FMU cannot be started")?))
     }
@@ -226,7 +223,7 @@ impl Drop for Server {
 }
 
 /// Adds the outcomes of a process to `run`, and returns the serialized states.
-fn read(
+fn add_outcomes(
     sequence: &[Numbered],
     ended: Ended,
     limit: f64,
@@ -248,7 +245,7 @@ fn read(
     if let Some(bytes) = last.filter(|_| ended.code == Some(EXECUTED)) {
         return Ok(bytes);
     }
-    // These are messages of fmu-check: a failed allocation of Rust, and of a guarded array.
+    // Rust and guarded arrays print these messages if an allocation fails.
     let no_memory = ["memory allocation of", "no memory for an array"];
     if !ended.inside && no_memory.iter().any(|text| run.output.contains(text)) {
         return Err(Stop::OutOfMemory.into());

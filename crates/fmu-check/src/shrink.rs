@@ -5,7 +5,8 @@ use crate::description::Description;
 use crate::legal::first_illegal;
 use std::collections::HashMap;
 
-/// Returns groups of calls that are only removed together.
+/// Returns the numbers of the steps, in groups. The steps of a group are only removed together, for example the calls of an
+/// event.
 fn units(sequence: &[Numbered]) -> Vec<Vec<u32>> {
     let (mut units, mut open, mut before) = (Vec::<Vec<u32>>::new(), false, "");
     for numbered in sequence {
@@ -30,7 +31,8 @@ fn units(sequence: &[Numbered]) -> Vec<Vec<u32>> {
     units
 }
 
-/// Returns the function and the arguments of a call without its instance, or `None` for calls that only read and for other steps.
+/// Returns the function and the arguments of a call, without its instance. Returns `None` for calls that only read and for other
+/// steps.
 fn content(step: &Step) -> Option<String> {
     match step {
         Step::Call { function, args, .. } => {
@@ -56,7 +58,8 @@ fn without(sequence: &[Numbered], ids: &[u32]) -> CallSequence {
     .collect()
 }
 
-/// Joins corresponding units of compared simulations. A simulation without one of these calls would have other results.
+/// Joins the units that have the same calls in compared simulations, because the results would differ if only one of the
+/// simulations lacked a call.
 fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
     let contents: HashMap<u32, String> = all_steps(sequence)
         .into_iter()
@@ -74,8 +77,9 @@ fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
     groups.into_iter().map(|(_, ids)| ids).collect()
 }
 
-/// Removes calls that `reproduces` does not need, if the standard allows the remaining calls. Calls of `pinned` functions are not
-/// removed; with `compared`, corresponding calls of compared simulations are removed together.
+/// Returns the shortest sequence found that still satisfies `reproduces` and, if the standard allows the original sequence, is
+/// allowed, too. Calls of `pinned` functions are not removed. If `compared` is set, corresponding calls of compared simulations
+/// are removed together.
 pub fn shrink(
     description: &Description,
     sequence: &CallSequence,

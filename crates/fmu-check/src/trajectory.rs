@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 /// Maximum duration of a simulation with long steps, because checks repeat the simulation many times.
 const LONG: Duration = Duration::from_millis(250);
 
-/// Reason for which a simulation fails, and its call sequence.
+/// Reason why a simulation failed, and its call sequence.
 #[derive(Debug)]
 pub struct NoTrajectory(pub String, pub CallSequence);
 
@@ -44,14 +44,15 @@ pub fn range(description: &Description) -> f64 {
     description.stop_time.map_or(1.0, |stop| stop - description.start_time).max(1e-6)
 }
 
-/// Returns the step size, a multiple of `fixedInternalStepSize` if there is one (section 4.4.1 of FMI 3.0).
+/// Returns the step size of the default experiment, or 1 % of its duration. It is rounded to a multiple of
+/// `fixedInternalStepSize` if there is one (section 4.4.1 of FMI 3.0).
 pub fn step_size(description: &Description) -> f64 {
     let size = description.step_size.unwrap_or(range(description) / 100.0);
     let internal = description.co_simulation.as_ref().and_then(|offer| offer.number("fixedInternalStepSize"));
     internal.map_or(size, |internal| internal * (size / internal).round().clamp(1.0, 100.0))
 }
 
-/// Returns the trajectory of the first `succeeded` points.
+/// Shortens a trajectory to its first `succeeded` points.
 fn up_to(mut trajectory: Trajectory, succeeded: usize) -> Trajectory {
     trajectory.points.truncate(succeeded);
     if let Some(last) = trajectory.points.last() {
@@ -60,9 +61,9 @@ fn up_to(mut trajectory: Trajectory, succeeded: usize) -> Trajectory {
     trajectory
 }
 
-/// Finds successful steps without Event Mode. The attempts, in this order, are steps of two sizes to the end of the default
-/// experiment, if the FMU allows several sizes and is fast enough, and steps of one size. In a second attempt with either,
-/// Booleans are constant.
+/// Finds successful steps without Event Mode. If the FMU allows several step sizes and is fast enough, the steps have two sizes
+/// and reach the end of the default experiment, otherwise they have one size. Boolean inputs change, unless the steps succeed
+/// only if they are constant.
 fn in_steps(checker: &Checker, trajectory: Trajectory) -> anyhow::Result<Trajectory> {
     let description = &checker.description;
     let size = step_size(description);
@@ -86,7 +87,7 @@ fn in_steps(checker: &Checker, trajectory: Trajectory) -> anyhow::Result<Traject
         let (succeeded, discarded) = successful_steps(checker, &run, &writer.sequence);
         match failure(&writer.sequence, &run, &ids) {
             None => return Ok(up_to(trajectory, succeeded)),
-            // The model ends its simulation.
+            // The model has ended the simulation with Discard.
             Some(_) if discarded && succeeded >= 2 => return Ok(up_to(trajectory, succeeded)),
             Some(why) if !discrete && reach == 1.0 => return Err(NoTrajectory(why, writer.sequence).into()),
             Some(_) => {}
@@ -138,7 +139,7 @@ fn initialized(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<Opt
     }
 }
 
-/// Results at a point.
+/// Results at a point; `slopes` are the derivatives.
 #[derive(Default)]
 struct Reached {
     states: Vec<f64>,
@@ -150,8 +151,8 @@ struct Reached {
     ends: bool,
 }
 
-/// Executes the trajectory and the point after it, with an event if the FMU reports one. Returns `None` if a call fails after at
-/// least three points.
+/// Executes the trajectory and then `point`. If the FMU reports an event there, sets `point.event` and starts again. Returns
+/// `None` if a call fails after at least three points.
 fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> anyhow::Result<Option<Reached>> {
     let count = checker.description.states_count().unwrap_or(0);
     let indicators = checker.description.event_indicators.unwrap_or(0);
@@ -215,8 +216,8 @@ fn with_events(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<
     Ok(trajectory)
 }
 
-/// Integrates by Euler's method up to the end of the default experiment. The trajectory has the first points, then every
-/// twentieth and the points with events.
+/// Integrates by Euler's method up to the end of the default experiment. The trajectory contains the first points, then every
+/// twentieth point and all points with events.
 fn integrated(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<Trajectory> {
     let description = &checker.description;
     let (count, range) = (description.states_count().unwrap_or(0), range(description));
@@ -269,6 +270,7 @@ fn integrated(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<T
     Ok(trajectory)
 }
 
+/// Returns points for consecutive steps of these sizes, with inputs that change at each point.
 pub fn steps(description: &Description, start: f64, sizes: &[f64], discrete: bool) -> Vec<Point> {
     let mut time = start;
     let points = sizes.iter().enumerate();

@@ -1,4 +1,4 @@
-//! Values for variables, within their ranges and near their start values or different from them.
+//! Values that the checks set: within the range of a variable, and near its start value or different from it.
 
 use crate::call_sequence::Values;
 use crate::description::{Description, Variable, kind_of};
@@ -33,7 +33,8 @@ pub fn other_values(description: &Description, index: usize) -> Option<Values> {
     })
 }
 
-/// Returns values for at most 1000 inputs, near their start values and within their ranges; with `discrete`, also for Booleans.
+/// Returns values for at most 1000 inputs, near their start values and within their ranges. They change with `phase`. If
+/// `discrete` is set, Boolean inputs change, too.
 pub fn input_values(description: &Description, phase: usize, discrete: bool) -> Vec<(usize, Values)> {
     let mut values = Vec::new();
     for (index, variable) in description.variables.iter().enumerate() {
@@ -62,7 +63,8 @@ pub fn input_values(description: &Description, phase: usize, discrete: bool) -> 
     values
 }
 
-/// Returns values for at most 1000 continuous inputs that differ from their start values by this part of their range or nominal value.
+/// Returns values for at most 1000 continuous inputs that differ from their start values by this fraction of their range or
+/// nominal value.
 pub fn inputs_by(description: &Description, by: f64) -> Vec<(usize, Values)> {
     let is_continuous = |(_, variable): &(usize, &Variable)| {
         variable.causality == "input"

@@ -2,8 +2,9 @@
 
 use super::Fits::{self, Always, Integrated, Several, Stepped};
 use crate::call_sequence::{Arg, NULL_INSTANCE, Step};
-use crate::checker::{Checker, Random};
+use crate::checker::Checker;
 use crate::finding::{event, first_failure};
+use crate::random::Random;
 use crate::worker::MOST_UPDATES;
 use crate::writer::Part::{
     self, Begin, Call, Drop, Enter, Free, Leave, Make, Points, ReadAll, Restore, Save,

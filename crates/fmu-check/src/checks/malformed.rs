@@ -2,8 +2,9 @@
 
 use super::rejections::unknown_reference;
 use crate::call_sequence::{Arg, CallSequence, End, Kind, Values};
-use crate::checker::{Checker, Random};
+use crate::checker::Checker;
 use crate::description::{kind_of, type_name};
+use crate::random::Random;
 use crate::writer::{Part, Point, Trajectory, Writer, access};
 use fmi_abi::calls::{Signature, signatures};
 use fmi_abi::{BaseType, Mode};

@@ -1,8 +1,10 @@
-//! Findings that may follow from another one: a variable that instances share, for example, makes results depend on everything.
+//! Finds the findings that may be consequences of another one. For example, if instances share a variable, most other results may
+//! be wrong, too.
 
 use crate::finding::Finding;
 
-/// Rules whose violation has further findings as its consequence, with the rules or topics of these.
+/// Rules whose violation may cause further findings, with patterns for the names of these: a prefix, or `*` and a suffix. The
+/// cause of a rule in this list can only be an earlier rule of the list.
 const CAUSES: [(&str, &[&str]); 6] = [
     ("arrays.written-beyond", &["*.crash", "results.", "states.", "reset."]),
     ("results.process", &["results.", "states.", "reset."]),
@@ -25,7 +27,7 @@ const CAUSES: [(&str, &[&str]); 6] = [
     ("resources.settings", &["results.", "states.", "reset.", "logs.printed"]),
 ];
 
-/// Sets the cause of each finding that may follow from another one, and moves it behind its cause.
+/// Sets the cause of each finding that may follow from another one, and moves the finding behind its cause.
 pub fn explain(findings: &mut Vec<Finding>) {
     let found: Vec<String> = findings.iter().map(|finding| finding.name.clone()).collect();
     for finding in findings.iter_mut() {
@@ -42,11 +44,11 @@ pub fn explain(findings: &mut Vec<Finding>) {
         std::mem::take(findings).into_iter().partition(|finding| finding.cause.is_none());
     for cause in causes {
         let of = |finding: &&Finding| finding.cause.as_ref() == Some(&cause.name);
-        let its: Vec<Finding> = consequences.iter().filter(of).cloned().collect();
+        let followers: Vec<Finding> = consequences.iter().filter(of).cloned().collect();
         findings.push(cause);
-        findings.extend(its);
+        findings.extend(followers);
     }
-    // The cause of a cause is before both.
+    // A finding whose cause has a cause, too, was not listed behind it, so it is added at the end.
     let listed: Vec<String> = findings.iter().map(|finding| finding.name.clone()).collect();
     findings.extend(consequences.into_iter().filter(|finding| !listed.contains(&finding.name)));
 }

@@ -16,7 +16,7 @@ use std::path::Path;
 /// Report on an FMU.
 #[derive(Clone, serde::Serialize)]
 pub struct Report {
-    /// Version of the structure of the report, which changes when a field is changed or removed.
+    /// Version of the format of the report, which is increased when a field is changed or removed.
     pub schema: u32,
     /// Version of fmu-check.
     pub version: &'static str,
@@ -46,7 +46,7 @@ pub struct Report {
     pub passed: Vec<String>,
     /// Interface types and topics that were not checked, with the reason for each.
     pub unreached: Vec<Unchecked>,
-    /// Names in the baseline that match no finding and nothing unchecked.
+    /// Names in the baseline that match no finding and no unchecked interface or topic.
     pub unused: Vec<String>,
     /// Findings, the most severe first.
     pub findings: Vec<Finding>,
@@ -124,7 +124,7 @@ impl Report {
         if self.interfaces.is_empty() { "no interface".to_owned() } else { self.interfaces.join(" and ") }
     }
 
-    /// Returns the numbers of findings for each severity, of accepted findings and of unchecked topics.
+    /// Returns the number of findings of each severity, of accepted findings, and of unchecked interfaces and topics.
     fn summary(&self) -> String {
         let many =
             |count: usize, one: &str, more: &str| format!("{count} {}", if count == 1 { one } else { more });

@@ -9,6 +9,7 @@ pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
+/// Returns the page.
 pub fn page(report: &Report) -> String {
     let mut text = String::new();
     for (severity, what) in [
@@ -16,7 +17,7 @@ pub fn page(report: &Report) -> String {
         (Severity::Fragile, "Fragile: no rule forbids it, but importers fail."),
         (
             Severity::Note,
-            "Note: importers work all the same, or the program of the finding does not show it.",
+            "Note: importers work nevertheless, or the program of the finding does not show it.",
         ),
     ] {
         let findings: Vec<_> =
@@ -36,7 +37,7 @@ pub fn page(report: &Report) -> String {
                 if finding.section.is_empty() { "Not in the standard" } else { &finding.section }
             );
             if let Some(cause) = &finding.cause {
-                let _ = writeln!(text, "<p>It may follow from {cause}, which should be repaired first.</p>");
+                let _ = writeln!(text, "<p>It may follow from {cause}, which should be fixed first.</p>");
             }
             if let Proof::NotShown(why) | Proof::NotRun(why) = &finding.proof {
                 let _ = writeln!(text, "<p>Not reproduced: {}.</p>", escape(why));

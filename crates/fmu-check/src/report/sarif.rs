@@ -4,6 +4,7 @@ use super::Report;
 use crate::finding::{Finding, Severity};
 use serde_json::{Value, json};
 
+/// Returns the SARIF level of a severity.
 const fn level(severity: Severity) -> &'static str {
     match severity {
         Severity::Violation => "error",
@@ -12,6 +13,7 @@ const fn level(severity: Severity) -> &'static str {
     }
 }
 
+/// Returns the report as a SARIF log.
 pub fn sarif(report: &Report) -> Value {
     let rules: Vec<Value> = report
         .findings

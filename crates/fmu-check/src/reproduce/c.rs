@@ -10,6 +10,7 @@ use fmi_abi::calls::signature;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+/// Returns the program that makes the calls of a finding and compares their results with the evidence.
 pub fn program(
     finding: &Finding,
     sequence: &CallSequence,
@@ -68,7 +69,8 @@ pub fn program(
     )
 }
 
-/// Returns the name of the directory in which a process has the FMU, or NULL for the directory of the argument.
+/// Returns the C expression for the directory in which a process finds the FMU: a name, or NULL for the directory that the
+/// program gets as its argument.
 fn place(part: &[Numbered]) -> String {
     match part.first().map(|numbered| &numbered.step) {
         Some(Step::Elsewhere(name)) => literal(name.as_bytes()),
@@ -76,13 +78,13 @@ fn place(part: &[Numbered]) -> String {
     }
 }
 
-/// Returns the functions that the calls need.
+/// Returns the C functions that the calls need.
 fn prelude(sequence: &CallSequence) -> String {
     let integrates = sequence.iter().any(|numbered| matches!(numbered.step, Step::Integrate(..)));
     [include_str!("prelude.c"), if integrates { include_str!("integrate.c") } else { "" }].concat()
 }
 
-/// Returns the lines of the comment at the top of a program.
+/// Returns the lines of the comment at the beginning of a program.
 fn head(finding: &Finding, description: &Description) -> String {
     let section = if finding.section.is_empty() { "not in the standard" } else { &finding.section };
     let lines = [
@@ -95,8 +97,8 @@ fn head(finding: &Finding, description: &Description) -> String {
     lines.iter().map(|line| format!(" * {}\n", in_comment(line))).collect()
 }
 
-/// Returns a string of a model description for a comment of a program: in one line, and without the characters that may end the
-/// comment, also as trigraphs and continued lines.
+/// Prepares a string of a model description for a comment: puts it on one line, and replaces the characters that could end the
+/// comment, even as trigraphs or over continued lines.
 fn in_comment(text: &str) -> String {
     fmi_abi::one_line(&text.replace('\\', "/")).replace('\\', "/").replace("??", "? ?").replace("*/", "* /")
 }
@@ -115,7 +117,7 @@ fn library(setting: &Setting, sequence: &CallSequence) -> String {
 fn shows(evidence: &Evidence) -> String {
     let results = match evidence {
         Evidence::None | Evidence::End | Evidence::Orphans => None,
-        Evidence::Printed => Some("has_words(result(\"printed\", 0))".to_owned()),
+        Evidence::Printed => Some("has_text(result(\"printed\", 0))".to_owned()),
         Evidence::Damage => Some("noted(\"damage\")".to_owned()),
         Evidence::Strays => Some("noted(\"stray\")".to_owned()),
         Evidence::Differ(pairs) => {
@@ -124,7 +126,7 @@ fn shows(evidence: &Evidence) -> String {
         }
         Evidence::Same(expected, pairs) => {
             let same = |Expected { id, observed, .. }: &Expected| match is_paired(pairs, *id) {
-                // Only the status.
+                // The values only have to differ from the other call of the pair, so only the status is compared.
                 true => {
                     let (status, _) = observed.split_once(';').unwrap_or_default();
                     format!("begins(result(\"r\", {id}), \"{status};\")")
@@ -160,13 +162,16 @@ fn is_paired(pairs: &[[u32; 2]], id: u32) -> bool {
     pairs.iter().any(|pair| pair.contains(&id))
 }
 
-/// Writes calls, and collects the functions and variables that they need.
+/// Writes calls in C, and collects the functions and variables that they need.
 struct Writer<'a> {
     fmi3: bool,
     evidence: &'a Evidence,
     description: &'a Description,
+    /// Number of the next C variable or thread function.
     next: usize,
+    /// Functions that run on separate threads.
     threads: String,
+    /// Indices of the instances, saved states and serialized states that need a variable.
     instances: BTreeSet<usize>,
     states: BTreeSet<usize>,
     bytes: BTreeSet<usize>,
@@ -296,7 +301,7 @@ impl Writer<'_> {
              \x20   int status = {call}({handle}{passed});\n\
              {}\x20   print(\"{name}: %d\", status);\n{}    print(\"\\n\"); release(before);\n}}\n",
             lines(parts.before),
-            // Another thread may run before this one copies the strings.
+            // Gives other threads time to overwrite the strings before this one copies them.
             if name.ends_with("GetString") { "    if (threads) usleep(20);\n" } else { "" },
             lines(after)
         )
@@ -349,9 +354,12 @@ impl Writer<'_> {
     }
 }
 
+/// Lines that the arguments of a call need.
 #[derive(Default)]
 struct Parts {
+    /// Lines before the call.
     before: Vec<String>,
+    /// Lines that print or copy the results after the call.
     after: Vec<String>,
     /// Lines that write the results to a file.
     results: Vec<String>,
@@ -360,6 +368,7 @@ struct Parts {
 }
 
 impl Parts {
+    /// Adds an array for the FMU to read; returns the name of its variable.
     fn array(&mut self, number: usize, element: &str, list: impl Iterator<Item = String>) -> String {
         let list: Vec<String> = list.collect();
         let (count, list) = (list.len(), if list.is_empty() { "0".to_owned() } else { list.join(", ") });
@@ -367,14 +376,15 @@ impl Parts {
         self.before.push(format!(
             "{element} v{number}[] = {{{list}}}; void *a{number} = guarded(v{number}, {size});"
         ));
-        self.checks.push(format!("look_at(a{number}, v{number}, {size});"));
+        self.checks.push(format!("check_array(a{number}, v{number}, {size});"));
         format!("a{number}")
     }
 
+    /// Adds an array for results; returns the name of its variable.
     fn out(&mut self, name: &str, kind: Kind, count: usize, number: usize) -> String {
         let (c, width) = (kind.c_name(), kind.size());
         self.before.push(format!("void *a{number} = guarded(NULL, {count} * sizeof({c}));"));
-        self.checks.push(format!("look_at(a{number}, NULL, 0);"));
+        self.checks.push(format!("check_array(a{number}, NULL, 0);"));
         let letter = match kind {
             Kind::Pointer => 's',
             kind if kind.is_float() => 'f',
@@ -399,7 +409,7 @@ impl Parts {
     }
 }
 
-/// Returns the names of at most eight variables whose value references are the first argument.
+/// Returns the names of the variables whose value references are the first argument, at most eight.
 fn comment(args: &[Arg], description: &Description) -> Option<String> {
     let Some(Arg::In(Kind::U32, references)) = args.first() else { return None };
     let names: Vec<&str> = references
@@ -414,6 +424,7 @@ fn comment(args: &[Arg], description: &Description) -> Option<String> {
     (!names.is_empty()).then(|| format!("{}{more}", in_comment(&names.join(", "))))
 }
 
+/// Returns the C type of an argument that has this type in `fmi_abi`.
 fn type_of(name: &str) -> &'static str {
     match name {
         "usize" => "size_t",
@@ -425,6 +436,7 @@ fn type_of(name: &str) -> &'static str {
     }
 }
 
+/// Returns a number as a C expression.
 fn number_of(kind: Kind, bits: u64) -> String {
     let number = kind.number(bits);
     match kind {

@@ -1,4 +1,4 @@
-//! Compiles and runs the program of a finding: a finding stands only if its program shows it.
+//! Compiles and runs the program of a finding. A finding that its program does not show becomes a note.
 
 use crate::finding::{Finding, Proof};
 use crate::run::{Stop, Workers};
@@ -7,10 +7,11 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Number of runs of a program, the first of which that shows the finding is enough: threads may have other results in every run.
+/// Maximum number of runs of a program. One run that shows the finding is enough, because threads may lead to different results
+/// in every run.
 const RUNS: usize = 3;
 
-/// Place and time for the programs.
+/// Directories, and limits of memory and time, for the programs.
 pub struct Proving<'a> {
     pub workers: &'a Workers,
     /// Directory of the unpacked FMU.
@@ -34,7 +35,7 @@ impl Proving<'_> {
         let directory = tempfile::tempdir_in(self.scratch)?;
         let (source, program) = (directory.path().join("repro.c"), directory.path().join("repro"));
         std::fs::write(&source, &finding.c)?;
-        // A hang lasts as long as in the check, everything else may take longer: the machine may be busy.
+        // A hang must last as long as in the check. Everything else may take longer, because the machine may be busy.
         let ends = ["crash", "exit"].iter().any(|end| finding.name.ends_with(end));
         let patience = match finding.name.ends_with("hang") {
             true => self.limit.min(10.0),
@@ -57,7 +58,7 @@ impl Proving<'_> {
                 None if Instant::now() >= self.deadline => {
                     return Ok(Proof::NotRun("the time was over".to_owned()));
                 }
-                // The program limits the time of its calls itself, so the FMU has stopped it.
+                // The program sets an alarm that ends it, so only the FMU can have prevented its end.
                 None if ends => return Ok(Proof::Shown),
                 None => return Ok(Proof::NotShown("its program does not end".to_owned())),
             }
@@ -65,7 +66,7 @@ impl Proving<'_> {
         Ok(Proof::NotShown(last))
     }
 
-    /// Compiles a program; returns the reason for which that is not possible.
+    /// Compiles a program; returns the reason if that is not possible.
     fn compile(&self, source: &Path, program: &Path, patience: f64) -> anyhow::Result<Option<Proof>> {
         let compiler = std::env::var_os("CC").filter(|name| !name.is_empty()).unwrap_or_else(|| "cc".into());
         let mut command = Command::new(&compiler);

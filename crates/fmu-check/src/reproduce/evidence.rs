@@ -1,4 +1,4 @@
-//! Results that are compared by the program that reproduces a finding: those without which the criterion is fulfilled.
+//! Chooses the results that the program of a finding compares: the results that the criterion needs to detect the violation.
 
 use crate::call_sequence::{CallSequence, End, Numbered, Outcome, Run, Step, Values};
 use crate::finding::{Finding, SharedCriterion};
@@ -12,19 +12,20 @@ pub enum Evidence {
     None,
     /// Crash, hang or exit, or a library that cannot be loaded.
     End,
-    /// Processes that are alive after the end of the call sequence, or too many of them before.
+    /// Processes that are alive after the end of the call sequence, or too many processes before its end.
     Orphans,
     /// Output on the standard output or the standard error.
     Printed,
     /// Writes outside of the arrays for results.
     Damage,
-    /// Messages with another environment pointer than the program's.
+    /// Messages with an environment pointer other than the one of the program.
     Strays,
-    /// Pairs of calls, at least one of which has different results.
+    /// Pairs of calls. The results of at least one pair differ.
     Differ(Vec<[u32; 2]>),
     /// Calls that all have the expected results, and pairs of calls that all have different values.
     Same(Vec<Expected>, Vec<[u32; 2]>),
-    /// Quantity that grows by more than a number between the measurements of two steps; settings only differ.
+    /// Quantity, the numbers of two steps that measure it, and a limit. The quantity grows by more than the limit; settings only
+    /// have to differ.
     Grown(Measure, u32, u32, u64),
 }
 
@@ -99,8 +100,8 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     }
 }
 
-/// Returns the pairs of calls whose values only have to differ: with equal values, the criterion is fulfilled. The values of an FMU
-/// may be others in every run.
+/// Returns the pairs of calls whose values only have to differ, because the criterion is fulfilled if they are equal. The program
+/// does not compare the values themselves, which may be different in every run.
 fn unequal(criterion: &SharedCriterion, run: &Run, expected: &[Expected]) -> Vec<[u32; 2]> {
     let compared: Vec<&Outcome> = expected
         .iter()
@@ -113,7 +114,7 @@ fn unequal(criterion: &SharedCriterion, run: &Run, expected: &[Expected]) -> Vec
         criterion(&changed).is_none()
     };
     let mut pairs = Vec::new();
-    // A criterion with more calls compares more than pairs.
+    // A criterion that needs more calls does not only compare pairs.
     if compared.len() > MOST_COMPARED {
         return pairs;
     }
@@ -137,8 +138,8 @@ fn alike(one: &Outcome, other: &Outcome) -> bool {
     one.written != other.written && shape(one) == shape(other)
 }
 
-/// Returns each read on a thread with the corresponding read of the simulation before the threads: of its instance if that one was
-/// simulated before, otherwise of any. The pairs that differ are not the same in every run.
+/// Pairs each read on a thread with the corresponding read before the threads: of the same instance if it was simulated before,
+/// otherwise of any instance. Which pairs differ may change from run to run.
 fn pairs(sequence: &CallSequence) -> Vec<[u32; 2]> {
     let queries = |sequence: &[Numbered]| -> Vec<(Option<usize>, u32)> {
         let query = |numbered: &Numbered| match &numbered.step {
@@ -183,7 +184,7 @@ fn needed(criterion: &SharedCriterion, run: &Run) -> Run {
     needed
 }
 
-/// Returns the parts of an outcome that the criterion needs.
+/// Returns the expected results of a call: the parts of its outcome that the criterion needs.
 fn expected_result(criterion: &SharedCriterion, run: &Run, id: u32) -> Expected {
     let without = |change: &dyn Fn(&mut Outcome)| {
         let mut changed = run.clone();
@@ -203,6 +204,7 @@ fn expected_result(criterion: &SharedCriterion, run: &Run, id: u32) -> Expected 
     }
 }
 
+/// Returns bytes as hexadecimal digits.
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |mut text, byte| {
         let _ = write!(text, "{byte:02x}");
@@ -210,7 +212,7 @@ fn hex(bytes: &[u8]) -> String {
     })
 }
 
-/// Formats the results as the programs do.
+/// Formats the results of a call in the same way as the programs.
 fn shown(outcome: &Outcome, [written, log]: [bool; 2]) -> String {
     let mut text = String::new();
     let or_null = |bytes: &Option<Vec<u8>>| bytes.as_ref().map_or("-".to_owned(), |bytes| hex(bytes));
@@ -265,7 +267,7 @@ fn grown(finding: &Finding, needed: &Run) -> Evidence {
     }
 }
 
-/// Returns the sequence with the numbers of repetitions of a run, at most `REPETITIONS`.
+/// Returns the sequence with as many repetitions as in a run, but at most `REPETITIONS`.
 pub fn as_repeated(sequence: &CallSequence, run: &Run) -> CallSequence {
     let mut sequence = sequence.clone();
     for numbered in &mut sequence {

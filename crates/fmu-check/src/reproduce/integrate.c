@@ -1,14 +1,18 @@
-/* Integrates Model Exchange by Euler's method or the classical Runge-Kutta method, with steps of one size and with events. */
+/* Integrates an FMU in Model Exchange by Euler's method or the classical Runge-Kutta method, with steps of a fixed size and with events. */
+
+/* Reads a vector. */
 static int vector(void *c, const char *name, double *x, int count) {
     return count ? ((int (*)(void *, double *, size_t))function(name))(c, x, (size_t)count) : 0;
 }
 
+/* Sets the time and the states. */
 static int set(void *c, double time, const double *x, int count) {
     int status = ((int (*)(void *, double))function(FMI == 3 ? "fmi3SetTime" : "fmi2SetTime"))(c, time);
     if (status > 1 || !count) return status;
     return ((int (*)(void *, const double *, size_t))function(FMI == 3 ? "fmi3SetContinuousStates" : "fmi2SetContinuousStates"))(c, x, (size_t)count);
 }
 
+/* Advances by a step from the states x to the states y; k has room for the derivatives at all stages. */
 static int advance(void *c, double time, double h, bool euler, const double *x, double *k, double *y, int n) {
     static const double at[] = {0, 0.5, 0.5, 1};
     int stage, i;
@@ -24,6 +28,7 @@ static int advance(void *c, double time, double h, bool euler, const double *x, 
     return set(c, time + h, y, n);
 }
 
+/* Reads the event indicators; returns whether one of them has changed its sign. */
 static bool crosses(void *c, const double *z, double *now, int nz) {
     int i;
     bool found = false;

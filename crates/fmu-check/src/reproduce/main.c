@@ -3,7 +3,8 @@
 #define PATIENCE 20
 #endif
 
-/* Sets the paths for an FMU in this directory: in FMI 2.0, the location of the resources is a URI, in which bytes are percent-encoded. */
+/* Sets the paths for an FMU in this directory. In FMI 2.0, the location of the resources is a URI, in which most bytes are
+   percent-encoded. */
 static void locate(const char *directory) {
     char *to = resources;
     const char *at;
@@ -17,7 +18,7 @@ static void locate(const char *directory) {
     strcpy(to, "/resources");
 }
 
-/* Each phase runs in a separate process, so that a crash does not end this one. */
+/* Executes a phase. Each phase runs in a separate process, so that a crash does not end the main process. */
 static void phase(int number, const char *directory) {
     char path[5100];
     locate(directory);
@@ -41,7 +42,7 @@ static void phase(int number, const char *directory) {
 }
 
 /* Ends the processes that this one has adopted; returns whether there were any. */
-static bool orphans(void) {
+static bool end_orphans(void) {
     bool found = false;
     struct dirent *entry;
     DIR *processes;
@@ -65,7 +66,8 @@ static bool orphans(void) {
     return found;
 }
 
-static void clear(void) {
+/* Removes the directory for the results. */
+static void remove_scratch(void) {
     struct dirent *entry;
     char path[5300];
     DIR *files = opendir(scratch);
@@ -84,7 +86,7 @@ int main(int count, char **arguments) {
     int status;
     bool found;
     if (!full) { perror("the directory of the unpacked FMU"); return 3; }
-    at_once = EVIDENCE == END;
+    bind_now = EVIDENCE == END;
     if (count > 3) { scratch = arguments[3]; phase(atoi(arguments[2]), full); }
     snprintf(temporary, sizeof temporary, "%s/fmu-check-XXXXXX", directory && *directory ? directory : "/tmp");
     if (!mkdtemp(temporary)) { perror("mkdtemp"); return 3; }
@@ -100,7 +102,7 @@ int main(int count, char **arguments) {
         child = fork();
         if (child == 0) {
             setsid();
-            /* Uninitialized memory differs between the processes. */
+            /* Uninitialized memory differs between the processes, so that results that depend on it differ, too. */
             snprintf(path, sizeof path, "%zu", 1 + 90 * i);
             setenv("MALLOC_PERTURB_", path, 1);
             setenv("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0", 1);
@@ -111,12 +113,12 @@ int main(int count, char **arguments) {
         waitpid(child, &status, 0);
         if (WIFSIGNALED(status)) printf("the process was ended by signal %d (%s)\n", WTERMSIG(status), strsignal(WTERMSIG(status)));
         else if (WEXITSTATUS(status)) printf("the process ended with exit status %d\n", WEXITSTATUS(status));
-        /* A crash or a hang shows that the FMU is broken, even if another end was expected. */
-        if (status) { orphans(); clear(); return EVIDENCE == END || WIFSIGNALED(status) ? 1 : 3; }
+        /* A crash or a hang shows that the FMU is faulty, even if the finding is another one. */
+        if (status) { end_orphans(); remove_scratch(); return EVIDENCE == END || WIFSIGNALED(status) ? 1 : 3; }
     }
-    found = orphans();
+    found = end_orphans();
     if (EVIDENCE != ORPHANS) found = EVIDENCE == RESULTS && shows();
-    clear();
+    remove_scratch();
     printf("%s\n", found ? "The finding is reproduced." : "The finding is not reproduced.");
     return EVIDENCE == NONE ? 3 : found;
 }

@@ -39,23 +39,25 @@ typedef struct {
 
 enum { NONE, END, ORPHANS, RESULTS };
 
-/* A library that does not name libm among the libraries that it needs can be loaded where the program has it, as importers do. */
+/* Links this program to libm, as most importers are: a library that needs libm, but does not declare that, can then be loaded. */
 static __attribute__((used)) double (*volatile needs_libm)(double) = cos;
 
 static void *library;
 static char library_path[5000];
 /* Output of this program; the standard output belongs to the library. */
 static FILE *out;
-static bool quiet, at_once, threads;
+/* Whether output is switched off, the loader resolves all symbols of the library, and several threads run. */
+static bool quiet, bind_now, threads;
 /* Time at which the alarm of this program is due. */
 static double alarm_ends;
 /* Directory for the results of calls, which other processes read. */
 static const char *scratch = ".";
-/* Messages that were logged since the last call. */
+/* Messages that were logged during the current call, as hexadecimal digits. */
 static __thread char messages[1 << 16];
 
 #define print(...) (quiet ? 0 : fprintf(out ? out : stdout, __VA_ARGS__))
 
+/* Opens a file for results; ends the process if that is not possible. */
 static FILE *results(const char *kind, int number, const char *mode) {
     char path[5100];
     FILE *file;
@@ -65,6 +67,7 @@ static FILE *results(const char *kind, int number, const char *mode) {
     return file;
 }
 
+/* Returns the contents of a file for results. */
 static __attribute__((unused)) char *result(const char *kind, int number) {
     FILE *file = results(kind, number, "r");
     char *text = calloc(1, 1 << 24);
@@ -77,10 +80,12 @@ static __attribute__((unused)) bool begins(const char *text, const char *with) {
     return strncmp(text, with, strlen(with)) == 0;
 }
 
-static __attribute__((unused)) bool has_words(const char *text) {
+/* Returns whether there is anything but white space. */
+static __attribute__((unused)) bool has_text(const char *text) {
     return text[strspn(text, " \t\r\n")] != 0;
 }
 
+/* Returns whether the results of at least one of these pairs of calls differ. */
 static __attribute__((unused)) bool any_differ(const int (*pairs)[2], size_t count) {
     size_t i;
     bool found = false;
@@ -103,7 +108,8 @@ static __attribute__((unused)) void put_numbers(FILE *file, const void *array, s
     fprintf(file, ";");
 }
 
-static char *hexes(char *to, const char *text) {
+/* Writes a string as hexadecimal digits; returns the end of the digits. */
+static char *put_hex(char *to, const char *text) {
     if (!text) return to + sprintf(to, "-");
     for (; *text; text++) to += sprintf(to, "%02x", (unsigned char)*text);
     *to = 0;
@@ -116,19 +122,20 @@ static __attribute__((unused)) void put_strings(FILE *file, const char *const *a
         static const char untouched[9] = "ZZZZZZZZ";
         char *text = calloc(1, 1 << 20);
         const char *one = memcmp(&array[i], untouched, sizeof one) ? array[i] : NULL;
-        if (!one || strlen(one) < (1 << 18)) hexes(text, one);
+        if (!one || strlen(one) < (1 << 18)) put_hex(text, one);
         fprintf(file, "%s,", text);
         free(text);
     }
     fprintf(file, ";");
 }
 
+/* Loads the library; ends the process with status 4 if that is not possible. */
 static void open_library(void) {
-    library = dlopen(library_path, (at_once ? RTLD_NOW : RTLD_LAZY) | RTLD_LOCAL);
+    library = dlopen(library_path, (bind_now ? RTLD_NOW : RTLD_LAZY) | RTLD_LOCAL);
     if (!library) { print("%s\n", dlerror()); fflush(out); _exit(4); }
 }
 
-/* Unloads the library, after which the standard output must still be usable. */
+/* Unloads the library. The output crashes if the library has set a buffer of the standard output that was unloaded with it. */
 static __attribute__((unused)) void close_library(void) {
     dlclose(library);
     putchar('\n');
@@ -165,7 +172,7 @@ static void release(size_t before) {
 }
 
 /* Reports bytes that have changed before an array or in an array that is for reading. */
-static __attribute__((unused)) void look_at(const void *array, const void *before, size_t size) {
+static __attribute__((unused)) void check_array(const void *array, const void *before, size_t size) {
     size_t page = (size_t)sysconf(_SC_PAGESIZE);
     const char *at = (const char *)((uintptr_t)array / page * page) - page;
     bool bad = before && memcmp(array, before, size) != 0;
@@ -180,40 +187,41 @@ static __attribute__((unused)) bool noted(const char *kind) {
     return access(path, F_OK) == 0;
 }
 
-/* The environment pointer of all instances, which the library passes to the logger. */
+/* Its address is the environment pointer of all instances, which the library passes to the logger. */
 static char environment_of_importer;
 
-static void look_at_environment(const void *environment) {
+static void check_environment(const void *environment) {
     if (environment == &environment_of_importer) return;
     print("    the next message has another environment pointer\n");
     fclose(results("stray", 0, "w"));
 }
 
-static void keep_message(int status, const char *category, const char *text) {
+/* Adds a message to `messages`, if there is room. */
+static void record_message(int status, const char *category, const char *text) {
     size_t length = strlen(messages);
     if (length + 2 * (strlen(category ? category : "") + strlen(text ? text : "")) + 64 > sizeof messages) return;
     char *to = messages + length;
     to += sprintf(to, "%d ", status);
-    to = hexes(to, category);
+    to = put_hex(to, category);
     *to++ = ' ';
-    to = hexes(to, text);
+    to = put_hex(to, text);
     strcpy(to, ";");
 }
 
 static __attribute__((unused)) void logger2(void *environment, const char *name, int status, const char *category, const char *text, ...) {
     char whole[8000] = "";
     va_list list;
-    look_at_environment(environment);
+    check_environment(environment);
     va_start(list, text);
     if (text) vsnprintf(whole, sizeof whole, text, list);
     va_end(list);
-    keep_message(status, category, text ? whole : NULL);
+    record_message(status, category, text ? whole : NULL);
     print("    log of %s: status %d, category %s: %s\n", name ? name : "NULL", status, category ? category : "NULL", whole);
 }
 
 static __attribute__((unused)) void logger3(void *environment, int status, const char *category, const char *text) {
-    look_at_environment(environment);
-    keep_message(status, category, text);
+    check_environment(environment);
+    record_message(status, category, text);
     print("    log: status %d, category %s: %s\n", status, category ? category : "NULL", text ? text : "NULL");
 }
 
@@ -243,7 +251,7 @@ static __attribute__((unused)) void *make(int index, const char *name, const cha
     return made;
 }
 
-/* Results of a call: its status, the values that it wrote, its messages. */
+/* Opens the file for the results of a call, which are its status, the values that it wrote and its messages; writes the status. */
 static __attribute__((unused)) FILE *begin(int number, int status) {
     FILE *file = results("r", number, "w");
     fprintf(file, "%d;", status);
@@ -263,7 +271,7 @@ static __attribute__((unused)) void version(int number, const char *name) {
     fclose(file);
 }
 
-/* Prints numbers that a call wrote; the kind f is floating-point, the width is in bytes. */
+/* Prints values that a call wrote. The kind is f (floating-point), s (string), i (signed) or u (unsigned); the width is in bytes. */
 static __attribute__((unused)) void show(const void *array, size_t count, char kind, size_t width) {
     size_t i;
     for (i = 0; i < count; i++) {
@@ -280,7 +288,7 @@ static __attribute__((unused)) void show(const void *array, size_t count, char k
     }
 }
 
-/* Returns the time of the next time event of an instance. */
+/* Returns a pointer to the time of the next time event of an instance. */
 static double *next_event(void *instance) {
     static struct { void *instance; double next; } known[64];
     size_t i;
@@ -328,7 +336,8 @@ static long entries(const char *path) {
 
 extern char **environ;
 
-/* Returns whether the next random numbers still are those of the seed that the first call sets, however many the FMU has used. */
+/* Sets a seed in the first call. Later calls return whether the next random numbers still follow from it, even if the FMU has used
+   some of them. */
 static bool seed_is_kept(void) {
     static char own[128] __attribute__((aligned(16))), reference[128] __attribute__((aligned(16)));
     static bool seeded;
@@ -347,7 +356,8 @@ static bool seed_is_kept(void) {
     return remaining > 0;
 }
 
-/* Writes the files of the working directory, limits, timers, standard streams, scheduling, seeds and the environment. */
+/* Writes the number of files in the working directory, limits, timers, standard streams, scheduling, whether the seed was kept, and
+   the environment. */
 static void put_settings(FILE *file) {
     int limits[] = {RLIMIT_NOFILE, RLIMIT_STACK, RLIMIT_CPU, RLIMIT_CORE, RLIMIT_AS, RLIMIT_DATA, RLIMIT_FSIZE, RLIMIT_NPROC, RLIMIT_MEMLOCK};
     int timers[] = {ITIMER_REAL, ITIMER_VIRTUAL, ITIMER_PROF};
@@ -363,7 +373,7 @@ static void put_settings(FILE *file) {
     }
     for (i = 0; i < 3; i++) {
         struct itimerval timer;
-        /* The real timer of this program ends hangs. */
+        /* The real timer runs because of the alarm of this program, so only its deviation from the alarm is a change. */
         double rest, off;
         getitimer(timers[i], &timer);
         rest = (double)timer.it_value.tv_sec + 1e-6 * (double)timer.it_value.tv_usec;
@@ -392,7 +402,7 @@ static void put_settings(FILE *file) {
     for (variable = environ; variable && *variable; variable++) fprintf(file, " %s", *variable);
 }
 
-/* Measures memory, threads and files, then settings of the process. */
+/* Writes the memory, threads and files of the process, and then its settings. */
 static __attribute__((unused)) void measure(int number) {
     long pages = 0, all = 0, memory;
     char here[5000] = "";
@@ -439,13 +449,14 @@ static __attribute__((unused)) long measured(int number, int index) {
     return numbers[index];
 }
 
-/* Passes the bytes of a saved state to the next process. */
+/* Writes the bytes of a serialized state to a file for the next process. */
 static __attribute__((unused)) void pass_on(int number, const char *bytes, size_t size) {
     FILE *file = results("bytes", number, "wb");
     fwrite(bytes, 1, size, file);
     fclose(file);
 }
 
+/* Reads the bytes of a serialized state from the previous process; returns their number. */
 static __attribute__((unused)) size_t *passed_on(int number, char *bytes) {
     FILE *file = results("bytes", number, "ab+");
     size_t *size = guarded(NULL, sizeof *size);

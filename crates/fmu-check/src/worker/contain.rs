@@ -1,5 +1,5 @@
-//! Containment of the processes of an FMU: a session for each call sequence, no signals to the processes of the checker, and the
-//! end of all descendants.
+//! Confines the processes of an FMU: each call sequence runs in a separate session, cannot send signals to the processes of the
+//! checker, and its descendants are ended after it.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -10,14 +10,14 @@ pub fn interrupted() -> bool {
     INTERRUPTED.load(Ordering::Relaxed)
 }
 
-/// Handles SIGINT, SIGTERM and SIGHUP: the first signal ends the check in order, a second one ends the process.
+/// Handles SIGINT, SIGTERM and SIGHUP: the first signal ends the check in order, the same signal again ends the process.
 #[cfg(unix)]
 pub fn listen_for_interrupts() {
     extern "C" fn interrupt(_: libc::c_int) {
         INTERRUPTED.store(true, Ordering::Relaxed);
     }
     for signal in [libc::SIGINT, libc::SIGTERM, libc::SIGHUP] {
-        // SAFETY: the handler only stores a flag. A signal that was ignored stays so, as under nohup.
+        // SAFETY: the handler only stores a flag. A signal that is ignored, for example under nohup, stays ignored.
         unsafe {
             let mut before: libc::sigaction = std::mem::zeroed();
             libc::sigaction(signal, std::ptr::null(), &mut before);
@@ -67,7 +67,7 @@ mod linux {
         }
     }
 
-    /// Waits at most 50 ms for data or the end of the file; returns whether either is there.
+    /// Waits at most 50 ms for data or the end of the file; returns whether one of them has arrived.
     pub fn readable(file: &impl AsRawFd) -> std::io::Result<bool> {
         let mut poll = libc::pollfd { fd: file.as_raw_fd(), events: libc::POLLIN, revents: 0 };
         // SAFETY: one descriptor, which is open.
@@ -119,7 +119,7 @@ mod linux {
     /// Reaps the children that have ended; returns whether other children are alive.
     fn reap() -> bool {
         loop {
-            // SAFETY: waits for no child that others wait for.
+            // SAFETY: no other code waits for children of this process.
             match unsafe { libc::waitpid(-1, std::ptr::null_mut(), libc::WNOHANG) } {
                 0 => return true,
                 -1 => return false,
@@ -143,8 +143,8 @@ mod linux {
         let orphans = descendants().into_iter().map(|(_, name)| name).collect();
         let begin = Instant::now();
         while reap() && begin.elapsed() < Duration::from_secs(10) {
-            // SAFETY: the processes descend from this one. One signal ends a group, so that no process of it escapes by starting
-            // another one.
+            // SAFETY: the processes descend from this one. Each group is ended by one signal, so that none of its processes can
+            // escape by starting another one.
             unsafe {
                 libc::kill(-leader, libc::SIGKILL);
                 for (pid, _) in descendants() {
@@ -160,16 +160,16 @@ mod linux {
         orphans
     }
 
-    /// Starts a session, and installs a filter for system calls: a signal to the processes of the checker or to all processes ends
-    /// this process with SIGSYS.
+    /// Starts a session, and installs a filter for system calls. It ends this process with SIGSYS if the process sends a signal
+    /// to a process of the checker or to all processes.
     pub fn isolate(checker: libc::pid_t) {
         // SAFETY: starts a session; the other calls only return numbers.
-        let (keeper, group, caller) = unsafe {
+        let (server, group, caller) = unsafe {
             libc::setsid();
-            let keeper = libc::getppid();
-            (keeper, libc::getpgid(checker), parent_of(checker))
+            let server = libc::getppid();
+            (server, libc::getpgid(checker), parent_of(checker))
         };
-        let mut targets = vec![-1, keeper, -keeper, checker, -checker, -group, caller];
+        let mut targets = vec![-1, server, -server, checker, -checker, -group, caller];
         targets.retain(|target| *target != 0);
         let step = |code: u32, jt, jf, k: i32| libc::sock_filter { code: code as u16, jt, jf, k: k as u32 };
         let load = |offset| step(libc::BPF_LD | libc::BPF_W | libc::BPF_ABS, 0, 0, offset);
@@ -189,7 +189,8 @@ mod linux {
         }
         program.extend([end(libc::SECCOMP_RET_ALLOW), end(libc::SECCOMP_RET_KILL_PROCESS)]);
         let filter = libc::sock_fprog { len: program.len() as u16, filter: program.as_mut_ptr() };
-        // SAFETY: the filter is for this process and its descendants. Without support for it, all system calls are allowed.
+        // SAFETY: the filter is for this process and its descendants. If the kernel does not support filters, all system calls
+        // are allowed.
         unsafe {
             libc::prctl(libc::PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
             libc::prctl(libc::PR_SET_SECCOMP, libc::SECCOMP_MODE_FILTER, &raw const filter);

@@ -1,6 +1,6 @@
-//! Integration of Model Exchange with steps of one size and events, as a simple importer does it.
+//! Integrates an FMU in Model Exchange with steps of a fixed size and with events, as a simple importer does.
 
-use super::Executor;
+use super::executor::Executor;
 use crate::call_sequence::{Arg, Integration, Kind, Outcome, Values};
 
 /// Maximum number of events in an integration; a model with more is not compared.
@@ -12,15 +12,16 @@ const BISECTIONS: usize = 40;
 /// Status of an integration that was not finished: Discard.
 const UNFINISHED: i32 = 2;
 
-/// An integration under way.
+/// An integration in progress.
 struct Importer<'a> {
     executor: &'a Executor,
     instance: usize,
     how: &'a Integration,
     fmi3: bool,
     time: f64,
-    /// Times of the events, and the number of the state events among them.
+    /// Times of all events.
     events: Vec<f64>,
+    /// Number of state events.
     state_events: usize,
 }
 
@@ -47,6 +48,7 @@ impl Importer<'_> {
         Ok(outcome.written.first().map(Values::numbers).unwrap_or_default())
     }
 
+    /// Sets the time and the states.
     fn set(&self, time: f64, states: &[f64]) -> Result<(), Failed> {
         self.call("SetTime", vec![Arg::real(time)])?;
         if !states.is_empty() {
@@ -59,13 +61,15 @@ impl Importer<'_> {
         Ok(())
     }
 
+    /// Returns the derivatives at a time and states.
     fn slopes(&self, time: f64, states: &[f64]) -> Result<Vec<f64>, Failed> {
         self.set(time, states)?;
         let name = if self.fmi3 { "GetContinuousStateDerivatives" } else { "GetDerivatives" };
         self.vector(name, self.how.states)
     }
 
-    /// Advances from the states by a step of Euler's method or of the classical Runge-Kutta method, and sets the result.
+    /// Advances from the states by a step of Euler's method or of the classical Runge-Kutta method. Sets the new states and
+    /// returns them.
     fn advance(&self, states: &[f64], size: f64) -> Result<Vec<f64>, Failed> {
         let plus = |by: f64, slopes: &[f64]| -> Vec<f64> {
             states.iter().zip(slopes).map(|(state, slope)| state + by * slope).collect()
@@ -93,7 +97,7 @@ impl Importer<'_> {
         Ok(before.iter().zip(&now).any(|(before, now)| (*before > 0.0) != (*now > 0.0)))
     }
 
-    /// Advances a step of at most this size, which ends at the first state event; returns whether there is one.
+    /// Advances by a step of this size, or to the first state event in it; returns whether there is one.
     fn step(&mut self, mut size: f64) -> Result<bool, Failed> {
         let states = self.vector("GetContinuousStates", self.how.states)?;
         let before = self.vector("GetEventIndicators", self.how.indicators)?;
@@ -113,6 +117,7 @@ impl Importer<'_> {
         Ok(crosses)
     }
 
+    /// Integrates to the end.
     fn run(&mut self) -> Result<(), Failed> {
         let how = self.how;
         let size = (how.end - how.begin) / how.steps as f64;
@@ -122,7 +127,7 @@ impl Importer<'_> {
             let until = (self.time + size).min(how.end).min(next.max(self.time));
             let crosses = until > self.time && self.step(until - self.time)?;
             if !crosses {
-                // Without a rounding error.
+                // Sets the exact time, without the rounding error of the sum.
                 self.time = if how.end - until < close { how.end } else { until };
                 self.call("SetTime", vec![Arg::real(self.time)])?;
             }
@@ -140,6 +145,7 @@ impl Importer<'_> {
         Ok(())
     }
 
+    /// Handles an event; fails if the model ends the simulation or has too many events.
     fn event(&mut self, is_state_event: bool) -> Result<(), Failed> {
         self.events.push(self.time);
         self.state_events += usize::from(is_state_event);
@@ -163,8 +169,8 @@ impl Importer<'_> {
     }
 }
 
-/// Integrates an instance. The outcome has the times of the first and the last event, infinite without an event, and the number of
-/// state events.
+/// Integrates an instance. The values of the outcome are the times of the first and the last event, which are infinite if there
+/// is none, and the number of state events.
 pub fn integrate(executor: &Executor, instance: usize, how: &Integration, outcome: &mut Outcome) {
     let fmi3 = executor.setting.fmi3;
     let mut importer =

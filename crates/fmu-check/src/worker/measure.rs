@@ -3,6 +3,7 @@
 use super::settings::settings;
 use crate::call_sequence::Measured;
 
+/// Measures this process.
 pub fn now() -> Measured {
     let (memory, exact) = memory();
     let entries = |directory: &str| std::fs::read_dir(directory).map_or(0, Iterator::count);

@@ -1,4 +1,5 @@
-//! Arrays that end at a guard page. An access beyond an array is a crash; a write before it is detected after the call.
+//! Arrays that end at a guard page, so that an access beyond the end crashes. A write before the beginning is detected after the
+//! call.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
@@ -16,7 +17,7 @@ pub const FILL: u8 = 0x5a;
 static FILLED: [u8; 4096] = [FILL; 4096];
 
 /// Returns the number of calls into the FMU that have not returned, in memory that a forked process shares with its parent.
-pub fn calls_under_way() -> &'static AtomicU32 {
+pub fn calls_in_progress() -> &'static AtomicU32 {
     static COUNT: OnceLock<&AtomicU32> = OnceLock::new();
     COUNT.get_or_init(|| {
         #[cfg(unix)]
@@ -32,15 +33,15 @@ pub fn calls_under_way() -> &'static AtomicU32 {
     })
 }
 
-/// Runs code of the FMU, and counts it in `calls_under_way` until it returns.
+/// Runs code of the FMU, and counts it in `calls_in_progress` until it returns.
 pub fn in_fmu<T>(run: impl FnOnce() -> T) -> T {
-    calls_under_way().fetch_add(1, Ordering::Relaxed);
+    calls_in_progress().fetch_add(1, Ordering::Relaxed);
     let result = run();
-    calls_under_way().fetch_sub(1, Ordering::Relaxed);
+    calls_in_progress().fetch_sub(1, Ordering::Relaxed);
     result
 }
 
-fn untouched(bytes: &[u8]) -> bool {
+fn is_filled(bytes: &[u8]) -> bool {
     bytes.chunks(FILLED.len()).all(|part| *part == FILLED[..part.len()])
 }
 
@@ -50,7 +51,7 @@ mod pages {
     use std::ptr::null_mut;
     use std::sync::{Mutex, PoisonError};
 
-    /// Lengths and addresses of the pages that are kept for reuse.
+    /// Lengths and addresses of freed pages that can be used again.
     static KEPT: Mutex<Vec<(usize, usize)>> = Mutex::new(Vec::new());
 
     /// Mapped pages, the last of which is a guard page.
@@ -97,7 +98,7 @@ mod pages {
 
     impl Drop for Pages {
         fn drop(&mut self) {
-            // With accessible memory after arrays, freed arrays remain accessible, too.
+            // If memory after arrays is accessible, freed arrays remain accessible, too.
             if KEEP.load(Ordering::Relaxed) {
                 KEPT.lock().unwrap_or_else(PoisonError::into_inner).push((self.length, self.map as usize));
             } else if AFTER.load(Ordering::Relaxed) == 0 {
@@ -127,8 +128,10 @@ mod pages {
 /// Array for one call.
 pub struct Guarded {
     pages: pages::Pages,
+    /// Index of the first byte of the array in the pages.
     begin: usize,
     size: usize,
+    /// Bytes of the array before the call.
     before: Vec<u8>,
 }
 
@@ -152,7 +155,7 @@ impl Guarded {
     }
 
     /// Makes an array of `size` bytes for results.
-    pub fn room(size: usize) -> Self {
+    pub fn for_results(size: usize) -> Self {
         Self::new(&vec![FILL; size])
     }
 
@@ -178,14 +181,14 @@ impl Guarded {
         unsafe { map.add(self.begin + index).write(byte) };
     }
 
-    /// Describes a write before or after the array, or to the array if it is for reading.
+    /// Describes a write before or after the array or, if the array is for reading, a write to it; `None` if there was none.
     pub fn damage(&self, for_reading: bool) -> Option<String> {
         let all = self.all();
-        if !untouched(&all[..self.begin]) {
+        if !is_filled(&all[..self.begin]) {
             let index = all[..self.begin].iter().rposition(|byte| *byte != FILL).unwrap_or_default();
             return Some(format!("{} bytes before an array", self.begin - index));
         }
-        if !untouched(&all[self.begin + self.size..]) {
+        if !is_filled(&all[self.begin + self.size..]) {
             return Some("bytes after an array".to_owned());
         }
         (for_reading && self.bytes() != self.before)

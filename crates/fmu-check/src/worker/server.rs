@@ -2,8 +2,10 @@
 //! The server adopts and ends the orphaned processes of a call sequence.
 
 use super::contain::{MOST_PROCESSES, abandoned, adopt_descendants, descendants, end_descendants, isolate};
-use super::memory::calls_under_way;
-use super::{Ended, File, Program, SCRATCH, VARIABLE, work};
+use super::job::{Ended, Program, SCRATCH, VARIABLE};
+use super::memory::calls_in_progress;
+use super::work::{end, limit, work};
+use std::fs::File;
 use std::io::{Read as _, Seek as _, Write as _};
 use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
 use std::path::Path;
@@ -14,12 +16,12 @@ use std::time::{Duration, Instant};
 /// Maximum number of bytes of the standard output and standard error of a process that are recorded.
 const MOST_OUTPUT: u64 = 1 << 20;
 
-/// Executes the jobs of the standard input until it ends. Each line has the limit in seconds and the job.
+/// Executes jobs until the standard input ends. Each line of the input has the limit in seconds and a job.
 pub fn serve() -> Result<(), String> {
     adopt_descendants();
     let result = jobs();
     if abandoned() {
-        // A checker that was killed has not removed its directory.
+        // The checker was killed, so it has not removed its directory.
         if let Some(scratch) = std::env::var_os(SCRATCH) {
             let _ = std::env::set_current_dir("/");
             let _ = std::fs::remove_dir_all(Path::new(&scratch));
@@ -36,7 +38,7 @@ fn jobs() -> std::io::Result<()> {
     for line in std::io::stdin().lines() {
         let line = line?;
         let Some((limit, job)) = line.split_once(' ') else { continue };
-        calls_under_way().store(0, Ordering::Relaxed);
+        calls_in_progress().store(0, Ordering::Relaxed);
         // SAFETY: this process has one thread.
         match unsafe { libc::fork() } {
             -1 => return Err(std::io::Error::last_os_error()),
@@ -46,14 +48,15 @@ fn jobs() -> std::io::Result<()> {
             }
             child => {
                 let (ended, flood) = wait(child, limit.parse().unwrap_or_default());
-                // Orphans that end within 300 ms are not a finding. After three call sequences with orphans, the server does not wait.
+                // Orphans that end within 300 ms are not a finding. After three call sequences with orphans, the server no longer
+                // waits, to save time.
                 let patient = ended.is_some() && sequences_with_orphans < 3;
                 let orphans = end_descendants(child, Duration::from_millis(if patient { 300 } else { 0 }));
                 sequences_with_orphans += usize::from(ended.is_some() && !orphans.is_empty());
                 if abandoned() {
                     return Ok(());
                 }
-                let inside = calls_under_way().load(Ordering::Relaxed) > 0;
+                let inside = calls_in_progress().load(Ordering::Relaxed) > 0;
                 let ended = ended.map(Ended::from).unwrap_or_default();
                 pass_on(Ended { orphans, flood, inside, ..ended }, &mut files)?;
             }
@@ -72,19 +75,19 @@ fn execute(job: &str, [output, outcomes]: [File; 2]) -> ! {
     }
     drop((nothing, output));
     if let Ok(Program { program, fmu, memory }) = serde_json::from_str(job) {
-        super::limit(memory);
+        limit(memory);
         let mut command = std::process::Command::new(program);
-        // The program's files are in the directory of this server, which clears it.
+        // The program has its files in the directory of this server, which is cleared after each job.
         let here = std::env::current_dir().unwrap_or_default();
         command.arg(fmu).env("TMPDIR", here).env_remove(VARIABLE).env_remove(SCRATCH);
-        super::end(Err(command.exec().to_string()));
+        end(Err(command.exec().to_string()));
     }
     let read = serde_json::from_str(job).map_err(|error| error.to_string());
-    super::end(read.map(|job| work(job, outcomes)))
+    end(read.map(|job| work(job, outcomes)))
 }
 
-/// Waits for a process for at most `limit` seconds. Returns its wait status if it ended, or the number of processes if there are
-/// too many. Returns neither after the limit or if the checker has ended.
+/// Waits for a process for at most `limit` seconds. Returns its wait status if it ended, the number of processes if there were
+/// too many, and neither if the limit was reached or the checker has ended.
 fn wait(child: libc::pid_t, limit: f64) -> (Option<ExitStatus>, Option<usize>) {
     let (begin, mut status, mut looked) = (Instant::now(), 0, Instant::now());
     loop {

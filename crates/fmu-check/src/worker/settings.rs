@@ -72,7 +72,7 @@ fn linux() -> Vec<String> {
 
 #[cfg(unix)]
 mod unix {
-    use crate::worker::text_at;
+    use crate::worker::logger::text_at;
     use fmi_abi::c_types::{c_char, c_int, c_uint};
     use std::sync::atomic::{AtomicPtr, Ordering};
 
@@ -206,16 +206,17 @@ mod unix {
     /// Seed that the importer has set.
     const SEED: c_uint = 4711;
 
-    /// Maximum number of random numbers of the importer's seed among which the next ones are searched: an FMU may use the generator.
+    /// Number of random numbers from the importer's seed among which the next ones are searched, because an FMU may use some of
+    /// them.
     const SEARCHED: usize = 5_000_000;
 
-    /// State of the generator after the first measurement, which sets the importer's seed.
+    /// State of the generator; NULL before the first measurement, which sets the importer's seed.
     static OWN: AtomicPtr<c_char> = AtomicPtr::new(std::ptr::null_mut());
 
-    /// Returns whose seed the next random numbers have.
+    /// Returns whether the next random numbers follow from the seed of the importer or from another one, which the FMU has set.
     fn seed() -> &'static str {
         let (importers, fmus) = ("of the importer", "of the FMU");
-        // 31 numbers and a header.
+        // The state of the generator has 31 numbers and a header.
         let mut reference = [0_u64; 16];
         let reference = reference.as_mut_ptr().cast::<c_char>();
         // SAFETY: the memory is large enough. The generator uses the state at `OWN` afterwards, which is never freed.
@@ -250,7 +251,7 @@ mod unix {
 mod tests {
     use super::settings;
 
-    /// Makes a change, and returns the settings that it has changed.
+    /// Calls `change`, and returns the settings that differ afterwards.
     fn changed(change: fn()) -> String {
         let before = settings();
         change();
@@ -259,7 +260,7 @@ mod tests {
     }
 
     /// Blocks a signal.
-    fn block() {
+    fn block_signal() {
         // SAFETY: the set is initialized; the process ends after the test.
         unsafe {
             let mut set: libc::sigset_t = std::mem::zeroed();
@@ -268,8 +269,8 @@ mod tests {
         }
     }
 
-    /// Changes settings of other kinds, which the standard does not allow.
-    fn others() {
+    /// Changes other settings: a signal handler, a timer, a standard stream and the priority.
+    fn change_others() {
         // SAFETY: these functions change settings of this process, which ends after the test.
         unsafe {
             libc::signal(libc::SIGTERM, libc::SIG_IGN);
@@ -279,7 +280,8 @@ mod tests {
         }
     }
 
-    /// Checks that the settings are equal twice and after the use of random numbers, and that each change is in them.
+    /// Checks that the use of random numbers does not count as a change, and that changes of the seed and of other settings are
+    /// found.
     #[test]
     fn changes_are_in_the_settings() {
         settings();
@@ -289,8 +291,8 @@ mod tests {
         // SAFETY: sets the seed.
         let seeded = || unsafe { libc::srand(1) };
         assert_eq!(changed(seeded), "seed of random numbers of the FMU");
-        assert_eq!(changed(block), format!("blocked signals [{}]", libc::SIGUSR1));
-        let found = changed(others);
+        assert_eq!(changed(block_signal), format!("blocked signals [{}]", libc::SIGUSR1));
+        let found = changed(change_others);
         let expected = ["SIGTERM 0x1", "real timer running", "standard input", "priority"];
         assert!(expected.iter().all(|part| found.contains(part)), "{found}");
     }

@@ -1,27 +1,32 @@
-//! Event iteration: an update of the discrete states is repeated while the FMU needs another one, because no importer may leave
-//! Event Mode before.
+//! Event iteration: an update of the discrete states is repeated while the FMU needs another one, because an importer must not
+//! leave Event Mode earlier.
 
-use super::{Content, Kept};
+use super::arrays::{Content, PassedArray};
 use crate::call_sequence::Values;
 
 /// Maximum number of updates in an event.
 pub const MOST_UPDATES: usize = 100;
 
-/// Flags of an update, in the order of both FMI versions: another update is needed, the simulation ends, the nominal values and the
-/// values of the continuous states have changed, the next event time is defined.
+/// Number of flags of an update. In both FMI versions their order is: another update is needed, the simulation ends, the nominal
+/// values have changed, the values of the continuous states have changed, the next event time is defined.
 const FLAGS: usize = 5;
 
-/// Repeats an update of the discrete states that has returned `status`, until none is needed. The flags that report the end of the
-/// simulation or a change remain set if any of the updates has set them.
-pub fn iterate(function: &str, mut status: i32, kept: &[Kept], mut again: impl FnMut() -> i32) -> i32 {
-    // fmi2EventInfo has five flags of four bytes, FMI 3.0 has an array of a byte for each.
-    let flags: Vec<(&Kept, usize)> = match (function, kept) {
+/// Repeats an update of the discrete states that has returned `status`, until no further one is needed; returns the last status.
+/// The flags that report the end of the simulation or a change remain set if any of the updates has set them.
+pub fn iterate(
+    function: &str,
+    mut status: i32,
+    arrays: &[PassedArray],
+    mut again: impl FnMut() -> i32,
+) -> i32 {
+    // fmi2EventInfo has five flags of four bytes. FMI 3.0 has a separate array of one byte for each flag.
+    let flags: Vec<(&PassedArray, usize)> = match (function, arrays) {
         ("fmi2NewDiscreteStates", [info]) => (0..FLAGS).map(|flag| (info, 4 * flag)).collect(),
         ("fmi3UpdateDiscreteStates", [flags @ .., _]) => flags.iter().map(|flag| (flag, 0)).collect(),
         _ => return status,
     };
-    let is_output = |kept: &Kept| matches!(kept.content, Content::Output(..));
-    if flags.len() != FLAGS || !kept.iter().all(is_output) {
+    let is_output = |array: &PassedArray| matches!(array.content, Content::Output(..));
+    if flags.len() != FLAGS || !arrays.iter().all(is_output) {
         return status;
     }
     let is_set = |flag: usize| flags[flag].0.array.bytes().get(flags[flag].1).is_some_and(|byte| *byte != 0);
@@ -39,7 +44,7 @@ pub fn iterate(function: &str, mut status: i32, kept: &[Kept], mut again: impl F
     status
 }
 
-/// Returns the time of the next event from the results of an update, if it is defined.
+/// Returns the time of the next event from the results of an update; `None` if it is not defined.
 pub fn next_event(written: &[Values]) -> Option<f64> {
     match written {
         // fmi2EventInfo: the fifth flag is in the third word, the time is the fourth.

@@ -1,4 +1,4 @@
-//! Test FMUs in C: compiled once for all tests, and packed for each.
+//! Compiles the test FMUs, which are written in C, once for all tests, and packs them for each test.
 
 use std::hash::{Hash as _, Hasher as _};
 use std::io::Write as _;
@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use zip::write::SimpleFileOptions;
 
-/// Returns the path of the compiled library of a model, which the tests share. An environment variable chooses its faults when the
-/// library is loaded, but a fault in linking needs a library of its own, compiled with this macro.
+/// Returns the path of the compiled library of a model, which the tests share. An environment variable selects the faults when
+/// the library is loaded, but a fault in linking needs a separate library, which is compiled with this macro.
 pub fn library(model: &str, fmi: u32, macro_name: &str) -> PathBuf {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/mutants/{model}.c"));
     let mut hasher = std::hash::DefaultHasher::new();
@@ -27,7 +27,7 @@ pub fn library(model: &str, fmi: u32, macro_name: &str) -> PathBuf {
         .status()
         .expect("a C compiler");
     assert!(status.success(), "{model}.c does not compile");
-    // Another test may have been first.
+    // Replaces the same library if another test has stored it meanwhile.
     new.persist(&library).expect("a file");
     library
 }

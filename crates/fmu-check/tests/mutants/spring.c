@@ -1,6 +1,7 @@
-/* A mass between two springs, the second of which it touches at x = CONTACT, with a clock, as an FMU of FMI 2.0 or, with -DFMI=3,
-   of 3.0: without faults, or with those that SPRING_FAULTS lists with commas. They concern the behaviour in time, so the FMU has few
-   functions. The variants "harmless_..." do what the standard allows and a careless check would accuse. */
+/* A mass on a spring that touches a second spring at x = CONTACT, and a clock that counts periods, as an FMU of FMI 2.0 or, with
+   -DFMI=3, of FMI 3.0. It is correct, unless the environment variable SPRING_FAULTS lists faults, with commas between them. The faults
+   concern the behaviour in time, so the FMU has few functions. The variants "harmless_..." are correct, but do what a careless check
+   would report. */
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -40,14 +41,14 @@ enum { STARTED, INITIALIZATION, EVENT, RUNNING };
 
 typedef struct {
     double time, k, u, x, v, start, debt;
-    /* Values of an earlier moment, which faults show. */
+    /* Earlier values, which some faults return instead of the current ones. */
     double old_y, old_der, old_u, latched;
     int ticks, count, touches, entries, mode, cs, dirty, seen, event_used, stale, handled, count_before;
 } Model;
 
-/* Derivatives in a discrete state. */
+/* Returns the acceleration; `touches` is whether the mass touches the second spring. */
 static double acceleration(const Model *m, double x, double v, double u, int touches) {
-    /* A source that starts at zero. */
+    /* An input that acts from time zero on. */
     if (IS(harmless_source) && m->time < 0) u = 0;
     return (u - m->k * x - v - (touches ? 3 * m->k * (x - CONTACT) : 0)) / 0.1;
 }
@@ -72,7 +73,7 @@ static int ticks_until(const Model *m, double time) {
     return (int)floor((time - m->start) / PERIOD + 1e-9);
 }
 
-/* Handles what happens at this time in the discrete states. */
+/* Updates the discrete states for the current time. */
 static void discrete(Model *m) {
     int ticks = ticks_until(m, m->time);
     m->count += ticks != m->ticks;
@@ -146,7 +147,7 @@ static int get_boolean(void *c, const uint32_t *vr, size_t n, Flag *to SIZE) {
     return 0;
 }
 
-/* A step of the Runge-Kutta method, or of Euler's. */
+/* Advances by a step of the Runge-Kutta method or of Euler's method. */
 static void advance(Model *m, double h, bool euler) {
     double x = m->x, v = m->v, kx[4], kv[4];
     static const double at[] = {0, 0.5, 0.5, 1};
@@ -180,7 +181,7 @@ static void integrate(Model *m, double end) {
         discrete(m);
     }
     m->time = end;
-    /* As a solver with a tolerance, whose error depends on the steps. */
+    /* A solver with a tolerance has an error that depends on the steps. */
     if (IS(harmless_noise)) m->v += 1e-5 * sin(1e6 * m->time);
 }
 

@@ -1,6 +1,7 @@
-/* A valve with strings, discrete inputs and a file in its resources, as an FMU for Co-Simulation of FMI 2.0 or, with -DFMI=3, of 3.0.
-   VALVE_FAULT in the environment names its faults, with + between them. "manners" is not a fault: the valve then does what the standard allows and a hasty
-   check accuses. It needs no headers of FMI: nothing here is taken from what is tested. */
+/* A valve with strings, discrete inputs and a file in its resources, as an FMU for Co-Simulation of FMI 2.0 or, with -DFMI=3, of
+   FMI 3.0. It is correct, unless the environment variable VALVE_FAULT names faults, with + between them. With the name "unusual", the
+   valve is still correct, but does what a careless check would report. The headers of FMI are not used, so that the test FMU shares
+   nothing with the tested code. */
 #define _GNU_SOURCE
 #include <ctype.h>
 #include <locale.h>
@@ -64,7 +65,7 @@ static void start(State *s) {
     s->text[0] = copy("valve"); s->text[1] = copy("bar");
 }
 
-/* Returns the number in the file of the resources. */
+/* Returns the number in the file curve.txt of the resources. */
 static double read_curve(const char *location) {
     char path[5000] = "", *to = path;
     const char *at = location ? location : "";
@@ -87,7 +88,7 @@ static double read_curve(const char *location) {
 static void change_settings(void) {
     if (IS(seed_set)) srand(42);
     if (IS(stdout_buffered)) setvbuf(stdout, buffer_of_stdout, _IOFBF, sizeof buffer_of_stdout);
-    if (IS(manners)) {
+    if (IS(unusual)) {
         char *before = strdup(setlocale(LC_ALL, NULL));
         (void)rand();
         setlocale(LC_ALL, "C.UTF-8");
@@ -117,11 +118,11 @@ static void release(Valve *v) {
     free(v);
     alive--;
     if (!alive) { free(table); table = NULL; }
-    if (IS(manners) && !alive) unlink("valve.log");
+    if (IS(unusual) && !alive) unlink("valve.log");
 }
 
 __attribute__((destructor)) static void unloaded(void) {
-    /* As a pool with room for one. */
+    /* As if the library could only clean up after one instance. */
     if (IS(unload_after_two) && made > 1) abort();
 }
 
@@ -129,7 +130,7 @@ __attribute__((destructor)) static void unloaded(void) {
 
 static double flow(const State *s) {
     double share = IS(factor_varies) ? 1 + s->level : 1;
-        return s->gain * s->stage * s->open + *table * s->u * share;
+    return s->gain * s->stage * s->open + *table * s->u * share;
 }
 
 static double get(const State *s, uint32_t vr) {
@@ -139,7 +140,7 @@ static double get(const State *s, uint32_t vr) {
     case LEVEL: return s->level;
     case DER_LEVEL: case FLOW: return flow(s);
     case CURVE: return s->curve;
-    /* A factor that switches with the input, as in the example of the standard. */
+    /* The factor of u depends on the sign of u, which the standard allows for the kind "discrete". */
     case SHARE: return (s->u > 0 ? 2 : 3) * s->u * (IS(late) && s->steps > 3 ? s->open + 1 : 1);
     default: return NAN;
     }
@@ -213,7 +214,7 @@ static int step(void *c, double point, double size) {
     v->s.time = point + size;
     v->s.steps++;
     /* The model ends its simulation. */
-    if (IS(manners) && v->s.time > 0.2 - 1e-9) return DISCARD;
+    if (IS(unusual) && v->s.time > 0.2 - 1e-9) return DISCARD;
     return OK;
 }
 
@@ -340,7 +341,7 @@ EXPORT(GetRealStatus)(void *c, int kind, double *value) {
 EXPORT(GetBooleanStatus)(void *c, int kind, int *value) {
     ALLOW(STEPPING | ENDED)
     if (kind != 3) return DISCARD;
-    *value = IS(manners) && v->s.time > 0.2 - 1e-9;
+    *value = IS(unusual) && v->s.time > 0.2 - 1e-9;
     return OK;
 }
 EXPORT(GetStatus)(void *c, int kind, int *value) { ALLOW(STEPPING | ENDED) (void)kind; (void)value; return DISCARD; }

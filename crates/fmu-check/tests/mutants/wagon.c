@@ -1,5 +1,7 @@
-/* A wagon on a spring as an FMU of FMI 2.0 or, with -DFMI=3, of 3.0: without faults, or with the one that WAGON_FAULT names
-   in the environment. "manners" is not a fault: the wagon then does what the standard allows and few FMUs do; -DSYMBOL_MISSING and -DWITHOUT_NOMINALS put in two that the linker sees. It needs no headers of FMI: nothing here is taken from what is tested. */
+/* A wagon on a spring as an FMU of FMI 2.0 or, with -DFMI=3, of FMI 3.0. It is correct, unless the environment variable WAGON_FAULT
+   names one of the faults below, or -DSYMBOL_MISSING or -DWITHOUT_NOMINALS selects a fault in linking. With the name "unusual", the
+   wagon is still correct, but does what the standard allows and few FMUs do. The headers of FMI are not used, so that the test FMU
+   shares nothing with the tested code. */
 #define _GNU_SOURCE
 #include <fcntl.h>
 #include <locale.h>
@@ -19,7 +21,7 @@
 #define FMI 2
 #endif
 
-/* The fault that the environment names. */
+/* Name of the fault. */
 static const char *fault = "none";
 #define IS(name) (strcmp(fault, #name) == 0)
 
@@ -65,7 +67,7 @@ typedef struct {
     double *scratch, began, shown;
 } Model;
 
-extern int nobody_has_it(void);
+extern int missing_symbol(void);
 
 static State shared;
 static int runs, alive;
@@ -102,12 +104,12 @@ static int report(Model *m, int status, const char *text) {
     return status;
 }
 
-static int no(Model *m, const char *text) { return report(m, 3, text); }
+static int reject(Model *m, const char *text) { return report(m, 3, text); }
 
 #define ALLOW(modes)                                                                  \
     Model *m = c;                                                                     \
     if (!m) return 3;                                                                 \
-    if (!(m->s.mode & (modes))) return no(m, "not allowed here");
+    if (!(m->s.mode & (modes))) return reject(m, "not allowed here");
 
 static double slope(const Model *m) { return (IS(slope_off) && !m->cs ? 1.1 : 1) * (m->s.force - (IS(start_in_mode_ignored) ? m->s.first_spring : m->s.spring) * (m->s.x + 1e-3 * IS(start_in_mode_ignored)) - m->s.damper * m->s.v) / m->s.mass; }
 
@@ -128,7 +130,7 @@ static void attack(void) {
     if (IS(duplicates_itself)) fork();
     if (IS(kills_group)) kill(0, SIGKILL);
     if (IS(kills_parent)) kill(getppid(), SIGKILL);
-    /* Signal 0 only tests the permission, in case the checker does not prevent it. */
+    /* Signal 0 only tests the permission, so no process is harmed if the checker does not prevent the call. */
     if (IS(kills_all)) kill(-1, 0);
     if (IS(stops_parent)) kill(getppid(), SIGSTOP);
     if (IS(make_hangs)) for (;;) pause();
@@ -145,7 +147,7 @@ static void *make(const char *name, const char *token, int cs, int logging, Logg
     m->given = name;
     if (!name || !*name || !token || (strcmp(token, "wagon") && !IS(token_ignored))) {
         m->logging = 1;
-        no(m, "no name or another token");
+        reject(m, "no name or another token");
         free(m);
         return NULL;
     }
@@ -164,7 +166,7 @@ static void *make(const char *name, const char *token, int cs, int logging, Logg
     return m;
 }
 
-/* The value of a real variable; sets `known`. */
+/* Returns the value of a real variable; sets `known` to whether there is such a variable. */
 static double get(Model *m, uint32_t vr, bool *known) {
     const State *s = &m->s;
     double y = 2 * s->force + s->x + *m->scratch * 1e-3;
@@ -200,16 +202,16 @@ static int get_reals(void *c, const uint32_t *vr, size_t n, double *value) {
     ALLOW(INSTANTIATED | INITIALIZATION | STEP | EVENT | CONTINUOUS | TERMINATED)
     size_t i;
     bool known;
-    if (IS(get_after_end_rejected) && m->s.mode == TERMINATED) return no(m, "it is over");
-    if (n && (!vr || !value) && !IS(null_crashes)) return no(m, "an array is NULL");
+    if (IS(get_after_end_rejected) && m->s.mode == TERMINATED) return reject(m, "it is over");
+    if (n && (!vr || !value) && !IS(null_crashes)) return reject(m, "an array is NULL");
     if (IS(crash_amid) && m->s.steps == 7) abort();
     for (i = 0; i < n; i++) {
         get(m, vr[i], &known);
         if (IS(reference_crashes) && !known) *(volatile int *)8 = 0;
         if (IS(reference_exits) && !known) exit(3);
-        /* As 20-sim: the tables of FMI 2.0 do not allow plain local variables here. */
-        if (IS(manners) && FMI == 2 && vr[i] == POWER && m->s.mode == INITIALIZATION) return no(m, "a local variable");
-        if (!known) return no(m, "an unknown reference");
+        /* FMUs of 20-sim do so, because the tables of FMI 2.0 do not allow importers to read plain local variables here. */
+        if (IS(unusual) && FMI == 2 && vr[i] == POWER && m->s.mode == INITIALIZATION) return reject(m, "a local variable");
+        if (!known) return reject(m, "an unknown reference");
     }
     for (i = 0; i < n; i++) if (!(IS(reference_once) && i && vr[i] == vr[i - 1])) value[i] = get(m, vr[i], &known);
     if (IS(write_const) && n) *(uint32_t *)vr = 0;
@@ -222,14 +224,14 @@ static int set_reals(void *c, const uint32_t *vr, size_t n, const double *value)
     ALLOW(INSTANTIATED | INITIALIZATION | STEP | EVENT | CONTINUOUS | (IS(set_after_end) || IS(set_after_end_crashes) ? TERMINATED : 0))
     size_t i;
     if (IS(set_after_end_crashes) && m->s.mode == TERMINATED) abort();
-    if (n && (!vr || !value)) return no(m, "an array is NULL");
+    if (n && (!vr || !value)) return reject(m, "an array is NULL");
     for (i = 0; i < n; i++) {
         if (IS(half_set) && vr[i] == FORCE) m->s.force = value[i];
-        if (!settable(m, vr[i])) return no(m, "it cannot be set");
-        if (vr[i] != FORCE && !(m->s.mode & (INSTANTIATED | INITIALIZATION))) return no(m, "a fixed parameter");
+        if (!settable(m, vr[i])) return reject(m, "it cannot be set");
+        if (vr[i] != FORCE && !(m->s.mode & (INSTANTIATED | INITIALIZATION))) return reject(m, "a fixed parameter");
         if (!isfinite(value[i]) || (vr[i] == MASS && value[i] <= 0)) {
             if (IS(discard_changes)) { m->s.x += 1; return report(m, 2, "no such value"); }
-            return no(m, "no such value");
+            return reject(m, "no such value");
         }
     }
     if (IS(read_past) && n && value[n] == 1e99) return 3;
@@ -245,8 +247,8 @@ static int set_reals(void *c, const uint32_t *vr, size_t n, const double *value)
 static int get_count(void *c, const uint32_t *vr, size_t n, int32_t *value) {
     ALLOW(INSTANTIATED | INITIALIZATION | STEP | EVENT | CONTINUOUS | TERMINATED)
     size_t i;
-    if (n && (!vr || !value)) return no(m, "an array is NULL");
-    for (i = 0; i < n; i++) if (vr[i] != COUNT) return no(m, "an unknown reference");
+    if (n && (!vr || !value)) return reject(m, "an array is NULL");
+    for (i = 0; i < n; i++) if (vr[i] != COUNT) return reject(m, "an unknown reference");
     for (i = 0; i < n; i++) if (!IS(output_unwritten)) value[i] = m->s.count + (IS(integer_out_of_range) ? 999 : 0);
     return 0;
 }
@@ -254,8 +256,8 @@ static int get_count(void *c, const uint32_t *vr, size_t n, int32_t *value) {
 static int get_fast(void *c, const uint32_t *vr, size_t n, Flag *value) {
     ALLOW(INSTANTIATED | INITIALIZATION | STEP | EVENT | CONTINUOUS | TERMINATED)
     size_t i;
-    if (n && (!vr || !value)) return no(m, "an array is NULL");
-    for (i = 0; i < n; i++) if (vr[i] != FAST) return no(m, "an unknown reference");
+    if (n && (!vr || !value)) return reject(m, "an array is NULL");
+    for (i = 0; i < n; i++) if (vr[i] != FAST) return reject(m, "an unknown reference");
     for (i = 0; i < n; i++) {
         unsigned char two = IS(boolean_two) ? 2 : (unsigned char)(m->s.fast != 0);
         memset(&value[i], 0, sizeof value[i]);
@@ -267,8 +269,8 @@ static int get_fast(void *c, const uint32_t *vr, size_t n, Flag *value) {
 static int get_label(void *c, const uint32_t *vr, size_t n, const char **value) {
     ALLOW(INSTANTIATED | INITIALIZATION | STEP | EVENT | CONTINUOUS | TERMINATED)
     size_t i;
-    if (n && (!vr || !value)) return no(m, "an array is NULL");
-    for (i = 0; i < n; i++) if (vr[i] != LABEL) return no(m, "an unknown reference");
+    if (n && (!vr || !value)) return reject(m, "an array is NULL");
+    for (i = 0; i < n; i++) if (vr[i] != LABEL) return reject(m, "an unknown reference");
     for (i = 0; i < n; i++) value[i] = IS(string_latin1) ? "wag\xf6n" : m->s.label;
     return 0;
 }
@@ -276,9 +278,9 @@ static int get_label(void *c, const uint32_t *vr, size_t n, const char **value) 
 static int set_label(void *c, const uint32_t *vr, size_t n, const char *const *value) {
     ALLOW(INSTANTIATED | INITIALIZATION)
     size_t i;
-    if (n && (!vr || !value)) return no(m, "an array is NULL");
+    if (n && (!vr || !value)) return reject(m, "an array is NULL");
     for (i = 0; i < n; i++)
-        if (vr[i] != LABEL || !value[i] || strlen(value[i]) >= sizeof m->s.label) return no(m, "no such text");
+        if (vr[i] != LABEL || !value[i] || strlen(value[i]) >= sizeof m->s.label) return reject(m, "no such text");
     for (i = 0; i < n; i++) strcpy(m->s.label, value[i]);
     if (IS(string_cut)) m->s.label[8] = 0;
     if (IS(string_leaks) && !malloc(40)) return 3;
@@ -288,10 +290,10 @@ static int set_label(void *c, const uint32_t *vr, size_t n, const char *const *v
 static int set_none(void *c, const uint32_t *vr, size_t n, const void *value) {
     ALLOW(INSTANTIATED | INITIALIZATION | STEP | EVENT)
     (void)vr; (void)value;
-    return n ? no(m, "it cannot be set") : 0;
+    return n ? reject(m, "it cannot be set") : 0;
 }
 
-/* Integrates by the Runge-Kutta method; steps end at events and at the end. */
+/* Integrates by the Runge-Kutta method, with steps that end at events. */
 static void integrate(Model *m, double end) {
     State *s = &m->s;
     while (s->time < end - 1e-12) {
@@ -315,8 +317,8 @@ static void integrate(Model *m, double end) {
         if (s->time >= s->next - 1e-12 && !(m->events && m->early)) { s->count += 1 + IS(counts_twice); s->next = 0.05 * (s->count / (1 + IS(counts_twice)) + 1); }
     }
     s->time = end;
-    /* As a solver with variable steps that starts again. */
-    if (IS(manners) && s->restored) s->v += 1e-6, s->restored = 0;
+    /* A solver with variable steps has slightly different results after a restart. */
+    if (IS(unusual) && s->restored) s->v += 1e-6, s->restored = 0;
     s->fast = s->v > 0.5;
 }
 
@@ -325,13 +327,13 @@ static int step(void *c, double point, double size) {
     if (IS(endless_step) && !(size < 1e9)) for (;;) usleep(1000);
     if (IS(long_step_hangs) && size > 1e3 && size < 1e4) for (;;) usleep(1000);
     if (IS(step_rejected_halfway) && !(size > 0)) m->s.x += 0.01;
-    if (!isfinite(point) || !isfinite(size) || !(size > 0) || size > 1e4) return no(m, "no such step");
-    if (fabs(point - m->s.time) > 1e-9 * (1 + fabs(point))) return no(m, "another time");
-    if (IS(last_step_rejected) && point + size >= m->s.stop) return no(m, "it is over");
-    if (!IS(stop_ignored) && point + size > m->s.stop * (1 + 1e-12) + 1e-12) return no(m, "beyond the stop time");
+    if (!isfinite(point) || !isfinite(size) || !(size > 0) || size > 1e4) return reject(m, "no such step");
+    if (fabs(point - m->s.time) > 1e-9 * (1 + fabs(point))) return reject(m, "another time");
+    if (IS(last_step_rejected) && point + size >= m->s.stop) return reject(m, "it is over");
+    if (!IS(stop_ignored) && point + size > m->s.stop * (1 + 1e-12) + 1e-12) return reject(m, "beyond the stop time");
     if (IS(step_prints)) puts("a step");
 #ifdef SYMBOL_MISSING
-    if (size == 0.123) return nobody_has_it();
+    if (size == 0.123) return missing_symbol();
 #endif
     if (IS(step_adds)) m->s.x += 1e-7;
     integrate(m, IS(step_overshoots) ? point + 1e-3 * ceil(size / 1e-3 - 1e-9) : point + size);
@@ -354,7 +356,7 @@ static int step(void *c, double point, double size) {
 
 static int enter(void *c, double from, double stop) {
     ALLOW(INSTANTIATED)
-    if (!isfinite(from) || fabs(from) > 1e9) return no(m, "no such time");
+    if (!isfinite(from) || fabs(from) > 1e9) return reject(m, "no such time");
     m->s.time = from;
     m->s.next = from + 0.05;
     m->s.stop = stop;
@@ -400,7 +402,7 @@ void *fmi3InstantiateScheduledExecution(void) { return NULL; }
 #define STATE(verb, end) int fmi3##verb##FMUState##end
 #define DESERIALIZE int fmi3DeserializeFMUState
 #define SIZES , size_t nvalues
-#define SIZES_RIGHT if (c && nvalues != n) return no(c, "sizes that differ");
+#define SIZES_RIGHT if (c && nvalues != n) return reject(c, "sizes that differ");
 #else
 #define EXPORT(name) int fmi2##name
 const char *fmi2GetVersion(void) { return IS(version_wrong) ? "2.1" : "2.0"; }
@@ -420,7 +422,7 @@ typedef const char *Text;
 #define ACCESS(name, type, get, set)                                                                                          \
     EXPORT(Get##name)(void *c, const uint32_t *vr, size_t n, type *value SIZES) { SIZES_RIGHT return get(c, vr, n, value); } \
     EXPORT(Set##name)(void *c, const uint32_t *vr, size_t n, const type *value SIZES) { SIZES_RIGHT return set(c, vr, n, value); }
-#define REJECTED(name) EXPORT(name)(void *c) { return c ? no(c, "not supported") : 3; }
+#define REJECTED(name) EXPORT(name)(void *c) { return c ? reject(c, "not supported") : 3; }
 
 void FREE(void *c) {
     Model *m = c;
@@ -433,8 +435,8 @@ void FREE(void *c) {
 EXPORT(SetDebugLogging)(void *c, Flag on, size_t n, const char *const *categories) {
     ALLOW(63)
     size_t i;
-    if (n && !categories) return no(m, "an array is NULL");
-    for (i = 0; i < n; i++) if (!categories[i] || strcmp(categories[i], "logStatusError")) return no(m, "an unknown category");
+    if (n && !categories) return reject(m, "an array is NULL");
+    for (i = 0; i < n; i++) if (!categories[i] || strcmp(categories[i], "logStatusError")) return reject(m, "an unknown category");
     m->logging = on;
     return 0;
 }
@@ -442,55 +444,55 @@ EXPORT(SetDebugLogging)(void *c, Flag on, size_t n, const char *const *categorie
 EXPORT(ExitInitializationMode)(void *c) {
     ALLOW(INITIALIZATION)
     m->s.mode = m->cs && !m->events ? STEP : EVENT;
-    /* As Dymola: an event may need several updates. */
-    m->s.updates_needed = IS(manners) && m->s.mode == EVENT ? 3 : 0;
+    /* In FMUs of Dymola, an event may need several updates. */
+    m->s.updates_needed = IS(unusual) && m->s.mode == EVENT ? 3 : 0;
     return 0;
 }
 EXPORT(Terminate)(void *c) {
     ALLOW(STEP | EVENT | CONTINUOUS)
     if (IS(name_gone)) report(m, 0, "the end");
-    if (IS(terminate_rejected) && m->s.steps > 1) return no(m, "not yet");
+    if (IS(terminate_rejected) && m->s.steps > 1) return reject(m, "not yet");
     m->s.mode = TERMINATED;
     return 0;
 }
 EXPORT(Reset)(void *c) {
     ALLOW(63)
-    if (IS(reset_rejected) && m->s.mode == TERMINATED) return no(m, "it is over");
+    if (IS(reset_rejected) && m->s.mode == TERMINATED) return reject(m, "it is over");
     start(&m->s);
     return 0;
 }
 EXPORT(EnterEventMode)(void *c) {
     ALLOW(CONTINUOUS | EVENT | STEP)
-    if (m->s.mode == STEP && !m->events) return no(m, "no event mode was agreed upon");
+    if (m->s.mode == STEP && !m->events) return reject(m, "no event mode was agreed upon");
     m->s.mode = EVENT;
-    m->s.updates_needed = IS(manners) ? 3 : 0;
+    m->s.updates_needed = IS(unusual) ? 3 : 0;
     return 0;
 }
-EXPORT(EnterContinuousTimeMode)(void *c) { ALLOW(EVENT) if (m->s.updates_needed) return no(m, "another update is needed"); m->s.mode = CONTINUOUS; return 0; }
+EXPORT(EnterContinuousTimeMode)(void *c) { ALLOW(EVENT) if (m->s.updates_needed) return reject(m, "another update is needed"); m->s.mode = CONTINUOUS; return 0; }
 EXPORT(CompletedIntegratorStep)(void *c, Flag no_set, Flag *event, Flag *terminate) {
     ALLOW(CONTINUOUS)
     (void)no_set;
-    if (!event || !terminate) return no(m, "a flag is NULL");
+    if (!event || !terminate) return reject(m, "a flag is NULL");
     m->s.steps++;
     *event = 0; *terminate = 0;
     return 0;
 }
 EXPORT(SetTime)(void *c, double time) {
     ALLOW(CONTINUOUS)
-    if (!isfinite(time)) return no(m, "no such time");
+    if (!isfinite(time)) return reject(m, "no such time");
     m->s.time = time;
     return 0;
 }
 EXPORT(SetContinuousStates)(void *c, const double *x, size_t n) {
     ALLOW(CONTINUOUS)
-    if (n != 2 || !x || !isfinite(x[0]) || !isfinite(x[1])) return no(m, "no such states");
+    if (n != 2 || !x || !isfinite(x[0]) || !isfinite(x[1])) return reject(m, "no such states");
     m->s.x = x[0]; m->s.v = x[1];
     shared = m->s;
     return 0;
 }
 EXPORT(GetContinuousStates)(void *c, double *x, size_t n) {
     ALLOW(62)
-    if (n != 2 || !x) return no(m, "there are two states");
+    if (n != 2 || !x) return reject(m, "there are two states");
     x[0] = m->s.x; x[1] = m->s.v;
     return 0;
 }
@@ -500,33 +502,34 @@ EXPORT(GetContinuousStateDerivatives)(void *c, double *x, size_t n) {
 EXPORT(GetDerivatives)(void *c, double *x, size_t n) {
 #endif
     ALLOW(62)
-    if (n != 2 || !x) return no(m, "there are two states");
+    if (n != 2 || !x) return reject(m, "there are two states");
     x[IS(vector_swapped)] = m->s.v; x[!IS(vector_swapped)] = slope(m);
     return 0;
 }
 EXPORT(GetEventIndicators)(void *c, double *z, size_t n) {
     ALLOW(62)
-    if (n != 1 || !z) return no(m, "there is one event indicator");
+    if (n != 1 || !z) return reject(m, "there is one event indicator");
     z[0] = m->s.v - 0.5;
     return 0;
 }
 #ifndef WITHOUT_NOMINALS
 EXPORT(GetNominalsOfContinuousStates)(void *c, double *x, size_t n) {
     ALLOW(63)
-    if (n != 2 || !x) return no(m, "there are two states");
+    if (n != 2 || !x) return reject(m, "there are two states");
     x[0] = IS(nominal_zero) ? 0 : 1; x[1] = 1;
     return 0;
 }
 #endif
 
+/* Copies of states to which serialized states point with the fault bytes_with_address. */
 static char *secret[4096];
 static unsigned secrets;
 
 STATE(Get, )(void *c, void **state) {
     ALLOW(63)
     State *saved;
-    if (!state) return no(m, "a handle is NULL");
-    if (IS(state_not_supported)) return no(m, "not supported");
+    if (!state) return reject(m, "a handle is NULL");
+    if (IS(state_not_supported)) return reject(m, "not supported");
     saved = *state ? *state : malloc(sizeof *saved);
     if (!(IS(handle_not_reused) && *state)) *saved = m->s;
     if (IS(lossy_state) || (IS(lossy_when_late) && m->s.time > 0.4)) saved->v = (float)saved->v;
@@ -539,7 +542,7 @@ STATE(Get, )(void *c, void **state) {
 STATE(Set, )(void *c, void *state) {
     ALLOW(63)
     double next = m->s.next;
-    if (!state) return no(m, "a state is NULL");
+    if (!state) return reject(m, "a state is NULL");
     m->s = *(State *)state;
     if (IS(state_without_event)) m->s.next = next;
     m->s.restored = 1;
@@ -556,14 +559,14 @@ STATE(Free, )(void *c, void **state) {
 }
 STATE(Serialized, Size)(void *c, void *state, size_t *size) {
     ALLOW(63)
-    if (!state || !size) return no(m, "NULL");
+    if (!state || !size) return reject(m, "NULL");
     *size = sizeof(State) + 8;
     return 0;
 }
 STATE(Serialize, )(void *c, void *state, char *bytes, size_t size) {
     ALLOW(63)
     State copy;
-    if (!state || !bytes || size < sizeof copy + 8) return no(m, "no room");
+    if (!state || !bytes || size < sizeof copy + 8) return reject(m, "no room");
     copy = *(State *)state;
     if (IS(bytes_without_input)) copy.force = 0;
     memset(bytes, 0, size);
@@ -579,15 +582,15 @@ STATE(Serialize, )(void *c, void *state, char *bytes, size_t size) {
 DESERIALIZE(void *c, const char *bytes, size_t size, void **state) {
     ALLOW(63)
     State copy;
-    if (!state || !bytes || (size != sizeof copy + 8 && !IS(bytes_crash))) return no(m, "no state");
+    if (!state || !bytes || (size != sizeof copy + 8 && !IS(bytes_crash))) return reject(m, "no state");
     if (IS(bytes_crash)) { memcpy(&copy, bytes + 8, sizeof copy); }
-    if (memcmp(bytes, "wagon001", 8)) return no(m, "no state");
+    if (memcmp(bytes, "wagon001", 8)) return reject(m, "no state");
     if (IS(bytes_with_address)) { char *from; memcpy(&from, bytes + 8, sizeof from); memcpy(&copy, from, sizeof copy); }
     else memcpy(&copy, bytes + 8, sizeof copy);
-    /* Only possible values are accepted. */
+    /* Values that the model cannot have are rejected. */
     copy.label[sizeof copy.label - 1] = 0;
     if (!isfinite(copy.time) || !isfinite(copy.x) || !isfinite(copy.v) || !(copy.next > copy.time - 1) || !(copy.next < 1e9) ||
-        !(copy.mass > 0) || !(fabs(copy.time) < 1e9)) return no(m, "no state");
+        !(copy.mass > 0) || !(fabs(copy.time) < 1e9)) return reject(m, "no state");
     if (!*state) *state = malloc(sizeof copy);
     memcpy(*state, &copy, sizeof copy);
     return 0;
@@ -609,13 +612,13 @@ static int directional(void *c, const uint32_t *unknown, size_t nu, const uint32
     ALLOW(62)
     size_t i, j;
     double *sums;
-    if ((nu && !unknown) || (nk && !known) || ((adjoint ? nu : nk) && !seed) || ((adjoint ? nk : nu) && !out)) return no(m, "NULL");
-    for (i = 0; i < nu; i++) if (isnan(partial(m, unknown[i], X))) return no(m, "an unknown that is none");
-    for (j = 0; j < nk; j++) if (known[j] != X && known[j] != V && known[j] != FORCE) return no(m, "a known that is none");
+    if ((nu && !unknown) || (nk && !known) || ((adjoint ? nu : nk) && !seed) || ((adjoint ? nk : nu) && !out)) return reject(m, "NULL");
+    for (i = 0; i < nu; i++) if (isnan(partial(m, unknown[i], X))) return reject(m, "an unknown that is none");
+    for (j = 0; j < nk; j++) if (known[j] != X && known[j] != V && known[j] != FORCE) return reject(m, "a known that is none");
     sums = calloc(nu + nk + 1, sizeof *sums);
     uint32_t own[8];
     if (IS(order_ignored) && nu <= 8 && !adjoint) {
-        /* As in ModelStructure. */
+        /* Sorts the unknowns as in ModelStructure, as if their order in the call did not matter. */
         static const uint32_t order[] = { Y, DER_X, DER_V };
         size_t next = 0, k;
         for (k = 0; k < 3; k++) for (i = 0; i < nu; i++) if (unknown[i] == order[k]) own[next++] = unknown[i];
@@ -641,14 +644,14 @@ EXPORT(EnterInitializationMode)(void *c, bool defined, double tolerance, double 
     return enter(c, from, stops ? stop : INFINITY);
 }
 #define NONE(type)                                                                                                                   \
-    EXPORT(Get##type)(void *c, const uint32_t *vr, size_t n, void *value, size_t nvalues) { ALLOW(63) (void)vr; (void)value; (void)nvalues; return n ? no(m, "there are none") : 0; } \
+    EXPORT(Get##type)(void *c, const uint32_t *vr, size_t n, void *value, size_t nvalues) { ALLOW(63) (void)vr; (void)value; (void)nvalues; return n ? reject(m, "there are none") : 0; } \
     EXPORT(Set##type)(void *c, const uint32_t *vr, size_t n, const void *value, size_t nvalues) { (void)nvalues; return set_none(c, vr, n, value); }
 ACCESS(Float64, double, get_reals, set_reals) ACCESS(Int32, int32_t, get_count, set_none)
 ACCESS(Boolean, bool, get_fast, set_none) ACCESS(String, Text, get_label, set_label)
 NONE(Float32) NONE(Int8) NONE(UInt8) NONE(Int16) NONE(UInt16) NONE(UInt32) NONE(Int64) NONE(UInt64)
 EXPORT(UpdateDiscreteStates)(void *c, bool *again, bool *terminate, bool *nominals, bool *values, bool *defined, double *next) {
     ALLOW(EVENT)
-    if (!again || !terminate || !nominals || !values || !defined || !next) return no(m, "a flag is NULL");
+    if (!again || !terminate || !nominals || !values || !defined || !next) return reject(m, "a flag is NULL");
     *terminate = *nominals = *values = false;
     *defined = true;
     return update(m, again, next);
@@ -656,7 +659,7 @@ EXPORT(UpdateDiscreteStates)(void *c, bool *again, bool *terminate, bool *nomina
 EXPORT(DoStep)(void *c, double point, double size, bool no_set, bool *event, bool *terminate, bool *early, double *last) {
     int status;
     (void)no_set;
-    if (c && (!event || !terminate || !early || !last)) return no(c, "a flag is NULL");
+    if (c && (!event || !terminate || !early || !last)) return reject(c, "a flag is NULL");
     Model *m = c;
     bool stops = m && m->events && m->early && m->s.next < point + size - 1e-9 && m->s.next > point + 1e-9;
     status = step(c, point, stops ? m->s.next - point : size);
@@ -668,16 +671,16 @@ EXPORT(DoStep)(void *c, double point, double size, bool no_set, bool *event, boo
     return 0;
 }
 EXPORT(GetDirectionalDerivative)(void *c, const uint32_t *u, size_t nu, const uint32_t *k, size_t nk, const double *seed, size_t ns, double *out, size_t no_) {
-    if (c && (ns != nk || no_ != nu)) return no(c, "sizes that differ");
+    if (c && (ns != nk || no_ != nu)) return reject(c, "sizes that differ");
     return directional(c, u, nu, k, nk, seed, out, false);
 }
 EXPORT(GetAdjointDerivative)(void *c, const uint32_t *u, size_t nu, const uint32_t *k, size_t nk, const double *seed, size_t ns, double *out, size_t no_) {
-    if (c && (ns != nu || no_ != nk)) return no(c, "sizes that differ");
+    if (c && (ns != nu || no_ != nk)) return reject(c, "sizes that differ");
     return directional(c, u, nu, k, nk, seed, out, true);
 }
-EXPORT(GetNumberOfContinuousStates)(void *c, size_t *n) { ALLOW(63) if (!n) return no(m, "NULL"); *n = 2; return 0; }
-EXPORT(GetNumberOfEventIndicators)(void *c, size_t *n) { ALLOW(63) if (!n) return no(m, "NULL"); *n = 1; return 0; }
-EXPORT(EnterStepMode)(void *c) { ALLOW(EVENT) if (!m->cs || m->s.updates_needed) return no(m, "not in Model Exchange, nor before the last update"); m->s.mode = STEP; return 0; }
+EXPORT(GetNumberOfContinuousStates)(void *c, size_t *n) { ALLOW(63) if (!n) return reject(m, "NULL"); *n = 2; return 0; }
+EXPORT(GetNumberOfEventIndicators)(void *c, size_t *n) { ALLOW(63) if (!n) return reject(m, "NULL"); *n = 1; return 0; }
+EXPORT(EnterStepMode)(void *c) { ALLOW(EVENT) if (!m->cs || m->s.updates_needed) return reject(m, "not in Model Exchange, nor before the last update"); m->s.mode = STEP; return 0; }
 REJECTED(GetBinary) REJECTED(SetBinary) REJECTED(GetClock) REJECTED(SetClock) REJECTED(GetNumberOfVariableDependencies)
 REJECTED(GetVariableDependencies) REJECTED(EnterConfigurationMode) REJECTED(ExitConfigurationMode) REJECTED(GetIntervalDecimal)
 REJECTED(GetIntervalFraction) REJECTED(GetShiftDecimal) REJECTED(GetShiftFraction) REJECTED(SetIntervalDecimal)
@@ -687,7 +690,7 @@ REJECTED(GetOutputDerivatives) REJECTED(ActivateModelPartition)
 EXPORT(SetupExperiment)(void *c, int defined, double tolerance, double from, int stops, double stop) {
     ALLOW(INSTANTIATED)
     (void)defined; (void)tolerance;
-    if (!isfinite(from) || fabs(from) > 1e9) return no(m, "no such time");
+    if (!isfinite(from) || fabs(from) > 1e9) return reject(m, "no such time");
     m->s.time = from;
     m->s.stop = stops ? stop : INFINITY;
     return 0;
@@ -697,13 +700,13 @@ ACCESS(Real, double, get_reals, set_reals) ACCESS(Integer, int32_t, get_count, s
 ACCESS(Boolean, int, get_fast, set_none) ACCESS(String, Text, get_label, set_label)
 EXPORT(NewDiscreteStates)(void *c, Event *event) {
     ALLOW(EVENT)
-    if (!event) return no(m, "NULL");
+    if (!event) return reject(m, "NULL");
     memset(event, 0, sizeof *event);
     event->defined = 1;
     return update(m, &event->again, &event->next);
 }
 EXPORT(DoStep)(void *c, double point, double size, int no_set) { (void)no_set; return step(c, point, size); }
-EXPORT(CancelStep)(void *c) { return c ? no(c, "no step is under way") : 3; }
+EXPORT(CancelStep)(void *c) { return c ? reject(c, "no step is under way") : 3; }
 EXPORT(GetDirectionalDerivative)(void *c, const uint32_t *u, size_t nu, const uint32_t *k, size_t nk, const double *seed, double *out) {
     return directional(c, u, nu, k, nk, seed, out, false);
 }

@@ -1,0 +1,81 @@
+//! Jobs for the processes that execute call sequences, and the results of these processes.
+
+use crate::call_sequence::{CallSequence, Setting};
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+use std::process::ExitStatus;
+
+/// Environment variable with the path of the job of a worker; empty for a server.
+pub const VARIABLE: &str = "FMU_CHECK_JOB";
+
+/// Environment variable with the path of the temporary directory of a check.
+pub const SCRATCH: &str = "FMU_CHECK_SCRATCH";
+
+/// Exit status of a worker that fails for a reason other than the FMU.
+pub const OWN_FAULT: i32 = 97;
+
+/// Exit status of a worker that has executed its call sequence.
+pub const EXECUTED: i32 = 96;
+
+/// Least number of repetitions whose measurements are evaluated.
+pub const EVALUATED: usize = 50;
+
+/// Call sequence for a process.
+#[derive(Serialize, Deserialize)]
+pub struct Job {
+    /// Parameters that all call sequences share.
+    pub setting: Setting,
+    pub sequence: CallSequence,
+    /// Serialized states of earlier processes of the call sequence, by index.
+    pub bytes: HashMap<usize, Vec<u8>>,
+}
+
+/// Program that is run instead of a call sequence, with the directory of the FMU as its argument.
+#[derive(Serialize, Deserialize)]
+pub struct Program {
+    pub program: std::path::PathBuf,
+    pub fmu: std::path::PathBuf,
+    /// Maximum address space of its processes in bytes.
+    pub memory: u64,
+}
+
+/// Results of a process. A process that exceeded the limit has neither an exit status nor a signal.
+#[derive(Default, Serialize, Deserialize)]
+pub struct Ended {
+    /// Exit status.
+    pub code: Option<i32>,
+    /// Signal that ended the process.
+    pub signal: Option<i32>,
+    /// Standard output and standard error.
+    pub output: String,
+    /// Outcomes of the steps, a line of JSON for each.
+    pub outcomes: String,
+    /// Names of the child processes that were alive after the process had ended.
+    pub orphans: Vec<String>,
+    /// Number of processes at a time, if it exceeded the maximum.
+    pub flood: Option<usize>,
+    /// Whether the process ended while it executed code of the FMU.
+    pub inside: bool,
+}
+
+impl From<ExitStatus> for Ended {
+    fn from(status: ExitStatus) -> Self {
+        #[cfg(unix)]
+        let signal = std::os::unix::process::ExitStatusExt::signal(&status);
+        #[cfg(not(unix))]
+        let signal = None;
+        Self { code: status.code(), signal, ..Self::default() }
+    }
+}
+
+/// Last line that a worker writes, after all steps. It has the serialized states by index.
+#[derive(Serialize, Deserialize)]
+pub struct Last {
+    pub bytes: HashMap<usize, Vec<u8>>,
+}
+
+/// Line that a worker writes if it cannot load the library, with the message of the loader.
+#[derive(Serialize, Deserialize)]
+pub struct Unloadable {
+    pub unloadable: String,
+}

@@ -1,0 +1,130 @@
+//! Executes the steps of a call sequence.
+
+use super::executor::{Executor, Instance, THREADS};
+use super::job::{EVALUATED, EXECUTED, Last};
+use super::logger::{messages, text_at};
+use super::memory::{self, in_fmu};
+use super::{integrate, locked, measure};
+use crate::call_sequence::{NULL_INSTANCE, Numbered, Outcome, Step};
+use fmi_abi::c_types::{c_char, c_void};
+use std::collections::HashMap;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+impl Executor {
+    /// Executes steps. Writes their outcomes to the file if `report` is set, otherwise returns them.
+    pub fn execute(&self, sequence: &[Numbered], report: bool) -> Vec<Outcome> {
+        let mut outcomes = Vec::new();
+        for numbered in sequence {
+            let mut outcome = Outcome { id: numbered.id, ..Outcome::default() };
+            match &numbered.step {
+                Step::Repeat(times, steps) => {
+                    let begin = Instant::now();
+                    memory::KEEP.store(true, Ordering::Relaxed);
+                    let (mut done, mut last) = (0, Vec::new());
+                    // Until there are enough repetitions for an evaluation, four times as much time is allowed, because the
+                    // machine may be busy.
+                    let patience = |done: usize| if done < EVALUATED { 4.0 } else { 1.0 };
+                    let seconds = || begin.elapsed().as_secs_f64();
+                    while done < *times && seconds() < patience(done) * self.setting.repetitions {
+                        last = self.execute(steps, false);
+                        done += 1;
+                        if last.iter().any(|outcome| outcome.status.is_some_and(|status| status > 2)) {
+                            break;
+                        }
+                    }
+                    memory::KEEP.store(false, Ordering::Relaxed);
+                    outcome.measured =
+                        Some(crate::call_sequence::Measured { times: done, ..Default::default() });
+                    if report {
+                        last.iter().for_each(|outcome| self.write(outcome));
+                    }
+                }
+                Step::Parallel(sequences) => {
+                    memory::KEEP.store(true, Ordering::Relaxed);
+                    THREADS.store(true, Ordering::Relaxed);
+                    std::thread::scope(|scope| {
+                        for sequence in sequences {
+                            scope.spawn(|| self.execute(sequence, report));
+                        }
+                    });
+                    THREADS.store(false, Ordering::Relaxed);
+                    memory::KEEP.store(false, Ordering::Relaxed);
+                }
+                step => self.execute_step(step, &mut outcome),
+            }
+            if report {
+                self.write(&outcome);
+            } else {
+                outcomes.push(outcome);
+            }
+        }
+        outcomes
+    }
+
+    /// Executes a step that contains no other steps.
+    fn execute_step(&self, step: &Step, outcome: &mut Outcome) {
+        match step {
+            Step::Make(index, make) => self.make(*index, make, outcome),
+            Step::Free(index) => {
+                let null = (*index == NULL_INSTANCE).then_some(Instance {
+                    handle: 0,
+                    environment: 0,
+                    co_simulation: self.setting.libraries[0].is_some(),
+                    next_event: f64::INFINITY,
+                    _callbacks: None,
+                });
+                let Some(instance) = null.or_else(|| locked(&self.instances).remove(index)) else { return };
+                let name = self.named("FreeInstance");
+                let address = self.find(instance.co_simulation, &name);
+                outcome.missing = address.is_none();
+                outcome.status = address.map(|address| {
+                    // SAFETY: the functions of both FMI versions have this type.
+                    in_fmu(|| unsafe {
+                        let function: unsafe extern "C" fn(*mut c_void) = std::mem::transmute(address);
+                        function(instance.handle as *mut c_void);
+                    });
+                    0
+                });
+                (outcome.log, outcome.strays) = messages(instance.environment);
+            }
+            Step::Version(name) => {
+                let address = self.find(self.setting.libraries[0].is_some(), name);
+                outcome.missing = address.is_none();
+                // SAFETY: these functions have no arguments and return a string.
+                outcome.text = address.and_then(|address| unsafe {
+                    let function: unsafe extern "C" fn() -> *const c_char = std::mem::transmute(address);
+                    text_at(in_fmu(|| function()))
+                });
+            }
+            Step::Call { instance, function, args } => self.call(*instance, function, args, outcome),
+            Step::Integrate(instance, how) => {
+                memory::KEEP.store(true, Ordering::Relaxed);
+                integrate::integrate(self, *instance, how, outcome);
+                memory::KEEP.store(false, Ordering::Relaxed);
+            }
+            Step::Measure => outcome.measured = Some(measure::now()),
+            Step::Unload => {
+                let mut loaded: Vec<_> =
+                    locked(&self.libraries).iter_mut().filter_map(Option::take).collect();
+                loaded.dedup_by_key(|library| std::ptr::from_ref(*library));
+                for library in loaded {
+                    // SAFETY: made by Box::leak, and nothing else refers to it.
+                    in_fmu(|| drop(unsafe { Box::from_raw(std::ptr::from_ref(library).cast_mut()) }));
+                }
+                // Crashes if the library has set a buffer of the standard output that was unloaded with it.
+                #[cfg(unix)]
+                // SAFETY: writes an empty line, and the buffers of the C library.
+                in_fmu(|| unsafe {
+                    libc::puts(c"".as_ptr());
+                    libc::fflush(std::ptr::null_mut());
+                });
+            }
+            Step::Quit => {
+                self.write(&Last { bytes: HashMap::new() });
+                in_fmu(|| std::process::exit(EXECUTED))
+            }
+            Step::Repeat(..) | Step::Parallel(_) | Step::FreshProcess | Step::Elsewhere(_) => {}
+        }
+    }
+}

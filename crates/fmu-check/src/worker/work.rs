@@ -1,0 +1,93 @@
+//! Executes a job in a process with limited resources.
+
+use super::executor::{Executor, PROCESS};
+use super::job::{EXECUTED, Job, Last, OWN_FAULT};
+use super::{locked, memory};
+use crate::call_sequence::{Setting, Step};
+use std::fs::File;
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::Ordering;
+
+/// Writes the buffered output, and ends the process. The exit handlers of the library do not run, because only `Step::Quit` tests
+/// them.
+pub fn end(result: Result<(), String>) -> ! {
+    let status = match result {
+        Ok(()) => EXECUTED,
+        Err(error) => {
+            eprintln!("{error}");
+            OWN_FAULT
+        }
+    };
+    #[cfg(unix)]
+    // SAFETY: writes the buffers of the C library, and ends the process.
+    unsafe {
+        libc::fflush(std::ptr::null_mut());
+        libc::_exit(status)
+    }
+    #[cfg(not(unix))]
+    std::process::exit(status)
+}
+
+/// Executes a call sequence, and writes the outcome of each step to the file, as a line of JSON.
+pub fn work(job: Job, file: File) {
+    limit(job.setting.memory);
+    PROCESS.store(std::process::id(), Ordering::Relaxed);
+    if job.setting.soft {
+        memory::AFTER.store(4096, std::sync::atomic::Ordering::Relaxed);
+    }
+    let setting = match job.sequence.first().map(|numbered| &numbered.step) {
+        Some(Step::Elsewhere(name)) => elsewhere(&job.setting, name),
+        _ => job.setting,
+    };
+    let executor = Executor {
+        setting,
+        libraries: Mutex::default(),
+        instances: Mutex::default(),
+        states: Mutex::default(),
+        bytes: Mutex::new(job.bytes),
+        sizes: Mutex::default(),
+        file: Mutex::new(file),
+    };
+    executor.execute(&job.sequence, true);
+    executor.write(&Last { bytes: std::mem::take(&mut locked(&executor.bytes)) });
+}
+
+/// Makes a link of this name to the directory of the FMU in the working directory; returns the setting with the paths through the
+/// link.
+fn elsewhere(setting: &Setting, name: &str) -> Setting {
+    let directory = setting.resources.parent().unwrap_or(&setting.resources);
+    let there = std::env::current_dir().unwrap_or_default().join(name);
+    #[cfg(unix)]
+    if let Err(error) = std::os::unix::fs::symlink(directory, &there) {
+        eprintln!("{}: {error}", there.display());
+        std::process::exit(OWN_FAULT);
+    }
+    let moved = |path: &Path| there.join(path.strip_prefix(directory).unwrap_or(path));
+    Setting {
+        libraries: setting.libraries.clone().map(|library| library.map(|library| moved(&library))),
+        resources: moved(&setting.resources),
+        ..setting.clone()
+    }
+}
+
+/// Limits the memory and the size of files of this process, and ends it together with its parent process.
+pub fn limit(memory: u64) {
+    #[cfg(unix)]
+    {
+        let set = |what, value| {
+            let limit = libc::rlimit { rlim_cur: value, rlim_max: value };
+            // SAFETY: sets a limit of this process.
+            unsafe { libc::setrlimit(what, &limit) };
+        };
+        set(libc::RLIMIT_CORE, 0);
+        set(libc::RLIMIT_FSIZE, 1 << 30);
+        #[cfg(target_os = "linux")]
+        {
+            set(libc::RLIMIT_AS, memory as _);
+            // SAFETY: this process is killed when its parent process ends.
+            unsafe { libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) };
+        }
+    }
+    let _ = memory;
+}

@@ -1,0 +1,70 @@
+//! FMUs without a fault, in which fmu-check must find nothing.
+
+use super::wagon::{fmu, found, library};
+use std::process::Command;
+use tempfile::TempDir;
+
+/// Asserts that fmu-check finds only these notes in a variant of the wagon, and checks both interface types.
+fn clean(fmi: u32, variant: &str, notes: &[&str]) {
+    let directory = TempDir::new().expect("a directory");
+    let path = fmu(directory.path(), fmi, &library(fmi, ""), |text| text);
+    // The unusual behaviour concerns these topics.
+    let topics = ["--only", "life_cycle,states,start_values,results,reset"];
+    let options = if variant == "none" { &[][..] } else { &topics };
+    let (_, report) = found(&path, variant, &[&["--repeat", "0.3"][..], options].concat());
+    let findings = report["findings"].as_array().expect("a list").iter();
+    // Whether there is a note on glibc depends on the system on which the library was compiled.
+    let found: Vec<_> = findings.filter(|finding| finding["name"] != "package.glibc").collect();
+    let is_expected = |finding: &&serde_json::Value| {
+        finding["severity"] == "note" && notes.iter().any(|name| finding["name"] == *name)
+    };
+    assert!(found.iter().all(is_expected) && found.len() == notes.len(), "{found:#?}");
+    let unchecked = report["unreached"].as_array().expect("a list");
+    assert!(unchecked.iter().all(|of| of["why"] == "left out (--only)"), "{unchecked:?}");
+    assert_eq!(report["interfaces"].as_array().map(Vec::len), Some(2));
+}
+
+#[test]
+fn none_in_fmi2() {
+    clean(2, "none", &[]);
+}
+
+#[test]
+fn none_in_fmi3() {
+    clean(3, "none", &[]);
+}
+
+/// Asserts that unusual behaviour is not a violation if the standard allows it: an event needs several updates, a local variable
+/// cannot be read in Initialization Mode, and a solver takes other steps after a restart.
+#[test]
+fn unusual_behaviour_is_accepted() {
+    clean(2, "unusual", &["states.digits"]);
+    clean(3, "unusual", &["states.digits"]);
+}
+
+/// Asserts that there is no finding if this machine lacks a library that the FMU needs, but that the interface types are reported
+/// as not checked.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_missing_library_of_the_machine_is_not_a_fault() {
+    let directory = TempDir::new().expect("a directory");
+    let [fortran, library] =
+        ["libgfortran-of-another.so.5", "wagon.so"].map(|name| directory.path().join(name));
+    let compile = |arguments: &[&str]| {
+        let status = Command::new("cc").args(["-shared", "-fPIC", "-x", "c"]).args(arguments).status();
+        assert!(status.expect("a C compiler").success());
+    };
+    let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/mutants/wagon.c");
+    let [fortran, output] = [&fortran, &library].map(|path| path.to_str().expect("a path"));
+    compile(&["-Wl,-soname,libgfortran-of-another.so.5", "/dev/null", "-o", fortran]);
+    let link = ["-x", "none", "-Wl,--no-as-needed", fortran, "-lm", "-lpthread", "-o", output];
+    compile(&[&[source][..], &link].concat());
+    let path = fmu(directory.path(), 2, &library, |text| text);
+    let (found, report) = found(&path, "none", &["--only", "functions,life_cycle"]);
+    assert_eq!(found, [], "{report:#}");
+    let unchecked = report["unreached"].as_array().expect("a list").iter();
+    let why: Vec<_> = unchecked.filter(|of| of["allowed"] == false).map(|of| of["why"].to_string()).collect();
+    assert_eq!(why.len(), 2);
+    assert!(why.iter().all(|why| why.contains("this machine lacks libgfortran-of-another.so.5")), "{why:?}");
+    assert_eq!(report["status"], 2);
+}

@@ -1,0 +1,209 @@
+//! Reports, options and exit statuses of checks.
+
+use super::wagon::{UNLIMITED, check, fmu, found, library, not_shown_without_fault, unpack};
+use std::process::Command;
+use tempfile::TempDir;
+
+/// Asserts that every report lists the interface types that were not checked, and that the check fails unless an option names
+/// them.
+#[test]
+fn nothing_passes_unchecked() {
+    let both = "co-simulation,model-exchange";
+    let tool = |text: String| text.replace("<CoSimulation", "<CoSimulation needsExecutionTool=\"true\"");
+    let elsewhere = |text: String| {
+        text.replace("<ModelExchange modelIdentifier=\"wagon", "<ModelExchange modelIdentifier=\"cart")
+    };
+    let scheduled = |text: String| text.replace("<CoSimulation", "<ScheduledExecution/><CoSimulation");
+    let neither = |text: String| text.replace("modelIdentifier=\"wagon", "modelIdentifier=\"cart");
+    type Change = Box<dyn Fn(String) -> String>;
+    let cases: [(u32, Change, &str, &str); 4] = [
+        (2, Box::new(tool), "co-simulation", "needsExecutionTool"),
+        (2, Box::new(elsewhere), "model-exchange", "there is no cart"),
+        (3, Box::new(scheduled), "scheduled-execution", "Scheduled Execution"),
+        (3, Box::new(neither), both, "there is no cart"),
+    ];
+    for (fmi, change, names, why) in cases {
+        let directory = TempDir::new().expect("a directory");
+        let path = fmu(directory.path(), fmi, &library(fmi, ""), change);
+        let out = directory.path().join("out");
+        let run = |options: &[&str]| {
+            check(&path)
+                .args(UNLIMITED)
+                .args(["--only", "functions", "--out"])
+                .arg(&out)
+                .args(options)
+                .output()
+                .expect("runs")
+        };
+        let output = run(&[]);
+        assert_eq!(output.status.code(), Some(2), "{names}: {output:?}");
+        for name in names.split(',') {
+            let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+            let all = [printed, "report.json".into(), "junit.xml".into(), "report.html".into()];
+            for (index, text) in all.into_iter().enumerate() {
+                let text =
+                    if index == 0 { text } else { std::fs::read_to_string(out.join(text)).expect("it") };
+                assert!(text.contains(name) && text.contains(why), "{name}: {text}");
+            }
+        }
+        assert_eq!(run(&["--allow-unchecked", names]).status.code(), Some(0), "{names}");
+    }
+    // A hang is a violation, after which the interface type is not checked.
+    let directory = TempDir::new().expect("a directory");
+    let path = fmu(directory.path(), 2, &library(2, ""), |text| text);
+    let (found, report) = found(&path, "make_hangs", &["--only", "states", "--no-shrink", "--limit", "0.3"]);
+    assert!(found.iter().any(|(name, _)| name == "life_cycle.hang"), "{found:?}");
+    assert_eq!(report["findings"][0]["severity"], "violation");
+    let unchecked = report["unreached"].as_array().expect("a list").iter();
+    let names: Vec<_> = unchecked.filter(|of| of["allowed"] == false).map(|of| of["name"].clone()).collect();
+    assert_eq!(names, ["co-simulation", "model-exchange"]);
+}
+
+/// Asserts that a finding does not fail in any report if the baseline accepts it, but fails if the baseline accepts only another
+/// observation.
+#[test]
+fn a_baseline_accepts_with_a_reason() {
+    let directory = TempDir::new().expect("a directory");
+    let path = fmu(directory.path(), 2, &library(2, ""), |text| text);
+    let (baseline, out) = (directory.path().join("baseline.txt"), directory.path().join("out"));
+    for (line, status) in [("start_values.start: known", 0), ("start_values.start \"mass\": known", 1)] {
+        std::fs::write(&baseline, line).expect("a file");
+        let mut command = check(&path);
+        command.args(UNLIMITED).args(["--only", "start_values", "--no-shrink", "--baseline"]).arg(&baseline);
+        let output = command.arg("--out").arg(&out).env("WAGON_FAULT", "start_value").output().expect("runs");
+        assert_eq!(output.status.code(), Some(status), "{line}: {output:?}");
+        let read = |name: &str| std::fs::read_to_string(out.join(name)).expect(name);
+        assert_eq!(read("junit.xml").contains("<failure"), status == 1, "{line}");
+        let sarif: serde_json::Value = serde_json::from_str(&read("report.sarif")).expect("JSON");
+        let result = &sarif["runs"][0]["results"][0];
+        assert_eq!(
+            (result["ruleId"].as_str(), result["level"].as_str()),
+            (Some("start_values.start"), Some("error"))
+        );
+        assert_eq!(result["suppressions"].is_array(), status == 0, "{line}");
+        let report: serde_json::Value = serde_json::from_str(&read("report.json")).expect("JSON");
+        assert_eq!((&report["schema"], &report["status"]), (&1.into(), &status.into()));
+        assert_eq!(String::from_utf8_lossy(&output.stdout).contains("1 accepted"), status == 0);
+    }
+}
+
+/// Asserts that a quick check executes few enough call sequences for its 30 seconds, that it reports the topics that it leaves
+/// out, and that it passes. On a busy machine, the time may be over before all topics are checked; then the report says so.
+#[test]
+fn a_quick_check_is_quick() {
+    let directory = TempDir::new().expect("a directory");
+    let path = fmu(directory.path(), 2, &library(2, ""), |text| text);
+    let (_, report) = found(&path, "none", &["--quick"]);
+    let executed = report["sequences"].as_u64().expect("a number");
+    assert!(executed <= 400, "{executed} call sequences");
+    let unchecked = report["unreached"].as_array().expect("a list");
+    let (late, left_out): (Vec<_>, Vec<_>) =
+        unchecked.iter().partition(|of| of["why"] == "the time was over");
+    let names: Vec<_> = left_out.iter().map(|of| (of["name"].clone(), of["allowed"].clone())).collect();
+    assert_eq!(names, [("resources".into(), true.into()), ("malformed".into(), true.into())]);
+    assert_eq!(report["status"], if late.is_empty() { 0 } else { 2 });
+}
+
+/// Asserts that a check of 100,000 variables needs at most 1 GB of memory, and that its processor time does not grow with the
+/// square of their number. The limit of processor time is ten times what the check needs, while quadratic work needs a thousand
+/// times as much.
+#[cfg(target_os = "linux")]
+#[test]
+fn many_variables_take_little_time_and_memory() {
+    let directory = TempDir::new().expect("a directory");
+    let path = fmu(directory.path(), 2, &library(2, ""), |text| {
+        let alias = |index| {
+            let name = format!("name=\"y{index}\" valueReference=\"9\" variability=\"continuous\"");
+            format!("<ScalarVariable {name}><Real/></ScalarVariable>\n")
+        };
+        let aliases: String = (0..100_000).map(alias).collect();
+        text.replace("</ModelVariables>", &(aliases + "</ModelVariables>"))
+    });
+    let mut command = Command::new("sh");
+    // 1 GB of address space and 60 seconds of processor time for each process.
+    command.args([
+        "-c",
+        "ulimit -v 1000000 && ulimit -t 60 && exec \"$0\" \"$@\"",
+        env!("CARGO_BIN_EXE_fmu-check"),
+    ]);
+    let topics = "description,package,functions,states,derivatives,dependencies,reset,logs";
+    let command = command.arg(&path).args(UNLIMITED).args(["--json", "--no-shrink", "--only", topics]);
+    let output = command.output().expect("runs");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|error| panic!("{error}: {}", String::from_utf8_lossy(&output.stderr)));
+    assert_eq!(report["variables"][0], 100_014);
+    assert_eq!(report["interfaces"].as_array().map(Vec::len), Some(2));
+    let names = report["findings"].as_array().expect("a list").iter().map(|finding| &finding["name"]);
+    assert!(names.clone().all(|name| name == "package.glibc"), "{:?}", names.collect::<Vec<_>>());
+}
+
+/// Asserts that an FMU is not unpacked if it exceeds the maximum size.
+#[test]
+fn unpacking_has_a_limit() {
+    let directory = TempDir::new().expect("a directory");
+    let path = fmu(directory.path(), 2, &library(2, ""), |text| text + &" ".repeat(3 << 20));
+    let run = |megabytes: &str| {
+        check(&path).args(["--only", "description", "--unpacked", megabytes]).output().expect("runs")
+    };
+    let output = run("2");
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(text.contains("has more than 2 MB when it is unpacked"), "{text}");
+    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(run("4").status.code(), Some(0));
+}
+
+/// Asserts that an FMU of a draft of FMI 3.0 is rejected instead of being checked by the rules of FMI 3.0.
+#[test]
+fn drafts_are_not_checked() {
+    let directory = TempDir::new().expect("a directory");
+    let beta = |text: String| text.replace("fmiVersion=\"3.0\"", "fmiVersion=\"3.0-beta.3\"");
+    let path = fmu(directory.path(), 3, &library(3, ""), beta);
+    let output = check(&path).output().expect("runs");
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(text.contains("3.0-beta.3") && text.contains("a draft of FMI 3.0"), "{text}");
+    assert_eq!(output.status.code(), Some(2));
+}
+
+/// Asserts that the README shows the output of this check, in which the wagon rejects the step to the stop time.
+#[test]
+fn the_readme_shows_real_output() {
+    let directory = TempDir::new().expect("a directory");
+    let path = fmu(directory.path(), 2, &library(2, ""), |text| text);
+    let mut command = check(&path);
+    command.args(UNLIMITED).args(["--only", "life_cycle"]).env("WAGON_FAULT", "last_step_rejected");
+    let output = command.output().expect("runs");
+    let output = String::from_utf8_lossy(&output.stdout).replace(&*directory.path().to_string_lossy(), "");
+    let printed: String = output
+        .lines()
+        .take_while(|line| !line.starts_with("not checked"))
+        .map(|line| format!("{}\n", line.trim_start_matches('/').trim_end()))
+        .collect();
+    let readme = include_str!("../../README.md");
+    assert!(printed.lines().count() == 3 && readme.contains(&printed), "{printed}");
+}
+
+/// Asserts that a shortened call sequence has few calls and that its program reproduces the fault.
+#[test]
+fn programs_show_it() {
+    let directory = TempDir::new().expect("a directory");
+    for (mutant, topic, name, most) in [
+        ("lossy_state", "states", "states.restore-values", 14),
+        ("write_past", "start_values", "arrays.written-beyond", 6),
+        ("bytes_with_address", "states", "states.fresh-process.crash", 14),
+    ] {
+        let path = fmu(directory.path(), 2, &library(2, ""), |text| text);
+        let out = directory.path().join("out");
+        let (_, report) = found(&path, mutant, &["--only", topic, "--out", &out.to_string_lossy()]);
+        let finding =
+            report["findings"].as_array().and_then(|all| all.iter().find(|finding| finding["name"] == name));
+        let finding = finding.unwrap_or_else(|| panic!("{mutant}: {report:#}"));
+        let steps = finding["steps"][1].as_u64().expect("a number");
+        assert!(steps <= most, "{mutant}: {steps} calls");
+        for file in ["report.html", "report.json", "junit.xml"] {
+            assert!(std::fs::read_to_string(out.join(file)).expect(file).contains(name), "{file}");
+        }
+        let unpacked = directory.path().join("unpacked");
+        unpack(&path, &unpacked);
+        not_shown_without_fault(&out, name, &unpacked, mutant);
+    }
+}

@@ -1,0 +1,70 @@
+//! Builds the wagon FMU, and runs fmu-check.
+
+use super::packing;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Returns the model description without a fault.
+fn description(fmi: u32) -> String {
+    if fmi == 2 { include_str!("wagon2.xml") } else { include_str!("wagon3.xml") }.to_owned()
+}
+
+/// Returns the path of the compiled library. The environment variable `WAGON_FAULT` chooses the fault.
+pub fn library(fmi: u32, macro_name: &str) -> PathBuf {
+    packing::library("wagon", fmi, macro_name)
+}
+
+/// Packs the FMU with a changed description.
+pub fn fmu(directory: &Path, fmi: u32, library: &Path, change: impl Fn(String) -> String) -> PathBuf {
+    packing::pack(directory, ("wagon", fmi), &change(description(fmi)), library, &[])
+}
+
+/// Options for a maximum duration that no check reaches, because the machine may be busy.
+pub const UNLIMITED: [&str; 2] = ["--time", "3600"];
+
+/// Returns the command that checks an FMU.
+pub fn check(fmu: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fmu-check"));
+    command.arg(fmu);
+    command
+}
+
+/// Unpacks an FMU.
+pub fn unpack(fmu: &Path, directory: &Path) {
+    let file = std::fs::File::open(fmu).expect("the FMU");
+    zip::ZipArchive::new(file).expect("a ZIP").extract(directory).expect("a directory");
+}
+
+/// Checks an FMU with a fault; returns the names and observations of the findings, and the report.
+pub fn found(fmu: &Path, fault: &str, options: &[&str]) -> (Vec<(String, String)>, serde_json::Value) {
+    let unlimited = if options.contains(&"--quick") { &[][..] } else { &UNLIMITED };
+    let mut command = check(fmu);
+    let output = command.args(options).args(unlimited).arg("--json").env("WAGON_FAULT", fault);
+    let output = output.output().expect("runs");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|error| panic!("{error}: {}", String::from_utf8_lossy(&output.stderr)));
+    let text =
+        |finding: &serde_json::Value, name: &str| finding[name].as_str().unwrap_or_default().to_owned();
+    let findings = report["findings"].as_array().expect("a list");
+    (findings.iter().map(|finding| (text(finding, "name"), text(finding, "observed"))).collect(), report)
+}
+
+/// Asserts that the program of a finding does not show the finding in the FMU without the fault. With the fault, the check has
+/// already run the program.
+pub fn not_shown_without_fault(out: &Path, name: &str, unpacked: &Path, fault: &str) {
+    let program = out.join("repro");
+    let source = out.join(format!("{name}.c"));
+    // Only the program of a hang runs until this limit.
+    let patience = if name.ends_with("hang") { "-DPATIENCE=5" } else { "-DPATIENCE=60" };
+    let compiled = Command::new("cc")
+        .args(["-w", patience, "-o"])
+        .arg(&program)
+        .arg(source)
+        .args(["-ldl", "-lpthread", "-lm"])
+        .status();
+    assert!(compiled.expect("a C compiler").success(), "{name}.c");
+    let output = Command::new(&program).arg(unpacked).env("WAGON_FAULT", "none").output().expect("runs");
+    let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    let text: String = text.chars().rev().take(2000).collect::<Vec<_>>().into_iter().rev().collect();
+    assert_eq!(output.status.code(), Some(0), "{name} of {fault} in the FMU without it: {text}");
+}
