@@ -1,5 +1,5 @@
-//! The life cycle of an instance (sections 2.1.5 and 2.1.6 of FMI 2.0, 2.3 of FMI 3.0), and the settings of
-//! the log.
+//! Functions for the life cycle of an instance (sections 2.1.5 and 2.1.6 of FMI 2.0, 2.3 of FMI 3.0), and for the
+//! settings of its log.
 //!
 //! # Safety
 //! The importer guarantees the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
@@ -13,7 +13,7 @@ use fmi_abi::Category;
 use fmi_abi::c_types::c_char;
 use std::ffi::CStr;
 
-/// Converts times and tolerance of the importer; `Boolean` is the Boolean type of the FMI version.
+/// Converts the importer's arguments to an [`Experiment`]; `Boolean` is the Boolean type of the FMI version.
 pub(crate) fn experiment<Boolean: Default + PartialEq>(
     tolerance_defined: Boolean,
     tolerance: f64,

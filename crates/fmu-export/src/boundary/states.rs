@@ -1,4 +1,5 @@
-//! Saved states behind pointers. A handle is only compared; the instance looks up the state.
+//! Functions for saved states. A handle has the type of a pointer, but is never dereferenced, because the instance
+//! looks up the state.
 //!
 //! # Safety
 //! The importer guarantees the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
@@ -9,7 +10,8 @@ use crate::instance::{Instance, Outcome, reject};
 use fmi_abi::c_types::c_void;
 use std::ptr::without_provenance_mut;
 
-/// The instance owns the state until the importer frees the state or the instance.
+/// Saves the current state, into the state of the handle if it is not NULL. The instance owns the saved state until the
+/// importer frees the state or the instance.
 pub unsafe fn get_state<M: Exported>(instance: &mut Instance<M>, state: *mut *mut c_void) -> Outcome {
     // SAFETY: by contract, NULL or a pointer to a handle, which is initialized.
     let handle = unsafe { out_value(state, "FMUstate")?.assume_init_mut() };
@@ -22,7 +24,7 @@ pub unsafe fn set_state<M: Exported>(instance: &mut Instance<M>, state: *mut c_v
     instance.restore(state.addr())
 }
 
-/// Frees the state and clears the handle; ignores NULL.
+/// Frees the state and sets the handle to NULL. Ignores a NULL pointer and a NULL handle.
 pub unsafe fn free_state<M: Exported>(instance: &mut Instance<M>, state: *mut *mut c_void) -> Outcome {
     if state.is_null() {
         return Ok(());
@@ -70,8 +72,8 @@ pub unsafe fn serialize<M: Exported, Byte>(
     Ok(())
 }
 
-/// The instance owns the state until the importer frees the state or the instance. An existing state of the
-/// handle is overwritten.
+/// De-serializes a state, into the state of the handle if it is not NULL. The instance owns the state until the
+/// importer frees the state or the instance.
 pub unsafe fn deserialize<M: Exported, Byte>(
     instance: &mut Instance<M>,
     bytes: *const Byte,
@@ -90,7 +92,8 @@ pub unsafe fn deserialize<M: Exported, Byte>(
     Ok(())
 }
 
-/// Rejects a further state if the memory of the instance is limited and too small for it.
+/// Rejects a further state if the memory is too small for it, which is limited in WebAssembly. Does nothing on other
+/// targets, or if an existing state is overwritten.
 fn check_memory<M: Exported>(instance: &mut Instance<M>, handle: *mut c_void) -> Outcome {
     #[cfg(target_family = "wasm")]
     if handle.is_null() && !super::webassembly::has_memory(2 * instance.size_of_state()) {

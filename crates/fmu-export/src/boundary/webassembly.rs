@@ -1,6 +1,7 @@
-//! Functions for the code around a WebAssembly module: the C code in an FMU with C sources, or the
-//! scripts of a page. A panic does not unwind there, and the module cannot access the importer's memory and callbacks. Each instance has a separate
-//! module with its own memory.
+//! Functions for the code around a WebAssembly module, which is the C code of an FMU with C sources, or the scripts
+//! of a page. In WebAssembly, a panic does not unwind, and the model cannot access the memory and the callbacks of
+//! the importer, so the code around the module replaces both. Each instance has a separate module with its own
+//! memory.
 
 #![cfg(target_family = "wasm")]
 
@@ -20,7 +21,7 @@ thread_local! {
     static PANIC: Cell<Option<String>> = const { Cell::new(None) };
 }
 
-/// Stores a file for the model.
+/// Stores a file, which the model can then read; see [`read_resource`](crate::read_resource).
 ///
 /// # Safety
 /// `path` is a string, and `content` points to `size` bytes.
@@ -31,7 +32,7 @@ pub unsafe fn add_file(path: *const c_char, content: *const c_void, size: usize)
     crate::files::store(path, content.to_owned());
 }
 
-/// Stores the messages of panics for [`broken`].
+/// From now on, stores the message of a panic for [`broken`].
 pub(super) fn keep_panics() {
     let keep = |panic: &PanicHookInfo| {
         PANIC.set(Some(panic_message(panic.payload()).to_owned()));
@@ -39,18 +40,18 @@ pub(super) fn keep_panics() {
     std::panic::set_hook(Box::new(keep));
 }
 
-/// Returns whether `size` contiguous bytes of memory are available, and some more for messages.
+/// Returns whether `size` contiguous bytes of memory are available, in addition to some bytes for messages.
 pub(super) fn has_memory(size: usize) -> bool {
     const SPARE: usize = 4096;
     let mut piece = Vec::<u8>::new();
     let is_there = piece.try_reserve_exact(size + SPARE).is_ok();
-    // Without this, the compiler may remove the unused allocation.
+    // Otherwise the compiler might remove the unused allocation.
     std::hint::black_box(piece);
     is_there
 }
 
-/// Allocates `size` bytes for the arguments of a call, in place of the previous ones. Returns NULL if there
-/// is not enough memory.
+/// Allocates `size` bytes for the arguments of a call, and frees the bytes of the previous call. Returns NULL if
+/// there is not enough memory.
 pub fn room(size: usize) -> *mut c_void {
     ROOM.with_borrow_mut(|room| {
         *room = Vec::new();
@@ -62,8 +63,8 @@ pub fn room(size: usize) -> *mut c_void {
     })
 }
 
-/// Ends a call that trapped because of a panic or for `reason`. Without an instance, the call was
-/// `fmi2Instantiate`.
+/// Ends a call that trapped, because of a panic or for another `reason`, and returns its status. If `c` is NULL, the
+/// call was `fmi2Instantiate`.
 ///
 /// # Safety
 /// `c` is NULL or a live component of this model; the other arguments are strings.

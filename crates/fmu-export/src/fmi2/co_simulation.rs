@@ -45,18 +45,19 @@ pub unsafe fn fmi2DoStep<M: Exported>(
     instance.do_step(current_communication_point, communication_step_size)
 }
 
-/// Steps are synchronous, so there is never a step to cancel. The table of allowed calls permits the function
-/// in no state.
+/// Does nothing. Because steps are synchronous, there is never a step to cancel, and the table of allowed calls
+/// permits this function in no state.
 pub unsafe fn fmi2CancelStep<M: Exported>(_: &mut Instance<M>) -> Outcome {
     Ok(())
 }
 
-/// Returns the status kind of this number, or an error.
+/// Returns the kind of status with this number, or an error if there is none.
 fn status_kind(kind: fmi2StatusKind) -> Outcome<StatusKind> {
     StatusKind::from_c(kind).map_or_else(|| reject(format!("there is no fmi2StatusKind {kind}")), Ok)
 }
 
-/// Discards a query that concerns only asynchronous steps, or that another function returns.
+/// Returns the status Discard for a query that concerns only asynchronous steps, or that another function must
+/// answer.
 fn no_status(kind: StatusKind) -> Outcome {
     discard(match kind {
         StatusKind::DoStepStatus | StatusKind::PendingStatus => {
@@ -97,7 +98,7 @@ pub unsafe fn fmi2GetBooleanStatus<M: Exported>(
     }
 }
 
-/// Defines the queries that concern only asynchronous steps.
+/// Defines the functions that have no status to return, because all their queries concern asynchronous steps.
 macro_rules! without_status {
     ($($function:ident $value:ty;)+) => {
         $(

@@ -22,7 +22,7 @@ impl<M: Exported> Instance<M> {
         None => 0,
     };
 
-    /// Performs one iteration of the event handling.
+    /// Performs one iteration of an event.
     pub fn event(&mut self) -> Outcome<Event> {
         let time = self.state.time;
         let event = self.try_change(|model| {
