@@ -76,8 +76,8 @@ impl Variable {
         }
     }
 
-    /// Returns the start values of all elements as numbers, up to the first that is not a number. Booleans are 0 and
-    /// 1.
+    /// Returns the start values of all elements as numbers, with 0 and 1 for Booleans, up to the first value that is
+    /// not a number.
     pub fn starts(&self) -> Vec<f64> {
         let number = |value: &str| match value {
             "true" => Some(1.0),

@@ -28,8 +28,7 @@ pub type Receive = unsafe extern "C" fn(context: *mut c_void, json: *const u8, l
 /// files in the directory `resources`.
 ///
 /// # Safety
-/// The caller guarantees that `receive` may be called with this context, and that `resources` is a string or
-/// NULL.
+/// `receive` may be called with this context, and `resources` is NULL or a NUL-terminated string.
 #[doc(hidden)]
 pub unsafe fn pass_description<M: Exported>(
     resources: *const c_char,
@@ -50,7 +49,7 @@ pub unsafe fn pass_description<M: Exported>(
 /// From now on, passes the location and the message of each panic to `receive`, instead of printing them.
 ///
 /// # Safety
-/// The caller guarantees that `receive` may be called with this context at any time, from any thread.
+/// `receive` may be called with this context at any time, from any thread.
 #[doc(hidden)]
 pub unsafe fn pass_panics(receive: Receive, context: *mut c_void) {
     struct Context(*mut c_void);

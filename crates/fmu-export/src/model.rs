@@ -82,13 +82,14 @@ pub trait Model: Variables + Clone + Send + Sync {
     /// Mode. The importer may set further values before it leaves this mode.
     ///
     /// # Errors
-    /// Fails if the model cannot start with these values. The model may have changed by then: this crate undoes it.
+    /// Fails if the model cannot start with these values. This function may have changed the model by then, because
+    /// this crate undoes the change.
     fn initialize(&mut self, _experiment: &Experiment) -> Result<(), Error> {
         Ok(())
     }
 
-    /// Calculates values that several variables share. This crate calls it once after each change of values,
-    /// state or time (s), before any of them is read.
+    /// Calculates values on which several variables depend. If values, the state or the time (s) have changed, this
+    /// crate calls it once before the next value is read.
     #[inline]
     fn calculate(&mut self, _time: f64) {}
 
@@ -212,7 +213,7 @@ fn percent_decoded(text: &str) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// Data of the experiment from the importer (section 2.1.6 of FMI 2.0).
+/// Data of the experiment that the importer passes (section 2.1.6 of FMI 2.0).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Experiment {
     /// Start time, s.

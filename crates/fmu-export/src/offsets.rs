@@ -45,7 +45,7 @@ impl<M: Variables> Placed<M> {
     #[inline(always)]
     pub fn real_in_place(&self, line: u32) -> f64 {
         let offset = self.model.offset_to_read(Index(line), offset_of!(Self, no_number));
-        // SAFETY: by the contract of `Variables`, the offset of an `f64` in the model; otherwise the offset
+        // SAFETY: by the contract of `Variables`, `offset` is the offset of an `f64` in the model, or else the offset
         // of `no_number`.
         unsafe { (&raw const *self).byte_add(offset).cast::<f64>().read() }
     }
@@ -57,8 +57,8 @@ impl<M: Variables> Placed<M> {
         let without = const { both_offsets(offset_of!(Self, nowhere), offset_of!(Self, is_missed)).unwrap() };
         let offsets = self.model.offsets_to_set(Index(line), offset_of!(Self, no_mark), without);
         let [value_offset, mark] = [offsets as u32, (offsets >> 32) as u32].map(|offset| offset as usize);
-        // SAFETY: by the contract of `Variables`, the offsets of an `f64` and a `bool` in the model;
-        // otherwise offsets of fields of `Self`.
+        // SAFETY: by the contract of `Variables`, these are the offsets of an `f64` and a `bool` in the model, or
+        // else of fields of `Self`.
         unsafe {
             (&raw mut *self).byte_add(value_offset).cast::<f64>().write(value);
             (&raw mut *self).byte_add(mark).cast::<bool>().write(true);

@@ -17,8 +17,8 @@ macro_rules! export_fmu {
     };
 }
 
-/// Defines the symbols of the library for a model: the functions of both FMI versions, and the function that
-/// describes the model to fmu-package.
+/// Defines the symbols of the library for a model: the functions of both FMI versions, and the functions that
+/// fmu-package and the code around a WebAssembly module call.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! symbols {

@@ -65,7 +65,7 @@ pub unsafe trait Variables: Sized + 'static {
     #[doc(hidden)]
     fn offsets_to_set(&mut self, line: Index, no_mark: usize, without: u64) -> u64;
 
-    /// Visits the memory of the model: the values that are not variables.
+    /// Visits the values in the model's `memory`, which are not variables.
     #[doc(hidden)]
     fn visit_memory(&mut self, visitor: &mut dyn StateVisitor);
 

@@ -89,7 +89,7 @@ pub const INTEGER: Type = Type::integer("");
 pub const BOOLEAN: Type = Type { name: "", attributes: Attributes::Boolean, base: BaseType::Boolean };
 /// A string.
 pub const STRING: Type = Type { name: "", attributes: Attributes::String, base: BaseType::String };
-/// Bytes of any meaning.
+/// A binary value of any kind.
 pub const BINARY: Type = Type::binary("", "application/octet-stream");
 
 impl Type {

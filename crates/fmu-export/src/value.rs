@@ -245,7 +245,7 @@ pub trait Enumeration: Copy + 'static {
     /// Items, in the order of declaration.
     const ITEMS: &'static [Item];
 
-    /// Returns the value with this number.
+    /// Returns the value with this number; `None` if there is none.
     fn from_number(number: i32) -> Option<Self>;
 
     /// Returns the number of the value.

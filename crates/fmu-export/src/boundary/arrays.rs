@@ -6,8 +6,8 @@ use fmi_abi::c_types::c_char;
 use std::ffi::CStr;
 use std::mem::MaybeUninit;
 
-/// Returns the importer's array of `length` values as a slice to read. Fails if the pointer is NULL or not aligned;
-/// `argument` is the name of the array for the message.
+/// Returns the importer's array of `length` values as a slice to read. Fails if the array is not empty and the
+/// pointer is NULL or not aligned; `argument` is the name of the array in the message.
 ///
 /// # Safety
 /// `pointer` is NULL or points to `length` values that do not change during `'a`.
@@ -42,7 +42,7 @@ pub(crate) unsafe fn out_slice<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), length) })
 }
 
-/// Checks that an array of `count` elements has the `needed` length; `what` describes the elements for the message.
+/// Checks that an array of `count` elements has the `needed` length; `what` describes the elements in the message.
 #[inline]
 pub(crate) fn same(what: &str, needed: usize, count: usize) -> Outcome {
     if count == needed {
@@ -76,7 +76,7 @@ pub(crate) unsafe fn of_elements<M: Exported, R: Reference>(
 }
 
 /// Returns the importer's memory for one value. Fails if the pointer is NULL or not aligned; `argument` is its name
-/// for the message.
+/// in the message.
 ///
 /// # Safety
 /// `pointer` is NULL or points to a value that no other code uses during `'a`.
@@ -99,7 +99,7 @@ pub(crate) unsafe fn string<'a>(pointer: *const c_char) -> Option<&'a CStr> {
 
 #[inline]
 fn check<T>(pointer: *const T, length: usize, argument: &str) -> Outcome {
-    // One test covers both faults: not aligned, or a size in bytes that overflows `isize`.
+    // `odd` is not 0 in two cases: the pointer is not aligned, or the size in bytes overflows `isize`.
     let odd = pointer.addr() & (align_of::<T>() - 1) | length >> (isize::BITS - 1 - size_of::<T>().ilog2());
     if pointer.is_null() || odd != 0 {
         return reject_array(pointer, length, argument);

@@ -1,4 +1,4 @@
-//! The code that every call on an instance shares.
+//! The code that all calls on an instance share.
 
 use super::ImporterLog;
 use crate::export::Exported;
@@ -39,14 +39,14 @@ pub(crate) unsafe fn call<M: Exported>(
     rule: &'static Rule,
     body: impl FnOnce(&mut Instance<M>) -> Outcome,
 ) -> Status {
-    // SAFETY: by contract, NULL or a live component of this model. The reference is shared, because the log callback
-    // of a running call may also call this function.
+    // SAFETY: by contract, `c` is NULL or a live component of this model. The reference is shared, because the log
+    // callback of a running call may also call this function.
     let Some(component) = (unsafe { c.cast::<Component<M>>().as_ref() }) else {
         return Status::Error;
     };
-    // SAFETY: by contract, no other thread uses the component. On this thread, no body is running, because bodies
-    // never call the importer, and no message is being delivered. The last use of the reference is before any
-    // delivery.
+    // SAFETY: by contract, no other thread uses the component. On this thread, no other reference to the instance is
+    // in use, because bodies never call the importer, and `finish` uses none while it delivers messages. The last use
+    // of this reference is before any delivery.
     let instance = unsafe { &mut *component.instance.get() };
     if !instance.fmi_state().is_in(rule.accepted()) {
         return not_allowed(component, rule);
@@ -66,12 +66,12 @@ pub(crate) unsafe fn call<M: Exported>(
 /// `None` if the caller must use the general path.
 ///
 /// # Safety
-/// `c` meets the requirement of [`call`].
+/// Same as for [`call`].
 #[inline(always)]
 pub(crate) unsafe fn call_fast<M: Exported>(
     c: *mut c_void,
     rule: &'static Rule,
-    way: impl FnOnce(*mut Instance<M>) -> bool,
+    fast_path: impl FnOnce(*mut Instance<M>) -> bool,
 ) -> Option<Status> {
     // SAFETY: as in `call`.
     let component = unsafe { c.cast::<Component<M>>().as_ref() }?;
@@ -84,8 +84,8 @@ pub(crate) unsafe fn call_fast<M: Exported>(
     // which makes the processor stall if one of them was written just before.
     //
     // SAFETY: as in `call`.
-    let walk = || way(instance).then(|| unsafe { &mut *instance }.listen());
-    match catch_unwind(AssertUnwindSafe(walk)) {
+    let body = || fast_path(instance).then(|| unsafe { &mut *instance }.listen());
+    match catch_unwind(AssertUnwindSafe(body)) {
         Ok(Some(false)) => Some(Status::Ok),
         Ok(None) => None,
         Ok(Some(true)) => Some(finish(component, rule.name, Ok(Ok(())))),
@@ -130,8 +130,8 @@ pub(super) fn finish<M: Exported>(component: &Component<M>, name: &str, ended: E
     };
     let deliver = || {
         let messages = {
-            // SAFETY: as in `call`, no other code has a reference to the instance. The last use of this
-            // reference is before the first delivery.
+            // SAFETY: as in `call`, no other reference to the instance is in use. The last use of this reference is
+            // before the first delivery.
             let instance = unsafe { &mut *component.instance.get() };
             match &ended {
                 Ok(Ok(())) => {}
@@ -153,7 +153,7 @@ pub(super) fn finish<M: Exported>(component: &Component<M>, name: &str, ended: E
         component.delivering.set(true);
         messages.iter().for_each(|message| component.importer.deliver(message));
         component.delivering.set(false);
-        // SAFETY: as above, because the deliveries have ended.
+        // SAFETY: as above. The deliveries have ended.
         unsafe { &mut *component.instance.get() }.while_delivering(false);
     };
     forget_panic(catch_unwind(AssertUnwindSafe(deliver)));

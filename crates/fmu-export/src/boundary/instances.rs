@@ -94,7 +94,7 @@ fn make_instance<M: Exported>(arguments: Arguments) -> Outcome<Instance<M>> {
 /// `c` is NULL or an instance of this model that has not been freed.
 pub(crate) unsafe fn free<M: Exported>(c: *mut c_void) {
     let component = c.cast::<Component<M>>();
-    // SAFETY: by contract, NULL or a live component of this model.
+    // SAFETY: by contract, `c` is NULL or a live component of this model.
     if unsafe { component.as_ref() }.is_none_or(|component| component.delivering.get()) {
         return;
     }

@@ -53,11 +53,11 @@ pub unsafe fn set_debug_logging<M: Exported, Boolean: Default + PartialEq>(
     categories: *const *const c_char,
 ) -> Outcome {
     let on = on != Boolean::default();
-    // SAFETY: by contract, an array of this length.
+    // SAFETY: by contract, `categories` is NULL or an array of this length.
     let names = unsafe { in_slice(categories, count, "categories") }?;
     let mut found = 0;
     for name in names {
-        // SAFETY: by contract, NULL or a string.
+        // SAFETY: by contract, each name is NULL or a string.
         let name = unsafe { string(*name) }.map_or(&b""[..], CStr::to_bytes);
         let Some(bit) = Logger::find(name) else {
             let known = Category::ALL.map(|category| category.name().to_string_lossy()).join(", ");

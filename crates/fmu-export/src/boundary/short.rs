@@ -16,31 +16,31 @@
 //! | step of any size | a step of one of four alternating sizes | 31 |
 //! | arrays of 1 or 2 variables besides 4 | one scalar per call | 216 for outputs, 112 for angles |
 //!
-//! Getting and setting access fields by the offsets of [`offsets`](crate::offsets). Two more parts stored the result
-//! of the check of allowed calls and the latest end of a step in additional fields. They saved only 6 instructions,
-//! so they were removed.
+//! Getting and setting access fields by the offsets of [`offsets`](crate::offsets). Two more parts stored results in
+//! additional fields: the allowed state once the model has started, and the latest end of a step. They saved only 6
+//! instructions, so they were removed.
 //!
 //! # Safety
 //! The contract of the C functions also applies to these functions.
 #![allow(non_snake_case)]
-#![allow(clippy::missing_safety_doc, reason = "the contract above is that of every function")]
-#![allow(clippy::too_many_arguments, reason = "as many as the standard has")]
+#![allow(clippy::missing_safety_doc, reason = "every function has the contract above")]
+#![allow(clippy::too_many_arguments, reason = "the FMI standard defines the arguments")]
 
 use crate::export::Exported;
 use crate::instance::{FromOne, Instance, Reference};
 use fmi_abi::fmi3::types::fmi3Boolean;
 use std::mem::MaybeUninit;
 
-/// Names this module, which contains the fast paths for the most frequent arguments, for the macro [`call`].
+/// Name of this module in the macro [`call`], because it contains the fast paths for the most frequent arguments.
 pub(crate) use super::short as usual;
 
 /// Returns whether the pointers can be arrays of `count` elements: they are not NULL and are aligned, and the arrays
 /// are neither empty nor larger than memory.
 #[inline(always)]
 fn are_arrays(vr: *const u32, values: *const f64, count: usize) -> bool {
-    // One subtraction and one test detect several faults: NULL and a length of 0 become -1, whose highest bits are
-    // set, as the highest bits of impossible lengths are. References have half the size of values, so their addresses
-    // are doubled before the test of alignment.
+    // The subtraction turns NULL and a length of 0 into -1, so that their highest bits are set, as in the address or
+    // length of an array that cannot exist. References have half the size of values, so their address is doubled for
+    // the test of alignment.
     let highest = vr.addr().wrapping_sub(1) | values.addr().wrapping_sub(1) | count.wrapping_sub(1);
     let lowest = (vr.addr() << 1 | values.addr()) & (size_of::<f64>() - 1);
     highest >> (usize::BITS - 5) | lowest == 0
@@ -192,8 +192,8 @@ pub(crate) unsafe fn fmi3DoStep<M: Exported>(
     unsafe { fmi3_step(flags, last_successful_time, point + size, || instance.step_fast(point, size)) }
 }
 
-/// Makes a step, if none of the pointers is NULL and all are aligned. If the step succeeds, writes to the pointers
-/// that it reached its end without an event.
+/// Makes a step, if no pointer is NULL and all are aligned. If `step` succeeds, it has reached its end without an
+/// event, so the results are the same for all steps.
 #[inline(always)]
 unsafe fn fmi3_step(
     flags: [*mut fmi3Boolean; 3],
@@ -244,10 +244,10 @@ macro_rules! call {
                 $crate::boundary::short::call!(@fast [$($rest)*] $function($c $(, $argument: $type)*))
             }
         }
-        let way = move |instance: *mut $crate::instance::Instance<M>| {
+        let fast_path = move |instance: *mut $crate::instance::Instance<M>| {
             $crate::boundary::short::$path::$function(&mut *instance $(, $argument)*)
         };
-        match $crate::boundary::call_fast::<M>($c, Function::$function.rule(), way) {
+        match $crate::boundary::call_fast::<M>($c, Function::$function.rule(), fast_path) {
             Some(status) => status,
             None => otherwise::<M>($c $(, $argument)*),
         }

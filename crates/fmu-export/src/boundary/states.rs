@@ -13,7 +13,7 @@ use std::ptr::without_provenance_mut;
 /// Saves the current state, into the state of the handle if it is not NULL. The instance owns the saved state until the
 /// importer frees the state or the instance.
 pub unsafe fn get_state<M: Exported>(instance: &mut Instance<M>, state: *mut *mut c_void) -> Outcome {
-    // SAFETY: by contract, NULL or a pointer to a handle, which is initialized.
+    // SAFETY: by contract, `state` is NULL or points to an initialized handle.
     let handle = unsafe { out_value(state, "FMUstate")?.assume_init_mut() };
     check_memory(instance, *handle)?;
     *handle = without_provenance_mut(instance.save(handle.addr())?);
@@ -29,7 +29,7 @@ pub unsafe fn free_state<M: Exported>(instance: &mut Instance<M>, state: *mut *m
     if state.is_null() {
         return Ok(());
     }
-    // SAFETY: by contract, a pointer to a handle, which is initialized.
+    // SAFETY: by contract, `state` points to an initialized handle.
     let handle = unsafe { out_value(state, "FMUstate")?.assume_init_mut() };
     if !handle.is_null() {
         let state = instance.remove(handle.addr())?;
@@ -44,7 +44,7 @@ pub unsafe fn serialized_size<M: Exported>(
     state: *mut c_void,
     size: *mut usize,
 ) -> Outcome {
-    // SAFETY: by contract, NULL or a pointer to a size.
+    // SAFETY: by contract, `size` is NULL or points to a size.
     let size = unsafe { out_value(size, "size")? };
     size.write(instance.serialized_size(state.addr())?);
     Ok(())
@@ -56,7 +56,7 @@ pub unsafe fn serialize<M: Exported, Byte>(
     bytes: *mut Byte,
     size: usize,
 ) -> Outcome {
-    // SAFETY: by contract, an array of this length.
+    // SAFETY: by contract, `bytes` is NULL or points to an array of this length.
     let bytes = unsafe { out_slice(bytes.cast::<u8>(), size, "serializedState")? };
     let needed = instance.serialized_size(state.addr())?;
     if size != needed {
@@ -80,7 +80,8 @@ pub unsafe fn deserialize<M: Exported, Byte>(
     size: usize,
     state: *mut *mut c_void,
 ) -> Outcome {
-    // SAFETY: by contract, an array of this length, and NULL or a pointer to a handle, which is initialized.
+    // SAFETY: by contract, `bytes` is NULL or points to an array of this length, and `state` is NULL or points to an
+    // initialized handle.
     let (bytes, handle) = unsafe {
         (
             in_slice(bytes.cast::<u8>(), size, "serializedState")?,
@@ -92,8 +93,8 @@ pub unsafe fn deserialize<M: Exported, Byte>(
     Ok(())
 }
 
-/// Rejects a further state if the memory is too small for it, which is limited in WebAssembly. Does nothing on other
-/// targets, or if an existing state is overwritten.
+/// Rejects a further state in WebAssembly, where memory is limited, if there is too little memory for it. Accepts
+/// every state on other targets, and every state that overwrites another.
 fn check_memory<M: Exported>(instance: &mut Instance<M>, handle: *mut c_void) -> Outcome {
     #[cfg(target_family = "wasm")]
     if handle.is_null() && !super::webassembly::has_memory(2 * instance.size_of_state()) {

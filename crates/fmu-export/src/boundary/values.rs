@@ -40,7 +40,7 @@ macro_rules! getters_and_setters {
             use crate::boundary::{in_slice, of_elements, out_slice, same};
             use crate::instance::Reference;
             let value_count = [$($value_count,)? count][0];
-            // SAFETY: by contract, arrays of these lengths that do not overlap.
+            // SAFETY: by contract, the pointers are NULL or point to arrays of these lengths, which do not overlap.
             unsafe {
                 if M::ARRAYS && <$reference>::ARRAYS {
                     return of_elements::<M, $reference>(instance, vr, count, value_count, |instance, vr| {
@@ -64,7 +64,8 @@ macro_rules! getters_and_setters {
             use crate::boundary::{in_slice, of_elements, same};
             use crate::instance::Reference;
             let value_count = [$($value_count,)? count][0];
-            // SAFETY: by contract, arrays of these lengths; `char` pointers are strings.
+            // SAFETY: by contract, the pointers are NULL or point to arrays of these lengths; `char` pointers are
+            // NULL or strings.
             unsafe {
                 if M::ARRAYS && <$reference>::ARRAYS {
                     return of_elements::<M, $reference>(instance, vr, count, value_count, |instance, vr| {
@@ -173,7 +174,7 @@ pub(crate) fn set_booleans<M: Exported, R: Reference, T: From<bool> + PartialEq 
     instance.set(vr, bases, &|index| Value::Boolean(values[index] == known[1]))
 }
 
-/// Gets strings. The instance owns the strings, which are valid until the next call on it.
+/// Gets strings. The instance owns the strings, and they are valid at least until the next call on it.
 pub(crate) fn get_strings<M: Exported, R: Reference>(
     instance: &mut Instance<M>,
     vr: &[R],
@@ -206,7 +207,7 @@ pub(crate) unsafe fn set_strings<M: Exported, R: Reference>(
 ) -> Outcome {
     let mut strings = Vec::with_capacity(vr.len());
     for (index, value) in values.iter().enumerate() {
-        // SAFETY: by contract, NULL or a string.
+        // SAFETY: by contract, each value is NULL or a string.
         let fault = match unsafe { string(*value) }.map(CStr::to_str) {
             Some(Ok(value)) => {
                 strings.push(Value::String(value.to_owned()));

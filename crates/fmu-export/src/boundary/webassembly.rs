@@ -1,7 +1,7 @@
 //! Functions for the code around a WebAssembly module, which is the C code of an FMU with C sources, or the scripts
-//! of a page. In WebAssembly, a panic does not unwind, and the model cannot access the memory and the callbacks of
-//! the importer, so the code around the module replaces both. Each instance has a separate module with its own
-//! memory.
+//! of a page. In WebAssembly, a panic does not unwind, and the library cannot access the importer's memory and
+//! callbacks, so the code around the module must handle panics, arguments and log messages. Each instance has a
+//! separate module with its own memory.
 
 #![cfg(target_family = "wasm")]
 
@@ -24,9 +24,9 @@ thread_local! {
 /// Stores a file, which the model can then read; see [`read_resource`](crate::read_resource).
 ///
 /// # Safety
-/// `path` is a string, and `content` points to `size` bytes.
+/// `path` is NULL or a NUL-terminated string, and `content` points to `size` bytes.
 pub unsafe fn add_file(path: *const c_char, content: *const c_void, size: usize) {
-    // SAFETY: the caller guarantees both.
+    // SAFETY: the caller guarantees the string and the bytes.
     let (path, content) = unsafe { (string(path), std::slice::from_raw_parts(content.cast::<u8>(), size)) };
     let path = path.unwrap_or_default().to_string_lossy().into_owned().into();
     crate::files::store(path, content.to_owned());

@@ -15,7 +15,7 @@ pub unsafe fn fmi2SetRealInputDerivatives<M: Exported>(
     order: *const fmi2Integer,
     value: *const fmi2Real,
 ) -> Outcome {
-    // SAFETY: by contract, arrays of this length.
+    // SAFETY: by contract, the pointers are NULL or point to arrays of this length.
     let (vr, order, value) = unsafe {
         (in_slice(vr, count, "vr")?, in_slice(order, count, "order")?, in_slice(value, count, "value")?)
     };
@@ -29,7 +29,8 @@ pub unsafe fn fmi2GetRealOutputDerivatives<M: Exported>(
     order: *const fmi2Integer,
     value: *mut fmi2Real,
 ) -> Outcome {
-    // SAFETY: by contract, arrays of this length; the written one does not overlap the others.
+    // SAFETY: by contract, the pointers are NULL or point to arrays of this length; the array of results does not
+    // overlap the others.
     unsafe {
         output_derivatives::<M, fmi2ValueReference>(instance, vr, count, (order, "order"), value, count)
     }
@@ -75,7 +76,7 @@ pub unsafe fn fmi2GetRealStatus<M: Exported>(
 ) -> Outcome {
     match status_kind(kind)? {
         StatusKind::LastSuccessfulTime => {
-            // SAFETY: by contract, NULL or a pointer to a value.
+            // SAFETY: by contract, the pointer is NULL or points to a value.
             unsafe { out_value(value, "value") }?.write(instance.last_successful_time());
             Ok(())
         }
@@ -90,7 +91,7 @@ pub unsafe fn fmi2GetBooleanStatus<M: Exported>(
 ) -> Outcome {
     match status_kind(kind)? {
         StatusKind::Terminated => {
-            // SAFETY: by contract, NULL or a pointer to a value.
+            // SAFETY: by contract, the pointer is NULL or points to a value.
             unsafe { out_value(value, "value") }?.write(instance.has_ended().into());
             Ok(())
         }

@@ -19,7 +19,7 @@
 //!   content may be uninitialized.
 //! * The callbacks work until the instance is freed.
 #![allow(non_snake_case)]
-#![allow(clippy::missing_safety_doc, reason = "the contract above is that of every function")]
+#![allow(clippy::missing_safety_doc, reason = "every function has the contract above")]
 
 mod co_simulation;
 mod common;

@@ -71,7 +71,7 @@ pub unsafe fn fmi3GetBinary<M: Exported>(
     values: *mut fmi3Binary,
     value_count: usize,
 ) -> Outcome {
-    // SAFETY: by contract, arrays of these lengths that do not overlap.
+    // SAFETY: by contract, the pointers are NULL or point to arrays of these lengths, which do not overlap.
     unsafe {
         of_elements::<M, FromOne>(instance, vr, count, value_count, |instance, vr| {
             let values = out_slice(values, value_count, "values")?;
@@ -100,7 +100,8 @@ pub unsafe fn fmi3SetBinary<M: Exported>(
     values: *const fmi3Binary,
     value_count: usize,
 ) -> Outcome {
-    // SAFETY: by contract, arrays of these lengths; each value is NULL or an array of its size.
+    // SAFETY: by contract, the pointers are NULL or point to arrays of these lengths; each value is NULL or has its
+    // size.
     unsafe {
         of_elements::<M, FromOne>(instance, vr, count, value_count, |instance, vr| {
             let values: &[fmi3Binary] = in_slice(values, value_count, "values")?;
@@ -130,7 +131,8 @@ macro_rules! derivatives {
                 sensitivity: *mut fmi3Float64,
                 sensitivity_count: usize,
             ) -> Outcome {
-                // SAFETY: by contract, arrays of these lengths; the written one does not overlap the others.
+                // SAFETY: by contract, the pointers are NULL or point to arrays of these lengths; the array of
+                // results does not overlap the others.
                 unsafe {
                     partial_derivatives::<M, FromOne, $adjoint>(
                         instance,
@@ -186,7 +188,7 @@ pub unsafe fn fmi3UpdateDiscreteStates<M: Exported>(
 }
 
 pub unsafe fn fmi3GetNumberOfEventIndicators<M: Exported>(_: &mut Instance<M>, count: *mut usize) -> Outcome {
-    // SAFETY: by contract, NULL or a pointer to a value.
+    // SAFETY: by contract, the pointer is NULL or points to a value.
     unsafe { out_value(count, "nEventIndicators") }?.write(Instance::<M>::INDICATORS);
     Ok(())
 }
@@ -195,7 +197,7 @@ pub unsafe fn fmi3GetNumberOfContinuousStates<M: Exported>(
     _: &mut Instance<M>,
     count: *mut usize,
 ) -> Outcome {
-    // SAFETY: by contract, NULL or a pointer to a value.
+    // SAFETY: by contract, the pointer is NULL or points to a value.
     unsafe { out_value(count, "nContinuousStates") }?.write(M::STATES.len());
     Ok(())
 }

@@ -19,8 +19,8 @@
 //! An `fmi3Binary` is NULL or points to as many bytes as the size that is passed with it. Booleans are bytes here, so
 //! that C callers may pass any value.
 #![allow(non_snake_case)]
-#![allow(clippy::missing_safety_doc, reason = "the contract above is that of every function")]
-#![allow(clippy::too_many_arguments, reason = "as many as the standard has")]
+#![allow(clippy::missing_safety_doc, reason = "every function has the contract above")]
+#![allow(clippy::too_many_arguments, reason = "the FMI standard defines the arguments")]
 
 mod absent;
 mod co_simulation;

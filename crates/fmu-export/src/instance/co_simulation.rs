@@ -22,7 +22,7 @@ pub(crate) struct Reached {
 /// endless loop.
 const MOST_EVENTS: u32 = 10_000;
 
-/// The remedies for too many events.
+/// Advice in the message about too many events.
 const CHATTER: &str = "make shorter steps, or give the events hysteresis if the model chatters";
 
 impl<M: Exported> Instance<M> {
@@ -51,7 +51,7 @@ impl<M: Exported> Instance<M> {
             }
     }
 
-    /// Performs a step of FMI 2.0 (section 4.2.2 there).
+    /// Performs a step of an importer of FMI 2.0 (section 4.2.2 of FMI 2.0).
     #[inline]
     pub fn do_step(&mut self, point: f64, step_size: f64) -> Outcome {
         match self.step(point, step_size)? {
@@ -60,7 +60,8 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// Performs a step of FMI 3.0 (section 4.2.1 there). A step with another status than OK changes nothing.
+    /// Performs a step of an importer of FMI 3.0 (section 4.2.1 of FMI 3.0). If it returns another status than OK, it
+    /// has changed nothing.
     #[inline]
     pub fn do_step_to(&mut self, point: f64, step_size: f64) -> Outcome<Reached> {
         let stepped = self.step(point, step_size)?;
@@ -68,7 +69,7 @@ impl<M: Exported> Instance<M> {
         let early = time < end;
         match stepped {
             Stepped::Early(_) if early && !self.importer.early_return => {
-                let why = "the model stops there, and earlyReturnAllowed has ruled that out";
+                let why = "the model stops there, but earlyReturnAllowed is false";
                 return self.go_back(discard(format!("the step to {end} ends early, at {time}: {why}")));
             }
             Stepped::Terminate(_) => {
@@ -145,7 +146,7 @@ impl<M: Exported> Instance<M> {
             let time = self.state.time;
             return reject_with(move || {
                 format!(
-                    "the communication point is {point}, but the last step ended at {time}; go on from there or set a saved state"
+                    "the communication point is {point}, but the last step ended at {time}: continue from there, or restore a saved state"
                 )
             });
         }

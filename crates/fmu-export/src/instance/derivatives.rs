@@ -225,7 +225,8 @@ impl<M: Exported> Instance<M> {
     }
 }
 
-/// Returns the time derivative of a variable: 0 for parameters, 1 or 0 for the time.
+/// Returns a time derivative of a variable. It is 0 for a parameter; for the time, it is 1 if the order is 1,
+/// otherwise 0.
 fn derivative<M: Exported>(model: &M, index: usize, order: u32) -> f64 {
     match M::TABLE[index].causality() {
         Causality::Parameter | Causality::CalculatedParameter => 0.0,

@@ -37,7 +37,7 @@ impl<V> Handles<V> {
     /// number of another collection.
     fn secret(&self) -> usize {
         let address = self.identity.as_deref().map_or(NULL, |identity| (&raw const *identity).addr());
-        // Fibonacci hashing spreads the address over the upper bits. The rotation moves them to the index.
+        // Fibonacci hashing spreads the address over the upper bits, and the rotation moves these bits to the index.
         address.wrapping_mul(0x9e37_79b9_7f4a_7c15_u64 as usize | 1).rotate_right(INDEX_BITS)
     }
 

@@ -1,7 +1,8 @@
 //! An instance of a model. Its methods check and carry out the calls of both FMI versions. They take Rust types
 //! instead of pointers.
 //!
-//! Every method checks all its arguments before it changes anything, so an error leaves the instance unchanged.
+//! Every method checks all its arguments before it changes anything, or undoes its changes, so an error leaves the
+//! instance unchanged.
 
 mod co_simulation;
 mod derivatives;
@@ -269,7 +270,7 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    /// Sets up the experiment and enters Initialization Mode, as FMI 3.0 does in one call.
+    /// Sets up the experiment and enters Initialization Mode, which is one call in FMI 3.0.
     pub fn enter_initialization_mode_at(&mut self, experiment: Experiment) -> Outcome {
         let before = (self.state.experiment, self.state.time);
         self.setup_experiment(experiment)?;

@@ -66,7 +66,7 @@ pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<
         return reject("the saved state has another version of the layout; save it again with this FMU");
     }
     if bytes.len() < HEADER_LENGTH + CHECKSUM_LENGTH {
-        return reject("the saved state is cut short");
+        return reject("the saved state is truncated");
     }
     if bytes[8..16] != guid_hash::<M>() {
         return reject("the saved state comes from another FMU (its guid differs)");
@@ -76,7 +76,7 @@ pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<
         return reject("the saved state is damaged or has the wrong length (its checksum is wrong)");
     }
     let Some(from) = Origin::from_byte(content[16]) else {
-        return reject("the saved state holds impossible values");
+        return reject("the saved state contains impossible values");
     };
     from.check(origin)?;
     let mut reader = Reader { rest: &content[HEADER_LENGTH..], valid: true };
@@ -85,7 +85,7 @@ pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<
         return reject("the saved state has the wrong length");
     }
     if !reader.valid || !POSSIBLE.contains(origin.0, origin.1, state.mode) {
-        return reject("the saved state holds impossible values");
+        return reject("the saved state contains impossible values");
     }
     check(state)?;
     state.model.restored()?;
@@ -100,7 +100,7 @@ fn check<M: Exported>(state: &State<M>) -> Outcome {
     let Experiment { start_time, stop_time, tolerance } = state.experiment;
     let times = [Some(state.time), Some(start_time), stop_time, tolerance];
     if !times.into_iter().flatten().all(f64::is_finite) {
-        return reject("the saved state holds impossible values");
+        return reject("the saved state contains impossible values");
     }
     for variable in M::TABLE.iter().filter(|variable| variable.has_start()) {
         if let Some(value) = variable.value(&state.model) {
