@@ -19,8 +19,9 @@ pub trait CoSimulation: Model {
     const ENDS_EARLY: bool = false;
 
     /// Whether a [`step`](Self::step) that fails leaves the model unchanged, because it first checks everything that
-    /// can fail. If not, this crate undoes a failed step, for which it copies the model before each step. The copy
-    /// takes a few nanoseconds for a small model, so the declaration is only worthwhile if a model must be very fast.
+    /// can fail. If it does not, this crate copies the model before each step, in order to undo a failed one. For a
+    /// small model the copy takes only a few nanoseconds, so the declaration is worthwhile only for a model that must
+    /// be very fast.
     ///
     /// A model without heap memory is copied by `clone_from`. Of any other model, only the content of a serialized
     /// state is copied: the fields after `in`, and the `memory`, of the [table](crate::variables). This needs no
@@ -31,13 +32,13 @@ pub trait CoSimulation: Model {
     /// Advances the model by one step.
     ///
     /// # Errors
-    /// Fails if the step cannot be carried out. The step may have changed the model by then, because this crate
-    /// undoes it, unless the model declares [`ATOMIC_STEP`](Self::ATOMIC_STEP).
+    /// Fails if the step cannot be carried out. This crate then undoes the step, so it may fail after it has changed
+    /// the model, unless the model declares [`ATOMIC_STEP`](Self::ATOMIC_STEP).
     fn step(&mut self, step: Step) -> Result<Stepped, Error>;
 
     /// Makes a step of this size, s, and calculates like [`calculate`](Model::calculate), if the model can do both
-    /// quickly and without events and messages. The result must equal the result of [`step`](Self::step). In all
-    /// other cases the function must return false and change nothing; this crate then calls
+    /// fast, and without events or messages. The result must equal the result of [`step`](Self::step). In all other
+    /// cases the function must return false and change nothing; this crate then calls
     /// [`step_any_size`](Self::step_any_size).
     ///
     /// This crate calls it only after the first `step`, and only if steps cannot end early. Because it is inlined
@@ -133,8 +134,8 @@ pub trait ModelExchange: Model {
     /// function is called again as long as its result contains `again`.
     ///
     /// # Errors
-    /// Fails if the model cannot continue. The event may have changed the model by then, because this crate undoes
-    /// it.
+    /// Fails if the model cannot continue. This crate then undoes the event, so it may fail after it has changed the
+    /// model.
     fn event(&mut self, _time: f64) -> Result<Event, Error> {
         Ok(Event::default())
     }

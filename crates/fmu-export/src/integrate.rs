@@ -65,8 +65,8 @@ pub enum Crossing {
     Any,
 }
 
-/// Returns the part of a step up to the event, at which an indicator changes its sign in the direction `crossing`.
-/// Returns `None` if it does not do so between both ends of the step.
+/// Returns the part of a step up to an event: the time at which an indicator changes its sign in the direction
+/// `crossing`. Returns `None` if the indicator has not changed its sign in this direction at the end of the step.
 ///
 /// `indicator` integrates the model over a part of the step, which begins with the step and may have size 0, and
 /// returns the value of the indicator at its end. The returned part ends at most `tolerance` s after the change of

@@ -63,7 +63,7 @@ impl Log {
     }
 }
 
-/// Returns an empty log, so that no message is delivered twice.
+/// A copy of a log is empty, so that no message is delivered twice.
 impl Clone for Log {
     fn clone(&self) -> Self {
         Self::default()

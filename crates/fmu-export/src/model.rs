@@ -26,9 +26,9 @@ use std::path::{Path, PathBuf};
 /// | call of the importer | effect on the model |
 /// |---|---|
 /// | instantiate, reset | [`new`](Self::new) |
-/// | set inputs, states, start values of outputs | sets the field and runs the `then` of the table; before the first step, then calls [`calculate_start`](Self::calculate_start) |
+/// | set inputs, states, start values of outputs | sets the field and runs the `then` of the table; before the first step, also calls [`calculate_start`](Self::calculate_start) |
 /// | set parameters | as above, then [`update`](Self::update) once; an error undoes the change |
-/// | enter initialization | [`initialize`](Self::initialize), undone after an error; not called, but an error, if the last value for any start value was rejected |
+/// | enter initialization | [`initialize`](Self::initialize), undone after an error. If any start value was rejected and not set again, this is an error and nothing is called |
 /// | get | [`calculate`](Self::calculate), if a value was set or a step was made since its last call; then the `by` of the table |
 /// | step | [`CoSimulation::step_fast`](crate::CoSimulation::step_fast), then [`step_any_size`](crate::CoSimulation::step_any_size) and [`step`](crate::CoSimulation::step), until one of them makes the step; an error undoes it |
 /// | event | [`ModelExchange::event`](crate::ModelExchange::event); an error undoes it |
@@ -42,7 +42,7 @@ pub trait Model: Variables + Clone + Send + Sync {
     /// Creates the model with its start values. The start values of the description are read from this model.
     ///
     /// # Errors
-    /// Fails if the model cannot be created. The importer then gets no instance, but the message.
+    /// Fails if the model cannot be created. The importer then gets the message instead of an instance.
     fn new(setup: &Setup) -> Result<Self, Error>;
 
     /// Checks conditions between several values and updates fields that depend on parameters. This crate calls it
@@ -82,8 +82,8 @@ pub trait Model: Variables + Clone + Send + Sync {
     /// Mode. The importer may set further values before it leaves this mode.
     ///
     /// # Errors
-    /// Fails if the model cannot start with these values. This function may have changed the model by then, because
-    /// this crate undoes the change.
+    /// Fails if the model cannot start with these values. This crate then undoes the call, so it may fail after it
+    /// has changed the model.
     fn initialize(&mut self, _experiment: &Experiment) -> Result<(), Error> {
         Ok(())
     }

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-/// Visitor of all values of a model's state, which counts their bytes, writes them, or replaces them by the values it
-/// reads.
+/// A visitor of the values of a model's state. Implementations count their bytes, write them, or replace them by
+/// values that were read.
 pub trait StateVisitor {
     /// Visits a floating-point number.
     fn real(&mut self, value: &mut f64);
@@ -13,8 +13,8 @@ pub trait StateVisitor {
     fn boolean(&mut self, value: &mut bool);
     /// Visits a string.
     fn string(&mut self, value: &mut String);
-    /// Visits the number of elements that follow, which have at least one byte each. If fewer bytes remain, the state
-    /// becomes invalid and the length becomes 0.
+    /// Visits the number of elements that follow, which have at least one byte each. If fewer bytes than elements
+    /// remain, the state becomes invalid and the length becomes 0.
     fn length(&mut self, value: &mut usize);
     /// Marks the state as invalid; it is then rejected.
     fn invalid(&mut self);

@@ -55,8 +55,8 @@ pub(crate) const fn settable(
 }
 
 /// Modes in which an importer sets start values.
-pub(crate) const STARTING: AllowedStates = both("IN", "IN");
+pub(crate) const START_VALUE_MODES: AllowedStates = both("IN", "IN");
 
 /// All modes that an instance can have, except fatal.
-pub(crate) const POSSIBLE: AllowedStates = AllowedStates::new(Standard::Fmi2, "INCFTE", "INMKTE")
+pub(crate) const ALL_MODES: AllowedStates = AllowedStates::new(Standard::Fmi2, "INCFTE", "INMKTE")
     .union(AllowedStates::new(Standard::Fmi3, "INCMT", "INMKT"));

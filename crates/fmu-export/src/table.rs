@@ -327,8 +327,8 @@ pub const fn count_states<M>(lines: &[Variable<M>]) -> usize {
     count
 }
 
-/// Returns the `N` states. Searches the derivative only once for each line, because a search for each element would
-/// be slow.
+/// Returns the `N` states. Searches for the derivative once for each line, because a search for each element would be
+/// slow.
 #[doc(hidden)]
 pub const fn find_states<M, const N: usize>(lines: &[Variable<M>]) -> [StateOfTable; N] {
     let mut states = [StateOfTable { state: 0, derivative: 0 }; N];
@@ -468,7 +468,8 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 ///
 /// The macro implements [`Variables`] for the model. It also defines an enum with the names of the lines, for
 /// [`Partials`](crate::Partials) and other capabilities. The enum is called `Name`, unless `names` gives it another
-/// name, as is necessary for two models in one module. [`Variables::index`] returns the index of a name in the table.
+/// name, which is necessary if a module contains two models. [`Variables::index`] returns the index of a name in the
+/// table.
 ///
 /// ```
 /// use fmu_export::{NUMBER, variables};

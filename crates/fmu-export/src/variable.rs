@@ -17,7 +17,7 @@ use std::mem::MaybeUninit;
 pub struct Index(#[doc(hidden)] pub u32);
 
 impl Index {
-    /// The time, also for a table without it; for [`depends_on`](Variable::depends_on).
+    /// The time, for [`depends_on`](Variable::depends_on). The table need not contain it.
     pub const TIME: Self = Self(u32::MAX);
 }
 
@@ -87,8 +87,8 @@ macro_rules! functions {
 }
 
 functions! {
-    /// Functions that read the element with this number; a scalar is its element 0. `reals` fills the slice with
-    /// elements, beginning with this one, and returns 0 if all values are finite. Only arrays have it, because each
+    /// Functions that read the element with a number; a scalar is its element 0. `reals` fills a slice with the
+    /// elements from this number on, and returns 0 if all values are finite. Only arrays have it, because each
     /// function adds to the size of a library.
     Read {
         real: fn(&M, usize) -> f64,
@@ -96,8 +96,8 @@ functions! {
         value: fn(&M, usize) -> Value
     }
 
-    /// Functions that set the element with this number, and a function that visits the field for a serialized state.
-    /// It visits an array as a whole.
+    /// Functions that set the element with a number, and `visit`, which passes the field to a visitor of serialized
+    /// states, an array as a whole.
     Store {
         real: fn(&mut M, usize, f64),
         value: fn(&mut M, usize, &Value),
@@ -338,7 +338,7 @@ impl<M> Variable<M> {
             settable(self.causality, self.variability, self.initial, self.state, self.reinit, real);
         if real && !matches!(self.causality, Causality::Parameter) {
             // Excludes the modes in which start values are set, because a rejected start value must be recorded.
-            self.takes_reals = self.settable.without(crate::settable::STARTING);
+            self.takes_reals = self.settable.without(crate::settable::START_VALUE_MODES);
             if self.plain {
                 self.takes_fast = self.takes_reals;
             }
@@ -617,21 +617,21 @@ pub fn read_reals(array: &impl Place, first: usize, values: &mut [MaybeUninit<f6
         .sum()
 }
 
-/// [Reads](read_real) a Real of a calculated value.
+/// Reads a Real of a calculated value; see [`read_real`].
 #[doc(hidden)]
 #[inline(always)]
 pub fn read_real_by<M, T: Place>(model: &M, calculate: fn(&M) -> T, number: usize) -> f64 {
     read_real(&calculate(model), number)
 }
 
-/// [Reads](read_value) a calculated value.
+/// Reads a calculated value; see [`read_value`].
 #[doc(hidden)]
 #[inline(always)]
 pub fn read_value_by<M, T: Place>(model: &M, calculate: fn(&M) -> T, number: usize) -> Value {
     read_value(&calculate(model), number)
 }
 
-/// [Reads](read_reals) Reals of a calculated array.
+/// Reads Reals of a calculated array; see [`read_reals`].
 #[doc(hidden)]
 #[inline(always)]
 pub fn read_reals_by<M, T: Place>(
@@ -648,7 +648,7 @@ pub fn read_reals_by<M, T: Place>(
 #[track_caller]
 pub const fn reject(name: &str, fault: &str) -> ! {
     let message =
-        Letters::new().with(b"the variable ").with(name.as_bytes()).with(b": ").with(fault.as_bytes());
+        ConstString::new().with(b"the variable ").with(name.as_bytes()).with(b": ").with(fault.as_bytes());
     match std::str::from_utf8(message.bytes()) {
         Ok(message) => panic!("{}", message),
         Err(_) => panic!("a name is not UTF-8"),
@@ -676,12 +676,12 @@ const fn wrong_type(base: BaseType) -> &'static str {
 }
 
 /// A string that is built at compile time: the message about an invalid line.
-pub(crate) struct Letters {
+pub(crate) struct ConstString {
     bytes: [u8; 400],
     length: usize,
 }
 
-impl Letters {
+impl ConstString {
     pub const fn new() -> Self {
         Self { bytes: [0; 400], length: 0 }
     }

@@ -222,7 +222,7 @@ impl<M: Exported> Instance<M> {
             });
             stepped = match next {
                 Ok(stepped) => stepped,
-                Err(rejection) => return self.stuck(time, *rejection),
+                Err(rejection) => return self.fail_step(time, *rejection),
             };
             self.state.stale = true;
         }
@@ -230,7 +230,7 @@ impl<M: Exported> Instance<M> {
 
     /// Ends a step that failed at `time`, after its first part. The step is undone, unless it failed because of too
     /// many events in FMI 2.0: then it ends early at `time`.
-    fn stuck(&mut self, time: f64, mut why: Rejection) -> Outcome<Stepped> {
+    fn fail_step(&mut self, time: f64, mut why: Rejection) -> Outcome<Stepped> {
         why.message = format!("the step cannot go on at {time}: {}", why.message);
         if self.standard() == Standard::Fmi2 && why.status == Status::Discard {
             self.logger.log(Status::Warning, why.message);

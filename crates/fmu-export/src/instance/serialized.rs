@@ -6,7 +6,7 @@ use super::{Outcome, State, reject};
 use crate::export::Exported;
 use crate::model::Experiment;
 use crate::saved::{Saved, StateVisitor};
-use crate::settable::POSSIBLE;
+use crate::settable::ALL_MODES;
 use fmi_abi::Mode;
 
 impl<M: Exported> State<M> {
@@ -84,7 +84,7 @@ pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<
     if !reader.rest.is_empty() {
         return reject("the saved state has the wrong length");
     }
-    if !reader.valid || !POSSIBLE.contains(origin.0, origin.1, state.mode) {
+    if !reader.valid || !ALL_MODES.contains(origin.0, origin.1, state.mode) {
         return reject("the saved state contains impossible values");
     }
     check(state)?;

@@ -2,7 +2,7 @@
 
 use super::{Instance, Outcome, Reference, finite, implicit_value, reject, reject_with};
 use crate::export::Exported;
-use crate::settable::STARTING;
+use crate::settable::START_VALUE_MODES;
 use crate::types::Attributes;
 use crate::variable::Variable;
 use fmi_abi::BaseType;
@@ -205,10 +205,10 @@ impl<M: Exported> Instance<M> {
             Some((*vr, rejection))
         });
         match to_blame {
-            Some((blamed, rejection)) => self.remember(vr, Some(blamed.index()), Err(rejection)),
+            Some((blamed, rejection)) => self.record_rejection(vr, Some(blamed.index()), Err(rejection)),
             None => {
                 let set = self.set_settable(vr, value);
-                self.remember(vr, None, set)
+                self.record_rejection(vr, None, set)
             }
         }
     }
@@ -226,7 +226,7 @@ impl<M: Exported> Instance<M> {
         self.check_all_settable(vr, bases)?;
         let blamed = vr[index].index();
         let rejection = reject(why(M::TABLE[blamed as usize].name()));
-        self.remember(vr, Some(blamed), rejection)
+        self.record_rejection(vr, Some(blamed), rejection)
     }
 
     fn check_all_settable<R: Reference>(&self, vr: &[R], bases: &[BaseType]) -> Outcome {
@@ -237,8 +237,8 @@ impl<M: Exported> Instance<M> {
     /// Otherwise, importers that continue after the error would simulate with other start values than the user wants.
     /// All variables of the call are recorded, because none of them was set; `blamed` is the index of the one whose
     /// value was rejected.
-    fn remember<R: Reference>(&mut self, vr: &[R], blamed: Option<u32>, set: Outcome) -> Outcome {
-        if self.fmi_state().is_in(STARTING) {
+    fn record_rejection<R: Reference>(&mut self, vr: &[R], blamed: Option<u32>, set: Outcome) -> Outcome {
+        if self.fmi_state().is_in(START_VALUE_MODES) {
             for vr in vr.iter().map(|vr| vr.index()) {
                 let Err(rejection) = &set else {
                     self.rejected.remove(vr);
