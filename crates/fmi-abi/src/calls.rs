@@ -144,7 +144,7 @@ pub fn signature(name: &str) -> Option<&'static Signature> {
 /// # Safety
 /// Same as for [`fmi2::call`].
 pub unsafe fn call(address: *const c_void, name: &str, instance: *mut c_void, words: &[u64]) -> c_int {
-    // SAFETY: the caller guarantees the requirement.
+    // SAFETY: the caller guarantees the requirements, which are the same.
     unsafe {
         if name.starts_with("fmi3") {
             fmi3::call(address, name, instance, words)

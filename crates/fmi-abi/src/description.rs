@@ -31,9 +31,10 @@ pub struct Variable {
     pub has_variability: bool,
     /// `exact`, `approx` or `calculated`, with the default of the standard; empty if there is no default.
     pub initial: String,
-    /// Start values as strings, as many as the description contains. If an array has only one, it is the start value of each element.
+    /// Start values as strings, as many as the description contains. If an array has only one, it applies to each
+    /// element.
     pub start: Vec<String>,
-    /// Sizes of the dimensions of an array; `None` if a size is unknown or too large.
+    /// Sizes of the dimensions of an array; empty for a scalar, `None` if a size is unknown or too large.
     pub dimensions: Option<Vec<usize>>,
     /// Number of values: 1 for a scalar. `None` if it is unknown or [too large](Self::is_too_large).
     pub size: Option<usize>,
@@ -120,7 +121,7 @@ impl Variable {
 pub struct Unknown {
     /// Index of the variable.
     pub variable: usize,
-    /// Indices of the variables on which it depends; `None` if the attribute is missing.
+    /// Indices of the variables on which the unknown depends; `None` if the attribute is missing.
     pub dependencies: Option<Vec<usize>>,
     /// `dependenciesKind`, in the order of the dependencies; empty if the attribute is missing or has another length.
     pub kinds: Vec<DependencyKind>,

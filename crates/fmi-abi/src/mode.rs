@@ -21,8 +21,8 @@ pub enum Mode {
     ContinuousTime = 32,
     /// After the end of the simulation.
     Terminated = 64,
-    /// State of FMI 2.0 after an error. This implementation never enters it, since a rejected call leaves the
-    /// instance unchanged; states that were serialized with it can be read.
+    /// State of FMI 2.0 after an error. fmu-export never enters it, because a rejected call leaves the instance
+    /// unchanged, but reads states that were serialized in this mode.
     Error = 128,
     /// After a panic.
     Fatal = 256,

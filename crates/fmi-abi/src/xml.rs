@@ -32,7 +32,7 @@ pub fn parse<'a>(text: &'a str, name: &str) -> Result<Document<'a>, String> {
 /// callers first check the memory for the whole file here, where a lack of memory is only an error.
 ///
 /// # Errors
-/// Fails if the memory is not available, and for more than 1 GiB.
+/// Fails if the memory is not available, or if it is more than 1 GiB.
 pub fn reserve(bytes: usize) -> Result<(), String> {
     let megabytes = bytes.div_ceil(1 << 20);
     if bytes > MAX_MEMORY {
@@ -88,7 +88,7 @@ fn scan(text: &str) -> Result<(), String> {
 struct Tag {
     attributes: usize,
     namespaces: usize,
-    /// Whether the element ends with the tag.
+    /// Whether the element has no content and no end tag, as in `<a/>`.
     is_empty: bool,
     length: usize,
 }

@@ -32,8 +32,8 @@ pub trait CoSimulation: Model {
     /// Advances the model by one step.
     ///
     /// # Errors
-    /// Fails if the step cannot be carried out. This crate then undoes the step, so it may fail after it has changed
-    /// the model, unless the model declares [`ATOMIC_STEP`](Self::ATOMIC_STEP).
+    /// Fails if the step cannot be carried out. This crate then undoes the step, so `step` may fail after it has
+    /// changed the model, unless the model declares [`ATOMIC_STEP`](Self::ATOMIC_STEP).
     fn step(&mut self, step: Step) -> Result<Stepped, Error>;
 
     /// Makes a step of this size, s, and calculates like [`calculate`](Model::calculate), if the model can do both

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-/// A visitor of the values of a model's state. Implementations count their bytes, write them, or replace them by
-/// values that were read.
+/// A visitor of the values of a model's state. Implementations count the bytes of the values, write the values, or
+/// replace them by values that were read.
 pub trait StateVisitor {
     /// Visits a floating-point number.
     fn real(&mut self, value: &mut f64);

@@ -19,9 +19,10 @@ const fn both(co_simulation: &str, model_exchange: &str) -> AllowedStates {
 /// 4, 5 and 6. Sections 2.3.2, 2.3.3, 2.3.5, 3.2.1 and 4.2.1 of FMI 3.0 define the same rules, except that FMI 3.0
 /// also allows inputs before the initialization, and has an Event Mode in Co-Simulation.
 ///
-/// The function also tolerates inputs before the initialization in FMI 2.0 (OpenModelica and libcosim set them),
-/// parameters after the initialization (OpenModelica, and users who tune fixed parameters), and Real parameters in
-/// Continuous-Time Mode (CasADi sets them between two evaluations).
+/// The function also tolerates further calls that importers make:
+/// * inputs before the initialization in FMI 2.0 (OpenModelica and libcosim set them);
+/// * parameters after the initialization (OpenModelica, and users who tune fixed parameters);
+/// * Real parameters in Continuous-Time Mode (CasADi sets them between two evaluations).
 pub(crate) const fn settable(
     causality: Causality,
     variability: Variability,

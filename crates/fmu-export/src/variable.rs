@@ -96,8 +96,8 @@ functions! {
         value: fn(&M, usize) -> Value
     }
 
-    /// Functions that set the element with a number, and `visit`, which passes the field to a visitor of serialized
-    /// states, an array as a whole.
+    /// Functions that set the element with a number. `visit` passes the whole field to a visitor of serialized
+    /// states.
     Store {
         real: fn(&mut M, usize, f64),
         value: fn(&mut M, usize, &Value),
