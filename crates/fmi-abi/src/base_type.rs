@@ -3,7 +3,8 @@
 use crate::Standard;
 use std::fmt;
 
-/// Defines the base types with their descriptions, and their XML elements in FMI 2.0 (if it has the type) and FMI 3.0.
+/// Defines the base types. Each line contains a description and the XML elements: for FMI 2.0 in brackets, which are
+/// empty if FMI 2.0 lacks the type, then for FMI 3.0.
 macro_rules! base_types {
     ($($base:ident $description:literal [$($fmi2:literal)?] $fmi3:literal;)+) => {
         /// Base types of variables. FMI 2.0 has only Real, Integer, Boolean, String and Enumeration. FMI 3.0 has all

@@ -1,5 +1,5 @@
-//! Calls of the functions of both FMI versions by name, with arguments as 64-bit words. Only this module
-//! knows their argument types at run time.
+//! Calls functions of both FMI versions by name, with arguments as 64-bit words, and lists the types of their
+//! arguments for use at run time.
 
 use crate::c_types::{c_int, c_void};
 use crate::{Rule, Standard};
@@ -14,8 +14,8 @@ pub struct Argument {
 }
 
 impl Argument {
-    /// Returns the pointee's type without the prefix `fmi2` or `fmi3`, and whether it is only read; `None` if
-    /// it is not a pointer.
+    /// For a pointer, returns the type of its target without the prefix `fmi2` or `fmi3`, and whether the function
+    /// only reads the target. Returns `None` for an argument that is not a pointer.
     pub fn pointee(&self) -> Option<(&'static str, bool)> {
         // Macro expansion may add a space after the asterisk.
         let (mutability, of) = self.of.strip_prefix('*')?.trim_start().split_once(' ')?;
@@ -76,7 +76,7 @@ macro_rules! calls {
             $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
         }
     ) => {
-        /// Signatures of the FMI version, in the order of the standard.
+        /// Signatures of the functions with an instance argument, in the order of [`Function`].
         pub const SIGNATURES: &[Signature] = &[
             $(Signature {
                 rule: Function::$function.rule(),
@@ -87,11 +87,11 @@ macro_rules! calls {
         /// Names of the functions without an instance argument.
         pub const FREE: &[&str] = &[$(stringify!($free)),+];
 
-        /// Calls the function of this name at this address.
+        /// Calls the function `name` at `address`. Each missing word is 0. Returns -1 if no function has this name.
         ///
         /// # Safety
-        /// The address is the address of a function of this name with the type of the FMI standard, and the
-        /// words are valid arguments for it.
+        /// The function at `address` has the type that the FMI standard defines for `name`, and the words are valid
+        /// arguments for it.
         pub unsafe fn call(address: *const c_void, name: &str, instance: *mut c_void, words: &[u64]) -> c_int {
             let mut words = words.iter().copied();
             match name {
@@ -133,18 +133,18 @@ pub const fn signatures(standard: Standard) -> &'static [Signature] {
     }
 }
 
-/// Returns the signature of this function.
+/// Returns the signature of the function with this name; `None` if there is none with an instance argument.
 pub fn signature(name: &str) -> Option<&'static Signature> {
     let standard = if name.starts_with("fmi3") { Standard::Fmi3 } else { Standard::Fmi2 };
     signatures(standard).iter().find(|of| of.rule.name == name)
 }
 
-/// Calls a function of either FMI version.
+/// Calls a function of either FMI version; see [`fmi2::call`].
 ///
 /// # Safety
-/// The requirement of [`fmi2::call`].
+/// Same as for [`fmi2::call`].
 pub unsafe fn call(address: *const c_void, name: &str, instance: *mut c_void, words: &[u64]) -> c_int {
-    // SAFETY: the caller guarantees the requirement.
+    // SAFETY: the caller guarantees the requirements, which are the same.
     unsafe {
         if name.starts_with("fmi3") {
             fmi3::call(address, name, instance, words)

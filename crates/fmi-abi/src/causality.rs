@@ -35,13 +35,13 @@ attribute! {
         Parameter = "parameter",
         /// Calculated from parameters.
         CalculatedParameter = "calculatedParameter",
-        /// Set by the importer at every communication point.
+        /// Set by the importer during the simulation.
         Input = "input",
         /// Read by the importer.
         Output = "output",
         /// Used only inside the model.
         Local = "local",
-        /// The time.
+        /// The independent variable: the time.
         Independent = "independent",
     }
 }
@@ -53,7 +53,7 @@ attribute! {
         Constant = "constant",
         /// The variable does not change after initialization.
         Fixed = "fixed",
-        /// The variable changes when the user changes a parameter.
+        /// The variable changes only when the user changes a tunable parameter.
         Tunable = "tunable",
         /// The variable changes at events or communication points.
         Discrete = "discrete",

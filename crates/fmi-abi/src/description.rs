@@ -1,17 +1,17 @@
-//! Reads model descriptions without rejecting faulty ones. Missing attributes get the defaults of the standard; faults
-//! are listed.
+//! Reads model descriptions, and accepts faulty ones as far as possible: missing attributes get the defaults of the
+//! FMI standard, and the faults are listed.
 
 use crate::{BaseType, Interface, Standard, is_c_identifier, shown};
 use roxmltree::Node;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
 
-/// Largest number of values that all arrays have together; the size of a further array counts as unknown.
+/// Maximum number of values in all arrays together. The size of an array that would exceed it counts as unknown.
 pub const MAX_VALUES: usize = 1 << 22;
-/// Bytes that a variable and a value in a list take at most, with all that is read of them.
+/// Upper bounds for the memory that a variable and a value in a list take, in bytes.
 const VARIABLE: usize = 1000;
 const VALUE: usize = 64;
-/// Number of unknown references of the model structure that are listed.
+/// Maximum number of faults that are listed for references to missing variables.
 const MAX_LOST: usize = 100;
 
 /// A variable; an array of FMI 3.0 is one variable.
@@ -27,17 +27,18 @@ pub struct Variable {
     pub causality: String,
     /// `fixed`, `continuous` and so on, with the default of the standard.
     pub variability: String,
-    /// Whether the variability is given.
+    /// Whether the description contains the variability.
     pub has_variability: bool,
     /// `exact`, `approx` or `calculated`, with the default of the standard; empty if there is no default.
     pub initial: String,
-    /// Start values as strings, as many as the description contains. If an array has only one, it is the start value of each element.
+    /// Start values as strings, as many as the description contains. If an array has only one, it applies to each
+    /// element.
     pub start: Vec<String>,
-    /// Sizes of the dimensions of an array; `None` if a size is unknown or too large.
+    /// Sizes of the dimensions of an array; empty for a scalar, `None` if a size is unknown or too large.
     pub dimensions: Option<Vec<usize>>,
-    /// Number of values; `None` if it is unknown, or too large together with the arrays before.
+    /// Number of values: 1 for a scalar. `None` if it is unknown or [too large](Self::is_too_large).
     pub size: Option<usize>,
-    /// Whether the array has more values than [`MAX_VALUES`], together with the arrays before.
+    /// Whether the array and the arrays before it together have more than [`MAX_VALUES`] values.
     pub is_too_large: bool,
     /// Smallest value of the variable or of its declared type, if given.
     pub min: Option<f64>,
@@ -62,13 +63,13 @@ pub struct Variable {
 }
 
 impl Variable {
-    /// Returns the start value of an element. If an array has only one start value, each element has it.
+    /// Returns the start value of an element. If an array has only one start value, it applies to each element.
     pub fn start_of(&self, element: usize) -> Option<&str> {
         let is_repeated = self.start.len() == 1 && self.size.is_some_and(|size| element < size);
         self.start.get(if is_repeated { 0 } else { element }).map(String::as_str)
     }
 
-    /// Returns the number of start values; a single one of an array counts for each element.
+    /// Returns the number of start values. If an array has only one start value, it counts once for each element.
     pub fn starts_count(&self) -> usize {
         match (self.size, self.start.len()) {
             (Some(size), 1) => size,
@@ -76,7 +77,8 @@ impl Variable {
         }
     }
 
-    /// Returns the start values of all elements as numbers, up to the first that is not a number.
+    /// Returns the start values of all elements as numbers, with 0 and 1 for Booleans, up to the first value that is
+    /// not a number.
     pub fn starts(&self) -> Vec<f64> {
         let number = |value: &str| match value {
             "true" => Some(1.0),
@@ -91,7 +93,8 @@ impl Variable {
         }
     }
 
-    /// Takes the values of an array from the number of values that remain for all arrays. The size of an array that has more is unknown.
+    /// Subtracts the size of an array from the number of values that remain for all arrays. If too few remain, the
+    /// size becomes unknown.
     fn limit(&mut self, remaining: &mut usize) {
         if self.dimensions.as_ref().is_none_or(Vec::is_empty) {
             return;
@@ -118,9 +121,9 @@ impl Variable {
 pub struct Unknown {
     /// Index of the variable.
     pub variable: usize,
-    /// Indices of the variables on which it depends; `None` if the attribute is missing.
+    /// Indices of the variables on which the unknown depends; `None` if the attribute is missing.
     pub dependencies: Option<Vec<usize>>,
-    /// `dependenciesKind`, in the order of the dependencies; empty if the attribute is missing or the lists do not have the same length.
+    /// `dependenciesKind`, in the order of the dependencies; empty if the attribute is missing or has another length.
     pub kinds: Vec<DependencyKind>,
 }
 
@@ -140,7 +143,7 @@ pub enum DependencyKind {
 }
 
 impl DependencyKind {
-    /// Returns the kind of this name; `Dependent` for an unknown name, which claims least.
+    /// Returns the kind of this name. An unknown name is read as `Dependent`, the kind that claims least.
     fn named(name: &str) -> Self {
         match name {
             "constant" => Self::Constant,
@@ -161,12 +164,11 @@ pub struct Offer {
     pub once_per_process: bool,
     /// Whether the library starts another program, which must be installed.
     pub needs_execution_tool: bool,
-    /// Whether it accepts input derivatives (FMI 2.0, `canInterpolateInputs`).
+    /// Whether the FMU accepts input derivatives (FMI 2.0, `canInterpolateInputs`).
     pub input_derivatives: bool,
-    /// Whether it provides directional derivatives (`providesDirectionalDerivative`, in FMI 3.0 with a final
-    /// s).
+    /// Whether the FMU provides directional derivatives (`providesDirectionalDerivative`, in FMI 3.0 with a final s).
     pub directional_derivatives: bool,
-    /// Whether its state can be saved and restored (`canGetAndSetFMUstate`, in FMI 3.0
+    /// Whether the state of an instance can be saved and restored (`canGetAndSetFMUstate`, in FMI 3.0
     /// `canGetAndSetFMUState`).
     pub saves_states: bool,
     /// Whether saved states can be serialized (`canSerializeFMUstate`).
@@ -190,8 +192,8 @@ impl Offer {
         }
     }
 
-    /// Fails if the identifier is not one of C: it is the name of a file, and part of names in programs. A missing one is a fault that
-    /// is listed.
+    /// Fails if the identifier is not an identifier of C, because files and identifiers in programs are named after
+    /// it. A missing identifier passes, because it is listed as a fault.
     fn check(&self) -> Result<(), String> {
         if self.identifier.is_empty() || is_c_identifier(&self.identifier) {
             return Ok(());
@@ -202,19 +204,19 @@ impl Offer {
         ))
     }
 
-    /// Returns whether one of these attributes is true.
+    /// Returns whether at least one of these attributes is true.
     pub fn can(&self, names: &[&str]) -> bool {
         names.iter().any(|name| matches!(self.attributes.get(*name).map(String::as_str), Some("true" | "1")))
     }
 
-    /// Returns an attribute that is a positive number.
+    /// Returns the value of an attribute, if it is a positive number.
     pub fn number(&self, name: &str) -> Option<f64> {
         let number: Option<f64> = self.attributes.get(name)?.trim().parse().ok();
         number.filter(|number| *number > 0.0 && number.is_finite())
     }
 }
 
-/// Kinds of faults.
+/// Kinds of faults in a model description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// A required attribute is missing.
@@ -282,11 +284,12 @@ impl ModelDescription {
         Self::parse_configured(xml, &HashMap::new())
     }
 
-    /// Reads a `modelDescription.xml` whose structural parameters, by value reference, have other values than their start values, so
-    /// that arrays have other sizes (section 2.4.7.5.1 of FMI 3.0).
+    /// Reads a `modelDescription.xml` for an instance in which structural parameters have other values than their
+    /// start values. `structure` maps their value references to these values, which determine the sizes of arrays
+    /// (section 2.4.7.5.1 of FMI 3.0).
     ///
     /// # Errors
-    /// Fails as [`parse`](Self::parse) does.
+    /// Fails for the same reasons as [`parse`](Self::parse).
     pub fn parse_configured(xml: &str, structure: &HashMap<u32, usize>) -> Result<Self, String> {
         let document = crate::xml::parse(xml, "modelDescription.xml")?;
         let root = document.root_element();
@@ -356,7 +359,8 @@ impl ModelDescription {
         }
     }
 
-    /// Reads the model structure: indices in FMI 2.0, counted from 1; value references in FMI 3.0.
+    /// Reads the model structure, which refers to variables by index in FMI 2.0, counted from 1, and by value
+    /// reference in FMI 3.0.
     fn structure(&mut self, root: Node) {
         let by_reference: HashMap<u32, usize> =
             self.variables.iter().enumerate().rev().map(|(index, of)| (of.reference, index)).collect();
@@ -388,7 +392,7 @@ impl ModelDescription {
         };
         let mut list = |group: &str, of_fmi3: &str| -> Vec<Unknown> {
             let Some(structure) = child(root, "ModelStructure") else { return Vec::new() };
-            // A second entry of a variable says nothing new.
+            // Only the first entry of a variable counts.
             let mut known = HashSet::new();
             let mut new = |node| unknown(node).filter(|unknown: &Unknown| known.insert(unknown.variable));
             match standard {
@@ -456,7 +460,7 @@ fn variables(
         };
         let declared = of_type.attribute("declaredType").and_then(|name| types.get(name));
         let base = base_of(standard, of_type.tag_name().name());
-        // A size is a number, or the start value of a structural parameter (section 2.4.7.5.1 of FMI 3.0).
+        // A size is a number, or the value of a structural parameter (section 2.4.7.5.1 of FMI 3.0).
         let size = |dimension: Node| {
             let parameter = || nodes.get(*by_reference.get(&number(dimension, "valueReference")?)?).copied();
             let configured = || structure.get(&number(dimension, "valueReference")?).copied();
@@ -478,10 +482,10 @@ fn variables(
     Ok(found)
 }
 
-/// A declared type, whose attributes variables share.
+/// A declared type. Variables of this type share its attributes.
 struct Declared<'a> {
     node: Node<'a, 'a>,
-    /// In FMI 2.0, the element that has the attributes (section 2.2.3).
+    /// In FMI 2.0, the child element that has the attributes (section 2.2.3).
     inner: Option<Node<'a, 'a>>,
     unit: Option<Arc<str>>,
     display_unit: Option<Arc<str>>,
@@ -500,7 +504,7 @@ impl<'a> Declared<'a> {
     }
 }
 
-/// Reads a variable whose attributes are in `of_type` and in the declared type.
+/// Reads a variable. The attributes of its type are in the element `of_type`, or else in the declared type.
 fn variable(
     node: Node,
     of_type: Node,
@@ -609,7 +613,7 @@ fn enumeration(node: Node) -> Option<(String, Vec<(String, String)>)> {
     (!items.is_empty()).then(|| Some((node.attribute("name")?.to_owned(), items)))?
 }
 
-/// Converts an index that counts from 1.
+/// Converts an index that counts from 1 to one that counts from 0; `None` for 0.
 fn from_one(number: u32) -> Option<usize> {
     (number as usize).checked_sub(1)
 }

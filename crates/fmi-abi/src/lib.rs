@@ -3,7 +3,7 @@
 mod base_type;
 pub mod c_types;
 #[cfg(feature = "calls")]
-#[allow(unsafe_code, reason = "a function is called at an address")]
+#[allow(unsafe_code, reason = "it calls functions through their addresses")]
 pub mod calls;
 mod causality;
 #[cfg(feature = "description")]
@@ -41,13 +41,13 @@ macro_rules! table {
             $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
         }
     ) => {
-        /// The functions that work on an instance.
+        /// The functions whose first argument is an instance.
         #[allow(non_camel_case_types, missing_docs)]
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Function { $($function),+ }
 
         impl Function {
-            /// The function's row of the table.
+            /// Returns the function's row of [`ALLOWED`].
             #[inline]
             pub const fn rule(self) -> &'static $crate::Rule {
                 &ALLOWED[self as usize]
@@ -71,12 +71,13 @@ macro_rules! table {
             /// The names of all functions.
             pub const NAMES: &[&str] = &[$(stringify!($free),)+ $(stringify!($function),)+];
 
-            /// Finds the functions of a library by their names. A function that the library lacks is replaced by one that
-            /// returns Error, a null pointer or nothing.
+            /// Finds the functions of a library by their names. `symbol` returns the address of the function with a
+            /// name, or `None` if the library lacks it. A missing function is replaced by one that returns Error, a
+            /// null pointer or nothing, as its type requires.
             ///
             /// # Safety
-            /// Each pointer that `symbol` returns is a function of that name with the type of the standard. The library stays
-            /// loaded while the functions are used.
+            /// Each address that `symbol` returns belongs to the function of that name and has the type of the FMI
+            /// standard. The library stays loaded while the functions are used.
             #[allow(unsafe_code)]
             pub unsafe fn find(mut symbol: impl FnMut(&'static str) -> Option<*const $crate::c_types::c_void>) -> Self {
                 Self {
@@ -109,7 +110,7 @@ macro_rules! table {
 }
 pub(crate) use table;
 
-/// The result of a function that a library lacks.
+/// The result of the function that replaces a missing one.
 trait Absent {
     const RESULT: Self;
 }

@@ -3,7 +3,8 @@
 use crate::status::Status;
 use std::ffi::CStr;
 
-/// Log category; the model description lists them as `LogCategories` (section 2.2.4 of FMI 2.0).
+/// Category of log messages. The model description lists all categories as `LogCategories` (section 2.2.4 of FMI
+/// 2.0).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Category {
     /// Progress of the simulation.
@@ -37,7 +38,7 @@ impl Category {
         }
     }
 
-    /// Returns a sentence for the model description.
+    /// Returns the sentence that describes the category in the model description.
     pub const fn description(self) -> &'static str {
         match self {
             Self::Events => "Progress of the simulation: instantiation, initialization, reset, termination",

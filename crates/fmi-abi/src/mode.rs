@@ -21,8 +21,8 @@ pub enum Mode {
     ContinuousTime = 32,
     /// After the end of the simulation.
     Terminated = 64,
-    /// State of FMI 2.0 after an error. This implementation never enters it, since a rejected call leaves the
-    /// instance unchanged; states that were serialized with it can be read.
+    /// State of FMI 2.0 after an error. fmu-export never enters it, because a rejected call leaves the instance
+    /// unchanged, but reads states that were serialized in this mode.
     Error = 128,
     /// After a panic.
     Fatal = 256,
@@ -39,7 +39,7 @@ const fn row(mode: Mode, letter: u8, name: &'static str) -> Row {
     Row { mode, letter, name }
 }
 
-/// All modes. In fatal no call is allowed, so it has no letter.
+/// All modes. The mode fatal has no letter, because no call is allowed in it.
 const MODES: [Row; 9] = [
     row(Mode::Instantiated, b'I', "instantiated"),
     row(Mode::Initialization, b'N', "initialization mode"),
@@ -66,8 +66,8 @@ impl fmt::Display for Mode {
     }
 }
 
-/// A set of modes for each FMI version and interface type, for example the modes in which a function may be called. Each
-/// of the four pairs has 16 bits.
+/// A set of modes for each FMI version and interface type, for example the modes in which a function may be called.
+/// Each of the four pairs of version and interface type has 16 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AllowedStates(u64);
 
@@ -90,7 +90,7 @@ const fn bits(letters: &str) -> u64 {
     while let [letter, tail @ ..] = rest {
         let mut known = 0;
         while MODES[known].letter != *letter {
-            known += 1; // An unknown letter leads past the end: a compile-time error.
+            known += 1; // An unknown letter leads past the end of `MODES`, which is a compile-time error.
         }
         set |= MODES[known].mode as u64;
         rest = tail;
@@ -117,7 +117,7 @@ impl AllowedStates {
         self.0 & bit(standard, interface, mode) != 0
     }
 
-    /// Returns whether the set contains nothing.
+    /// Returns whether the set is empty.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
@@ -147,7 +147,8 @@ impl AllowedStates {
         Self(self.0 & kept)
     }
 
-    /// Lists the modes of this set for an FMI version and an interface type, for error messages.
+    /// Lists the modes of this set for an FMI version and an interface type, for error messages; "no state" if there
+    /// are none.
     pub fn names(self, standard: Standard, interface: Interface) -> String {
         let contained = MODES.iter().filter(|row| self.contains(standard, interface, row.mode));
         let names: Vec<_> = contained.map(|row| row.name).collect();

@@ -10,13 +10,13 @@ pub struct Rule {
     pub name: &'static str,
     /// States in which the FMI standard allows the call.
     pub standard: AllowedStates,
-    /// Further states in which this project tolerates the call.
+    /// Further states in which fmu-export tolerates the call.
     pub tolerated: AllowedStates,
 }
 
 impl Rule {
-    /// Creates a row from the letters of [`AllowedStates::new`] for each interface type. Tolerated modes apply
-    /// only to interface types that have the function, or to both if the standard allows it in no mode here.
+    /// Creates a row from mode letters, as in [`AllowedStates::new`]. The tolerated modes apply to each interface
+    /// type in which the standard allows the call at all. If the standard allows it nowhere, they apply to both.
     pub const fn new(
         of: Standard,
         name: &'static str,

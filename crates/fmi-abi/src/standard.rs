@@ -14,8 +14,8 @@ pub enum Standard {
 }
 
 impl Standard {
-    /// Returns the value reference that fmu-export assigns to the variable at this index of a model's list.
-    /// It is the index in FMI 2.0, and the index plus 1 in FMI 3.0.
+    /// Returns the value reference that fmu-export assigns to the variable at this index of a model's table: the
+    /// index itself in FMI 2.0, and the index plus 1 in FMI 3.0.
     pub const fn reference(self, index: u32) -> u32 {
         index.wrapping_add(self as u32)
     }

@@ -4,7 +4,7 @@ use crate::c_types::c_int;
 
 /// Status that a call returns (section 2.1.3 of FMI 2.0).
 ///
-/// `Pending` is omitted: no function here is asynchronous.
+/// `Pending` is omitted, because no function of fmu-export is asynchronous.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub enum Status {

@@ -1,17 +1,18 @@
-//! Strings of files and FMUs in messages.
+//! Makes strings from files and FMUs safe to print in messages.
 
 use std::borrow::Cow;
 
-/// Number of characters of a name or a message that a line repeats.
+/// Maximum number of characters of a string that a message quotes.
 pub const SHOWN: usize = 200;
 
-/// Returns a string for a message of one line: control characters, and characters that reorder or end a line, are escaped as in
-/// Rust, because a terminal would obey them; a string of more than [`SHOWN`] characters is cut.
+/// Returns a string that can be printed in a message of one line. Control characters, and characters that reorder or
+/// end a line, are escaped as in Rust, because a terminal would interpret them. A string of more than [`SHOWN`]
+/// characters is cut, and ends with `...`.
 pub fn shown(text: &str) -> Cow<'_, str> {
     shown_to(text, SHOWN)
 }
 
-/// Escapes and cuts as [`shown`] does, after this number of characters.
+/// Escapes and cuts a string as [`shown`] does, but after `most` characters.
 pub fn shown_to(text: &str, most: usize) -> Cow<'_, str> {
     let cut = text.char_indices().nth(most).map_or(text.len(), |(index, _)| index);
     let mut line = one_line(&text[..cut]);
@@ -21,7 +22,7 @@ pub fn shown_to(text: &str, most: usize) -> Cow<'_, str> {
     line
 }
 
-/// Escapes as [`shown`] does, without cutting the string.
+/// Escapes a string as [`shown`] does, without cutting it.
 pub fn one_line(text: &str) -> Cow<'_, str> {
     if !text.contains(is_unsafe) {
         return Cow::Borrowed(text);
@@ -37,14 +38,14 @@ pub fn one_line(text: &str) -> Cow<'_, str> {
     Cow::Owned(escaped)
 }
 
-/// Returns whether a terminal or an editor would obey the character instead of showing it: control characters, line and paragraph
-/// separators, and marks that change the direction of text.
+/// Returns whether a terminal or an editor would interpret the character instead of showing it. These are control
+/// characters, line and paragraph separators, and marks that change the direction of text.
 fn is_unsafe(letter: char) -> bool {
     letter.is_control()
         || matches!(letter, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// Returns whether a string is an identifier of C, which the standard requires of `modelIdentifier`.
+/// Returns whether a string is an identifier of C, as the FMI standard requires for `modelIdentifier`.
 pub fn is_c_identifier(text: &str) -> bool {
     let mut letters = text.chars();
     letters.next().is_some_and(|first| first.is_ascii_alphabetic() || first == '_')
@@ -56,7 +57,7 @@ mod tests {
     use super::{is_c_identifier, one_line, shown};
 
     #[test]
-    fn a_terminal_has_nothing_to_obey() {
+    fn characters_that_a_terminal_interprets_are_escaped() {
         assert_eq!(shown("x \u{e4}\u{1f600}"), "x \u{e4}\u{1f600}");
         assert_eq!(shown("\u{1b}[31m\r\n\t\0"), "\\u{1b}[31m\\r\\n\\t\\u{0}");
         assert_eq!(one_line("a\u{9b}b\u{202e}c\u{2028}d"), "a\\u{9b}b\\u{202e}c\\u{2028}d");

@@ -42,7 +42,7 @@ impl Value {
     }
 }
 
-/// Parses two hexadecimal digits for each byte.
+/// Parses bytes with two hexadecimal digits each; `None` if the string has any other form.
 fn bytes(string: &str) -> Option<Vec<u8>> {
     let digit = |byte: &u8| char::from(*byte).to_digit(16);
     let digits: Vec<u32> = string.as_bytes().iter().map(digit).collect::<Option<_>>()?;

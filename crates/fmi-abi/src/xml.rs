@@ -1,20 +1,21 @@
-//! XML of untrusted files: before it is parsed, the memory and the time that parsing may take are limited.
+//! Parses the XML of untrusted files. It first checks that the parser will not need too much memory or time.
 
 use roxmltree::Document;
 
-/// Largest depth of nested elements.
+/// Maximum depth of nested elements.
 const MAX_DEPTH: usize = 250;
-/// Maximum number of comparisons while a file is read, and the additional number for each byte. They are limited because the parser
-/// compares the attributes of an element with each other, and its namespaces with the namespaces of the elements around it.
+/// Maximum number of comparisons that the parser may make for a file, and the number that each byte of the file adds
+/// to it. The parser compares all attributes of an element with each other, and its namespaces with the namespaces of
+/// the elements around it, so without a limit the time could grow quadratically.
 const COMPARISONS: usize = 1 << 22;
 const COMPARISONS_PER_BYTE: usize = 8;
-/// Largest number of bytes that a step of reading a file may take.
+/// Maximum number of bytes that [`reserve`] accepts.
 const MAX_MEMORY: usize = 1 << 30;
-/// Bytes that an element, with the text after it, and an attribute take at most in a document.
+/// Upper bounds for the memory of a parsed element (with the text after it) and of an attribute, in bytes.
 const ELEMENT: usize = 300;
 const ATTRIBUTE: usize = 200;
 
-/// Parses an XML file that is called `name` in messages.
+/// Parses the content of an XML file. Error messages begin with `name`.
 ///
 /// # Errors
 /// Fails if the file is not well-formed, has a document type definition, or would take too much memory or time.
@@ -27,11 +28,11 @@ pub fn parse<'a>(text: &'a str, name: &str) -> Result<Document<'a>, String> {
         .map_err(|error| format!("{name} is not well-formed XML: {}", crate::shown(&error.to_string())))
 }
 
-/// Checks that this number of bytes is available. Collections that grow end the process if there is no memory, so the memory of a
-/// whole file is requested first, at a location where its absence is an error.
+/// Checks that this number of bytes can be allocated. A collection that grows ends the process if memory runs out, so
+/// callers first check the memory for the whole file here, where a lack of memory is only an error.
 ///
 /// # Errors
-/// Fails if the memory is not available, and for more than 1 GB.
+/// Fails if the memory is not available, or if it is more than 1 GiB.
 pub fn reserve(bytes: usize) -> Result<(), String> {
     let megabytes = bytes.div_ceil(1 << 20);
     if bytes > MAX_MEMORY {
@@ -44,11 +45,11 @@ pub fn reserve(bytes: usize) -> Result<(), String> {
     reserved.map_err(|_| format!("it would take about {megabytes} MB of memory, which are not available"))
 }
 
-/// Checks the depth of the elements and the numbers of their attributes, in a single pass. A file that is not well-formed may pass,
-/// because the parser stops at the first fault.
+/// Checks the depth of the elements, and counts the comparisons that their attributes and namespaces need, in a
+/// single pass. A file that is not well-formed may pass this check, because the parser rejects it later.
 fn scan(text: &str) -> Result<(), String> {
     let bytes = text.as_bytes();
-    // Numbers of the namespaces of the open elements.
+    // For each open element, the number of namespaces that are declared in it and around it.
     let mut open: Vec<usize> = Vec::new();
     let (mut at, mut comparisons) = (0, 0_usize);
     while let Some(begin) = text[at..].find('<').map(|offset| at + offset) {
@@ -83,11 +84,11 @@ fn scan(text: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// The tag at which an element begins.
+/// Start tag of an element.
 struct Tag {
     attributes: usize,
     namespaces: usize,
-    /// Whether the element ends with the tag.
+    /// Whether the element has no content and no end tag, as in `<a/>`.
     is_empty: bool,
     length: usize,
 }

@@ -1,7 +1,8 @@
-//! The description of the model in a library, as JSON, for `fmu-package`, which builds FMUs.
+//! Description of a model as JSON. `fmu-package`, which builds FMUs, loads the library and requests it.
 //!
-//! Floating-point numbers and integers of types are strings, which keep all digits. The functions are not
-//! inlined and take trait objects, because the description runs once, and its size counts in every library.
+//! Floating-point numbers, and the limits of integer types, are written as strings, so that they keep all digits. The
+//! functions are not inlined and take trait objects, because they run only once, but their code is in every library
+//! and should be small.
 
 use crate::boundary::{forget_panic, panic_message, string};
 use crate::capabilities::Events;
@@ -19,16 +20,15 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 /// Version of the format of the description.
 const VERSION: u32 = 1;
 
-/// Function that receives the description: a UTF-8 string and its length in bytes.
+/// Function that receives a UTF-8 string, such as the description, with its length in bytes.
 #[doc(hidden)]
 pub type Receive = unsafe extern "C" fn(context: *mut c_void, json: *const u8, length: usize);
 
-/// Passes the description of a model to `receive`, or an empty description if the model panics. The model may
-/// read the files in the directory `resources`.
+/// Passes the description of a model to `receive`, or an empty string if the model panics. The model may read the
+/// files in the directory `resources`.
 ///
 /// # Safety
-/// The caller guarantees that `receive` may be called with this context, and that `resources` is a string or
-/// NULL.
+/// `receive` may be called with this context, and `resources` is NULL or a NUL-terminated string.
 #[doc(hidden)]
 pub unsafe fn pass_description<M: Exported>(
     resources: *const c_char,
@@ -46,14 +46,14 @@ pub unsafe fn pass_description<M: Exported>(
     unsafe { receive(context, json.as_ptr(), json.len()) }
 }
 
-/// Passes the place and the message of each panic to `receive` from now on, instead of printing them.
+/// From now on, passes the location and the message of each panic to `receive`, instead of printing them.
 ///
 /// # Safety
-/// The caller guarantees that `receive` may be called with this context at any time, from any thread.
+/// `receive` may be called with this context at any time, from any thread.
 #[doc(hidden)]
 pub unsafe fn pass_panics(receive: Receive, context: *mut c_void) {
     struct Context(*mut c_void);
-    // SAFETY: the caller guarantees it for any thread.
+    // SAFETY: the caller guarantees that `receive` may be called with the context from any thread.
     unsafe impl Send for Context {}
     // SAFETY: as above.
     unsafe impl Sync for Context {}
@@ -70,7 +70,7 @@ pub unsafe fn pass_panics(receive: Receive, context: *mut c_void) {
     }));
 }
 
-/// Returns the description of a model in this program, which has no resources.
+/// Returns the description of a model in this program, as JSON. The model gets no directory of resources.
 pub fn describe<M: Exported>() -> String {
     describe_with::<M>(None)
 }
@@ -214,8 +214,9 @@ fn unit(json: &mut Json, of: &Unit) {
     json.close('}');
 }
 
-/// Writes the start values of a new model, `null` for a variable without start value, or the reason why the
-/// model has none. For Model Exchange, also writes the first event indicator that the model does not write.
+/// Writes the start values of a new model, or the reason why the model cannot be created. The value is `null` if the
+/// variable has no start value, and `false` if reading it panics. For Model Exchange, also writes the number of the
+/// first event indicator that the model leaves unwritten.
 fn starts<M: Exported>(json: &mut Json, setup: &Setup) {
     json.open("", '{');
     let instantiated = catch_unwind(|| M::new(setup));
@@ -250,7 +251,7 @@ fn starts<M: Exported>(json: &mut Json, setup: &Setup) {
     json.close('}');
 }
 
-/// Returns the first event indicator whose previous value the model does not overwrite.
+/// Returns the number of the first event indicator that the model does not overwrite.
 fn forgotten_indicator<M: Exported>(mut model: M) -> Option<usize> {
     let count = M::MODEL_EXCHANGE.map_or(0, |offer| offer.indicators);
     model.calculate(0.0);
@@ -262,7 +263,7 @@ fn forgotten_indicator<M: Exported>(mut model: M) -> Option<usize> {
     fill(1.0).iter().zip(fill(2.0)).position(|(one, two)| (*one, two) == (1.0, 2.0))
 }
 
-/// Writer of JSON; members of an array have the name "".
+/// Writer of JSON. Elements of an array are written with an empty name.
 #[derive(Default)]
 struct Json(String);
 
@@ -307,13 +308,13 @@ impl Json {
         self.quoted(value);
     }
 
-    /// Writes a number with all its digits, or a name, as a string.
+    /// Writes a value as a string, in its `Debug` format, in which a number has all its digits.
     #[inline(never)]
     fn number(&mut self, name: &str, value: &dyn Debug) {
         self.string(name, &format!("{value:?}"));
     }
 
-    /// Writes a number, true, false or null.
+    /// Writes a value without quotation marks: a number, true, false or null.
     #[inline(never)]
     fn word(&mut self, name: &str, word: &dyn Display) {
         self.begin(name);

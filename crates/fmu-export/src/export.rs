@@ -1,10 +1,11 @@
-//! The capabilities of a model in one trait: [`offer!`](crate::offer).
+//! [`Exported`], which collects the capabilities of a model in one trait, and [`offer!`](crate::offer), which
+//! implements it.
 
 use crate::capabilities::{Event, Events, Step, StepCompleted, Stepped};
 use crate::model::{Error, Model};
 
-/// A model and its capabilities. [`offer!`](crate::offer) implements it from the capability traits. This
-/// crate does not call functions of missing capabilities.
+/// A model with its capabilities. [`offer!`](crate::offer) implements this trait from the capability traits. The
+/// functions of missing capabilities have defaults, which this crate never calls.
 pub trait Exported: Model {
     /// Capabilities in Co-Simulation; `None` if the model does not support it.
     const CO_SIMULATION: Option<CoSimulationOffer> = None;
@@ -14,7 +15,7 @@ pub trait Exported: Model {
     const PARTIALS: bool = false;
     /// Whether the model uses input derivatives.
     const INPUT_DERIVATIVES: bool = false;
-    /// Highest order of output derivatives; 0 for none.
+    /// Highest order of output derivatives; 0 if there are none.
     const OUTPUT_DERIVATIVES: u32 = 0;
 
     #[doc(hidden)]
@@ -70,13 +71,14 @@ pub struct CoSimulationOffer {
     pub events: Events,
     /// Whether steps may end early, at events or at other times.
     pub ends_early: bool,
-    /// Whether a step checks everything that can fail before it changes the model, so that no copy is needed to undo
-    /// it.
+    /// Whether a step checks everything that can fail before it changes the model, so that this crate need not copy
+    /// the model to undo a failed step.
     pub atomic_step: bool,
 }
 
 impl CoSimulationOffer {
-    /// Panics if a step ended in a way that the model does not declare, because importers rely on the declaration.
+    /// Checks the result of a step. Panics if the step ended in a way that the model does not declare, because
+    /// importers rely on the declaration.
     #[doc(hidden)]
     #[inline]
     pub fn check(&self, stepped: &Result<Stepped, Error>) {
@@ -96,7 +98,7 @@ impl CoSimulationOffer {
         }
     }
 
-    /// Returns whether an importer of FMI 3.0 can handle events.
+    /// Returns whether an importer of FMI 3.0 can use Event Mode.
     pub const fn has_event_mode(&self) -> bool {
         !matches!(self.events, Events::None)
     }
@@ -111,14 +113,14 @@ pub struct ModelExchangeOffer {
     pub step_completed: bool,
 }
 
-/// Declares the capabilities of a model without exporting C symbols; [`export_fmu!`](crate::export_fmu)
-/// includes it. Use it for tests, and for libraries with several models.
+/// Declares the capabilities of a model, without exporting C symbols. Use it for tests, and for libraries with
+/// several models. [`export_fmu!`](crate::export_fmu) calls it.
 ///
-/// The compiler checks that the named and the implemented capabilities agree.
+/// Compilation fails if the macro names other capabilities than the model implements.
 #[macro_export]
 macro_rules! offer {
-    // An associated constant of the type, if its bound holds, takes precedence over the constant of the
-    // trait.
+    // `IMPLEMENTED` is true if the model implements the capability: an inherent constant takes precedence over the
+    // constant of a trait, but exists only if its bound holds.
     (@must_agree $model:ty, $capability:ident, $($offered:tt)+) => {
         const _: () = {
             struct Is<T>(::core::marker::PhantomData<T>);

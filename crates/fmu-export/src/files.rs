@@ -1,4 +1,5 @@
-//! Files that the page around a WebAssembly module contains. C sources have none.
+//! Files for a model in WebAssembly, which has no file system. The page around the module stores them. There are none
+//! in an FMU with C sources.
 
 #![cfg(target_family = "wasm")]
 
@@ -15,7 +16,8 @@ pub(crate) fn store(path: PathBuf, content: Vec<u8>) {
     FILES.with_borrow_mut(|files| files.push((path, content)));
 }
 
-/// Reads a file that was stored.
+/// Returns the content of a file. Fails with `Unsupported` if no file was stored, and with `NotFound` if this one was
+/// not.
 pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
     FILES.with_borrow(|files| match files.iter().find(|(name, _)| name == path) {
         Some((_, content)) => Ok(content.clone()),

@@ -2,8 +2,8 @@
 
 use std::mem::MaybeUninit;
 
-/// An array that is filled from its beginning, at compile time, because the compiler needs quadratic time to overwrite the
-/// elements of an array that contain references.
+/// An array that starts uninitialized and is filled from its beginning, at compile time. If it started with other
+/// values, the compiler would need quadratic time to overwrite elements that contain references.
 pub(crate) struct Filling<T, const N: usize> {
     items: [MaybeUninit<T>; N],
     count: usize,
@@ -19,6 +19,8 @@ impl<T: Copy, const N: usize> Filling<T, N> {
         self.count += 1;
     }
 
+    /// Returns the array.
+    ///
     /// # Panics
     /// Panics if an element is missing.
     pub const fn filled(self) -> [T; N] {

@@ -1,6 +1,7 @@
-//! General data of a model for the model description.
+//! General data of a model: name, author, default experiment and so on.
 
-/// General data of an FMU (section 2.2.1 of FMI 2.0, 2.4.1 of FMI 3.0). [`info!`](crate::info) takes some of it from Cargo.
+/// General data of an FMU, for the model description (section 2.2.1 of FMI 2.0, 2.4.1 of FMI 3.0).
+/// [`info!`](crate::info) takes author, version and licence from `Cargo.toml`.
 #[derive(Clone, Debug)]
 pub struct Info {
     /// `modelName`, the name that users see.
@@ -62,7 +63,8 @@ impl Default for DefaultExperiment {
 }
 
 impl Info {
-    /// Creates the data of a model; the remaining fields are empty.
+    /// Creates the data of a model. The remaining strings are empty, the experiment is
+    /// [`DefaultExperiment::DEFAULT`], and `smooth` is false.
     pub const fn new(name: &'static str, identifier: &'static str, guid: &'static str) -> Self {
         Self {
             name,
@@ -83,7 +85,7 @@ impl Info {
 /// `Cargo.toml`. The guid comes from the environment variable `FMU_GUID`, in which fmu-package passes a hash
 /// of the model's sources to the compiler.
 ///
-/// Without that variable the guid is all zeros; fmu-package does not pack such a library.
+/// If that variable is not set, the guid consists of zeros, and fmu-package rejects the library.
 ///
 /// ```
 /// const INFO: fmu_export::Info =

@@ -1,5 +1,5 @@
-//! Integration within a step of Co-Simulation: parts of a step, a Runge-Kutta method, and the search for an
-//! event.
+//! Help for the integration within a step of Co-Simulation: splitting a step, a Runge-Kutta method, and the search
+//! for events.
 
 use crate::capabilities::Step;
 use crate::model::Error;
@@ -16,7 +16,7 @@ impl Step {
     /// Splits the step into parts of equal size, each at most `longest` s.
     ///
     /// # Errors
-    /// Fails for more than 10,000,000 parts.
+    /// Fails if there would be more than 10,000,000 parts, or if `longest` is not above 0.
     pub fn parts(self, longest: f64) -> Result<impl Iterator<Item = Self>, Error> {
         let count = (self.size / longest).ceil().max(1.0);
         if !(longest > 0.0 && count <= MOST_PARTS) {
@@ -30,9 +30,9 @@ impl Step {
     }
 }
 
-/// Returns the state after a step of the classical Runge-Kutta method of order 4.
+/// Integrates a state over a step with the classical Runge-Kutta method of order 4, and returns the state at its end.
 ///
-/// `rates` returns the time derivatives of a state at a time, s.
+/// `rates` returns the time derivatives for a time, s, and a state.
 ///
 /// ```
 /// # use fmu_export::{Step, rk4};
@@ -54,7 +54,7 @@ pub fn rk4<const N: usize>(
     after(size, std::array::from_fn(|n| (first[n] + 2.0 * (second[n] + third[n]) + fourth[n]) / 6.0))
 }
 
-/// Direction in which an indicator of an event changes its sign.
+/// Direction in which an event indicator changes its sign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Crossing {
     /// From above zero to zero or below.
@@ -65,13 +65,13 @@ pub enum Crossing {
     Any,
 }
 
-/// Returns the part of a step up to the event at which an indicator changes its sign, or `None` if the
-/// indicator has the same sign at both ends of the step.
+/// Returns the part of a step up to an event: the time at which an indicator changes its sign in the direction
+/// `crossing`. Returns `None` if the indicator has not changed its sign in this direction at the end of the step.
 ///
-/// `indicator` returns the value at the end of a part of the step: it integrates the model over this part.
-/// The part may have size 0. The returned part ends at most `tolerance` s after the change of sign, never
-/// before. An indicator that begins at zero does not change its sign. Two changes of sign in a step are not
-/// found; [`Step::parts`] makes shorter steps.
+/// `indicator` integrates the model over a part of the step, which begins with the step and may have size 0, and
+/// returns the value of the indicator at its end. The returned part ends at most `tolerance` s after the change of
+/// sign, and never before it. An indicator that begins at zero is not searched. Two changes of sign within a step
+/// cancel each other, so they are not found; [`Step::parts`] splits a step into shorter ones.
 ///
 /// ```
 /// # use fmu_export::{Crossing, Step, find_event};
@@ -93,12 +93,13 @@ pub fn find_event(
     is_after(falls, end).then(|| locate(step, [begin, end], falls, tolerance, indicator))
 }
 
-/// Returns the part of a step up to the first event among several indicators, and the number of the indicator; see
-/// [`find_event`].
+/// Returns the part of a step up to the first event among several indicators, and the number of the indicator,
+/// counted from 0; see [`find_event`].
 ///
-/// Each indicator has its own direction and is observed separately. So an indicator that begins at zero, for example because
-/// its event has just happened, does not hide the others, as it would in the minimum of all indicators. Several events may happen
-/// at the same time: after the event, compare all indicators with zero.
+/// Each indicator has its own direction and is searched separately. If a model passed the minimum of all indicators
+/// to [`find_event`] instead, an indicator that begins at zero, for example because its event has just happened,
+/// would hide the others. Several events may happen at the same time, so compare all indicators with zero after the
+/// event.
 ///
 /// ```
 /// # use fmu_export::{Crossing, Step, find_first_event};
@@ -123,7 +124,7 @@ pub fn find_first_event<const N: usize>(
     let mut before = step;
     for (number, crossing) in crossings.into_iter().enumerate() {
         let Some(falls) = crossing.falls(begin[number]) else { continue };
-        // A later event is of no interest, so the search ends at the event that was found last.
+        // Only the first event counts, so the next search ends at the earliest event found so far.
         if is_after(falls, end[number]) {
             let ends = [begin[number], end[number]];
             before = locate(before, ends, falls, tolerance, |part| indicators(part)[number]);
@@ -135,7 +136,8 @@ pub fn find_first_event<const N: usize>(
 }
 
 impl Crossing {
-    /// Returns whether an indicator that begins with this value is observed to fall, or to rise; `None` if it is not observed.
+    /// Returns whether an indicator that begins with this value is searched for a fall (true) or a rise (false);
+    /// `None` if it is not searched.
     fn falls(self, begin: f64) -> Option<bool> {
         match self {
             Self::Falling | Self::Any if begin > 0.0 => Some(true),
@@ -149,7 +151,8 @@ fn is_after(falls: bool, value: f64) -> bool {
     if falls { value <= 0.0 } else { value >= 0.0 }
 }
 
-/// Returns the part of a step up to a change of sign. The indicator has these values at the start and at the end of the step.
+/// Returns the part of a step up to a change of sign. `begin` and `end` are the values of the indicator at both ends
+/// of the step.
 fn locate(
     step: Step,
     [begin, end]: [f64; 2],
@@ -158,7 +161,7 @@ fn locate(
     mut indicator: impl FnMut(Step) -> f64,
 ) -> Step {
     let part = |size: f64| Step { size, ..step };
-    // The ITP method (Oliveira and Takahashi, 2020): the regula falsi, with at most one evaluation more than
+    // The ITP method (Oliveira and Takahashi, 2020): a regula falsi that needs at most one evaluation more than
     // bisection.
     let tolerance = tolerance.max(4.0 * f64::EPSILON * step.size);
     let (mut before, mut after) = ((0.0, begin), (step.size, end));
@@ -206,7 +209,7 @@ mod tests {
         }
     }
 
-    /// x' = cos(t) x has the solution e^(sin t); half the step size gives 1/16 of the error.
+    /// Solves x' = cos(t) x, whose solution is e^(sin t). Half the step size must give 1/16 of the error.
     #[test]
     fn rk4_has_order_4() {
         let error = |size: f64| {
@@ -236,7 +239,8 @@ mod tests {
         assert_eq!(find(2.0, 1.0, Crossing::Any), None);
     }
 
-    /// Smooth, discontinuous, infinite and flat indicators. Bisection needs 32 evaluations for this tolerance.
+    /// Searches smooth, discontinuous, infinite and flat indicators. Bisection would need 32 evaluations for this
+    /// tolerance.
     #[test]
     fn the_search_never_needs_much_more_than_bisection() {
         type Case = (fn(f64) -> f64, usize);
@@ -260,7 +264,8 @@ mod tests {
         }
     }
 
-    /// cos(a t) falls through zero at pi / (2 a); the indicator that begins at zero would hide it in the minimum.
+    /// Each indicator cos(a t) falls through zero at pi / (2 a). Indicator 1 begins at zero, so it would hide the
+    /// others if they were combined into their minimum.
     #[test]
     fn the_first_of_several_events_is_found() {
         let factors = [1.0, 0.0, 2.0, 1.5];
@@ -274,7 +279,8 @@ mod tests {
         assert!(number == 2 && event.size >= exact && event.size < exact + 2e-10, "{event:?}, {number}");
         assert_eq!(find(Crossing::Rising, 1.9), None);
         assert_eq!(find(Crossing::Falling, 0.5), None);
-        // The search ends at the event that was found last, where indicator 2 has changed its sign only once.
+        // Indicator 2 changes its sign twice in this step, but only once up to the event of indicator 0, where its
+        // search ends.
         assert_eq!(find(Crossing::Falling, 2.4).unwrap().1, 2);
     }
 
@@ -286,7 +292,7 @@ mod tests {
         assert_eq!(find(|x| x), None);
         assert_eq!(find(|x| if x > 0.0 { f64::NAN } else { 1.0 }), None);
         assert_eq!(find(|x| x / 0.0), None);
-        // No tolerance: as close as numbers are.
+        // With tolerance 0, the result is as exact as rounding permits.
         let exact = find(|x| 0.7 - x).unwrap().size;
         assert!((exact - 0.7).abs() < 1e-15, "{exact}");
     }

@@ -2,13 +2,13 @@
 //!
 //! ## Structure of the crate
 //!
-//! An author writes a [`Model`] with a table of [`variables!`], implements capabilities and calls
-//! [`export_fmu!`]. `instance` contains the checks and effects of each call, without pointers and independent
-//! of the FMI version. `boundary` contains the code that the C functions share. [`fmi2`] and [`fmi3`] contain
-//! the C functions; [`fmi_abi`] contains their types and the tables of allowed calls. `offsets` reads and writes
-//! fields of a model by their offsets, and `filling` fills arrays at compile time. All `unsafe` code is in these five modules,
-//! in `describe`, and in the code that the macros generate. [`describe`](describe())
-//! returns the library's description of its model for the program that makes the FMU.
+//! An author writes a [`Model`] with a table of [`variables!`], implements capabilities and calls [`export_fmu!`].
+//! `instance` contains the checks and effects of each call, without pointers, for both FMI versions. [`fmi2`] and
+//! [`fmi3`] contain the C functions, and `boundary` contains the code that they share; [`fmi_abi`] contains their
+//! types and the tables of allowed calls. `offsets` reads and writes fields of a model by their offsets, and
+//! `filling` fills arrays at compile time. [`describe`](describe()) returns the description of the model for
+//! fmu-package, which builds the FMU. All `unsafe` code is in `boundary`, `fmi2`, `fmi3`, `offsets`, `filling` and
+//! `describe`, and in the code that the macros generate.
 
 mod boundary;
 mod capabilities;

@@ -1,8 +1,8 @@
-//! Log messages that every importer shows unchanged.
+//! Log messages, in a form that every importer shows unchanged.
 //!
-//! The callback is variadic and its message is a `printf` format. Some importers never expand the format, and
-//! others look for `#r1#` in it, so each message is complete, contains neither `%` nor `#`, and is passed
-//! without further arguments.
+//! In FMI 2.0, the log callback is variadic and its message is a `printf` format. Some importers never expand the
+//! format, and others replace value references such as `#r1#` in it. So each message is complete, contains neither
+//! `%` nor `#`, and is passed without further arguments.
 
 use fmi_abi::{Category, Standard, Status};
 use std::ffi::{CStr, CString};
@@ -26,8 +26,8 @@ impl Message {
         Category::of(self.status).name()
     }
 
-    /// Returns the message on one line, without characters that `printf`, FMI (section 2.1.5 of FMI 2.0) or C strings
-    /// interpret.
+    /// Returns the message on one line. Characters that `printf`, FMI (section 2.1.5 of FMI 2.0) or C strings would
+    /// interpret are replaced by `_`.
     pub fn printable(&self) -> CString {
         let special = |c: char| matches!(c, '%' | '#') || c.is_control();
         let safe: String = self.message.chars().map(|c| if special(c) { '_' } else { c }).collect();
@@ -35,9 +35,9 @@ impl Message {
     }
 }
 
-/// Messages of a model to the user. The log is a field of the model, which [`Model::log`](crate::Model::log)
-/// returns. This crate delivers the messages at the end of the call. It replaces `%`, `#` and control
-/// characters by `_`, because importers interpret them.
+/// Messages of a model to the user. The log is a field of the model, and [`Model::log`](crate::Model::log) returns a
+/// reference to it. This crate delivers the messages at the end of each call of the importer. It replaces `%`, `#`
+/// and control characters by `_`, because importers would interpret them.
 ///
 /// ```
 /// # let mut log = fmu_export::Log::default();
@@ -72,7 +72,7 @@ impl Clone for Log {
     fn clone_from(&mut self, _: &Self) {}
 }
 
-/// Filters messages by category and keeps them until the call ends.
+/// Filters messages by category, and stores them until the end of the call.
 #[derive(Debug)]
 pub(crate) struct Logger {
     enabled: u8,
@@ -84,9 +84,9 @@ pub(crate) struct Logger {
 }
 
 impl Logger {
-    /// Enables errors; the other categories on demand (section 2.1.3 of FMI 2.0, 2.3.1 of FMI 3.0). FMI 2.0
-    /// also enables warnings. FMI 3.0 also enables discards, because most importers treat a discard like an
-    /// error.
+    /// Enables all categories if `logging_on` is true (section 2.1.3 of FMI 2.0, 2.3.1 of FMI 3.0). Otherwise enables
+    /// errors and, in FMI 2.0, warnings. In FMI 3.0 it enables discards instead of warnings, because most importers
+    /// treat a discard like an error.
     pub fn new(standard: Standard, logging_on: bool) -> Self {
         let errors = bit(Category::Error) | bit(Category::Fatal);
         let (always, fixed) = match standard {
@@ -98,12 +98,13 @@ impl Logger {
         logger
     }
 
-    /// Enables all categories, or restores the default (a call without a list).
+    /// Enables all categories, or restores the default. The importer requests this by a call without a list of
+    /// categories.
     pub fn set_all(&mut self, on: bool) {
         self.enabled = if on { bit(Category::All) } else { self.always };
     }
 
-    /// Enables or disables these categories (a call with a list).
+    /// Enables or disables these categories. The importer requests this by a call with a list of categories.
     pub fn set(&mut self, categories: u8, on: bool) {
         if on {
             self.enabled |= categories;
@@ -112,7 +113,7 @@ impl Logger {
         }
     }
 
-    /// Returns the bit of the category with this name.
+    /// Returns the bit of the category with this name; for `logAll`, the bits of all categories.
     pub fn find(name: &[u8]) -> Option<u8> {
         let mut known = Category::ALL.iter();
         known.find(|category| category.name().to_bytes() == name).map(|category| bit(*category))
@@ -130,7 +131,7 @@ impl Logger {
         }
     }
 
-    /// Takes the messages of a model. Returns whether there were any.
+    /// Takes the messages from the log of a model. Returns whether there were any.
     #[inline]
     pub fn listen(&mut self, log: Option<&mut Log>) -> bool {
         let Some(log) = log.filter(|log| !log.is_empty()) else { return false };
@@ -154,7 +155,7 @@ mod tests {
     use fmi_abi::Status;
 
     #[test]
-    fn nothing_is_left_that_an_importer_would_expand() {
+    fn characters_that_an_importer_would_expand_are_replaced() {
         let message = Message { status: Status::Ok, message: "a%s#r1#\0b\nc".to_owned() };
         assert_eq!(message.printable().to_str(), Ok("a_s_r1__b_c"));
     }

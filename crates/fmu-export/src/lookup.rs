@@ -1,11 +1,11 @@
-//! [`LookupTable`]: a characteristic or a time series that a model reads from a file.
+//! [`LookupTable`], a characteristic curve or a time series that a model reads from a file.
 
 use crate::model::{Error, read_resource};
 use crate::saved::{Saved, StateVisitor};
 use std::path::Path;
 
-/// Returns the value at `x` on the straight lines between the points (`xs`, `ys`), whose `xs` rise. Beyond the
-/// first and the last point, it returns their values; without points, NaN.
+/// Interpolates linearly between the points (`xs`, `ys`), where `xs` must be in ascending order. Returns the value at
+/// `x`: the first or the last of `ys` if `x` is outside of `xs`, NaN if there are no points.
 ///
 /// # Panics
 /// Panics if `ys` is shorter than `xs`.
@@ -21,9 +21,9 @@ pub fn interpolate(xs: &[f64], ys: &[f64], x: f64) -> f64 {
     }
 }
 
-/// Points with straight lines between them, from a CSV file with two columns.
+/// Points between which values are interpolated linearly, from a CSV file with two columns.
 ///
-/// Its first line may name the columns. The values of the first column rise.
+/// The first line of the file may contain the names of the columns. The values in the first column must rise.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LookupTable {
     xs: Vec<f64>,
@@ -34,8 +34,8 @@ impl LookupTable {
     /// Reads a file; [`Setup::resource`](crate::Setup::resource) returns the path of a file in the FMU.
     ///
     /// # Errors
-    /// Fails if the file cannot be read or is not such a table. The message contains the path, the line and the
-    /// column.
+    /// Fails if the file cannot be read or does not contain such a table. The message contains the path and, for a
+    /// fault in the table, the line and the column.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let error = |reason: &dyn std::fmt::Display| Error::new(format!("{}{reason}", path.display()));
         let bytes = read_resource(path).map_err(|reason| error(&format_args!(": {reason}")))?;
@@ -45,7 +45,7 @@ impl LookupTable {
 
     fn parse(text: &str) -> Result<Self, String> {
         let mut table = Self::default();
-        // Spreadsheets begin a file with a byte order mark.
+        // Spreadsheet programs write a byte order mark at the beginning of a file.
         for (line, row) in (1..).zip(text.trim_start_matches('\u{feff}').lines()) {
             let fields: Vec<&str> = row.split(',').map(str::trim).collect();
             let numbers: Vec<Option<f64>> = fields.iter().map(|field| field.parse().ok()).collect();
@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_lie_on_straight_lines() {
+    fn values_are_interpolated_linearly() {
         let table = LookupTable::parse("\u{feff}speed, force\r\n-1,-2\r\n\r\n0, 0\r\n2,1e1\r\n").unwrap();
         assert_eq!(table.xs(), [-1.0, 0.0, 2.0]);
         let points =

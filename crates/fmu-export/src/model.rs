@@ -1,4 +1,4 @@
-//! The trait that every model implements, [`Model`]. Further abilities are
+//! [`Model`], the trait that every model implements. A model implements further traits for its
 //! [capabilities](crate::capabilities).
 
 use crate::info::Info;
@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 
 /// A model that can be exported as an FMU.
 ///
-/// A model is a struct with the values of its inputs, parameters and states, a [table](crate::variables) that
-/// maps variables to fields, and equations. This crate provides the C interface, the order of calls, the
-/// checks, the log and the saved states. A model needs no `unsafe` and no value references.
+/// A model consists of a struct with the values of its inputs, parameters and states, a [table](crate::variables)
+/// that maps variables to fields, and equations. This crate provides the C interface, checks the order of calls and
+/// the values, and takes care of the log and of saved states. So a model needs no `unsafe` and no value references.
 ///
 /// A model implements capabilities and names them in [`export_fmu!`](crate::export_fmu):
 /// [`CoSimulation`](crate::CoSimulation), [`ModelExchange`](crate::ModelExchange),
@@ -26,15 +26,15 @@ use std::path::{Path, PathBuf};
 /// | call of the importer | effect on the model |
 /// |---|---|
 /// | instantiate, reset | [`new`](Self::new) |
-/// | set inputs, states, start values of outputs | sets the field and runs the `then` of the table; then [`calculate_start`](Self::calculate_start), until the first step |
+/// | set inputs, states, start values of outputs | sets the field and runs the `then` of the table; before the first step, also calls [`calculate_start`](Self::calculate_start) |
 /// | set parameters | as above, then [`update`](Self::update) once; an error undoes the change |
-/// | enter initialization | [`initialize`](Self::initialize), undone after an error; an error while the last value set for some start value was rejected |
-/// | get | [`calculate`](Self::calculate), if a value was set or a step was done since the last time; then the `by` of the table |
-/// | step | [`CoSimulation::step_fast`](crate::CoSimulation::step_fast), then [`step_any_size`](crate::CoSimulation::step_any_size) and [`step`](crate::CoSimulation::step), until one of them does it; an error undoes the step |
+/// | enter initialization | [`initialize`](Self::initialize), undone after an error. If any start value was rejected and not set again, this is an error and nothing is called |
+/// | get | [`calculate`](Self::calculate), if a value was set or a step was made since its last call; then the `by` of the table |
+/// | step | [`CoSimulation::step_fast`](crate::CoSimulation::step_fast), then [`step_any_size`](crate::CoSimulation::step_any_size) and [`step`](crate::CoSimulation::step), until one of them makes the step; an error undoes it |
 /// | event | [`ModelExchange::event`](crate::ModelExchange::event); an error undoes it |
 /// | enter Continuous-Time Mode | [`ModelExchange::continuous_time_entered`](crate::ModelExchange::continuous_time_entered) |
 /// | save, restore | `clone_from` |
-/// | de-serialize | on a copy, sets the fields and the memory of the table; then [`restored`](Self::restored) and [`update`](Self::update) |
+/// | de-serialize | sets the fields and the memory of the table in a copy of the model, then calls its [`restored`](Self::restored) and [`update`](Self::update) |
 pub trait Model: Variables + Clone + Send + Sync {
     /// General data of the model.
     const INFO: Info;
@@ -42,17 +42,18 @@ pub trait Model: Variables + Clone + Send + Sync {
     /// Creates the model with its start values. The start values of the description are read from this model.
     ///
     /// # Errors
-    /// Fails if the model cannot be made. The importer then gets no instance, and the message.
+    /// Fails if the model cannot be created. The importer then gets the message instead of an instance.
     fn new(setup: &Setup) -> Result<Self, Error>;
 
-    /// Checks conditions between several values and updates fields that depend on parameters. This crate
-    /// calls it once after each call of the importer that changes parameters, and after a de-serialization.
-    /// The ranges of single parameters have been checked before.
+    /// Checks conditions between several values and updates fields that depend on parameters. This crate calls it
+    /// once after each call of the importer that changes parameters, and after a de-serialization. At that time, the
+    /// range of each single parameter has already been checked.
     ///
-    /// Many importers, for example FMPy, set one parameter per call, so there must be a path from one valid
-    /// pair of values to another over valid pairs.
+    /// Many importers, for example FMPy, set one parameter per call. So if a condition relates two parameters, an
+    /// importer must be able to get from one valid pair of values to another by changing one parameter at a time,
+    /// with only valid pairs in between.
     ///
-    /// This crate does not call it after inputs, states or start values of outputs have been set.
+    /// This crate does not call this function after inputs, states or start values of outputs have been set.
     ///
     /// # Errors
     /// Fails if the values are inconsistent. The change is then undone, and the importer gets the message.
@@ -60,8 +61,8 @@ pub trait Model: Variables + Clone + Send + Sync {
         Ok(())
     }
 
-    /// Checks the `memory` of the table after a de-serialization, because only the model knows its valid
-    /// range, and updates fields that depend on it. This crate then calls [`update`](Self::update).
+    /// Checks the `memory` of the table after a de-serialization, because this crate cannot check its range, and
+    /// updates fields that depend on it. This crate calls [`update`](Self::update) afterwards.
     ///
     /// # Errors
     /// Fails if the state is impossible for the model. The bytes are then rejected.
@@ -69,10 +70,11 @@ pub trait Model: Variables + Clone + Send + Sync {
         Ok(())
     }
 
-    /// Calculates the states whose start is [`calculated`](crate::Variable::calculated). This crate calls it
-    /// after each value that is set, until the first step or Continuous-Time Mode. It is also called after
-    /// the importer has set states, and between a de-serialization and the next step, so the model must
-    /// remember whether the states are still calculated.
+    /// Calculates the states whose start value is [`calculated`](crate::Variable::calculated). This crate calls it
+    /// whenever a value is set, until the first step or Continuous-Time Mode. The importer may have set the states
+    /// itself by then. A de-serialized state may come from a later time, but this crate then also calls the function
+    /// until the next step. In both cases the states must not change, so the model must remember whether they are
+    /// still to be calculated.
     #[inline]
     fn calculate_start(&mut self) {}
 
@@ -80,25 +82,25 @@ pub trait Model: Variables + Clone + Send + Sync {
     /// Mode. The importer may set further values before it leaves this mode.
     ///
     /// # Errors
-    /// Fails if the model cannot start with these values. The model may have changed by then: this crate undoes it.
+    /// Fails if the model cannot start with these values. This crate then undoes the call, so it may fail after it
+    /// has changed the model.
     fn initialize(&mut self, _experiment: &Experiment) -> Result<(), Error> {
         Ok(())
     }
 
-    /// Calculates values that several variables share. This crate calls it once after each change of values,
-    /// state or time (s), before any of them is read.
+    /// Calculates values on which several variables depend. If values, the state or the time (s) have changed, this
+    /// crate calls it once before the next value is read.
     #[inline]
     fn calculate(&mut self, _time: f64) {}
 
-    /// Returns the log of the model, if it has one: a [`Log`] among its fields. Messages in any other log are
-    /// never delivered.
+    /// Returns the log of the model: a [`Log`] among its fields, or `None`. Only messages in this log are delivered.
     #[inline]
     fn log(&mut self) -> Option<&mut Log> {
         None
     }
 }
 
-/// Data with which a model is made.
+/// Data from which a model is created.
 #[derive(Clone, Debug)]
 pub struct Setup {
     /// Interface type: Co-Simulation or Model Exchange.
@@ -115,12 +117,12 @@ impl Setup {
         Self { interface, instance_name: String::new(), resource_location: None }
     }
 
-    /// Returns the directory `resources` of the unpacked FMU. Returns `None` if the importer passes none, or
-    /// a location that is not a local file.
+    /// Returns the directory `resources` of the unpacked FMU; `None` if the importer passes no location, or one that
+    /// is not a local directory.
     ///
-    /// FMI 3.0 passes a path. FMI 2.0 passes a URI, which importers write as `file:/`, `file:///` or
-    /// `file:////`, with or without `localhost`, with or without `%20` for spaces, or as a path. A directory
-    /// on another host is accepted only on Windows.
+    /// FMI 3.0 passes a path. FMI 2.0 passes a URI, but importers differ in how they write it: with `file:/`,
+    /// `file:///` or `file:////`, with or without `localhost`, with or without `%20` for spaces, or as a path. A
+    /// directory on another host is accepted only on Windows.
     pub fn resources(&self) -> Option<PathBuf> {
         resources(self.resource_location.as_deref()?, cfg!(windows))
     }
@@ -146,11 +148,11 @@ impl Setup {
     }
 }
 
-/// Reads a file in the directory of [`Setup::resources`]. Unlike `std::fs`, this also works in the page that runs the FMU in a
-/// browser, which contains the files.
+/// Reads a file in the directory of [`Setup::resources`]. Unlike `std::fs`, this function also works in a browser,
+/// where the page that runs the FMU contains the files.
 ///
 /// # Errors
-/// The errors of [`std::fs::read`].
+/// Fails for the same reasons as [`std::fs::read`].
 pub fn read_resource(path: impl AsRef<Path>) -> std::io::Result<Vec<u8>> {
     #[cfg(target_family = "wasm")]
     let content = crate::files::read(path.as_ref());
@@ -163,8 +165,8 @@ fn resources(location: &str, windows: bool) -> Option<PathBuf> {
     if location.trim().is_empty() {
         return None;
     }
-    // Otherwise it is a path, which may contain a colon anywhere. A scheme contains no separator (section 3.1
-    // of RFC 3986) and is longer than a drive letter.
+    // The location is a URI only if a scheme precedes its first colon. A scheme contains no path separator (section
+    // 3.1 of RFC 3986) and is longer than a drive letter; otherwise the location is a path.
     let is_scheme = |scheme: &str| scheme.len() > 1 && !scheme.contains(['/', '\\']);
     let Some((scheme, rest)) = location.split_once(':').filter(|(scheme, _)| is_scheme(scheme)) else {
         return Some(location.into());
@@ -211,7 +213,7 @@ fn percent_decoded(text: &str) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// Data of the experiment from the importer (section 2.1.6 of FMI 2.0).
+/// Data of the experiment that the importer passes (section 2.1.6 of FMI 2.0).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Experiment {
     /// Start time, s.
@@ -222,7 +224,7 @@ pub struct Experiment {
     pub tolerance: Option<f64>,
 }
 
-/// Reason why a model cannot do a requested operation. The sentence names a remedy.
+/// Reason why a model cannot do what the importer requests, as a sentence that names a remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Error(String);
 
@@ -248,7 +250,7 @@ mod tests {
     use std::path::Path;
 
     #[test]
-    fn resources_are_found_however_they_are_written() {
+    fn resources_are_found_in_every_notation() {
         for (location, path) in [
             ("file:///tmp/a%20b/resources", "/tmp/a b/resources"),
             ("file:/tmp/resources", "/tmp/resources"),

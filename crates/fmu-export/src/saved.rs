@@ -1,10 +1,11 @@
-//! Content of a serialized state: [`Saved`] for all Rust types in which a model may remember values.
+//! Content of a serialized state: [`Saved`], implemented for the Rust types in which a model may store values.
 
 use std::collections::{BTreeMap, VecDeque};
 
-/// Visitor of all values of a model's state; counts, writes or replaces them.
+/// A visitor of the values of a model's state. Implementations count the bytes of the values, write the values, or
+/// replace them by values that were read.
 pub trait StateVisitor {
-    /// Visits a floating-point value of any type.
+    /// Visits a floating-point number.
     fn real(&mut self, value: &mut f64);
     /// Visits an integer.
     fn integer(&mut self, value: &mut i64);
@@ -12,12 +13,12 @@ pub trait StateVisitor {
     fn boolean(&mut self, value: &mut bool);
     /// Visits a string.
     fn string(&mut self, value: &mut String);
-    /// Visits the number of elements that follow; each element has at least one byte. A length beyond the
-    /// remaining bytes makes the state invalid and becomes 0.
+    /// Visits the number of elements that follow, which have at least one byte each. If fewer bytes than elements
+    /// remain, the state becomes invalid and the length becomes 0.
     fn length(&mut self, value: &mut usize);
     /// Marks the state as invalid; it is then rejected.
     fn invalid(&mut self);
-    /// Returns whether more elements may follow: false once the state is invalid.
+    /// Returns whether more elements can follow, which is false once the state is invalid.
     fn continues(&self) -> bool {
         true
     }
@@ -25,8 +26,8 @@ pub trait StateVisitor {
 
 /// A value that can be written to a serialized state and read back.
 ///
-/// Implemented for numbers, Booleans and strings, and for options, boxes, tuples, arrays, vectors, queues and
-/// ordered maps of them. [`saved!`](crate::saved) implements it for a struct.
+/// It is implemented for numbers, Booleans and strings, and for options, boxes, tuples, arrays, vectors, queues and
+/// ordered maps of such values. [`saved!`](crate::saved) implements it for a struct.
 pub trait Saved {
     /// Passes every value to the visitor, always in the same order, for writing and for reading.
     fn visit(&mut self, visitor: &mut dyn StateVisitor);
@@ -67,7 +68,7 @@ macro_rules! integers {
 
 integers!(i8 i16 i32 i64 isize u8 u16 u32);
 
-/// Stored as the `i64` with the same bits.
+/// A `u64` is stored as the `i64` with the same bits.
 impl Saved for u64 {
     fn visit(&mut self, visitor: &mut dyn StateVisitor) {
         let mut number = self.cast_signed();
@@ -76,7 +77,7 @@ impl Saved for u64 {
     }
 }
 
-/// A value beyond the range of this machine makes the state invalid.
+/// A `usize` is stored in 64 bits. A value that this machine cannot represent makes the state invalid.
 impl Saved for usize {
     fn visit(&mut self, visitor: &mut dyn StateVisitor) {
         let mut number = *self as u64;
@@ -92,7 +93,7 @@ impl Saved for f32 {
     fn visit(&mut self, visitor: &mut dyn StateVisitor) {
         let mut number = f64::from(*self);
         visitor.real(&mut number);
-        // A number that is not representable as `f32` was not written from one.
+        // A number that an `f32` cannot represent was not written by an `f32`, so the state is invalid.
         match number as f32 {
             read if f64::from(read) == number || number.is_nan() => *self = read,
             _ => visitor.invalid(),
@@ -128,7 +129,7 @@ impl<T: Saved + Default> Saved for Option<T> {
     fn visit(&mut self, visitor: &mut dyn StateVisitor) {
         let mut present = self.is_some();
         visitor.boolean(&mut present);
-        // A missing value is written as a default value, so that the length of a state is constant.
+        // If there is no value, a default value is written, so that the length of a state is constant.
         let mut value = self.take().unwrap_or_default();
         value.visit(visitor);
         *self = present.then_some(value);
@@ -141,7 +142,7 @@ impl<T: Saved + Default> Saved for Vec<T> {
         visitor.length(&mut length);
         self.truncate(length);
         self.iter_mut().for_each(|value| value.visit(visitor));
-        // Malformed bytes may claim any length, so an element is made only after the previous ones were read.
+        // Malformed bytes may claim any length, so each element is created only after the previous one was read.
         while self.len() < length && visitor.continues() {
             let mut value = T::default();
             value.visit(visitor);
@@ -162,7 +163,7 @@ impl<K: Saved + Default + Ord, V: Saved + Default> Saved for BTreeMap<K, V> {
     fn visit(&mut self, visitor: &mut dyn StateVisitor) {
         let mut entries: Vec<(K, V)> = std::mem::take(self).into_iter().collect();
         entries.visit(visitor);
-        // Maps are written in ascending order of keys.
+        // Maps are written in ascending order of keys, so other bytes are invalid.
         if !entries.is_sorted_by(|(one, _), (next, _)| one < next) {
             visitor.invalid();
         }
@@ -170,8 +171,8 @@ impl<K: Saved + Default + Ord, V: Saved + Default> Saved for BTreeMap<K, V> {
     }
 }
 
-/// Defines a struct whose fields all belong to a serialized state. With `for`, implements
-/// [`Saved`](crate::Saved) for an existing struct; the compiler checks that no field is missing.
+/// Defines a struct and implements [`Saved`](crate::Saved) for it, so that all its fields belong to a serialized
+/// state. With `for`, implements it for an existing struct; the compiler then checks that no field is missing.
 ///
 /// ```
 /// fmu_export::saved! {

@@ -1,10 +1,10 @@
-//! Modes in which a variable may be set: those that the standard allows, and those tolerated for existing
-//! importers.
+//! Modes in which a variable may be set: the modes that the FMI standard allows, and further modes that are tolerated
+//! because existing importers use them.
 
 use fmi_abi::{AllowedStates, Standard};
 use fmi_abi::{Causality, Initial, Variability};
 
-/// Returns the modes of Co-Simulation and of Model Exchange with these letters, in both FMI versions.
+/// Returns the modes with these letters in Co-Simulation and in Model Exchange, for both FMI versions.
 const fn both(co_simulation: &str, model_exchange: &str) -> AllowedStates {
     AllowedStates::new(Standard::Fmi2, co_simulation, model_exchange).union(AllowedStates::new(
         Standard::Fmi3,
@@ -15,12 +15,14 @@ const fn both(co_simulation: &str, model_exchange: &str) -> AllowedStates {
 
 /// Returns the modes in which an importer may set a variable, in both FMI versions.
 ///
-/// The modes of the standard are taken from the tables in sections 3.2.3 and 4.2.4 of FMI 2.0, with footnotes 1, 3, 4,
-/// 5 and 6. Sections 2.3.2, 2.3.3, 2.3.5, 3.2.1 and 4.2.1 of FMI 3.0 give equal rules. FMI 3.0 also allows inputs
-/// before the initialization, and has an Event Mode in Co-Simulation.
+/// The modes of the standard are taken from the tables in sections 3.2.3 and 4.2.4 of FMI 2.0, with footnotes 1, 3,
+/// 4, 5 and 6. Sections 2.3.2, 2.3.3, 2.3.5, 3.2.1 and 4.2.1 of FMI 3.0 define the same rules, except that FMI 3.0
+/// also allows inputs before the initialization, and has an Event Mode in Co-Simulation.
 ///
-/// Tolerated are inputs before the initialization of FMI 2.0 (OpenModelica and libcosim), parameters after the
-/// initialization (OpenModelica, and users who tune), and Real parameters between two evaluations (CasADi).
+/// The function also tolerates further calls that importers make:
+/// * inputs before the initialization in FMI 2.0 (OpenModelica and libcosim set them);
+/// * parameters after the initialization (OpenModelica, and users who tune fixed parameters);
+/// * Real parameters in Continuous-Time Mode (CasADi sets them between two evaluations).
 pub(crate) const fn settable(
     causality: Causality,
     variability: Variability,
@@ -53,9 +55,9 @@ pub(crate) const fn settable(
     set
 }
 
-/// Modes in which start values are set.
-pub(crate) const STARTING: AllowedStates = both("IN", "IN");
+/// Modes in which an importer sets start values.
+pub(crate) const START_VALUE_MODES: AllowedStates = both("IN", "IN");
 
-/// All modes of instances except fatal.
-pub(crate) const POSSIBLE: AllowedStates = AllowedStates::new(Standard::Fmi2, "INCFTE", "INMKTE")
+/// All modes that an instance can have, except fatal.
+pub(crate) const ALL_MODES: AllowedStates = AllowedStates::new(Standard::Fmi2, "INCFTE", "INMKTE")
     .union(AllowedStates::new(Standard::Fmi3, "INCMT", "INMKT"));

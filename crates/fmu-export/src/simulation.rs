@@ -1,4 +1,4 @@
-//! [`Simulation`]: runs a model in the tests of its author.
+//! [`Simulation`] runs a model in the tests of its author.
 
 use crate::export::Exported;
 use crate::instance::{Importer, Instance, Rejection};
@@ -7,10 +7,11 @@ use crate::table::Variables;
 use crate::variable::Variable;
 use fmi_abi::{BaseType, Interface, Mode, Standard, Status, Value};
 
-/// Simulates a model in this process, for the tests of the model. It makes the calls of a Co-Simulation
-/// importer.
+/// Simulates a model in this process, for the tests of the model. It makes the calls that a Co-Simulation importer
+/// makes.
 ///
-/// The FMU checks every value, handles events within a step and stores messages.
+/// As in an FMU, every value is checked, and events are handled within a step. Messages are stored; see
+/// [`messages`](Self::messages).
 ///
 /// ```
 /// # use fmu_export::*;
@@ -47,13 +48,13 @@ impl<M: Exported> Simulation<M> {
     /// [`INFO`](crate::Model::INFO).
     ///
     /// # Errors
-    /// Fails if the model cannot be made, or does not support Co-Simulation.
+    /// Fails if the model cannot be created, or does not support Co-Simulation.
     pub fn new() -> Result<Self, Error> {
         Self::with(Setup::new(Interface::CoSimulation))
     }
 
-    /// Creates a simulation with the directory of the model's resources, such as `modelDescription/resources`
-    /// of the package.
+    /// Creates a simulation of a model that reads files. `directory` contains the files, for example
+    /// `modelDescription/resources` of the package.
     ///
     /// # Errors
     /// Same errors as [`new`](Self::new).
@@ -74,8 +75,8 @@ impl<M: Exported> Simulation<M> {
         self
     }
 
-    /// Sets a variable, an element, or all elements of an array, for example `x` or `x[2]`. Set start values
-    /// before the first step; set inputs and tunable parameters at any time.
+    /// Sets a variable, one element of an array, or all its elements to the same value; `name` is for example `x` or
+    /// `x[2]`. Set start values before the first step; set inputs and tunable parameters at any time.
     ///
     /// # Errors
     /// Fails if there is no such variable, or if the model rejects the value.
@@ -85,10 +86,10 @@ impl<M: Exported> Simulation<M> {
         self.set_all(&indices, values)
     }
 
-    /// Sets the elements of an array together, row by row.
+    /// Sets the elements of an array to these values, row by row.
     ///
     /// # Errors
-    /// Fails for the errors of [`set`](Self::set), and if the array has another length.
+    /// Fails for the same reasons as [`set`](Self::set), and if the array has another number of elements.
     pub fn set_array<V: Into<Value>>(
         &mut self,
         name: &str,
@@ -126,7 +127,7 @@ impl<M: Exported> Simulation<M> {
         Ok(self)
     }
 
-    /// Initializes the model. Without this call, [`run`](Self::run) initializes it.
+    /// Initializes the model, if it is not initialized yet. [`run`](Self::run) calls this function.
     ///
     /// # Errors
     /// Fails if the model cannot start with these values.
@@ -139,8 +140,7 @@ impl<M: Exported> Simulation<M> {
         Ok(self)
     }
 
-    /// Performs steps to this time, s, or until the model ends the simulation; see
-    /// [`has_ended`](Self::has_ended).
+    /// Performs steps until this time, s, or until the model ends the simulation; see [`has_ended`](Self::has_ended).
     ///
     /// # Errors
     /// Fails if the model rejects a step.
@@ -150,7 +150,7 @@ impl<M: Exported> Simulation<M> {
         let steps = ((until - begin) / self.step_size - 1e-9).ceil();
         for step in 1..=steps as u64 {
             let end = if step as f64 == steps { until } else { begin + step as f64 * self.step_size };
-            // A step may end early; the next step then begins there.
+            // A step may end early; the next step then begins at that time.
             while self.time() < end && !self.has_ended() {
                 let time = self.time();
                 self.instance.do_step_to(time, end - time)?;
@@ -170,7 +170,7 @@ impl<M: Exported> Simulation<M> {
         self.instance.has_ended()
     }
 
-    /// Returns the value of a variable.
+    /// Returns the value of a variable; for an array, the value of its first element.
     ///
     /// # Errors
     /// Fails if there is no such variable, or if its value is not finite.
@@ -178,10 +178,10 @@ impl<M: Exported> Simulation<M> {
         Ok(self.values(name)?.swap_remove(0))
     }
 
-    /// Returns the value of a number; 0 or 1 for a Boolean.
+    /// Returns the value of a variable as a number: 0 or 1 for a Boolean, the number of the item for an Enumeration.
     ///
     /// # Errors
-    /// Fails for the errors of [`value`](Self::value), and if the variable is not a number.
+    /// Fails for the same reasons as [`value`](Self::value), and if the variable is a String or a Binary.
     pub fn get(&mut self, name: &str) -> Result<f64, Error> {
         match self.value(name)? {
             Value::Real(value) => Ok(value),
@@ -204,7 +204,7 @@ impl<M: Exported> Simulation<M> {
         Ok(values)
     }
 
-    /// Serializes the state of the model: its variables and the fields that `memory` lists.
+    /// Serializes the state of the model: its variables, and the fields that `memory` in its table lists.
     ///
     /// # Errors
     /// Fails if the state cannot be saved.
@@ -219,7 +219,7 @@ impl<M: Exported> Simulation<M> {
     /// Restores a state that this or another simulation has saved.
     ///
     /// # Errors
-    /// Fails if the bytes are not a state of this model, or if the model rejects them.
+    /// Fails if the bytes are not a state of this model, or if the model rejects the state.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<&mut Self, Error> {
         let handle = self.instance.deserialize(bytes, 0)?;
         self.instance.restore(handle)?;
@@ -227,7 +227,7 @@ impl<M: Exported> Simulation<M> {
         Ok(self)
     }
 
-    /// Returns the messages since the last call, of the model and of the FMU.
+    /// Returns the messages of the model and of this crate since the last call.
     pub fn messages(&mut self) -> Vec<(Status, String)> {
         self.instance.logger.take().into_iter().map(|message| (message.status, message.message)).collect()
     }
@@ -243,7 +243,7 @@ fn variable<M: Variables>(index: u32) -> &'static Variable<M> {
     &M::TABLE[index as usize]
 }
 
-/// Returns the indices of a variable, an element, or all elements of an array.
+/// Returns the indices in the table of a variable, of one element of an array, or of all its elements.
 fn indices<M: Exported>(name: &str) -> Result<Vec<u32>, Error> {
     let of_name = |of: &Variable<M>| of.name() == name || of.length() > 1 && of.name_of_array() == name;
     let indices: Vec<u32> =

@@ -1,4 +1,4 @@
-//! The C symbols of a library: [`export_fmu!`](crate::export_fmu).
+//! [`export_fmu!`](crate::export_fmu), which defines the C symbols of a library.
 
 /// Exports a [`Model`](crate::Model) with its capabilities as an FMU. The library then contains the functions of FMI 2.0
 /// and of FMI 3.0.
@@ -17,13 +17,13 @@ macro_rules! export_fmu {
     };
 }
 
-/// Defines the symbols of the library for a model: the functions of both FMI versions, and the function that
-/// describes the model to fmu-package.
+/// Defines the symbols of the library for a model: the functions of both FMI versions, and the functions that
+/// fmu-package and the code around a WebAssembly module call.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! symbols {
     ($model:ty) => {
-        // The modules below use only this item of the author's crate, because other items there may have
+        // The modules below use only this item of the author's crate, because other items of the crate may have the
         // names of FMI types.
         #[doc(hidden)]
         #[allow(non_camel_case_types)]
@@ -66,7 +66,8 @@ macro_rules! symbols {
             }
         }
 
-        /// The C functions of FMI 3.0. C sources contain only FMI 2.0.
+        /// The C functions of FMI 3.0. They are absent in WebAssembly, because it is only used for FMI 2.0: in FMUs
+        /// with C sources and in pages.
         #[doc(hidden)]
         #[cfg(not(target_family = "wasm"))]
         #[allow(unsafe_code, non_snake_case, missing_docs, clippy::missing_safety_doc)]

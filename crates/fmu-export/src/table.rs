@@ -1,4 +1,5 @@
-//! The table of variables: [`variables!`](crate::variables) and the code that it generates.
+//! The table of variables: [`variables!`](crate::variables), the trait that it implements, and the functions that the
+//! generated code calls.
 
 use crate::filling::Filling;
 use crate::saved::StateVisitor;
@@ -9,8 +10,8 @@ use std::mem::MaybeUninit;
 /// The variables of a model. [`variables!`](crate::variables) implements it.
 ///
 /// # Safety
-/// Each offset that a function returns is the offset of a valid value of its type in this model in its
-/// current state. For a line without an offset, the function returns the argument for that case.
+/// Each offset that a function returns is the offset of a valid value of the stated type in this model, at the time
+/// of the call. If a line has no offset, the function returns the argument for that case.
 pub unsafe trait Variables: Sized + 'static {
     /// Names of the lines of the table.
     type Name: Copy + PartialEq + Debug + 'static;
@@ -19,8 +20,8 @@ pub unsafe trait Variables: Sized + 'static {
     #[doc(hidden)]
     const LINES: &'static [Variable<Self>];
 
-    /// The variables, with one entry for each element of an array. The index in this list is the value
-    /// reference in FMI 2.0.
+    /// The variables, with one entry for each element of an array. The index of an entry is its value reference in
+    /// FMI 2.0.
     const TABLE: &'static [Variable<Self>];
 
     /// Names of the lines.
@@ -41,7 +42,8 @@ pub unsafe trait Variables: Sized + 'static {
         index_of(Self::LINES, line.expect("the table has a line for each name"))
     }
 
-    /// Returns the name of the variable at an index of the table, and the number of the element.
+    /// Returns the name of the variable at an index of the table, and the number of the element in its array; 0 for a
+    /// scalar.
     #[doc(hidden)]
     #[inline]
     fn element(index: u32) -> (Self::Name, usize) {
@@ -52,22 +54,22 @@ pub unsafe trait Variables: Sized + 'static {
         (Self::NAMES[variable.line as usize], variable.element())
     }
 
-    /// Returns the offset of the `f64` that holds the value of a line, or `without` if reading needs a
-    /// calculation.
+    /// Returns the offset of the `f64` that is the value of a line, or `without` if reading the line needs a function
+    /// call.
     #[doc(hidden)]
     fn offset_to_read(&self, line: Index, without: usize) -> usize;
 
-    /// Returns the offset of the `f64` that setting a line writes to. The upper half holds the offset of the
-    /// `bool` that becomes true then, or `no_mark`. Returns `without` if setting a line needs a function
-    /// call.
+    /// Returns two offsets: in the lower half, the offset of the `f64` to which setting a line writes; in the upper
+    /// half, the offset of the `bool` that then becomes true, or `no_mark` if there is none. Returns `without` if
+    /// setting the line needs a function call.
     #[doc(hidden)]
     fn offsets_to_set(&mut self, line: Index, no_mark: usize, without: u64) -> u64;
 
-    /// Visits the memory of the model: the values that are not variables.
+    /// Visits the values in the model's `memory`, which are not variables.
     #[doc(hidden)]
     fn visit_memory(&mut self, visitor: &mut dyn StateVisitor);
 
-    /// Copies the memory of another model, then all its values that are stored in fields of the table.
+    /// Copies the memory of another model, and all its values that are in fields of the table.
     #[doc(hidden)]
     fn copy_values(&mut self, from: &Self);
 
@@ -82,8 +84,8 @@ pub unsafe trait Variables: Sized + 'static {
 }
 
 impl<M: Variables> Variable<M> {
-    /// Returns the variables in [`depends_on`](Self::depends_on) as indices in the table, without
-    /// [`Index::TIME`]; of an array all elements.
+    /// Returns the variables in [`depends_on`](Self::depends_on) as indices in the table, except [`Index::TIME`]. An
+    /// array is represented by all its elements. Returns `None` for a variable without `depends_on`.
     pub fn dependencies(&self) -> Option<impl Iterator<Item = u32> + use<M>> {
         let indices = |known: &Index| {
             let line = known.0;
@@ -98,8 +100,8 @@ impl<M: Variables> Variable<M> {
         self.read.as_ref().map(|read| (read.real)(model, self.number()))
     }
 
-    /// Reads the scalar, or elements of the array from this element on, as many as `values` holds. Returns 0
-    /// if all values are finite.
+    /// Fills `values` with elements of the array, beginning with this one, or with the scalar. Returns 0 if all
+    /// values are finite, otherwise NaN.
     pub(crate) fn reals(&self, model: &M, time: f64, values: &mut [MaybeUninit<f64>]) -> f64 {
         if let Some(Read { reals: Some(reals), .. }) = self.read {
             return reals(model, self.number(), values);
@@ -114,14 +116,15 @@ impl<M: Variables> Variable<M> {
         }
     }
 
-    /// Returns the number of the element; a constant for models without arrays.
+    /// Returns the number of the element. In models without arrays it is the constant 0, so that the compiler can
+    /// simplify the code.
     #[inline(always)]
     fn number(&self) -> usize {
         if M::ARRAYS { self.element() } else { 0 }
     }
 }
 
-/// A continuous-time state.
+/// A continuous-time state: its index in the table, and the index of its derivative.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct StateOfTable {
@@ -144,7 +147,7 @@ const fn is_array<M>(variable: &Variable<M>) -> bool {
     !variable.dimensions().is_empty()
 }
 
-/// Returns the number of variables before a line.
+/// Returns the number of entries of the table before a line.
 const fn index_of<M>(lines: &[Variable<M>], line: usize) -> usize {
     let (mut index, mut before) = (0, 0);
     while before < line {
@@ -154,14 +157,14 @@ const fn index_of<M>(lines: &[Variable<M>], line: usize) -> usize {
     index
 }
 
-/// Returns the number of variables of the lines; each element of an array counts.
+/// Returns the number of entries of the table; each element of an array counts.
 #[doc(hidden)]
 pub const fn count_elements<M>(lines: &[Variable<M>]) -> usize {
     index_of(lines, lines.len())
 }
 
-// The compiler interprets the following functions, and a call of a generic function takes it a microsecond, so the code
-// for each element of an array has few calls.
+// The compiler interprets the following functions, and takes a microsecond for each call of a generic function. So
+// the code that runs for each element of an array contains few calls.
 
 /// Returns the total length in bytes of the names of all array elements.
 #[doc(hidden)]
@@ -169,7 +172,7 @@ pub const fn count_letters<M>(lines: &[Variable<M>]) -> usize {
     let (mut count, mut line) = (0, 0);
     while line < lines.len() {
         let (sizes, length) = (lines[line].dimensions(), lines[line].length());
-        // A bracket or a comma before each index, and a bracket after the last.
+        // Each index follows a bracket or a comma, and a bracket follows the last index.
         if !sizes.is_empty() {
             count += length * (lines[line].name_of_array().len() + sizes.len() + 1);
         }
@@ -183,7 +186,7 @@ pub const fn count_letters<M>(lines: &[Variable<M>]) -> usize {
     count
 }
 
-/// Returns the number of digits of all numbers from 1 to `last`.
+/// Returns the total number of digits of all numbers from 1 to `last`.
 const fn count_digits_up_to(last: usize) -> usize {
     let (mut count, mut digits, mut first) = (0, 1, 1);
     while first <= last {
@@ -213,8 +216,9 @@ pub const fn write_names<M, const LETTERS: usize>(lines: &[Variable<M>]) -> [u8;
     letters
 }
 
-/// Writes the name of an array element: the name of the array with indices that count from 1 (section 2.2.9 of FMI
-/// 2.0). Indices follow the variable, as in `der(T[3])`. Returns the index after it.
+/// Writes the name of an array element into `letters`, beginning at `at`: the name of the array with indices that
+/// count from 1 (section 2.2.9 of FMI 2.0). In the name of a derivative, the indices follow the name of the variable,
+/// as in `der(T[3])`. Returns the index after the last letter.
 const fn write_name(
     name: &[u8],
     sizes: &[usize],
@@ -255,7 +259,7 @@ const fn write_name(
     at
 }
 
-/// Returns the index of the element in a direction, counted from 1.
+/// Returns the index of an element in one dimension, counted from 1.
 const fn index_in(sizes: &[usize], element: usize, direction: usize) -> usize {
     let (mut row, mut inner) = (1, direction + 1);
     while inner < sizes.len() {
@@ -279,7 +283,8 @@ const fn length_of_name(name: &str, sizes: &[usize], element: usize) -> usize {
     length
 }
 
-/// Returns the table of variables; the names of array elements are slices of the result of [`write_names`].
+/// Returns the table of variables. `letters` is the result of [`write_names`]; the names of array elements are slices
+/// of it.
 #[doc(hidden)]
 pub const fn spread<M, const COUNT: usize>(
     lines: &[Variable<M>],
@@ -309,7 +314,7 @@ pub const fn spread<M, const COUNT: usize>(
     table.filled()
 }
 
-/// Returns the number of states of the lines; each element of an array counts.
+/// Returns the number of states; each element of an array counts.
 #[doc(hidden)]
 pub const fn count_states<M>(lines: &[Variable<M>]) -> usize {
     let (mut count, mut line) = (0, 0);
@@ -322,7 +327,8 @@ pub const fn count_states<M>(lines: &[Variable<M>]) -> usize {
     count
 }
 
-/// Returns the `N` states of the lines. The derivative of an array is searched once.
+/// Returns the `N` states. Searches for the derivative once for each line, because a search for each element would be
+/// slow.
 #[doc(hidden)]
 pub const fn find_states<M, const N: usize>(lines: &[Variable<M>]) -> [StateOfTable; N] {
     let mut states = [StateOfTable { state: 0, derivative: 0 }; N];
@@ -347,7 +353,7 @@ pub const fn find_states<M, const N: usize>(lines: &[Variable<M>]) -> [StateOfTa
     states
 }
 
-/// Returns the line that is the derivative of a line.
+/// Returns the number of the line that is the derivative of the line `state`.
 const fn derivative<M>(lines: &[Variable<M>], state: u32) -> Option<u32> {
     let mut line = 0;
     while line < lines.len() {
@@ -359,7 +365,7 @@ const fn derivative<M>(lines: &[Variable<M>], state: u32) -> Option<u32> {
     None
 }
 
-/// Rejects an invalid line. The error points at the line in the author's file.
+/// Ends the compilation if a line is invalid. The compiler's message then refers to the line in the author's file.
 #[doc(hidden)]
 #[track_caller]
 pub const fn check_line<M>(lines: &[Variable<M>], Index(line): Index) {
@@ -367,7 +373,8 @@ pub const fn check_line<M>(lines: &[Variable<M>], Index(line): Index) {
     if let Some(fault) = of.fault() {
         reject(of.name(), fault);
     }
-    // Section 2.2.7 of FMI 2.0. The compiler checks only names that are identifiers, not names that are strings.
+    // Names must be unique (section 2.2.7 of FMI 2.0). The compiler checks this only for identifiers, and not for
+    // names that are strings.
     let mut other = 0;
     while other < lines.len() {
         if other < line as usize && has_name(of, &lines[other]) || is_element(of, &lines[other]) {
@@ -392,7 +399,7 @@ const fn has_name<M>(one: &Variable<M>, other: &Variable<M>) -> bool {
     is_equal(one.name().as_bytes(), other.name().as_bytes())
 }
 
-/// Returns whether a variable has the name of an element of the array.
+/// Returns whether `one` has the name of an element of `array`.
 const fn is_element<M>(one: &Variable<M>, array: &Variable<M>) -> bool {
     let name = one.name().as_bytes();
     let (mut index, mut has_index) = (0, false);
@@ -423,45 +430,45 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
     index == one.len() && index == other.len()
 }
 
-/// Defines a model's table of variables: the kind of each variable, and the field or calculation of its
-/// value.
+/// Defines a model's table of variables. Each line contains the kind of a variable, and the field or the calculation
+/// of its value.
 ///
 /// ```text
-/// variables! { for Model, names Name, memory in PLACE, ...;  // both if you like, and there is any
+/// variables! { for Model, names Name, memory in PLACE, ...;  // `names` and `memory` are optional
 ///     /// Description that importers show
-///     name = KIND(&TYPE).refinement() in PLACE;              // lives in a field of the model
-///     name = KIND(&TYPE) in PLACE then PLACE;                // and this bool becomes true when it is set
-///     name = KIND(&TYPE) in PLACE then |model| { ... };      // and this is done after it was set
-///     name = KIND(&TYPE) by |model| ...;                     // is calculated when it is read
-///     name = KIND(&TYPE) from PLACE;                         // is read where Model::calculate has left it
-///     name as "any text" = KIND(&TYPE) in PLACE by |model| ...;  // is set there, and read like this
+///     name = KIND(&TYPE).refinement() in PLACE;              // the value is a field of the model
+///     name = KIND(&TYPE) in PLACE then PLACE;                // setting it also sets a bool to true
+///     name = KIND(&TYPE) in PLACE then |model| { ... };      // the block runs after the value was set
+///     name = KIND(&TYPE) by |model| ...;                     // the value is calculated when it is read
+///     name = KIND(&TYPE) from PLACE;                         // Model::calculate writes the value to a field
+///     name as "any text" = KIND(&TYPE) in PLACE by |model| ...;  // set in a field, but calculated when it is read
 /// }
 /// ```
 ///
 /// A kind is a function of [`Variable`]: `input`, `output`, `local`, `parameter`, `calculated_parameter`,
-/// `independent`. A refinement is one of its methods; its arguments name other variables by their names in
-/// the table. A PLACE is a path of fields, such as `motors[0].theta`. Start values are the values in
-/// the model that [`Model::new`](crate::Model::new) returns.
+/// `independent`. A refinement is one of its methods; its arguments name other variables by their names in the table.
+/// A PLACE is a path of fields, such as `motors[0].theta`. The start values are the values in the model that
+/// [`Model::new`](crate::Model::new) returns.
 ///
-/// Both `names` and `memory` are optional. Access to a Real needs no function call if its place is an `f64`
-/// in a path of fields and array elements, without a block after `then`. A path through a `Box`, a `Vec` or
-/// an `Index` needs a call.
+/// Access to a Real is fastest if its place is an `f64` in a path of fields and array elements, and if there is no
+/// block after `then`: no function call is needed then. A path through a `Box`, a `Vec` or an implementation of
+/// `Index` needs a call.
 ///
-/// If the value is an array, in a place or calculated, the line is an array: `[f64; 8]`, or `[[f64; 2]; 3]`
-/// as a matrix, row by row. FMI 3.0 has one variable for an array. FMI 2.0 has a scalar for each element,
-/// `T[1]` to `T[8]`. Start values, ranges and errors refer to elements. `then` follows the setting of each
-/// element. `by` returns the whole array, which is calculated once for elements that are read together. The
-/// derivative of an array is an array of the same length. A variable that depends on an array depends on all
-/// its elements. With arrays, all names must follow the structured naming convention (section 2.2.9 of FMI
-/// 2.0), for example `motor.current`, `axes[1].angle`, `'any text'`.
+/// If the type of the value is an array, such as `[f64; 8]`, the variable is an array; `[[f64; 2]; 3]` is a matrix,
+/// row by row. FMI 3.0 has one variable for an array, but FMI 2.0 has a scalar for each element, `T[1]` to `T[8]`.
+/// Start values, ranges and errors refer to single elements, and `then` is carried out after each element is set.
+/// `by` returns the whole array; it is calculated only once for elements that are read together. The derivative of an
+/// array is an array of the same dimensions. A variable that depends on an array depends on all its elements. If a
+/// table contains an array, all its names must follow the structured naming convention (section 2.2.9 of FMI 2.0),
+/// for example `motor.current`, `axes[1].angle`, `'any text'`.
 ///
-/// A serialized state contains all places and the `memory`; see [`Saved`](crate::Saved). It must contain all
-/// values that `initialize`, a step or an event changes. `build_fmu` of fmu-package rejects models in which a
-/// value is missing.
+/// A serialized state consists of the fields after `in` and the `memory`; see [`Saved`](crate::Saved). List in
+/// `memory` all other values that `initialize`, a step or an event changes. `build_fmu` of fmu-package rejects models
+/// in which such a value is missing.
 ///
 /// The macro implements [`Variables`] for the model. It also defines an enum with the names of the lines, for
-/// [`Partials`](crate::Partials) and other capabilities. The enum is called `Name`, or as given after
-/// `names`, for example if a module has two models. [`Variables::index`] returns the index of a name in the
+/// [`Partials`](crate::Partials) and other capabilities. The enum is called `Name`, unless `names` gives it another
+/// name, which is necessary if a module contains two models. [`Variables::index`] returns the index of a name in the
 /// table.
 ///
 /// ```
@@ -510,8 +517,8 @@ macro_rules! variables {
         const _: () = {
             #[allow(non_upper_case_globals, non_camel_case_types, unused)]
             mod index {
-                // Not called `Name`: a module cannot use items of a function, and the macro may be called in
-                // a function.
+                // A separate enum instead of `Name`: the macro may be called in a function, and this module cannot
+                // access items of a function.
                 #[repr(u32)]
                 enum Place { $( $name ),+ }
 
@@ -519,8 +526,9 @@ macro_rules! variables {
             }
 
             $(
-                // A function with the name of the kind makes the compiler point at the author's line. Tokens
-                // keep their position in the author's file at their first use in a macro.
+                // The function has the name of the kind, for example `input`, so that the compiler's message refers
+                // to the author's line: tokens keep their position in the author's file at their first use in a
+                // macro.
                 #[allow(long_running_const_eval, clippy::needless_borrows_for_generic_args)]
                 const _: () = {
                     #[track_caller]
@@ -543,8 +551,9 @@ macro_rules! variables {
                             @refined [$crate::Variable::<$model>::$kind $of] $( . $refinement $arguments )*
                         )
                     };
-                    // Bound to its own name, a field lets the compiler point at the author's line. The function hides
-                    // constants of this name, which cannot be bound.
+                    // Below, each field is bound to a variable of its own name, so that the compiler's messages refer
+                    // to the author's line. The function hides any constant of this name, which would be a pattern in
+                    // a `match` and not a variable.
                     $( #[allow(dead_code)] fn $first() {} )?
                     $(
                         let variable = variable.stored(
@@ -694,8 +703,8 @@ macro_rules! variables {
     };
     (@names [] $($variants:tt)+) => { $crate::variables! { @names [Name] $($variants)+ } };
     (@names [$names:ident] $($variants:tt)+) => {
-        /// Names of the variables: the identifiers at the start of the lines of `variables!`, which defines
-        /// this enum. `names` in `variables!` sets the name of the enum.
+        /// Names of the variables: the identifiers at the start of the lines of `variables!`, which generates this
+        /// enum. `names` in `variables!` sets the name of the enum.
         #[allow(non_camel_case_types)]
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u32)]

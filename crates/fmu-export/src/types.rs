@@ -22,7 +22,7 @@ pub struct Item {
     pub description: &'static str,
 }
 
-/// The type of a variable; if it has a name, it becomes a type definition.
+/// The type of a variable. If it has a name, it becomes a type definition in the model description.
 ///
 /// ```
 /// use fmu_export::{Type, units};
@@ -34,13 +34,13 @@ pub struct Item {
 pub struct Type {
     /// Name, different from the names of all variables; empty for a type without definition.
     pub name: &'static str,
-    /// Attributes other than the name.
+    /// Attributes, which depend on the base type.
     pub attributes: Attributes,
     /// FMI base type.
     pub base: BaseType,
 }
 
-/// Attributes of a type other than its name.
+/// Attributes of a type that depend on its base type.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Attributes {
@@ -89,12 +89,13 @@ pub const INTEGER: Type = Type::integer("");
 pub const BOOLEAN: Type = Type { name: "", attributes: Attributes::Boolean, base: BaseType::Boolean };
 /// A string.
 pub const STRING: Type = Type { name: "", attributes: Attributes::String, base: BaseType::String };
-/// Bytes of any meaning.
+/// A binary value of any kind.
 pub const BINARY: Type = Type::binary("", "application/octet-stream");
 
 impl Type {
-    /// Creates the type of a physical quantity of this name in this unit, without range and nominal value.
-    /// [`quantity`](Self::quantity) sets a quantity that differs from the name of the type.
+    /// Creates the type of a physical quantity in this unit. `name` is the name of the type and of the quantity,
+    /// unless [`quantity`](Self::quantity) sets another quantity. The type has no range and no nominal value at
+    /// first.
     pub const fn real(name: &'static str, unit: &'static Unit) -> Self {
         let attributes = Attributes::Real { quantity: name, unit, min: None, max: None, nominal: None };
         Self { name, attributes, base: BaseType::Real }
@@ -110,14 +111,14 @@ impl Type {
         Self::whole(name, BaseType::Integer)
     }
 
-    /// Creates an integer type of a certain base type, such as [`BaseType::UInt16`].
+    /// Creates an integer type with another base type than `i32`, such as [`BaseType::UInt16`].
     #[track_caller]
     pub const fn whole(name: &'static str, base: BaseType) -> Self {
         let Some((min, max)) = base.range() else { panic!("the base type is not an integer type") };
         Self { name, attributes: Attributes::Integer { min, max }, base }
     }
 
-    /// Creates a binary type with a MIME type and at most 1 MiB.
+    /// Creates a binary type with this MIME type. Its values may have up to 1 MiB.
     pub const fn binary(name: &'static str, mime_type: &'static str) -> Self {
         let attributes = Attributes::Binary { mime_type, max_size: 1 << 20 };
         Self { name, attributes, base: BaseType::Binary }
@@ -128,7 +129,8 @@ impl Type {
         Self { name, attributes: Attributes::Enumeration(items), base: BaseType::Enumeration }
     }
 
-    /// Sets the quantity of a Real type if it differs from the name: `Velocity` for a type `Speed`.
+    /// Sets the quantity of a Real type if it differs from the name of the type, for example `Velocity` for a type
+    /// `Speed`.
     #[must_use]
     #[track_caller]
     pub const fn quantity(mut self, name: &'static str) -> Self {
@@ -192,7 +194,7 @@ impl Type {
         self
     }
 
-    /// Sets the largest number of bytes, at most 1 MiB.
+    /// Sets the largest number of bytes of a binary type, at most 1 MiB.
     #[must_use]
     #[track_caller]
     pub const fn max_size(mut self, largest: usize) -> Self {
@@ -223,7 +225,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_quantity_differs_from_the_name() {
+    fn a_quantity_may_differ_from_the_name() {
         let width = Type::real("Length", &units::ONE).quantity("Width");
         assert!(matches!(width.attributes, Attributes::Real { quantity: "Width", .. }));
         assert_eq!(width.name, "Length");

@@ -1,5 +1,5 @@
-//! Units (section 2.2.2 of FMI 2.0, 2.4.3 of FMI 3.0), and constants for mechanics, ready to use in a
-//! [`Type`](crate::Type). The display unit of angles is the degree.
+//! Units (section 2.2.2 of FMI 2.0, 2.4.3 of FMI 3.0), and constants for the most frequent units of mechanics, for
+//! use in a [`Type`](crate::Type). The display unit of angles is the degree.
 
 use std::f64::consts::PI;
 
@@ -22,7 +22,8 @@ pub struct Unit {
     pub display: Option<DisplayUnit>,
 }
 
-/// Exponents of the base units; a value in them is `factor * value + offset`.
+/// A unit in terms of base units: their exponents, and the conversion of a value to base units, `factor * value +
+/// offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(non_snake_case, reason = "the symbols of the units")]
 pub struct BaseUnit {
@@ -42,7 +43,7 @@ pub struct BaseUnit {
     pub cd: i32,
     /// Exponent of the radian.
     pub rad: i32,
-    /// Factor by which a value in the unit is multiplied.
+    /// Factor by which a value in this unit is multiplied.
     pub factor: f64,
     /// Offset that is added after the multiplication.
     pub offset: f64,
@@ -63,7 +64,7 @@ pub struct DisplayUnit {
 macro_rules! exponents {
     ($($unit:ident)+) => {
         $(
-            #[doc = concat!("With this exponent of ", stringify!($unit), ".")]
+            #[doc = concat!("Sets the exponent of ", stringify!($unit), ".")]
             #[allow(non_snake_case, reason = "the symbols of the units")]
             #[must_use]
             pub const fn $unit(mut self, exponent: i32) -> Self {
@@ -84,14 +85,14 @@ impl Unit {
 
     exponents!(kg m s A K mol cd rad);
 
-    /// Sets the factor to the base units.
+    /// Sets the factor of the conversion to base units.
     #[must_use]
     pub const fn factor(mut self, factor: f64) -> Self {
         self.base.factor = factor;
         self
     }
 
-    /// Sets the offset, in base units.
+    /// Sets the offset of the conversion to base units.
     #[must_use]
     pub const fn offset(mut self, offset: f64) -> Self {
         self.base.offset = offset;
@@ -136,9 +137,9 @@ pub const N_M_S_PER_RAD: Unit =
 mod tests {
     use super::*;
 
-    /// Checks a right angle, and a stiffness of 1 N m per degree.
+    /// Converts a right angle, and a stiffness of 1 N m per degree.
     #[test]
-    fn people_see_degrees() {
+    fn angles_are_displayed_in_degrees() {
         let shown =
             |unit: Unit, value: f64| unit.display.map(|display| display.factor * value + display.offset);
         assert_eq!(shown(RAD, PI / 2.0), Some(90.0));

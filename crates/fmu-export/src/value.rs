@@ -5,8 +5,8 @@ use crate::types::Item;
 use fmi_abi::{BaseType, Value};
 
 /// A Rust type that can hold a variable's value: `f64`, `i32`, `bool`, `String`, or an enum made by
-/// [`enumeration!`](crate::enumeration). The types `f32`, `i8` to `u64` other than `i32`, and `Vec<u8>` are
-/// possible only for FMI 3.0.
+/// [`enumeration!`](crate::enumeration). Models with `f32`, `Vec<u8>` or an integer type other than `i32` can be
+/// exported only for FMI 3.0.
 pub trait Scalar: Saved {
     /// FMI base type.
     const BASE: BaseType;
@@ -14,17 +14,17 @@ pub trait Scalar: Saved {
     /// Returns the value.
     fn value(&self) -> Value;
 
-    /// Sets a value of the right type. Ignores impossible values; this crate has rejected them before.
+    /// Sets a value of the right type. Ignores impossible values, because this crate has rejected them before.
     fn assign(&mut self, value: &Value);
 
-    /// Returns the [`value`](Self::value) of a Real; NaN for all other types. Numeric types override it to
-    /// avoid the conversion.
+    /// Returns the [`value`](Self::value) of a Real; NaN for all other types. `f64` overrides it to avoid the
+    /// conversion.
     #[inline]
     fn real(&self) -> f64 {
         self.value().real()
     }
 
-    /// [Sets](Self::assign) the value of a Real. Numeric types override it to avoid the conversion.
+    /// [Sets](Self::assign) the value of a Real. `f64` overrides it to avoid the conversion.
     #[inline]
     fn set_real(&mut self, value: f64) {
         self.assign(&Value::Real(value));
@@ -53,10 +53,10 @@ pub trait Place: Saved {
     /// Number of elements in each dimension.
     const DIMENSIONS: Dimensions;
 
-    /// Returns an element, counted from 0, row by row; element 0 of a scalar is the scalar.
+    /// Returns an element. Elements count from 0, row by row; a scalar is its element 0.
     fn element(&self, number: usize) -> &Self::Element;
 
-    /// Returns an element as mutable reference; see [`element`](Self::element).
+    /// Returns an element as a mutable reference; see [`element`](Self::element).
     fn element_mut(&mut self, number: usize) -> &mut Self::Element;
 
     /// Returns a reference to the number if the type is `f64`.
@@ -99,7 +99,7 @@ impl<T: Place, const N: usize> Place for [T; N] {
     }
 }
 
-/// The sizes of an array, the length of a row last; empty for a scalar.
+/// Sizes of an array in each dimension; the last is the length of a row. Empty for a scalar.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Dimensions {
@@ -245,14 +245,14 @@ pub trait Enumeration: Copy + 'static {
     /// Items, in the order of declaration.
     const ITEMS: &'static [Item];
 
-    /// Returns the value with this number.
+    /// Returns the value with this number; `None` if there is none.
     fn from_number(number: i32) -> Option<Self>;
 
     /// Returns the number of the value.
     fn number(self) -> i32;
 }
 
-/// Implements [`Saved::visit`] for [`enumeration!`](crate::enumeration).
+/// Implements [`Saved::visit`] for the enums of [`enumeration!`](crate::enumeration).
 #[doc(hidden)]
 pub fn visit_enumeration<T: Enumeration>(value: &mut T, visitor: &mut dyn StateVisitor) {
     let mut number = i64::from(value.number());

@@ -11,13 +11,13 @@ use fmi_abi::{Causality, Initial, Variability};
 use std::marker::PhantomData;
 use std::mem::MaybeUninit;
 
-/// Line of a variable in the table. Authors write the name of the variable; see
+/// Number of a line in the table of variables. Authors write the name of the variable instead; see
 /// [`variables!`](crate::variables).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Index(#[doc(hidden)] pub u32);
 
 impl Index {
-    /// The time, even if it is not a variable of the table; for [`depends_on`](Variable::depends_on).
+    /// The time, for [`depends_on`](Variable::depends_on). The table need not contain it.
     pub const TIME: Self = Self(u32::MAX);
 }
 
@@ -25,10 +25,11 @@ impl Index {
 /// one entry per element.
 pub struct Variable<M> {
     name: &'static str,
-    /// Name of the array for an element of an array; otherwise equal to `name`.
+    /// For an element of an array, the name of the array; otherwise equal to `name`.
     name_of_line: &'static str,
-    /// Line of the variable. `element` is the number of the element in an array.
+    /// Number of the line in the table.
     pub(crate) line: u32,
+    /// Number of the element in its array, counted from 0; 0 for a scalar.
     element: u32,
     dimensions: Dimensions,
     description: &'static str,
@@ -38,22 +39,22 @@ pub struct Variable<M> {
     of: &'static Type,
     /// Base type of `of`; a copy for speed.
     base: BaseType,
-    /// Line of the state; in the table, the index of the state.
+    /// In a line, the number of the state's line; in an entry of the table, the index of the state.
     derivative_of: Option<Index>,
     pub(crate) depends_on: Option<&'static [Index]>,
     state: bool,
     reinit: bool,
     /// Modes in which the importer may set this variable; derived from the other fields.
     pub(crate) settable: AllowedStates,
-    /// Modes in which setting a Real stores the value without further checks; none for other variables.
+    /// Modes in which setting a Real stores any finite value without further checks; none for other variables.
     pub(crate) takes_reals: AllowedStates,
-    /// Modes in which setting only writes the field and the `bool` after `then`, once the model has started.
+    /// Modes in which setting a Real only writes the field and the `bool` after `then`, once the model has started.
     pub(crate) takes_fast: AllowedStates,
-    /// Whether setting it has no side effect except the `bool` after `then`.
+    /// Whether setting the variable has no side effect except on the `bool` after `then`.
     plain: bool,
     pub(crate) read: Option<Read<M>>,
     pub(crate) store: Option<Store<M>>,
-    /// A fault that is known before the line is complete.
+    /// A fault that a method has found; [`fault`](Self::fault) reports it when the line is complete.
     rejected: Option<&'static str>,
 }
 
@@ -86,17 +87,17 @@ macro_rules! functions {
 }
 
 functions! {
-    /// Functions that read a value: an element of an array, or element 0 of a scalar. `reals` fills the slice,
-    /// starting at an element; it returns 0 if all values are finite. Only arrays have it, because each function
-    /// adds to the size of a library.
+    /// Functions that read the element with a number; a scalar is its element 0. `reals` fills a slice with the
+    /// elements from this number on, and returns 0 if all values are finite. Only arrays have it, because each
+    /// function adds to the size of a library.
     Read {
         real: fn(&M, usize) -> f64,
         reals: Option<fn(&M, usize, &mut [MaybeUninit<f64>]) -> f64>,
         value: fn(&M, usize) -> Value
     }
 
-    /// Functions that set an element in the model, and visit the value for a serialized state. An array is
-    /// visited as a whole.
+    /// Functions that set the element with a number. `visit` passes the whole field to a visitor of serialized
+    /// states.
     Store {
         real: fn(&mut M, usize, f64),
         value: fn(&mut M, usize, &Value),
@@ -140,7 +141,7 @@ impl<M> Variable<M> {
         }
     }
 
-    /// Creates a variable that is continuous if it is a Real, otherwise discrete.
+    /// Creates a variable that is continuous if it is a floating-point number, otherwise discrete.
     const fn moving(causality: Causality, of: &'static Type) -> Self {
         let variability = match of.base() {
             base if base.is_float() => Variability::Continuous,
@@ -149,19 +150,19 @@ impl<M> Variable<M> {
         Self::new(causality, variability, of)
     }
 
-    /// Creates an input; continuous if it is a Real, otherwise discrete.
+    /// Creates an input; continuous if it is a Real or Float32, otherwise discrete.
     pub const fn input(of: &'static Type) -> Self {
         Self::moving(Causality::Input, of)
     }
 
-    /// Creates an output that the model calculates; continuous if it is a Real, otherwise discrete.
+    /// Creates an output that the model calculates; continuous if it is a Real or Float32, otherwise discrete.
     pub const fn output(of: &'static Type) -> Self {
         let mut variable = Self::moving(Causality::Output, of);
         variable.initial = Some(Initial::Calculated);
         variable
     }
 
-    /// Creates a local variable that the model calculates; continuous if it is a Real, otherwise discrete.
+    /// Creates a local variable that the model calculates; continuous if it is a Real or Float32, otherwise discrete.
     pub const fn local(of: &'static Type) -> Self {
         let mut variable = Self::moving(Causality::Local, of);
         variable.initial = Some(Initial::Calculated);
@@ -175,7 +176,7 @@ impl<M> Variable<M> {
         variable
     }
 
-    /// Creates a calculated parameter, which depends on fixed parameters.
+    /// Creates a calculated parameter: the model calculates it from fixed parameters.
     pub const fn calculated_parameter(of: &'static Type) -> Self {
         let mut variable = Self::new(Causality::CalculatedParameter, Variability::Fixed, of);
         variable.initial = Some(Initial::Calculated);
@@ -203,8 +204,8 @@ impl<M> Variable<M> {
         variable
     }
 
-    /// Creates the independent variable, the time. It has neither `in` nor `by`: its value is the instance's
-    /// time.
+    /// Creates the independent variable, the time. Its line has neither `in` nor `by`, because its value is the time
+    /// of the instance.
     pub const fn independent(of: &'static Type) -> Self {
         Self::new(Causality::Independent, Variability::Continuous, of)
     }
@@ -224,25 +225,25 @@ impl<M> Variable<M> {
         self
     }
 
-    /// Makes a parameter tunable, or a variable that depends on tunable parameters.
+    /// Makes a parameter tunable, or makes a calculated variable change only with tunable parameters.
     #[must_use]
     pub const fn tunable(mut self) -> Self {
         self.variability = Variability::Tunable;
         self
     }
 
-    /// Makes a Real discrete: it changes only at events or communication points.
+    /// Makes a continuous variable discrete: it changes only at events or communication points.
     #[must_use]
     pub const fn discrete(mut self) -> Self {
         self.variability = Variability::Discrete;
         self
     }
 
-    /// Makes an output or local variable a continuous-time state with an exact start value.
-    /// [`calculated`](Self::calculated) replaces the exact start value.
+    /// Makes an output or local variable a continuous-time state. Its start value is exact, unless
+    /// [`calculated`](Self::calculated) follows.
     ///
-    /// A state has a field in the model (`in`), which holds the value that was set or that the last step
-    /// calculated.
+    /// A state needs a field in the model (`in`). The field contains the value that was set last or that the last
+    /// step calculated.
     #[must_use]
     pub const fn state(mut self) -> Self {
         self.state = true;
@@ -263,10 +264,10 @@ impl<M> Variable<M> {
         self
     }
 
-    /// Marks a state whose start value the model calculates. After each value that is set,
-    /// [`calculate_start`](crate::Model::calculate_start) updates it, until the first step, until the
-    /// importer sets states, or until Continuous-Time Mode. Its [`depends_on`](Self::depends_on) lists the
-    /// variables that an importer can set instead.
+    /// Marks a state whose start value the model calculates. Whenever a value is set,
+    /// [`calculate_start`](crate::Model::calculate_start) updates it, until the first step, until the importer sets
+    /// states, or until Continuous-Time Mode. An importer that tries to set the start value gets an error, which
+    /// names the variables in [`depends_on`](Self::depends_on) as those to set instead.
     #[must_use]
     pub const fn calculated(mut self) -> Self {
         self.initial = Some(Initial::Calculated);
@@ -280,29 +281,28 @@ impl<M> Variable<M> {
         self
     }
 
-    /// Makes an output or local variable the time derivative of another variable. An input cannot be one,
-    /// because importers assume that a derivative belongs to a state.
+    /// Makes an output or local variable the time derivative of another variable. An input cannot be a derivative,
+    /// because importers assume that each derivative belongs to a state.
     #[must_use]
     pub const fn derivative_of(mut self, of: Index) -> Self {
         self.derivative_of = Some(of);
         self
     }
 
-    /// Lists the only inputs, states, parameters and start values on which an output or local variable
-    /// depends. In the table, write `depends_on(u, x)` or `depends_on(&[u, x])`; for no dependencies,
-    /// `depends_on(&[])`.
+    /// Lists all inputs, states, parameters and start values on which an output or local variable depends. In the
+    /// table, write `depends_on(u, x)` or `depends_on(&[u, x])`; if it depends on none, write `depends_on(&[])`.
     ///
-    /// The list contains direct dependencies (section 2.2.8 of FMI 2.0), at a communication point or instant and in
-    /// Initialization Mode. An output that reacts to an input only through a step or a state does not depend
-    /// on that input. The time, a known in FMI 3.0, is [`Index::TIME`]. Without a list, the variable depends
-    /// on all knowns; see [`Info::smooth`](crate::Info::smooth).
+    /// The list contains only direct dependencies (section 2.2.8 of FMI 2.0): the variables whose values change the
+    /// result at the same instant, or in Initialization Mode. An output that reacts to an input only through a step
+    /// or a state does not depend on that input. The time, which FMI 3.0 counts as a known, is [`Index::TIME`]. A
+    /// variable without a list is taken to depend on all knowns; see [`Info::smooth`](crate::Info::smooth).
     #[must_use]
     pub const fn depends_on(mut self, knowns: &'static [Index]) -> Self {
         self.depends_on = Some(knowns);
         self
     }
 
-    /// Called by the macro; sets the functions for a value in a field of the model.
+    /// Sets the functions that access a value in a field of the model. The macro calls it.
     #[doc(hidden)]
     pub const fn stored(mut self, shape: Shape, read: Read<M>, store: Store<M>, plain: bool) -> Self {
         self.plain = plain;
@@ -310,7 +310,7 @@ impl<M> Variable<M> {
         self.read_by(shape, read)
     }
 
-    /// Called by the macro; sets the functions for a value that is calculated.
+    /// Sets the functions that read a calculated value. The macro calls it.
     #[doc(hidden)]
     pub const fn read_by(mut self, shape: Shape, mut read: Read<M>) -> Self {
         if shape.base as u8 != self.base as u8 {
@@ -326,7 +326,8 @@ impl<M> Variable<M> {
         self
     }
 
-    /// Called by the macro last; sets name and description.
+    /// Sets the name and the description, and derives the modes in which the variable may be set. The macro calls it
+    /// last.
     #[doc(hidden)]
     pub const fn finished(mut self, name: &'static str, description: &'static str) -> Self {
         self.name = name;
@@ -336,8 +337,8 @@ impl<M> Variable<M> {
         self.settable =
             settable(self.causality, self.variability, self.initial, self.state, self.reinit, real);
         if real && !matches!(self.causality, Causality::Parameter) {
-            // A rejected start value must be recorded, so setting start values needs further checks.
-            self.takes_reals = self.settable.without(crate::settable::STARTING);
+            // Excludes the modes in which start values are set, because a rejected start value must be recorded.
+            self.takes_reals = self.settable.without(crate::settable::START_VALUE_MODES);
             if self.plain {
                 self.takes_fast = self.takes_reals;
             }
@@ -345,8 +346,8 @@ impl<M> Variable<M> {
         self
     }
 
-    /// Returns an element of the array of this line, or the only variable of the line. `first` is the index of the first
-    /// element of which the line is the derivative.
+    /// Returns the entry of the table for an element of this line, or for its only variable. If the line is a
+    /// derivative, `first` is the index of the first element of its state.
     pub(crate) const fn spread(
         &self,
         line: usize,
@@ -364,7 +365,7 @@ impl<M> Variable<M> {
         variable
     }
 
-    /// Returns the fault of a variable that is invalid by itself.
+    /// Returns the reason why this line is invalid, regardless of other lines; `None` if it is valid.
     pub(crate) const fn fault(&self) -> Option<&'static str> {
         use Causality::*;
         use Variability::*;
@@ -458,7 +459,7 @@ impl<M> Variable<M> {
         self.dimensions.sizes()
     }
 
-    /// Returns the number of elements of the array; 1 for a scalar.
+    /// Returns the number of elements of the array to which the element belongs; 1 for a scalar.
     pub const fn length(&self) -> usize {
         self.dimensions.length()
     }
@@ -472,7 +473,7 @@ impl<M> Variable<M> {
         self.dimensions.is(&of.dimensions)
     }
 
-    /// Returns the description, one sentence.
+    /// Returns the description.
     pub const fn description(&self) -> &'static str {
         self.description
     }
@@ -492,7 +493,7 @@ impl<M> Variable<M> {
         self.initial
     }
 
-    /// Returns the type: unit, range and so on.
+    /// Returns the type, which contains unit and range.
     pub const fn variable_type(&self) -> &'static Type {
         self.of
     }
@@ -503,7 +504,7 @@ impl<M> Variable<M> {
         self.base
     }
 
-    /// Returns the index of the variable of which this one is the time derivative.
+    /// Returns the index of the variable of which this one is the time derivative; `None` if it is not a derivative.
     pub const fn differentiates(&self) -> Option<u32> {
         match self.derivative_of {
             Some(Index(of)) => Some(of),
@@ -559,7 +560,7 @@ impl<M> Variable<M> {
     }
 }
 
-/// Returns the type of a field.
+/// Returns a marker for the type of a field, so that the type can be inferred from a path of fields.
 #[doc(hidden)]
 pub fn type_of<T>(_: &T) -> PhantomData<T> {
     PhantomData
@@ -577,35 +578,36 @@ pub const fn shape_of_calculation<M, T: Place>(_: PhantomData<M>, _: fn(&M) -> T
     Shape { base: T::Element::BASE, dimensions: T::DIMENSIONS }
 }
 
-/// Reads a Real: an element of an array, or the scalar.
+/// Reads the Real with this number in a field: an element of an array, or element 0 of a scalar.
 #[doc(hidden)]
 #[inline(always)]
 pub fn read_real(field: &impl Place, number: usize) -> f64 {
     field.element(number).real()
 }
 
-/// Reads a value of any type: an element of an array, or the scalar.
+/// Reads the value with this number in a field: an element of an array, or element 0 of a scalar.
 #[doc(hidden)]
 #[inline(always)]
 pub fn read_value(field: &impl Place, number: usize) -> Value {
     field.element(number).value()
 }
 
-/// Sets a Real.
+/// Sets the Real with this number in a field.
 #[doc(hidden)]
 #[inline(always)]
 pub fn set_real(field: &mut impl Place, number: usize, value: f64) {
     field.element_mut(number).set_real(value);
 }
 
-/// Sets a value of any type.
+/// Sets the value with this number in a field. Ignores a value of another type.
 #[doc(hidden)]
 #[inline(always)]
 pub fn set_value(field: &mut impl Place, number: usize, value: &Value) {
     field.element_mut(number).assign(value);
 }
 
-/// Reads Reals of an array from an element on. Returns 0 if all values are finite.
+/// Reads consecutive Reals of an array, beginning with the element `first`. Returns 0 if all values are finite,
+/// otherwise NaN.
 #[doc(hidden)]
 pub fn read_reals(array: &impl Place, first: usize, values: &mut [MaybeUninit<f64>]) -> f64 {
     values
@@ -615,21 +617,21 @@ pub fn read_reals(array: &impl Place, first: usize, values: &mut [MaybeUninit<f6
         .sum()
 }
 
-/// [Reads](read_real) a Real of a calculated value.
+/// Reads a Real of a calculated value; see [`read_real`].
 #[doc(hidden)]
 #[inline(always)]
 pub fn read_real_by<M, T: Place>(model: &M, calculate: fn(&M) -> T, number: usize) -> f64 {
     read_real(&calculate(model), number)
 }
 
-/// [Reads](read_value) a calculated value.
+/// Reads a calculated value; see [`read_value`].
 #[doc(hidden)]
 #[inline(always)]
 pub fn read_value_by<M, T: Place>(model: &M, calculate: fn(&M) -> T, number: usize) -> Value {
     read_value(&calculate(model), number)
 }
 
-/// [Reads](read_reals) Reals of a calculated array.
+/// Reads Reals of a calculated array; see [`read_reals`].
 #[doc(hidden)]
 #[inline(always)]
 pub fn read_reals_by<M, T: Place>(
@@ -646,7 +648,7 @@ pub fn read_reals_by<M, T: Place>(
 #[track_caller]
 pub const fn reject(name: &str, fault: &str) -> ! {
     let message =
-        Letters::new().with(b"the variable ").with(name.as_bytes()).with(b": ").with(fault.as_bytes());
+        ConstString::new().with(b"the variable ").with(name.as_bytes()).with(b": ").with(fault.as_bytes());
     match std::str::from_utf8(message.bytes()) {
         Ok(message) => panic!("{}", message),
         Err(_) => panic!("a name is not UTF-8"),
@@ -673,13 +675,13 @@ const fn wrong_type(base: BaseType) -> &'static str {
     }
 }
 
-/// A string that is built at compile time: the name of an array element, or a message.
-pub(crate) struct Letters {
+/// A string that is built at compile time: the message about an invalid line.
+pub(crate) struct ConstString {
     bytes: [u8; 400],
     length: usize,
 }
 
-impl Letters {
+impl ConstString {
     pub const fn new() -> Self {
         Self { bytes: [0; 400], length: 0 }
     }

@@ -1,5 +1,5 @@
-//! Untrusted files: archives of FMUs and systems, and the XML files in them. Only regular files are read, and never
-//! more than a limit.
+//! Reads untrusted files: archives of FMUs and systems, and the XML files in them. Only regular files are read, each
+//! up to a limit.
 
 mod scratch;
 mod unpack;
@@ -11,10 +11,11 @@ use std::io::Read;
 use std::path::Path;
 pub use unpack::{Entry, Limits, unpack};
 
-/// Largest XML file, in bytes.
+/// Maximum size of an XML file, in bytes.
 pub const MAX_XML: u64 = 256 << 20;
 
-/// Opens a regular file only, because a pipe would wait for a writer, and a device may never end.
+/// Opens a file, if it is a regular file. Other files are rejected, because a pipe would wait for a writer, and a
+/// device may never end.
 ///
 /// # Errors
 /// Fails if there is no such file, or it is not a regular file.
@@ -26,7 +27,7 @@ pub fn open(path: &Path) -> Result<File, String> {
     File::open(path).map_err(message)
 }
 
-/// Reads a file with at most this number of bytes.
+/// Reads a file of at most `most` bytes.
 ///
 /// # Errors
 /// Fails if the file cannot be opened or read, or has more bytes.
@@ -48,7 +49,8 @@ pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, String> {
 /// Reads and decodes an XML file.
 ///
 /// # Errors
-/// Fails as [`read`] does, and for other encodings than UTF-8, UTF-16 with a byte order mark, and ISO-8859-1.
+/// Fails for the same reasons as [`read`], and if the encoding is not UTF-8, UTF-16 with a byte order mark, or
+/// ISO-8859-1.
 pub fn read_xml(path: &Path) -> Result<String, String> {
     let bytes = read(path, MAX_XML)?;
     reserve(2 * bytes.len()).map_err(|why| format!("cannot be read: {why}"))?;
@@ -56,7 +58,8 @@ pub fn read_xml(path: &Path) -> Result<String, String> {
         .ok_or_else(|| "is not in an encoding that is supported (UTF-8, UTF-16, ISO-8859-1)".to_owned())
 }
 
-/// Decodes an XML file: UTF-8, UTF-16 with a byte order mark, or ISO-8859-1, which the XML declaration names.
+/// Decodes an XML file: UTF-8, UTF-16 with a byte order mark, or ISO-8859-1 if the XML declaration names it or a
+/// similar encoding. Returns `None` for other encodings.
 fn decoded(bytes: &[u8]) -> Option<String> {
     let wide = |order: fn([u8; 2]) -> u16| {
         let units = bytes[2..].as_chunks().0.iter().copied().map(order);

@@ -1,24 +1,25 @@
-//! Temporary directories that do not stay behind.
+//! Temporary directories that are removed even if the process is killed.
 
 use std::fs::{self, File};
 use std::io;
 use std::path::Path;
 use tempfile::TempDir;
 
-/// File in the directory that is locked while it is in use.
+/// Name of a file that is locked while its directory is in use.
 const LOCK: &str = ".in-use";
 
-/// A temporary directory, removed when dropped. A process that ends otherwise leaves it behind, but not its lock, so that the next
-/// process removes it.
+/// A temporary directory, removed when dropped. A killed process leaves its directory behind, but the system releases
+/// the lock, so the next process that creates a directory with this prefix removes the old one.
 #[derive(Debug)]
 pub struct Scratch {
-    /// Before the lock, so that it is removed while it is locked.
+    /// Declared before the lock, so that the directory is removed while it is still locked.
     directory: TempDir,
     _lock: File,
 }
 
 impl Scratch {
-    /// Creates a directory whose name begins with `prefix`, and removes those that ended processes have left behind.
+    /// Creates a directory whose name begins with `prefix`, and removes the directories with this prefix that ended
+    /// processes have left behind.
     ///
     /// # Errors
     /// Fails if no directory can be created.
@@ -28,7 +29,8 @@ impl Scratch {
             let directory = tempfile::Builder::new().prefix(prefix).tempdir()?;
             let lock = File::create_new(directory.path().join(LOCK))?;
             lock.lock()?;
-            // Another process may have locked the file before, and removed the directory.
+            // Another process may have locked the file first and removed the directory; then the loop creates another
+            // one.
             if directory.path().join(LOCK).exists() {
                 return Ok(Self { directory, _lock: lock });
             }
@@ -41,15 +43,15 @@ impl Scratch {
     }
 }
 
-/// Removes the directories whose lock no process holds. Failures are ignored, because they only mean that a
-/// directory stays.
+/// Removes the directories whose lock no process holds. Failures are ignored, because a directory that remains does
+/// no harm.
 fn remove_abandoned(parent: &Path, prefix: &str) {
     for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
         let is_directory = entry.file_type().is_ok_and(|of| of.is_dir());
         if !is_directory || !entry.file_name().to_string_lossy().starts_with(prefix) {
             continue;
         }
-        // Other users' directories cannot be opened.
+        // The directory of another user is skipped, because its lock file cannot be opened.
         let lock = File::options().write(true).open(entry.path().join(LOCK));
         if lock.is_ok_and(|lock| lock.metadata().is_ok_and(|of| of.is_file()) && lock.try_lock().is_ok()) {
             let _ = fs::remove_dir_all(entry.path());
@@ -66,10 +68,10 @@ mod tests {
     fn directories_of_ended_processes_are_removed() {
         let prefix = format!("fmi-abi-test-{}-", std::process::id());
         let in_use = Scratch::new(&prefix).unwrap();
-        // As a killed process leaves it: with a file that no process has locked.
+        // The directory of a killed process: it contains a file that no process has locked.
         let abandoned = tempfile::Builder::new().prefix(&prefix).tempdir().unwrap().keep();
         fs::write(abandoned.join(LOCK), "").unwrap();
-        // As it is before the process locks it.
+        // The directory of a process that has not created its lock file yet.
         let new = tempfile::Builder::new().prefix(&prefix).tempdir().unwrap();
         let other = Scratch::new(&prefix).unwrap();
         assert!(!abandoned.exists());

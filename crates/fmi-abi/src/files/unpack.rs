@@ -7,15 +7,15 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::{Component, Path};
 use zip::ZipArchive;
 
-/// Bytes that an entry of the directory of an archive takes at most in memory.
+/// Upper bound for the memory that an entry of an archive's directory takes, in bytes.
 const ENTRY: usize = 1000;
 
-/// Largest archive that is unpacked.
+/// Limits for the content of an archive.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Number of bytes of all files.
+    /// Maximum number of bytes of all files together, unpacked.
     pub bytes: u64,
-    /// Number of files and directories.
+    /// Maximum number of files and directories.
     pub entries: usize,
 }
 
@@ -32,16 +32,17 @@ pub struct Entry<'a> {
     pub name: &'a str,
     /// Whether the path stays in the directory.
     pub is_inside: bool,
-    /// Name of the compression, if it is not one that the standard permits.
+    /// Name of the compression method, if the FMI standard does not permit it.
     pub compression: Option<String>,
 }
 
-/// Unpacks the ZIP file `path`, which is `what` for messages, to the directory `to`. `wanted` returns whether an entry is extracted;
-/// entries outside and links, which could lead outside, never are. What is unpacked is taken from the limits. Permissions are ignored,
-/// because some tools write entries that the owner could not read, but programs stay executable.
+/// Unpacks the ZIP file `path` into the directory `to`; messages call the file `what`, for example "an FMU". `wanted`
+/// returns whether an entry is extracted. Entries outside of the directory are never extracted, and neither are
+/// links, because they could lead outside. The unpacked bytes and entries are subtracted from `limits`. Permissions
+/// are ignored, because some tools write entries that the owner could not read, but programs stay executable.
 ///
 /// # Errors
-/// Fails if the file is not a ZIP file or exceeds the limits, if an entry cannot be extracted, and if `wanted` does.
+/// Fails if the file is not a ZIP file or exceeds the limits, if an entry cannot be extracted, or if `wanted` fails.
 pub fn unpack(
     path: &Path,
     what: &str,
@@ -63,7 +64,7 @@ pub fn unpack(
     limits.entries -= archive.len();
     let most = limits.bytes;
     let too_large = || format!("has more than {} MB when it is unpacked, the limit for archives", most >> 20);
-    // What the archive declares may be wrong, so the files are counted, too.
+    // The declared size may be wrong, so the loop also counts the bytes that it extracts.
     if archive.decompressed_size().is_some_and(|size| size > u128::from(most)) {
         return Err(too_large());
     }
@@ -83,9 +84,10 @@ fn check_count(count: u64, limits: Limits) -> Result<(), String> {
     reserve(bytes).map_err(|why| format!("cannot be unpacked: {why}"))
 }
 
-/// Returns the number of entries that the end of an archive declares, before the archive's directory is read.
+/// Returns the number of entries that the end of an archive declares, so that it can be checked before the directory
+/// is read. Returns `None` if the file has no such end.
 fn declared_count(file: &mut File) -> Option<u64> {
-    /// Lengths of the record at the end, of its longest comment, and of the records before it in large archives.
+    /// Total length of the record at the end, its longest comment, and the records before it in large archives.
     const LONGEST: u64 = 22 + 65_535 + 76;
     let length = file.seek(SeekFrom::End(0)).ok()?;
     file.seek(SeekFrom::Start(length.saturating_sub(LONGEST))).ok()?;
@@ -100,7 +102,7 @@ fn declared_count(file: &mut File) -> Option<u64> {
     short.map(u64::from).max(long)
 }
 
-/// Extracts an entry and returns its size, or `most` + 1 if it is larger than `most`.
+/// Extracts an entry and returns its size in bytes: 0 if nothing is written, `most` + 1 if it is larger than `most`.
 fn extract(
     archive: &mut ZipArchive<File>,
     index: usize,
@@ -110,7 +112,7 @@ fn extract(
 ) -> Result<u64, String> {
     let mut entry = archive.by_index(index).map_err(|error| shown(&error.to_string()).into_owned())?;
     let name = entry.name().map_err(|error| shown(&error.to_string()).into_owned())?.into_owned();
-    // Some tools of Windows write backslashes.
+    // Some Windows tools write backslashes.
     let relative = name.replace('\\', "/");
     let path = Path::new(&relative);
     let is_normal = |part: Component| matches!(part, Component::Normal(_) | Component::CurDir);
@@ -123,7 +125,7 @@ fn extract(
     if !wanted(&Entry { name: &name, is_inside, compression })? || !is_inside || entry.is_symlink() {
         return Ok(0);
     }
-    // Some tools write an entry `./`, which the system does not create.
+    // Omits `.` from the path, because some tools write an entry `./`, and creating that directory would fail.
     let mut to = directory.to_owned();
     to.extend(path.components().filter(|part| matches!(part, Component::Normal(_))));
     let message = |error: std::io::Error| format!("{}: {error}", shown(&name));
@@ -137,7 +139,7 @@ fn extract(
         std::fs::create_dir_all(parent).map_err(message)?;
     }
     let mut file = File::create(&to).map_err(message)?;
-    // The size that the entry declares may be wrong.
+    // The size that the entry declares may be wrong, so the copy is limited as well.
     let size = std::io::copy(&mut (&mut entry).take(most + 1), &mut file).map_err(message)?;
     #[cfg(unix)]
     if entry.unix_mode().is_some_and(|mode| mode & 0o111 != 0) {
@@ -147,7 +149,7 @@ fn extract(
     Ok(size)
 }
 
-/// Returns what a file is that is not a zip file, from its first bytes.
+/// Returns what a file seems to be instead of a zip file, judged by its first bytes; `None` if this is unknown.
 fn instead(start: &[u8]) -> Option<String> {
     let text = start.trim_ascii_start();
     let why = match text {
@@ -208,7 +210,7 @@ mod tests {
         assert_eq!(unpacked(3 << 20, 2).unwrap_err(), "has 3 entries; the limit for archives is 2");
         assert!(!to.exists(), "nothing is written");
         assert_eq!(unpacked(3 << 20, 3), Ok(()));
-        // The archive declares smaller files.
+        // Changes the archive so that it declares smaller sizes than its files have.
         let bytes = std::fs::read(&path).unwrap();
         let size = (1_u32 << 20).to_le_bytes();
         let mut changed = bytes.clone();
@@ -221,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn files_that_are_no_archive() {
+    fn files_that_are_not_archives_are_recognized() {
         for (start, why) in [
             (&b""[..], "empty"),
             (b"version https://git-lfs.github.com/spec/v1\n", "git lfs pull"),

@@ -48,9 +48,9 @@ pub enum StatusKind {
     DoStepStatus,
     /// A message about a pending step.
     PendingStatus,
-    /// The end of the last successful step.
+    /// The time at the end of the last successful step.
     LastSuccessfulTime,
-    /// Whether the slave requests the end of the simulation.
+    /// Whether the FMU requests the end of the simulation.
     Terminated,
 }
 
@@ -76,12 +76,12 @@ pub type fmi2CallbackLogger = unsafe extern "C" fn(
     message: fmi2String,
     ...
 );
-/// The importer's `calloc`. Never called, because instances are on Rust's heap
+/// The importer's `calloc`. fmu-export never calls it, because instances are on Rust's heap
 /// (`canNotUseMemoryManagementFunctions`).
 pub type fmi2CallbackAllocateMemory = unsafe extern "C" fn(count: usize, size: usize) -> *mut c_void;
-/// The importer's `free`. Never called.
+/// The importer's `free`. fmu-export never calls it.
 pub type fmi2CallbackFreeMemory = unsafe extern "C" fn(memory: *mut c_void);
-/// Callback for the end of an asynchronous step. Never called, because no step is asynchronous.
+/// Callback for the end of an asynchronous step. fmu-export never calls it, because its steps are synchronous.
 pub type fmi2StepFinished = unsafe extern "C" fn(environment: fmi2ComponentEnvironment, status: fmi2Status);
 
 /// The importer's callbacks; each may be NULL.

@@ -4,26 +4,28 @@ pub mod types;
 
 use types::*;
 
-/// Passes the list of functions to another macro, after any tokens that follow its name. First come the
-/// functions without an instance argument, with arguments and result. Functions on an instance follow as
-/// `name CS ME tolerated (arguments);`.
+/// Passes the list of functions to the macro at the path `with`. Tokens after the path are passed on before the list.
+/// The list begins with the functions that have no instance argument, with their arguments and results. The functions
+/// on an instance follow as `name CS ME tolerated (arguments);`, where `CS` and `ME` are the states in which the
+/// standard allows the call in Co-Simulation and Model Exchange.
 ///
-/// The letters are the states of sections 2.3, 3.2 and 4.2 of FMI 3.0: I instantiated, N Initialization Mode, C Step
-/// Mode, M Event Mode, K Continuous-Time Mode, T terminated. In fatal no call is allowed. For `fmi3Set...`,
-/// the list contains all states in which some variable can be set; fmu-export checks each variable.
+/// Each letter is a state of sections 2.3, 3.2 and 4.2 of FMI 3.0: I instantiated, N Initialization Mode, C Step
+/// Mode, M Event Mode, K Continuous-Time Mode, T terminated. Fatal has no letter, because no call is allowed in it.
+/// For `fmi3Set...`, the list contains all states in which any variable can be set; fmu-export also checks each
+/// variable.
 ///
-/// In fmu-export an error changes nothing, so the importer may continue although section 2.3.1 of FMI 3.0 moves the
-/// instance to terminated.
+/// In fmu-export, a call that returns an error changes nothing, so the importer may continue, although by section
+/// 2.3.1 of FMI 3.0 the instance would be terminated.
 ///
-/// No state allows fmi3ActivateModelPartition, because its state cannot be entered. Some functions are allowed but
-/// return an error with the reason: functions of clocks, fmi3EvaluateDiscreteStates, and
-/// fmi3EnterConfigurationMode after the initialization, because there are no structural parameters.
+/// No state allows fmi3ActivateModelPartition, because it belongs to Scheduled Execution, which is not supported.
+/// Some functions are allowed but return an error with the reason: functions of clocks, fmi3EvaluateDiscreteStates,
+/// and fmi3EnterConfigurationMode after the initialization, because there are no structural parameters.
 ///
 /// Tolerated calls, for interface types that have the function:
 /// * fmi3SetTime in Initialization Mode and Event Mode, fmi3SetContinuousStates in Event Mode, as in FMI 2.0;
-/// * the two functions for the numbers of states and event indicators, and the function for nominal values,
-///   in every state: the numbers never change;
-/// * functions that set discrete inputs in Continuous-Time Mode, for inputs that have the value already (FMPy);
+/// * the functions that return the number of states, the number of event indicators and the nominal values, in every
+///   state, because the numbers never change and nominal values exist from the start;
+/// * functions that set discrete inputs in Continuous-Time Mode, if each input already has the value (FMPy);
 /// * fmi3EnterEventMode in Event Mode, as in FMI 2.0 (OpenModelica);
 /// * fmi3EnterConfigurationMode and fmi3ExitConfigurationMode in instantiated, although there are no structural
 ///   parameters (FMIKit). Nothing changes, so the instance stays in instantiated.

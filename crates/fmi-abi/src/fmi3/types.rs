@@ -34,7 +34,7 @@ pub type fmi3UInt32 = u32;
 pub type fmi3Int64 = i64;
 /// An unsigned integer of 64 bits.
 pub type fmi3UInt64 = u64;
-/// A Boolean: `bool` in C. The type is a byte, because a C caller can pass any value.
+/// A Boolean: `bool` in C. The type is a byte, because a C caller can pass values other than 0 and 1.
 pub type fmi3Boolean = u8;
 /// One character.
 pub type fmi3Char = c_char;
@@ -53,12 +53,12 @@ pub const fmi3True: fmi3Boolean = 1;
 #[allow(non_upper_case_globals)]
 pub const fmi3False: fmi3Boolean = 0;
 
-/// `fmi3DependencyKind`.
+/// Kind of a dependency: the C enumeration `fmi3DependencyKind` as an integer.
 pub type fmi3DependencyKind = c_int;
-/// `fmi3Dependent`: a dependency of unknown kind.
+/// `fmi3Dependent`: a dependency of any kind.
 #[allow(non_upper_case_globals)]
 pub const fmi3Dependent: fmi3DependencyKind = 5;
-/// `fmi3IntervalQualifier`.
+/// State of a clock's interval: the C enumeration `fmi3IntervalQualifier` as an integer.
 pub type fmi3IntervalQualifier = c_int;
 
 /// The importer's log function.
@@ -68,9 +68,9 @@ pub type fmi3LogMessageCallback = unsafe extern "C" fn(
     category: fmi3String,
     message: fmi3String,
 );
-/// Never called, because there are no clocks.
+/// Callback for ticks of clocks. fmu-export never calls it, because it does not support clocks.
 pub type fmi3ClockUpdateCallback = unsafe extern "C" fn(environment: fmi3InstanceEnvironment);
-/// Never called, because there is no intermediate update.
+/// Callback within a step. fmu-export never calls it, because it does not support intermediate update.
 pub type fmi3IntermediateUpdateCallback = unsafe extern "C" fn(
     environment: fmi3InstanceEnvironment,
     time: fmi3Float64,
@@ -81,7 +81,7 @@ pub type fmi3IntermediateUpdateCallback = unsafe extern "C" fn(
     early_return_requested: *mut fmi3Boolean,
     early_return_time: *mut fmi3Float64,
 );
-/// Never called: there is no Scheduled Execution.
+/// Callback of Scheduled Execution, which fmu-export does not support.
 pub type fmi3LockPreemptionCallback = unsafe extern "C" fn();
-/// Never called: there is no Scheduled Execution.
+/// Callback of Scheduled Execution, which fmu-export does not support.
 pub type fmi3UnlockPreemptionCallback = unsafe extern "C" fn();

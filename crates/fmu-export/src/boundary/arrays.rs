@@ -1,4 +1,4 @@
-//! Arrays, pointers and strings of the importer.
+//! Conversion of the importer's pointers to slices, references and strings.
 
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, Reference, elements_of, reject};
@@ -6,7 +6,8 @@ use fmi_abi::c_types::c_char;
 use std::ffi::CStr;
 use std::mem::MaybeUninit;
 
-/// Returns the importer's array of `length` values for reading.
+/// Returns the importer's array of `length` values as a slice to read. Fails if the array is not empty and the
+/// pointer is NULL or not aligned; `argument` is the name of the array in the message.
 ///
 /// # Safety
 /// `pointer` is NULL or points to `length` values that do not change during `'a`.
@@ -21,7 +22,8 @@ pub(crate) unsafe fn in_slice<'a, T>(pointer: *const T, length: usize, argument:
     Ok(unsafe { std::slice::from_raw_parts(pointer, length) })
 }
 
-/// Returns the importer's array of `length` values for writing. Its previous content may be uninitialized.
+/// Returns the importer's array of `length` values as a slice to write; see [`in_slice`]. Its previous content may be
+/// uninitialized.
 ///
 /// # Safety
 /// `pointer` is NULL or points to `length` values that no other code uses during `'a`.
@@ -40,7 +42,7 @@ pub(crate) unsafe fn out_slice<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), length) })
 }
 
-/// Checks that the array length equals the number of values.
+/// Checks that an array of `count` elements has the `needed` length; `what` describes the elements in the message.
 #[inline]
 pub(crate) fn same(what: &str, needed: usize, count: usize) -> Outcome {
     if count == needed {
@@ -49,11 +51,11 @@ pub(crate) fn same(what: &str, needed: usize, count: usize) -> Outcome {
     reject(format!("there are {needed} {what}, the array has {count} elements"))
 }
 
-/// Calls `body` with the elements of variables of FMI 3.0, in a model with arrays. The value reference of the
-/// first element denotes the whole array; its values are contiguous (section 2.2.7.2 of FMI 3.0).
+/// Calls `body` with the indices of all elements of variables of FMI 3.0. The value reference of the first element
+/// denotes the whole array, and the values of an array are contiguous (section 2.2.7.2 of FMI 3.0).
 ///
 /// # Safety
-/// The value references are NULL or an array of this length, which does not change.
+/// `vr` is NULL or points to `count` value references, which do not change during the call.
 pub(crate) unsafe fn of_elements<M: Exported, R: Reference>(
     instance: &mut Instance<M>,
     vr: *const u32,
@@ -73,7 +75,8 @@ pub(crate) unsafe fn of_elements<M: Exported, R: Reference>(
     outcome
 }
 
-/// Returns the importer's memory for one value.
+/// Returns the importer's memory for one value. Fails if the pointer is NULL or not aligned; `argument` is its name
+/// in the message.
 ///
 /// # Safety
 /// `pointer` is NULL or points to a value that no other code uses during `'a`.
@@ -85,7 +88,7 @@ pub(crate) unsafe fn out_value<'a, T>(pointer: *mut T, argument: &str) -> Outcom
     Ok(unsafe { &mut *pointer.cast() })
 }
 
-/// Returns the importer's string.
+/// Returns the importer's string; `None` for NULL.
 ///
 /// # Safety
 /// `pointer` is NULL or a NUL-terminated string that does not change during `'a`.
@@ -96,7 +99,7 @@ pub(crate) unsafe fn string<'a>(pointer: *const c_char) -> Option<&'a CStr> {
 
 #[inline]
 fn check<T>(pointer: *const T, length: usize, argument: &str) -> Outcome {
-    // One test covers both faults: not aligned, or a size in bytes that overflows `isize`.
+    // `odd` is not 0 in two cases: the pointer is not aligned, or the size in bytes overflows `isize`.
     let odd = pointer.addr() & (align_of::<T>() - 1) | length >> (isize::BITS - 1 - size_of::<T>().ilog2());
     if pointer.is_null() || odd != 0 {
         return reject_array(pointer, length, argument);

@@ -1,4 +1,4 @@
-//! The code that every call on an instance shares.
+//! The code that all calls on an instance share.
 
 use super::ImporterLog;
 use crate::export::Exported;
@@ -11,41 +11,42 @@ use std::any::Any;
 use std::cell::{Cell, UnsafeCell};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-// WebAssembly traps instead; a trap ends the call, not the process.
+// WebAssembly is excepted, because a panic there traps, and a trap ends the call but not the process.
 #[cfg(all(panic = "abort", not(target_family = "wasm")))]
 compile_error!("an FMU must not end the importer's process: build with panic = \"unwind\"");
 
-/// Target of a component pointer.
+/// The object to which the importer's instance pointer points.
 ///
-/// Processors fetch cache lines of 64 bytes in pairs. The alignment keeps adjacent instances in separate
-/// pairs, so that threads that step them do not slow each other down.
+/// Processors fetch cache lines of 64 bytes in pairs. The alignment puts adjacent instances into separate pairs, so
+/// that two threads that step them do not slow each other down.
 #[repr(align(128))]
 pub(crate) struct Component<M> {
-    /// Whether the importer's log callback is running; it must not call back. The state of the instance
-    /// forbids calls as well.
+    /// Whether the importer's log callback is running. It must not call the instance, whose state forbids all calls
+    /// during this time.
     pub delivering: Cell<bool>,
     pub instance: UnsafeCell<Instance<M>>,
     pub importer: ImporterLog,
 }
 
-/// Runs a function's body on the instance of `c` if the table of allowed calls permits the call.
+/// Runs a function's body on the instance of `c`, if the table of allowed calls permits the call, and returns the
+/// status.
 ///
 /// # Safety
-/// `c` as in the contract of the FMI version's module.
+/// `c` meets the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
 #[inline(always)]
 pub(crate) unsafe fn call<M: Exported>(
     c: *mut c_void,
     rule: &'static Rule,
     body: impl FnOnce(&mut Instance<M>) -> Outcome,
 ) -> Status {
-    // SAFETY: by contract, NULL or a live component of this model. The reference is shared because the log
-    // callback of a running call may come here as well.
+    // SAFETY: by contract, `c` is NULL or a live component of this model. The reference is shared, because the log
+    // callback of a running call may also call this function.
     let Some(component) = (unsafe { c.cast::<Component<M>>().as_ref() }) else {
         return Status::Error;
     };
-    // SAFETY: by contract, no other thread is here. On this thread, no body is running, because bodies never
-    // call the importer, and no message is being delivered. The last use of the reference is before any
-    // delivery.
+    // SAFETY: by contract, no other thread uses the component. On this thread, no other reference to the instance is
+    // in use, because bodies never call the importer, and `finish` uses none while it delivers messages. The last use
+    // of this reference is before any delivery.
     let instance = unsafe { &mut *component.instance.get() };
     if !instance.fmi_state().is_in(rule.accepted()) {
         return not_allowed(component, rule);
@@ -61,16 +62,16 @@ pub(crate) unsafe fn call<M: Exported>(
     }
 }
 
-/// Runs the fast path of a call if the table of allowed calls permits the call. Returns `None` if the caller
-/// must use the general path.
+/// Runs the fast path of a call, if the table of allowed calls permits the call, and returns the status. Returns
+/// `None` if the caller must use the general path.
 ///
 /// # Safety
-/// `c` meets the requirement of [`call`].
+/// Same as for [`call`].
 #[inline(always)]
 pub(crate) unsafe fn call_fast<M: Exported>(
     c: *mut c_void,
     rule: &'static Rule,
-    way: impl FnOnce(*mut Instance<M>) -> bool,
+    fast_path: impl FnOnce(*mut Instance<M>) -> bool,
 ) -> Option<Status> {
     // SAFETY: as in `call`.
     let component = unsafe { c.cast::<Component<M>>().as_ref() }?;
@@ -79,12 +80,12 @@ pub(crate) unsafe fn call_fast<M: Exported>(
     if !unsafe { &*instance }.fmi_state().is_in(rule.accepted()) {
         return None;
     }
-    // The fast path takes a pointer. With a reference, the compiler may read several values with one instruction. The
-    // processor stalls if one of them was written just before.
+    // The fast path takes a pointer. With a reference, the compiler might read several values with one instruction,
+    // which makes the processor stall if one of them was written just before.
     //
     // SAFETY: as in `call`.
-    let walk = || way(instance).then(|| unsafe { &mut *instance }.listen());
-    match catch_unwind(AssertUnwindSafe(walk)) {
+    let body = || fast_path(instance).then(|| unsafe { &mut *instance }.listen());
+    match catch_unwind(AssertUnwindSafe(body)) {
         Ok(Some(false)) => Some(Status::Ok),
         Ok(None) => None,
         Ok(Some(true)) => Some(finish(component, rule.name, Ok(Ok(())))),
@@ -92,8 +93,8 @@ pub(crate) unsafe fn call_fast<M: Exported>(
     }
 }
 
-/// Rejects a call that the table of allowed calls forbids. A call from the log callback returns an error
-/// without a message.
+/// Rejects a call that the table of allowed calls forbids. A call from within the log callback also returns an error,
+/// but without a message.
 #[cold]
 #[inline(never)]
 fn not_allowed<M: Exported>(component: &Component<M>, rule: &'static Rule) -> Status {
@@ -115,10 +116,10 @@ fn reject_call<M: Exported>(instance: &Instance<M>, accepted: AllowedStates) -> 
     Err(Box::new(Rejection { status, message }))
 }
 
-/// Result of a body: its outcome, or the payload of its panic.
+/// How a body ended: with an outcome, or with a panic and its payload.
 type Ended = Result<Outcome, Box<dyn Any + Send>>;
 
-/// Ends a call that is not simply OK: delivers the messages and returns the status.
+/// Ends a call that has messages, an error or a panic: delivers the messages and returns the status.
 #[cold]
 #[inline(never)]
 pub(super) fn finish<M: Exported>(component: &Component<M>, name: &str, ended: Ended) -> Status {
@@ -129,8 +130,8 @@ pub(super) fn finish<M: Exported>(component: &Component<M>, name: &str, ended: E
     };
     let deliver = || {
         let messages = {
-            // SAFETY: as in `call`, no other code has a reference to the instance. The last use of this
-            // reference is before the first delivery.
+            // SAFETY: as in `call`, no other reference to the instance is in use. The last use of this reference is
+            // before the first delivery.
             let instance = unsafe { &mut *component.instance.get() };
             match &ended {
                 Ok(Ok(())) => {}
@@ -152,7 +153,7 @@ pub(super) fn finish<M: Exported>(component: &Component<M>, name: &str, ended: E
         component.delivering.set(true);
         messages.iter().for_each(|message| component.importer.deliver(message));
         component.delivering.set(false);
-        // SAFETY: as above; the deliveries have ended.
+        // SAFETY: as above. The deliveries have ended.
         unsafe { &mut *component.instance.get() }.while_delivering(false);
     };
     forget_panic(catch_unwind(AssertUnwindSafe(deliver)));
@@ -162,7 +163,7 @@ pub(super) fn finish<M: Exported>(component: &Component<M>, name: &str, ended: E
     status
 }
 
-/// Drops the payload of a panic. If the drop panics as well, leaks the second payload.
+/// Drops the payload of a panic, if there is one. If dropping it panics as well, leaks the second payload.
 pub(crate) fn forget_panic(ended: Result<(), Box<dyn Any + Send>>) {
     if let Err(panic) = ended
         && let Err(second) = catch_unwind(AssertUnwindSafe(|| drop(panic)))

@@ -1,15 +1,15 @@
-//! Derivatives in arrays of the importer.
+//! Partial and time derivatives, which are written to arrays of the importer.
 
 use super::{in_slice, out_slice, same};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, Reference, elements_of};
 use std::mem::MaybeUninit;
 
-/// Computes partial derivatives (section 2.1.9 of FMI 2.0, 2.2.12 of FMI 3.0). The arguments are unknowns,
-/// knowns, seed and result, each with its length; `names` are their names in messages.
+/// Computes directional derivatives, or adjoint derivatives if `ADJOINT` is true (section 2.1.9 of FMI 2.0, 2.2.12 of
+/// FMI 3.0). The last four arguments are arrays with their lengths; `names` contains their names for messages.
 ///
 /// # Safety
-/// Each array is NULL or has its length; the result does not overlap the others.
+/// Each array is NULL or has the given length; the result does not overlap the others.
 #[inline]
 pub(crate) unsafe fn partial_derivatives<M: Exported, R: Reference, const ADJOINT: bool>(
     instance: &mut Instance<M>,
@@ -48,10 +48,11 @@ fn elements<M: Exported, R: Reference>(vr: &[R]) -> Vec<u32> {
     vr.iter().flat_map(|vr| elements_of::<M>(vr.index())).collect()
 }
 
-/// Computes time derivatives of outputs (section 4.2.2 of FMI 2.0, 4.2.4 of FMI 3.0).
+/// Computes time derivatives of outputs (section 4.2.2 of FMI 2.0, 4.2.4 of FMI 3.0). `count` is the number of
+/// references and of orders.
 ///
 /// # Safety
-/// Each array is NULL or has its length; the values do not overlap the others.
+/// Each array is NULL or has the given length; the values do not overlap the others.
 pub(crate) unsafe fn output_derivatives<M: Exported, R: Reference>(
     instance: &mut Instance<M>,
     vr: *const u32,

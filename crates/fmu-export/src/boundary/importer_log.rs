@@ -6,17 +6,23 @@ use fmi_abi::fmi2::types::fmi2CallbackLogger;
 use fmi_abi::fmi3::types::fmi3LogMessageCallback;
 use std::ffi::CString;
 
-/// The callback in the form of its FMI version.
+/// The callback, whose type depends on the FMI version.
 #[derive(Clone, Copy)]
-#[cfg_attr(target_family = "wasm", allow(dead_code, reason = "the C around the module knows the importer"))]
+#[cfg_attr(
+    target_family = "wasm",
+    allow(dead_code, reason = "the C code around the module calls the importer")
+)]
 pub(crate) enum Callback {
     Fmi2(fmi2CallbackLogger),
     Fmi3(fmi3LogMessageCallback),
 }
 
-/// The callback, if the importer has one, and the arguments that it gets with every call. Copied because the
-/// callbacks structure of FMI 2.0 may be invalid after `fmi2Instantiate`.
-#[cfg_attr(target_family = "wasm", allow(dead_code, reason = "the C around the module knows the importer"))]
+/// The callback, if the importer has one, and the arguments that it gets with every call. They are copied, because
+/// the structure in which FMI 2.0 passes them may be invalid after `fmi2Instantiate`.
+#[cfg_attr(
+    target_family = "wasm",
+    allow(dead_code, reason = "the C code around the module calls the importer")
+)]
 pub(crate) struct ImporterLog {
     pub callback: Option<Callback>,
     pub environment: *mut c_void,
@@ -33,7 +39,7 @@ unsafe extern "C" {
     );
 }
 
-/// Passes a message to the C code around the module.
+/// Passes a message to the code around the module.
 #[cfg(target_family = "wasm")]
 pub(super) fn log(message: &Message) {
     fmu_log(message.status, message.category().as_ptr(), message.printable().as_ptr());

@@ -12,19 +12,20 @@ use std::cell::{Cell, UnsafeCell};
 use std::ffi::CStr;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Arguments of an importer for a new instance, in any FMI version.
+/// Arguments that an importer passes for a new instance, in either FMI version.
 pub(crate) struct Arguments<'a> {
     pub name: Option<&'a CStr>,
-    /// The guid, or the instantiation token.
+    /// The guid (FMI 2.0) or the instantiation token (FMI 3.0).
     pub guid: Option<&'a CStr>,
     pub resources: Option<&'a CStr>,
     pub logging_on: bool,
-    /// Interface type that follows from the other arguments, or the reason why it is invalid.
+    /// Interface type, or the reason why the importer's arguments are invalid.
     pub interface: Outcome<Interface>,
     pub importer: Importer,
 }
 
-/// Creates an instance, or logs the reason and returns NULL. The importer owns the result until it frees it.
+/// Creates an instance, or logs the reason for a failure and returns NULL. The importer owns the instance until it
+/// frees it.
 pub(crate) fn instantiate<M: Exported>(
     function: &str,
     log: impl FnOnce() -> ImporterLog,
@@ -93,14 +94,14 @@ fn make_instance<M: Exported>(arguments: Arguments) -> Outcome<Instance<M>> {
 /// `c` is NULL or an instance of this model that has not been freed.
 pub(crate) unsafe fn free<M: Exported>(c: *mut c_void) {
     let component = c.cast::<Component<M>>();
-    // SAFETY: by contract, NULL or a live component of this model.
+    // SAFETY: by contract, `c` is NULL or a live component of this model.
     if unsafe { component.as_ref() }.is_none_or(|component| component.delivering.get()) {
         return;
     }
     // SAFETY: by contract, the pointer comes from `instantiate`, which leaked the box, and has not been
     // freed.
     let mut component = unsafe { Box::from_raw(component) };
-    // Drops one model at a time: a second panic while the first unwinds would abort the process.
+    // Drops one model at a time, because a second panic while the first one unwinds would abort the process.
     while let Some(model) = component.instance.get_mut().remove_any() {
         forget_panic(catch_unwind(AssertUnwindSafe(|| drop(model))));
     }

@@ -1,5 +1,5 @@
-//! The life cycle of an instance (sections 2.1.5 and 2.1.6 of FMI 2.0, 2.3 of FMI 3.0), and the settings of
-//! the log.
+//! Functions for the life cycle of an instance (sections 2.1.5 and 2.1.6 of FMI 2.0, 2.3 of FMI 3.0), and for the
+//! settings of its log.
 //!
 //! # Safety
 //! The importer guarantees the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
@@ -13,7 +13,7 @@ use fmi_abi::Category;
 use fmi_abi::c_types::c_char;
 use std::ffi::CStr;
 
-/// Converts times and tolerance of the importer; `Boolean` is the Boolean type of the FMI version.
+/// Converts the importer's arguments to an [`Experiment`]; `Boolean` is the Boolean type of the FMI version.
 pub(crate) fn experiment<Boolean: Default + PartialEq>(
     tolerance_defined: Boolean,
     tolerance: f64,
@@ -53,11 +53,11 @@ pub unsafe fn set_debug_logging<M: Exported, Boolean: Default + PartialEq>(
     categories: *const *const c_char,
 ) -> Outcome {
     let on = on != Boolean::default();
-    // SAFETY: by contract, an array of this length.
+    // SAFETY: by contract, `categories` is NULL or an array of this length.
     let names = unsafe { in_slice(categories, count, "categories") }?;
     let mut found = 0;
     for name in names {
-        // SAFETY: by contract, NULL or a string.
+        // SAFETY: by contract, each name is NULL or a string.
         let name = unsafe { string(*name) }.map_or(&b""[..], CStr::to_bytes);
         let Some(bit) = Logger::find(name) else {
             let known = Category::ALL.map(|category| category.name().to_string_lossy()).join(", ");

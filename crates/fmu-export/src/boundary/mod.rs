@@ -1,5 +1,6 @@
-//! The code that the C functions of both FMI versions share: an instance behind a pointer, calls on it, and
-//! the importer's arrays. Also the functions that differ only in their names.
+//! The code that the C functions of both FMI versions share: it turns the importer's pointers into an instance,
+//! slices and strings, and carries out calls on the instance. It also contains the bodies of functions that differ
+//! only in their names.
 
 mod arrays;
 mod call;

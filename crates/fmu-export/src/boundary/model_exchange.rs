@@ -41,7 +41,7 @@ pub unsafe fn set_continuous_states<M: Exported>(
     count: usize,
 ) -> Outcome {
     let name = argument_name(instance, "x", "continuousStates");
-    // SAFETY: by contract, an array of this length.
+    // SAFETY: by contract, the pointer is NULL or points to an array of this length.
     instance.set_continuous_states(unsafe { in_slice(x, count, name) }?)
 }
 
@@ -50,7 +50,7 @@ pub unsafe fn get_derivatives<M: Exported>(
     derivatives: *mut f64,
     count: usize,
 ) -> Outcome {
-    // SAFETY: by contract, an array of this length.
+    // SAFETY: by contract, the pointer is NULL or points to an array of this length.
     instance.get_derivatives(unsafe { out_slice(derivatives, count, "derivatives") }?)
 }
 
@@ -59,7 +59,7 @@ pub unsafe fn get_event_indicators<M: Exported>(
     indicators: *mut f64,
     count: usize,
 ) -> Outcome {
-    // SAFETY: by contract, an array of this length.
+    // SAFETY: by contract, the pointer is NULL or points to an array of this length.
     instance.get_event_indicators(unsafe { out_slice(indicators, count, "eventIndicators") }?)
 }
 
@@ -69,7 +69,7 @@ pub unsafe fn get_continuous_states<M: Exported>(
     count: usize,
 ) -> Outcome {
     let name = argument_name(instance, "x", "continuousStates");
-    // SAFETY: by contract, an array of this length.
+    // SAFETY: by contract, the pointer is NULL or points to an array of this length.
     instance.get_continuous_states(unsafe { out_slice(x, count, name) }?)
 }
 
@@ -79,6 +79,6 @@ pub unsafe fn get_nominals<M: Exported>(
     count: usize,
 ) -> Outcome {
     let name = argument_name(instance, "x_nominal", "nominals");
-    // SAFETY: by contract, an array of this length.
+    // SAFETY: by contract, the pointer is NULL or points to an array of this length.
     instance.get_nominals(unsafe { out_slice(nominals, count, name) }?)
 }

@@ -1,10 +1,12 @@
-//! Fast paths of the C functions that every step calls, under their names and with their arguments.
+//! Fast paths of the C functions that an importer calls for every step. They have the names and arguments of the C
+//! functions.
 //!
-//! Each function either does all work and returns true, or writes nothing to the importer and returns false.
-//! Then the general path handles the call and reports errors. Both paths make equivalent checks.
+//! Each function either does all the work and returns true, or writes nothing into the importer's memory and returns
+//! false. In the latter case, the general path handles the call and reports errors. Both paths make equivalent
+//! checks.
 //!
-//! Each part must save at least 15 instructions of a step that takes about 360, because the code is unsafe and has to be read.
-//! These were counted on the testbed with `make instructions`, by taking one part out at a time:
+//! Because this code is unsafe and hard to read, each part must save at least 15 of the about 360 instructions that a
+//! step takes. The savings were counted on the testbed with `make instructions`, by removing one part at a time:
 //!
 //! | part | use | instructions saved |
 //! |---|---|---|
@@ -14,28 +16,31 @@
 //! | step of any size | a step of one of four alternating sizes | 31 |
 //! | arrays of 1 or 2 variables besides 4 | one scalar per call | 216 for outputs, 112 for angles |
 //!
-//! Setting and getting read fields by the offsets of [`offsets`](crate::offsets). Two more parts, which kept the allowed state after
-//! the start and the latest end of a step in fields of their own, saved 6 instructions and were removed.
+//! Getting and setting access fields by the offsets of [`offsets`](crate::offsets). Two more parts stored results in
+//! additional fields: the allowed state once the model has started, and the latest end of a step. They saved only 6
+//! instructions, so they were removed.
 //!
 //! # Safety
-//! The contract is the contract of the C functions.
+//! The contract of the C functions also applies to these functions.
 #![allow(non_snake_case)]
-#![allow(clippy::missing_safety_doc, reason = "the contract above is that of every function")]
-#![allow(clippy::too_many_arguments, reason = "as many as the standard has")]
+#![allow(clippy::missing_safety_doc, reason = "every function has the contract above")]
+#![allow(clippy::too_many_arguments, reason = "the FMI standard defines the arguments")]
 
 use crate::export::Exported;
 use crate::instance::{FromOne, Instance, Reference};
 use fmi_abi::fmi3::types::fmi3Boolean;
 use std::mem::MaybeUninit;
 
-/// The fast paths of the most frequent arguments are in this module itself.
+/// Name of this module in the macro [`call`], because it contains the fast paths for the most frequent arguments.
 pub(crate) use super::short as usual;
 
-/// Returns whether these can be arrays of `count` elements: not empty, not larger than memory, not NULL, and
-/// aligned.
+/// Returns whether the pointers can be arrays of `count` elements: they are not NULL and are aligned, and the arrays
+/// are neither empty nor larger than memory.
 #[inline(always)]
 fn are_arrays(vr: *const u32, values: *const f64, count: usize) -> bool {
-    // Minus 1, NULL and 0 have the highest bits set. References have half the size of values.
+    // The subtraction turns NULL and a length of 0 into -1, so that their highest bits are set, as in the address or
+    // length of an array that cannot exist. References have half the size of values, so their address is doubled for
+    // the test of alignment.
     let highest = vr.addr().wrapping_sub(1) | values.addr().wrapping_sub(1) | count.wrapping_sub(1);
     let lowest = (vr.addr() << 1 | values.addr()) & (size_of::<f64>() - 1);
     highest >> (usize::BITS - 5) | lowest == 0
@@ -113,8 +118,8 @@ pub(crate) unsafe fn fmi2DoStep<M: Exported>(
     instance.step_fast(point, size)
 }
 
-/// Steps of other sizes than the last. They have a function of their own, because the fast path would have to save
-/// registers for the call of a function that is not inlined.
+/// Fast paths for steps of other sizes than the last. They are separate, because they call a function that is not
+/// inlined, for which the fast path of the usual step would have to save registers.
 pub(crate) mod any_size {
     use super::{Exported, Instance, fmi3_step, fmi3Boolean};
 
@@ -187,7 +192,8 @@ pub(crate) unsafe fn fmi3DoStep<M: Exported>(
     unsafe { fmi3_step(flags, last_successful_time, point + size, || instance.step_fast(point, size)) }
 }
 
-/// Steps, if the pointers can be written, and reports a step that reached its end without an event.
+/// Makes a step, if no pointer is NULL and all are aligned. If `step` succeeds, it has reached its end without an
+/// event, so the results are the same for all steps.
 #[inline(always)]
 unsafe fn fmi3_step(
     flags: [*mut fmi3Boolean; 3],
@@ -195,7 +201,7 @@ unsafe fn fmi3_step(
     end: f64,
     step: impl FnOnce() -> bool,
 ) -> bool {
-    // Same tests as in `are_arrays`.
+    // The tests are the same as in `are_arrays`.
     let [highest1, highest2, highest3] = flags.map(|flag| flag.addr().wrapping_sub(1));
     let highest = highest1 | highest2 | highest3 | last_successful_time.addr().wrapping_sub(1);
     let lowest = last_successful_time.addr() & (align_of::<f64>() - 1);
@@ -212,8 +218,8 @@ unsafe fn fmi3_step(
     true
 }
 
-/// Calls a function's body for model `M`, after its fast paths if it has any. The names in brackets are the modules of
-/// the fast paths, in the order in which they are tried.
+/// Calls the body of a function for model `M`. If the function has fast paths, tries them first: the names in
+/// brackets are their modules, in this order.
 macro_rules! call {
     (fmi2GetReal $arguments:tt) => { $crate::boundary::short::call!(@fast [usual] fmi2GetReal $arguments) };
     (fmi2SetReal $arguments:tt) => { $crate::boundary::short::call!(@fast [usual] fmi2SetReal $arguments) };
@@ -227,7 +233,7 @@ macro_rules! call {
         })
     };
     (@fast [$path:ident $($rest:ident)*] $function:ident ($c:ident $(, $argument:ident: $type:ty)*)) => {{
-        // A separate function, so that the fast path needs no stack space for it.
+        // The rest is a separate function, so that the fast path needs no stack space for it.
         #[inline(never)]
         unsafe fn otherwise<M: $crate::Exported>(
             $c: *mut fmi_abi::c_types::c_void
@@ -238,10 +244,10 @@ macro_rules! call {
                 $crate::boundary::short::call!(@fast [$($rest)*] $function($c $(, $argument: $type)*))
             }
         }
-        let way = move |instance: *mut $crate::instance::Instance<M>| {
+        let fast_path = move |instance: *mut $crate::instance::Instance<M>| {
             $crate::boundary::short::$path::$function(&mut *instance $(, $argument)*)
         };
-        match $crate::boundary::call_fast::<M>($c, Function::$function.rule(), way) {
+        match $crate::boundary::call_fast::<M>($c, Function::$function.rule(), fast_path) {
             Some(status) => status,
             None => otherwise::<M>($c $(, $argument)*),
         }
@@ -250,8 +256,8 @@ macro_rules! call {
 }
 pub(crate) use call;
 
-/// Defines the C functions of an FMI version, generic over the model and under their C names, and a table of
-/// pointers to them.
+/// Defines the C functions of an FMI version, generic over the model and under their C names, and `functions`, which
+/// returns pointers to all of them.
 macro_rules! c_functions {
     (
         $standard:ident $handle:ident

@@ -1,4 +1,5 @@
-//! Saved states behind pointers. A handle is only compared; the instance looks up the state.
+//! Functions for saved states. A handle has the type of a pointer, but is never dereferenced, because the instance
+//! looks up the state.
 //!
 //! # Safety
 //! The importer guarantees the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
@@ -9,9 +10,10 @@ use crate::instance::{Instance, Outcome, reject};
 use fmi_abi::c_types::c_void;
 use std::ptr::without_provenance_mut;
 
-/// The instance owns the state until the importer frees the state or the instance.
+/// Saves the current state, into the state of the handle if it is not NULL. The instance owns the saved state until the
+/// importer frees the state or the instance.
 pub unsafe fn get_state<M: Exported>(instance: &mut Instance<M>, state: *mut *mut c_void) -> Outcome {
-    // SAFETY: by contract, NULL or a pointer to a handle, which is initialized.
+    // SAFETY: by contract, `state` is NULL or points to an initialized handle.
     let handle = unsafe { out_value(state, "FMUstate")?.assume_init_mut() };
     check_memory(instance, *handle, 0)?;
     *handle = without_provenance_mut(instance.save(handle.addr())?);
@@ -22,12 +24,12 @@ pub unsafe fn set_state<M: Exported>(instance: &mut Instance<M>, state: *mut c_v
     instance.restore(state.addr())
 }
 
-/// Frees the state and clears the handle; ignores NULL.
+/// Frees the state and sets the handle to NULL. Ignores a NULL pointer and a NULL handle.
 pub unsafe fn free_state<M: Exported>(instance: &mut Instance<M>, state: *mut *mut c_void) -> Outcome {
     if state.is_null() {
         return Ok(());
     }
-    // SAFETY: by contract, a pointer to a handle, which is initialized.
+    // SAFETY: by contract, `state` points to an initialized handle.
     let handle = unsafe { out_value(state, "FMUstate")?.assume_init_mut() };
     if !handle.is_null() {
         let state = instance.remove(handle.addr())?;
@@ -42,7 +44,7 @@ pub unsafe fn serialized_size<M: Exported>(
     state: *mut c_void,
     size: *mut usize,
 ) -> Outcome {
-    // SAFETY: by contract, NULL or a pointer to a size.
+    // SAFETY: by contract, `size` is NULL or points to a size.
     let size = unsafe { out_value(size, "size")? };
     size.write(instance.serialized_size(state.addr())?);
     Ok(())
@@ -54,7 +56,7 @@ pub unsafe fn serialize<M: Exported, Byte>(
     bytes: *mut Byte,
     size: usize,
 ) -> Outcome {
-    // SAFETY: by contract, an array of this length.
+    // SAFETY: by contract, `bytes` is NULL or points to an array of this length.
     let bytes = unsafe { out_slice(bytes.cast::<u8>(), size, "serializedState")? };
     let needed = instance.serialized_size(state.addr())?;
     if size != needed {
@@ -70,15 +72,16 @@ pub unsafe fn serialize<M: Exported, Byte>(
     Ok(())
 }
 
-/// The instance owns the state until the importer frees the state or the instance. An existing state of the
-/// handle is overwritten.
+/// De-serializes a state, into the state of the handle if it is not NULL. The instance owns the state until the
+/// importer frees the state or the instance.
 pub unsafe fn deserialize<M: Exported, Byte>(
     instance: &mut Instance<M>,
     bytes: *const Byte,
     size: usize,
     state: *mut *mut c_void,
 ) -> Outcome {
-    // SAFETY: by contract, an array of this length, and NULL or a pointer to a handle, which is initialized.
+    // SAFETY: by contract, `bytes` is NULL or points to an array of this length, and `state` is NULL or points to an
+    // initialized handle.
     let (bytes, handle) = unsafe {
         (
             in_slice(bytes.cast::<u8>(), size, "serializedState")?,
@@ -90,8 +93,9 @@ pub unsafe fn deserialize<M: Exported, Byte>(
     Ok(())
 }
 
-/// Rejects a further state if the memory of the instance is limited and too small for it. `serialized` is the length of the bytes
-/// that the state is read from.
+/// Rejects a further state in WebAssembly, where memory is limited, if there is too little memory for it. `serialized`
+/// is the length of the bytes from which the state is read, or 0. Accepts every state on other targets, and every state
+/// that overwrites another.
 fn check_memory<M: Exported>(instance: &mut Instance<M>, handle: *mut c_void, serialized: usize) -> Outcome {
     #[cfg(target_family = "wasm")]
     if handle.is_null() {

@@ -1,4 +1,5 @@
-//! Values of variables in arrays of the importer (section 2.1.7 of FMI 2.0, 2.2.7.2 of FMI 3.0).
+//! Getters and setters, which exchange values with arrays of the importer (section 2.1.7 of FMI 2.0, 2.2.7.2 of FMI
+//! 3.0).
 
 use super::string;
 use crate::export::Exported;
@@ -10,9 +11,9 @@ use std::ffi::{CStr, CString};
 use std::fmt::Display;
 use std::mem::MaybeUninit;
 
-/// Defines getters and setters of an FMI version under their C names. Each entry lists the function that
-/// implements it and the base types of its variables. In FMI 3.0 the functions also take the number of
-/// values.
+/// Defines the getters and setters of an FMI version under their C names. Each entry contains, after each name, the
+/// function below that implements it, and the base types of its variables. In FMI 3.0 the functions also take the
+/// number of values.
 macro_rules! getters_and_setters {
     (
         $reference:ty, $value_count:tt;
@@ -39,7 +40,7 @@ macro_rules! getters_and_setters {
             use crate::boundary::{in_slice, of_elements, out_slice, same};
             use crate::instance::Reference;
             let value_count = [$($value_count,)? count][0];
-            // SAFETY: by contract, arrays of these lengths that do not overlap.
+            // SAFETY: by contract, the pointers are NULL or point to arrays of these lengths, which do not overlap.
             unsafe {
                 if M::ARRAYS && <$reference>::ARRAYS {
                     return of_elements::<M, $reference>(instance, vr, count, value_count, |instance, vr| {
@@ -63,7 +64,8 @@ macro_rules! getters_and_setters {
             use crate::boundary::{in_slice, of_elements, same};
             use crate::instance::Reference;
             let value_count = [$($value_count,)? count][0];
-            // SAFETY: by contract, arrays of these lengths; `char` pointers are strings.
+            // SAFETY: by contract, the pointers are NULL or point to arrays of these lengths; `char` pointers are
+            // NULL or strings.
             unsafe {
                 if M::ARRAYS && <$reference>::ARRAYS {
                     return of_elements::<M, $reference>(instance, vr, count, value_count, |instance, vr| {
@@ -121,7 +123,7 @@ pub(crate) fn set_float32<M: Exported, R: Reference>(
     instance.set(vr, bases, &|index| Value::Real(values[index].into()))
 }
 
-/// Gets integers. `Value` stores them in a wider type, and no value is outside of the narrow type.
+/// Gets integers. `Value` stores them in a wider type, but each one fits into the type of its variable.
 pub(crate) fn get_integers<M: Exported, R: Reference, T: TryFrom<i128> + Default>(
     instance: &mut Instance<M>,
     vr: &[R],
@@ -155,7 +157,8 @@ pub(crate) fn get_booleans<M: Exported, R: Reference, T: From<bool>>(
     })
 }
 
-/// Sets Booleans. They are numbers in C, so callers may pass any number.
+/// Sets Booleans. Because they are numbers in C, a caller may pass any number, so numbers other than 0 and 1 are
+/// rejected.
 pub(crate) fn set_booleans<M: Exported, R: Reference, T: From<bool> + PartialEq + Display>(
     instance: &mut Instance<M>,
     vr: &[R],
@@ -171,7 +174,7 @@ pub(crate) fn set_booleans<M: Exported, R: Reference, T: From<bool> + PartialEq 
     instance.set(vr, bases, &|index| Value::Boolean(values[index] == known[1]))
 }
 
-/// Gets strings. The instance owns them until the next call on it.
+/// Gets strings. The instance owns the strings, and they are valid at least until the next call on it.
 pub(crate) fn get_strings<M: Exported, R: Reference>(
     instance: &mut Instance<M>,
     vr: &[R],
@@ -181,7 +184,7 @@ pub(crate) fn get_strings<M: Exported, R: Reference>(
     let mut strings = Vec::with_capacity(vr.len());
     instance.get(vr, bases, &mut |_, value| {
         if let Value::String(value) = value {
-            // C would read a NUL as the end of the string.
+            // Replaces NULs, because C would read a NUL as the end of the string.
             strings.push(CString::new(value.replace('\0', " ")).unwrap_or_default());
         }
     })?;
@@ -195,7 +198,7 @@ pub(crate) fn get_strings<M: Exported, R: Reference>(
 /// Sets strings.
 ///
 /// # Safety
-/// Each value is NULL or a string.
+/// Each value is NULL or a NUL-terminated string.
 pub(crate) unsafe fn set_strings<M: Exported, R: Reference>(
     instance: &mut Instance<M>,
     vr: &[R],
@@ -204,7 +207,7 @@ pub(crate) unsafe fn set_strings<M: Exported, R: Reference>(
 ) -> Outcome {
     let mut strings = Vec::with_capacity(vr.len());
     for (index, value) in values.iter().enumerate() {
-        // SAFETY: by contract, NULL or a string.
+        // SAFETY: by contract, each value is NULL or a string.
         let fault = match unsafe { string(*value) }.map(CStr::to_str) {
             Some(Ok(value)) => {
                 strings.push(Value::String(value.to_owned()));

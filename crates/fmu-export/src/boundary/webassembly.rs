@@ -1,6 +1,7 @@
-//! Functions for the code around a WebAssembly module: the C code in an FMU with C sources, or the
-//! scripts of a page. A panic does not unwind there, and the module cannot access the importer's memory and callbacks. Each instance has a separate
-//! module with its own memory.
+//! Functions for the code around a WebAssembly module, which is the C code of an FMU with C sources, or the scripts
+//! of a page. In WebAssembly, a panic does not unwind, and the library cannot access the importer's memory and
+//! callbacks, so the code around the module must handle panics, arguments and log messages. Each instance has a
+//! separate module with its own memory.
 
 #![cfg(target_family = "wasm")]
 
@@ -20,18 +21,18 @@ thread_local! {
     static PANIC: Cell<Option<String>> = const { Cell::new(None) };
 }
 
-/// Stores a file for the model.
+/// Stores a file, which the model can then read; see [`read_resource`](crate::read_resource).
 ///
 /// # Safety
-/// `path` is a string, and `content` points to `size` bytes.
+/// `path` is NULL or a NUL-terminated string, and `content` points to `size` bytes.
 pub unsafe fn add_file(path: *const c_char, content: *const c_void, size: usize) {
-    // SAFETY: the caller guarantees both.
+    // SAFETY: the caller guarantees the string and the bytes.
     let (path, content) = unsafe { (string(path), std::slice::from_raw_parts(content.cast::<u8>(), size)) };
     let path = path.unwrap_or_default().to_string_lossy().into_owned().into();
     crate::files::store(path, content.to_owned());
 }
 
-/// Stores the messages of panics for [`broken`].
+/// From now on, stores the message of a panic for [`broken`].
 pub(super) fn keep_panics() {
     let keep = |panic: &PanicHookInfo| {
         PANIC.set(Some(panic_message(panic.payload()).to_owned()));
@@ -45,15 +46,15 @@ pub(super) fn has_memory<const N: usize>(sizes: [usize; N]) -> bool {
     const MESSAGES: usize = 4096;
     let allocate = |size| {
         let mut block = Vec::<u8>::new();
-        // Without black_box, the compiler may remove the unused allocation.
+        // Without black_box, the compiler might remove the unused allocation.
         block.try_reserve_exact(size).is_ok().then(|| std::hint::black_box(block))
     };
     let blocks = (sizes.map(allocate), allocate(MESSAGES));
     blocks.0.iter().all(Option::is_some) && blocks.1.is_some()
 }
 
-/// Allocates `size` bytes for the arguments of a call, in place of the previous ones. Returns NULL if there
-/// is not enough memory.
+/// Allocates `size` bytes for the arguments of a call, and frees the bytes of the previous call. Returns NULL if
+/// there is not enough memory.
 pub fn argument_buffer(size: usize) -> *mut c_void {
     ARGUMENT_BUFFER.with_borrow_mut(|buffer| {
         *buffer = Vec::new();
@@ -65,8 +66,8 @@ pub fn argument_buffer(size: usize) -> *mut c_void {
     })
 }
 
-/// Ends a call that trapped because of a panic or for `reason`. Without an instance, the call was
-/// `fmi2Instantiate`.
+/// Ends a call that trapped, because of a panic or for another `reason`, and returns its status. If `c` is NULL, the
+/// call was `fmi2Instantiate`.
 ///
 /// # Safety
 /// `c` is NULL or a live component of this model; the other arguments are strings.

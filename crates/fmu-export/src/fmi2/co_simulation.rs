@@ -15,7 +15,7 @@ pub unsafe fn fmi2SetRealInputDerivatives<M: Exported>(
     order: *const fmi2Integer,
     value: *const fmi2Real,
 ) -> Outcome {
-    // SAFETY: by contract, arrays of this length.
+    // SAFETY: by contract, the pointers are NULL or point to arrays of this length.
     let (vr, order, value) = unsafe {
         (in_slice(vr, count, "vr")?, in_slice(order, count, "order")?, in_slice(value, count, "value")?)
     };
@@ -29,7 +29,8 @@ pub unsafe fn fmi2GetRealOutputDerivatives<M: Exported>(
     order: *const fmi2Integer,
     value: *mut fmi2Real,
 ) -> Outcome {
-    // SAFETY: by contract, arrays of this length; the written one does not overlap the others.
+    // SAFETY: by contract, the pointers are NULL or point to arrays of this length; the array of results does not
+    // overlap the others.
     unsafe {
         output_derivatives::<M, fmi2ValueReference>(instance, vr, count, (order, "order"), value, count)
     }
@@ -45,18 +46,19 @@ pub unsafe fn fmi2DoStep<M: Exported>(
     instance.do_step(current_communication_point, communication_step_size)
 }
 
-/// Steps are synchronous, so there is never a step to cancel. The table of allowed calls permits the function
-/// in no state.
+/// Does nothing. Because steps are synchronous, there is never a step to cancel, and the table of allowed calls
+/// permits this function in no state.
 pub unsafe fn fmi2CancelStep<M: Exported>(_: &mut Instance<M>) -> Outcome {
     Ok(())
 }
 
-/// Returns the status kind of this number, or an error.
+/// Returns the kind of status with this number, or an error if there is none.
 fn status_kind(kind: fmi2StatusKind) -> Outcome<StatusKind> {
     StatusKind::from_c(kind).map_or_else(|| reject(format!("there is no fmi2StatusKind {kind}")), Ok)
 }
 
-/// Discards a query that concerns only asynchronous steps, or that another function returns.
+/// Returns the status Discard for a query that concerns only asynchronous steps, or that another function must
+/// answer.
 fn no_status(kind: StatusKind) -> Outcome {
     discard(match kind {
         StatusKind::DoStepStatus | StatusKind::PendingStatus => {
@@ -74,7 +76,7 @@ pub unsafe fn fmi2GetRealStatus<M: Exported>(
 ) -> Outcome {
     match status_kind(kind)? {
         StatusKind::LastSuccessfulTime => {
-            // SAFETY: by contract, NULL or a pointer to a value.
+            // SAFETY: by contract, the pointer is NULL or points to a value.
             unsafe { out_value(value, "value") }?.write(instance.last_successful_time());
             Ok(())
         }
@@ -89,7 +91,7 @@ pub unsafe fn fmi2GetBooleanStatus<M: Exported>(
 ) -> Outcome {
     match status_kind(kind)? {
         StatusKind::Terminated => {
-            // SAFETY: by contract, NULL or a pointer to a value.
+            // SAFETY: by contract, the pointer is NULL or points to a value.
             unsafe { out_value(value, "value") }?.write(instance.has_ended().into());
             Ok(())
         }
@@ -97,7 +99,7 @@ pub unsafe fn fmi2GetBooleanStatus<M: Exported>(
     }
 }
 
-/// Defines the queries that concern only asynchronous steps.
+/// Defines the functions that have no status to return, because all their queries concern asynchronous steps.
 macro_rules! without_status {
     ($($function:ident $value:ty;)+) => {
         $(

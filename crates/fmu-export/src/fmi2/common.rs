@@ -49,7 +49,8 @@ pub unsafe fn fmi2GetDirectionalDerivative<M: Exported>(
     seed: *const fmi2Real,
     result: *mut fmi2Real,
 ) -> Outcome {
-    // SAFETY: by contract, arrays of these lengths; the written one does not overlap the others.
+    // SAFETY: by contract, the pointers are NULL or point to arrays of these lengths; the array of results does not
+    // overlap the others.
     unsafe {
         partial_derivatives::<M, fmi2ValueReference, false>(
             instance,
@@ -66,7 +67,7 @@ pub unsafe fn fmi2NewDiscreteStates<M: Exported>(
     instance: &mut Instance<M>,
     info: *mut fmi2EventInfo,
 ) -> Outcome {
-    // SAFETY: by contract, NULL or a pointer to an event information.
+    // SAFETY: by contract, `info` is NULL or points to a structure of this type.
     let info = unsafe { out_value(info, "fmi2eventInfo") }?;
     let event = instance.event()?;
     info.write(fmi2EventInfo {

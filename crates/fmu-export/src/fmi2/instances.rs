@@ -6,12 +6,12 @@ use crate::export::Exported;
 use crate::instance::{Importer, reject};
 use fmi_abi::Interface;
 
-/// `fmi2GetTypesPlatform`
+/// `fmi2GetTypesPlatform`. Returns the name of the standard C types.
 pub unsafe extern "C" fn fmi2GetTypesPlatform<M: Exported>() -> fmi2String {
     c"default".as_ptr()
 }
 
-/// `fmi2GetVersion`
+/// `fmi2GetVersion`. Returns the FMI version.
 pub unsafe extern "C" fn fmi2GetVersion<M: Exported>() -> fmi2String {
     c"2.0".as_ptr()
 }
@@ -29,8 +29,8 @@ pub unsafe extern "C" fn fmi2Instantiate<M: Exported>(
     if functions.is_null() {
         return std::ptr::null_mut();
     }
-    // SAFETY: by contract, the callbacks. Copied because they may be invalid after this call; any alignment
-    // is accepted.
+    // SAFETY: by contract, a pointer to the callbacks, which may have any alignment. They are copied, because the
+    // pointer may be invalid after this call.
     let functions = unsafe { functions.read_unaligned() };
     // SAFETY: by contract, each is NULL or a string.
     let (name, guid, resources) = unsafe { (string(instance_name), string(guid), string(resource_location)) };

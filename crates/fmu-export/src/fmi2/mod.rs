@@ -1,25 +1,25 @@
-//! Implementation of the C functions of FMI 2.0. Only this module, [`fmi3`](crate::fmi3) and `boundary`
-//! contain pointers and `unsafe`.
+//! Implementation of the C functions of FMI 2.0. Only this module, [`fmi3`](crate::fmi3) and `boundary` receive
+//! pointers from the importer.
 //!
-//! Each C function exists once, generic over the model and under its C name. `boundary` calls all functions
-//! on an instance in the same way. It finds the instance, checks the table of allowed calls and runs the
-//! function's body. It converts an error or a panic into a status and delivers the log messages. No panic
-//! leaves this module.
+//! Each C function exists once, generic over the model and under its C name. `boundary` carries out all calls on an
+//! instance in the same way: it finds the instance, checks the table of allowed calls, runs the function's body,
+//! converts an error or a panic into a status, and delivers the log messages. So no panic reaches the importer.
 //!
 //! # Safety
 //!
 //! All functions share one contract with the importer, which is the contract of the FMI standard:
-//! * A component is NULL or comes from `fmi2Instantiate` of this library, with the same model, and has not
-//!   been freed. Two threads do not use it at the same time. (A call from the log callback is rejected.)
-//! * `fmi2GetFMUstate`, `fmi2DeSerializeFMUstate` and `fmi2FreeFMUstate` get a pointer to an initialized
-//!   handle, which is NULL before its first use (section 2.1.8 of FMI 2.0). Any value of the handle is safe: a handle
-//!   that belongs to no state of this instance is rejected and not dereferenced.
-//! * A pointer with a length is NULL or points to that many values; a pointer to one value is NULL or points
-//!   to one. Strings are NUL-terminated. Arrays that are written do not overlap others; their previous
+//! * A component is NULL, or `fmi2Instantiate` of this library has returned it for the same model, and it has not
+//!   been freed. Two threads do not use it at the same time. (A call from within the log callback is safe, and is
+//!   rejected.)
+//! * `fmi2GetFMUstate`, `fmi2DeSerializeFMUstate` and `fmi2FreeFMUstate` get a pointer to an initialized handle,
+//!   which is NULL before its first use (section 2.1.8 of FMI 2.0). Any value of the handle is safe, because a handle
+//!   is not dereferenced, and is rejected unless it belongs to a state of this instance.
+//! * A pointer with a length is NULL or points to that many values; a pointer to one value is NULL or points to one.
+//!   Strings are NUL-terminated. An array to which a function writes does not overlap other arrays; its previous
 //!   content may be uninitialized.
 //! * The callbacks work until the instance is freed.
 #![allow(non_snake_case)]
-#![allow(clippy::missing_safety_doc, reason = "the contract above is that of every function")]
+#![allow(clippy::missing_safety_doc, reason = "every function has the contract above")]
 
 mod co_simulation;
 mod common;

@@ -1,5 +1,5 @@
-//! Functions that return an error with the reason because no model of this crate supports them: clocks,
-//! structural parameters, Scheduled Execution, dependencies of array elements.
+//! Functions that always return an error with the reason, because this crate does not support their features: clocks,
+//! Scheduled Execution, and dependencies of single array elements.
 
 use super::types::*;
 use crate::export::Exported;

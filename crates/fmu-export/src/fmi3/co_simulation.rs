@@ -21,7 +21,8 @@ pub unsafe fn fmi3GetOutputDerivatives<M: Exported>(
     value: *mut fmi3Float64,
     value_count: usize,
 ) -> Outcome {
-    // SAFETY: by contract, arrays of these lengths; the written one does not overlap the others.
+    // SAFETY: by contract, the pointers are NULL or point to arrays of these lengths; the array of results does not
+    // overlap the others.
     unsafe { output_derivatives::<M, FromOne>(instance, vr, count, (order, "orders"), value, value_count) }
 }
 

@@ -1,4 +1,5 @@
-//! Functions of both interface types (sections 2.2 and 2.3 of FMI 3.0), and the sizes for Model Exchange (section 3.2).
+//! Functions of both interface types (sections 2.2 and 2.3 of FMI 3.0), and the numbers of states and event
+//! indicators for Model Exchange (section 3.2).
 //!
 //! # Safety
 //! The importer guarantees the contract of the [module above](super#safety).
@@ -29,8 +30,9 @@ pub unsafe fn fmi3EnterInitializationMode<M: Exported>(
     ))
 }
 
-/// Accepts the call before the initialization, where FMIKit makes it for every FMU with inputs. It changes nothing,
-/// because section 2.3.2 of FMI 3.0 requires structural parameters, which models of this crate do not have.
+/// Accepts the call before the initialization, because FMIKit makes it there for every FMU with inputs. The call
+/// changes nothing: Configuration Mode exists for structural parameters (section 2.3.2 of FMI 3.0), which models of
+/// this crate do not have.
 pub unsafe fn fmi3EnterConfigurationMode<M: Exported>(instance: &mut Instance<M>) -> Outcome {
     if instance.mode() != Mode::Instantiated {
         return reject("this FMU has no structural parameters");
@@ -39,7 +41,7 @@ pub unsafe fn fmi3EnterConfigurationMode<M: Exported>(instance: &mut Instance<M>
     Ok(())
 }
 
-/// Accepts the call after [`fmi3EnterConfigurationMode`], which does not change the state.
+/// Accepts the call that follows [`fmi3EnterConfigurationMode`]. Neither function changes the state.
 pub unsafe fn fmi3ExitConfigurationMode<M: Exported>(_: &mut Instance<M>) -> Outcome {
     Ok(())
 }
@@ -60,7 +62,7 @@ getters_and_setters! { FromOne, [value_count];
     fmi3GetString get_strings, fmi3SetString set_strings, fmi3String: [String];
 }
 
-/// The instance owns the bytes until the next call on it.
+/// Gets binary values. The instance owns the bytes, which are valid until the next call on it.
 pub unsafe fn fmi3GetBinary<M: Exported>(
     instance: &mut Instance<M>,
     vr: *const fmi3ValueReference,
@@ -69,7 +71,7 @@ pub unsafe fn fmi3GetBinary<M: Exported>(
     values: *mut fmi3Binary,
     value_count: usize,
 ) -> Outcome {
-    // SAFETY: by contract, arrays of these lengths that do not overlap.
+    // SAFETY: by contract, the pointers are NULL or point to arrays of these lengths, which do not overlap.
     unsafe {
         of_elements::<M, FromOne>(instance, vr, count, value_count, |instance, vr| {
             let values = out_slice(values, value_count, "values")?;
@@ -98,7 +100,8 @@ pub unsafe fn fmi3SetBinary<M: Exported>(
     values: *const fmi3Binary,
     value_count: usize,
 ) -> Outcome {
-    // SAFETY: by contract, arrays of these lengths; each value is NULL or an array of its size.
+    // SAFETY: by contract, the pointers are NULL or point to arrays of these lengths; each value is NULL or has its
+    // size.
     unsafe {
         of_elements::<M, FromOne>(instance, vr, count, value_count, |instance, vr| {
             let values: &[fmi3Binary] = in_slice(values, value_count, "values")?;
@@ -113,7 +116,7 @@ pub unsafe fn fmi3SetBinary<M: Exported>(
     }
 }
 
-/// Defines the functions for partial derivatives; the literal is true for adjoint derivatives.
+/// Defines the functions that compute partial derivatives; `true` denotes adjoint derivatives.
 macro_rules! derivatives {
     ($($function:ident: $adjoint:literal;)+) => {
         $(
@@ -128,7 +131,8 @@ macro_rules! derivatives {
                 sensitivity: *mut fmi3Float64,
                 sensitivity_count: usize,
             ) -> Outcome {
-                // SAFETY: by contract, arrays of these lengths; the written one does not overlap the others.
+                // SAFETY: by contract, the pointers are NULL or point to arrays of these lengths; the array of
+                // results does not overlap the others.
                 unsafe {
                     partial_derivatives::<M, FromOne, $adjoint>(
                         instance,
@@ -184,7 +188,7 @@ pub unsafe fn fmi3UpdateDiscreteStates<M: Exported>(
 }
 
 pub unsafe fn fmi3GetNumberOfEventIndicators<M: Exported>(_: &mut Instance<M>, count: *mut usize) -> Outcome {
-    // SAFETY: by contract, NULL or a pointer to a value.
+    // SAFETY: by contract, the pointer is NULL or points to a value.
     unsafe { out_value(count, "nEventIndicators") }?.write(Instance::<M>::INDICATORS);
     Ok(())
 }
@@ -193,7 +197,7 @@ pub unsafe fn fmi3GetNumberOfContinuousStates<M: Exported>(
     _: &mut Instance<M>,
     count: *mut usize,
 ) -> Outcome {
-    // SAFETY: by contract, NULL or a pointer to a value.
+    // SAFETY: by contract, the pointer is NULL or points to a value.
     unsafe { out_value(count, "nContinuousStates") }?.write(M::STATES.len());
     Ok(())
 }

@@ -6,7 +6,7 @@ use crate::export::Exported;
 use crate::instance::{Importer, Outcome, reject};
 use fmi_abi::{Interface, Standard};
 
-/// `fmi3GetVersion`
+/// `fmi3GetVersion`. Returns the FMI version.
 pub unsafe extern "C" fn fmi3GetVersion<M: Exported>() -> fmi3String {
     c"3.0".as_ptr()
 }
@@ -102,7 +102,8 @@ pub unsafe extern "C" fn fmi3InstantiateScheduledExecution<M: Exported>(
     }
 }
 
-/// Creates an instance. The strings are its name, the instantiation token and the path of the resources.
+/// Creates an instance, or returns NULL after logging the reason. The strings are its name, the instantiation token
+/// and the path of the resources.
 ///
 /// # Safety
 /// The strings are NULL or valid; the callback works until the instance is freed.

@@ -1,26 +1,26 @@
-//! Implementation of the C functions of FMI 3.0, with the structure of [`fmi2`](crate::fmi2).
+//! Implementation of the C functions of FMI 3.0. The structure is the same as in [`fmi2`](crate::fmi2).
 //!
-//! A model needs nothing special for FMI 3.0. It has the variables of FMI 2.0, and the instantiation token is
-//! the guid. An array is one variable, whereas FMI 2.0 has one variable for each element. Clocks, structural
-//! parameters, intermediate update and Scheduled Execution are not supported; their functions return an error
-//! with the reason.
+//! A model needs nothing special for FMI 3.0. It has the same variables as in FMI 2.0, except that an array is one
+//! variable, whereas FMI 2.0 has one variable for each element. The instantiation token is the guid. Clocks,
+//! structural parameters, intermediate update and Scheduled Execution are not supported; their functions return an
+//! error with the reason.
 //!
-//! Every model has a time, as the FMI standard requires: the independent variable of the table, or an
-//! additional one after all variables ([`independent`]). After it there is a local variable for each event
+//! Every model has an independent variable, the time, as FMI 3.0 requires. If the table does not contain it, it
+//! follows the table as an additional variable ([`independent`]). Then follows a local variable for each event
 //! indicator ([`indicator`]).
 //!
-//! [Value references](reference()) count from 1 in the order of the variables, and an array takes as many as
-//! it has elements. OMSimulator 3.0.0 interprets value references of dependencies as indices of the list,
-//! which count from 1 in FMI 2.0. With this numbering, both interpretations select the same variable.
+//! [Value references](reference()) count from 1 in the order of the variables, and an array takes as many as it has
+//! elements. The reason is that OMSimulator 3.0.0 takes the value references of dependencies for indices in the list
+//! of variables, which count from 1 in FMI 2.0. With this numbering, both interpretations select the same variable.
 //!
 //! # Safety
 //!
-//! The contract with the importer is the contract of [`fmi2`](crate::fmi2), with an instance in place of a
-//! component. The bytes of an `fmi3Binary` are NULL or have the length that their size gives. Booleans are
-//! bytes here, so that C callers may pass any value.
+//! The contract with the importer is the contract of [`fmi2`](crate::fmi2), with an instance in place of a component.
+//! An `fmi3Binary` is NULL or points to as many bytes as the size that is passed with it. Booleans are bytes here, so
+//! that C callers may pass any value.
 #![allow(non_snake_case)]
-#![allow(clippy::missing_safety_doc, reason = "the contract above is that of every function")]
-#![allow(clippy::too_many_arguments, reason = "as many as the standard has")]
+#![allow(clippy::missing_safety_doc, reason = "every function has the contract above")]
+#![allow(clippy::too_many_arguments, reason = "the FMI standard defines the arguments")]
 
 mod absent;
 mod co_simulation;
@@ -38,17 +38,18 @@ use crate::variable::Variable;
 use fmi_abi::Standard;
 use types::*;
 
-/// Returns the value reference of the variable at this index of the table, or after the table.
+/// Returns the value reference of the variable at this index, which is in the table or after it.
 pub const fn reference(index: u32) -> fmi3ValueReference {
     Standard::Fmi3.reference(index)
 }
 
-/// Returns the independent variable with its index: in the table, or of `time`, the first after the table.
+/// Returns the index of the independent variable, and the variable: in the table, or the variable `time`, which then
+/// follows the table.
 pub fn independent<M: Variables>() -> (u32, &'static Variable<M>) {
     crate::instance::independent::<M>()
 }
 
-/// Returns the index of an event indicator, counted from 0: after the table and the time.
+/// Returns the index of the variable of an event indicator. `number` is the number of the indicator, counted from 0.
 pub fn indicator<M: Variables>(number: usize) -> u32 {
     crate::instance::first_indicator::<M>() + number as u32
 }

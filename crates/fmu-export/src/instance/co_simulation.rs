@@ -11,35 +11,37 @@ use fmi_abi::Status;
 /// Result of a step in FMI 3.0.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reached {
-    /// Whether the importer must handle an event.
+    /// Whether the importer must handle an event before the next step.
     pub event: bool,
     pub terminate: bool,
     pub early: bool,
     pub time: f64,
 }
 
-/// Limit of events per step, and of iterations per event; more count as an endless loop.
+/// Maximum number of events per step, and of iterations per event. A model that needs more is taken to be in an
+/// endless loop.
 const MOST_EVENTS: u32 = 10_000;
 
-/// The remedies for too many events.
+/// Advice in the message about too many events.
 const CHATTER: &str = "make shorter steps, or give the events hysteresis if the model chatters";
 
 impl<M: Exported> Instance<M> {
-    /// Whether steps may end early. A constant, so that models without early ends have no overhead.
+    /// Whether steps may end early. It is a constant, so that models whose steps never end early have no overhead.
     pub(super) const ENDS_EARLY: bool = match M::CO_SIMULATION {
         Some(offer) => offer.ends_early,
         None => false,
     };
 
-    /// Whether a failed step leaves the model unchanged. A constant, so that these models have no overhead.
+    /// Whether a failed step leaves the model unchanged. It is a constant, so that models with such steps have no
+    /// overhead.
     const IS_ATOMIC: bool = match M::CO_SIMULATION {
         Some(offer) => offer.atomic_step,
         None => true,
     };
 
-    /// Returns whether a step may fail after a part of it is done: the model itself may fail then, or the events
-    /// that this crate handles within the step. In FMI 3.0, a step may also stop where an importer does not accept an
-    /// early return.
+    /// Returns whether a step may fail after it has changed the model, so that it has to be undone. The model itself
+    /// may fail, or an event that this crate handles within the step. In FMI 3.0, a step may also end early for an
+    /// importer that does not accept this.
     pub(super) fn needs_undo(importer: Importer) -> bool {
         let handles_events = M::CO_SIMULATION.is_some_and(|offer| offer.events == Events::Stop);
         !Self::IS_ATOMIC
@@ -49,7 +51,7 @@ impl<M: Exported> Instance<M> {
             }
     }
 
-    /// Performs a step of FMI 2.0 (section 4.2.2 there).
+    /// Performs a step of an importer of FMI 2.0 (section 4.2.2 of FMI 2.0).
     #[inline]
     pub fn do_step(&mut self, point: f64, step_size: f64) -> Outcome {
         match self.step(point, step_size)? {
@@ -58,7 +60,8 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// Performs a step of FMI 3.0 (section 4.2.1 there). A step with another status than OK changes nothing.
+    /// Performs a step of an importer of FMI 3.0 (section 4.2.1 of FMI 3.0). If it returns another status than OK, it
+    /// has changed nothing.
     #[inline]
     pub fn do_step_to(&mut self, point: f64, step_size: f64) -> Outcome<Reached> {
         let stepped = self.step(point, step_size)?;
@@ -66,7 +69,7 @@ impl<M: Exported> Instance<M> {
         let early = time < end;
         match stepped {
             Stepped::Early(_) if early && !self.importer.early_return => {
-                let why = "the model stops there, and earlyReturnAllowed has ruled that out";
+                let why = "the model stops there, but earlyReturnAllowed is false";
                 return self.go_back(discard(format!("the step to {end} ends early, at {time}: {why}")));
             }
             Stepped::Terminate(_) => {
@@ -83,9 +86,10 @@ impl<M: Exported> Instance<M> {
         })
     }
 
-    /// Restores the state at the start of the step, which then returns an error, or `fmi3Discard` if a
-    /// shorter step may help. Section 4.2.1 of FMI 3.0 requires the state before the step and no early return
-    /// then. Although FMI 2.0 leaves the state open (section 2.1.3), this crate has one rule for both.
+    /// Restores the state at the start of a failed step and returns `why`: an error, or a discard if a shorter step
+    /// may help. Section 4.2.1 of FMI 3.0 requires that a step with such a status leaves the state as it was before
+    /// the step. FMI 2.0 does not specify the state (section 2.1.3), so this crate applies the same rule to both
+    /// versions.
     #[cold]
     fn go_back<T>(&mut self, why: Outcome<T>) -> Outcome<T> {
         self.listen();
@@ -95,8 +99,8 @@ impl<M: Exported> Instance<M> {
         why
     }
 
-    /// Performs a step that begins where the last one ended, has its size and needs no further checks. Otherwise
-    /// returns false and changes nothing.
+    /// Performs a step with the model's `step_fast`, if the step begins where the last one ended and needs no further
+    /// checks. Returns false, and changes nothing, if the step must take the general path.
     #[inline(always)]
     pub fn step_fast(&mut self, point: f64, step_size: f64) -> bool {
         let end = point + step_size;
@@ -104,7 +108,7 @@ impl<M: Exported> Instance<M> {
         self.finish_usual(done, end)
     }
 
-    /// Does the same as [`step_fast`](Self::step_fast) for steps of any size.
+    /// Does the same with the model's `step_any_size`; see [`step_fast`](Self::step_fast).
     #[inline(always)]
     pub fn step_any_size(&mut self, point: f64, step_size: f64) -> bool {
         let end = point + step_size;
@@ -133,7 +137,7 @@ impl<M: Exported> Instance<M> {
 
     pub(super) fn step(&mut self, point: f64, step_size: f64) -> Outcome<Stepped> {
         let end = point + step_size;
-        // False for NaN as well.
+        // These conditions are also false for NaN, so it is rejected.
         if !(point > f64::NEG_INFINITY && end > point && end < f64::INFINITY) {
             return reject_step(point, step_size);
         }
@@ -142,7 +146,7 @@ impl<M: Exported> Instance<M> {
             let time = self.state.time;
             return reject_with(move || {
                 format!(
-                    "the communication point is {point}, but the last step ended at {time}; go on from there or set a saved state"
+                    "the communication point is {point}, but the last step ended at {time}: continue from there, or restore a saved state"
                 )
             });
         }
@@ -155,7 +159,8 @@ impl<M: Exported> Instance<M> {
             });
         }
         if Self::ENDS_EARLY {
-            // The importer has not received the request to end the simulation, or ignores it.
+            // The model has requested the end of the simulation, but the importer has not received the request or
+            // ignores it.
             if self.state.ended {
                 self.state.time = point;
                 return Ok(Stepped::Terminate(point));
@@ -186,8 +191,8 @@ impl<M: Exported> Instance<M> {
         self.state.model.exported_step(Step { time, size, stop_at_events })
     }
 
-    /// Completes a step that did not simply reach its end; handles the events that the importer does not
-    /// handle.
+    /// Completes a step that stopped before its end or at an event. Handles the events that the importer does not
+    /// handle itself, and performs the rest of the step after each of them.
     #[cold]
     fn through_events(&mut self, mut stepped: Stepped, point: f64, end: f64) -> Outcome<Stepped> {
         self.state.time = point;
@@ -217,15 +222,15 @@ impl<M: Exported> Instance<M> {
             });
             stepped = match next {
                 Ok(stepped) => stepped,
-                Err(rejection) => return self.stuck(time, *rejection),
+                Err(rejection) => return self.fail_step(time, *rejection),
             };
             self.state.stale = true;
         }
     }
 
-    /// Ends a step that fails after a part of it is done. The step is undone, except that in FMI 2.0 a step with too
-    /// many events ends early.
-    fn stuck(&mut self, time: f64, mut why: Rejection) -> Outcome<Stepped> {
+    /// Ends a step that failed at `time`, after its first part. The step is undone, unless it failed because of too
+    /// many events in FMI 2.0: then it ends early at `time`.
+    fn fail_step(&mut self, time: f64, mut why: Rejection) -> Outcome<Stepped> {
         why.message = format!("the step cannot go on at {time}: {}", why.message);
         if self.standard() == Standard::Fmi2 && why.status == Status::Discard {
             self.logger.log(Status::Warning, why.message);
@@ -234,7 +239,7 @@ impl<M: Exported> Instance<M> {
         self.go_back(Err(Box::new(why)))
     }
 
-    /// Performs the event iteration in Co-Simulation, for importers that do not handle events.
+    /// Performs the event iteration in Co-Simulation for an importer that does not handle events.
     pub(super) fn handle_event(&mut self) -> Outcome {
         let time = self.state.time;
         let ended = self.try_change(|model| {
@@ -292,12 +297,13 @@ fn reject_step<T>(point: f64, step_size: f64) -> Outcome<T> {
     ))
 }
 
-/// Tolerance for the end of the last step after the stop time, relative to the simulated time, because
-/// importers that count in nanoseconds round a step of 1/60 s up, every time.
+/// Tolerance by which the last step may end after the stop time, relative to the simulated time. It exists because
+/// importers that count in nanoseconds round the size of each step, for example of 1/60 s, so their steps add up to
+/// more than the stop time.
 const STOP_TIME_ROUNDING: f64 = 1e-7;
 
-/// Returns the tolerance for a communication point, because importers count in nanoseconds, add up step sizes
-/// or multiply them, with different rounding errors.
+/// Returns the tolerance for a communication point. Importers count in nanoseconds, add up step sizes or multiply
+/// them, and each way has different rounding errors.
 #[inline]
 fn rounding(point: f64, step_size: f64) -> f64 {
     (0.01 * step_size).min(1e-9) + 8.0 * f64::EPSILON * point.abs()

@@ -11,8 +11,8 @@ use fmi_abi::{Mode, Standard};
 use std::mem::MaybeUninit;
 
 impl<M: Exported> Instance<M> {
-    /// Computes the products of partial derivatives and seed, and adds them to `sums`, which are zero before.
-    /// A directional derivative sums over the knowns, an adjoint derivative over the unknowns.
+    /// Multiplies the partial derivatives by the seed and adds the products to `sums`, which must be zero before. A
+    /// directional derivative is a sum over the knowns, an adjoint derivative a sum over the unknowns.
     #[inline]
     pub fn derivatives<R: Reference, const ADJOINT: bool>(
         &mut self,
@@ -26,7 +26,8 @@ impl<M: Exported> Instance<M> {
         }
         self.calculated();
         let initial = self.mode() == Mode::Initialization;
-        // The total is finite only if all sums are finite; these are finite only if all seeds are.
+        // The total is finite only if all sums are, and a sum is finite only if all its seeds are, so one check is
+        // enough.
         let mut total = 0.0;
         for (column, known) in knowns.iter().enumerate() {
             self.check_known(*known, initial)?;
@@ -58,7 +59,7 @@ impl<M: Exported> Instance<M> {
         self.reject_numbers(seeded, seed, wanted, sums)
     }
 
-    /// Reports the first seed or sum that is not finite, if there is one.
+    /// Returns an error for the first seed or sum that is not finite, if there is one.
     #[cold]
     #[inline(never)]
     fn reject_numbers<R: Reference>(
@@ -99,8 +100,8 @@ impl<M: Exported> Instance<M> {
         ))
     }
 
-    /// Checks that a variable is an unknown: outputs and derivatives of states; in Initialization Mode all
-    /// InitialUnknowns (section 2.1.9 of FMI 2.0).
+    /// Checks that a variable is an unknown. Unknowns are the outputs and the derivatives of states, and in
+    /// Initialization Mode also the other InitialUnknowns (section 2.1.9 of FMI 2.0).
     #[inline]
     fn check_unknown<R: Reference>(&self, unknown: R, initial: bool) -> Outcome {
         let is_unknown = |of: &Variable<M>| {
@@ -125,10 +126,10 @@ impl<M: Exported> Instance<M> {
         reject(format!("{} is not an unknown: neither output nor state derivative", variable.name()))
     }
 
-    /// Checks that a variable is a known: inputs, states and parameters; in Initialization Mode all exact
-    /// variables (section 2.2.8 of FMI 2.0). Parameters may be set at any time, whether or not the
-    /// description calls them tunable. In FMI 2.0 they are knowns only in Initialization Mode, but CasADi
-    /// uses them later.
+    /// Checks that a variable is a known. Knowns are inputs, parameters, states and the time; in Initialization Mode,
+    /// variables with `initial` "exact" take the place of the states (section 2.2.8 of FMI 2.0). Parameters are
+    /// knowns at any time, whether they are tunable or not: in FMI 2.0 they are knowns only in Initialization Mode,
+    /// but CasADi uses them later, too.
     #[inline]
     fn check_known<R: Reference>(&self, known: R, initial: bool) -> Outcome {
         let is_known = |of: &Variable<M>| {
@@ -146,7 +147,7 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// Rejects a variable that is not a known. Accepts the time of FMI 3.0, which may be outside of the table.
+    /// Rejects a variable that is not a known, unless it is the time of FMI 3.0, which may be after the table.
     #[cold]
     #[inline(never)]
     fn reject_known(&self, index: u32) -> Outcome {
@@ -224,7 +225,8 @@ impl<M: Exported> Instance<M> {
     }
 }
 
-/// Returns the time derivative of a variable: 0 for parameters, 1 or 0 for the time.
+/// Returns a time derivative of a variable. It is 0 for a parameter; for the time, it is 1 if the order is 1,
+/// otherwise 0.
 fn derivative<M: Exported>(model: &M, index: usize, order: u32) -> f64 {
     match M::TABLE[index].causality() {
         Causality::Parameter | Causality::CalculatedParameter => 0.0,

@@ -1,10 +1,12 @@
-//! Handles of objects that an importer keeps: insertion, search and removal in constant time.
+//! A collection of objects that an importer refers to by handles, with insertion, search and removal in constant
+//! time.
 
 use std::mem::size_of;
 
-/// Objects with their handles. A handle is a number, which an importer keeps as a pointer. It contains the index of the
-/// object and the number of objects that had this index before, so the handle of a removed object stays invalid.
-/// The address of an allocation that lives as long as this collection distinguishes handles of different collections.
+/// Objects with their handles. A handle is a number, which the importer stores as a pointer. It contains the index of
+/// a slot and its generation, which counts the objects that have been removed from the slot. So the handle of a
+/// removed object stays invalid, until the bits of the generation overflow. Handles of different collections differ,
+/// because each is combined with the address of an allocation that belongs to its collection.
 #[derive(Debug)]
 pub(super) struct Handles<V> {
     slots: Vec<Slot<V>>,
@@ -26,11 +28,11 @@ enum Content<V> {
     Empty(Option<u32>),
 }
 
-/// Bits of the index in a handle; the others contain the generation.
+/// Number of bits of a handle that contain the index. The other bits contain the generation.
 const INDEX_BITS: u32 = if size_of::<usize>() < 8 { 20 } else { 32 };
 const INDEX_MASK: usize = (1 << INDEX_BITS) - 1;
 
-/// The number that is not a handle: NULL.
+/// A number that is never a handle.
 pub(super) const NULL: usize = 0;
 
 impl<V> Handles<V> {
@@ -38,10 +40,11 @@ impl<V> Handles<V> {
         Self { slots: Vec::new(), empty: None, identity: None }
     }
 
-    /// Returns a number that differs in most bits from the number of another collection.
+    /// Returns a number with which all handles of this collection are combined. It differs in most bits from the
+    /// number of another collection.
     fn secret(&self) -> usize {
         let address = self.identity.as_deref().map_or(NULL, |identity| (&raw const *identity).addr());
-        // Fibonacci hashing spreads the address over the upper bits. The rotation moves them to the index.
+        // Fibonacci hashing spreads the address over the upper bits, and the rotation moves these bits to the index.
         address.wrapping_mul(0x9e37_79b9_7f4a_7c15_u64 as usize | 1).rotate_right(INDEX_BITS)
     }
 
@@ -59,8 +62,8 @@ impl<V> Handles<V> {
         }
     }
 
-    /// Inserts an object and returns its handle. Returns `None` if there are too many for the bits of a handle or
-    /// for the memory.
+    /// Inserts an object and returns its handle; `None` if there are more objects than a handle has indices, or too little
+    /// memory.
     pub fn insert(&mut self, value: V) -> Option<usize> {
         self.identity.get_or_insert_with(|| Box::new(0));
         let index = match self.empty {
@@ -97,7 +100,7 @@ impl<V> Handles<V> {
         }
     }
 
-    /// Removes any object. All handles are invalid then.
+    /// Removes any object and returns it, to empty the collection. No handle may be used afterwards.
     pub fn pop(&mut self) -> Option<V> {
         while let Some(slot) = self.slots.pop() {
             self.empty = None;
@@ -119,7 +122,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     #[test]
-    fn it_is_a_map_whose_keys_are_never_used_again() {
+    fn it_is_a_map_whose_keys_are_not_reused() {
         let (mut handles, mut map, mut removed) = (Handles::new(), BTreeMap::new(), Vec::new());
         let mut other = Handles::new();
         for step in 0_u32..4000 {

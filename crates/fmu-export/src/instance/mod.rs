@@ -1,7 +1,8 @@
-//! An instance of a model. Its methods check and carry out the calls of both FMI versions, with Rust
-//! types instead of pointers.
+//! An instance of a model. Its methods check and carry out the calls of both FMI versions. They take Rust types
+//! instead of pointers.
 //!
-//! Every method checks all its arguments before it changes anything, so an error leaves the instance unchanged.
+//! Every method checks all its arguments before it changes anything, or undoes its changes, so an error leaves the
+//! instance unchanged.
 
 mod co_simulation;
 mod derivatives;
@@ -35,34 +36,36 @@ use fmi_abi::{FmiState, Interface, Mode, Standard};
 /// An instance of model `M`.
 pub(crate) struct Instance<M> {
     pub logger: Logger,
-    /// State of the FMI state machine, FMI version and interface type, as one bit; derived from these.
+    /// State of the FMI state machine, FMI version and interface type, as one bit. It is derived from other fields,
+    /// to make the check of allowed calls fast.
     fmi_state: FmiState,
     importer: Importer,
     setup: Setup,
     state: State<M>,
-    /// Messages of rejected start values, for the variables that have not been set to a valid value since.
+    /// Messages of rejected start values by the index of the variable. Setting the variable to a valid value removes
+    /// its message.
     rejected: Sorted<u32, String>,
     /// States that the importer has saved and not freed.
     saved: saved_states::SavedStates<M>,
-    /// State at the start of the last step, if a step may fail after a part of it is done; see
+    /// Backup of the state at the start of the last step, if a failed step may have to be undone; see
     /// [`needs_undo`](Self::needs_undo).
     rollback: Option<Box<State<M>>>,
-    /// Strings that the importer reads until the next call.
+    /// Strings that the last call has returned, which the importer may read until the next call.
     pub strings: Vec<std::ffi::CString>,
-    /// Bytes that the importer reads until the next call.
+    /// Binary values that the last call has returned, which the importer may read until the next call.
     pub bytes: Vec<Vec<u8>>,
-    /// Reusable buffer for the indices of variables of a call, with each element of arrays; for models with
-    /// arrays.
+    /// Reusable buffer for models with arrays: the indices of all elements of the variables of a call.
     pub elements: Vec<u32>,
 }
 
-/// Properties of the importer, fixed when the instance is made.
+/// Properties of the importer, which do not change after the instantiation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Importer {
     pub standard: Standard,
     /// Whether the importer handles events in Co-Simulation.
     pub event_mode: bool,
-    /// Whether the importer accepts steps that end early. In FMI 2.0 they end with `fmi2Discard`.
+    /// Whether the importer accepts steps that end early. Importers of FMI 2.0 accept them, because the step then
+    /// returns `fmi2Discard`.
     pub early_return: bool,
 }
 
@@ -71,12 +74,13 @@ impl Importer {
     pub const FMI2: Self = Self { standard: Standard::Fmi2, event_mode: false, early_return: true };
 }
 
-/// Content of a saved state.
+/// State of an instance, and the content of a saved state.
 struct State<M> {
     mode: Mode,
-    /// Whether the model must calculate before a value is read.
+    /// Whether [`calculate`](crate::Model::calculate) of the model must be called before a value is read.
     stale: bool,
-    /// Whether the model has stepped or been in Continuous-Time Mode, as far as the instance knows.
+    /// Whether the model has made a step or entered Continuous-Time Mode. After a de-serialization this is unknown,
+    /// and false.
     started: bool,
     /// Whether the model has requested the end of the simulation.
     ended: bool,
@@ -101,11 +105,11 @@ impl<M: Clone> Clone for State<M> {
 }
 
 impl<M: Exported> State<M> {
-    /// Whether a copy that undoes a step consists of the values in the table only, because a clone of the model may
-    /// allocate.
+    /// Whether a backup contains only the fields that the table lists, and its `memory`. This is so for a model with
+    /// heap memory, because cloning the whole model may allocate.
     const COPIES_VALUES: bool = std::mem::needs_drop::<M>();
 
-    /// Copies what [`undo`](Self::undo) needs.
+    /// Copies the parts of `source` that [`undo`](Self::undo) needs.
     fn back_up(&mut self, source: &Self) {
         if !Self::COPIES_VALUES {
             return self.clone_from(source);
@@ -117,10 +121,10 @@ impl<M: Exported> State<M> {
         self.model.copy_values(model);
     }
 
-    /// Returns to a state that was [backed up](Self::back_up).
+    /// Restores a state that was [backed up](Self::back_up).
     ///
     /// # Panics
-    /// Panics if the model rejects the state that it was in.
+    /// Panics if the model rejects the state, although it was in this state before.
     #[cold]
     fn undo(&mut self, before: &Self) {
         self.back_up(before);
@@ -135,7 +139,7 @@ impl<M: Exported> State<M> {
         }
     }
 
-    /// Creates the state of a new instance and after a reset.
+    /// Creates the state that an instance has after instantiation or a reset.
     fn new(setup: &Setup) -> Result<Self, Error> {
         Ok(Self {
             mode: Mode::Instantiated,
@@ -149,8 +153,8 @@ impl<M: Exported> State<M> {
     }
 }
 
-/// Life cycle (sections 2.1.5 and 2.1.6 of FMI 2.0, 2.3 of FMI 3.0). The submodules contain the other
-/// functions.
+/// Functions of the life cycle (sections 2.1.5 and 2.1.6 of FMI 2.0, 2.3 of FMI 3.0). The submodules contain the
+/// other functions.
 impl<M: Exported> Instance<M> {
     pub fn new(setup: Setup, importer: Importer, logging_on: bool) -> Outcome<Self> {
         match setup.interface {
@@ -207,7 +211,7 @@ impl<M: Exported> Instance<M> {
         self.fmi_state = FmiState::new(self.importer.standard, self.setup.interface, mode);
     }
 
-    /// Forbids all calls while messages are delivered.
+    /// Forbids all calls if messages are being delivered; otherwise allows them as before.
     #[cold]
     pub fn while_delivering(&mut self, is_delivering: bool) {
         self.enter(self.state.mode);
@@ -216,20 +220,20 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// Replaces everything that a saved state contains.
+    /// Replaces the whole state of the instance.
     fn replace(&mut self, state: State<M>) {
         self.state = state;
         self.rejected.clear();
         self.enter(self.state.mode);
     }
 
-    /// Marks the instance as fatal after a panic: only freeing is allowed.
+    /// Marks the instance as fatal after a panic: the importer may only free it.
     #[cold]
     pub fn break_down(&mut self) {
         self.enter(Mode::Fatal);
     }
 
-    /// Takes the messages of the model. Returns whether there were any.
+    /// Takes the messages from the log of the model. Returns whether there were any.
     #[inline]
     pub fn listen(&mut self) -> bool {
         self.logger.listen(self.state.model.log())
@@ -266,7 +270,7 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    /// Sets up the experiment and enters Initialization Mode, as FMI 3.0 does in one call.
+    /// Sets up the experiment and enters Initialization Mode, which is one call in FMI 3.0.
     pub fn enter_initialization_mode_at(&mut self, experiment: Experiment) -> Outcome {
         let before = (self.state.experiment, self.state.time);
         self.setup_experiment(experiment)?;
@@ -305,16 +309,17 @@ impl<M: Exported> Instance<M> {
 
     /// Applies a change that may fail to the model, and undoes it after an error.
     ///
-    /// The copy is the backup and not the draft, because a model may keep memory and computed values that its
-    /// copies lack. So a change that is accepted leaves the instance as fast as it was.
+    /// The change applies to the model itself, and a copy is the backup, not the other way around. A copy may lack
+    /// allocated memory and cached results of the original, so this way an accepted change does not make the instance
+    /// slower.
     #[cold]
     #[inline(never)]
     fn try_change<T, E: Into<Box<Rejection>>>(
         &mut self,
         change: impl FnOnce(&mut M) -> Result<T, E>,
     ) -> Outcome<T> {
-        // Takes the messages before and after the change, because a change or the backup may replace the model with
-        // its log.
+        // Takes the messages before and after the change, because the change or the backup may replace the model, and
+        // its log with it.
         self.listen();
         let before = M::clone(&self.state.model);
         let changed = change(&mut self.state.model);
@@ -331,7 +336,7 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// Returns the model after all calculations that reading needs.
+    /// Returns the model, after the calculation that reading its values may require.
     #[inline]
     fn calculated(&mut self) -> &Placed<M> {
         if self.state.stale {
@@ -343,7 +348,7 @@ impl<M: Exported> Instance<M> {
 }
 
 impl<M: Exported> Instance<M> {
-    /// Returns the variable at this index.
+    /// Returns the variable at this index: in the table or, in FMI 3.0, an additional one after it.
     #[inline]
     fn find(&self, index: u32) -> Option<&'static Variable<M>> {
         match M::TABLE.get(index as usize) {
@@ -352,7 +357,7 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// Returns the variable at this index, if it has the type.
+    /// Returns the variable at this index, or an error if there is none or its type is not `base`.
     #[inline]
     fn variable(&self, index: u32, base: BaseType) -> Outcome<&'static Variable<M>> {
         match self.find(index) {
@@ -372,7 +377,7 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// Returns the number of values of the variables; in FMI 3.0 a reference may denote an array.
+    /// Returns the number of values of these variables together. In FMI 3.0, a value reference may denote an array.
     pub fn count_elements<R: Reference>(&self, vr: &[R]) -> Outcome<usize> {
         if !(M::ARRAYS && R::ARRAYS) {
             return Ok(vr.len());
@@ -393,8 +398,7 @@ impl<M: Exported> Instance<M> {
     }
 }
 
-/// Returns the indices of the elements of an array of FMI 3.0 whose first element has this index; for a
-/// scalar, its index.
+/// Returns the indices of all elements of an array whose first element has this index; for a scalar, only its index.
 pub(crate) fn elements_of<M: crate::Variables>(index: u32) -> impl Iterator<Item = u32> {
     let length = M::TABLE.get(index as usize).map_or(1, |of| of.length() as u32);
     (0..length).map(move |number| index.wrapping_add(number))
@@ -405,7 +409,8 @@ struct Implicit<M>(std::marker::PhantomData<M>);
 impl<M: 'static> Implicit<M> {
     const TIME: &'static Variable<M> = &Variable::independent(&TIME).finished("time", "Simulation time");
 
-    /// Represents any event indicator; the values come from the model.
+    /// Describes every event indicator. Its value is never read, because the model calculates the values of all
+    /// indicators together.
     const INDICATOR: &'static Variable<M> = &Variable::local(&NUMBER)
         .read_by(
             shape_of_calculation(std::marker::PhantomData::<M>, |_| f64::NAN),
@@ -414,8 +419,8 @@ impl<M: 'static> Implicit<M> {
         .finished("eventIndicator", "An event happens where it changes its sign");
 }
 
-/// Returns a variable that FMI 3.0 requires and that follows the table. These variables are the time (section
-/// 2.4.7.4), if the table has none, and the event indicators (section 2.4.8).
+/// Returns an additional variable of FMI 3.0, whose index is after the table. These variables are the time (section
+/// 2.4.7.4), if the table does not contain it, and the event indicators (section 2.4.8).
 #[cold]
 fn implicit<M: Exported>(index: u32) -> Option<&'static Variable<M>> {
     let (time, variable) = independent::<M>();
@@ -423,13 +428,13 @@ fn implicit<M: Exported>(index: u32) -> Option<&'static Variable<M>> {
     variable.or_else(|| indicator::<M>(index).map(|_| Implicit::INDICATOR))
 }
 
-/// Returns the number of the event indicator at this index.
+/// Returns the number of the event indicator at this index, counted from 0; `None` if another variable has the index.
 fn indicator<M: Exported>(index: u32) -> Option<usize> {
     let number = index.checked_sub(first_indicator::<M>())? as usize;
     (number < Instance::<M>::INDICATORS).then_some(number)
 }
 
-/// Returns the value of a variable after the table.
+/// Returns the value of an additional variable: the time, or an event indicator.
 #[cold]
 fn implicit_value<M: Exported>(model: &M, time: f64, index: u32) -> f64 {
     let Some(number) = indicator::<M>(index) else { return time };
@@ -438,7 +443,7 @@ fn implicit_value<M: Exported>(model: &M, time: f64, index: u32) -> f64 {
     indicators[number]
 }
 
-/// Returns the index of the first event indicator: after the table and the time.
+/// Returns the index of the first event indicator, which follows the table and the time.
 pub(crate) fn first_indicator<M: crate::Variables>() -> u32 {
     let (time, _) = independent::<M>();
     (M::TABLE.len() as u32).max(time + 1)
@@ -454,7 +459,7 @@ impl<M: crate::Variables> Implicit<M> {
     };
 }
 
-/// Returns the independent variable of FMI 3.0 with its index.
+/// Returns the index of the time and its variable, in the table or after it.
 #[inline]
 pub(crate) fn independent<M: crate::Variables>() -> (u32, &'static Variable<M>) {
     Implicit::INDEPENDENT

@@ -10,7 +10,7 @@ use std::mem::MaybeUninit;
 impl<M: Exported> Instance<M> {
     pub fn enter_event_mode(&mut self) -> Outcome {
         if self.interface() == Interface::CoSimulation && !self.importer.event_mode {
-            return reject("the instance was made without event mode (eventModeUsed was false)");
+            return reject("the instance was created without Event Mode (eventModeUsed was false)");
         }
         self.enter(Mode::Event);
         Ok(())
@@ -22,7 +22,7 @@ impl<M: Exported> Instance<M> {
         None => 0,
     };
 
-    /// Performs one iteration of the event handling.
+    /// Performs one iteration of an event.
     pub fn event(&mut self) -> Outcome<Event> {
         let time = self.state.time;
         let event = self.try_change(|model| {
@@ -101,7 +101,10 @@ impl<M: Exported> Instance<M> {
         self.calculated().exported_nominals(&mut now);
         if let Some(index) = now.iter().position(|nominal| !(nominal.is_finite() && *nominal > 0.0)) {
             let name = M::TABLE[M::STATES[index].state as usize].name();
-            return reject(format!("the nominal value of {name} must be > 0, the model says {}", now[index]));
+            return reject(format!(
+                "the nominal value of {name} must be > 0, the model returns {}",
+                now[index]
+            ));
         }
         nominals.iter_mut().zip(now).for_each(|(nominal, now)| {
             nominal.write(now);

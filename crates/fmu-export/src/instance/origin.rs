@@ -4,8 +4,8 @@ use super::{Outcome, reject};
 use fmi_abi::{Interface, Standard};
 use std::fmt;
 
-/// FMI version and interface type of the instance that serialized a state. An instance with another origin rejects the state, because it
-/// may be in a mode that does not exist there, and because other calls are allowed after it.
+/// FMI version and interface type of the instance that serialized a state. An instance of another version or type
+/// rejects the state: its mode may not exist there, or may allow other calls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Origin(pub Standard, pub Interface);
 
@@ -26,7 +26,7 @@ impl Origin {
         Self::ALL.into_iter().find(|origin| origin.byte() == byte)
     }
 
-    /// Rejects a state of another origin.
+    /// Rejects a state whose origin differs from the origin of the instance, `own`.
     pub fn check(self, own: Self) -> Outcome {
         if self == own {
             return Ok(());

@@ -2,17 +2,19 @@
 
 use fmi_abi::Standard;
 
-/// A value reference: a number that denotes the index of a variable in the table, or after it.
+/// A value reference: a number from which the index of a variable follows. The index is in the table, or after it for
+/// the additional variables of FMI 3.0.
 pub(crate) trait Reference: Copy {
     /// Whether a reference may denote a whole array.
     const ARRAYS: bool;
-    /// Name of the array of references in the FMI standard; `VALUES` is the name of the array of values.
+    /// Name that the FMI standard gives to the array of references.
     const REFERENCES: &str;
+    /// Name that the FMI standard gives to the array of values.
     const VALUES: &str;
 
     fn index(self) -> u32;
 
-    /// Casts an importer's array to an array of this type.
+    /// Casts the importer's array of numbers to an array of this type, which has the same layout.
     fn cast(array: *const u32) -> *const Self;
 }
 

@@ -1,4 +1,4 @@
-//! Errors: the reason why a call returns another status than OK.
+//! The reason why a call returns another status than OK.
 
 use crate::model::Error;
 use fmi_abi::Status;
@@ -10,23 +10,24 @@ pub(crate) struct Rejection {
     pub message: String,
 }
 
-/// The error is boxed, so that success is returned in registers.
+/// Result of a call. The error is boxed, so that a success is returned in registers.
 pub(crate) type Outcome<T = ()> = Result<T, Box<Rejection>>;
 
-/// Returns an error.
+/// Returns an error with this message.
 #[cold]
 pub(crate) fn reject<T>(message: impl Into<String>) -> Outcome<T> {
     Err(Box::new(Rejection { status: Status::Error, message: message.into() }))
 }
 
-/// Returns an error, for functions that must be fast: their successful path contains no code for the message.
+/// Returns an error whose message is built only here, so that the successful path of a fast function contains no code
+/// for it.
 #[cold]
 #[inline(never)]
 pub(crate) fn reject_with<T>(message: impl FnOnce() -> String) -> Outcome<T> {
     reject(message())
 }
 
-/// Returns a discard, for a status that is not available or a step that ended early.
+/// Returns the status Discard: the requested information is not available, or a step ended early.
 #[cold]
 pub(crate) fn discard<T>(message: impl Into<String>) -> Outcome<T> {
     Err(Box::new(Rejection { status: Status::Discard, message: message.into() }))

@@ -7,10 +7,10 @@ use crate::export::Exported;
 use fmi_abi::{Interface, Mode};
 
 /// States that the importer has saved. Handles are looked up and never dereferenced, so a wrong handle cannot corrupt
-/// memory. The handle of a freed state stays invalid, because a handle contains the number of states that its slot had
-/// before.
+/// memory. The handle of a freed state stays invalid, because a handle contains a number that counts how often its
+/// slot has been freed.
 ///
-/// The instance owns the states and frees them at its end (section 2.1.5 of FMI 2.0, 2.3.1 of FMI 3.0).
+/// The instance owns the states. When it is freed, they are freed too (section 2.1.5 of FMI 2.0, 2.3.1 of FMI 3.0).
 pub(super) type SavedStates<M> = Handles<Box<State<M>>>;
 
 impl<M: Exported> Instance<M> {
@@ -18,14 +18,15 @@ impl<M: Exported> Instance<M> {
         Origin(self.standard(), self.interface())
     }
 
-    /// Returns the current size of a state in bytes, and of its content, which includes the data that it points to.
+    /// Returns two numbers of bytes for the current state: its size, and the size of its content, which includes the data
+    /// to which it points.
     #[cfg(target_family = "wasm")]
     pub fn size_of_state(&mut self) -> [usize; 2] {
         [size_of::<State<M>>(), serialized::size(&mut self.state)]
     }
 
-    /// Saves into the state of this handle, or into a new one; returns the handle. An existing state is
-    /// reused without allocation if the model's `clone_from` does not allocate.
+    /// Saves the current state and returns its handle. If `handle` is not NULL, the state of this handle is
+    /// overwritten; this allocates nothing, unless the model's `clone_from` does.
     pub fn save(&mut self, handle: usize) -> Outcome<usize> {
         if handle == NULL {
             return self.insert(self.state.clone());
@@ -54,7 +55,8 @@ impl<M: Exported> Instance<M> {
         Ok(self.saved.remove(handle))
     }
 
-    /// Removes any state and returns it; `None` if there are no more.
+    /// Removes any state, for example the backup for a failed step, and returns it; `None` if there are no more. Used
+    /// when the instance is freed.
     pub fn remove_any(&mut self) -> Option<impl Sized + use<M>> {
         self.rollback.take().or_else(|| self.saved.pop())
     }
@@ -69,7 +71,8 @@ impl<M: Exported> Instance<M> {
         serialized::write(find(&mut self.saved, handle)?, origin, bytes)
     }
 
-    /// De-serializes into the state of this handle, or into a new one; returns the handle.
+    /// De-serializes a state and returns its handle. If `handle` is not NULL, the state of this handle is
+    /// overwritten.
     pub fn deserialize(&mut self, bytes: &[u8], handle: usize) -> Outcome<usize> {
         if handle != NULL {
             find(&mut self.saved, handle)?;

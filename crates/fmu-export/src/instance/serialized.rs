@@ -1,4 +1,4 @@
-//! Saved states as bytes, with version and checksum.
+//! Serialized states: saved states as bytes, with a version and a checksum.
 
 use super::origin::Origin;
 use super::values::check_value;
@@ -6,11 +6,11 @@ use super::{Outcome, State, reject};
 use crate::export::Exported;
 use crate::model::Experiment;
 use crate::saved::{Saved, StateVisitor};
-use crate::settable::POSSIBLE;
+use crate::settable::ALL_MODES;
 use fmi_abi::Mode;
 
 impl<M: Exported> State<M> {
-    /// Visits all fields except those that are derived from others.
+    /// Visits all fields, except `stale` and `started`, which [`read`] sets.
     fn visit(&mut self, visitor: &mut dyn StateVisitor) {
         let mut mode = i64::from(self.mode as u32);
         visitor.integer(&mut mode);
@@ -27,20 +27,22 @@ impl<M: Exported> State<M> {
     }
 }
 
-/// Start of every serialized state; the last digit is the version of the layout.
+/// First bytes of every serialized state. The last digit is the version of the layout.
 const MAGIC: &[u8; 8] = b"fmustat2";
-/// Length of the magic, a hash of the guid, and the FMI version and interface type.
+/// Length of the magic, a hash of the guid, and a byte for FMI version and interface type.
 const HEADER_LENGTH: usize = 8 + 8 + 1;
 const CHECKSUM_LENGTH: usize = 8;
 
-/// Returns the number of bytes of a serialized state. `state` is not changed.
+/// Returns the number of bytes of a serialized state. Does not change `state`, although a visitor needs a mutable
+/// reference.
 pub(super) fn size<M: Exported>(state: &mut State<M>) -> usize {
     let mut counter = Writer::default();
     state.visit(&mut counter);
     HEADER_LENGTH + counter.count + CHECKSUM_LENGTH
 }
 
-/// Fills `bytes`, which must have the length from [`size`]. Rejects a state that could not be read back.
+/// Serializes a state into `bytes`, which must have the length from [`size`]. Rejects a state that [`read`] would
+/// reject.
 pub(super) fn write<M: Exported>(state: &mut State<M>, origin: Origin, bytes: &mut [u8]) -> Outcome {
     check(state)?;
     let (content, checksum) = bytes.split_at_mut(bytes.len() - CHECKSUM_LENGTH);
@@ -53,7 +55,8 @@ pub(super) fn write<M: Exported>(state: &mut State<M>, origin: Origin, bytes: &m
     Ok(())
 }
 
-/// Reads a state from untrusted bytes; overwrites `state`, which may be any state of the model.
+/// Reads a state from untrusted bytes into `state`, which may be any state of the model. After an error, `state` may
+/// be partly overwritten.
 pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<M>) -> Outcome {
     let version = MAGIC.len() - 1;
     if bytes.len() < MAGIC.len() || bytes[..version] != MAGIC[..version] {
@@ -63,7 +66,7 @@ pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<
         return reject("the saved state has another version of the layout; save it again with this FMU");
     }
     if bytes.len() < HEADER_LENGTH + CHECKSUM_LENGTH {
-        return reject("the saved state is cut short");
+        return reject("the saved state is truncated");
     }
     if bytes[8..16] != guid_hash::<M>() {
         return reject("the saved state comes from another FMU (its guid differs)");
@@ -73,7 +76,7 @@ pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<
         return reject("the saved state is damaged or has the wrong length (its checksum is wrong)");
     }
     let Some(from) = Origin::from_byte(content[16]) else {
-        return reject("the saved state holds impossible values");
+        return reject("the saved state contains impossible values");
     };
     from.check(origin)?;
     let mut reader = Reader { rest: &content[HEADER_LENGTH..], valid: true };
@@ -81,8 +84,8 @@ pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<
     if !reader.rest.is_empty() {
         return reject("the saved state has the wrong length");
     }
-    if !reader.valid || !POSSIBLE.contains(origin.0, origin.1, state.mode) {
-        return reject("the saved state holds impossible values");
+    if !reader.valid || !ALL_MODES.contains(origin.0, origin.1, state.mode) {
+        return reject("the saved state contains impossible values");
     }
     check(state)?;
     state.model.restored()?;
@@ -91,12 +94,13 @@ pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<
     Ok(())
 }
 
-/// Checks that start values are valid and times are finite. The model must check its `memory` itself.
+/// Checks that the variables with start values have valid values, and that times are finite. The model must check its
+/// `memory` itself.
 fn check<M: Exported>(state: &State<M>) -> Outcome {
     let Experiment { start_time, stop_time, tolerance } = state.experiment;
     let times = [Some(state.time), Some(start_time), stop_time, tolerance];
     if !times.into_iter().flatten().all(f64::is_finite) {
-        return reject("the saved state holds impossible values");
+        return reject("the saved state contains impossible values");
     }
     for variable in M::TABLE.iter().filter(|variable| variable.has_start()) {
         if let Some(value) = variable.value(&state.model) {
@@ -110,14 +114,15 @@ fn guid_hash<M: Exported>() -> [u8; 8] {
     fnv1a(M::INFO.guid.as_bytes()).to_le_bytes()
 }
 
-/// FNV-1a. Every step is a bijection of the hash, so it detects any single changed byte.
+/// Computes the FNV-1a hash. It detects any single changed byte, because every step maps different hashes to
+/// different hashes.
 fn fnv1a(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
         (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3)
     })
 }
 
-/// Writes to the memory, or only counts the bytes without memory.
+/// Writes a state to `rest`, or only counts its bytes if there is no `rest`.
 #[derive(Default)]
 struct Writer<'a> {
     rest: Option<&'a mut [u8]>,
@@ -155,6 +160,7 @@ impl StateVisitor for Writer<'_> {
     fn invalid(&mut self) {}
 }
 
+/// Reads a state from the bytes in `rest`. `valid` becomes false at the first fault.
 struct Reader<'a> {
     rest: &'a [u8],
     valid: bool,
@@ -226,7 +232,7 @@ mod tests {
         bytes
     }
 
-    /// Returns the value in the bytes, if all bytes are valid.
+    /// Returns the value that the bytes contain; `None` if they are invalid or too many.
     fn read<T: Saved + Default>(bytes: &[u8]) -> Option<T> {
         let mut value = T::default();
         let mut reader = Reader { rest: bytes, valid: true };
@@ -238,11 +244,14 @@ mod tests {
     fn round_trip<T: Saved + Default + Clone + PartialEq + std::fmt::Debug>(value: T) {
         let bytes = written(value.clone());
         assert_eq!(read(&bytes), Some(value));
-        assert!((0..bytes.len()).all(|length| read::<T>(&bytes[..length]).is_none()), "a cut is seen");
+        assert!(
+            (0..bytes.len()).all(|length| read::<T>(&bytes[..length]).is_none()),
+            "missing bytes are detected"
+        );
     }
 
     #[test]
-    fn every_type_round_trip() {
+    fn every_type_is_read_as_written() {
         round_trip(-0.25);
         round_trip([f64::MIN_POSITIVE, f64::INFINITY]);
         round_trip([f32::MAX, f32::NEG_INFINITY]);
@@ -286,8 +295,7 @@ mod tests {
         }
     }
 
-    /// Checks that vectors of any length come back, and that a false length creates no elements without
-    /// bytes.
+    /// Reads a long vector, and checks that a false length creates no elements for which there are no bytes.
     #[test]
     fn long_vectors() {
         let value = vec![true; (1 << 20) + 1];

@@ -1,7 +1,6 @@
-//! A map for few entries, because the code of a `BTreeMap` is ten times as large, which counts in every
-//! library.
+//! A map for few entries. It replaces a `BTreeMap`, whose code is ten times as large and would be in every library.
 
-/// Entries in the order of their keys.
+/// A map as a list of entries, sorted by key.
 #[derive(Clone, Debug)]
 pub(super) struct Sorted<K, V>(Vec<(K, V)>);
 
@@ -14,7 +13,7 @@ impl<K: Ord + Copy, V> Sorted<K, V> {
         self.0.binary_search_by_key(&key, |(key, _)| *key)
     }
 
-    /// Inserts a value or replaces the value of the key.
+    /// Inserts a value, or replaces the value that the key has.
     pub fn insert(&mut self, key: K, value: V) {
         match self.index(key) {
             Ok(index) => self.0[index].1 = value,

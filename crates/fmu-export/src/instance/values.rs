@@ -1,8 +1,8 @@
-//! Values (section 2.1.7 of FMI 2.0, 2.2.7.2 of FMI 3.0).
+//! Getting and setting values (section 2.1.7 of FMI 2.0, 2.2.7.2 of FMI 3.0).
 
 use super::{Instance, Outcome, Reference, finite, implicit_value, reject, reject_with};
 use crate::export::Exported;
-use crate::settable::STARTING;
+use crate::settable::START_VALUE_MODES;
 use crate::types::Attributes;
 use crate::variable::Variable;
 use fmi_abi::BaseType;
@@ -35,8 +35,8 @@ impl<M: Exported> Instance<M> {
         if is_finite(sum) { Ok(()) } else { self.get_reals_one_by_one(vr, values) }
     }
 
-    /// Gets Reals if no calculation is needed, all are fields of the model, and all are finite. Otherwise
-    /// returns false and writes nothing.
+    /// Gets Reals, if no calculation is needed, all are fields of the model, and all are finite. Returns false, and
+    /// writes nothing, in all other cases.
     #[inline(always)]
     pub fn get_reals_fast<R: Reference, const N: usize>(
         &mut self,
@@ -58,8 +58,8 @@ impl<M: Exported> Instance<M> {
         true
     }
 
-    /// Gets contiguous elements of an array together, so that the function that calculates the array is
-    /// called once.
+    /// Gets Reals of a model with arrays. Consecutive elements of an array are read together, so that the model
+    /// calculates the array only once for them.
     pub(super) fn get_reals_of_arrays(
         &mut self,
         index: impl Fn(usize) -> u32,
@@ -84,8 +84,8 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    /// Gets Reals, including the time and the event indicators of FMI 3.0, which are not in the table. The
-    /// error names the first value that is not finite.
+    /// Gets Reals one by one, including the time and the event indicators of FMI 3.0, which are not in the table. An
+    /// error contains the name of the first variable that is not finite.
     #[cold]
     #[inline(never)]
     fn get_reals_one_by_one<R: Reference>(&mut self, vr: &[R], values: &mut [MaybeUninit<f64>]) -> Outcome {
@@ -124,12 +124,12 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    /// Sets Reals if all are plain fields of the model and may be set. Otherwise returns false; then
-    /// [`set_reals`](Self::set_reals) sets all.
+    /// Sets Reals, if all are plain fields of the model and may be set. Otherwise returns false; the caller must then
+    /// set all of them with [`set_reals`](Self::set_reals).
     #[inline(always)]
     pub fn set_reals_fast<R: Reference, const N: usize>(&mut self, vr: &[R; N], values: &[f64; N]) -> bool {
         let fmi_state = self.fmi_state();
-        // Copies the arrays, because the compiler cannot assume that they do not overlap the model.
+        // Copies the arrays, because the compiler must assume that they may overlap the model.
         let lines: [usize; N] = std::array::from_fn(|number| vr[number].index() as usize);
         let values: [f64; N] = std::array::from_fn(|number| values[number]);
         let is_taken = |line: &usize| {
@@ -153,7 +153,8 @@ impl<M: Exported> Instance<M> {
         self.set(vr, &[BaseType::Real], &|index| Value::Real(values[index]))
     }
 
-    /// Gets values of any other type: checks all, then passes each to `each` with its index.
+    /// Gets values of any type in `bases`. First checks all variables, then passes each value to `each`, with its
+    /// index in `vr`.
     #[inline(never)]
     pub fn get<R: Reference>(
         &mut self,
@@ -184,8 +185,8 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// Sets values of any type, which `value` returns by index. Checks all, then sets all. One function
-    /// serves all types, because this keeps libraries small.
+    /// Sets values of any type in `bases`; `value` returns the value for an index in `vr`. First checks all values,
+    /// then sets all. One function serves all types, because this keeps libraries small.
     #[inline(never)]
     pub fn set<R: Reference>(
         &mut self,
@@ -204,16 +205,16 @@ impl<M: Exported> Instance<M> {
             Some((*vr, rejection))
         });
         match to_blame {
-            Some((blamed, rejection)) => self.remember(vr, Some(blamed.index()), Err(rejection)),
+            Some((blamed, rejection)) => self.record_rejection(vr, Some(blamed.index()), Err(rejection)),
             None => {
                 let set = self.set_settable(vr, value);
-                self.remember(vr, None, set)
+                self.record_rejection(vr, None, set)
             }
         }
     }
 
-    /// Rejects setting variables because the value at one index is not valid for its type. `why` gets the
-    /// variable's name.
+    /// Rejects a call that sets variables, because the value at `index` is not valid in its C type. `why` returns the
+    /// message for the name of the variable.
     #[cold]
     pub fn reject_value<R: Reference>(
         &mut self,
@@ -225,18 +226,19 @@ impl<M: Exported> Instance<M> {
         self.check_all_settable(vr, bases)?;
         let blamed = vr[index].index();
         let rejection = reject(why(M::TABLE[blamed as usize].name()));
-        self.remember(vr, Some(blamed), rejection)
+        self.record_rejection(vr, Some(blamed), rejection)
     }
 
     fn check_all_settable<R: Reference>(&self, vr: &[R], bases: &[BaseType]) -> Outcome {
         vr.iter().try_for_each(|vr| self.check_settable(self.variable_of(vr.index(), bases)?))
     }
 
-    /// Records rejected start values, so that the initialization fails until the variables are set to valid
-    /// values: some importers continue after the error, and the simulation would then use other start values
-    /// than the user wants. The record includes all variables of the call.
-    fn remember<R: Reference>(&mut self, vr: &[R], blamed: Option<u32>, set: Outcome) -> Outcome {
-        if self.fmi_state().is_in(STARTING) {
+    /// Records rejected start values, so that the initialization fails until the variables are set to valid values.
+    /// Otherwise, importers that continue after the error would simulate with other start values than the user wants.
+    /// All variables of the call are recorded, because none of them was set; `blamed` is the index of the one whose
+    /// value was rejected.
+    fn record_rejection<R: Reference>(&mut self, vr: &[R], blamed: Option<u32>, set: Outcome) -> Outcome {
+        if self.fmi_state().is_in(START_VALUE_MODES) {
             for vr in vr.iter().map(|vr| vr.index()) {
                 let Err(rejection) = &set else {
                     self.rejected.remove(vr);
@@ -294,13 +296,13 @@ impl<M: Exported> Instance<M> {
         })
     }
 
-    /// Returns the name of a variable that has the type.
+    /// Returns the name of a variable, or an error if its type is not `base`.
     pub fn name(&self, vr: impl Reference, base: BaseType) -> Outcome<&'static str> {
         Ok(self.variable(vr.index(), base)?.name())
     }
 
-    /// Returns whether setting a variable is a call that the standard forbids, but has no effect: FMPy sets discrete inputs
-    /// in Continuous-Time Mode to the values that they have.
+    /// Returns whether setting a variable is forbidden by the FMI standard but has no effect. Such calls are
+    /// tolerated, because FMPy sets discrete inputs in Continuous-Time Mode to the values that they already have.
     fn changes_nothing(&self, variable: &Variable<M>, value: impl FnOnce() -> Value) -> bool {
         self.mode() == Mode::ContinuousTime
             && variable.causality() == Causality::Input
@@ -330,15 +332,16 @@ impl<M: Exported> Instance<M> {
     }
 }
 
-/// Returns whether a sum is finite, which requires that all its terms are. The sum is checked because this is
-/// faster than a check of each term.
+/// Returns whether a sum is finite. This implies that all its terms are finite, and is faster to check than each
+/// term.
 #[inline(always)]
 pub(super) fn is_finite(sum: f64) -> bool {
-    // Takes half as many instructions as `f64::is_finite`.
+    // This takes half as many instructions as `f64::is_finite`.
     !(sum * 0.0).is_nan()
 }
 
-/// Checks that numbers are finite, parameters in the range of their type, and items in their enumeration.
+/// Checks that a number is finite, that a parameter is in the range of its type, that an enumeration has the item,
+/// and that a Binary is not too long.
 pub(super) fn check_value<M>(variable: &Variable<M>, value: &Value) -> Outcome {
     let name = variable.name();
     let enforced = variable.causality() == Causality::Parameter;
