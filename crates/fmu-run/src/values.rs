@@ -1,4 +1,4 @@
-//! Values of variables, where the elements of an array are variables; an array of the FMU is read or set with one call.
+//! Reads and sets variables, including array elements. All elements of an array are read or set with one call of the FMU.
 
 use crate::arrays::Expanded;
 use crate::instance::Instance;
@@ -7,7 +7,7 @@ use fmi_client::Rejection;
 use std::sync::Arc;
 
 impl Instance {
-    /// Sets numeric variables of one type; 0 or 1 for a Boolean.
+    /// Sets numeric variables of one type. Booleans are 0 or 1.
     #[inline]
     pub(crate) fn set_numbers(
         &mut self,
@@ -22,7 +22,7 @@ impl Instance {
         self.client.set_numbers(base, vr, values)
     }
 
-    /// Reads numeric variables of one type; 0 or 1 for a Boolean.
+    /// Reads numeric variables of one type. Booleans are 0 or 1.
     #[inline]
     pub(crate) fn get_numbers(
         &mut self,
@@ -46,7 +46,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Sets variables of which some are array elements; the other elements of the arrays keep their values.
+    /// Sets variables, some of which are array elements. All other elements of the arrays keep their values.
     #[cold]
     fn set_elements(&mut self, base: BaseType, vr: &[u32], values: &[f64]) -> Result<(), Rejection> {
         let expanded = self.arrays.expanded(vr);
@@ -70,8 +70,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Returns the values of an array before the initialization: the values that were set, or the start
-    /// values.
+    /// Returns the values of an array before Initialization Mode: those that were set, or the start values.
     fn early_numbers(&self, array: usize) -> Vec<f64> {
         if let Some(known) = self.early.as_ref().and_then(|early| early.numbers.get(&array)) {
             return known.clone();
@@ -84,7 +83,7 @@ impl Instance {
         (0..self.arrays.length(array.reference)).map(number).collect()
     }
 
-    /// Sets variables of one type to exact values; the other elements of arrays keep theirs.
+    /// Sets variables of one type to exact values. All other elements of arrays keep their values.
     pub(crate) fn set_values(
         &mut self,
         base: BaseType,
@@ -126,7 +125,7 @@ impl Instance {
         Ok(indices.iter().map(|index| all[*index].clone()).collect())
     }
 
-    /// Returns the exact values of an array before the initialization.
+    /// Returns the exact values of an array before Initialization Mode: those that were set, or the start values.
     fn early_values(&self, array: usize) -> Vec<Value> {
         if let Some(known) = self.early.as_ref().and_then(|early| early.values.get(&array)) {
             return known.clone();

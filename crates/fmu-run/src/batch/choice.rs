@@ -1,4 +1,4 @@
-//! Choice of the instance for a run: a new one, or the instance of an earlier run after a reset.
+//! Chooses the instance for a run: a new one, or the reset instance of an earlier run.
 
 use super::reuse::{Choice, Origin, Used};
 use super::worker::{Failure, Worker};
@@ -8,7 +8,7 @@ use fmi_abi::Interface;
 use std::time::{Duration, Instant};
 
 impl Worker<'_> {
-    /// Takes an instance of an earlier batch.
+    /// Takes an instance that an earlier batch has kept, if there is one.
     pub fn begin(&mut self) {
         if !self.may_reuse() {
             return;
@@ -29,7 +29,8 @@ impl Worker<'_> {
         self.system.kept().put(Idle { components: instance.into_components(), given, took });
     }
 
-    /// Keeps the instance of a complete run for the next run, if the duration of the run was measured.
+    /// Keeps the instance of a complete run for the next run. `took` is the duration of the run; `None` means that instances are not
+    /// kept.
     pub fn keep(&mut self, instance: Running, run: usize, took: Option<Duration>) {
         if self.may_reuse()
             && let Some(took) = took
@@ -59,8 +60,8 @@ impl Worker<'_> {
         Choice::New
     }
 
-    /// Performs a run in a new instance, after the same run in a reset instance. If both give the same bits, the
-    /// FMU can be reset after these changes.
+    /// Performs a run twice, in a reset instance and then in a new one, and returns the result of the new one. If both results are
+    /// bit-identical, this counts as a proof that the FMU can be reset after these changes.
     pub fn check(
         &mut self,
         (instance, changes): (Running, Vec<Change>),
@@ -76,7 +77,7 @@ impl Worker<'_> {
         let again = reset.map(|instance| self.perform(instance, run, times, &mut kept, &mut measured));
         let (seen, exact) = (self.reuse.seen.take(), self.take_exact());
         self.reuse.is_check = false;
-        // Some FMUs permit only one instance.
+        // Frees the instance first, because some FMUs permit only one.
         self.reuse.used = None;
         let took = begin.elapsed();
         let result = self.run_new(run, times, trajectories, measures);
@@ -97,7 +98,7 @@ impl Worker<'_> {
         match (is_same, &self.reuse.used) {
             (false, _) => trust.distrust(),
             (true, Some(_)) => trust.prove(changes),
-            // Values that cannot be read are not compared.
+            // The final values could not be read, so they were not compared.
             (true, None) if result.is_ok() => trust.distrust(),
             // An incomplete run proves nothing.
             (true, None) => {}
@@ -105,7 +106,7 @@ impl Worker<'_> {
         result
     }
 
-    /// Creates an instance. The error contains the reason, and whether there is no message.
+    /// Creates an instance. The error contains the reason, and whether the FMU logged no message.
     pub fn create(&mut self) -> Result<Running, (String, bool)> {
         let begin = Instant::now();
         let instance = Running::new(self.system, self.plan.interface, &self.logging())?;
@@ -115,12 +116,13 @@ impl Worker<'_> {
         Ok(instance)
     }
 
-    /// Returns whether runs may share an instance. With logging on, each run has a new one, so that its messages are complete; in
-    /// Model Exchange, because resets are only proven for Co-Simulation.
+    /// Returns whether runs may share an instance. With logging on, they may not, so that the messages of each run are complete. In
+    /// Model Exchange they may not either, because resets are only checked in Co-Simulation.
     fn may_reuse(&self) -> bool {
         !self.is_logging() && self.plan.interface == Interface::CoSimulation
     }
 
+    /// Returns the values that the earlier run set.
     fn given_in(&self, origin: Origin) -> Given {
         match origin {
             Origin::Earlier(given) => given,

@@ -8,7 +8,7 @@ use crate::running::Running;
 use fmi_client::Rejection;
 
 impl<'a> Worker<'a> {
-    /// Runs an instance in Model Exchange, as `follow` does in Co-Simulation.
+    /// Runs an instance in Model Exchange from the start values to the last time. `follow` is its counterpart in Co-Simulation.
     pub fn integrate(
         &mut self,
         integrated: &'a Integrated<'a>,
@@ -43,7 +43,8 @@ impl<'a> Worker<'a> {
         })
     }
 
-    /// Reads the outputs at the end of a run that the FMU ends. At a communication point they belong to the results.
+    /// Reads the outputs at the end of a run that the FMU has ended. They belong to the results if the end is at a communication
+    /// point.
     fn end(
         &mut self,
         running: &mut Running,
@@ -65,7 +66,7 @@ impl<'a> Worker<'a> {
     }
 }
 
-/// A run as the march sees it.
+/// Functions for the simulation loop: they read outputs into the results of a run.
 struct Observed<'w, 'a> {
     worker: &'w mut Worker<'a>,
     times: &'w [f64],

@@ -1,4 +1,4 @@
-//! Checks a batch and looks up its names.
+//! Checks a batch and looks up its variables.
 
 use super::exact::Input;
 use super::inputs::{Inputs, Numbers, checked, each_input, is_held, once};
@@ -21,13 +21,13 @@ pub(super) struct Plan<'a> {
     pub runs: usize,
     pub inputs: Inputs<'a>,
     pub derivatives: Inputs<'a>,
-    /// Variables of both.
+    /// Variables of all inputs and input derivatives.
     pub set_in_steps: Arc<[Target]>,
     pub start: StartValues<'a>,
-    /// Inputs whose values numbers do not have.
+    /// Inputs whose values `f64` cannot represent.
     pub exact_inputs: Vec<Input>,
     pub outputs: Selection,
-    /// Outputs whose values numbers do not have.
+    /// Outputs whose values `f64` cannot represent.
     pub exact_outputs: Vec<(String, Target)>,
     pub every: Option<usize>,
     pub measures: &'a [Measure],
@@ -35,7 +35,7 @@ pub(super) struct Plan<'a> {
     pub read_before_set: bool,
     pub tolerance: Tolerance,
     pub interface: Interface,
-    /// Inputs and settings of Model Exchange.
+    /// Inputs and settings of Model Exchange; `None` in Co-Simulation.
     pub integrated: Option<Integrated<'a>>,
 }
 
@@ -86,7 +86,7 @@ impl<'a> Plan<'a> {
         Ok(plan)
     }
 
-    /// Returns the number of kept times.
+    /// Returns the number of times at which outputs are stored.
     pub fn kept(&self) -> usize {
         self.every.map_or(0, |every| self.time.len().div_ceil(every))
     }
@@ -134,7 +134,7 @@ impl<'a> Plan<'a> {
     }
 }
 
-/// Fails if settings of Model Exchange are given for Co-Simulation.
+/// Fails if settings for Model Exchange are given in Co-Simulation.
 fn check_of_co_simulation(batch: &Batch) -> Result<(), Error> {
     if batch.events || batch.integration != Integration::default() {
         return request(
@@ -145,6 +145,7 @@ fn check_of_co_simulation(batch: &Batch) -> Result<(), Error> {
     Ok(())
 }
 
+/// Fails unless there are at least two times, which are finite and increase.
 fn checked_time(time: &[f64]) -> Result<&[f64], Error> {
     if time.len() < 2 {
         return request(format!("time has {} values; a run needs at least two", time.len()));
@@ -162,7 +163,7 @@ fn checked_time(time: &[f64]) -> Result<&[f64], Error> {
     Ok(time)
 }
 
-/// Returns the number of runs; checks that all values for each run agree on it.
+/// Returns the number of runs. Fails if inputs and start values are given for different numbers of runs.
 fn runs(batch: &Batch) -> Result<usize, Error> {
     let mut found: Option<(&str, usize)> = None;
     let trajectories =

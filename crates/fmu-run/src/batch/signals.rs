@@ -6,7 +6,7 @@ use super::inputs::{Inputs, Numbers};
 /// Inputs of a run.
 pub(super) struct Signals<'a> {
     values: Vec<Signal<'a>>,
-    /// Values at a time.
+    /// Buffer for the values of all inputs at a time.
     row: Vec<f64>,
 }
 
@@ -41,7 +41,7 @@ impl<'a> Signals<'a> {
         self.values.is_empty()
     }
 
-    /// Returns the values at the time with this index.
+    /// Returns the values of all inputs at the time with this index.
     #[inline(always)]
     pub fn at(&mut self, time: usize) -> &[f64] {
         for (value, signal) in self.row.iter_mut().zip(&self.values) {

@@ -1,4 +1,4 @@
-//! A thread of a batch: performs one run after the other.
+//! The work of a thread of a batch, which performs one run after the other.
 
 use super::Occurrence;
 use super::measure::Measured;
@@ -16,17 +16,17 @@ use fmi_client::Rejection;
 use std::sync::Arc;
 use std::time;
 
-/// Failure of a run before its last time.
+/// Failure of a run before the last time.
 #[derive(PartialEq)]
 pub(super) struct Failure {
-    /// Index of the time of the failure; `None` before the end of the initialization.
+    /// Index of the time of the failure; `None` if the initialization failed.
     pub at: Option<usize>,
     pub text: String,
-    /// Whether the FMU gave no reason.
+    /// Whether the FMU logged no message.
     pub is_silent: bool,
 }
 
-/// Values of a run at the kept times that it has reached, output by output at each time.
+/// Index of a run, and its values that `f64` cannot represent: for each stored time that it reached, the values of all such outputs.
 pub(super) type Exact = (usize, Vec<Value>);
 
 /// Instance and buffers of a thread.
@@ -34,40 +34,41 @@ pub(super) struct Worker<'a> {
     pub system: &'a System,
     pub plan: &'a Plan<'a>,
     pub watch: &'a Watch,
-    /// Deadline of a run that is repeated with logging on.
+    /// Deadline, if failed runs are repeated with logging on.
     deadline: Option<time::Instant>,
-    /// Collects all messages, and the number of the instance.
+    /// Collector of all messages, if the caller requests them, and the number of this thread's instance.
     pub feed: Option<(Arc<Feed>, usize)>,
-    /// Whether this thread called the runs; then it calls the pulse.
+    /// Whether this is the thread of the caller, which calls the pulse.
     is_caller: bool,
     pulse: Pulse,
     pub reuse: Reuse,
     inputs: Signals<'a>,
     derivatives: Signals<'a>,
-    /// Number of the run.
+    /// Index of the current run.
     number: usize,
-    /// Values of the current run that are not numbers, and such values of finished runs.
+    /// Values of the current run that `f64` cannot represent.
     exact_of_run: Vec<Value>,
+    /// The same for finished runs.
     pub exact: Vec<Exact>,
     /// Events in Model Exchange.
     pub events: Vec<Occurrence>,
-    /// Orders of the input derivatives.
+    /// Orders of the input derivatives, which are all 1.
     orders: Vec<i32>,
-    /// Outputs at a time, in their order.
+    /// Numeric outputs at the current time.
     pub row: Vec<f64>,
-    /// Number of times that the run has reached.
+    /// Number of communication points that the run has reached.
     pub reached: usize,
     measured: Measured,
 }
 
-/// Index of the next kept value in a trajectory, and number of times until then.
+/// Position in the trajectories of a run: index of the next stored value, and number of communication points until then.
 #[derive(Default)]
 pub(super) struct Kept {
     index: usize,
     wait: usize,
 }
 
-/// Index of the time (`None` before the end of the initialization) and the error.
+/// Index of the time at which a run stopped (`None` if the initialization failed), and the error.
 pub(super) type Stopped = (Option<usize>, Rejection);
 
 impl<'a> Worker<'a> {
@@ -100,7 +101,7 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Returns whether the FMU logs its messages, and instances are new for each run, so that the messages are complete.
+    /// Returns whether logging is on. Each run then has a new instance, so that its messages are complete.
     pub fn is_logging(&self) -> bool {
         self.deadline.is_some() || self.feed.is_some()
     }
@@ -109,7 +110,7 @@ impl<'a> Worker<'a> {
         Logging { on: self.is_logging(), feed: self.feed.clone() }
     }
 
-    /// Performs a run over these times. May return a note if the run reaches the last time.
+    /// Performs a run over these times. If the run reaches the last time, the result may be a note about its end.
     pub fn run(
         &mut self,
         run: usize,
@@ -143,7 +144,7 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Performs a run in this instance, which can be used again if the run is complete.
+    /// Performs a run in this instance, and keeps the instance for later runs if the run is complete.
     pub fn perform(
         &mut self,
         mut instance: Running,
@@ -187,7 +188,7 @@ impl<'a> Worker<'a> {
         let is_usable = is_complete && self.reuse.observe(&mut instance);
         let mut terminated = if rejected { Ok(()) } else { instance.terminate() };
         if is_complete && !is_usable {
-            // The error comes from the comparison, not from the run.
+            // The instance became unusable when its values were read for the comparison, so this is not an error of the run.
             terminated = Ok(());
         } else if is_complete && terminated.is_ok() {
             self.keep(instance, run, begin.map(|begin| begin.elapsed()));
@@ -205,23 +206,23 @@ impl<'a> Worker<'a> {
         Err(Failure { at, text, is_silent: rejection.is_silent() })
     }
 
-    /// Returns the values of a check that numbers do not have.
+    /// Removes and returns the values of the current run that `f64` cannot represent.
     pub fn take_exact(&mut self) -> Vec<Value> {
         std::mem::take(&mut self.exact_of_run)
     }
 
-    /// Returns whether a run had the same values.
+    /// Returns whether the last finished run has this index and these values that `f64` cannot represent.
     pub fn has_exact(&self, run: usize, values: &[Value]) -> bool {
         let last = self.exact.last().filter(|(number, _)| *number == run);
         last.map_or(values.is_empty(), |(_, found)| found == values)
     }
 
-    /// Returns whether the caller does not observe the run.
+    /// Returns whether the run is not visible to the caller: it is repeated with logging on, or only checks the reset.
     pub fn is_repeated(&self) -> bool {
         self.deadline.is_some() || self.reuse.is_check
     }
 
-    /// Records the run and its time, so that messages of the FMU can be logged with both.
+    /// Records the index and the time of the run for the messages of the FMU.
     #[inline(always)]
     pub fn report_time(&self, run: usize, time: f64) {
         if let Some((feed, instance)) = &self.feed {
@@ -229,7 +230,7 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Runs an instance from the start values to the last time, or until the caller cancels or the deadline
+    /// Runs an instance in Co-Simulation from the start values to the last time, unless the caller cancels the run or the deadline
     /// passes.
     fn follow(
         &mut self,
@@ -255,7 +256,7 @@ impl<'a> Worker<'a> {
             }
             self.report_time(run, time);
             if let Some(deadline) = self.deadline {
-                // Messages about earlier steps are not the reason of a later error.
+                // Drops messages about earlier steps, so that they do not become the reason of a later error.
                 instance.forget_log();
                 if time::Instant::now() > deadline {
                     return Ok(());
@@ -297,7 +298,7 @@ impl<'a> Worker<'a> {
                 let size = next - time;
                 if let Err(rejection) = instance.step(time, size) {
                     let Some(end) = rejection.ended() else { return Err(at(rejection)) };
-                    // Outputs can be read, but inputs no longer set (section 4.2.4 of FMI 2.0).
+                    // Now outputs can be read, but inputs can no longer be set (section 4.2.4 of FMI 2.0).
                     if instance.get(&plan.outputs, &mut self.row).is_err() {
                         self.row.fill(f64::NAN);
                     }
@@ -311,7 +312,7 @@ impl<'a> Worker<'a> {
         Ok(())
     }
 
-    /// Calls the pulse if it is due, and returns whether the run goes on after a step in Model Exchange.
+    /// Calls the pulse if it is due. Returns whether the run continues. Called after each step in Model Exchange.
     pub fn proceeds(&mut self) -> bool {
         if self.is_caller && self.pulse.is_due() {
             self.watch.pulse();
@@ -360,7 +361,7 @@ impl<'a> Worker<'a> {
         Experiment { start_time, stop_time, tolerance: self.plan.tolerance }
     }
 
-    /// Sets start values before Initialization Mode and inputs in it.
+    /// Sets start values, enters Initialization Mode, sets the first values of the inputs, and leaves Initialization Mode.
     fn start(&mut self, instance: &mut Running, run: usize) -> Result<(), Rejection> {
         let plan = self.plan;
         instance.begin(self.experiment(), &plan.start, run)?;

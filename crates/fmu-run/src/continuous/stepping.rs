@@ -1,4 +1,4 @@
-//! Completed steps of the solver: locates events in them, reads outputs and informs the FMU.
+//! Processes each completed step of the solver: locates events in it, reads outputs and notifies the FMU.
 
 use super::march::{Arrival, Hooks, March};
 use super::model::Model;
@@ -6,7 +6,8 @@ use fmi_client::Rejection;
 use ivp::dense::StepInterpolant;
 use ivp::solout::{ControlFlag, SolOut};
 
-/// Parts of the first step after an event at which event indicators are evaluated, too: one may return to the side from which it came.
+/// Fractions of the first step after an event at which event indicators are also evaluated, because an indicator may quickly change
+/// its sign back.
 const PROBES: [f64; 4] = [1e-6, 1e-3, 0.1, 0.5];
 
 /// Observes the steps of the solver.
@@ -32,14 +33,15 @@ impl<'s, 'a, 'm, H: Hooks> Stepping<'s, 'a, 'm, H> {
         Self { march, model, hooks, stop, arrival: None, failure: None }
     }
 
-    /// Goes to the end of the interval, if the FMU has no states.
+    /// Processes the whole interval as one step, for an FMU without states.
     pub fn without_states(mut self) -> Result<Arrival, Rejection> {
         let (begin, stop) = (self.march.time, self.stop);
         self.step([begin, stop], &[], &|_, _| ())?;
         Ok(self.arrival.unwrap_or(Arrival::Stop))
     }
 
-    /// Completes a step: locates an event in it, reads outputs at the communication points and reports the step to the FMU.
+    /// Processes a step: locates an event in it, reads outputs at the communication points and notifies the FMU. `at` writes the
+    /// states at a time within the step.
     fn step(
         &mut self,
         [begin, end]: [f64; 2],
@@ -82,7 +84,8 @@ impl<'s, 'a, 'm, H: Hooks> Stepping<'s, 'a, 'm, H> {
         Ok(())
     }
 
-    /// Returns the first point after an event indicator has changed its sign, and the indicator; else the end of the step.
+    /// Returns the first point after an event indicator has changed its sign, and the index of the indicator. If none has, returns
+    /// the end of the step.
     fn first_event(
         &mut self,
         begin: f64,
@@ -115,6 +118,7 @@ impl<'s, 'a, 'm, H: Hooks> Stepping<'s, 'a, 'm, H> {
         Ok((before, None))
     }
 
+    /// Evaluates states and event indicators at a time within the step.
     fn point(&self, time: f64, at: &dyn Fn(f64, &mut [f64])) -> Result<Point, Rejection> {
         let mut point = Point { time, x: vec![0.0; self.march.x.len()], z: vec![0.0; self.march.z.len()] };
         at(time, &mut point.x);
@@ -122,8 +126,8 @@ impl<'s, 'a, 'm, H: Hooks> Stepping<'s, 'a, 'm, H> {
         Ok(point)
     }
 
-    /// Narrows the interval in which the first event indicator changes its sign, and returns its end, where the sign has changed.
-    /// The Illinois method, with a bisection now and then.
+    /// Narrows the interval in which an event indicator first changes its sign, and returns its end, where the sign has changed. Uses
+    /// the Illinois method, with a bisection in every fourth iteration.
     fn locate(
         &self,
         mut before: Point,
@@ -164,7 +168,7 @@ impl<H: Hooks> SolOut for Stepping<'_, '_, '_, H> {
         interpolant: Option<&StepInterpolant<'_>>,
     ) -> ControlFlag {
         if *end <= self.march.time {
-            // The call before the first step.
+            // The solver also calls this function before the first step.
             return ControlFlag::Continue;
         }
         if self.model.parts().has_failed() {

@@ -1,4 +1,5 @@
-//! Instances of an FMU, controlled call by call: set, step, get, save and restore, all instances in parallel.
+//! Instances of an FMU that the caller controls with single calls (set, step, get, save, restore). Each call acts on all instances in
+//! parallel.
 
 mod derivatives;
 mod exact;
@@ -37,7 +38,7 @@ pub struct Setup<'a> {
     pub stop_time: Option<f64>,
     /// Relative tolerance for solvers inside the FMU.
     pub tolerance: Tolerance,
-    /// Whether all messages of the FMU are collected, with its logging switched on; see [`Instances::take_messages`].
+    /// Whether logging is on and all messages of the FMU are collected for [`Instances::take_messages`].
     pub listening: bool,
     /// Number of threads; `None` uses one thread for each processor.
     pub threads: Option<usize>,
@@ -59,46 +60,47 @@ impl Default for Setup<'_> {
     }
 }
 
-/// Instances of one FMU, each with its own time. Every method acts on all of them, in several threads. Values
-/// are stored in rows, one for each instance: instances times variables, the last index varies fastest.
+/// Instances of one FMU, each with its own time. Every method acts on all of them, in several threads. Arrays of values have one row
+/// for each instance, with one value for each variable; the rows follow each other.
 ///
-/// If a call returns an error for an instance, the instance fails, and the others continue.
-/// [`errors`](Self::errors) contains the reason; values read from a failed instance are NaN.
-/// [`reset`](Self::reset) and [`restore`](Self::restore) make it usable again.
+/// If a call of the FMU returns an error, the instance fails, and all others continue. [`errors`](Self::errors) contains the reason;
+/// values read from a failed instance are NaN. [`reset`](Self::reset) and [`restore`](Self::restore) make it usable again.
 #[derive(Debug)]
 pub struct Instances {
     system: System,
     interface: Interface,
     all: Vec<One>,
     begin: Begin,
-    /// Collects all messages, if the caller wants them.
+    /// Collects all messages, if the caller requests them.
     feed: Option<Arc<Feed>>,
     /// Threads in addition to the caller's.
     threads: Option<Threads>,
 }
 
 #[derive(Debug)]
+/// Start values and experiment, for [`Instances::reset`].
 struct Begin {
     start: StartValues<'static>,
     experiment: Experiment,
 }
 
-/// Selection of the instances for a call: all, or those with true.
+/// Instances on which a call acts: all, or those whose entry is true.
 pub type Mask<'a> = Option<&'a [bool]>;
 
 impl System {
-    /// Makes instances, sets their start values and initializes them. Instances for Model Exchange have
-    /// handled the events at the start and are in Continuous-Time Mode.
+    /// Creates instances, sets their start values and initializes them. Instances for Model Exchange have also handled the initial
+    /// event and are in Continuous-Time Mode.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if the settings do not fit the FMU. Returns [`Error::Fmu`] if the FMU does
-    /// not support the interface type or makes no instances.
+    /// Returns [`Error::Request`] if the settings do not fit the FMU. Returns [`Error::Fmu`] if the FMU does not support the
+    /// interface type, or if all instances fail.
     pub fn instances(&self, setup: &Setup) -> Result<Instances, Error> {
         let (system, start) = self.configured(&setup.start)?;
         system.instances_of(setup, &start, setup.listening.then(|| self.feed()))
     }
 
-    /// Makes instances as [`instances`](Self::instances) does, and returns the messages so far also if there is an error.
+    /// Creates instances as [`instances`](Self::instances) does. Appends the messages so far to `messages`, even if an error is
+    /// returned.
     ///
     /// # Errors
     /// Same errors as [`instances`](Self::instances).
@@ -110,7 +112,7 @@ impl System {
         made
     }
 
-    /// Makes instances, whose structural parameters have their values.
+    /// Creates instances of this system, whose structural parameters are already set.
     fn instances_of(
         &self,
         setup: &Setup,
@@ -191,7 +193,7 @@ impl Instances {
         self.all.iter().map(|one| one.own.event)
     }
 
-    /// Replaces start values for the next [`reset`](Self::reset); start values of other variables stay.
+    /// Replaces start values for the next [`reset`](Self::reset). Start values of other variables stay as they are.
     ///
     /// # Errors
     /// Returns [`Error::Request`] if a variable is unknown, or if the values do not fit it or the number of
@@ -236,11 +238,11 @@ impl Instances {
         each(&mut self.threads, &mut self.all, mask, reset);
     }
 
-    /// Sets variables, from a row for each instance or from one row for all.
+    /// Sets variables, from one row for all instances or a row for each.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if a variable is read-only, an integer or a Boolean cannot have its value,
-    /// or an output feeds a variable.
+    /// Returns [`Error::Request`] if a variable is read-only or connected to an output, or if an integer or a Boolean cannot have its
+    /// value.
     ///
     /// # Panics
     /// Panics if the number of values is wrong.
@@ -294,8 +296,8 @@ impl Instances {
         Ok(())
     }
 
-    /// Sets variables, performs a step and reads other variables. Equals [`set`](Self::set),
-    /// [`step`](Self::step) and [`get`](Self::get), but starts the threads only once.
+    /// Sets variables, performs a step and reads other variables. Has the same effect as [`set`](Self::set), [`step`](Self::step) and
+    /// [`get`](Self::get), but distributes the work to the threads only once.
     ///
     /// # Errors
     /// Same errors as [`set`](Self::set) and [`step`](Self::step).
@@ -331,7 +333,7 @@ impl Instances {
         self.feed.as_ref().map(|feed| feed.take()).unwrap_or_default()
     }
 
-    /// Calls `body` for each instance that has not failed. An error makes the instance fail.
+    /// Calls `body` for each instance in the mask that has not failed. An error makes the instance fail.
     fn alive(
         &mut self,
         mask: Mask,
@@ -342,7 +344,7 @@ impl Instances {
         });
     }
 
-    /// Fills a row of values for each instance, with NaN for a failed instance.
+    /// Calls `body` to fill a row of values for each instance. The row of a failed instance is filled with NaN.
     fn fill(
         &mut self,
         length: usize,
@@ -366,7 +368,7 @@ fn check_size(size: f64) -> Result<(), Error> {
     request(format!("the size of a step is {size} s; it must be above 0 and finite"))
 }
 
-/// Initializes an instance: from the start values to the first step.
+/// Sets start values and initializes an instance, so that it can perform its first step. Returns the initial event of Model Exchange.
 fn initialize(
     instance: &mut Running,
     begin: &Begin,

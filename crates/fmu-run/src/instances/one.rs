@@ -1,4 +1,4 @@
-//! An instance among others, and the work on all of them in several threads.
+//! One of many instances, and functions that process all of them in several threads.
 
 use super::Mask;
 use crate::error::Error;
@@ -8,10 +8,11 @@ use crate::threads::Threads;
 use fmi_client::{Event, Rejection};
 
 #[derive(Debug)]
+/// An instance with its state.
 pub(super) struct One {
-    /// The instance; `None` if it could not be made again.
+    /// The instance; `None` if it could not be created again.
     pub instance: Option<Running>,
-    /// Reason why the instance failed, if it did.
+    /// Reason why the instance has failed, if it has.
     pub error: Option<String>,
     pub own: Own,
 }
@@ -36,22 +37,22 @@ impl One {
     }
 }
 
-/// Allocates entries for the instances of a system, if there is enough memory for them and for their data.
+/// Allocates entries for the instances of a system. Fails if memory does not suffice for them and for their data.
 pub(super) fn empty(count: usize, components: usize) -> Result<Vec<One>, Error> {
-    /// Minimum of further memory per component: allocations of its FMU and of its log.
+    /// Minimum of further memory per component, in bytes: allocations of its FMU and of its log.
     const COMPONENT: usize = 256;
     let too_many = || Error::Memory(format!("{count} instances need more memory than there is"));
     let mut all = Vec::new();
     all.try_reserve_exact(count).map_err(|_| too_many())?;
     let each = size_of::<Running>() + components * (size_of::<Instance>() + COMPONENT);
     let needed = count.checked_mul(each).ok_or_else(too_many)?;
-    // Freed immediately; it only tests whether so much memory is available.
+    // Freed immediately, because it only tests whether so much memory is available.
     Vec::<u8>::new().try_reserve_exact(needed).map_err(|_| too_many())?;
     all.resize_with(count, || One { instance: None, error: None, own: Own::default() });
     Ok(all)
 }
 
-/// Calls `body` for each instance in the mask.
+/// Calls `body` with the index of each instance in the mask, and the instance.
 pub(super) fn each(
     threads: &mut Option<Threads>,
     all: &mut [One],
@@ -68,8 +69,8 @@ pub(super) fn each(
     });
 }
 
-/// Calls `body` for each instance and its row of `length` values. This thread and each thread of the pool get
-/// a part of the instances.
+/// Calls `body` with the index of each instance, the instance, and its row of `length` values. This thread and each thread of the
+/// pool process a part of the instances.
 pub(super) fn in_parts(
     threads: &mut Option<Threads>,
     all: &mut [One],
@@ -84,7 +85,7 @@ pub(super) fn in_parts(
         }
     };
     if let Some(of_parent) = threads.take_if(|threads| !threads.are_here()) {
-        // Without threads, this one does all the work.
+        // If threads cannot be created, this one does all the work.
         *threads = Threads::new(of_parent.count()).ok();
     }
     let Some(threads) = threads else { return work(0, all, values) };
@@ -100,7 +101,7 @@ pub(super) fn in_parts(
     threads.share(|| work(0, own, own_values), others);
 }
 
-/// Returns the row of an instance, from a row for each instance or one row for all.
+/// Returns a function that returns the row of an instance. `values` contains one row for all instances or a row for each.
 pub(super) fn rows<'v>(values: &'v [f64], length: usize, instances: usize) -> impl Fn(usize) -> &'v [f64] {
     let each = values.len() == length * instances;
     assert!(
