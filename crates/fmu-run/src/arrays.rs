@@ -1,8 +1,8 @@
 //! Arrays of FMI 3.0. In this crate each element is a variable, but the FMU has only the array, with one value reference. A call of
 //! the FMU gets or sets all values of an array (section 2.2.7.2 of FMI 3.0).
 
-use fmi_abi::BaseType;
 use fmi_abi::description::Variable;
+use fmi_abi::{BaseType, Value};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -78,6 +78,13 @@ impl Array {
         let (variable, behind) = array.split_at(end.unwrap_or(array.len()));
         format!("{variable}[{}]{behind}", indices.join(","))
     }
+}
+
+/// Values of arrays that were set before Initialization Mode, by index of the array.
+#[derive(Debug, Default)]
+pub(crate) struct ArrayStartValues {
+    pub numbers: HashMap<usize, Vec<f64>>,
+    pub values: HashMap<usize, Vec<Value>>,
 }
 
 /// Variables of the FMU that cover the requested variables: scalars, and whole arrays instead of elements.

@@ -4,7 +4,7 @@ use crate::description::{Description, Structural};
 use crate::error::Error;
 use crate::files::{Files, Kind};
 use crate::library::Library;
-use crate::machine;
+use crate::platform;
 use fmi_abi::description::Offer;
 use fmi_abi::files::Limits;
 use fmi_abi::{Interface, Standard};
@@ -111,7 +111,7 @@ unsafe fn load(
     let loaded = unsafe { Library::load(&file, standard, resources, Arc::clone(files)) };
     loaded.map(Arc::new).map_err(|error| {
         // The error names the failed call; its source contains the reason.
-        let why = machine::mismatch(&file).unwrap_or_else(|| match error.source() {
+        let why = platform::mismatch(&file).unwrap_or_else(|| match error.source() {
             Some(source) => format!("{error}: {source}"),
             None => error.to_string(),
         });

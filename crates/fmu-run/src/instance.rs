@@ -1,8 +1,7 @@
 //! An instance of a component. Array elements are separate variables here.
 
-use crate::arrays::{Arrays, Expanded};
+use crate::arrays::{ArrayStartValues, Arrays, Expanded};
 use crate::description::{Description, Structural};
-use crate::early::EarlyValues;
 use crate::error::{Error, request};
 use crate::fmu::Loaded;
 use crate::library::Library;
@@ -23,7 +22,7 @@ pub struct Instance {
     pub(crate) arrays: Arc<Arrays>,
     /// Values of arrays that were set before Initialization Mode, because they cannot be read then; `None` from Initialization Mode
     /// on.
-    pub(crate) early: Option<EarlyValues>,
+    pub(crate) array_starts: Option<ArrayStartValues>,
 }
 
 /// Times, s, and relative tolerance of an experiment, which are passed to the FMU.
@@ -94,9 +93,9 @@ impl Instance {
             let prefix = if component.is_empty() { String::new() } else { format!("{component}: ") };
             (prefix + &why, rejection.is_silent())
         })?;
-        let (description, early) = (Arc::clone(&fmu.description), Some(EarlyValues::default()));
+        let (description, array_starts) = (Arc::clone(&fmu.description), Some(ArrayStartValues::default()));
         let arrays = Arc::clone(&description.arrays);
-        let mut instance = Self { client, _library: Arc::clone(library), description, arrays, early };
+        let mut instance = Self { client, _library: Arc::clone(library), description, arrays, array_starts };
         instance.configure().map_err(|rejection| (rejection.to_string(), rejection.is_silent()))?;
         Ok(instance)
     }
@@ -120,7 +119,7 @@ impl Instance {
         tolerance: Option<f64>,
     ) -> Result<(), Rejection> {
         self.client.enter_initialization_mode(start_time, stop_time, tolerance)?;
-        self.early = None;
+        self.array_starts = None;
         Ok(())
     }
 
@@ -158,7 +157,7 @@ impl Instance {
 
     pub(crate) fn reset(&mut self) -> Result<(), Rejection> {
         self.client.reset()?;
-        self.early = Some(EarlyValues::default());
+        self.array_starts = Some(ArrayStartValues::default());
         self.configure()
     }
 }

@@ -1,8 +1,8 @@
 //! Groups of variables that are set or read together.
 
 use crate::error::{Error, request};
-use crate::found::Found;
 use crate::instance::Instance;
+use crate::lookup::Found;
 use fmi_abi::BaseType;
 use fmi_client::Rejection;
 use std::collections::HashMap;

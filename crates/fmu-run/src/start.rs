@@ -1,7 +1,7 @@
 //! Start values: looks up names, and checks and converts values.
 
 use crate::error::{Error, request};
-use crate::found::{Found, is_exact};
+use crate::lookup::{Found, is_exact};
 use crate::selection::{Target, fits};
 use crate::system::{StartValue, System};
 use fmi_abi::{BaseType, Value};

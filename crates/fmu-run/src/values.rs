@@ -51,9 +51,9 @@ impl Instance {
     fn set_elements(&mut self, base: BaseType, vr: &[u32], values: &[f64]) -> Result<(), Rejection> {
         let expanded = self.arrays.expanded(vr);
         let mut all = vec![0.0; expanded.count];
-        if self.early.is_some() {
+        if self.array_starts.is_some() {
             for (array, begin) in &expanded.arrays {
-                let known = self.early_numbers(*array);
+                let known = self.start_numbers(*array);
                 all[*begin..][..known.len()].copy_from_slice(&known);
             }
         } else if !expanded.is_complete() {
@@ -61,18 +61,18 @@ impl Instance {
         }
         expanded.indices.iter().zip(values).for_each(|(index, value)| all[*index] = *value);
         self.client.set_numbers(base, &expanded.references, &all)?;
-        if let Some(early) = &mut self.early {
+        if let Some(starts) = &mut self.array_starts {
             for (array, begin) in expanded.arrays {
                 let length = self.arrays.length(self.arrays.all()[array].reference);
-                early.numbers.insert(array, all[begin..][..length].to_vec());
+                starts.numbers.insert(array, all[begin..][..length].to_vec());
             }
         }
         Ok(())
     }
 
     /// Returns the values of an array before Initialization Mode: those that were set, or the start values.
-    fn early_numbers(&self, array: usize) -> Vec<f64> {
-        if let Some(known) = self.early.as_ref().and_then(|early| early.numbers.get(&array)) {
+    fn start_numbers(&self, array: usize) -> Vec<f64> {
+        if let Some(known) = self.array_starts.as_ref().and_then(|starts| starts.numbers.get(&array)) {
             return known.clone();
         }
         let array = &self.arrays.all()[array];
@@ -96,9 +96,9 @@ impl Instance {
         }
         let expanded = self.arrays.expanded(vr);
         let mut all = vec![Value::Integer(0); expanded.count];
-        if self.early.is_some() {
+        if self.array_starts.is_some() {
             for (array, begin) in &expanded.arrays {
-                let known = self.early_values(*array);
+                let known = self.start_values(*array);
                 all[*begin..][..known.len()].clone_from_slice(&known);
             }
         } else if !expanded.is_complete() {
@@ -106,10 +106,10 @@ impl Instance {
         }
         expanded.indices.iter().zip(values).for_each(|(index, value)| all[*index].clone_from(value));
         self.client.set_values(base, &expanded.references, &all)?;
-        if let Some(early) = &mut self.early {
+        if let Some(starts) = &mut self.array_starts {
             for (array, begin) in expanded.arrays {
                 let length = self.arrays.length(self.arrays.all()[array].reference);
-                early.values.insert(array, all[begin..][..length].to_vec());
+                starts.values.insert(array, all[begin..][..length].to_vec());
             }
         }
         Ok(())
@@ -126,8 +126,8 @@ impl Instance {
     }
 
     /// Returns the exact values of an array before Initialization Mode: those that were set, or the start values.
-    fn early_values(&self, array: usize) -> Vec<Value> {
-        if let Some(known) = self.early.as_ref().and_then(|early| early.values.get(&array)) {
+    fn start_values(&self, array: usize) -> Vec<Value> {
+        if let Some(known) = self.array_starts.as_ref().and_then(|starts| starts.values.get(&array)) {
             return known.clone();
         }
         let arrays = Arc::clone(&self.arrays);

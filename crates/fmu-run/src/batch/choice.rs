@@ -2,8 +2,8 @@
 
 use super::reuse::{Choice, Origin, Used};
 use super::worker::{Failure, Worker};
-use crate::kept::{Change, Given, Idle};
-use crate::running::Running;
+use crate::pool::{Change, Given, Idle};
+use crate::system_instance::SystemInstance;
 use fmi_abi::Interface;
 use std::time::{Duration, Instant};
 
@@ -13,8 +13,8 @@ impl Worker<'_> {
         if !self.may_reuse() {
             return;
         }
-        if let Some(Idle { components, given, took }) = self.system.kept().take() {
-            let instance = Running::of(self.system, components);
+        if let Some(Idle { components, given, took }) = self.system.pool().take() {
+            let instance = SystemInstance::of(self.system, components);
             self.reuse.used = Some(Used { instance, origin: Origin::Earlier(given), took });
         }
     }
@@ -26,12 +26,12 @@ impl Worker<'_> {
             return;
         }
         let given = self.given_in(origin);
-        self.system.kept().put(Idle { components: instance.into_components(), given, took });
+        self.system.pool().put(Idle { components: instance.into_components(), given, took });
     }
 
     /// Keeps the instance of a complete run for the next run. `took` is the duration of the run; `None` means that instances are not
     /// kept.
-    pub fn keep(&mut self, instance: Running, run: usize, took: Option<Duration>) {
+    pub fn keep(&mut self, instance: SystemInstance, run: usize, took: Option<Duration>) {
         if self.may_reuse()
             && let Some(took) = took
         {
@@ -45,7 +45,7 @@ impl Worker<'_> {
         let is_of_this_batch = matches!(origin, Origin::Run(_));
         if !(self.reuse.is_trusted && is_of_this_batch) {
             let changes = self.given_in(origin).changes(&self.given(run));
-            let trust = self.system.kept().trust();
+            let trust = self.system.pool().trust();
             let all = self.plan.start.targets().map(Change::Value).chain([Change::Steps, Change::Inputs]);
             self.reuse.is_trusted = trust.proves(all);
             if !trust.proves(changes.iter().copied()) {
@@ -56,7 +56,7 @@ impl Worker<'_> {
         if let Some(instance) = instance.reset() {
             return Choice::Reset(instance);
         }
-        self.system.kept().trust().distrust();
+        self.system.pool().trust().distrust();
         Choice::New
     }
 
@@ -64,7 +64,7 @@ impl Worker<'_> {
     /// bit-identical, this counts as a proof that the FMU can be reset after these changes.
     pub fn check(
         &mut self,
-        (instance, changes): (Running, Vec<Change>),
+        (instance, changes): (SystemInstance, Vec<Change>),
         run: usize,
         times: &[f64],
         trajectories: &mut [f64],
@@ -93,7 +93,7 @@ impl Worker<'_> {
             && self.has_exact(run, &exact)
             && same(&kept, trajectories)
             && same(&measured, measures);
-        let mut trust = self.system.kept().trust();
+        let mut trust = self.system.pool().trust();
         trust.checked(took);
         match (is_same, &self.reuse.used) {
             (false, _) => trust.distrust(),
@@ -107,11 +107,11 @@ impl Worker<'_> {
     }
 
     /// Creates an instance. The error contains the reason, and whether the FMU logged no message.
-    pub fn create(&mut self) -> Result<Running, (String, bool)> {
+    pub fn create(&mut self) -> Result<SystemInstance, (String, bool)> {
         let begin = Instant::now();
-        let instance = Running::new(self.system, self.plan.interface, &self.logging())?;
+        let instance = SystemInstance::new(self.system, self.plan.interface, &self.logging())?;
         if self.may_reuse() {
-            self.system.kept().trust().created(begin.elapsed());
+            self.system.pool().trust().created(begin.elapsed());
         }
         Ok(instance)
     }

@@ -1,12 +1,12 @@
 //! Inputs and outputs whose values `f64` cannot represent: strings, bytes, integers of 64 bits.
 
 use super::Trajectory;
-use super::grid::Grid;
+use super::resampling::Resampling;
 use crate::error::{Error, request};
-use crate::found::Found;
-use crate::running::Running;
+use crate::lookup::Found;
 use crate::selection::Target;
 use crate::start::exact;
+use crate::system_instance::SystemInstance;
 use fmi_abi::Value;
 use fmi_client::Rejection;
 use std::hash::{Hash, Hasher};
@@ -37,11 +37,11 @@ impl Input {
             Trajectory::Value(value) => (vec![value.clone()], 0),
             Trajectory::Values(values) => (values.to_vec(), time.len()),
             Trajectory::Sampled { times, values } => {
-                indices = Some(Grid::of(name, times, time)?.indices());
+                indices = Some(Resampling::of(name, times, time)?.indices());
                 (reals(values), times.len())
             }
             Trajectory::SampledValues { times, values } => {
-                indices = Some(Grid::of(name, times, time)?.indices());
+                indices = Some(Resampling::of(name, times, time)?.indices());
                 (values.to_vec(), times.len())
             }
         };
@@ -83,7 +83,7 @@ impl Input {
     }
 
     /// Sets the value at the time with this index if it is new.
-    pub fn set(&self, instance: &mut Running, run: usize, time: usize) -> Result<(), Rejection> {
+    pub fn set(&self, instance: &mut SystemInstance, run: usize, time: usize) -> Result<(), Rejection> {
         if !self.changes(run, time) {
             return Ok(());
         }

@@ -1,11 +1,11 @@
 //! Checks the inputs of a batch.
 
 use super::exact::Input;
-use super::grid::Grid;
+use super::resampling::Resampling;
 use super::{Batch, Trajectory};
 use crate::description::Variable;
 use crate::error::{Error, request};
-use crate::found::{Found, article, is_exact};
+use crate::lookup::{Found, article, is_exact};
 use crate::selection::{Selection, fits};
 use crate::system::System;
 use fmi_abi::BaseType;
@@ -24,7 +24,7 @@ pub(super) enum Numbers<'a> {
     EachRun(&'a [f64]),
     /// Values at the input's own times. `is_each`: whether each run has its own values.
     Sampled {
-        grid: Grid,
+        resampling: Resampling,
         times: &'a [f64],
         values: &'a [f64],
         is_held: bool,
@@ -94,8 +94,8 @@ pub(super) fn checked<'a>(
         Trajectory::Shared(values) => Numbers::Shared(values),
         Trajectory::EachRun(values) => Numbers::EachRun(values),
         Trajectory::Sampled { times, values } => {
-            let grid = Grid::of(name, times, time)?;
-            Numbers::Sampled { grid, times, values, is_held, is_each: values.len() > times.len() }
+            let resampling = Resampling::of(name, times, time)?;
+            Numbers::Sampled { resampling, times, values, is_held, is_each: values.len() > times.len() }
         }
         Trajectory::RateOf(other) => {
             return request(format!(

@@ -2,16 +2,16 @@
 
 mod choice;
 mod exact;
-mod exchange;
-mod grid;
+mod input_rows;
 mod inputs;
-mod integrated;
 mod measure;
+mod model_exchange;
+mod model_exchange_plan;
 mod plan;
 mod pulse;
+mod resampling;
 mod reuse;
 mod run;
-mod signals;
 mod watch;
 mod worker;
 
@@ -31,7 +31,7 @@ use fmi_abi::{Interface, Value};
 /// In each run, start values are set before Initialization Mode, and the first values of the inputs are set in it. Then, at each
 /// time, inputs are set, outputs are read, and a step to the next time is performed.
 ///
-/// In Model Exchange, the states are integrated between events. Continuous inputs are functions of time between two values: lines, or
+/// In Model Exchange, the states are model_exchange between events. Continuous inputs are functions of time between two values: lines, or
 /// cubics if their [derivatives](Self::input_derivatives) are given. All other inputs change in Event Mode.
 #[derive(Clone, Debug, Default)]
 pub struct Batch<'a> {
@@ -233,7 +233,7 @@ impl Planned<'_> {
         Size {
             runs: plan.runs,
             outputs: plan.outputs.len(),
-            kept: plan.kept(),
+            kept: plan.stored_times(),
             measures: plan.measures.len(),
             exact: plan.exact_outputs.len(),
         }

@@ -2,12 +2,12 @@
 
 use super::exact::Input;
 use super::inputs::{Inputs, Numbers, checked, each_input, is_held, once};
-use super::integrated::Integrated;
+use super::model_exchange_plan::ModelExchangePlan;
 use super::{Batch, Measure, Trajectory};
 use crate::continuous::Integration;
 use crate::error::{Error, request};
-use crate::found::is_exact;
 use crate::instance::Tolerance;
+use crate::lookup::is_exact;
 use crate::selection::{Selection, Target};
 use crate::start::{Start, StartValues};
 use crate::system::System;
@@ -36,7 +36,7 @@ pub(super) struct Plan<'a> {
     pub tolerance: Tolerance,
     pub interface: Interface,
     /// Inputs and settings of Model Exchange; `None` in Co-Simulation.
-    pub integrated: Option<Integrated<'a>>,
+    pub model_exchange: Option<ModelExchangePlan<'a>>,
 }
 
 impl<'a> Plan<'a> {
@@ -61,7 +61,7 @@ impl<'a> Plan<'a> {
             read_before_set: batch.read_before_set,
             tolerance: batch.tolerance,
             interface,
-            integrated: None,
+            model_exchange: None,
         };
         if batch.every == Some(0) {
             return request("every must be at least 1".to_owned());
@@ -80,14 +80,14 @@ impl<'a> Plan<'a> {
                 plan.find_inputs(system, batch)?;
             }
             Interface::ModelExchange => {
-                plan.integrated = Integrated::of(system, batch, &mut plan.exact_inputs)?;
+                plan.model_exchange = ModelExchangePlan::of(system, batch, &mut plan.exact_inputs)?;
             }
         }
         Ok(plan)
     }
 
     /// Returns the number of times at which outputs are stored.
-    pub fn kept(&self) -> usize {
+    pub fn stored_times(&self) -> usize {
         self.every.map_or(0, |every| self.time.len().div_ceil(every))
     }
 
@@ -123,7 +123,7 @@ impl<'a> Plan<'a> {
                 Numbers::Shared(values) => values,
                 Numbers::EachRun(values) => of_run(values, times),
                 Numbers::Sampled { values, is_each: false, .. } => values,
-                Numbers::Sampled { grid, values, .. } => of_run(values, grid.length),
+                Numbers::Sampled { resampling, values, .. } => of_run(values, resampling.length),
             };
             values.iter().for_each(|value| hash.write_u64(value.to_bits()));
         }

@@ -1,7 +1,7 @@
 //! Data for reusing the instance of an earlier run.
 
-use crate::kept::{Change, Given};
-use crate::running::{Observed, Running};
+use crate::pool::{Change, Given};
+use crate::system_instance::{Observed, SystemInstance};
 use std::time::Duration;
 
 /// How the instance for a run is obtained.
@@ -9,14 +9,14 @@ pub(super) enum Choice {
     /// A new instance.
     New,
     /// A reset instance.
-    Reset(Running),
+    Reset(SystemInstance),
     /// A new instance. The run is also performed in the used instance, to check whether it can be reset.
-    Check(Running, Vec<Change>),
+    Check(SystemInstance, Vec<Change>),
 }
 
 /// An instance after a complete run.
 pub(super) struct Used {
-    pub instance: Running,
+    pub instance: SystemInstance,
     pub origin: Origin,
     /// Duration of the run.
     pub took: Duration,
@@ -47,7 +47,7 @@ pub(super) struct Reuse {
 impl Reuse {
     /// Reads all values of an instance, if they are to be compared. Returns false if they cannot be read; then the instance may be
     /// unusable.
-    pub fn observe(&mut self, instance: &mut Running) -> bool {
+    pub fn observe(&mut self, instance: &mut SystemInstance) -> bool {
         if self.compares {
             self.seen = instance.observe().ok();
         }

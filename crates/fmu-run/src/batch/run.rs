@@ -33,7 +33,8 @@ pub(super) fn run(
     [trajectories, measures]: [&mut [f64]; 2],
 ) -> Result<Finished, Error> {
     let begin = time::Instant::now();
-    let (trajectory, measured) = (plan.outputs.len() * plan.kept(), plan.outputs.len() * plan.measures.len());
+    let (trajectory, measured) =
+        (plan.outputs.len() * plan.stored_times(), plan.outputs.len() * plan.measures.len());
     let fits = trajectories.len() >= plan.runs * trajectory && measures.len() >= plan.runs * measured;
     assert!(fits, "there is too little memory for {} runs", plan.runs);
     let rows = split(trajectories, trajectory).zip(split(measures, measured));
@@ -88,7 +89,7 @@ pub(super) fn run(
 
 /// Sorts the values of all runs in the order of [`Runs::exact`](super::Runs::exact).
 fn arranged(plan: &Plan, found: impl Iterator<Item = Exact>) -> Vec<Option<Value>> {
-    let (outputs, kept) = (plan.exact_outputs.len(), plan.kept());
+    let (outputs, kept) = (plan.exact_outputs.len(), plan.stored_times());
     let mut all = vec![None; plan.runs * outputs * kept];
     for (run, values) in found {
         for (index, value) in values.into_iter().enumerate() {
@@ -112,7 +113,7 @@ fn repeat_with_logging(
     let next = || silent.lock().unwrap_or_else(PoisonError::into_inner).next();
     let repeated = on_threads(system, plan.threads, watch, |number| {
         let mut worker = Worker::new(system, plan, watch, number, Some(until));
-        let mut trajectories = vec![0.0; plan.outputs.len() * plan.kept()];
+        let mut trajectories = vec![0.0; plan.outputs.len() * plan.stored_times()];
         let mut measures = vec![0.0; plan.outputs.len() * plan.measures.len()];
         while !watch.is_cancelled()
             && time::Instant::now() < until
@@ -141,7 +142,7 @@ fn on_threads<T: Send>(
     if threads <= 1 {
         return Ok(vec![work(0)]);
     }
-    let others = system.kept().take_threads(threads - 1)?;
+    let others = system.pool().take_threads(threads - 1)?;
     let (found, running, arrived) = (Mutex::new(Vec::new()), Mutex::new(threads - 1), Condvar::new());
     others.pool().in_place_scope(|scope| {
         for number in 1..threads {
@@ -167,7 +168,7 @@ fn on_threads<T: Send>(
             }
         }
     });
-    system.kept().put_threads(others);
+    system.pool().put_threads(others);
     Ok(found.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 

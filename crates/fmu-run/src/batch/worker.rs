@@ -1,16 +1,16 @@
 //! The work of a thread of a batch, which performs one run after the other.
 
 use super::Occurrence;
+use super::input_rows::InputRows;
 use super::measure::Measured;
 use super::plan::Plan;
 use super::pulse::Pulse;
 use super::reuse::{Choice, Reuse};
-use super::signals::Signals;
 use super::watch::{Watch, lock};
 use crate::instance::Experiment;
 use crate::messages::{Feed, Logging};
-use crate::running::Running;
 use crate::system::System;
+use crate::system_instance::SystemInstance;
 use fmi_abi::Value;
 use fmi_client::Rejection;
 use std::sync::Arc;
@@ -42,8 +42,8 @@ pub(super) struct Worker<'a> {
     is_caller: bool,
     pulse: Pulse,
     pub reuse: Reuse,
-    inputs: Signals<'a>,
-    derivatives: Signals<'a>,
+    inputs: InputRows<'a>,
+    derivatives: InputRows<'a>,
     /// Index of the current run.
     number: usize,
     /// Values of the current run that `f64` cannot represent.
@@ -88,8 +88,8 @@ impl<'a> Worker<'a> {
             is_caller: number == 0,
             pulse: Pulse::default(),
             reuse: Reuse::default(),
-            inputs: Signals::new(&plan.inputs),
-            derivatives: Signals::new(&plan.derivatives),
+            inputs: InputRows::new(&plan.inputs),
+            derivatives: InputRows::new(&plan.derivatives),
             number: 0,
             exact_of_run: Vec::new(),
             exact: Vec::new(),
@@ -147,23 +147,25 @@ impl<'a> Worker<'a> {
     /// Performs a run in this instance, and keeps the instance for later runs if the run is complete.
     pub fn perform(
         &mut self,
-        mut instance: Running,
+        mut instance: SystemInstance,
         run: usize,
         times: &[f64],
         trajectories: &mut [f64],
         measures: &mut [f64],
     ) -> Result<Option<String>, Failure> {
         let plan = self.plan;
-        let begin = self.system.kept().trust().may_keep().then(time::Instant::now);
+        let begin = self.system.pool().trust().may_keep().then(time::Instant::now);
         instance.forget_log();
         self.inputs.begin(&plan.inputs, run, plan.time.len());
         self.derivatives.begin(&plan.derivatives, run, plan.time.len());
         (self.reached, self.number) = (0, run);
         self.exact_of_run.clear();
         self.measured.begin();
-        let stopped = match &plan.integrated {
+        let stopped = match &plan.model_exchange {
             None => self.follow(times, &mut instance, run, trajectories).err(),
-            Some(integrated) => self.integrate(integrated, times, &mut instance, run, trajectories).err(),
+            Some(model_exchange) => {
+                self.integrate(model_exchange, times, &mut instance, run, trajectories).err()
+            }
         };
         if !self.is_repeated() && !plan.exact_outputs.is_empty() {
             self.exact.push((run, std::mem::take(&mut self.exact_of_run)));
@@ -175,7 +177,7 @@ impl<'a> Worker<'a> {
             lock(&self.watch.ended).extend(ended.map(|time| (run, time, self.row.clone())));
         }
         let filled = plan.every.map_or(0, |every| self.reached.div_ceil(every));
-        for trajectory in trajectories.chunks_mut(plan.kept().max(1)) {
+        for trajectory in trajectories.chunks_mut(plan.stored_times().max(1)) {
             trajectory[filled..].fill(f64::NAN);
         }
         let rejected = stopped.as_ref().is_some_and(|(_, rejection)| rejection.ended().is_none());
@@ -235,7 +237,7 @@ impl<'a> Worker<'a> {
     fn follow(
         &mut self,
         times: &[f64],
-        instance: &mut Running,
+        instance: &mut SystemInstance,
         run: usize,
         trajectories: &mut [f64],
     ) -> Result<(), Stopped> {
@@ -244,7 +246,7 @@ impl<'a> Worker<'a> {
         instance.forget_log();
         let measures = !plan.measures.is_empty();
         // Index of the next kept value in a trajectory, and number of times until then.
-        let (kept, mut index, mut wait) = (plan.kept(), 0, 0);
+        let (kept, mut index, mut wait) = (plan.stored_times(), 0, 0);
         let mut ended: Option<Rejection> = None;
         for (k, &time) in times.iter().enumerate() {
             let at = |rejection| (Some(k), rejection);
@@ -323,7 +325,7 @@ impl<'a> Worker<'a> {
     /// Reads the outputs at a communication point in Model Exchange.
     pub fn record(
         &mut self,
-        instance: &mut Running,
+        instance: &mut SystemInstance,
         kept: &mut Kept,
         time: f64,
         trajectories: &mut [f64],
@@ -340,7 +342,7 @@ impl<'a> Worker<'a> {
 
     /// Keeps the outputs of a time. Returns whether they belong to a trajectory.
     pub fn keep_row(&mut self, kept: &mut Kept, time: f64, trajectories: &mut [f64]) -> bool {
-        let (plan, length) = (self.plan, self.plan.kept());
+        let (plan, length) = (self.plan, self.plan.stored_times());
         let keeps = kept.wait == 0 && kept.index < length;
         if keeps {
             for (output, value) in self.row.iter().enumerate() {
@@ -362,7 +364,7 @@ impl<'a> Worker<'a> {
     }
 
     /// Sets start values, enters Initialization Mode, sets the first values of the inputs, and leaves Initialization Mode.
-    fn start(&mut self, instance: &mut Running, run: usize) -> Result<(), Rejection> {
+    fn start(&mut self, instance: &mut SystemInstance, run: usize) -> Result<(), Rejection> {
         let plan = self.plan;
         instance.begin(self.experiment(), &plan.start, run)?;
         self.set_values(instance, 0)?;
@@ -370,7 +372,7 @@ impl<'a> Worker<'a> {
     }
 
     #[inline(always)]
-    fn set_inputs(&mut self, instance: &mut Running, time: usize) -> Result<(), Rejection> {
+    fn set_inputs(&mut self, instance: &mut SystemInstance, time: usize) -> Result<(), Rejection> {
         self.set_values(instance, time)?;
         if self.derivatives.is_empty() {
             return Ok(());
@@ -380,7 +382,7 @@ impl<'a> Worker<'a> {
     }
 
     #[inline(always)]
-    fn set_values(&mut self, instance: &mut Running, time: usize) -> Result<(), Rejection> {
+    fn set_values(&mut self, instance: &mut SystemInstance, time: usize) -> Result<(), Rejection> {
         for input in &self.plan.exact_inputs {
             input.set(instance, self.number, time)?;
         }

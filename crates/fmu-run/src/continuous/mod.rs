@@ -1,19 +1,19 @@
 //! Model Exchange: integrates the states of an FMU from event to event.
 //!
-//! [`inputs`] describes inputs as functions of time, [`model`] evaluates the FMU for the solver, [`march`] alternates between smooth
+//! [`inputs`] describes inputs as functions of time, [`model`] evaluates the FMU for the solver, [`simulation`] alternates between smooth
 //! intervals and events, [`solve`] integrates an interval, and [`stepping`] locates events in its steps.
 //! The solvers are in the crate `ivp`. Every event restarts them.
 
 mod chatter;
 mod inputs;
-mod march;
 mod model;
+mod simulation;
 mod solve;
 mod stepping;
 
 pub(crate) use inputs::{Curve, Signals, Slopes};
-pub(crate) use march::{Hooks, March};
 pub(crate) use model::Model;
+pub(crate) use simulation::{Hooks, Simulation};
 
 use crate::error::{Error, request};
 use std::str::FromStr;

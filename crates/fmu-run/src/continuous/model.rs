@@ -2,8 +2,8 @@
 
 use super::inputs::{Break, Signals};
 use crate::description::Description;
-use crate::running::Running;
 use crate::selection::Selection;
+use crate::system_instance::SystemInstance;
 use fmi_abi::{Interface, Status};
 use fmi_client::{Continuous, Rejection};
 use ivp::ivp::FirstOrderSystem;
@@ -22,7 +22,7 @@ pub(crate) struct Model<'a>(RefCell<Parts<'a>>);
 
 /// State of a [`Model`].
 pub(crate) struct Parts<'a> {
-    pub running: &'a mut Running,
+    pub instance: &'a mut SystemInstance,
     inputs: Signals<'a>,
     /// Continuous inputs.
     moving: &'a Selection,
@@ -46,14 +46,14 @@ pub(crate) struct Parts<'a> {
 
 impl<'a> Model<'a> {
     pub fn new(
-        running: &'a mut Running,
+        instance: &'a mut SystemInstance,
         description: &Description,
         inputs: Signals<'a>,
         [moving, held]: [&'a Selection; 2],
         retries: bool,
     ) -> Self {
         Self(RefCell::new(Parts {
-            running,
+            instance,
             inputs,
             moving,
             held,
@@ -95,14 +95,14 @@ impl Parts<'_> {
     /// Sets all inputs to their values at this time, s, in Initialization Mode or Event Mode.
     pub fn set_inputs(&mut self, time: f64) -> Result<(), Rejection> {
         self.at = None;
-        let Self { running, inputs, moving, held, row, .. } = self;
+        let Self { instance, inputs, moving, held, row, .. } = self;
         if !moving.is_empty() {
             inputs.moving(time, row);
-            running.set(moving, row)?;
+            instance.set(moving, row)?;
         }
         if !held.is_empty() {
             inputs.held(time, row);
-            running.set(held, row)?;
+            instance.set(held, row)?;
         }
         Ok(())
     }
@@ -127,14 +127,14 @@ impl Parts<'_> {
         if self.at == Some(time) && self.x == x {
             return Ok(());
         }
-        let Self { running, inputs, moving, row, .. } = self;
-        running.sole().set_time(time)?;
+        let Self { instance, inputs, moving, row, .. } = self;
+        instance.sole().set_time(time)?;
         if !moving.is_empty() && (self.at.is_none() || inputs.is_moving()) {
             inputs.moving(time, row);
-            running.set(moving, row)?;
+            instance.set(moving, row)?;
         }
         if !x.is_empty() {
-            running.sole().set_continuous_states(x)?;
+            instance.sole().set_continuous_states(x)?;
         }
         self.at = Some(time);
         self.x.clear();
@@ -146,7 +146,7 @@ impl Parts<'_> {
     #[inline]
     fn derivatives(&mut self, time: f64, x: &[f64], values: &mut [f64]) -> Result<(), Rejection> {
         self.set(time, x)?;
-        self.running.sole().get_continuous(Continuous::Derivatives, values)
+        self.instance.sole().get_continuous(Continuous::Derivatives, values)
     }
 
     /// Evaluates the derivatives at the beginning of a step and fails if one is not finite, because a shorter step would not help.
@@ -162,7 +162,7 @@ impl Parts<'_> {
     /// Reads the event indicators. Fails if one is NaN.
     pub fn indicators(&mut self, time: f64, x: &[f64], values: &mut [f64]) -> Result<(), Rejection> {
         self.set(time, x)?;
-        self.running.sole().get_continuous(Continuous::EventIndicators, values)?;
+        self.instance.sole().get_continuous(Continuous::EventIndicators, values)?;
         match values.iter().position(|value| value.is_nan()) {
             None => Ok(()),
             Some(index) => Err(missing("event indicator", index, values[index], time)),
@@ -175,7 +175,7 @@ impl Parts<'_> {
         if x.is_empty() {
             return Ok(());
         }
-        self.running.sole().get_continuous(Continuous::States, x)
+        self.instance.sole().get_continuous(Continuous::States, x)
     }
 
     /// Reads the magnitudes of the nominal values of the states. Values that are 0 or not finite are replaced by 1.
@@ -183,7 +183,7 @@ impl Parts<'_> {
         if self.nominals.is_empty() {
             return Ok(());
         }
-        self.running.sole().get_continuous(Continuous::Nominals, &mut self.nominals)?;
+        self.instance.sole().get_continuous(Continuous::Nominals, &mut self.nominals)?;
         for nominal in &mut self.nominals {
             *nominal = nominal.abs();
             if !(*nominal > 0.0 && nominal.is_finite()) {
@@ -253,7 +253,7 @@ impl Parts<'_> {
             let columns = self.set(time, x).and_then(|()| {
                 (0..n).try_for_each(|column| {
                     let state = &states[column..=column];
-                    self.running.sole().directional_derivative(&derivatives, state, &[1.0], &mut after)?;
+                    self.instance.sole().directional_derivative(&derivatives, state, &[1.0], &mut after)?;
                     (0..n).for_each(|row| j[(row, column)] = after[row]);
                     Ok::<_, Rejection>(())
                 })
@@ -263,7 +263,7 @@ impl Parts<'_> {
                 return;
             }
             // The FMU declares directional derivatives but does not have them; from here on, finite differences replace them.
-            self.running.forget_log();
+            self.instance.forget_log();
         }
         self.evaluate(time, x, &mut before);
         for column in 0..n {

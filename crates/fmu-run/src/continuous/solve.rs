@@ -1,14 +1,14 @@
 //! Integrates smooth intervals with the solver.
 
 use super::Solver;
-use super::march::{Arrival, Hooks, March, Settings};
 use super::model::Model;
+use super::simulation::{Arrival, Hooks, Settings, Simulation};
 use super::stepping::Stepping;
 use fmi_client::Rejection;
 use ivp::methods::{BDF, DOP853, DOPRI5, IntegrationResult, RK4, Tolerance};
 use ivp::status::Status;
 
-impl March<'_> {
+impl Simulation<'_> {
     /// Integrates to the time `stop`, s, or to an event before it.
     pub(super) fn integrate(
         &mut self,

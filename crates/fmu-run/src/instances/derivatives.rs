@@ -1,6 +1,6 @@
 //! Directional derivatives, and derivatives of inputs and outputs with respect to time.
 
-use super::one::rows;
+use super::entry::rows;
 use super::{Instances, Mask};
 use crate::error::{Error, request};
 use crate::selection::Selection;

@@ -2,7 +2,7 @@
 
 use super::{Instances, Mask};
 use crate::error::{Error, request};
-use crate::found::is_exact;
+use crate::lookup::is_exact;
 use crate::selection::Target;
 use crate::start::exact;
 use fmi_abi::{BaseType, Value};

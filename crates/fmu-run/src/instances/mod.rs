@@ -2,9 +2,9 @@
 //! parallel.
 
 mod derivatives;
+mod entry;
 mod exact;
-mod exchange;
-mod one;
+mod model_exchange;
 mod states;
 
 pub use states::States;
@@ -13,14 +13,14 @@ use crate::description::Description;
 use crate::error::{Error, request};
 use crate::instance::{Experiment, Tolerance};
 use crate::messages::{Feed, Logged, Logging};
-use crate::running::Running;
 use crate::selection::Selection;
 use crate::start::{Start, StartValues};
 use crate::system::System;
+use crate::system_instance::SystemInstance;
 use crate::threads::Threads;
+use entry::{Entry, Progress, each, empty, in_parts, rows};
 use fmi_abi::Interface;
 use fmi_client::{Event, Rejection};
-use one::{One, Own, each, empty, in_parts, rows};
 use std::sync::Arc;
 
 /// Settings for new instances.
@@ -69,7 +69,7 @@ impl Default for Setup<'_> {
 pub struct Instances {
     system: System,
     interface: Interface,
-    all: Vec<One>,
+    all: Vec<Entry>,
     begin: Begin,
     /// Collects all messages, if the caller requests them.
     feed: Option<Arc<Feed>>,
@@ -174,7 +174,7 @@ impl Instances {
 
     /// Returns the time of each instance, s.
     pub fn times(&self) -> impl Iterator<Item = f64> {
-        self.all.iter().map(|one| one.own.time)
+        self.all.iter().map(|one| one.progress.time)
     }
 
     /// Returns the indices of the failed instances, each with the reason.
@@ -190,7 +190,7 @@ impl Instances {
 
     /// Returns the result of the last event of each instance.
     pub fn events(&self) -> impl Iterator<Item = Event> {
-        self.all.iter().map(|one| one.own.event)
+        self.all.iter().map(|one| one.progress.event)
     }
 
     /// Replaces start values for the next [`reset`](Self::reset). Start values of other variables stay as they are.
@@ -219,16 +219,16 @@ impl Instances {
     /// Resets the instances to their start values and initializes them.
     pub fn reset(&mut self, mask: Mask) {
         let (system, interface, begin, feed) = (&self.system, self.interface, &self.begin, &self.feed);
-        let reset = |index: usize, one: &mut One| {
+        let reset = |index: usize, one: &mut Entry| {
             one.error = None;
-            (one.own.time, one.own.event) = (begin.experiment.start_time, Event::default());
+            (one.progress.time, one.progress.event) = (begin.experiment.start_time, Event::default());
             let feed = feed.as_ref().map(|feed| (Arc::clone(feed), index));
             let logging = Logging { on: feed.is_some(), feed };
-            match Running::renewed(one.instance.take(), system, interface, &logging) {
+            match SystemInstance::renewed(one.instance.take(), system, interface, &logging) {
                 Ok(instance) => {
                     let instance = one.instance.insert(instance);
                     match initialize(instance, begin, index, interface) {
-                        Ok(event) => one.own.event = event,
+                        Ok(event) => one.progress.event = event,
                         Err(rejection) => one.error = Some(rejection.to_string()),
                     }
                 }
@@ -267,9 +267,9 @@ impl Instances {
     /// Returns [`Error::Request`] if the size is not above 0 and finite.
     pub fn step(&mut self, size: f64, mask: Mask) -> Result<(), Error> {
         check_size(size)?;
-        self.alive(mask, |_, own, instance| {
-            instance.step(own.time, size)?;
-            own.time += size;
+        self.alive(mask, |_, progress, instance| {
+            instance.step(progress.time, size)?;
+            progress.time += size;
             Ok(())
         });
         Ok(())
@@ -280,17 +280,17 @@ impl Instances {
     /// # Errors
     /// Returns [`Error::Request`] if the time is not finite, or not after the time of an instance.
     pub fn step_to(&mut self, time: f64, mask: Mask) -> Result<(), Error> {
-        let steps = |index: usize, one: &One| one.error.is_none() && mask.is_none_or(|mask| mask[index]);
+        let steps = |index: usize, one: &Entry| one.error.is_none() && mask.is_none_or(|mask| mask[index]);
         let mut ahead = self.all.iter().enumerate().filter(|(index, one)| steps(*index, one));
-        if let Some((index, one)) = ahead.find(|(_, one)| !(time.is_finite() && time > one.own.time)) {
+        if let Some((index, one)) = ahead.find(|(_, one)| !(time.is_finite() && time > one.progress.time)) {
             return request(format!(
                 "to is {time} s; it must be after the time of each instance, and instance {index} is at {} s",
-                one.own.time
+                one.progress.time
             ));
         }
-        self.alive(mask, |_, own, instance| {
-            instance.step(own.time, time - own.time)?;
-            own.time = time;
+        self.alive(mask, |_, progress, instance| {
+            instance.step(progress.time, time - progress.time)?;
+            progress.time = time;
             Ok(())
         });
         Ok(())
@@ -313,10 +313,10 @@ impl Instances {
         set.check(values)?;
         check_size(size)?;
         let inputs = rows(values, set.len(), self.len());
-        self.fill(get.len(), read, |index, own, instance, row| {
+        self.fill(get.len(), read, |index, progress, instance, row| {
             instance.set(set, inputs(index))?;
-            instance.step(own.time, size)?;
-            own.time += size;
+            instance.step(progress.time, size)?;
+            progress.time += size;
             instance.get(get, row)
         });
         Ok(())
@@ -337,10 +337,10 @@ impl Instances {
     fn alive(
         &mut self,
         mask: Mask,
-        body: impl Fn(usize, &mut Own, &mut Running) -> Result<(), Rejection> + Sync,
+        body: impl Fn(usize, &mut Progress, &mut SystemInstance) -> Result<(), Rejection> + Sync,
     ) {
         each(&mut self.threads, &mut self.all, mask, |index, one| {
-            one.with(|own, instance| body(index, own, instance));
+            one.with(|progress, instance| body(index, progress, instance));
         });
     }
 
@@ -349,11 +349,11 @@ impl Instances {
         &mut self,
         length: usize,
         values: &mut [f64],
-        body: impl Fn(usize, &mut Own, &mut Running, &mut [f64]) -> Result<(), Rejection> + Sync,
+        body: impl Fn(usize, &mut Progress, &mut SystemInstance, &mut [f64]) -> Result<(), Rejection> + Sync,
     ) {
         assert_eq!(values.len(), length * self.all.len(), "a row of {length} values for each instance");
-        let body = |index: usize, one: &mut One, row: &mut [f64]| {
-            if !one.with(|own, instance| body(index, own, instance, row)) {
+        let body = |index: usize, one: &mut Entry, row: &mut [f64]| {
+            if !one.with(|progress, instance| body(index, progress, instance, row)) {
                 row.fill(f64::NAN);
             }
         };
@@ -370,7 +370,7 @@ fn check_size(size: f64) -> Result<(), Error> {
 
 /// Sets start values and initializes an instance, so that it can perform its first step. Returns the initial event of Model Exchange.
 fn initialize(
-    instance: &mut Running,
+    instance: &mut SystemInstance,
     begin: &Begin,
     index: usize,
     interface: Interface,

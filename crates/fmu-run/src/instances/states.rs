@@ -1,9 +1,9 @@
 //! Saved states of all instances.
 
-use super::one::{One, each};
+use super::entry::{Entry, each};
 use super::{Instances, Mask};
 use crate::error::{Error, request};
-use crate::running::Saved;
+use crate::system_instance::Saved;
 
 /// States that [`Instances`] have saved, one for each instance that had not failed. They contain indices instead of pointers, so
 /// restoring them in other instances by mistake cannot corrupt memory. Freeing consumes the value, so freed states cannot be used.
@@ -28,8 +28,8 @@ impl Instances {
         self.system.check_offer(self.interface, |offer| offer.saves_states, why)?;
         let mut states = vec![None; self.len()];
         let indices = std::sync::Mutex::new(&mut states);
-        self.alive(None, |index, own, instance| {
-            let saved = (instance.save()?, own.time);
+        self.alive(None, |index, progress, instance| {
+            let saved = (instance.save()?, progress.time);
             indices.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[index] = Some(saved);
             Ok(())
         });
@@ -55,10 +55,10 @@ impl Instances {
                     .map_err(|why| Error::Request(format!("instance {index}: {why}")))?;
             }
         }
-        let back = |index: usize, one: &mut One| {
+        let back = |index: usize, one: &mut Entry| {
             let (Some((saved, time)), Some(instance)) = (states.0[index], &mut one.instance) else { return };
             match instance.restore(saved) {
-                Ok(()) => (one.own.time, one.error) = (time, None),
+                Ok(()) => (one.progress.time, one.error) = (time, None),
                 Err(rejection) => one.error = Some(rejection.to_string()),
             }
         };

@@ -9,9 +9,9 @@ mod ssp;
 use crate::description::{Description, Variable};
 use crate::error::{Error, request};
 use crate::fmu::Loaded;
-use crate::found::{Found, is_exact};
-use crate::kept::Kept;
+use crate::lookup::{Found, is_exact};
 use crate::messages::Feed;
+use crate::pool::Pool;
 use crate::selection::Selection;
 pub use elements::Elements;
 use fmi_abi::description::Offer;
@@ -48,7 +48,7 @@ struct Definition {
     exchange: Exchange,
     start: Vec<(String, StartValue)>,
     stop_time: Option<f64>,
-    kept: Kept,
+    pool: Pool,
     /// Arrays by name, found when they are first needed.
     arrays: OnceLock<HashMap<String, Elements>>,
 }
@@ -200,11 +200,11 @@ impl System {
     /// Frees the instances and the threads that earlier [runs](Self::run) have kept for later ones. They are also freed with the last
     /// clone of the system.
     pub fn release(&self) {
-        self.0.kept.clear();
+        self.0.pool.clear();
     }
 
-    pub(crate) fn kept(&self) -> &Kept {
-        &self.0.kept
+    pub(crate) fn pool(&self) -> &Pool {
+        &self.0.pool
     }
 
     /// Returns whether instances may be kept while no run uses them.
@@ -412,7 +412,7 @@ impl Definition {
             exchange: Exchange::default(),
             start: Vec::new(),
             stop_time: None,
-            kept: Kept::default(),
+            pool: Pool::default(),
             arrays: OnceLock::new(),
         }
     }

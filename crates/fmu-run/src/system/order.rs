@@ -2,7 +2,7 @@
 
 use crate::description::Dependencies;
 use crate::error::{Error, request};
-use crate::found::Found;
+use crate::lookup::Found;
 use crate::selection::Selection;
 use fmi_abi::shown;
 use std::collections::HashMap;

@@ -6,7 +6,7 @@ use std::path::Path;
 /// Returns a message that names the platform of a library and this platform, if they differ.
 pub(crate) fn mismatch(library: &Path) -> Option<String> {
     let bytes = std::fs::read(library).ok()?;
-    let (system, processors) = made_for(&bytes)?;
+    let (system, processors) = target_of(&bytes)?;
     let here = match OS {
         "linux" => "Linux",
         "macos" => "macOS",
@@ -19,7 +19,7 @@ pub(crate) fn mismatch(library: &Path) -> Option<String> {
 }
 
 /// Returns the operating system and the processors, as named by `std::env::consts::ARCH`. Returns `None` for unknown formats.
-fn made_for(bytes: &[u8]) -> Option<(&'static str, Vec<&'static str>)> {
+fn target_of(bytes: &[u8]) -> Option<(&'static str, Vec<&'static str>)> {
     let at = |index: usize| bytes.get(index..)?.first_chunk::<4>().copied();
     let number = |index| at(index).map(u32::from_le_bytes);
     let half = |index| number(index).map(|word| word & 0xffff);
@@ -74,7 +74,7 @@ fn made_for(bytes: &[u8]) -> Option<(&'static str, Vec<&'static str>)> {
 
 #[cfg(test)]
 mod tests {
-    use super::made_for;
+    use super::target_of;
 
     /// Checks headers that are made from the specifications. The tests of the Python package check files that linkers wrote.
     #[test]
@@ -82,26 +82,26 @@ mod tests {
         let elf = |class, order, machine: [u8; 2]| {
             let mut bytes = [b"\x7fELF".as_slice(), &[class, order], &[0; 12], &machine].concat();
             bytes.resize(64, 0);
-            made_for(&bytes).expect("ELF")
+            target_of(&bytes).expect("ELF")
         };
         assert_eq!(elf(2, 1, [62, 0]), ("Linux", vec!["x86_64"]));
         assert_eq!(elf(1, 1, [243, 0]), ("Linux", vec!["riscv32"]));
         assert_eq!(elf(2, 2, [0, 22]), ("Linux", vec!["s390x"]));
         assert_eq!(elf(2, 1, [2, 1]), ("Linux", vec!["loongarch64"]));
         let mach = [&[0xcf, 0xfa, 0xed, 0xfe, 0x0c, 0, 0, 1][..], &[0; 24]].concat();
-        assert_eq!(made_for(&mach), Some(("macOS", vec!["aarch64"])));
+        assert_eq!(target_of(&mach), Some(("macOS", vec!["aarch64"])));
         // In a truncated file, nothing beyond its end may be read.
         let mut pe = vec![0; 0x48];
         pe[..2].copy_from_slice(b"MZ");
         pe[0x3c] = 0x40;
         pe[0x40..0x46].copy_from_slice(b"PE\0\0\x64\xaa");
-        assert_eq!(made_for(&pe), Some(("Windows", vec!["aarch64"])));
+        assert_eq!(target_of(&pe), Some(("Windows", vec!["aarch64"])));
         for bytes in [&pe[..], &mach, b"\xca\xfe\xba\xbe\0\0\0\x02", b"MZ", b"#!/bin/sh\n"] {
             for length in 0..bytes.len() {
-                let _ = made_for(&bytes[..length]);
+                let _ = target_of(&bytes[..length]);
             }
         }
         pe[0x3c..0x40].fill(0xff);
-        assert_eq!(made_for(&pe), None);
+        assert_eq!(target_of(&pe), None);
     }
 }

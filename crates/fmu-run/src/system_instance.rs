@@ -1,7 +1,7 @@
 //! An instance of a system: one instance of each component.
 
-use crate::found::is_exact;
 use crate::instance::{Experiment, Instance};
+use crate::lookup::is_exact;
 use crate::messages::Logging;
 use crate::selection::{Selection, Target};
 use crate::start::StartValues;
@@ -58,7 +58,7 @@ impl DerefMut for Components {
 /// An instance of a system. Each function acts on the instances of all components. A single FMU is a system with one component and no
 /// connections.
 #[derive(Debug)]
-pub(crate) struct Running {
+pub(crate) struct SystemInstance {
     /// Unique number. Saved states contain it, because they can only be restored in the instances that saved them.
     generation: u64,
     components: Components,
@@ -74,7 +74,7 @@ pub(crate) struct Running {
     buffer: Vec<f64>,
 }
 
-impl Running {
+impl SystemInstance {
     /// Resets used instances or creates new ones. The error contains the reason, and whether the FMU logged no message.
     pub fn renewed(
         used: Option<Self>,

@@ -16,7 +16,7 @@ use std::time::Duration;
 
 /// Idle instances and threads of a system.
 #[derive(Debug, Default)]
-pub(crate) struct Kept {
+pub(crate) struct Pool {
     idle: Mutex<Vec<Idle>>,
     threads: Mutex<Option<Threads>>,
     trust: Mutex<Trust>,
@@ -35,7 +35,7 @@ pub(crate) struct Idle {
 /// Maximum number of idle entries of a system.
 const MOST_IDLE: usize = 256;
 
-impl Kept {
+impl Pool {
     pub fn take(&self) -> Option<Idle> {
         lock(&self.idle).pop()
     }

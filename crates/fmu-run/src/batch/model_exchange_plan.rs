@@ -12,7 +12,7 @@ use fmi_abi::{BaseType, Interface, Standard};
 use std::sync::Arc;
 
 /// Checked inputs and settings of runs in Model Exchange.
-pub(super) struct Integrated<'a> {
+pub(super) struct ModelExchangePlan<'a> {
     pub description: Arc<Description>,
     /// Continuous inputs.
     pub moving: Selection,
@@ -38,7 +38,7 @@ enum Source<'a> {
 /// Relative tolerance if neither the caller nor the model description has one.
 const RTOL: f64 = 1e-6;
 
-impl<'a> Integrated<'a> {
+impl<'a> ModelExchangePlan<'a> {
     /// Checks the inputs and settings. Adds the inputs whose values `f64` cannot represent to `exact`. Fails for a system of several
     /// FMUs, which can only run in Co-Simulation.
     pub fn of(system: &System, batch: &'a Batch, exact: &mut Vec<Input>) -> Result<Option<Self>, Error> {
@@ -56,7 +56,7 @@ impl<'a> Integrated<'a> {
             Standard::Fmi2 => !offer.can(&["completedIntegratorStepNotNeeded"]),
             Standard::Fmi3 => offer.can(&["needsCompletedIntegratorStep"]),
         });
-        let mut integrated = Self {
+        let mut model_exchange = Self {
             description,
             moving: Selection::default(),
             held: Selection::default(),
@@ -66,8 +66,8 @@ impl<'a> Integrated<'a> {
             reports_steps,
             keeps_events: batch.events,
         };
-        integrated.find_inputs(system, batch, exact)?;
-        Ok(Some(integrated))
+        model_exchange.find_inputs(system, batch, exact)?;
+        Ok(Some(model_exchange))
     }
 
     fn find_inputs(
@@ -157,7 +157,7 @@ fn of_run<'a>(numbers: &'a Numbers<'a>, run: usize, points: &'a [f64]) -> (&'a [
     }
 }
 
-impl<'a> Integrated<'a> {
+impl<'a> ModelExchangePlan<'a> {
     /// Returns the inputs of a run as functions of time.
     pub fn signals(&'a self, run: usize, points: &'a [f64]) -> Signals<'a> {
         let curve = |source: &'a Source<'a>| match source {

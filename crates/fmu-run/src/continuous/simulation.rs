@@ -5,29 +5,29 @@ use super::chatter::{Chatter, MOST_EVENTS};
 use super::inputs::Break;
 use super::model::Model;
 use super::{Integration, Solver};
-use crate::running::Running;
+use crate::system_instance::SystemInstance;
 use fmi_client::Rejection;
 
 /// Functions of the caller that are called during a run.
 pub(crate) trait Hooks {
     /// Reads outputs at the communication point with this index.
-    fn record(&mut self, running: &mut Running, index: usize) -> Result<(), Rejection>;
+    fn record(&mut self, instance: &mut SystemInstance, index: usize) -> Result<(), Rejection>;
 
     /// Returns whether the run continues; called after each step.
     fn proceed(&mut self, time: f64) -> bool;
 
     /// Called before an event (`is_after` is false) and after it, so that the caller can read outputs.
-    fn event(&mut self, running: &mut Running, time: f64, is_after: bool) -> Result<(), Rejection>;
+    fn event(&mut self, instance: &mut SystemInstance, time: f64, is_after: bool) -> Result<(), Rejection>;
 
     /// Returns whether a string, bytes or a 64-bit integer among the inputs changes at this communication point.
     fn changes(&self, index: usize) -> bool;
 
     /// Sets these inputs to their values at this communication point, in Event Mode.
-    fn set_exact(&mut self, running: &mut Running, index: usize) -> Result<(), Rejection>;
+    fn set_exact(&mut self, instance: &mut SystemInstance, index: usize) -> Result<(), Rejection>;
 }
 
 /// State of a run.
-pub(crate) struct March<'a> {
+pub(crate) struct Simulation<'a> {
     /// Communication points, s.
     pub(super) times: &'a [f64],
     /// Index of the first communication point whose outputs have not been read.
@@ -75,7 +75,7 @@ pub(super) enum Arrival {
     Cancel,
 }
 
-impl<'a> March<'a> {
+impl<'a> Simulation<'a> {
     pub fn new(
         times: &'a [f64],
         [states, indicators]: [usize; 2],
@@ -108,7 +108,7 @@ impl<'a> March<'a> {
             if self.times[self.next] <= self.time {
                 let mut parts = model.parts();
                 parts.set(self.time, &self.x)?;
-                hooks.record(parts.running, self.next)?;
+                hooks.record(parts.instance, self.next)?;
                 self.next += 1;
                 if is_end {
                     return Ok(());
@@ -155,7 +155,7 @@ impl<'a> March<'a> {
         if is_sure || model.parts().until() <= self.time {
             let mut parts = model.parts();
             parts.set(self.time, &self.x)?;
-            hooks.event(parts.running, self.time, false)?;
+            hooks.event(parts.instance, self.time, false)?;
         }
         let passed = model.parts().pass(self.time, is_end);
         if !is_sure && passed != Break::Jump {
@@ -167,27 +167,27 @@ impl<'a> March<'a> {
         }
         {
             let mut parts = model.parts();
-            parts.running.sole().enter_event_mode()?;
+            parts.instance.sole().enter_event_mode()?;
             parts.set_inputs(self.time)?;
             if exact {
-                hooks.set_exact(parts.running, self.next)?;
+                hooks.set_exact(parts.instance, self.next)?;
             }
         }
         self.update(model, false)?;
         let mut parts = model.parts();
         parts.set(self.time, &self.x)?;
-        hooks.event(parts.running, self.time, true)
+        hooks.event(parts.instance, self.time, true)
     }
 
     /// Completes an event in Event Mode, enters Continuous-Time Mode and reads the values that have changed.
     fn update(&mut self, model: &Model, is_first: bool) -> Result<(), Rejection> {
         let mut parts = model.parts();
-        let event = parts.running.sole().event()?;
+        let event = parts.instance.sole().event()?;
         if event.terminate {
             drop(parts);
             return self.end(model);
         }
-        parts.running.sole().enter_continuous_time_mode()?;
+        parts.instance.sole().enter_continuous_time_mode()?;
         if event.states_changed || is_first {
             parts.states(&mut self.x)?;
         }
@@ -207,7 +207,7 @@ impl<'a> March<'a> {
     fn end(&self, model: &Model) -> Result<(), Rejection> {
         Err(model
             .parts()
-            .running
+            .instance
             .sole()
             .rejection("Model Exchange", fmi_abi::Status::Discard, Vec::new())
             .at_end(self.time))

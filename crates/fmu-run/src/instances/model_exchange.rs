@@ -1,6 +1,6 @@
 //! The functions of Model Exchange.
 
-use super::one::rows;
+use super::entry::rows;
 use super::{Instances, Mask};
 use crate::error::{Error, request};
 use crate::selection::Selection;
@@ -19,9 +19,9 @@ impl Instances {
             return request(format!("time is {time}; it must be finite"));
         }
         let row = rows(times, 1, self.len());
-        self.alive(mask, |index, own, instance| {
-            own.time = row(index)[0];
-            instance.sole().set_time(own.time)
+        self.alive(mask, |index, progress, instance| {
+            progress.time = row(index)[0];
+            instance.sole().set_time(progress.time)
         });
         Ok(())
     }
@@ -66,10 +66,10 @@ impl Instances {
     pub fn handle_events(&mut self, (set, values): (&Selection, &[f64]), mask: Mask) -> Result<(), Error> {
         set.check(values)?;
         let row = rows(values, set.len(), self.len());
-        self.alive(mask, |index, own, instance| {
+        self.alive(mask, |index, progress, instance| {
             instance.sole().enter_event_mode()?;
             instance.set(set, row(index))?;
-            own.event = instance.sole().event()?;
+            progress.event = instance.sole().event()?;
             instance.sole().enter_continuous_time_mode()
         });
         Ok(())
