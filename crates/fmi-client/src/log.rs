@@ -17,11 +17,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::thread::ThreadId;
 
-/// Receiver of log messages. It is called while the FMU logs, possibly on a thread of the FMU, so it must not call the FMU. It must
-/// not panic either.
+/// Receiver of log messages, called while the FMU logs, also from threads of the FMU. It must not call the FMU and must not panic.
 pub trait Listen: Send + Sync {
-    /// Receives a message. `number` identifies the instance, as in [`Settings::listener`](crate::Settings::listener). It is `None` if
-    /// the FMU passed an environment that does not belong to a living instance.
+    /// Receives a message of the instance with this [`number`](crate::Settings::listener); `None` if the FMU does not name one of
+    /// the living instances.
     fn hear(&self, number: Option<usize>, message: &Message);
 }
 
