@@ -288,7 +288,7 @@ impl Instance {
 
     fn set_binaries(&mut self, vr: &[u32], values: &[Value]) -> Result<(), Rejection> {
         let bytes = |value: &Value| match value {
-            // The pointer of an empty value is not NULL, either.
+            // The pointer is not NULL, even if the value is empty.
             Value::Binary(bytes) => (bytes.len(), bytes.as_ptr()),
             _ => (0, [].as_ptr()),
         };

@@ -28,11 +28,11 @@ use fmi_abi::{Interface, Value};
 /// Specification of runs. The number of runs is the number of values or time series that an input or a start value has for separate
 /// runs. If none has several, there is one run.
 ///
-/// In each run, start values are set before Initialization Mode, and the first values of the inputs are set in it. Then, at each
-/// time, inputs are set, outputs are read, and a step to the next time is performed.
+/// In each run, start values are set before Initialization Mode, and the first values of the inputs in Initialization Mode. Then, at
+/// each time, inputs are set, outputs are read, and a step to the next time is performed.
 ///
-/// In Model Exchange, the states are model_exchange between events. Continuous inputs are functions of time between two values: lines, or
-/// cubics if their [derivatives](Self::input_derivatives) are given. All other inputs change in Event Mode.
+/// In Model Exchange, the states are integrated between events. Continuous inputs are interpolated between their values by lines, or
+/// by cubics if their [derivatives](Self::input_derivatives) are given. All other inputs change in Event Mode.
 #[derive(Clone, Debug, Default)]
 pub struct Batch<'a> {
     /// Communication points, s. They must be finite and increasing, and at least two.

@@ -245,7 +245,7 @@ impl<'a> Worker<'a> {
         self.start(instance, run).map_err(|rejection| (None, rejection))?;
         instance.forget_log();
         let measures = !plan.measures.is_empty();
-        // Index of the next kept value in a trajectory, and number of times until then.
+        // Index of the next stored value in a trajectory, and number of communication points until then.
         let (kept, mut index, mut wait) = (plan.stored_times(), 0, 0);
         let mut ended: Option<Rejection> = None;
         for (k, &time) in times.iter().enumerate() {
@@ -340,7 +340,8 @@ impl<'a> Worker<'a> {
         Ok(())
     }
 
-    /// Keeps the outputs of a time. Returns whether they belong to a trajectory.
+    /// Stores the outputs of a communication point in the trajectories, if it is one of the stored times, and adds them to the
+    /// statistics. Returns whether it is one.
     pub fn keep_row(&mut self, kept: &mut Kept, time: f64, trajectories: &mut [f64]) -> bool {
         let (plan, length) = (self.plan, self.plan.stored_times());
         let keeps = kept.wait == 0 && kept.index < length;

@@ -141,7 +141,8 @@ pub(super) enum Break {
     Jump,
 }
 
-/// Relative change of a continuous input that is not an event, because rounding also causes such changes where two polynomials meet.
+/// Largest relative change of a continuous input that is not treated as an event, because rounding causes such changes where two
+/// polynomials meet.
 const SAME: f64 = 1e-9;
 
 impl<'a> Signals<'a> {

@@ -138,7 +138,8 @@ impl<'a> Simulation<'a> {
     /// Returns the latest time, s, at which the next smooth interval may end.
     fn stop(&self, model: &Model) -> f64 {
         let mut stop = self.last().min(model.parts().until()).min(self.event.unwrap_or(f64::INFINITY));
-        // Without states, only the communication points show events; steps of fixed size also end there.
+        // Without states there are no solver steps in which events could be located, so each interval ends at a communication point.
+        // Fixed steps end there, too.
         if self.x.is_empty() || self.settings.solver == Solver::Rk4 {
             stop = stop.min(self.times[self.next]);
         }

@@ -1,4 +1,4 @@
-//! Entry of many instances, and functions that process all of them in several threads.
+//! One of many instances, and functions that process all of them in several threads.
 
 use super::Mask;
 use crate::error::Error;
@@ -14,6 +14,7 @@ pub(super) struct Entry {
     pub instance: Option<SystemInstance>,
     /// Reason why the instance has failed, if it has.
     pub error: Option<String>,
+    /// Time and last event.
     pub progress: Progress,
 }
 
