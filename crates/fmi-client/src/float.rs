@@ -1,24 +1,24 @@
-//! The floating-point environment: rounding and exceptions, which some FMUs change for the whole thread.
+//! The floating-point environment (rounding mode and exception mask), which some FMUs change for the whole thread.
 
-/// Calls `body`, then restores the environment, because results of the caller would otherwise be rounded differently, and a
-/// division by zero could end the process.
+/// Calls `body`, then restores the environment. Otherwise the caller's results would be rounded differently, or a division by zero
+/// could end the process.
 #[cfg(target_arch = "x86_64")]
 pub(crate) fn keeping_environment<T>(body: impl FnOnce() -> T) -> T {
     use std::arch::asm;
-    let (mut of_sse, mut of_x87) = (0_u32, 0_u16);
+    let (mut sse, mut x87) = (0_u32, 0_u16);
     // SAFETY: stores the control registers in two variables.
     unsafe {
-        asm!("stmxcsr [{}]", "fnstcw [{}]", in(reg) &raw mut of_sse, in(reg) &raw mut of_x87, options(nostack, preserves_flags));
+        asm!("stmxcsr [{}]", "fnstcw [{}]", in(reg) &raw mut sse, in(reg) &raw mut x87, options(nostack, preserves_flags));
     }
     let result = body();
-    // SAFETY: values that the registers had; no exceptions are pending that they would raise.
+    // SAFETY: the registers had these values before; `fnclex` has cleared the exceptions that they could raise.
     unsafe {
-        asm!("fnclex", "ldmxcsr [{}]", "fldcw [{}]", in(reg) &raw const of_sse, in(reg) &raw const of_x87, options(nostack, preserves_flags));
+        asm!("fnclex", "ldmxcsr [{}]", "fldcw [{}]", in(reg) &raw const sse, in(reg) &raw const x87, options(nostack, preserves_flags));
     }
     result
 }
 
-/// Calls `body`, then sets the environment to what it was before.
+/// Calls `body`, then restores the environment, for the same reason as on x86-64.
 #[cfg(target_arch = "aarch64")]
 pub(crate) fn keeping_environment<T>(body: impl FnOnce() -> T) -> T {
     use std::arch::asm;
@@ -26,12 +26,12 @@ pub(crate) fn keeping_environment<T>(body: impl FnOnce() -> T) -> T {
     // SAFETY: reads the control register.
     unsafe { asm!("mrs {}, fpcr", out(reg) control, options(nomem, nostack, preserves_flags)) };
     let result = body();
-    // SAFETY: a value that the register had.
+    // SAFETY: the register had this value before.
     unsafe { asm!("msr fpcr, {}", in(reg) control, options(nomem, nostack, preserves_flags)) };
     result
 }
 
-/// Calls `body`.
+/// Calls `body`. On other processors the environment is not restored.
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
 pub(crate) fn keeping_environment<T>(body: impl FnOnce() -> T) -> T {
     body()

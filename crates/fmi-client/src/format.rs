@@ -1,22 +1,24 @@
-//! Expands formats of `printf` in log messages (section 2.1.5 of FMI 2.0), without trusting them.
+//! Expands `printf` formats in log messages (section 2.1.5 of FMI 2.0), without trusting them.
 //!
-//! Many FMUs log finished text that contains percent signs, so the arguments of a conversion may not exist. A conversion is
-//! expanded only if that is harmless: numbers are copied from registers and the stack; strings are read only through the kernel,
-//! which reports wrong pointers. `%n`, which would write to memory, and unknown conversions remain as they are.
+//! Many FMUs pass finished text as the format. Its percent signs look like conversions, but they have no arguments. So a conversion
+//! is expanded only if that is harmless: numbers are copied from registers and the stack, and strings are read through the kernel,
+//! which reports invalid pointers. `%n`, which would write to memory, and unknown conversions stay in the text.
 #![cfg(any(all(unix, target_arch = "x86_64"), all(target_os = "linux", target_arch = "aarch64")))]
 
 use std::ffi::{CStr, CString};
 
-/// Longest string that a conversion reads.
+/// Maximum length of a string argument in bytes.
 const LONGEST: usize = 1 << 16;
 
-/// Arguments of a variadic call: integers and pointers, and floating-point numbers.
+/// Arguments of a variadic call that have not been used yet.
 pub(crate) struct Arguments {
+    /// Integers and pointers.
     words: std::array::IntoIter<usize, 8>,
+    /// Floating-point numbers.
     numbers: std::array::IntoIter<f64, 8>,
 }
 
-/// A conversion of a format.
+/// A conversion specification of a format, such as `%-5.2f`.
 struct Conversion<'a> {
     flags: &'a str,
     width: Option<i32>,
@@ -31,7 +33,7 @@ impl Arguments {
         Self { words: words.into_iter(), numbers: numbers.into_iter() }
     }
 
-    /// Returns the text of a format with these arguments.
+    /// Returns the format with its conversions replaced by the arguments.
     pub fn expand(mut self, format: &str) -> String {
         let mut text = String::with_capacity(format.len());
         let mut rest = format;
@@ -53,8 +55,8 @@ impl Arguments {
         text + rest
     }
 
-    /// Reads a conversion after its percent sign, and returns its length. Percent-encoded characters of URIs and percent signs
-    /// before a space are not conversions.
+    /// Parses the conversion after a percent sign and returns its length, without the sign. Returns `None` if there is none: a
+    /// percent-encoded character of a URI, or a percent sign before a space, is not a conversion.
     fn parse<'a>(&mut self, text: &'a str) -> Option<(usize, Conversion<'a>)> {
         let bytes = text.as_bytes();
         if let [high, low, ..] = bytes
@@ -89,9 +91,9 @@ impl Arguments {
         Some((at + 1, Conversion { flags: &text[..flags], width, precision, length, kind }))
     }
 
-    /// Returns the text of a conversion; `None` if it must remain as it is.
+    /// Formats the next argument. Returns `None` if the conversion must stay in the text.
     fn convert(&mut self, of: &Conversion) -> Option<String> {
-        /// Longer numbers are a mistake.
+        /// Maximum width and precision. Larger ones are almost certainly not meant as a conversion.
         const WIDEST: i32 = 200;
         let part = |number: Option<i32>, before: &str| {
             number.map(|number| format!("{before}{number}")).unwrap_or_default()
@@ -139,16 +141,17 @@ impl Arguments {
     }
 }
 
-/// A value for one conversion of `snprintf`.
+/// A value that `snprintf` formats.
 enum Printed {
     Integer(i64),
     Number(f64),
 }
 
-/// Prints a value with a format that has one conversion of its type.
+/// Formats a value with `snprintf`. The format must have exactly one conversion, which fits the type of the value. Returns `None` if
+/// the result is too long.
 fn print(format: &str, value: Printed) -> Option<String> {
     let format = CString::new(format).ok()?;
-    // The longest number of `%f` has 309 digits before the point; width and precision are limited.
+    // A number printed with `%f` has at most 309 digits before the point; width and precision are limited to 200.
     let mut buffer = [0_u8; 640];
     let to = buffer.as_mut_ptr().cast();
     // SAFETY: the buffer has this size; the format has one conversion, for a value of this type.
@@ -162,11 +165,12 @@ fn print(format: &str, value: Printed) -> Option<String> {
     CStr::from_bytes_until_nul(&buffer).ok()?.to_str().ok().map(str::to_owned)
 }
 
-/// Returns the string at an address, up to a length, if there is one. The kernel copies the bytes, because the address may be wrong.
+/// Returns the string at an address, at most `limit` bytes of it. Returns `None` if there is no readable text. The kernel copies the
+/// bytes, because the address may be invalid.
 #[cfg(target_os = "linux")]
 fn string_at(address: usize, limit: usize) -> Option<String> {
     use std::os::unix::fs::FileExt;
-    /// Smallest size of pages; a readable page may precede one that is not.
+    /// Smallest page size. Each read ends at a page boundary, because the next page may not be readable.
     const PAGE: usize = 4096;
     let memory = std::fs::File::open("/proc/self/mem").ok().filter(|_| address >= PAGE)?;
     let (mut found, mut page) = (Vec::new(), [0; PAGE]);
@@ -181,11 +185,11 @@ fn string_at(address: usize, limit: usize) -> Option<String> {
         }
     }
     let is_text = |text: &String| !text.chars().any(|char| char.is_control() && !"\t\r\n".contains(char));
-    // An argument that does not exist may lead to any bytes.
+    // If the caller passed no argument, the address is arbitrary, and may point to data that is not text.
     if found.len() >= LONGEST { None } else { String::from_utf8(found).ok().filter(is_text) }
 }
 
-/// Returns `None`: strings remain as they are.
+/// Returns `None`, so that `%s` stays in the text.
 #[cfg(not(target_os = "linux"))]
 fn string_at(_address: usize, _limit: usize) -> Option<String> {
     None
@@ -245,7 +249,7 @@ mod tests {
         ] {
             assert_eq!(expand(text, &[1; 8], &[]), text);
         }
-        // More conversions than arguments are read.
+        // Only 8 arguments can be read, so the ninth conversion stays.
         assert_eq!(expand(&"%d ".repeat(9), &[1; 8], &[]), "1 1 1 1 1 1 1 1 %d ");
     }
 }

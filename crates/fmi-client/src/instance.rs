@@ -1,5 +1,5 @@
-//! An instance of an FMU of any version and its life cycle. Safe functions wrap the C calls: they check lengths, keep the library
-//! loaded, and call nothing after fmi2Fatal.
+//! The life cycle of an instance, for all FMI versions. Safe functions wrap the C calls: they check lengths, keep the library loaded,
+//! and do not call the instance after fmi2Fatal.
 
 use crate::float::keeping_environment;
 use crate::library::{Functions, Library};
@@ -16,20 +16,20 @@ use std::ptr::null;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Arguments of the instantiation.
+/// Arguments for instantiating an FMU.
 #[derive(Clone)]
 pub struct Settings<'a> {
-    /// Name that the FMU gets.
+    /// Instance name that is passed to the FMU.
     pub name: &'a str,
     /// Label of the instance in error messages; may be empty.
     pub label: &'a str,
     /// `guid` of FMI 2.0, `instantiationToken` of FMI 3.0.
     pub token: &'a str,
-    /// Location of the resources, as [`Standard::resources`] writes it, if there are any.
+    /// Location of the resources, in the form that [`Standard::resources`] returns; `None` if the FMU has no resources.
     pub resources: Option<&'a CStr>,
     /// Interface type.
     pub interface: Interface,
-    /// Whether the FMU logs more.
+    /// Whether debug logging is on (`loggingOn`).
     pub logging_on: bool,
     /// Whether the caller handles events in Co-Simulation (FMI 3.0).
     pub event_mode: bool,
@@ -105,7 +105,7 @@ pub enum Continuous {
     Nominals,
 }
 
-/// Limit of iterations of an event.
+/// Maximum number of iterations of an event.
 const MOST_ITERATIONS: usize = 10_000;
 
 /// `fmi2Pending`: the step is performed asynchronously.
@@ -126,12 +126,12 @@ impl Drop for Instance {
                 }
             });
         }
-        // After the last message.
+        // Comes last, because freeing the instance may log messages.
         self.log.unregister();
     }
 }
 
-/// Calls a function of FMI 2.0 or its counterpart in FMI 3.0; a version without the function gets an error.
+/// Calls a function of FMI 2.0 or its counterpart in FMI 3.0. If the FMI version does not have the function, the result is an error.
 macro_rules! call {
     ($self:ident, $fmi2:ident ( $($of_fmi2:expr),* ) $(, $fmi3:ident ( $($of_fmi3:expr),* ))?) => {{
         let handle = $self.handle(stringify!($fmi2))?;
@@ -166,7 +166,7 @@ impl Instance {
     /// Creates an instance.
     ///
     /// # Errors
-    /// Returns the FMU's messages if it makes none.
+    /// The FMU returns NULL. The error contains the FMU's messages.
     pub fn new(library: &Arc<Library>, settings: &Settings) -> Result<Self, Rejection> {
         let Settings { interface, logging_on, event_mode, early_return, .. } = *settings;
         let log = Log::register(settings.listener.clone());
@@ -269,7 +269,7 @@ impl Instance {
         self.rejection(function, Status::Error, vec![message])
     }
 
-    /// Converts the status of a call.
+    /// Converts the status code of a call to a `Result`.
     #[inline]
     pub(crate) fn check(&mut self, function: &'static str, code: c_int) -> Result<(), Rejection> {
         if code == Status::Ok as c_int { Ok(()) } else { self.not_ok(function, code) }
@@ -300,8 +300,8 @@ impl Instance {
         self.log.take();
     }
 
-    /// Sets up the experiment in FMI 2.0, before the start values are set; FMI 3.0 passes the times when it enters Initialization
-    /// Mode. Times in s; the tolerance is relative.
+    /// Sets up the experiment in FMI 2.0, before the start values are set. Does nothing in FMI 3.0, where the times are passed when
+    /// entering Initialization Mode. Times are in s; the tolerance is relative.
     ///
     /// # Errors
     /// The FMU rejects the call.
@@ -365,7 +365,7 @@ impl Instance {
     /// Enters Configuration Mode, where structural parameters are set (section 2.3.2 of FMI 3.0).
     ///
     /// # Errors
-    /// The FMU rejects the call; every FMU of FMI 2.0 does.
+    /// The FMU rejects the call, or is of FMI 2.0, which does not have this mode.
     pub fn enter_configuration_mode(&mut self) -> Result<(), Rejection> {
         call!(fmi3 self, fmi3EnterConfigurationMode())
     }
@@ -378,7 +378,7 @@ impl Instance {
         call!(fmi3 self, fmi3ExitConfigurationMode())
     }
 
-    /// Enters Step Mode after events of Co-Simulation in FMI 3.0.
+    /// Enters Step Mode after an event in Co-Simulation (FMI 3.0).
     ///
     /// # Errors
     /// The FMU rejects the call.
@@ -386,7 +386,7 @@ impl Instance {
         call!(fmi3 self, fmi3EnterStepMode())
     }
 
-    /// Sets time derivatives of inputs. FMI 3.0 has no function for this.
+    /// Sets time derivatives of inputs, each of the order in `orders`. FMI 3.0 does not have this function.
     ///
     /// # Errors
     /// The FMU rejects the call.
@@ -405,7 +405,7 @@ impl Instance {
         call!(self, fmi2SetRealInputDerivatives(vr, n, orders, values))
     }
 
-    /// Gets time derivatives of outputs, of order 1. There are more values than variables if some are arrays.
+    /// Reads the first time derivatives of outputs. If some outputs are arrays, there are more values than variables.
     ///
     /// # Errors
     /// The FMU rejects the call.
@@ -420,14 +420,14 @@ impl Instance {
         )
     }
 
-    /// Performs a step of Co-Simulation and returns the time that the FMU has reached, s; if the FMU performs the step
-    /// asynchronously, waits for its end.
+    /// Performs a step of Co-Simulation and returns the time that the FMU has reached, s. Waits for the end of the step if the FMU
+    /// performs it asynchronously.
     ///
     /// # Errors
     /// The FMU rejects the step, or ends the simulation (see [`Rejection::ended`]).
     #[inline]
     pub fn step(&mut self, time: f64, size: f64) -> Result<f64, Rejection> {
-        // A state that is kept may be restored (section 4.2.2 of FMI 2.0, noSetFMUStatePriorToCurrentPoint).
+        // While there are saved states, one of them may be restored (section 4.2.2 of FMI 2.0, noSetFMUStatePriorToCurrentPoint).
         let no_return = self.states.is_empty();
         let (mut event, mut terminate, mut early, mut reached) =
             (fmi3False, fmi3False, fmi3False, time + size);
@@ -463,7 +463,7 @@ impl Instance {
         }
     }
 
-    /// Detects whether a discarded step is a request to end the simulation (section 4.2.3 of FMI 2.0).
+    /// Adds the end time to the error of a discarded step if the FMU requests the end of the simulation (section 4.2.3 of FMI 2.0).
     #[cold]
     fn ended(&self, rejection: Rejection, time: f64) -> Rejection {
         let (mut wanted, mut reached) = (fmi2False, time);
@@ -487,8 +487,8 @@ impl Instance {
         rejection.at_end(if is_known { reached } else { time })
     }
 
-    /// Returns the error for a requested end of the simulation, or for an early return, which was not allowed
-    /// (section 4.2.1 of FMI 3.0).
+    /// Returns the error of a step after which the FMU requests the end of the simulation, or of a step that ended early although
+    /// this was not allowed (section 4.2.1 of FMI 3.0).
     #[cold]
     fn stopped(&self, wanted: bool, reached: f64) -> Rejection {
         let (function, status) = ("fmi3DoStep", Status::Discard);
@@ -501,8 +501,8 @@ impl Instance {
         if wanted { rejection.at_end(reached) } else { rejection }
     }
 
-    /// Computes directional derivatives of unknowns for a seed (section 2.1.9 of FMI 2.0, 2.2.12 of FMI 3.0). Arrays have several
-    /// values.
+    /// Computes directional derivatives of unknowns for a seed, which has a value for each known (section 2.1.9 of FMI 2.0, 2.2.12 of
+    /// FMI 3.0). Arrays have several values each.
     ///
     /// # Errors
     /// The FMU rejects the call.
@@ -543,7 +543,7 @@ impl Instance {
         call!(self, fmi2EnterContinuousTimeMode(), fmi3EnterContinuousTimeMode())
     }
 
-    /// Updates the discrete states until the event is over. The instance must be in Event Mode.
+    /// Updates the discrete states until the FMU needs no further iteration. The instance must be in Event Mode.
     ///
     /// # Errors
     /// The FMU rejects a call, or the event does not end.
@@ -586,8 +586,8 @@ impl Instance {
             .own_rejection("event", format!("the event does not end within {MOST_ITERATIONS} iterations")))
     }
 
-    /// Returns whether the FMU requests an event and the end of the simulation after a step of the
-    /// integrator.
+    /// Tells the FMU that an integrator step is complete. Returns whether the FMU requests an event, and whether it requests the end
+    /// of the simulation.
     ///
     /// # Errors
     /// The FMU rejects the call.
@@ -657,7 +657,8 @@ impl Instance {
     }
 }
 
-/// Waits for the end of an asynchronous step (section 4.2.2 of FMI 2.0: without `stepFinished`, the importer asks for the status).
+/// Waits for the end of an asynchronous step and returns its status. It asks for the status repeatedly, because the importer passes
+/// no `stepFinished` callback (section 4.2.2 of FMI 2.0).
 #[cold]
 fn wait(functions: &fmi_abi::fmi2::Functions, handle: *mut c_void) -> c_int {
     const LONGEST_PAUSE: Duration = Duration::from_millis(1);

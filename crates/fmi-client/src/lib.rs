@@ -2,9 +2,10 @@
 //!
 //! ## Structure of the crate
 //!
-//! [`Library`] contains the functions of an FMU. [`Instance`] calls them: `instance` the life cycle, `values` variables, `states`
-//! and `saved` saved states. `log` receives messages and knows the living instances, because the pointer that an FMU passes to the logger
-//! cannot be trusted; `format` expands formats of `printf` without trusting their arguments.
+//! [`Library`] holds the functions of an FMU, and [`Instance`] calls them. Module `instance` contains the life cycle, `values` gets
+//! and sets variables, and `states` saves and restores states, whose handles are stored in `saved`. `log` receives messages and keeps
+//! a list of the living instances, because the pointer that an FMU passes to the logger cannot be trusted. `format` expands `printf`
+//! formats, whose arguments cannot be trusted either.
 
 mod float;
 mod format;

@@ -1,4 +1,4 @@
-//! The shared library of an FMU, loaded as long as an instance uses it.
+//! The shared library of an FMU. It stays loaded as long as an instance uses it.
 
 use crate::float::keeping_environment;
 use fmi_abi::c_types::c_void;
@@ -22,12 +22,12 @@ pub enum Functions {
 }
 
 impl Library {
-    /// Loads a library. Functions of an unsupported interface type may be missing; calls of missing functions
-    /// return errors.
+    /// Loads a library. Functions of interface types that the FMU does not support may be missing; calls of missing functions return
+    /// errors.
     ///
     /// # Safety
-    /// The file is the library of an FMU of this FMI version. Its functions have the types of the FMI
-    /// standard, and the library is sound when it is loaded and called.
+    /// The file is the library of an FMU of this FMI version. Its functions have the types of the FMI standard, and it is sound to
+    /// load the library and to call them.
     ///
     /// # Errors
     /// Fails if the library cannot be loaded, or lacks the function that frees instances.
@@ -56,8 +56,8 @@ impl Library {
     /// Uses functions that are already in this process.
     ///
     /// # Safety
-    /// The functions belong to an FMU. They stay loaded as long as the value and its instances exist, and are sound when they
-    /// are called.
+    /// The functions belong to an FMU, and it is sound to call them. They stay loaded as long as the returned value and its instances
+    /// exist.
     pub unsafe fn of(functions: Functions) -> Self {
         Self { functions, _loaded: None }
     }
@@ -71,23 +71,23 @@ impl Library {
     }
 }
 
-/// Makes the symbols of libm, libdl and libpthread visible to all libraries, because many FMUs use them without naming the
-/// libraries that have them, and then depend on the importer to have loaded them.
+/// Makes the symbols of libm, libdl and libpthread visible to all libraries, because many FMUs use them but are not linked to these
+/// libraries. Such an FMU can only be loaded if its importer has loaded them.
 #[cfg(target_os = "linux")]
 fn provide_symbols() {
     use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_LAZY};
     static ONCE: std::sync::Once = std::sync::Once::new();
     ONCE.call_once(|| {
         for name in ["libm.so.6", "libdl.so.2", "libpthread.so.0"] {
-            // SAFETY: a library of the system, which most processes have loaded.
+            // SAFETY: a system library, which most processes have loaded already.
             if let Ok(library) = unsafe { Library::open(Some(name), RTLD_LAZY | RTLD_GLOBAL) } {
-                // It stays loaded.
+                // Keeps the library loaded.
                 std::mem::forget(library);
             }
         }
     });
 }
 
-/// Does nothing: other systems name libraries and symbols together.
+/// Does nothing, because on other systems each imported symbol names its library.
 #[cfg(not(target_os = "linux"))]
 fn provide_symbols() {}

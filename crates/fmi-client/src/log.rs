@@ -24,14 +24,14 @@ pub trait LogListener: Send + Sync {
     fn on_message(&self, number: Option<usize>, message: &Message);
 }
 
-/// Maximum number of stored messages. A later error quotes them as its reason; older ones are dropped.
+/// Maximum number of stored messages, from which a later error takes its reason. Older ones are dropped.
 const MOST_MESSAGES: usize = 64;
 
 /// The log of an instance.
 pub(crate) struct Log {
-    /// Environment of the instance: a number that is used once in a process.
+    /// Number that the FMU gets as the environment of the instance. It is unique in the process.
     environment: usize,
-    /// Messages since the last [`take`](Self::take), which follows each call that does not return OK.
+    /// Messages since the last call of [`take`](Self::take), which follows each FMI call that does not return OK.
     new: Mutex<VecDeque<Message>>,
     listener: Option<(Arc<dyn LogListener>, usize)>,
 }
@@ -42,7 +42,7 @@ impl fmt::Debug for Log {
     }
 }
 
-/// Logs of the living instances by environment.
+/// Logs of the living instances, by environment.
 static LIVING: RwLock<BTreeMap<usize, Arc<Log>>> = RwLock::new(BTreeMap::new());
 
 /// Messages with an unknown environment, each with the thread that logged it. Most FMUs log during a call and on its thread, so the next
@@ -74,8 +74,8 @@ impl Log {
         std::ptr::without_provenance_mut(self.environment)
     }
 
-    /// Returns the messages since the last call of this function. They include messages that this thread received with an environment of
-    /// no instance, because the call that this thread has just made is their likely cause.
+    /// Returns the messages since the last call of this function. Messages with an unknown environment are included if this thread
+    /// logged them, because the FMI call that this thread has just made is their likely cause.
     pub fn take(&self) -> Vec<Message> {
         let mut messages = Vec::from(std::mem::take(&mut *lock(&self.new)));
         let mut stray = lock(&STRAY);
@@ -97,7 +97,7 @@ impl Log {
     }
 }
 
-/// Adds an item; removes the oldest one if there are `MOST_MESSAGES`.
+/// Adds an item. If there are already `MOST_MESSAGES`, removes the oldest one first.
 fn push_limited<T>(items: &mut VecDeque<T>, item: T) {
     if items.len() >= MOST_MESSAGES {
         items.pop_front();
@@ -163,12 +163,12 @@ unsafe extern "C" fn free(memory: *mut c_void) {
     unsafe { libc::free(memory) }
 }
 
-/// Logger of FMI 2.0. Stable Rust cannot define variadic functions, so this one has a fixed number of arguments: integers and pointers, then
-/// floating-point numbers, which are passed in separate registers. On Linux, and on macOS with Intel processors, variadic functions
-/// receive their arguments in these registers and then on the stack. If the caller passes fewer arguments, the others have arbitrary
-/// values; reading them is harmless there, and a correct format does not use them.
+/// Logger of FMI 2.0. Stable Rust cannot define variadic functions, so this one has a fixed number of arguments: integers and
+/// pointers, then floating-point numbers, which are passed in separate registers. On Linux, and on macOS with Intel processors,
+/// variadic functions receive their arguments in these registers and then on the stack. If the caller passes fewer arguments, the
+/// others have arbitrary values; reading them is harmless there, and a correct format does not use them.
 #[cfg(any(all(unix, target_arch = "x86_64"), all(target_os = "linux", target_arch = "aarch64")))]
-#[allow(clippy::too_many_arguments, reason = "the values of the message")]
+#[allow(clippy::too_many_arguments, reason = "the arguments of the format")]
 unsafe extern "C" fn log_of_fmi2(
     environment: fmi2ComponentEnvironment,
     _instance_name: fmi2String,
@@ -199,8 +199,8 @@ unsafe extern "C" fn log_of_fmi2(
     store(environment.addr(), message);
 }
 
-/// Logger of FMI 2.0 that ignores the values for the format. On every platform of this project, the arguments before the `...` are passed
-/// as they are to a function without `...`.
+/// Logger of FMI 2.0 that does not expand formats, because it cannot read variadic arguments on these platforms. The arguments before
+/// the `...` are passed in the same way as to a function without `...`.
 #[cfg(not(any(all(unix, target_arch = "x86_64"), all(target_os = "linux", target_arch = "aarch64"))))]
 unsafe extern "C" fn log_of_fmi2(
     environment: fmi2ComponentEnvironment,

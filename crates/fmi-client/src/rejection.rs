@@ -2,7 +2,7 @@
 
 use fmi_abi::{Status, shown_to};
 
-/// Number of characters of an FMU's message that an error repeats.
+/// Maximum number of characters of an FMU's message in an error.
 const LONGEST: usize = 500;
 
 /// A log message of an FMU.
@@ -16,8 +16,8 @@ pub struct Message {
     pub text: String,
 }
 
-/// A status other than OK or Warning, with the function that returned it and the messages of the FMU. The
-/// error is boxed because it is rare and each call may return it.
+/// A status other than OK or Warning, with the function that returned it and the messages of the FMU. It is boxed because every call
+/// returns a result, which should be small, and errors are rare.
 #[derive(Debug)]
 pub struct Rejection(Box<Rejected>);
 
@@ -28,6 +28,7 @@ struct Rejected {
     function: &'static str,
     status: Status,
     log: Vec<Message>,
+    /// Time at which the FMU ended the simulation, s; `None` for any other error.
     ended: Option<f64>,
 }
 
@@ -50,14 +51,14 @@ impl Rejection {
         self.0.status
     }
 
-    /// Records that the FMU requests the end of the simulation, at this time, s.
+    /// Records that the FMU has requested the end of the simulation at this time, s.
     #[must_use]
     pub fn at_end(mut self, time: f64) -> Self {
         self.0.ended = Some(time);
         self
     }
 
-    /// Returns the time at which the FMU ended the simulation, s, if it did.
+    /// Returns the time at which the FMU ended the simulation, s; `None` for any other error.
     pub fn ended(&self) -> Option<f64> {
         self.0.ended
     }

@@ -1,4 +1,5 @@
-//! The handles of saved states. Callers have indices instead, so that they cannot pass a pointer that the FMU did not make.
+//! The handles of saved states. Callers get indices instead of handles, so that they cannot pass a pointer that the FMU did not
+//! return.
 
 use fmi_abi::c_types::c_void;
 use std::ptr::null_mut;
@@ -8,7 +9,7 @@ use std::ptr::null_mut;
 pub struct Saved(usize);
 
 impl Saved {
-    /// Returns the index, which is free again after [`Instance::forget`](crate::Instance::forget).
+    /// Returns the index. It is reused after [`Instance::forget`](crate::Instance::forget).
     pub fn index(self) -> usize {
         self.0
     }

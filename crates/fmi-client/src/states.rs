@@ -16,17 +16,18 @@ impl Instance {
     pub fn save(&mut self) -> Result<Saved, Rejection> {
         let mut state = null_mut();
         call!(self, fmi2GetFMUstate(&mut state), fmi3GetFMUState(&mut state))?;
-        self.kept(state, "save")
+        self.insert(state, "save")
     }
 
-    fn kept(&mut self, state: *mut c_void, function: &'static str) -> Result<Saved, Rejection> {
+    /// Stores a handle that the FMU returned. Fails if it is NULL.
+    fn insert(&mut self, state: *mut c_void, function: &'static str) -> Result<Saved, Rejection> {
         if state.is_null() {
             return Err(self.own_rejection(function, "the FMU returned no state".to_owned()));
         }
         Ok(self.states.insert(state))
     }
 
-    /// Returns the saved state of an index.
+    /// Returns the handle of a saved state.
     fn state(&self, saved: Saved, function: &'static str) -> Result<*mut c_void, Rejection> {
         self.states
             .get(saved)
@@ -58,7 +59,7 @@ impl Instance {
         }
     }
 
-    /// Returns a saved state as bytes.
+    /// Serializes a saved state to bytes.
     ///
     /// # Errors
     /// The FMU rejects a call, or reports a size for which there is not enough memory.
@@ -79,7 +80,7 @@ impl Instance {
         Ok(bytes)
     }
 
-    /// Reads a state from bytes.
+    /// Creates a saved state from serialized bytes.
     ///
     /// # Errors
     /// The FMU rejects the bytes.
@@ -90,11 +91,12 @@ impl Instance {
             fmi2DeSerializeFMUstate(from.cast(), size, &mut state),
             fmi3DeserializeFMUState(from, size, &mut state)
         )?;
-        self.kept(state, "deserialize")
+        self.insert(state, "deserialize")
     }
 }
 
-/// Returns bytes that are 0, if there is enough memory. The system provides their pages when the FMU writes to them.
+/// Returns `size` bytes that are 0, or `None` if memory does not suffice. The system provides their pages only when the FMU writes to
+/// them.
 fn zeros(size: usize) -> Option<Vec<u8>> {
     if size == 0 {
         return Some(Vec::new());

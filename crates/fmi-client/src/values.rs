@@ -1,7 +1,7 @@
-//! Values of variables. Each type has its functions in FMI 2.0 and FMI 3.0.
+//! Values of variables: the getters and setters of each type in FMI 2.0 and FMI 3.0.
 //!
-//! Numbers are passed as `f64`, because one type is fast to copy; [`Value`]s are exact and have all types. A variable of FMI 3.0 that is an array has several
-//! values.
+//! `set_numbers` and `get_numbers` pass all numeric types as `f64`, which is fast to copy. `set_values` and `get_values` pass
+//! [`Value`]s, which hold every type exactly. An array variable of FMI 3.0 has several values.
 
 use crate::instance::{Instance, call};
 use crate::library::Functions;
@@ -11,14 +11,14 @@ use fmi_abi::{BaseType, Standard, Value};
 use std::ffi::{CStr, CString};
 use std::ptr::null;
 
-/// Number type of an FMI function.
+/// A number type of the FMI functions, with conversions from and to `f64` and [`Value`].
 trait Number: Copy + Default {
     fn from_f64(value: f64) -> Self;
     fn to_f64(self) -> f64;
     fn from_value(value: &Value) -> Self;
     fn to_value(self) -> Value;
 
-    /// Calls a setter with these values.
+    /// Converts `values` and calls a setter with them.
     #[inline]
     fn set(values: &[f64], setter: impl FnOnce(*const Self) -> c_int) -> c_int {
         with_buffer(values.len(), |numbers: &mut [Self]| {
@@ -27,7 +27,7 @@ trait Number: Copy + Default {
         })
     }
 
-    /// Calls a getter for as many values.
+    /// Calls a getter and converts its results to `values`.
     #[inline]
     fn get(values: &mut [f64], getter: impl FnOnce(*mut Self) -> c_int) -> c_int {
         with_buffer(values.len(), |numbers: &mut [Self]| {
@@ -37,13 +37,13 @@ trait Number: Copy + Default {
         })
     }
 
-    /// Calls a setter with these values.
+    /// Converts `values` and calls a setter with them.
     fn set_values(values: &[Value], setter: impl FnOnce(*const Self) -> c_int) -> c_int {
         let numbers: Vec<Self> = values.iter().map(Self::from_value).collect();
         setter(numbers.as_ptr())
     }
 
-    /// Calls a getter for as many values.
+    /// Calls a getter and converts its results to `values`.
     fn get_values(values: &mut [Value], getter: impl FnOnce(*mut Self) -> c_int) -> c_int {
         let mut numbers = vec![Self::default(); values.len()];
         let code = getter(numbers.as_mut_ptr());
@@ -52,7 +52,7 @@ trait Number: Copy + Default {
     }
 }
 
-/// Calls `body` with a buffer, which needs no allocation for a few numbers.
+/// Calls `body` with a buffer of this length, which is on the stack for up to 8 numbers.
 #[inline]
 fn with_buffer<T: Number>(length: usize, body: impl FnOnce(&mut [T]) -> c_int) -> c_int {
     match [T::default(); 8].get_mut(..length) {
@@ -61,7 +61,7 @@ fn with_buffer<T: Number>(length: usize, body: impl FnOnce(&mut [T]) -> c_int) -
     }
 }
 
-/// Returns the number of a value as another type; 0 for a string and bytes.
+/// Converts a value to a number type. Strings and bytes become 0.
 macro_rules! number_of {
     ($value:ident as $type:ty) => {
         match $value {
@@ -123,8 +123,8 @@ impl Number for f64 {
     }
 }
 
-/// Expands a macro with the setter and the getter for a base type of numbers in the FMI version of the library. The
-/// functions of FMI 3.0 have the number of values as last argument.
+/// Invokes the macro `$with` with the setter and the getter of a numeric base type in the FMI version of the library. For FMI 3.0 it
+/// also passes `$n`, the number of values, which is the last argument of these functions.
 macro_rules! functions {
     ($with:ident, $library:expr, $base:expr, $n:ident) => {
         match (&$library.functions, $base) {
@@ -149,7 +149,7 @@ macro_rules! functions {
 }
 
 impl Instance {
-    /// Sets numeric variables of one type; 0 or 1 for a Boolean.
+    /// Sets numeric variables of one type. Booleans are 0 or 1.
     ///
     /// # Errors
     /// The FMU rejects the values.
@@ -158,7 +158,7 @@ impl Instance {
     /// Panics if there are fewer values than variables.
     #[inline]
     pub fn set_numbers(&mut self, base: BaseType, vr: &[u32], values: &[f64]) -> Result<(), Rejection> {
-        let n = self.fits(vr, values.len());
+        let n = self.checked_count(vr, values.len());
         let (handle, pointer, count) = (self.handle("set")?, vr.as_ptr(), vr.len());
         macro_rules! set {
             ($functions:ident $set:ident $get:ident $($n:ident)?) => {
@@ -172,7 +172,7 @@ impl Instance {
         self.check(function, code)
     }
 
-    /// Reads numeric variables of one type; 0 or 1 for a Boolean.
+    /// Reads numeric variables of one type into `values`. Booleans are 0 or 1.
     ///
     /// # Errors
     /// The FMU rejects the call.
@@ -181,7 +181,7 @@ impl Instance {
     /// Panics if there are fewer values than variables.
     #[inline]
     pub fn get_numbers(&mut self, base: BaseType, vr: &[u32], values: &mut [f64]) -> Result<(), Rejection> {
-        let n = self.fits(vr, values.len());
+        let n = self.checked_count(vr, values.len());
         let (handle, pointer, count) = (self.handle("get")?, vr.as_ptr(), vr.len());
         macro_rules! get {
             ($functions:ident $set:ident $get:ident $($n:ident)?) => {
@@ -198,9 +198,9 @@ impl Instance {
         self.check(function, code)
     }
 
-    /// Checks the number of values: in FMI 2.0 one for each variable, in FMI 3.0 more if variables are arrays.
+    /// Checks the number of values and returns it. FMI 2.0 has one value for each variable; FMI 3.0 has more if variables are arrays.
     #[inline]
-    fn fits(&self, vr: &[u32], values: usize) -> usize {
+    fn checked_count(&self, vr: &[u32], values: usize) -> usize {
         assert!(values >= vr.len(), "{values} values for {} variables", vr.len());
         values
     }
@@ -213,7 +213,7 @@ impl Instance {
     /// # Panics
     /// Panics if there are fewer values than variables.
     pub fn set_values(&mut self, base: BaseType, vr: &[u32], values: &[Value]) -> Result<(), Rejection> {
-        let n = self.fits(vr, values.len());
+        let n = self.checked_count(vr, values.len());
         match base {
             BaseType::String => return self.set_strings(vr, values),
             BaseType::Binary => return self.set_binaries(vr, values),
@@ -232,7 +232,7 @@ impl Instance {
         self.check(function, code)
     }
 
-    /// Reads exact values of variables of one type; more than there are variables if some are arrays.
+    /// Reads `n` exact values of variables of one type. If some variables are arrays, there are more values than variables.
     ///
     /// # Errors
     /// The FMU rejects the call.
@@ -240,7 +240,7 @@ impl Instance {
     /// # Panics
     /// Panics if there are fewer values than variables.
     pub fn get_values(&mut self, base: BaseType, vr: &[u32], n: usize) -> Result<Vec<Value>, Rejection> {
-        self.fits(vr, n);
+        self.checked_count(vr, n);
         match base {
             BaseType::String => return self.get_strings(vr, n),
             BaseType::Binary => return self.get_binaries(vr, n),
@@ -288,7 +288,7 @@ impl Instance {
 
     fn set_binaries(&mut self, vr: &[u32], values: &[Value]) -> Result<(), Rejection> {
         let bytes = |value: &Value| match value {
-            // A pointer that is not NULL, also for no bytes.
+            // The pointer is not NULL, even if the value is empty.
             Value::Binary(bytes) => (bytes.len(), bytes.as_ptr()),
             _ => (0, [].as_ptr()),
         };

@@ -1,4 +1,4 @@
-//! Repeats uses of this crate, so that callgrind can count their instructions; `make instructions` runs it.
+//! Repeats a use of this crate, so that callgrind can count its instructions. `make instructions` runs it.
 //!
 //! ```text
 //! count_runs FMU USE REPETITIONS
@@ -41,7 +41,7 @@ fn main() -> Result<(), fmu_run::Error> {
     Ok(())
 }
 
-/// Runs a batch on one thread, on the times `np.arange(samples) * 1e-3`.
+/// Runs a batch in one thread, with the times `np.arange(samples) * 1e-3`.
 fn run(fmu: &Fmu, samples: u32, runs: usize, measures: Vec<Measure>) -> Result<(), fmu_run::Error> {
     let time: Vec<f64> = (0..samples).map(|k| f64::from(k) * 1e-3).collect();
     let wave: Vec<f64> = time.iter().map(|t| 0.1 * (30.0 * t).sin()).collect();
@@ -61,7 +61,7 @@ fn run(fmu: &Fmu, samples: u32, runs: usize, measures: Vec<Measure>) -> Result<(
     Ok(())
 }
 
-/// Advances 64 stateful instances, on one thread.
+/// Advances 64 stateful instances in one thread.
 fn instances(fmu: &Fmu, steps: usize) -> Result<(), fmu_run::Error> {
     let mut wrists = fmu.instances(&Setup { count: 64, ..Setup::default() })?;
     let (motors, outputs) = (fmu.select(&MOTORS)?, fmu.select(&OUTPUTS)?);

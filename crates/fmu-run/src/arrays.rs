@@ -1,29 +1,31 @@
-//! Arrays of FMI 3.0. Each element is a variable here, but the FMU knows only the array, by one value
-//! reference. A call of the FMU gets or sets all values of an array (section 2.2.7.2 of FMI 3.0).
+//! Arrays of FMI 3.0. In this crate each element is a variable, but the FMU has only the array, with one value reference. A call of
+//! the FMU gets or sets all values of an array (section 2.2.7.2 of FMI 3.0).
 
-use fmi_abi::BaseType;
 use fmi_abi::description::Variable;
+use fmi_abi::{BaseType, Value};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Largest number of elements that all arrays have together. Elements of further arrays are not variables.
+/// Maximum number of elements of all arrays together. The elements of further arrays are not variables.
 const MAX_ELEMENTS: usize = 1 << 20;
-/// Largest number of bytes of the elements of all arrays, and bytes of an element besides its name.
+/// Maximum memory of the elements of all arrays, in bytes.
 const MAX_BYTES: usize = 256 << 20;
+/// Estimated memory of an element without its name, in bytes.
 const ELEMENT: usize = 160;
 
-/// The arrays of an FMU. Their elements have numbers that serve as value references; they are larger than all
-/// value references of the FMU.
+/// The arrays of an FMU. Each element has a number that serves as its value reference. These numbers are larger than all value
+/// references of the FMU.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Arrays {
     all: Vec<Array>,
     /// Index in `all` by value reference.
     by_reference: HashMap<u32, usize>,
-    /// Number of the first element. `elements` contains, for each element, the index of its array and its number in it.
+    /// Value reference of the first element.
     first: u32,
+    /// For each element, the index of its array and its number in the array.
     elements: Vec<(u32, u32)>,
-    /// Estimated bytes of the elements.
+    /// Estimated memory of the elements, in bytes.
     bytes: usize,
 }
 
@@ -33,12 +35,12 @@ pub(crate) struct Array {
     pub reference: u32,
     pub base: BaseType,
     sizes: Vec<usize>,
-    /// Start values as written: one for all elements, or one for each.
+    /// Start values as in the model description: one for all elements, or one for each.
     start: Vec<Arc<str>>,
 }
 
 impl Array {
-    /// Creates an array of the model description.
+    /// Creates an array from its declaration in the model description.
     pub fn new(of: &Variable, base: BaseType) -> Self {
         let (reference, start) = (of.reference, of.start.iter().map(|start| Arc::from(&**start)).collect());
         Self { reference, base, sizes: of.dimensions.clone().unwrap_or_default(), start }
@@ -49,7 +51,7 @@ impl Array {
         length.filter(|length| *length <= MAX_ELEMENTS)
     }
 
-    /// Returns the start value of an element.
+    /// Returns the start value of the element with this number, from 0, if there is one.
     pub fn start(&self, number: usize) -> Option<&Arc<str>> {
         match &*self.start {
             [one] => Some(one),
@@ -57,8 +59,8 @@ impl Array {
         }
     }
 
-    /// Returns the name of an element as in FMI 2.0 (section 2.2.9 there): indices count from 1 and follow
-    /// the variable.
+    /// Returns the name of the element with this number, in the notation of FMI 2.0 (section 2.2.9 there): `T[1,2]`, with indices
+    /// from 1. In `der(T[1])` they follow the variable.
     pub fn name(&self, array: &str, number: usize) -> String {
         let mut rest = number;
         let mut indices: Vec<_> = self
@@ -78,20 +80,28 @@ impl Array {
     }
 }
 
-/// Variables of the FMU for a call that concerns array elements: scalars and complete arrays.
+/// Values of arrays that were set before Initialization Mode, by index of the array.
+#[derive(Debug, Default)]
+pub(crate) struct ArrayStartValues {
+    pub numbers: HashMap<usize, Vec<f64>>,
+    pub values: HashMap<usize, Vec<Value>>,
+}
+
+/// Variables of the FMU that cover the requested variables: scalars, and whole arrays instead of elements.
 #[derive(Debug, Default)]
 pub(crate) struct Expanded {
     /// Value references of the FMU.
     pub references: Vec<u32>,
-    /// Number of their values. `indices` contains the index of each variable's value among them.
+    /// Number of values of these variables.
     pub count: usize,
+    /// For each requested variable, the index of its value among them.
     pub indices: Vec<usize>,
-    /// Index of each array and of its first value.
+    /// For each array, its index in [`Arrays`] and the index of its first value.
     pub arrays: Vec<(usize, usize)>,
 }
 
 impl Expanded {
-    /// Returns whether the variables include all elements of their arrays.
+    /// Returns whether every element of these arrays was requested.
     pub fn is_complete(&self) -> bool {
         let mut named = vec![false; self.count];
         self.indices.iter().for_each(|index| named[*index] = true);
@@ -109,7 +119,7 @@ impl Arrays {
         &self.all
     }
 
-    /// Adds an array with this name and returns the numbers of its elements; `None` if there are too many.
+    /// Adds an array with this name. Returns the value references of its elements, or `None` if there are too many.
     pub fn push(&mut self, array: Array, name: &str) -> Option<Range<u32>> {
         let length = array.length()?;
         let begin = u32::try_from(self.elements.len()).ok()?.checked_add(self.first)?;
@@ -128,30 +138,31 @@ impl Arrays {
         Some(begin..end)
     }
 
-    /// Returns how many bytes the elements take at most.
+    /// Returns the estimated memory of the elements, in bytes.
     pub fn bytes(&self) -> usize {
         self.bytes
     }
 
-    /// Returns the number of values of a variable of the FMU.
+    /// Returns the number of values of a variable of the FMU, which is 1 for a scalar.
     pub fn length(&self, reference: u32) -> usize {
         self.by_reference.get(&reference).and_then(|index| self.all[*index].length()).unwrap_or(1)
     }
 
-    /// Returns the index of the array to which an element belongs, and its number in the array.
+    /// Returns the index of the array to which an element belongs, and the number of the element in the array. Returns `None` for a
+    /// scalar.
     #[inline]
     pub fn find(&self, reference: u32) -> Option<(usize, usize)> {
         let (array, number) = self.elements.get(reference.checked_sub(self.first)? as usize)?;
         Some((*array as usize, *number as usize))
     }
 
-    /// Returns whether any of these is an array element.
+    /// Returns whether any of these variables is an array element.
     #[inline]
     pub fn among(&self, references: &[u32]) -> bool {
         !self.elements.is_empty() && references.iter().any(|reference| *reference >= self.first)
     }
 
-    /// Returns these variables with each array element replaced by its array.
+    /// Replaces each array element by its array.
     pub fn expanded(&self, references: &[u32]) -> Expanded {
         let mut expanded = Expanded::default();
         let mut begins = HashMap::new();

@@ -1,4 +1,4 @@
-//! The model description for running or connecting an FMU: array elements are variables.
+//! The model description with array elements as variables, for running and connecting FMUs.
 
 use crate::arrays::{Array, Arrays};
 use crate::index::Index;
@@ -13,20 +13,20 @@ use std::sync::Arc;
 pub struct Variable {
     /// Name.
     pub name: String,
-    /// Value reference; for an array element, a number that is not a value reference of the FMU.
+    /// Value reference. An array element has a number that is not a value reference of the FMU.
     pub reference: u32,
-    /// Start value as written in the file, if given.
+    /// Start value as written in the model description, if there is one.
     pub start: Option<Arc<str>>,
-    /// Name of the continuous state of which this variable is the time derivative, if it is one.
+    /// Name of the continuous state whose time derivative this variable is, if there is one.
     pub derivative_of: Option<String>,
-    /// Further attributes, which the elements of an array share.
+    /// Further attributes, shared by the elements of an array.
     attributes: Arc<Attributes>,
 }
 
 /// Attributes of a [`Variable`], or of all elements of an array.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Attributes {
-    /// Base type; Int32 of FMI 3.0 is Integer, Float64 is Real.
+    /// Base type. Int32 of FMI 3.0 is Integer, and Float64 is Real.
     pub base: BaseType,
     /// `input`, `output`, `parameter` and so on; `local` by default.
     pub causality: String,
@@ -42,14 +42,14 @@ pub struct Attributes {
     pub declared_type: Option<String>,
     /// Display unit of the variable or of its declared type, if given.
     pub display_unit: Option<Arc<str>>,
-    /// For an output: the variables on which it depends without a step. `None` if not given; then it may depend on all inputs
-    /// (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
+    /// For an output, the variables on which it depends directly, that is without a step. `None` if they are not declared; then the
+    /// output may depend on all inputs (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
     pub depends_on: Option<Dependencies>,
     /// Description.
     pub description: String,
 }
 
-/// Elements of an array share their attributes, so a variable reads them as its own fields.
+/// Gives access to the attributes as if they were fields of the variable.
 impl Deref for Variable {
     type Target = Attributes;
 
@@ -58,7 +58,7 @@ impl Deref for Variable {
     }
 }
 
-/// Value references of variables. Elements of an array have consecutive ones.
+/// A set of value references, stored as ranges because the elements of an array have consecutive ones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dependencies(Vec<Range<u32>>);
 
@@ -75,7 +75,7 @@ impl Dependencies {
         Self(ranges)
     }
 
-    /// Returns whether a variable with this value reference is among them.
+    /// Returns whether the set contains this value reference.
     pub fn contains(&self, reference: u32) -> bool {
         let index = self.0.partition_point(|range| range.end <= reference);
         self.0.get(index).is_some_and(|range| range.contains(&reference))
@@ -87,7 +87,7 @@ impl Dependencies {
     }
 }
 
-/// The model description of an FMU, with the variables that running or connecting it needs.
+/// The model description of an FMU, with the variables that can be set, read or connected.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Description {
     written: ModelDescription,
@@ -97,16 +97,16 @@ pub struct Description {
     pub states: usize,
     /// Number of event indicators.
     pub event_indicators: usize,
-    /// Arrays to which variables belong.
+    /// Arrays, whose elements are variables.
     pub(crate) arrays: Arc<Arrays>,
     indices: Index,
-    /// Variables of each variable of the file: one, or the elements of an array.
+    /// For each variable of the file, the range of its `variables`: one, or the elements of an array.
     spans: Vec<Range<usize>>,
-    /// Structural parameters that are set in Configuration Mode.
+    /// Structural parameters to which the caller has given values; they are set in Configuration Mode.
     pub(crate) structure: Vec<Structural>,
 }
 
-/// Value of a structural parameter.
+/// A structural parameter with its value.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Structural {
     pub base: BaseType,
@@ -114,7 +114,7 @@ pub(crate) struct Structural {
     pub value: Value,
 }
 
-/// A description has the fields of the model description as written.
+/// Gives access to the model description as it is written in the file.
 impl Deref for Description {
     type Target = ModelDescription;
 
@@ -127,12 +127,12 @@ impl Description {
     /// Reads a `modelDescription.xml`.
     ///
     /// # Errors
-    /// The message names the fault.
+    /// Returns a message that names the fault.
     pub fn parse(text: &str) -> Result<Self, String> {
         Self::parse_configured(text, Vec::new())
     }
 
-    /// Reads a `modelDescription.xml` with other values of structural parameters.
+    /// Reads a `modelDescription.xml` and replaces the values of structural parameters.
     pub(crate) fn parse_configured(text: &str, structure: Vec<Structural>) -> Result<Self, String> {
         let size = |of: &Structural| match of.value {
             Value::Integer(size) => Some((of.reference, usize::try_from(size).ok()?)),
@@ -189,12 +189,12 @@ impl Description {
         })
     }
 
-    /// Returns the variables of these unknowns, with the elements of arrays.
+    /// Returns the variables of these unknowns: for an array, all of its elements.
     pub fn elements<'a>(&'a self, of: &'a [Unknown]) -> impl Iterator<Item = &'a Variable> {
         of.iter().flat_map(|unknown| &self.variables[self.spans[unknown.variable].clone()])
     }
 
-    /// Returns the reason why a variable of the file is not among the variables.
+    /// Returns the reason why a variable of the file is not in `variables`; `None` if it is, or if it does not exist.
     pub(crate) fn why_missing(&self, name: &str) -> Option<&'static str> {
         let of = self.written.variables.iter().find(|of| of.name == name)?;
         match (of.base, &of.dimensions) {
@@ -211,23 +211,22 @@ impl Description {
         self.indices.find(name, |index| &self.variables[index].name).map(|index| &self.variables[index])
     }
 
-    /// Returns whether directional derivatives with respect to this variable may exist: for inputs,
-    /// parameters and continuous states.
+    /// Returns whether directional derivatives with respect to this variable may exist, which is possible for inputs, parameters and
+    /// continuous states.
     pub(crate) fn is_known(&self, name: &str) -> bool {
         self.variable(name).is_some_and(Variable::is_settable)
             || self.variables.iter().any(|of| of.derivative_of.as_deref() == Some(name))
     }
 
-    /// Returns names and numbers of the items of a variable's enumeration, if it has one.
+    /// Returns the names and numbers of the items of a variable's enumeration, if it has one.
     pub fn items(&self, of: &Variable) -> Option<&[(String, String)]> {
         self.enumerations.get(of.declared_type.as_deref()?).map(Vec::as_slice)
     }
 
-    /// Checks that an output may be connected to an input of this or another FMU: types, units and items must
-    /// be equal.
+    /// Checks that an output may be connected to an input of this or another FMU: types, units and enumeration items must be equal.
     ///
     /// # Errors
-    /// The message names the difference.
+    /// Returns a message that names the difference.
     pub fn connects(&self, output: &Variable, to: &Self, input: &Variable) -> Result<(), String> {
         let [one, other] = [output, input].map(Variable::kind);
         if one != other {
@@ -246,17 +245,17 @@ impl Description {
 }
 
 impl Variable {
-    /// Returns whether a caller may set the variable after the initialization, according to its causality.
+    /// Returns whether the causality permits a caller to set the variable after the initialization.
     pub(crate) fn is_settable(&self) -> bool {
         matches!(self.causality.as_str(), "input" | "parameter" | "structuralParameter")
     }
 
-    /// Returns whether the variable determines the sizes of arrays; it is set in Configuration Mode.
+    /// Returns whether the variable is a structural parameter, which determines the sizes of arrays and is set in Configuration Mode.
     pub(crate) fn is_structural(&self) -> bool {
         self.causality == "structuralParameter"
     }
 
-    /// Returns the kind of its values, for use in a message.
+    /// Returns a noun with article for the type of the variable, for messages.
     pub(crate) fn kind_in_words(&self) -> &'static str {
         match self.kind() {
             "Boolean" => "a Boolean",
@@ -281,8 +280,8 @@ impl Variable {
     }
 }
 
-/// Returns the value references of a variable, or of the elements of an array. `None` for clocks, and for arrays whose size is unknown
-/// or too large.
+/// Adds the elements of an array to `arrays` and returns their value references. Returns one meaningless number for a scalar, and
+/// `None` for a clock or an array whose size is unknown or too large.
 fn elements_of(of: &Declared, arrays: &mut Arrays) -> Option<Range<u32>> {
     let (base, sizes) = (of.base?, of.dimensions.as_ref()?);
     match sizes.is_empty() {
@@ -291,7 +290,7 @@ fn elements_of(of: &Declared, arrays: &mut Arrays) -> Option<Range<u32>> {
     }
 }
 
-/// Adds a variable, or the elements of an array.
+/// Adds a variable, or each element of an array, to `variables`.
 fn spread(of: &Declared, elements: Option<Range<u32>>, arrays: &Arrays, variables: &mut Vec<Variable>) {
     let (Some(base), Some(sizes), Some(elements)) = (of.base, &of.dimensions, elements) else { return };
     let attributes = Arc::new(Attributes {
@@ -317,7 +316,7 @@ fn spread(of: &Declared, elements: Option<Range<u32>>, arrays: &Arrays, variable
         let start = of.start.first().map(|start| Arc::from(&**start));
         return variables.push(variable(of.name.clone(), of.reference, start));
     }
-    // Several arrays may have the same value reference, so the array is found by its elements.
+    // Several arrays may have the same value reference, so the array is identified by its first element.
     let Some((index, _)) = arrays.find(elements.start) else { return };
     let array = &arrays.all()[index];
     variables.extend(elements.enumerate().map(|(number, reference)| {
@@ -325,8 +324,8 @@ fn spread(of: &Declared, elements: Option<Range<u32>>, arrays: &Arrays, variable
     }));
 }
 
-/// Sets the dependencies of outputs and the states of derivatives. `spans` contains the variables of each
-/// variable of the file.
+/// Sets `depends_on` of outputs and `derivative_of` of derivatives. `spans` contains the range in `variables` for each variable of
+/// the file.
 fn relate(written: &ModelDescription, spans: &[Range<usize>], variables: &mut [Variable]) {
     let references = |span: &Range<usize>, variables: &[Variable]| match &variables[span.clone()] {
         [] => None,

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Number of characters of a message at most.
+/// Maximum number of characters of a message.
 const LONGEST: usize = 1000;
 
 /// Error that prevents all runs. The error of a single run is [part of the results](crate::Runs::errors).
@@ -28,6 +28,7 @@ impl Error {
     }
 }
 
+/// Returns an [`Error::Request`].
 pub(crate) fn request<T>(message: String) -> Result<T, Error> {
     Err(Error::Request(message))
 }
@@ -36,7 +37,7 @@ impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Fmu(message) | Self::Request(message) | Self::Memory(message) => {
-                // Messages contain names of the FMU, which may be long, and which a terminal must not obey.
+                // Messages contain names from the FMU, which may be long, or contain control characters that would act on a terminal.
                 f.write_str(&fmi_abi::shown_to(message, LONGEST))
             }
             Self::Cancelled => f.write_str("cancelled"),

@@ -1,19 +1,19 @@
-//! The files of an FMU or a system: unpacked to a temporary directory, or in a directory of the caller.
+//! The files of an FMU or a system, in a temporary directory or in a directory of the caller.
 
 use fmi_abi::files::{Limits, Scratch, read_xml, unpack};
 use fmi_abi::shown;
 use std::path::{Path, PathBuf};
 
-/// Directory with the files.
+/// Directory that contains the files.
 #[derive(Debug)]
 pub(crate) enum Files {
-    /// Removed when dropped.
+    /// A temporary directory, which is removed when dropped.
     Temporary(Scratch),
     /// A directory that the caller has unpacked.
     Own(PathBuf),
 }
 
-/// The file at the top that shows what an archive is.
+/// Kind of archive, recognized by the file in its top directory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Fmu,
@@ -44,10 +44,11 @@ impl Files {
         }
     }
 
-    /// Unpacks a zip file within these limits; takes a directory as it is. The message of an error says what the file is instead.
+    /// Unpacks a zip file within these limits, or uses a directory where it is. If the content is of another kind, the error names
+    /// that kind.
     pub fn open(path: &Path, kind: Kind, limits: &mut Limits) -> Result<Self, String> {
         let files = if path.is_dir() {
-            // The FMU gets absolute paths of its resources.
+            // The path must be absolute, because the FMU gets the path of its resources.
             let path = path.canonicalize().map_err(|error| format!("cannot be opened ({error})"))?;
             Self::Own(path)
         } else {
@@ -70,13 +71,13 @@ impl Files {
         Err(format!("is not {}: the {what} has no {file}", kind.name()))
     }
 
-    /// Returns the content of an XML file at the top.
+    /// Returns the content of an XML file in the top directory.
     pub fn xml(&self, name: &str) -> Result<String, String> {
         read_xml(&self.path().join(name)).map_err(|why| format!("{name} {why}"))
     }
 }
 
-/// Returns a directory at the top that contains the file.
+/// Returns the name of a subdirectory that contains the file.
 fn below(directory: &Path, file: &str) -> Option<String> {
     let directories = std::fs::read_dir(directory).ok()?.flatten();
     directories

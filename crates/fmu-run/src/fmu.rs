@@ -4,7 +4,7 @@ use crate::description::{Description, Structural};
 use crate::error::Error;
 use crate::files::{Files, Kind};
 use crate::library::Library;
-use crate::machine;
+use crate::platform;
 use fmi_abi::description::Offer;
 use fmi_abi::files::Limits;
 use fmi_abi::{Interface, Standard};
@@ -13,7 +13,7 @@ use std::error::Error as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// File with the model description.
+/// Name of the file that contains the model description.
 const DESCRIPTION: &str = "modelDescription.xml";
 
 /// An unpacked and loaded FMU.
@@ -22,16 +22,15 @@ pub(crate) struct Loaded {
     pub description: Arc<Description>,
     files: Arc<Files>,
     co_simulation: Option<Arc<Library>>,
-    /// Library for Model Exchange, or the reason why it cannot be loaded although the library for
-    /// Co-Simulation can.
+    /// Library for Model Exchange. An error is the reason why this library cannot be loaded although the one for Co-Simulation can.
     model_exchange: Result<Option<Arc<Library>>, String>,
 }
 
 impl Loaded {
-    /// Opens an FMU; a zip file is unpacked within these limits.
+    /// Opens an FMU. A zip file is unpacked within these limits.
     ///
     /// # Safety
-    /// The requirement of [`Fmu::open`](crate::Fmu::open); if `execution_tool` is true, the program may be started.
+    /// The requirement of [`Fmu::open`](crate::Fmu::open). If `execution_tool` is true, the FMU may also start another program.
     pub unsafe fn open(path: &Path, execution_tool: bool, limits: &mut Limits) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
         let files = Files::open(path, Kind::Fmu, limits).map_err(fail)?;
@@ -54,7 +53,7 @@ impl Loaded {
         Ok(Self { description: Arc::new(description), files, co_simulation, model_exchange })
     }
 
-    /// Returns the FMU with other values of structural parameters.
+    /// Returns the FMU with these values of structural parameters, which change the sizes of arrays.
     pub fn configured(&self, structure: Vec<Structural>) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", self.description.model_name));
         let description =
@@ -67,7 +66,7 @@ impl Loaded {
         })
     }
 
-    /// Returns whether a process may have only one instance.
+    /// Returns whether a process may create only one instance.
     pub fn once_per_process(&self, interface: Interface) -> bool {
         self.description.offer(interface).is_some_and(|offer| offer.once_per_process)
     }
@@ -111,8 +110,8 @@ unsafe fn load(
     // SAFETY: the caller guarantees that the library is sound.
     let loaded = unsafe { Library::load(&file, standard, resources, Arc::clone(files)) };
     loaded.map(Arc::new).map_err(|error| {
-        // The loader's error names the failed call; its source gives the reason.
-        let why = machine::mismatch(&file).unwrap_or_else(|| match error.source() {
+        // The error names the failed call; its source contains the reason.
+        let why = platform::mismatch(&file).unwrap_or_else(|| match error.source() {
             Some(source) => format!("{error}: {source}"),
             None => error.to_string(),
         });
@@ -120,8 +119,8 @@ unsafe fn load(
     })
 }
 
-/// Returns the directories of `binaries/` that may contain a library for this machine. The names of FMI 2.0
-/// do not contain the processor; many FMUs for ARM use them nevertheless.
+/// Returns the names of the directories in `binaries/` that may contain a library for this platform. The names of FMI 2.0 do not
+/// contain the processor, but many FMUs for ARM use them nevertheless.
 fn directories(standard: Standard) -> Vec<String> {
     let system = if OS == "macos" { "darwin" } else { OS };
     let tuple = format!("{ARCH}-{system}");
@@ -145,7 +144,7 @@ fn library_of(directory: &Path, standard: Standard, offer: &Offer) -> Result<Pat
     {
         return Ok(found);
     }
-    // A tuple of FMI 3.0 may name the ABI, too: x86_64-linux-gnu (section 2.5.1.4.1).
+    // The name of a directory may also contain the ABI, such as x86_64-linux-gnu (section 2.5.1.4.1 of FMI 3.0).
     let with_abi =
         |name: &String| standard == Standard::Fmi3 && name.starts_with(&format!("{}-", directories[0]));
     let mut others: Vec<_> = std::fs::read_dir(&binaries)

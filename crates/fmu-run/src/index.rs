@@ -1,16 +1,16 @@
-//! Finds items by their names without a copy of the names.
+//! A hash table that finds items by name and does not copy the names.
 
 use hashbrown::HashTable;
 use std::hash::{BuildHasher, RandomState};
 
-/// Indices of items by name. Of items with the same name, the last counts.
+/// Indices of items by name. If several items have the same name, the last one is found.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Index {
     hasher: RandomState,
     table: HashTable<u32>,
 }
 
-/// The names determine the index.
+/// All values are equal, because equal names in the same order give the same indices.
 impl PartialEq for Index {
     fn eq(&self, _: &Self) -> bool {
         true
@@ -23,7 +23,7 @@ impl Index {
         let all: Vec<&str> = names.collect();
         let mut table: HashTable<u32> = HashTable::with_capacity(all.len());
         for (index, name) in all.iter().enumerate() {
-            // Value references and therefore variables have 32 bits.
+            // There are fewer than 2^32 variables, because their value references have 32 bits.
             let own = index as u32;
             let hash = |index: &u32| hasher.hash_one(all[*index as usize]);
             let same = |index: &u32| all[*index as usize] == *name;

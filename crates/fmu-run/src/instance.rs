@@ -1,8 +1,7 @@
-//! An instance of a component, where the elements of arrays are variables.
+//! An instance of a component. Array elements are separate variables here.
 
-use crate::arrays::{Arrays, Expanded};
+use crate::arrays::{ArrayStartValues, Arrays, Expanded};
 use crate::description::{Description, Structural};
-use crate::early::EarlyValues;
 use crate::error::{Error, request};
 use crate::fmu::Loaded;
 use crate::library::Library;
@@ -16,16 +15,17 @@ use std::sync::Arc;
 /// An instance, freed when dropped. It keeps its library loaded.
 #[derive(Debug)]
 pub struct Instance {
-    // Freed before the library is unloaded.
+    // First field, so that it is dropped before the library is unloaded.
     pub(crate) client: fmi_client::Instance,
     _library: Arc<Library>,
     description: Arc<Description>,
     pub(crate) arrays: Arc<Arrays>,
-    /// Values of arrays set before the initialization, when they cannot be read; `None` after its start.
-    pub(crate) early: Option<EarlyValues>,
+    /// Values of arrays that were set before Initialization Mode, because they cannot be read then; `None` from Initialization Mode
+    /// on.
+    pub(crate) array_starts: Option<ArrayStartValues>,
 }
 
-/// Times of an experiment, s, and its relative tolerance, for the FMU.
+/// Times, s, and relative tolerance of an experiment, which are passed to the FMU.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Experiment {
     pub start_time: f64,
@@ -39,14 +39,14 @@ pub enum Tolerance {
     /// The tolerance of the default experiment in the model description, if there is one.
     #[default]
     Default,
-    /// None: the FMU chooses.
+    /// No tolerance: the FMU chooses.
     None,
     /// This tolerance, above 0.
     Value(f64),
 }
 
 impl Tolerance {
-    /// Fails unless a given tolerance is above 0 and finite.
+    /// Fails if a tolerance is given that is not above 0 and finite.
     pub(crate) fn check(self) -> Result<(), Error> {
         match self {
             Self::Value(value) if !(value > 0.0 && value.is_finite()) => {
@@ -56,7 +56,7 @@ impl Tolerance {
         }
     }
 
-    /// Returns the tolerance for an FMU.
+    /// Returns the tolerance that is passed to an FMU with this model description.
     pub(crate) fn of(self, description: &ModelDescription) -> Option<f64> {
         match self {
             Self::Default => description.default_tolerance,
@@ -67,8 +67,8 @@ impl Tolerance {
 }
 
 impl Instance {
-    /// Creates an instance for an interface type. The error contains the reason, and whether the FMU gave none.
-    /// The instance has the name of its component.
+    /// Creates an instance for an interface type, with the name of its component. The error contains the reason, and whether the FMU
+    /// logged no message.
     pub(crate) fn new(
         fmu: &Loaded,
         (index, component): (usize, &str),
@@ -93,9 +93,9 @@ impl Instance {
             let prefix = if component.is_empty() { String::new() } else { format!("{component}: ") };
             (prefix + &why, rejection.is_silent())
         })?;
-        let (description, early) = (Arc::clone(&fmu.description), Some(EarlyValues::default()));
+        let (description, array_starts) = (Arc::clone(&fmu.description), Some(ArrayStartValues::default()));
         let arrays = Arc::clone(&description.arrays);
-        let mut instance = Self { client, _library: Arc::clone(library), description, arrays, early };
+        let mut instance = Self { client, _library: Arc::clone(library), description, arrays, array_starts };
         instance.configure().map_err(|rejection| (rejection.to_string(), rejection.is_silent()))?;
         Ok(instance)
     }
@@ -119,11 +119,11 @@ impl Instance {
         tolerance: Option<f64>,
     ) -> Result<(), Rejection> {
         self.client.enter_initialization_mode(start_time, stop_time, tolerance)?;
-        self.early = None;
+        self.array_starts = None;
         Ok(())
     }
 
-    /// Gets time derivatives of outputs, of order 1.
+    /// Reads the first time derivatives of outputs.
     pub(crate) fn get_output_derivatives(&mut self, vr: &[u32], values: &mut [f64]) -> Result<(), Rejection> {
         assert_eq!(vr.len(), values.len());
         let Expanded { references, count, indices, .. } = self.arrays.expanded(vr);
@@ -146,7 +146,7 @@ impl Instance {
             return self.client.directional_derivative(unknowns, knowns, seed, result);
         }
         let (unknowns, knowns) = (self.arrays.expanded(unknowns), self.arrays.expanded(knowns));
-        // The seed of all other elements is 0.
+        // Elements that are not among the knowns have the seed 0.
         let (mut seeds, mut results) = (vec![0.0; knowns.count], vec![0.0; unknowns.count]);
         knowns.indices.iter().zip(seed).for_each(|(index, seed)| seeds[*index] += seed);
         let references = (&unknowns.references, &knowns.references);
@@ -157,12 +157,12 @@ impl Instance {
 
     pub(crate) fn reset(&mut self) -> Result<(), Rejection> {
         self.client.reset()?;
-        self.early = Some(EarlyValues::default());
+        self.array_starts = Some(ArrayStartValues::default());
         self.configure()
     }
 }
 
-/// All other functions come from the instance of fmi-client.
+/// All other functions are called on the instance of fmi-client.
 impl Deref for Instance {
     type Target = fmi_client::Instance;
 

@@ -2,31 +2,30 @@
 //!
 //! ## Structure of the crate
 //!
-//! [`Fmu`] is an unpacked and loaded FMU of FMI 2.0 or 3.0. A [`Batch`] runs it many times on all processors;
-//! [`Instances`] are stateful and controlled by the caller. `continuous` integrates runs in Model Exchange. `description` makes array
-//! elements variables, `instance` and `values` call their functions through `fmi-client`. A caller needs `unsafe` only to
-//! [open](Fmu::open) an FMU.
+//! [`Fmu`] is an unpacked and loaded FMU of FMI 2.0 or 3.0. A [`Batch`] runs it many times on all processors; [`Instances`] are
+//! stateful and controlled by the caller. The module `continuous` integrates runs in Model Exchange. In `description`, array elements
+//! are variables, which `instance` and `values` read and set through `fmi-client`. A caller needs `unsafe` only to [open](Fmu::open)
+//! an FMU.
 
 mod arrays;
 mod batch;
 mod continuous;
 mod description;
-mod early;
 mod error;
 mod files;
 mod fmu;
-mod found;
 mod index;
 mod instance;
 mod instances;
-mod kept;
 mod library;
-mod machine;
+mod lookup;
 mod messages;
-mod running;
+mod platform;
+mod pool;
 mod selection;
 mod start;
 mod system;
+mod system_instance;
 mod threads;
 mod values;
 

@@ -1,4 +1,4 @@
-//! The shared library of an FMU with its files.
+//! The shared library of an FMU, which keeps the files of the FMU while it is loaded.
 
 use crate::files::Files;
 use fmi_abi::Standard;
@@ -10,9 +10,9 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub(crate) struct Library {
     pub client: Arc<fmi_client::Library>,
-    /// Location of its resources, as importers write it.
+    /// Location of the resources, as it is passed to the FMU.
     pub resources: CString,
-    // Removed after the library is unloaded.
+    // Last field, so that the files are removed after the library is unloaded.
     _files: Arc<Files>,
 }
 

@@ -1,4 +1,4 @@
-//! Messages of FMUs for callers that want them all.
+//! Collects the messages of FMUs for callers that request all of them.
 
 use fmi_client::{LogListener, Message};
 use std::collections::HashMap;
@@ -12,18 +12,18 @@ pub struct Logged {
     pub index: Option<usize>,
     /// Name of the component in a system; empty for a single FMU.
     pub component: String,
-    /// Communication point at or after which the message came, s, in runs.
+    /// In runs, the time of the last communication point or solver step before the message, s.
     pub time: Option<f64>,
     /// The message.
     pub message: Message,
 }
 
-/// Collects the messages of all instances of a system. Each component of an instance has a number, so that one callback can
-/// find out which of them logs: the index of the instance times the number of components, plus the index of the component.
+/// Collects the messages of all instances of a system. Each component of each instance has a number, because all of them share one
+/// callback: index of the instance * number of components + index of the component.
 #[derive(Debug)]
 pub(crate) struct Feed {
     components: Vec<String>,
-    /// Index and time of the run that an instance performs, by the number of the instance.
+    /// Index and time, s, of the run that an instance performs, by the number of the instance.
     runs: Mutex<HashMap<usize, (usize, f64)>>,
     logged: Mutex<Vec<Logged>>,
 }
@@ -33,12 +33,12 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Feed {
-    /// Creates a collector for a system of components with these names.
+    /// Creates a collector for a system whose components have these names.
     pub fn of(components: Vec<String>) -> Arc<Self> {
         Arc::new(Self { components, runs: Mutex::default(), logged: Mutex::default() })
     }
 
-    /// Records the run that an instance performs and its time, which later messages get.
+    /// Records the run that an instance performs and its time, s. Later messages of the instance are labelled with both.
     pub fn at(&self, instance: usize, run: usize, time: f64) {
         lock(&self.runs).insert(instance, (run, time));
     }
@@ -65,10 +65,10 @@ impl LogListener for Feed {
     }
 }
 
-/// How the messages of an instance are treated.
+/// Logging settings of an instance.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Logging {
-    /// Whether the FMU logs more.
+    /// Whether debug logging is on (`loggingOn`).
     pub on: bool,
     /// Receiver of all messages, and the number of the instance.
     pub feed: Option<(Arc<Feed>, usize)>,

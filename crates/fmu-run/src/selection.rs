@@ -1,21 +1,21 @@
 //! Groups of variables that are set or read together.
 
 use crate::error::{Error, request};
-use crate::found::Found;
 use crate::instance::Instance;
+use crate::lookup::Found;
 use fmi_abi::BaseType;
 use fmi_client::Rejection;
 use std::collections::HashMap;
 
-/// Numeric variables, looked up once by name. A row of values has one value for each, in this order; 0 and 1
-/// represent Booleans.
+/// Numeric variables that have been looked up by name. A row of values has one value for each, in the order of the names. Booleans
+/// are 0 or 1.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selection {
     names: Vec<String>,
     groups: Vec<Group>,
-    /// Whether all are Real variables of one component, so that a row is passed to the FMU unchanged.
+    /// Whether all variables are Real and belong to one component, so that a row is passed to the FMU unchanged.
     is_direct: bool,
-    /// Reason why a caller cannot set them, if one is read-only or fed by an output.
+    /// Reason why a caller cannot set the variables, if one of them is read-only or connected to an output.
     read_only: Option<String>,
 }
 
@@ -29,7 +29,7 @@ struct Group {
     indices: Vec<usize>,
 }
 
-/// Target of a value: component, type and value reference.
+/// Identifies a variable: component, type and value reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Target {
     pub component: usize,
@@ -67,7 +67,8 @@ impl Selection {
         });
     }
 
-    /// Adds a name and all variables that it denotes; `known` contains the indices of the groups.
+    /// Adds a name and all variables that it denotes. `known` maps component and type to the index of a group, which is faster than a
+    /// search if there are many groups.
     pub(crate) fn push_to(
         &mut self,
         known: &mut HashMap<(usize, BaseType), usize>,
@@ -77,7 +78,8 @@ impl Selection {
         self.push_with(name, found, |groups, of_type| *known.entry(of_type).or_insert(groups.len()));
     }
 
-    /// Adds a name; `index_of` returns the index of the group of a component and a type, or the number of groups if it is new.
+    /// Adds a name. `index_of` returns the index of the group for a component and a type, or the number of groups if there is no such
+    /// group.
     fn push_with(
         &mut self,
         name: &str,
@@ -102,7 +104,7 @@ impl Selection {
         self.is_direct = group.base == BaseType::Real && group.indices.len() == self.names.len();
     }
 
-    /// Returns the value references, if all are Real variables of one component.
+    /// Returns the value references, if all variables are Real and belong to one component.
     pub(crate) fn references(&self) -> Option<&[u32]> {
         match self.groups.first() {
             None => Some(&[]),
@@ -120,7 +122,7 @@ impl Selection {
         })
     }
 
-    /// Fails if a caller may not set the variables to the values of these rows.
+    /// Fails if a caller may not set the variables, or not to the values of these rows.
     #[inline]
     pub(crate) fn check(&self, values: &[f64]) -> Result<(), Error> {
         if self.is_direct && self.read_only.is_none() { Ok(()) } else { self.check_each(values) }
@@ -140,7 +142,7 @@ impl Selection {
         Ok(())
     }
 
-    /// Reads the values into a row, using a buffer.
+    /// Reads the values into a row. `buffer` saves allocations.
     #[inline(always)]
     pub(crate) fn get(
         &self,
@@ -163,9 +165,9 @@ impl Selection {
         Ok(())
     }
 
-    /// Fails if an integer of 64 bits may have been rounded.
+    /// Fails if an integer of 64 bits is so large that it may have been rounded.
     fn check_rounding(&self, indices: &[usize], values: &[f64]) -> Result<(), Rejection> {
-        /// Integers up to this magnitude are exact.
+        /// Integers below this magnitude are exact in `f64`.
         const EXACT: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;
         match indices.iter().zip(values).find(|(_, value)| value.abs() >= EXACT) {
             None => Ok(()),
@@ -179,7 +181,7 @@ impl Selection {
         }
     }
 
-    /// Sets the values of a row, using a buffer.
+    /// Sets the variables to the values of a row. `buffer` saves allocations.
     #[inline(always)]
     pub(crate) fn set(
         &self,
@@ -200,7 +202,7 @@ impl Selection {
     }
 }
 
-/// Checks that integers and Booleans can have these values. The FMU checks the values of Reals.
+/// Checks that integers and Booleans can have these values. Values of Reals are left to the FMU.
 pub(crate) fn fits(name: &str, base: BaseType, values: &[f64]) -> Result<(), Error> {
     let (low, high) = match base {
         BaseType::Boolean => (0.0, 1.0),
@@ -210,7 +212,7 @@ pub(crate) fn fits(name: &str, base: BaseType, values: &[f64]) -> Result<(), Err
             None => return Ok(()),
         },
     };
-    // The upper limits of 64 bits are rounded up.
+    // The upper limits of 64-bit integers are rounded up to powers of two, which are out of range.
     let fits = |value: f64| (low..=high).contains(&value) && !(high > 1e15 && value == high);
     match values.iter().find(|value| value.fract() != 0.0 || !fits(**value)) {
         None => Ok(()),

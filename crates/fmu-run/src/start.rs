@@ -1,14 +1,14 @@
-//! Start values: from names to value references.
+//! Start values: looks up names, and checks and converts values.
 
 use crate::error::{Error, request};
-use crate::found::{Found, is_exact};
+use crate::lookup::{Found, is_exact};
 use crate::selection::{Target, fits};
 use crate::system::{StartValue, System};
 use fmi_abi::{BaseType, Value};
 use std::borrow::Cow;
 
-/// Start value of a variable. A string is a value of a string variable, an item of an enumeration, or `true`
-/// or `false` for a Boolean.
+/// Start value of a variable. A string is the value of a string variable, the name of an item of an enumeration, or `true` or `false`
+/// for a Boolean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start<'a> {
     /// One number for all runs or instances; 0 or 1 for a Boolean.
@@ -19,14 +19,14 @@ pub enum Start<'a> {
     Text(&'a str),
     /// A string for each run or instance.
     EachText(&'a [String]),
-    /// An exact value, for all types: integers of 64 bits, bytes.
+    /// One exact value for all runs or instances. It can have any type: also integers of 64 bits, and bytes.
     Value(&'a Value),
     /// An exact value for each run or instance.
     EachValue(&'a [Value]),
 }
 
 impl Start<'_> {
-    /// Returns the number of runs or instances, if the value is given for each.
+    /// Returns the number of runs or instances for which there are separate values; `None` if one value is for all.
     pub(crate) fn count(&self) -> Option<usize> {
         match self {
             Self::Same(_) | Self::Text(_) | Self::Value(_) => None,
@@ -41,12 +41,12 @@ impl Start<'_> {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct StartValues<'a> {
     numbers: Vec<(Target, Cow<'a, [f64]>)>,
-    /// Values of types that numbers do not have: strings, bytes, integers of 64 bits.
+    /// Values that `f64` cannot represent: strings, bytes, integers of 64 bits.
     values: Vec<(Target, Vec<Value>)>,
 }
 
 impl<'a> StartValues<'a> {
-    /// Returns the start values of the system, replaced by the given values.
+    /// Returns the start values of the system, some of which are replaced by the given values.
     pub fn of(system: &System, given: &[(&str, Start<'a>)]) -> Result<Self, Error> {
         let mut all = Self::default();
         for (name, value) in system.start() {
@@ -60,7 +60,7 @@ impl<'a> StartValues<'a> {
         Ok(all)
     }
 
-    /// Returns the given start values; each variable may occur only once.
+    /// Checks the given start values. Each variable may occur only once.
     pub fn given(system: &System, given: &[(&str, Start<'a>)]) -> Result<Self, Error> {
         let mut all = Self::default();
         for (index, (name, start)) in given.iter().enumerate() {
@@ -83,18 +83,18 @@ impl<'a> StartValues<'a> {
         self.values.extend(new.values);
     }
 
-    /// Returns the numbers of a run or an instance.
+    /// Returns the numbers of a run or an instance, by its index.
     pub fn numbers(&self, of: usize) -> impl Iterator<Item = (Target, f64)> {
         self.numbers.iter().filter_map(move |(index, values)| Some((*index, *one(values, of)?)))
     }
 
-    /// Returns the variables.
+    /// Returns the variables that have start values.
     pub fn targets(&self) -> impl Iterator<Item = Target> {
         let values = self.values.iter().map(|(index, _)| *index);
         self.numbers.iter().map(|(index, _)| *index).chain(values)
     }
 
-    /// Returns the strings, bytes and integers of 64 bits of a run or an instance.
+    /// Returns the strings, bytes and integers of 64 bits of a run or an instance, by its index.
     pub fn values(&self, of: usize) -> impl Iterator<Item = (Target, &Value)> {
         self.values.iter().filter_map(move |(index, values)| Some((*index, one(values, of)?)))
     }
@@ -105,12 +105,13 @@ impl<'a> StartValues<'a> {
             && self.values.iter().all(|(_, values)| values.len() == 1)
     }
 
-    /// Copies borrowed values.
+    /// Copies borrowed values, to remove the lifetime.
     pub fn into_owned(self) -> StartValues<'static> {
         let own = |(index, numbers): (_, Cow<[f64]>)| (index, Cow::Owned(numbers.into_owned()));
         StartValues { numbers: self.numbers.into_iter().map(own).collect(), values: self.values }
     }
 
+    /// Looks up a name and converts its start value to the types of its variables.
     fn found(system: &System, name: &str, start: Start<'a>) -> Result<Self, Error> {
         let mut all = Self::default();
         for found in system.find_startable(name)? {
@@ -149,7 +150,7 @@ impl<'a> StartValues<'a> {
     }
 }
 
-/// Converts a value to the type of a variable for which [`is_exact`] holds.
+/// Checks and converts a value for a variable of a type for which [`is_exact`] holds.
 pub(crate) fn exact(found: Found, name: &str, value: Value) -> Result<Value, Error> {
     /// Integers up to this magnitude are exact in `f64`.
     const EXACT: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;
@@ -192,12 +193,12 @@ pub(crate) fn exact(found: Found, name: &str, value: Value) -> Result<Value, Err
     Ok(value)
 }
 
-/// Returns the number of an exact value, for a variable of numbers.
+/// Converts an exact value to `f64`, for a variable whose type is a number.
 fn number_in(found: Found, name: &str, value: &Value) -> Result<f64, Error> {
     found.check_number(name)?;
     match value {
         Value::Real(number) => Ok(*number),
-        // Types of fewer bits reject the numbers that are rounded here.
+        // Integers that are rounded here are out of range for the variable, so they are rejected later.
         Value::Integer(number) => Ok(*number as f64),
         Value::Boolean(boolean) => Ok(f64::from(u8::from(*boolean))),
         Value::String(_) | Value::Binary(_) => {
@@ -206,11 +207,12 @@ fn number_in(found: Found, name: &str, value: &Value) -> Result<f64, Error> {
     }
 }
 
+/// Returns the value with this index, or the only value.
 fn one<T>(values: &[T], of: usize) -> Option<&T> {
     if values.len() == 1 { values.first() } else { values.get(of) }
 }
 
-/// Returns the number for a string, for a variable that is not a string.
+/// Converts a string to the number of a Boolean or of an item of an enumeration.
 fn number_of(found: Found, name: &str, text: &str) -> Result<f64, Error> {
     if found.variable.base == BaseType::Boolean
         && let Ok(boolean) = text.parse::<bool>()

@@ -1,14 +1,14 @@
-//! Threads that wait for work between calls.
+//! Threads that are kept between calls.
 
 use crate::error::Error;
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Arc, Once};
 use std::time::{Duration, Instant};
 
-/// Number of forks from the first process with this library to this process.
+/// Number of forks between the first process that loaded this library and this process.
 static FORKS: AtomicU32 = AtomicU32::new(0);
 
-/// Identifies this process: the number is another one in a process that was forked from it.
+/// Returns a number that identifies this process. A forked process gets another number.
 pub fn process() -> u32 {
     static COUNTING: Once = Once::new();
     COUNTING.call_once(count_forks);
@@ -20,8 +20,7 @@ fn count_forks() {
     extern "C" fn forked() {
         FORKS.fetch_add(1, Ordering::Relaxed);
     }
-    // SAFETY: the function is called in a forked process; it only changes an atomic number, so that it is
-    // async-signal-safe.
+    // SAFETY: the function is called in the forked process. It only changes an atomic number, so it is async-signal-safe.
     unsafe {
         libc::pthread_atfork(None, None, Some(forked));
     }
@@ -30,12 +29,11 @@ fn count_forks() {
 #[cfg(not(unix))]
 fn count_forks() {}
 
-/// A pool of threads of this process. A forked process has the object but not its threads, so that work for
-/// them would never end.
+/// A pool of threads. A forked process has the object but not the threads, so work for them would never be done there.
 #[derive(Debug)]
 pub(crate) struct Threads {
     process: u32,
-    /// Number of threads that look for work without sleeping.
+    /// Number of threads that poll for work.
     awake: Arc<AtomicUsize>,
     /// `None` only while dropping.
     pool: Option<rayon::ThreadPool>,
@@ -57,10 +55,10 @@ impl Threads {
         self.pool().current_num_threads()
     }
 
-    /// Time for which threads look for work before they sleep. Waking a thread takes about as long.
+    /// Time for which threads poll for work before they sleep. Waking a thread takes about as long.
     const AWAKE: Duration = Duration::from_micros(50);
 
-    /// Calls `own` in this thread and each of the others in another thread. Returns when all are done.
+    /// Calls `own` in this thread and each of the other functions in another thread. Returns when all calls have returned.
     pub fn share<'s>(&'s self, own: impl FnOnce(), others: impl Iterator<Item = impl FnOnce() + Send + 's>) {
         let running = AtomicUsize::new(0);
         self.pool().in_place_scope(|scope| {
@@ -74,7 +72,7 @@ impl Threads {
             }
             self.stay_awake();
             own();
-            // The end of the scope would sleep if a thread needs a little longer.
+            // Polls for a short time, because this thread sleeps at the end of the scope if another one still works.
             let begin = Instant::now();
             while running.load(Ordering::Acquire) > 0 && begin.elapsed() < Self::AWAKE {
                 std::thread::yield_now();
@@ -82,7 +80,7 @@ impl Threads {
         });
     }
 
-    /// Lets the threads look for the work of a call that follows soon.
+    /// Makes the threads poll for the work of a call that may follow soon.
     fn stay_awake(&self) {
         if self.awake.load(Ordering::Relaxed) > 0 {
             return;
@@ -108,7 +106,7 @@ impl Threads {
 
 impl Drop for Threads {
     fn drop(&mut self) {
-        // After a fork, its locks may be held by threads that do not exist.
+        // After a fork, the pool is leaked: its locks may be held by threads that do not exist in this process.
         if !self.are_here() {
             std::mem::forget(self.pool.take());
         }

@@ -1,4 +1,4 @@
-//! Values of variables, where the elements of an array are variables; an array of the FMU is read or set with one call.
+//! Reads and sets variables, including array elements. All elements of an array are read or set with one call of the FMU.
 
 use crate::arrays::Expanded;
 use crate::instance::Instance;
@@ -7,7 +7,7 @@ use fmi_client::Rejection;
 use std::sync::Arc;
 
 impl Instance {
-    /// Sets numeric variables of one type; 0 or 1 for a Boolean.
+    /// Sets numeric variables of one type. Booleans are 0 or 1.
     #[inline]
     pub(crate) fn set_numbers(
         &mut self,
@@ -22,7 +22,7 @@ impl Instance {
         self.client.set_numbers(base, vr, values)
     }
 
-    /// Reads numeric variables of one type; 0 or 1 for a Boolean.
+    /// Reads numeric variables of one type. Booleans are 0 or 1.
     #[inline]
     pub(crate) fn get_numbers(
         &mut self,
@@ -46,14 +46,14 @@ impl Instance {
         Ok(())
     }
 
-    /// Sets variables of which some are array elements; the other elements of the arrays keep their values.
+    /// Sets variables, some of which are array elements. All other elements of the arrays keep their values.
     #[cold]
     fn set_elements(&mut self, base: BaseType, vr: &[u32], values: &[f64]) -> Result<(), Rejection> {
         let expanded = self.arrays.expanded(vr);
         let mut all = vec![0.0; expanded.count];
-        if self.early.is_some() {
+        if self.array_starts.is_some() {
             for (array, begin) in &expanded.arrays {
-                let known = self.early_numbers(*array);
+                let known = self.start_numbers(*array);
                 all[*begin..][..known.len()].copy_from_slice(&known);
             }
         } else if !expanded.is_complete() {
@@ -61,19 +61,18 @@ impl Instance {
         }
         expanded.indices.iter().zip(values).for_each(|(index, value)| all[*index] = *value);
         self.client.set_numbers(base, &expanded.references, &all)?;
-        if let Some(early) = &mut self.early {
+        if let Some(starts) = &mut self.array_starts {
             for (array, begin) in expanded.arrays {
                 let length = self.arrays.length(self.arrays.all()[array].reference);
-                early.numbers.insert(array, all[begin..][..length].to_vec());
+                starts.numbers.insert(array, all[begin..][..length].to_vec());
             }
         }
         Ok(())
     }
 
-    /// Returns the values of an array before the initialization: the values that were set, or the start
-    /// values.
-    fn early_numbers(&self, array: usize) -> Vec<f64> {
-        if let Some(known) = self.early.as_ref().and_then(|early| early.numbers.get(&array)) {
+    /// Returns the values of an array before Initialization Mode: those that were set, or the start values.
+    fn start_numbers(&self, array: usize) -> Vec<f64> {
+        if let Some(known) = self.array_starts.as_ref().and_then(|starts| starts.numbers.get(&array)) {
             return known.clone();
         }
         let array = &self.arrays.all()[array];
@@ -84,7 +83,7 @@ impl Instance {
         (0..self.arrays.length(array.reference)).map(number).collect()
     }
 
-    /// Sets variables of one type to exact values; the other elements of arrays keep theirs.
+    /// Sets variables of one type to exact values. All other elements of arrays keep their values.
     pub(crate) fn set_values(
         &mut self,
         base: BaseType,
@@ -97,9 +96,9 @@ impl Instance {
         }
         let expanded = self.arrays.expanded(vr);
         let mut all = vec![Value::Integer(0); expanded.count];
-        if self.early.is_some() {
+        if self.array_starts.is_some() {
             for (array, begin) in &expanded.arrays {
-                let known = self.early_values(*array);
+                let known = self.start_values(*array);
                 all[*begin..][..known.len()].clone_from_slice(&known);
             }
         } else if !expanded.is_complete() {
@@ -107,10 +106,10 @@ impl Instance {
         }
         expanded.indices.iter().zip(values).for_each(|(index, value)| all[*index].clone_from(value));
         self.client.set_values(base, &expanded.references, &all)?;
-        if let Some(early) = &mut self.early {
+        if let Some(starts) = &mut self.array_starts {
             for (array, begin) in expanded.arrays {
                 let length = self.arrays.length(self.arrays.all()[array].reference);
-                early.values.insert(array, all[begin..][..length].to_vec());
+                starts.values.insert(array, all[begin..][..length].to_vec());
             }
         }
         Ok(())
@@ -126,9 +125,9 @@ impl Instance {
         Ok(indices.iter().map(|index| all[*index].clone()).collect())
     }
 
-    /// Returns the exact values of an array before the initialization.
-    fn early_values(&self, array: usize) -> Vec<Value> {
-        if let Some(known) = self.early.as_ref().and_then(|early| early.values.get(&array)) {
+    /// Returns the exact values of an array before Initialization Mode: those that were set, or the start values.
+    fn start_values(&self, array: usize) -> Vec<Value> {
+        if let Some(known) = self.array_starts.as_ref().and_then(|starts| starts.values.get(&array)) {
             return known.clone();
         }
         let arrays = Arc::clone(&self.arrays);

@@ -1,4 +1,4 @@
-"""Gymnasium's environments of any FMU: one (`Env`), or thousands in parallel (`VectorEnv`), both of one `Task`::
+"""Gymnasium environments for any FMU: one instance (`Env`), or thousands in parallel (`VectorEnv`), both with the same `Task`::
 
     task = Task(fmu="model.fmu", actions={"u": (-1, 1)}, observations=("y",), step=0.01, length=500,
                 reward=lambda before, action, after: -abs(after[:, 0]), failed_reward=-500.0)
@@ -34,37 +34,40 @@ _Info = dict[str, Any]
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """A learning task on an FMU. Its functions take and return arrays with a row for each of n instances.
+    """A learning task for an FMU. Its functions take and return arrays that have a row for each of n instances.
 
     Parameters
     ----------
     fmu
-        The path of the FMU, or of an SSP with a system of FMUs, or an open one. Only with a path can the task
-        be registered or passed to another process.
+        The path of an FMU or of an SSP with a system of FMUs, or an open `Fmu` or `System`. The task can be registered or passed to
+        another process only if it has a path.
     actions
-        Inputs by name with their (low, high), or only names; bounds are then taken from the model description, if any.
+        Inputs by name with their bounds (low, high), or only names. In the latter case the bounds are `min` and `max` of the model
+        description, or infinite if it has none.
     observations
-        The numeric variables that are observed after each step, in the same forms.
+        Numeric variables that are observed after each step, in the same forms.
     reward
-        (observation before, action, observation after) -> (n,)
+        Function (observation before, action, observation after) -> (n,).
     step
         The time between actions, s.
     length
         Number of steps after which an episode is truncated.
     terminated
-        As `reward` -> (n,) of bool: whether the episode terminates.
-    inputs, to_inputs
-        If actions are not inputs: names of the inputs, and (actions, previous inputs (n, inputs)) -> (n, inputs).
-        Actions may then have any names.
+        Function with the arguments of `reward` -> (n,) of bool: whether the episode terminates.
+    inputs
+        Names of the inputs, if the actions are not inputs. Actions may then have any names.
+    to_inputs
+        Function that converts actions to inputs: (actions, previous inputs (n, inputs)) -> (n, inputs).
     start
-        Start values for all episodes: numbers or strings.
+        Start values for all episodes, by name: numbers or strings.
     drawn
-        Start values that are drawn for each episode: (low, high), or (generator, count) -> (count,).
+        Start values that are drawn for each episode, by name: uniformly from (low, high), or by a function (generator, count) ->
+        (count,).
     failed_reward
-        The reward for a step that the FMU rejects, which also ends the episode. It should be worse than anything that the rest of
-        the episode can cost, or the agent learns to provoke failures.
+        The reward for a step that the FMU rejects, which also ends the episode. It should be worse than anything that the rest of the
+        episode can cost; otherwise the agent learns to provoke failures.
     threads
-        See `Fmu.instances`.
+        Number of threads, as in `Fmu.instances`.
     """
 
     fmu: str | os.PathLike[str] | fmu_run.Fmu | fmu_run.System
@@ -87,8 +90,8 @@ class Task:
 class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
     """Instances of one FMU that run episodes in parallel.
 
-    If the FMU rejects a call of an instance, or an observation is not finite, the episode of the instance terminates: the
-    last observation is repeated, and `infos["error"]` contains the message. Other instances continue.
+    If the FMU rejects a call of an instance, or if an observation is not finite, the episode of the instance terminates: the last
+    observation is repeated, and `infos["error"]` contains the message. All other instances continue.
 
     Parameters
     ----------
@@ -97,16 +100,16 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
     num_envs
         Number of instances.
     autoreset_mode
-        When a new episode replaces a finished one: NEXT_STEP, in the next step, whose action is ignored and whose reward
-        is 0; SAME_STEP, in the same step, with `infos["final_obs"]` and `infos["final_info"]`; DISABLED, by
-        `reset(options={"reset_mask": ...})`.
+        When a new episode replaces a finished one. NEXT_STEP: in the next step, whose action is ignored and whose reward is 0.
+        SAME_STEP: in the same step, which also returns `infos["final_obs"]` and `infos["final_info"]`. DISABLED: only when the caller
+        calls `reset(options={"reset_mask": ...})`.
 
     Raises
     ------
     ValueError
         For invalid arguments.
     fmu_run.FmuError
-        If the FMU cannot be loaded, or rejects the start values; from `reset` and `step`, if it rejects drawn start values.
+        If the FMU cannot be loaded or rejects the start values. `reset` and `step` raise it if the FMU rejects drawn start values.
     """
 
     _own: fmu_run.Fmu | fmu_run.System | None = None
@@ -139,14 +142,14 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         self.single_action_space, self.single_observation_space = _box(actions), _box(observations)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        #: (num_envs,): the steps of each since its episode began.
+        #: (num_envs,): number of steps of each instance since its episode began.
         self.steps = np.zeros(num_envs, dtype=np.int64)
         self._drawn = {name: np.empty(num_envs) for name in task.drawn}
         self._over: _Bools = np.zeros(num_envs, dtype=bool)
         self._observation: _Array | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[_Array, _Info]:
-        """Begin new episodes: all, or those of `options["reset_mask"]`, (num_envs,) of bool.
+        """Begin new episodes of all instances, or of those in `options["reset_mask"]`, (num_envs,) of bool.
 
         Returns
         -------
@@ -163,12 +166,12 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         return self._observation.copy(), {}
 
     def step(self, actions: ArrayLike) -> tuple[_Array, _Array, _Bools, _Bools, _Info]:
-        """Take a step with all instances.
+        """Perform a step of all instances.
 
         Parameters
         ----------
         actions
-            (num_envs, actions)
+            (num_envs, actions): an action for each instance.
 
         Returns
         -------
@@ -214,7 +217,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
             self._own.close()
 
     def _advance(self, actions: _Array, before: _Array) -> tuple[_Array, dict[int, str]]:
-        """The observations after a step, and messages of failed instances."""
+        """Perform a step. Return the observations after it, and the messages of failed instances by index."""
         after, values = np.full_like(before, np.nan), actions
         if self.task.to_inputs is not None:
             values = np.asarray(self.task.to_inputs(actions, self._instances.get(self._inputs)), dtype=np.float64)
@@ -233,7 +236,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         return after, {index: why.get(index, "an observation is not a finite number") for index in indices}
 
     def _begin(self, which: _Bools, observation: _Array) -> None:
-        """New episodes for some instances, and their observations."""
+        """Begin new episodes of the selected instances, and write their first observations to `observation`."""
         for name, how in self.task.drawn.items():
             count = int(which.sum())
             self._drawn[name][which] = (
@@ -279,7 +282,7 @@ class Env(gymnasium.Env[_Array, _Array]):
         return observation[0], {}
 
     def step(self, action: ArrayLike) -> tuple[_Array, SupportsFloat, bool, bool, _Info]:
-        """Take a step; `info["error"]` contains the message if the FMU rejects it."""
+        """Perform a step. If the FMU rejects it, `info["error"]` contains the message."""
         observation, reward, terminated, truncated, info = self._one.step(np.asarray(action)[None])
         details = {name: values[0] for name, values in info.items() if not name.startswith("_")}
         return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), details

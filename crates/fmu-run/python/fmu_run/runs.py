@@ -1,4 +1,4 @@
-"""Results of runs."""
+"""Results of runs: `Runs` and `Event`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import xarray
 
 _Array = NDArray[np.float64]
-#: Ending of the name of a start value whose variable is an output, too.
+#: Suffix of the name of a start value in tables where its variable is also an output.
 AT_START = " at start"
 
 
@@ -28,11 +28,14 @@ class Event(NamedTuple):
     Parameters
     ----------
     run
-        The index of the run.
+        Index of the run.
     time
-        s.
-    before, after
-        Outputs before and after the event, by name; the elements of an array by their names, such as y[1].
+        Time of the event, s.
+    before
+        Values of the numeric outputs just before the event, by name, in the units of the FMU. Elements of an array have separate names,
+        such as y[1].
+    after
+        The same just after the event.
     """
 
     run: int
@@ -42,22 +45,24 @@ class Event(NamedTuple):
 
 
 class Runs(Mapping[str, _Array]):
-    """Results of `Fmu.run`: time series by output, statistics by output and measure.
+    """Results of `Fmu.run`: time series by output, and statistics by output and measure.
 
-    runs["roll"]: (runs, times), at the kept times. runs["roll", "peak"]: (runs,). A whole array is (runs, times, ...), its
-    measures are (runs, ...). Times that a run has not reached are NaN. Measures are NaN for a rejected run, and if a value is
-    NaN; for a run that the FMU ended they cover the times until then. Strings and bytes are arrays of objects; an Int64 or UInt64
-    is an array of integers, or of objects if a run has not reached a time. These have None instead of NaN, and no measures.
-    As a mapping, the object contains time series by output, none if only measures were requested; its truth value is
+    runs["roll"] is an array (runs, times), at the stored times, and runs["roll", "peak"] is an array (runs,). A whole array is
+    (runs, times, ...), and its measures are (runs, ...). Values at times that a run has not reached are NaN. The measures of a run are
+    NaN if it failed, or if a value is NaN. If the FMU ended a run early, they cover the times until then.
+
+    Strings and bytes are arrays of objects. An Int64 or UInt64 variable is an array of integers, or of objects if a run has not reached
+    all times. These arrays have None instead of NaN, and no measures.
+
+    As a mapping, the object contains the time series by output, and is empty if only measures were requested. As a condition, it is
     always true.
 
-    A RuntimeWarning reports NaN at the first use of a result. It reports failed runs only if neither `errors` nor `ok` was
-    read before.
+    A RuntimeWarning reports NaN at the first use of a result. It also reports failed runs, unless `errors` or `ok` was read before.
     """
 
-    #: (times,), s: the kept times.
+    #: (times,): the stored times, s.
     time: _Array
-    #: Notes on finished runs: the FMU ended by itself at the last time, or rejected the termination.
+    #: dict[int, str]: notes on finished runs by index: the FMU ended the simulation at the last time, or rejected its termination.
     notes: dict[int, str]
 
     def __init__(
@@ -78,15 +83,15 @@ class Runs(Mapping[str, _Array]):
         self._reported, self._checked = not self._errors, set[str | tuple[str, str]]()
         self._trajectories, self._measured = trajectories, measured
         self._outputs, self._measures, self._start = outputs, measures, start
-        #: Shape and names of the elements of the arrays among outputs and start values.
+        #: Shape and element names of each array among the outputs and start values.
         self._arrays = arrays or {}
-        #: Outputs whose values float64 does not have.
+        #: Outputs whose values float64 cannot represent.
         self._exact = exact or {}
         self._events = list(events)
 
     @cached_property
     def events(self) -> list[Event]:
-        """The events of all runs in Model Exchange, by run and time; empty unless `Fmu.run` was called with events=True."""
+        """The events of all runs in Model Exchange, sorted by run and time. Empty unless `Fmu.run` was called with events=True."""
         names = [element for name in self._numbers for element in self._elements(name)]
         return [
             Event(run, time, dict(zip(names, before, strict=True)), dict(zip(names, after, strict=True)))
@@ -95,7 +100,7 @@ class Runs(Mapping[str, _Array]):
 
     @cached_property
     def start(self) -> dict[str, Any]:
-        """The given start values by name, (runs,) each, for a whole array (runs, ...); strings and exact values are unchanged."""
+        """The given start values by name: (runs,) each, and (runs, ...) for a whole array. A single string or bytes is unchanged."""
         return {
             name: value
             if isinstance(value, str | bytes)
@@ -105,7 +110,7 @@ class Runs(Mapping[str, _Array]):
 
     @cached_property
     def _columns(self) -> dict[str, int]:
-        """The first column of each output in the results, and the columns of the elements of arrays."""
+        """Index of the first column of each output in the results, and of the column of each array element."""
         columns: dict[str, int] = {}
         elements: dict[str, int] = {}
         first = 0
@@ -119,7 +124,7 @@ class Runs(Mapping[str, _Array]):
 
     @property
     def _numbers(self) -> list[str]:
-        """The outputs that have measures."""
+        """Names of the outputs that have measures."""
         return [name for name in self._outputs if name not in self._exact]
 
     def _shape(self, name: str) -> tuple[int, ...]:
@@ -135,7 +140,7 @@ class Runs(Mapping[str, _Array]):
 
     @property
     def errors(self) -> dict[int, str]:
-        """Messages of the FMU, by index, on runs that it rejected or ended before the last time, with the time reached
+        """Messages of the FMU about runs that failed or that it ended before the last time, by index of the run. Each contains the time
         ("at 0.5 s: ...", "ended by the FMU at t = 0.5 s: ...")."""
         self._reported = True
         return self._errors
@@ -148,7 +153,7 @@ class Runs(Mapping[str, _Array]):
         return finished
 
     def check(self) -> Runs:
-        """Return this object if all runs are finished; else raise FmuError with the first error."""
+        """Return this object if all runs have reached the last time; otherwise raise FmuError with the first error."""
         if self.errors:
             number, why = next(iter(self.errors.items()))
             many = f" ({len(self.errors)} of {self.count} runs failed)" if self.count > 1 else ""
@@ -184,7 +189,7 @@ class Runs(Mapping[str, _Array]):
         return found
 
     def _announce(self, key: str | tuple[str, str], values: _Array) -> None:
-        """Warn about failed runs, unless the caller has read `errors`, and about other results with NaN."""
+        """Warn about failed runs, unless the caller has read `errors`, and about NaN in other runs."""
         lines = []
         if not self._reported:
             number, why = next(iter(self._errors.items()))
@@ -210,10 +215,11 @@ class Runs(Mapping[str, _Array]):
         return True
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a row for each run and each kept time, with both as index; a row for each run if there are only measures.
+        """Return a table with a row for each run and each stored time, which are its index. If there are only measures, it has a row for
+        each run.
 
-        The columns: start values by name, outputs by name, measures as `roll_peak`; values of a run are repeated in all of its
-        rows. A start value of an output is called `roll at start`. Raises ImportError without pandas.
+        The columns are start values and outputs, by name, and measures, such as `roll_peak`. Start values and measures are repeated in
+        all rows of a run. A start value of an output is called `roll at start`. Raises ImportError without pandas.
         """
         pandas = _needed("pandas")
         runs = np.arange(self.count)
@@ -231,9 +237,9 @@ class Runs(Mapping[str, _Array]):
         return pandas.DataFrame(columns, index=index)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return outputs over the dimensions run and time, measures as `roll_peak` over run, start values as coordinates of run. A
-        start value of an output is called `roll at start`. The dimensions of an array are called `T_0`, `T_1` and so on. Raises
-        ImportError without xarray."""
+        """Return a dataset of outputs with the dimensions run and time, and of measures, such as `roll_peak`, with the dimension run. Start
+        values are coordinates of run; a start value of an output is called `roll at start`. The dimensions of an array T are called
+        `T_0`, `T_1` and so on. Raises ImportError without xarray."""
         needed = _needed("xarray")
 
         def dims(name: str, *first: str) -> tuple[str, ...]:
@@ -267,7 +273,8 @@ class Runs(Mapping[str, _Array]):
         return found
 
     def _split(self, name: str, values: _Array | str, ahead: int) -> list[tuple[str, Any]]:
-        """The elements of an array by name, and their values over the first dimensions; other values unchanged."""
+        """Split an array into pairs of the name of an element and its values, which keep the first `ahead` dimensions. Other values are one
+        pair."""
         array = name.removesuffix(AT_START)
         if array not in self._arrays or isinstance(values, str):
             return [(name, values)]
@@ -282,7 +289,7 @@ class Runs(Mapping[str, _Array]):
 
 
 def _column(values: Any) -> NDArray[Any]:
-    """Start values as an array. NumPy would remove zeros at the end of bytes."""
+    """Return start values as an array. Bytes are objects, because NumPy would remove zeros at their end."""
     if isinstance(values, Sequence) and any(isinstance(value, bytes) for value in values):
         column = np.empty(len(values), dtype=object)
         column[:] = values

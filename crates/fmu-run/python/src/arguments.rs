@@ -1,4 +1,4 @@
-//! Arguments of Python functions. An error names the argument.
+//! Converts arguments of Python functions. Errors name the argument.
 
 use crate::buffers::array_of;
 use fmu_run::{Integration, Interface, System, Tolerance};
@@ -7,8 +7,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString, PyTuple};
 use std::path::PathBuf;
 
-/// Returns the error for an argument, with the beginning of its value.
+/// Returns the error for an invalid argument, which quotes the beginning of its value.
 pub fn wrong(name: &str, must: &str, value: &Bound<'_, PyAny>) -> PyErr {
+    /// Maximum number of quoted characters.
     const MOST: usize = 60;
     let written = value.repr().map_or_else(|_| value.get_type().to_string(), |repr| repr.to_string());
     let written = written.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -17,7 +18,7 @@ pub fn wrong(name: &str, must: &str, value: &Bound<'_, PyAny>) -> PyErr {
     PyValueError::new_err(format!("{name} must be {must}, it is {short}{dots}"))
 }
 
-/// Returns an optional count, at least 1.
+/// Returns an optional count, which must be at least 1.
 pub fn count(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<usize>> {
     let Some(value) = value else { return Ok(None) };
     let integer = value.py().import("operator")?.call_method1("index", (value,));
@@ -26,11 +27,11 @@ pub fn count(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<us
     if integer.lt(1)? {
         return Err(PyValueError::new_err(format!("{name} must be at least 1, it is {}", integer.str()?)));
     }
-    // A number that no machine has means: as many as possible.
+    // A count that does not fit in memory means as many as possible.
     Ok(Some(integer.extract().unwrap_or(usize::MAX >> 1)))
 }
 
-/// Returns a time or another number.
+/// Returns a number.
 pub fn number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
     if let Ok(number) = value.cast::<PyFloat>() {
         return Ok(number.value());
@@ -39,7 +40,7 @@ pub fn number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
     value.extract().ok().filter(|_| is_number).ok_or_else(|| wrong(name, "a number", value))
 }
 
-/// Returns a tolerance: the tolerance of the default experiment, none or a number.
+/// Returns a tolerance: a number, None, or 'default' for the tolerance of the default experiment.
 pub fn tolerance(value: &Bound<'_, PyAny>) -> PyResult<Tolerance> {
     if value.is_none() {
         return Ok(Tolerance::None);
@@ -52,7 +53,7 @@ pub fn tolerance(value: &Bound<'_, PyAny>) -> PyResult<Tolerance> {
         .map_err(|_| wrong("tolerance", "a number, None or 'default'", value))
 }
 
-/// Returns an interface type; its name may have an underscore, as in Python, or a hyphen.
+/// Returns an interface type. Its name may be written with an underscore or a hyphen.
 pub fn interface(value: &Bound<'_, PyAny>) -> PyResult<Interface> {
     let name = value.extract::<String>().map(|name| name.replace('_', "-"));
     match name.as_deref() {
@@ -118,7 +119,7 @@ pub fn items<'py>(
     }
 }
 
-/// Fails unless the optional argument can be called.
+/// Fails if the argument is given and is not callable.
 pub fn callable(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
     match value {
         Some(value) if !value.is_callable() => Err(wrong(name, "a function", value)),
@@ -126,7 +127,7 @@ pub fn callable(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
     }
 }
 
-/// Returns (value, unit) of a value with a unit.
+/// Returns the value and the unit if the argument is a tuple (value, unit), otherwise `None`.
 pub fn with_unit<'py>(value: &Bound<'py, PyAny>) -> Option<(Bound<'py, PyAny>, String)> {
     let pair = value.cast::<PyTuple>().ok().filter(|pair| pair.len() == 2)?;
     let (of, unit) = (pair.get_item(0).ok()?, pair.get_item(1).ok()?);
@@ -134,7 +135,7 @@ pub fn with_unit<'py>(value: &Bound<'py, PyAny>) -> Option<(Bound<'py, PyAny>, S
     (!of.is_instance_of::<PyString>()).then_some((of, unit))
 }
 
-/// Converts (value, unit) to the unit of the variable or of the elements of an array.
+/// Converts (value, unit) to the unit of the variable, or of the elements of an array. Returns other values unchanged.
 pub fn in_own_unit<'py>(
     system: &System,
     name: &str,
@@ -146,7 +147,7 @@ pub fn in_own_unit<'py>(
     numbers.sub(offset)?.div(factor)
 }
 
-/// Returns factor and offset of a unit of a variable or of the elements of an array.
+/// Returns factor and offset of the conversion from the unit of a variable, or of the elements of an array, to another unit.
 pub fn display_unit(system: &System, name: &str, unit: &str) -> PyResult<(f64, f64)> {
     let variable = system.array(name).and_then(|array| array.names.first()).map_or(name, String::as_str);
     system.display_unit(variable, unit).map_err(crate::python)

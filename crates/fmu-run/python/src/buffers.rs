@@ -1,4 +1,4 @@
-//! Arrays of float64 in Python objects.
+//! Reads and writes arrays of float64 in Python objects, without copies where possible.
 
 use pyo3::buffer::PyBuffer;
 use pyo3::exceptions::PyValueError;
@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyFloat, PyTuple};
 
-/// Input numbers: a single number, a copied row, or an array that is read in place.
+/// Numbers of an argument: a single number, a copied row, or an array that is read in place.
 pub enum Numbers {
     One(f64),
     Row(Vec<f64>),
@@ -33,6 +33,7 @@ impl Numbers {
         Ok(Self::Array(PyBuffer::get(&contiguous.call1((array,))?)?))
     }
 
+    /// Returns the shape of an array; empty for a single number and a copied row.
     pub fn shape(&self) -> &[usize] {
         match self {
             Self::One(_) | Self::Row(_) => &[],
@@ -49,7 +50,7 @@ impl Numbers {
     }
 }
 
-/// Converts to a NumPy array of float64.
+/// Converts an argument to a NumPy array of float64. Errors name the argument.
 pub fn array_of<'py>(name: &str, values: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     static ARRAY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     let py = values.py();
@@ -59,7 +60,7 @@ pub fn array_of<'py>(name: &str, values: &Bound<'py, PyAny>) -> PyResult<Bound<'
         true => no_numbers(&format!(" ({})", error.value(py))),
         false => error,
     })?;
-    // NumPy would convert None to NaN and strings to numbers.
+    // Checks the type first, because NumPy would convert None to NaN and strings to numbers.
     if !"biuf".contains(&array.getattr("dtype")?.getattr("kind")?.extract::<String>()?) {
         return Err(match array.getattr("ndim")?.extract::<usize>()? {
             0 => PyValueError::new_err(format!("{name}: {} is not a number", values.repr()?)),
@@ -69,8 +70,7 @@ pub fn array_of<'py>(name: &str, values: &Bound<'py, PyAny>) -> PyResult<Bound<'
     array.call_method1("astype", ("float64",))
 }
 
-/// Returns the numbers of an array. The caller must not write to it from another thread meanwhile, as for
-/// NumPy's own functions.
+/// Returns the numbers of an array. As with NumPy's own functions, no other thread must write to the array meanwhile.
 fn read(buffer: &PyBuffer<f64>) -> &[f64] {
     match buffer.item_count() {
         0 => &[],
@@ -81,7 +81,7 @@ fn read(buffer: &PyBuffer<f64>) -> &[f64] {
     }
 }
 
-/// An output array.
+/// An array to which results are written.
 pub struct Output(PyBuffer<f64>);
 
 impl Output {
@@ -93,7 +93,7 @@ impl Output {
     ) -> PyResult<(Bound<'py, PyAny>, Self)> {
         let array = match given {
             Some(array) => array,
-            // NumPy's `zeros` asks the kernel for large pages.
+            // Uses `zeros` of NumPy, because it asks the kernel for large pages.
             None => {
                 static ZEROS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
                 ZEROS.import(py, "numpy", "zeros")?.call1((PyTuple::new(py, shape)?,))?
@@ -112,7 +112,7 @@ impl Output {
         Ok((array, Self(buffer)))
     }
 
-    /// Fails if it shares memory with numbers that are read at the same time.
+    /// Fails if the array shares memory with numbers that are read at the same time.
     pub fn check_disjoint(&self, read: &Numbers) -> PyResult<()> {
         let (own, other) = (self.0.buf_ptr().addr(), read.values().as_ptr_range());
         let is_disjoint = own + 8 * self.0.item_count() <= other.start.addr() || other.end.addr() <= own;
@@ -130,7 +130,7 @@ impl Output {
     }
 }
 
-/// Writes a shape like NumPy.
+/// Formats a shape as NumPy does.
 pub fn shape(sizes: &[usize]) -> String {
     match sizes {
         [one] => format!("({one},)"),

@@ -1,4 +1,4 @@
-//! Values that float64 does not have: strings, bytes and integers of 64 bits.
+//! Values that float64 cannot represent: strings, bytes and integers of 64 bits.
 
 use crate::arguments::wrong;
 use crate::buffers::shape;
@@ -7,14 +7,15 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyByteArray, PyBytes, PyFloat, PyInt, PyList, PyString, PyTuple};
 
-/// Values of a variable, with the lengths of the sequences around them: none for a single value.
+/// Values of a variable.
 #[derive(Debug)]
 pub struct Exact {
     pub values: Vec<Value>,
+    /// Lengths of the nested sequences in which the values were given; empty for a single value.
     pub shape: Vec<usize>,
 }
 
-/// Returns the type of a variable, if it has values that float64 does not have.
+/// Returns the type of a variable if float64 cannot represent all of its values.
 pub fn exact_type(system: &System, name: &str) -> PyResult<Option<BaseType>> {
     system.exact_type(name).map_err(crate::python)
 }
@@ -45,6 +46,7 @@ impl Exact {
         self.values.iter().all(|value| matches!(value, Value::String(_)))
     }
 
+    /// Appends a value or a sequence, which is nested in `depth` sequences.
     fn add(&mut self, name: &str, given: &Bound<'_, PyAny>, depth: usize) -> PyResult<()> {
         if let Some(value) = value_of(given) {
             if depth != self.shape.len() && !self.values.is_empty() {
@@ -53,7 +55,7 @@ impl Exact {
             self.values.push(value?);
             return Ok(());
         }
-        // Arrays of NumPy.
+        // Converts arrays of NumPy to lists.
         let list = given.call_method0("tolist").unwrap_or_else(|_| given.clone());
         if let Some(value) = value_of(&list) {
             self.values.push(value?);
@@ -96,7 +98,7 @@ fn value_of(given: &Bound<'_, PyAny>) -> Option<PyResult<Value>> {
     None
 }
 
-/// Returns an integer; one that no type has is rejected with the others that the variable cannot have.
+/// Returns an integer. One that does not fit any type is replaced by the extreme i128, which is rejected later as out of range.
 fn integer(given: &Bound<'_, PyAny>) -> PyResult<Value> {
     let small = given.extract::<i64>().map(i128::from);
     let large = || given.extract::<u64>().map(i128::from);
@@ -106,7 +108,7 @@ fn integer(given: &Bound<'_, PyAny>) -> PyResult<Value> {
     }
 }
 
-/// Returns a value as a Python object; None if there is none.
+/// Converts a value to a Python object; None if there is none.
 fn object<'py>(py: Python<'py>, value: Option<&Value>) -> PyResult<Bound<'py, PyAny>> {
     Ok(match value {
         None => py.None().into_bound(py),
@@ -122,8 +124,8 @@ fn object<'py>(py: Python<'py>, value: Option<&Value>) -> PyResult<Bound<'py, Py
     })
 }
 
-/// Returns a NumPy array of this shape: of int64 or uint64 if the type has integers and all exist, otherwise of objects, with None
-/// where there is no value.
+/// Returns a NumPy array of this shape. If the type is Int64 or UInt64 and all values exist, its dtype is int64 or uint64. Otherwise
+/// it is an array of objects, with None where there is no value.
 pub fn array<'py>(
     py: Python<'py>,
     base: BaseType,
@@ -137,7 +139,7 @@ pub fn array<'py>(
     };
     let objects = values.iter().map(|value| object(py, value.as_ref())).collect::<PyResult<Vec<_>>>()?;
     let numpy = py.import("numpy")?;
-    // NumPy would take strings and bytes for sequences of fixed length.
+    // Fills the array item by item, because NumPy would convert a list of strings or bytes to strings of fixed length.
     let array = numpy.call_method1("empty", (objects.len(), kind))?;
     for (index, object) in objects.into_iter().enumerate() {
         array.set_item(index, object)?;

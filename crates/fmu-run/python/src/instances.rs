@@ -15,29 +15,28 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::{Duration, Instant};
 
-/// Instances of one FMU, run in parallel; made by `Fmu.instances`.
+/// Instances of one FMU, which run in parallel. `Fmu.instances` creates them.
 ///
-/// Every call acts on all of them, in threads and without the GIL. Arrays have the shape (n,) if one variable
-/// is given as a str, and (n, variables) for a sequence of str. Values to set may also be one number or one
-/// row for all. Arrays passed as `out` are written in place.
+/// Every call acts on all instances, in threads and without the GIL. Arrays of values have the shape (n,) if one variable is given as
+/// a str, and (n, variables) if a sequence of str is given. Values to set may also be one number or one row for all instances. Arrays
+/// passed as `out` are written in place.
 ///
-/// If a call fails for an instance, the instance drops out and the others continue. `errors` contains the
-/// reason; values read from the instance are NaN. `reset` and `restore` make it usable again. If the last
-/// instance drops out, the call raises FmuError with the reason. Later calls raise FmuError as well until an
-/// instance is usable again.
+/// If a call fails for an instance, the instance drops out and all others continue. `errors` contains the reason, and values read
+/// from this instance are NaN. `reset` and `restore` make it usable again. If the last instance drops out, the call raises FmuError
+/// with the reason, and so do later calls until an instance is usable again.
 #[pyclass(frozen, module = "fmu_run")]
 pub struct Instances {
     system: System,
     interface: Interface,
     count: usize,
     instances: Arc<Shared>,
-    /// Cache of looked-up names, by the objects that named them.
+    /// Cache of variables, by the Python objects that contain their names.
     known: Mutex<Vec<(Py<PyAny>, Arc<Named>)>>,
     /// Receives the messages of the FMU.
     log: Option<Log>,
 }
 
-/// Variables of a call.
+/// Variables of a call, found by name.
 #[derive(Default)]
 struct Named {
     selection: Selection,
@@ -45,7 +44,7 @@ struct Named {
     row: Vec<usize>,
 }
 
-/// Saved states of instances; freed with this object.
+/// Saved states of instances. They are freed with this object.
 #[pyclass(frozen, module = "fmu_run")]
 pub struct States {
     instances: Arc<Shared>,
@@ -55,7 +54,7 @@ pub struct States {
 impl Drop for States {
     fn drop(&mut self) {
         if let Some(states) = self.states.take().and_then(Arc::into_inner) {
-            // In a forked process they may be out of reach.
+            // In a forked process the lock may fail; then the states are not freed.
             if let Ok(mut instances) = self.instances.lock() {
                 instances.forget(states);
             }
@@ -63,10 +62,10 @@ impl Drop for States {
     }
 }
 
-/// Instances that Python threads share.
+/// Instances that several Python threads may use.
 struct Shared {
     instances: Mutex<fmu_run::Instances>,
-    /// Process that locked them last.
+    /// Number of the process that has locked the instances last.
     process: AtomicU32,
 }
 
@@ -75,9 +74,10 @@ impl Shared {
         Arc::new(Self { instances: Mutex::new(instances), process: AtomicU32::new(process()) })
     }
 
-    /// Waits until no other thread uses the instances. Fails if this is for ever, because a thread used them when
-    /// this process was forked.
+    /// Waits until no other thread uses the instances. If a thread used them when this process was forked, the lock is never released
+    /// here, so this function fails.
     fn lock(&self) -> PyResult<MutexGuard<'_, fmu_run::Instances>> {
+        /// Maximum time that a thread needs from locking the instances to storing its process.
         const BETWEEN_LOCK_AND_STORE: Duration = Duration::from_secs(1);
         let found = match self.instances.try_lock() {
             Ok(found) => found,
@@ -104,7 +104,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Mask: a sequence of n Booleans, true for the selected instances.
+/// An optional argument.
 type Optional<'py> = Option<Bound<'py, PyAny>>;
 
 #[pymethods]
@@ -159,11 +159,11 @@ impl Instances {
         Ok(format!("<Instances: {} of {}{failed}>", self.count, self.system.name()))
     }
 
-    /// dict[int, str]: the instances that have dropped out, each with the reason from the FMU.
+    /// dict[int, str]: the reason why an instance has dropped out, by its index.
     #[getter]
     fn errors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let errors = PyDict::new(py);
-        // Calls no Python code while the lock is held: dropping a States object takes the lock, too.
+        // Copies the errors, because no Python code may run while the lock is held: dropping a States object takes the lock, too.
         let found: Vec<_> =
             self.instances.lock()?.errors().map(|(index, why)| (index, why.to_owned())).collect();
         for (index, why) in found {
@@ -186,7 +186,7 @@ impl Instances {
         self.event_values(py, |event| event.next.unwrap_or(f64::NAN))
     }
 
-    /// (n,): 1 if the last event of the instance has changed continuous states, else 0.
+    /// (n,): 1 if the last event of the instance has changed its continuous states, else 0.
     #[getter]
     fn states_changed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.event_values(py, |event| f64::from(u8::from(event.states_changed)))
@@ -198,7 +198,7 @@ impl Instances {
         self.event_values(py, |event| f64::from(u8::from(event.terminate)))
     }
 
-    /// Set variables: a number or a row for all instances, or an array with a row for each.
+    /// Set variables. The values are a number or a row for all instances, or an array with a row for each.
     ///
     /// Parameters
     /// ----------
@@ -222,8 +222,9 @@ impl Instances {
         self.put(py, variables, values, mask, fmu_run::Instances::set)
     }
 
-    /// Read variables: (n,) for a str, (n, variables) for a sequence; written to `out` if it is given. A single Int64 or UInt64 is
-    /// an array of int64 or uint64, a string or bytes an array of objects, with None for an instance that has dropped out.
+    /// Read variables: (n,) for a str, (n, variables) for a sequence. The values are written to `out` if it is given. For a single
+    /// Int64 or UInt64 variable the result is an array of int64 or uint64. For a string or bytes it is an array of objects, with None
+    /// for an instance that has dropped out.
     #[pyo3(signature = (variables, out=None))]
     fn get<'py>(
         &self,
@@ -242,14 +243,13 @@ impl Instances {
         })
     }
 
-    /// list[str | None]: the value of a string variable in each instance; None for an instance that has
-    /// dropped out.
+    /// list[str | None]: read a string variable of each instance; None for an instance that has dropped out.
     fn texts(&self, py: Python, variable: &Bound<'_, PyAny>) -> PyResult<Vec<Option<String>>> {
         let variable = arguments::text("variable", variable)?;
         self.attempt(py, |all| all.texts(&variable))
     }
 
-    /// Perform a step of Co-Simulation: by `size`, or to the time `to`, s.
+    /// Perform a step of Co-Simulation of the given `size`, s, or to the time `to`, s.
     #[pyo3(signature = (size=None, *, to=None, mask=None))]
     fn step(&self, py: Python, size: Optional, to: Optional, mask: Optional) -> PyResult<()> {
         self.only(Interface::CoSimulation)?;
@@ -263,7 +263,7 @@ impl Instances {
         }
     }
 
-    /// Set variables, perform a step and read other variables in one call: `set`, `step` and `get`.
+    /// Set variables, perform a step of `size`, s, and read other variables in one call, as `set`, `step` and `get` do.
     #[pyo3(signature = (set, values, size, get, out=None))]
     fn advance<'py>(
         &self,
@@ -293,7 +293,7 @@ impl Instances {
     /// mask : (n,) of bool, optional
     ///     Selected instances; all by default.
     /// start : dict, optional
-    ///     Start values by name that replace earlier ones: numbers, (n,), or strings.
+    ///     Start values by name, which replace earlier ones: a number, (n,) numbers, or strings.
     #[pyo3(signature = (mask=None, *, start=None))]
     fn reset(&self, py: Python, mask: Optional, start: Optional) -> PyResult<()> {
         let (mask, start) = (self.mask(mask)?, Start::of(&self.system, start.as_ref())?);
@@ -317,8 +317,8 @@ impl Instances {
         self.revive(py, |all| all.restore(&states, mask.as_deref()))
     }
 
-    /// Return saved states as bytes, for use in another process: one for each instance, None for an instance
-    /// without a state.
+    /// Serialize saved states, for use in another process: a list with the bytes for each instance, or None for an instance without a
+    /// state.
     fn serialize<'py>(
         &self,
         py: Python<'py>,
@@ -329,8 +329,8 @@ impl Instances {
         Ok(found.into_iter().map(|bytes| bytes.map(|bytes| PyBytes::new(py, &bytes))).collect())
     }
 
-    /// Read states from the bytes that `serialize` returned, here or in another process: one or None for each
-    /// instance.
+    /// Create states from the bytes that `serialize` has returned, in this or another process: a sequence with the bytes or None for
+    /// each instance.
     fn deserialize(&self, py: Python, states: &Bound<'_, PyAny>) -> PyResult<States> {
         let must = "a sequence of bytes or None, one for each instance";
         let states =
@@ -339,7 +339,7 @@ impl Instances {
         Ok(States { instances: Arc::clone(&self.instances), states: Some(Arc::new(read)) })
     }
 
-    /// Compute directional derivatives of unknowns for a seed.
+    /// Compute directional derivatives of unknowns for a seed, which has a value for each known.
     ///
     /// Parameters
     /// ----------
@@ -370,7 +370,7 @@ impl Instances {
         Ok(array)
     }
 
-    /// Co-Simulation, FMI 2.0: set time derivatives of inputs, of order 1, in the shapes of `set`.
+    /// Co-Simulation, FMI 2.0: set the first time derivatives of inputs, in the shapes of `set`.
     #[pyo3(signature = (variables, values, mask=None))]
     fn set_input_derivatives(
         &self,
@@ -383,7 +383,7 @@ impl Instances {
         self.put(py, variables, values, mask, fmu_run::Instances::set_input_derivatives)
     }
 
-    /// Co-Simulation: read time derivatives of outputs, of order 1, in the shapes of `get`.
+    /// Co-Simulation: read the first time derivatives of outputs, in the shapes of `get`.
     #[pyo3(signature = (variables, out=None))]
     fn get_output_derivatives<'py>(
         &self,
@@ -396,7 +396,7 @@ impl Instances {
         self.read(py, &named.row, out, |all, values| all.get_output_derivatives(&named.selection, values))
     }
 
-    /// Model Exchange: set the time, s: a number for all instances or (n,).
+    /// Model Exchange: set the time, s: one number for all instances, or (n,).
     #[pyo3(signature = (time, mask=None))]
     fn set_time(&self, py: Python, time: &Bound<'_, PyAny>, mask: Optional) -> PyResult<()> {
         self.only(Interface::ModelExchange)?;
@@ -404,7 +404,7 @@ impl Instances {
         self.attempt(py, |all| all.set_time(time.values(), mask.as_deref()))
     }
 
-    /// Model Exchange: set the continuous states, (states,) for all instances or (n, states).
+    /// Model Exchange: set the continuous states: (states,) for all instances, or (n, states).
     #[pyo3(signature = (states, mask=None))]
     fn set_continuous_states(&self, py: Python, states: &Bound<'_, PyAny>, mask: Optional) -> PyResult<()> {
         self.only(Interface::ModelExchange)?;
@@ -440,14 +440,13 @@ impl Instances {
         self.continuous(py, Continuous::EventIndicators, out)
     }
 
-    /// Model Exchange: handle an event with all its iterations, and return to Continuous-Time Mode.
-    /// `next_event_time`, `states_changed` and `wants_to_end` contain the results.
+    /// Model Exchange: enter Event Mode, iterate until the event is complete, and return to Continuous-Time Mode. `next_event_time`,
+    /// `states_changed` and `wants_to_end` contain the results.
     ///
     /// Parameters
     /// ----------
     /// variables, values : optional
-    ///     Values to set in Event Mode before the event, as for `set`. Discrete variables can be set only
-    /// there.
+    ///     Values to set in Event Mode before the iterations, as in `set`. Discrete variables can only be set there.
     /// mask : (n,) of bool, optional
     ///     Selected instances; all by default.
     #[pyo3(signature = (variables=None, values=None, *, mask=None))]
@@ -473,11 +472,11 @@ impl Instances {
         self.attempt(py, |all| all.handle_events((&named.selection, values), mask.as_deref()))
     }
 
-    /// Model Exchange: report a completed step of the integrator.
+    /// Model Exchange: notify the FMU of a completed integrator step.
     ///
     /// Returns
     /// -------
-    /// (n, 2): 1 if an instance requests an event, and 1 if it requests the end of the simulation, else 0
+    /// (n, 2): whether an instance requests an event, and whether it requests the end of the simulation, as 1 or 0
     fn completed_integrator_step<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.only(Interface::ModelExchange)?;
         self.read(py, &[2], None, |all, values| {
@@ -488,9 +487,9 @@ impl Instances {
 }
 
 impl Instances {
-    /// Looks up the variables of an argument by name; results are cached by the identity of the Python object.
+    /// Looks up the variables of an argument by name. The result is cached by the identity of the Python object.
     fn named(&self, argument: &str, variables: &Bound<'_, PyAny>) -> PyResult<Arc<Named>> {
-        /// Size of the cache.
+        /// Maximum number of entries in the cache.
         const MOST: usize = 64;
         if let Some((_, named)) = lock(&self.known).iter().find(|(object, _)| object.is(variables)) {
             return Ok(Arc::clone(named));
@@ -508,7 +507,7 @@ impl Instances {
             None => vec![selection.len()],
         };
         let named = Arc::new(Named { selection, row });
-        // A list is mutable, so it is not cached.
+        // Only str and tuple are cached, because a list may change later.
         if is_one || variables.is_instance_of::<PyTuple>() {
             let mut known = lock(&self.known);
             known.truncate(MOST - 1);
@@ -529,13 +528,13 @@ impl Instances {
         Err(PyValueError::new_err(why))
     }
 
-    /// Returns the shape of an array with values for each instance.
+    /// Returns the shape of an array with a row for each instance.
     fn shape(&self, row: &[usize]) -> Vec<usize> {
         [&[self.count], row].concat()
     }
 
-    /// Reads the values of an argument, which may be one number for all instances, one row for all, or a row for each.
-    /// The error names the argument, its shape and the shape that it should have.
+    /// Reads the values of an argument: one number for all instances, one row for all, or a row for each. The error names the
+    /// argument, its shape and the expected shape.
     fn fitting(&self, row: &[usize], argument: &str, values: &Bound<'_, PyAny>) -> PyResult<Numbers> {
         let (values, length) = (Numbers::of(argument, values)?, row.iter().product());
         let given = values.shape();
@@ -555,7 +554,7 @@ impl Instances {
         }
     }
 
-    /// Fails if the instances are for another interface type, before the FMU would reject the call.
+    /// Fails if the instances are for another interface type, because the message is clearer than an error of the FMU.
     fn only(&self, wanted: Interface) -> PyResult<()> {
         let why = match (wanted, self.interface) {
             (wanted, interface) if wanted == interface => return Ok(()),
@@ -569,7 +568,7 @@ impl Instances {
         Err(PyValueError::new_err(why))
     }
 
-    /// Returns the states if they belong to these instances.
+    /// Returns saved states. Fails if they belong to other instances.
     fn own(&self, states: &Bound<'_, PyAny>) -> PyResult<Arc<fmu_run::States>> {
         let states =
             states.cast::<States>().map_err(|_| wrong("states", "what save() returned", states))?.get();
@@ -581,7 +580,7 @@ impl Instances {
         })
     }
 
-    /// Runs a call without the GIL; raises FmuError if no instance is left before or after it.
+    /// Runs a call without the GIL. Raises FmuError if all instances have dropped out before the call or during it.
     fn attempt<T: Send>(
         &self,
         py: Python,
@@ -598,7 +597,7 @@ impl Instances {
         })
     }
 
-    /// Runs a call that may make instances usable again.
+    /// Runs a call that may make instances usable again, even if all have dropped out before.
     fn revive<T: Send>(
         &self,
         py: Python,
@@ -607,6 +606,7 @@ impl Instances {
         self.called(py, |all| body(all).map_err(python))
     }
 
+    /// Runs a call without the GIL and passes on its messages. Raises FmuError if no instance is usable after it.
     fn called<T: Send>(
         &self,
         py: Python,
@@ -622,17 +622,17 @@ impl Instances {
         none_left.map_or(Ok(result), |why| Err(FmuError::new_err(why)))
     }
 
-    /// Passes the messages of a call on, without the lock, so that the receiver may use the instances.
+    /// Passes on the messages of a call. The lock is not held meanwhile, so that the receiver may use the instances.
     fn pass_messages(&self, py: Python) -> PyResult<()> {
         let Some(log) = &self.log else { return Ok(()) };
         let messages = self.instances.lock()?.take_messages();
         log.pass(py, messages)
     }
 
-    /// Returns name and type of a single variable whose values float64 does not have.
+    /// Returns name and type if the argument is the name of one variable whose values float64 cannot represent.
     fn exact(&self, variables: &Bound<'_, PyAny>) -> PyResult<Option<(String, BaseType)>> {
         let Ok(name) = variables.cast::<PyString>() else { return Ok(None) };
-        // Numbers are in the cache.
+        // A cached name belongs to numbers.
         if lock(&self.known).iter().any(|(object, _)| object.is(variables)) {
             return Ok(None);
         }
@@ -640,7 +640,7 @@ impl Instances {
         Ok(exact_type(&self.system, &name)?.map(|base| (name, base)))
     }
 
-    /// Sets values of variables: a row for each instance or one for all.
+    /// Sets variables with the function `body`. The values are a row for each instance or one for all.
     fn put(
         &self,
         py: Python,
@@ -654,6 +654,7 @@ impl Instances {
         self.attempt(py, |all| body(all, &named.selection, values.values(), mask.as_deref()))
     }
 
+    /// Fills a new array, or `out`, with a row for each instance.
     fn read<'py>(
         &self,
         py: Python<'py>,
@@ -666,6 +667,7 @@ impl Instances {
         Ok(array)
     }
 
+    /// Reads a continuous quantity of Model Exchange.
     fn continuous<'py>(
         &self,
         py: Python<'py>,
@@ -680,6 +682,7 @@ impl Instances {
         })
     }
 
+    /// Returns an array with a value of the last event of each instance.
     fn event_values<'py>(
         &self,
         py: Python<'py>,

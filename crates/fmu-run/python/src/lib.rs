@@ -1,5 +1,4 @@
-//! The Rust part of the Python package `fmu_run`: the module `fmu_run._native`. `fmu_run/__init__.py`
-//! contains the public interface.
+//! The Rust part of the Python package `fmu_run`, which is the module `fmu_run._native`. The public interface is written in Python.
 
 mod arguments;
 mod buffers;
@@ -24,7 +23,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 create_exception!(fmu_run, FmuError, PyException, "An FMU that cannot be loaded or run, or rejects a run.");
 
-/// An unpacked and loaded FMU or system, until it is closed.
+/// An unpacked and loaded FMU or system; `None` after it was closed.
 #[pyclass(frozen, module = "fmu_run._native")]
 struct Loaded(Mutex<Option<Model>>);
 
@@ -45,21 +44,20 @@ impl Deref for Model {
     }
 }
 
-/// Name, type, causality, variability, start value, unit, description, smallest and largest value, display
-/// unit.
+/// Name, type, causality, variability, start value, unit, description, minimum, maximum and display unit of a variable.
 type Described = (String, String, String, Text, Text, Text, String, Option<f64>, Option<f64>, Text);
 type Text = Option<String>;
-/// FMI version, model name, token, derivative of each state, continuous outputs, interface types with and
-/// without directional derivatives, attributes of units.
+/// FMI version, model name, token, name of the derivative by name of the state, names of continuous outputs, whether each interface
+/// type has directional derivatives, and attributes of units.
 type About = (String, String, String, Pairs, Vec<String>, Vec<(&'static str, bool)>, BTreeMap<String, Pairs>);
 type Pairs = Vec<(String, String)>;
-/// Outputs and connected inputs, by stage.
+/// Pairs of an output and a connected input, by stage.
 type Stages = Vec<Pairs>;
-/// Messages by run.
+/// Messages by index of the run.
 type Messages = Vec<(usize, String)>;
-/// Kept times; outputs; trajectories, (runs, outputs, times); names and values of statistics, (runs, outputs, statistics); errors;
-/// notes; start values; shapes and elements of whole arrays; values that float64 does not have, (runs, times) by output; events: run,
-/// time, outputs before and after.
+/// Stored times; names of outputs; trajectories, (runs, outputs, times); names and values of statistics, (runs, outputs, statistics);
+/// errors; notes; start values; shapes and element names of whole arrays; values that float64 cannot represent, (runs, times) by
+/// output; events, each with run, time, and outputs before and after.
 type Results<'py> = (
     Bound<'py, PyAny>,
     Vec<String>,
@@ -75,7 +73,7 @@ type Results<'py> = (
 );
 
 fn python(error: Error) -> PyErr {
-    // In one line, without control characters.
+    // `to_string` returns one line without control characters.
     let message = error.to_string();
     match error {
         Error::Fmu(_) => FmuError::new_err(message),
@@ -109,7 +107,7 @@ impl Loaded {
         Ok(Self(Mutex::new(Some(Model::System(system)))))
     }
 
-    /// Connects FMUs: components by name, connections from outputs to inputs.
+    /// Connects FMUs. `components` are their names and FMUs, `connections` are pairs of an output and an input.
     #[staticmethod]
     fn connected(
         name: &str,
@@ -148,7 +146,7 @@ impl Loaded {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).is_none()
     }
 
-    /// Returns factor and offset: value in the other unit = factor * value + offset.
+    /// Returns factor and offset of a conversion: value in `unit` = factor * value in the variable's unit + offset.
     fn display_unit(&self, name: &Bound<'_, PyAny>, unit: &Bound<'_, PyAny>) -> PyResult<(f64, f64)> {
         let (name, unit) = (arguments::text("name", name)?, arguments::text("unit", unit)?);
         arguments::display_unit(&*self.model()?, &name, &unit)
@@ -180,7 +178,7 @@ impl Loaded {
         ))
     }
 
-    /// Returns, for a system: name, stages of its connections, and stop time.
+    /// Returns the name, the stages of the connections, and the stop time of a system.
     fn about_system(&self) -> PyResult<(String, Stages, Option<f64>)> {
         let system = self.model()?;
         let stages = system
@@ -202,7 +200,7 @@ impl Loaded {
         Ok(self.model()?.variables().map(describe).collect())
     }
 
-    /// Performs the runs. Ctrl-C ends all runs after their current steps. Calls progress(done, runs).
+    /// Performs the runs. After Ctrl-C, all runs stop after their current step. Calls `progress(done, runs)`.
     #[allow(clippy::too_many_arguments, reason = "named where it is called")]
     fn run<'py>(
         &self,
@@ -271,7 +269,7 @@ impl Loaded {
         let measured_values = measured.as_mut().map_or(&mut [][..], |(_, output)| output.values());
         let results = [kept.values(), measured_values];
         let Finished { errors, notes, exact, events } =
-            carry_out(py, &planned, results, progress.map(Bound::unbind), log)?;
+            perform(py, &planned, results, progress.map(Bound::unbind), log)?;
         let exact = exact_outputs(py, &model, &planned, &exact)?;
         let measured = measured.map(|(array, _)| array);
         let (start, arrays) = (start.dict(py)?, arrays.dict(py)?);
@@ -281,7 +279,7 @@ impl Loaded {
     }
 }
 
-/// Returns the values that float64 does not have, (runs, times) by output.
+/// Returns the values that float64 cannot represent, (runs, times) by output.
 fn exact_outputs<'py>(
     py: Python<'py>,
     system: &System,
@@ -298,7 +296,7 @@ fn exact_outputs<'py>(
     Ok(dict)
 }
 
-/// Whole arrays among names.
+/// The names that denote whole arrays, with the elements of the arrays.
 #[derive(Default)]
 struct Arrays<'a>(BTreeMap<&'a str, &'a Elements>);
 
@@ -307,7 +305,7 @@ impl<'a> Arrays<'a> {
         Self(names.filter_map(|name| Some((name, system.array(name)?))).collect())
     }
 
-    /// Returns the names with each array replaced by its elements.
+    /// Replaces the names of arrays by the names of their elements.
     fn elements(&self, names: &'a [String]) -> Vec<&'a str> {
         let elements = |name: &'a String| match self.0.get(name.as_str()) {
             None => std::slice::from_ref(name),
@@ -316,7 +314,7 @@ impl<'a> Arrays<'a> {
         names.iter().flat_map(elements).map(String::as_str).collect()
     }
 
-    /// Returns the shape and the names of the elements by array.
+    /// Returns a dict with the shape and the element names of each array; `None` if there are no arrays.
     fn dict<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         if self.0.is_empty() {
             return Ok(None);
@@ -354,8 +352,8 @@ fn order_of(name: &Bound<'_, PyAny>) -> PyResult<Order> {
     }
 }
 
-/// Performs the runs without the GIL. Between steps, this thread handles Python signals and calls progress.
-fn carry_out(
+/// Performs the runs without the GIL. Between steps, this thread handles Python signals, passes on messages and calls `progress`.
+fn perform(
     py: Python,
     planned: &Planned,
     [trajectories, measures]: [&mut [f64]; 2],

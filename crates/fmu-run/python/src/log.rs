@@ -1,4 +1,4 @@
-//! Messages of the FMU for a Python function or a `logging.Logger`.
+//! Passes messages of the FMU to a Python function or a `logging.Logger`.
 
 use crate::arguments::wrong;
 use fmu_run::{Logged, Status};
@@ -8,13 +8,13 @@ use pyo3::prelude::*;
 pub struct Log(Receiver);
 
 enum Receiver {
-    /// Called with instance, status, category and message.
+    /// A function that is called with index, status, category and message.
     Function(Py<PyAny>),
     Logger(Py<PyAny>),
 }
 
 impl Log {
-    /// Checks the argument `log`.
+    /// Converts the argument `log`.
     pub fn of(given: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Self>> {
         let Some(given) = given else { return Ok(None) };
         let logger = given.py().import("logging")?.getattr("Logger")?;
@@ -27,13 +27,13 @@ impl Log {
         Err(wrong("log", "a function or a logging.Logger", given))
     }
 
-    /// Passes messages on, in their order.
+    /// Passes on messages, in their order.
     pub fn pass(&self, py: Python, messages: Vec<Logged>) -> PyResult<()> {
         messages.into_iter().try_for_each(|logged| self.pass_one(py, logged))
     }
 
     fn pass_one(&self, py: Python, logged: Logged) -> PyResult<()> {
-        // Levels of the module logging.
+        // Levels of the Python module `logging`.
         const INFO: u32 = 20;
         const WARNING: u32 = 30;
         const ERROR: u32 = 40;

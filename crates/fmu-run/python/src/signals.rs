@@ -1,4 +1,4 @@
-//! Inputs of runs: numbers, time series and whole arrays.
+//! Converts the inputs of runs: numbers, time series and whole arrays.
 
 use crate::arguments::in_own_unit;
 use crate::buffers::{Numbers, shape};
@@ -9,29 +9,30 @@ use pyo3::prelude::*;
 use pyo3::types::{PyString, PyTuple};
 use std::sync::Arc;
 
-/// Values of inputs.
+/// The inputs of runs. Each element of an array is an input.
 #[derive(Default)]
 pub struct Signals(Vec<Signal>);
 
 struct Signal {
     name: String,
     values: Values,
-    /// Times of the input, if it has its own.
+    /// Times at which the values are given, if they are not the communication points.
     times: Option<Arc<Numbers>>,
-    /// Whether there is a value for each time, and whether for each run.
+    /// Whether there is a value for each time.
     by_time: bool,
+    /// Whether there are separate values for each run.
     by_run: bool,
 }
 
 enum Values {
     Numbers(Numbers),
     Exact(Vec<Value>),
-    /// The derivative of another input.
+    /// The time derivative of the input with this name.
     RateOf(String),
 }
 
 impl Signals {
-    /// Reads inputs, each for this number of times or with its own times.
+    /// Converts inputs, whose values are given for this number of communication points or at their own times.
     pub fn of(system: &System, given: &[(String, Bound<'_, PyAny>)], times: usize) -> PyResult<Self> {
         let mut signals = Self::default();
         for (name, value) in given {
@@ -61,6 +62,7 @@ impl Signals {
         Ok(signals)
     }
 
+    /// Adds a variable whose values float64 cannot represent, or the elements of an array of this type.
     fn push_exact(
         &mut self,
         name: &str,
@@ -106,7 +108,7 @@ impl Signals {
         trajectories.collect()
     }
 
-    /// Adds the elements of an array, or a single variable.
+    /// Adds a numeric variable, or the elements of an array.
     fn push(
         &mut self,
         name: &str,
@@ -152,7 +154,7 @@ impl Signals {
     }
 }
 
-/// Returns the name of the input whose derivative is requested by `der(name)`.
+/// Returns the name of the input if the value is "der(name)", which requests its derivative. Fails for other strings.
 fn rate_of(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Option<String>> {
     let Ok(text) = given.cast::<PyString>() else { return Ok(None) };
     let text: String = text.extract()?;
@@ -164,8 +166,8 @@ fn rate_of(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Option<String>> {
     }
 }
 
-/// Separates (times, values) or (times, values, unit) into the times and the values; other values are returned unchanged. The times
-/// are a sequence, so that a tuple of two numbers is an input for two times.
+/// Separates (times, values) or (times, values, unit) into the times and the values. Other values are returned unchanged. The times
+/// must be a sequence, because a tuple of two numbers is an input with two values.
 #[allow(clippy::type_complexity, reason = "a pair")]
 fn with_times<'py>(
     name: &str,

@@ -1,4 +1,4 @@
-//! Start values that are given as a dict.
+//! Converts start values, which are given as a dict.
 
 use crate::arguments::{in_own_unit, items};
 use crate::buffers::{Numbers, array_of, shape};
@@ -8,12 +8,11 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 
-/// Start values by name: a number, an array with one for each run or instance, a string, a sequence of
-/// strings, or whole arrays.
+/// Start values by name. A value is one number or string, one for each run or instance, or a whole array.
 #[derive(Default)]
 pub struct Start {
     values: Vec<(String, Value)>,
-    /// The values as the caller gave them, after conversion to the units of the variables. They are returned as `Runs.start`.
+    /// The values as the caller gave them, converted to the units of the variables. They are returned as `Runs.start`.
     given: Vec<(String, Py<PyAny>)>,
 }
 
@@ -23,12 +22,12 @@ enum Value {
     Each(Vec<f64>),
     Text(String),
     Texts(Vec<String>),
-    /// A string, bytes or an integer of 64 bits, for all or for each.
+    /// Strings, bytes or integers of 64 bits: one for all runs or instances, or one for each.
     Exact(Exact),
 }
 
 impl Start {
-    /// Reads start values. Converts values given as (value, unit) to the unit of their variable.
+    /// Converts start values. Values given as (value, unit) are converted to the unit of their variable.
     pub fn of(system: &System, given: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let mut start = Self::default();
         for (name, value) in items("start", given)? {
@@ -37,7 +36,7 @@ impl Start {
         Ok(start)
     }
 
-    /// Separates the structural parameters among start values, and returns the system that has them with the other start values.
+    /// Sets the structural parameters among the start values. Returns the new system and the other start values.
     pub fn configured(system: &System, given: Option<&Bound<'_, PyAny>>) -> PyResult<(System, Self)> {
         let (mut structural, mut others) = (Self::default(), Vec::new());
         for (name, value) in items("start", given)? {
@@ -76,7 +75,7 @@ impl Start {
         self.values.iter().map(|(name, of)| (name.as_str(), of.value())).collect()
     }
 
-    /// Returns the names of the values.
+    /// Returns the names of the variables or arrays that have a start value.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.given.iter().map(|(name, _)| name.as_str())
     }
@@ -90,7 +89,7 @@ impl Start {
         Ok(dict)
     }
 
-    /// Adds the elements of an array: the same value for all, an array for all runs or instances, or an array for each.
+    /// Adds the elements of an array. The value is one for all elements, an array for all runs or instances, or an array for each.
     fn add_array(
         &mut self,
         system: &System,
@@ -100,7 +99,7 @@ impl Start {
     ) -> PyResult<()> {
         let count = array.names.len();
         let is_exact = array.names.first().map_or(Ok(None), |first| exact_type(system, first))?.is_some();
-        // Names of items and Booleans.
+        // Strings are names of enumeration items, or "true" and "false".
         let is_text =
             || array_of(name, value).is_err() && Exact::of(name, value).is_ok_and(|of| of.is_text());
         if is_exact || is_text() {

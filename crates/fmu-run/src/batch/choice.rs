@@ -1,20 +1,20 @@
-//! Choice of the instance for a run: a new one, or the instance of an earlier run after a reset.
+//! Chooses the instance for a run: a new one, or the reset instance of an earlier run.
 
 use super::reuse::{Choice, Origin, Used};
 use super::worker::{Failure, Worker};
-use crate::kept::{Change, Given, Idle};
-use crate::running::Running;
+use crate::pool::{Change, Given, Idle};
+use crate::system_instance::SystemInstance;
 use fmi_abi::Interface;
 use std::time::{Duration, Instant};
 
 impl Worker<'_> {
-    /// Takes an instance of an earlier batch.
+    /// Takes an instance that an earlier batch has kept, if there is one.
     pub fn begin(&mut self) {
         if !self.may_reuse() {
             return;
         }
-        if let Some(Idle { components, given, took }) = self.system.kept().take() {
-            let instance = Running::of(self.system, components);
+        if let Some(Idle { components, given, took }) = self.system.pool().take() {
+            let instance = SystemInstance::of(self.system, components);
             self.reuse.used = Some(Used { instance, origin: Origin::Earlier(given), took });
         }
     }
@@ -26,11 +26,12 @@ impl Worker<'_> {
             return;
         }
         let given = self.given_in(origin);
-        self.system.kept().put(Idle { components: instance.into_components(), given, took });
+        self.system.pool().put(Idle { components: instance.into_components(), given, took });
     }
 
-    /// Keeps the instance of a complete run for the next run, if the duration of the run was measured.
-    pub fn keep(&mut self, instance: Running, run: usize, took: Option<Duration>) {
+    /// Keeps the instance of a complete run for the next run. `took` is the duration of the run; `None` means that instances are not
+    /// kept.
+    pub fn keep(&mut self, instance: SystemInstance, run: usize, took: Option<Duration>) {
         if self.may_reuse()
             && let Some(took) = took
         {
@@ -44,7 +45,7 @@ impl Worker<'_> {
         let is_of_this_batch = matches!(origin, Origin::Run(_));
         if !(self.reuse.is_trusted && is_of_this_batch) {
             let changes = self.given_in(origin).changes(&self.given(run));
-            let trust = self.system.kept().trust();
+            let trust = self.system.pool().trust();
             let all = self.plan.start.targets().map(Change::Value).chain([Change::Steps, Change::Inputs]);
             self.reuse.is_trusted = trust.proves(all);
             if !trust.proves(changes.iter().copied()) {
@@ -55,15 +56,15 @@ impl Worker<'_> {
         if let Some(instance) = instance.reset() {
             return Choice::Reset(instance);
         }
-        self.system.kept().trust().distrust();
+        self.system.pool().trust().distrust();
         Choice::New
     }
 
-    /// Performs a run in a new instance, after the same run in a reset instance. If both give the same bits, the
-    /// FMU can be reset after these changes.
+    /// Performs a run twice, in a reset instance and then in a new one, and returns the result of the new one. If both results are
+    /// bit-identical, this counts as a proof that the FMU can be reset after these changes.
     pub fn check(
         &mut self,
-        (instance, changes): (Running, Vec<Change>),
+        (instance, changes): (SystemInstance, Vec<Change>),
         run: usize,
         times: &[f64],
         trajectories: &mut [f64],
@@ -76,7 +77,7 @@ impl Worker<'_> {
         let again = reset.map(|instance| self.perform(instance, run, times, &mut kept, &mut measured));
         let (seen, exact) = (self.reuse.seen.take(), self.take_exact());
         self.reuse.is_check = false;
-        // Some FMUs permit only one instance.
+        // Frees the instance first, because some FMUs permit only one.
         self.reuse.used = None;
         let took = begin.elapsed();
         let result = self.run_new(run, times, trajectories, measures);
@@ -92,12 +93,12 @@ impl Worker<'_> {
             && self.has_exact(run, &exact)
             && same(&kept, trajectories)
             && same(&measured, measures);
-        let mut trust = self.system.kept().trust();
+        let mut trust = self.system.pool().trust();
         trust.checked(took);
         match (is_same, &self.reuse.used) {
             (false, _) => trust.distrust(),
             (true, Some(_)) => trust.prove(changes),
-            // Values that cannot be read are not compared.
+            // The final values could not be read, so they were not compared.
             (true, None) if result.is_ok() => trust.distrust(),
             // An incomplete run proves nothing.
             (true, None) => {}
@@ -105,22 +106,23 @@ impl Worker<'_> {
         result
     }
 
-    /// Creates an instance. The error contains the reason, and whether there is no message.
-    pub fn create(&mut self) -> Result<Running, (String, bool)> {
+    /// Creates an instance. The error contains the reason, and whether the FMU logged no message.
+    pub fn create(&mut self) -> Result<SystemInstance, (String, bool)> {
         let begin = Instant::now();
-        let instance = Running::new(self.system, self.plan.interface, &self.logging())?;
+        let instance = SystemInstance::new(self.system, self.plan.interface, &self.logging())?;
         if self.may_reuse() {
-            self.system.kept().trust().created(begin.elapsed());
+            self.system.pool().trust().created(begin.elapsed());
         }
         Ok(instance)
     }
 
-    /// Returns whether runs may share an instance. With logging on, each run has a new one, so that its messages are complete; in
-    /// Model Exchange, because resets are only proven for Co-Simulation.
+    /// Returns whether runs may share an instance. With logging on, they may not, so that the messages of each run are complete. In
+    /// Model Exchange they may not either, because resets are only checked in Co-Simulation.
     fn may_reuse(&self) -> bool {
         !self.is_logging() && self.plan.interface == Interface::CoSimulation
     }
 
+    /// Returns the values that the earlier run set.
     fn given_in(&self, origin: Origin) -> Given {
         match origin {
             Origin::Earlier(given) => given,

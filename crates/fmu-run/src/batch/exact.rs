@@ -1,30 +1,30 @@
-//! Inputs and outputs whose values `f64` does not have: strings, bytes, integers of 64 bits.
+//! Inputs and outputs whose values `f64` cannot represent: strings, bytes, integers of 64 bits.
 
 use super::Trajectory;
-use super::grid::Grid;
+use super::resampling::Resampling;
 use crate::error::{Error, request};
-use crate::found::Found;
-use crate::running::Running;
+use crate::lookup::Found;
 use crate::selection::Target;
 use crate::start::exact;
+use crate::system_instance::SystemInstance;
 use fmi_abi::Value;
 use fmi_client::Rejection;
 use std::hash::{Hash, Hasher};
 
-/// An input of a run, held between the times at which it changes.
+/// An input with its values for all runs. Each value holds until the next one.
 pub(super) struct Input {
     targets: Vec<Target>,
     values: Vec<Value>,
-    /// Number of values of a run; 0 if one value is for all times of all runs.
+    /// Number of values for each run; 0 if there is one value for all times of all runs.
     length: usize,
     /// Whether each run has its own values.
     is_each: bool,
-    /// Index of the value at each communication point, if the input has its own times.
+    /// Index of the value at each communication point, if the input is given at its own times.
     indices: Option<Vec<usize>>,
 }
 
 impl Input {
-    /// Checks the values of an input.
+    /// Checks the values of an input and converts them to its type.
     pub fn of(name: &str, found: &[Found], trajectory: Trajectory, time: &[f64]) -> Result<Self, Error> {
         let reals = |values: &[f64]| values.iter().copied().map(Value::Real).collect::<Vec<_>>();
         let mut indices = None;
@@ -37,11 +37,11 @@ impl Input {
             Trajectory::Value(value) => (vec![value.clone()], 0),
             Trajectory::Values(values) => (values.to_vec(), time.len()),
             Trajectory::Sampled { times, values } => {
-                indices = Some(Grid::of(name, times, time)?.indices());
+                indices = Some(Resampling::of(name, times, time)?.indices());
                 (reals(values), times.len())
             }
             Trajectory::SampledValues { times, values } => {
-                indices = Some(Grid::of(name, times, time)?.indices());
+                indices = Some(Resampling::of(name, times, time)?.indices());
                 (values.to_vec(), times.len())
             }
         };
@@ -77,13 +77,13 @@ impl Input {
         (0..times).for_each(|time| self.value(run, time).to_string().hash(hash));
     }
 
-    /// Returns whether the value at the time with this index differs from the one before.
+    /// Returns whether the value at the time with this index is new: it is the first one, or differs from the one before.
     pub fn changes(&self, run: usize, time: usize) -> bool {
         time == 0 || self.value(run, time) != self.value(run, time - 1)
     }
 
-    /// Sets the value at the time with this index, if it differs from the one before.
-    pub fn set(&self, instance: &mut Running, run: usize, time: usize) -> Result<(), Rejection> {
+    /// Sets the value at the time with this index if it is new.
+    pub fn set(&self, instance: &mut SystemInstance, run: usize, time: usize) -> Result<(), Rejection> {
         if !self.changes(run, time) {
             return Ok(());
         }

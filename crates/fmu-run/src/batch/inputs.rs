@@ -1,30 +1,30 @@
 //! Checks the inputs of a batch.
 
 use super::exact::Input;
-use super::grid::Grid;
+use super::resampling::Resampling;
 use super::{Batch, Trajectory};
 use crate::description::Variable;
 use crate::error::{Error, request};
-use crate::found::{Found, article, is_exact};
+use crate::lookup::{Found, article, is_exact};
 use crate::selection::{Selection, fits};
 use crate::system::System;
 use fmi_abi::BaseType;
 
-/// Inputs and their values.
+/// Numeric inputs and their values.
 #[derive(Default)]
 pub(super) struct Inputs<'a> {
     pub variables: Selection,
     pub values: Vec<Numbers<'a>>,
 }
 
-/// Numbers of an input.
+/// Values of a numeric input.
 pub(super) enum Numbers<'a> {
     Constant(f64),
     Shared(&'a [f64]),
     EachRun(&'a [f64]),
-    /// At times of the input; whether they are held, and whether each run has its own.
+    /// Values at the input's own times. `is_each`: whether each run has its own values.
     Sampled {
-        grid: Grid,
+        resampling: Resampling,
         times: &'a [f64],
         values: &'a [f64],
         is_held: bool,
@@ -32,7 +32,7 @@ pub(super) enum Numbers<'a> {
     },
 }
 
-/// Passes the inputs that have numbers to `numeric`, in their order and with their variables. Adds all others to `exact`.
+/// Checks the names of the inputs. Passes each numeric input to `numeric`, with its variables, and adds all others to `exact`.
 pub(super) fn each_input<'a, 's>(
     system: &'s System,
     batch: &'a Batch,
@@ -52,7 +52,7 @@ pub(super) fn each_input<'a, 's>(
     Ok(())
 }
 
-/// Finds an input, or another variable that may change during a run.
+/// Finds the variables of an input, or of another variable that may be set during a run.
 fn input<'s>(system: &'s System, name: &str) -> Result<Vec<Found<'s>>, Error> {
     let variables = system.find(name)?;
     variables.iter().try_for_each(|found| found.check_own(name))?;
@@ -67,11 +67,12 @@ fn input<'s>(system: &'s System, name: &str) -> Result<Vec<Found<'s>>, Error> {
     Ok(variables)
 }
 
-/// Returns whether a variable keeps its value between the times at which it is given.
+/// Returns whether values of a variable are held between the times at which they are given; otherwise they are interpolated.
 pub(super) fn is_held(of: &Variable) -> bool {
     !of.base.is_float() || of.variability.as_deref().is_some_and(|of| of != "continuous")
 }
 
+/// Adds a name. Fails if it is in `names` already.
 pub(super) fn once<'a>(names: &mut Vec<&'a str>, name: &'a str, list: &str) -> Result<(), Error> {
     if names.contains(&name) {
         return request(format!("{name} is twice among the {list}"));
@@ -80,7 +81,7 @@ pub(super) fn once<'a>(names: &mut Vec<&'a str>, name: &'a str, list: &str) -> R
     Ok(())
 }
 
-/// Checks the values of an input at these times of the runs.
+/// Checks the values of a numeric input. `time` are the communication points.
 pub(super) fn checked<'a>(
     name: &str,
     base: BaseType,
@@ -93,8 +94,8 @@ pub(super) fn checked<'a>(
         Trajectory::Shared(values) => Numbers::Shared(values),
         Trajectory::EachRun(values) => Numbers::EachRun(values),
         Trajectory::Sampled { times, values } => {
-            let grid = Grid::of(name, times, time)?;
-            Numbers::Sampled { grid, times, values, is_held, is_each: values.len() > times.len() }
+            let resampling = Resampling::of(name, times, time)?;
+            Numbers::Sampled { resampling, times, values, is_held, is_each: values.len() > times.len() }
         }
         Trajectory::RateOf(other) => {
             return request(format!(

@@ -2,8 +2,8 @@
 
 use std::str::FromStr;
 
-/// A statistic of a trajectory over all times, including times that are not kept. If a value is NaN, all
-/// statistics except the last value are NaN.
+/// A statistic of a trajectory over all times, including times whose values are not kept. If a value is NaN, all statistics except
+/// [`End`](Self::End) are NaN.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
     /// The smallest value.
@@ -12,7 +12,7 @@ pub enum Measure {
     Max,
     /// The largest magnitude.
     Peak,
-    /// Time at which the peak is reached first, s.
+    /// The time at which the peak is first reached, s.
     TimeOfPeak,
     /// The mean of the samples.
     Mean,
@@ -47,9 +47,10 @@ impl FromStr for Measure {
     }
 }
 
-/// Running data of all outputs for the requested statistics.
+/// Intermediate results for the requested statistics of all outputs.
 #[derive(Clone, Debug)]
 pub(super) struct Measured {
+    /// Which groups of statistics are requested.
     extremes: bool,
     peaks: bool,
     sums: bool,
@@ -96,13 +97,13 @@ impl Measured {
         end.fill(f64::NAN);
     }
 
-    /// Adds the outputs at a time.
+    /// Adds the values of all outputs at a time, s.
     #[inline]
     pub fn add(&mut self, time: f64, row: &[f64]) {
         self.count += 1.0;
         if self.extremes {
             for ((min, max), value) in self.min.iter_mut().zip(&mut self.max).zip(row) {
-                // No later value is below or above NaN, so that NaN stays.
+                // NaN stays, because comparisons with it are false.
                 *min = if *value < *min || value.is_nan() { *value } else { *min };
                 *max = if *value > *max || value.is_nan() { *value } else { *max };
             }
@@ -125,7 +126,7 @@ impl Measured {
         self.end.copy_from_slice(row);
     }
 
-    /// Returns a statistic; NaN without outputs.
+    /// Returns a statistic of an output. Before the first call of [`add`](Self::add), it is NaN.
     pub fn measure(&self, measure: Measure, output: usize) -> f64 {
         match measure {
             _ if self.count == 0.0 => f64::NAN,
@@ -144,7 +145,7 @@ impl Measured {
 mod tests {
     use super::{Measure, Measured};
 
-    /// Calculates the statistics of a series as their definitions say.
+    /// Calculates a statistic directly from its definition.
     fn expected(measure: Measure, times: &[f64], values: &[f64]) -> f64 {
         let (count, end) = (values.len() as f64, values[values.len() - 1]);
         if measure == Measure::End {
@@ -168,7 +169,7 @@ mod tests {
         }
     }
 
-    /// Compares the statistics of successive runs, each with NaN at other times.
+    /// Compares the statistics of successive runs that have NaN at different times.
     #[test]
     fn not_a_number_stays_and_no_run_affects_the_next() {
         let measures = Measure::ALL.map(|(_, measure)| measure);
@@ -185,7 +186,7 @@ mod tests {
         let mut measured = Measured::new(&measures, 2);
         for run in runs {
             measured.begin();
-            // Its second output is never NaN.
+            // The second output is the time, which is never NaN.
             times.iter().zip(run).for_each(|(time, value)| measured.add(*time, &[value, *time]));
             for measure in measures {
                 let found = [0, 1].map(|output| measured.measure(measure, output));

@@ -1,17 +1,17 @@
-//! Many runs of an FMU or a system.
+//! Batches: many runs of an FMU or a system.
 
 mod choice;
 mod exact;
-mod exchange;
-mod grid;
+mod input_rows;
 mod inputs;
-mod integrated;
 mod measure;
+mod model_exchange;
+mod model_exchange_plan;
 mod plan;
 mod pulse;
+mod resampling;
 mod reuse;
 mod run;
-mod signals;
 mod watch;
 mod worker;
 
@@ -25,41 +25,40 @@ use crate::start::Start;
 use crate::system::System;
 use fmi_abi::{Interface, Value};
 
-/// Specification of runs. If an input or a start value is given for each run, there are many runs; otherwise
-/// there is one.
+/// Specification of runs. The number of runs is the number of values or time series that an input or a start value has for separate
+/// runs. If none has several, there is one run.
 ///
-/// In each run, start values are set before Initialization Mode, and inputs of the first time in it. At each
-/// time, inputs are set, outputs are read, and a step to the next time follows.
+/// In each run, start values are set before Initialization Mode, and the first values of the inputs in Initialization Mode. Then, at
+/// each time, inputs are set, outputs are read, and a step to the next time is performed.
 ///
-/// In Model Exchange, the states are integrated between the events. Continuous inputs are functions of time: the line between two
-/// values, or the cubic that has the [given derivatives](Self::input_derivatives), too. All other inputs change in Event Mode.
+/// In Model Exchange, the states are integrated between events. Continuous inputs are interpolated between their values by lines, or
+/// by cubics if their [derivatives](Self::input_derivatives) are given. All other inputs change in Event Mode.
 #[derive(Clone, Debug, Default)]
 pub struct Batch<'a> {
-    /// Communication points, s: finite, increasing, at least two.
+    /// Communication points, s. They must be finite and increasing, and at least two.
     pub time: &'a [f64],
-    /// Inputs and their values. All other inputs keep their start values.
+    /// Inputs and their values. Inputs that are not listed keep their start values.
     pub inputs: Vec<(&'a str, Trajectory<'a>)>,
-    /// Time derivatives of inputs, of order 1. In Co-Simulation they are set together with the inputs (only FMI 2.0); in Model
-    /// Exchange they belong to the values of a continuous input, at the same times.
+    /// First time derivatives of inputs. In Co-Simulation they are set together with the inputs (only FMI 2.0). In Model Exchange
+    /// they belong to a continuous input and are given at the same times as its values.
     pub input_derivatives: Vec<(&'a str, Trajectory<'a>)>,
     /// Start values of parameters, states, inputs and so on.
     pub start: Vec<(&'a str, Start<'a>)>,
-    /// Outputs to read: any variables. Strings, bytes and integers of 64 bits are in [`Runs::exact`], all others in
+    /// Variables to read. Strings, bytes and integers of 64 bits are returned in [`Runs::exact`], all others in
     /// [`Runs::trajectories`], each in this order.
     pub outputs: Vec<&'a str>,
-    /// Outputs are kept at the first time and then at each `every`-th time; `None` keeps no trajectories.
+    /// Stores the outputs at every `every`-th time, beginning with the first; `None` stores no trajectories.
     pub every: Option<usize>,
     /// Statistics of each output, over all times.
     pub measures: Vec<Measure>,
     /// Number of threads; `None` uses one thread for each processor.
     pub threads: Option<usize>,
-    /// Whether outputs are read directly after a step, before the next inputs are set. Section 4.2.4 of FMI
-    /// 2.0 describes this order, and FMPy uses it. Outputs that depend directly on inputs then lag by one
-    /// step.
+    /// Whether outputs are read directly after a step, before the next inputs are set. This is the order of section 4.2.4 of FMI 2.0
+    /// and of FMPy. Outputs that depend directly on inputs then lag by one step.
     pub read_before_set: bool,
     /// Relative tolerance for solvers inside the FMU.
     pub tolerance: Tolerance,
-    /// Interface type; `None` means Co-Simulation, or Model Exchange if the FMU has nothing else.
+    /// Interface type; `None` means Co-Simulation, or Model Exchange if the FMU has only that.
     pub interface: Option<Interface>,
     /// Solver and tolerances, in Model Exchange.
     pub integration: Integration,
@@ -72,13 +71,13 @@ pub struct Batch<'a> {
 pub enum Trajectory<'a> {
     /// One constant value.
     Constant(f64),
-    /// A value for each time, equal in all runs.
+    /// A value for each time, the same in all runs.
     Shared(&'a [f64]),
-    /// A time series for each run, concatenated: runs times x times.
+    /// A time series for each run, concatenated; the index of the time varies fastest.
     EachRun(&'a [f64]),
-    /// Values at the input's own times, s, which do not decrease: a time series for all runs, or one for each run, concatenated.
-    /// Between times, a continuous variable follows the line and any other is held; equal times are a step; before the first and
-    /// after the last time, the value is constant.
+    /// Values at the input's own times, which must not decrease: one time series for all runs, or one for each run, concatenated.
+    /// Between two times, a continuous variable is interpolated linearly and any other keeps the earlier value. Two equal times are a
+    /// step. Before the first and after the last time, the value is constant.
     Sampled {
         /// Times, s.
         times: &'a [f64],
@@ -87,11 +86,11 @@ pub enum Trajectory<'a> {
     },
     /// One constant value of any type.
     Value(&'a Value),
-    /// Values of any type: one for each time, or times for each run, concatenated. They are held between times.
+    /// Values of any type: one time series for all runs, or one for each run, concatenated. Each value holds until the next time.
     Values(&'a [Value]),
-    /// The time derivative of another input, by its name, in Model Exchange.
+    /// The time derivative of the input with this name, in Model Exchange.
     RateOf(&'a str),
-    /// Values of any type at the input's own times, s.
+    /// Values of any type at the input's own times, otherwise as [`Values`](Self::Values).
     SampledValues {
         /// Times, s.
         times: &'a [f64],
@@ -101,7 +100,7 @@ pub enum Trajectory<'a> {
 }
 
 impl Trajectory<'_> {
-    /// Returns the number of values, and of times that they are for; `None` if one value is for all times.
+    /// Returns the number of values and the number of times of a run; `None` if one value is for all times.
     fn counts(&self, times: usize) -> Option<(usize, usize)> {
         match self {
             Self::Constant(_) | Self::Value(_) | Self::RateOf(_) => None,
@@ -118,7 +117,7 @@ impl Trajectory<'_> {
 pub struct Size {
     /// Number of runs.
     pub runs: usize,
-    /// Number of outputs.
+    /// Number of outputs in [`Runs::trajectories`].
     pub outputs: usize,
     /// Number of [kept](Batch::every) times: the length of a trajectory.
     pub kept: usize,
@@ -129,12 +128,12 @@ pub struct Size {
 }
 
 impl Size {
-    /// Returns the number of values of all trajectories; `None` if they exceed the address space.
+    /// Returns the number of values in [`Runs::trajectories`]; `None` if they exceed the address space.
     pub fn trajectories(&self) -> Option<usize> {
         self.values(self.kept)
     }
 
-    /// Returns the number of all statistics; `None` if they exceed the address space.
+    /// Returns the number of values in [`Runs::measures`]; `None` if they exceed the address space.
     pub fn measures(&self) -> Option<usize> {
         self.values(self.measures)
     }
@@ -148,25 +147,24 @@ impl Size {
 /// Results of a [`Batch`].
 #[derive(Clone, Debug, Default)]
 pub struct Runs {
-    /// Shape of the results.
+    /// Numbers of runs, outputs, times and statistics.
     pub size: Size,
-    /// Trajectories: runs, outputs, times; the last index varies fastest. Times that a run has not reached
-    /// are NaN.
+    /// Trajectories, with the indices run, output and time, of which the last varies fastest. Values at times that a run has not
+    /// reached are NaN.
     pub trajectories: Vec<f64>,
-    /// Statistics: runs, outputs, statistics; the last index varies fastest. They are NaN for a failed run.
-    /// If the FMU ended a run, they cover the times until then.
+    /// Statistics, with the indices run, output and statistic, of which the last varies fastest. They are NaN for a failed run. If
+    /// the FMU ended a run early, they cover the times until then.
     pub measures: Vec<f64>,
-    /// Values of outputs that are strings, bytes or integers of 64 bits: runs, outputs, times; the last index varies fastest. `None`
-    /// at times that a run has not reached.
+    /// Values of outputs that are strings, bytes or integers of 64 bits, with the indices run, output and time, of which the last
+    /// varies fastest. They are `None` at times that a run has not reached.
     pub exact: Vec<Option<Value>>,
-    /// Runs that did not reach the last time, in ascending order, each with the time reached and the message
-    /// of the FMU. Either a call failed or the FMU ended the simulation. If a run failed without a message,
-    /// it is repeated with logging on after all other runs, unless this takes much longer.
+    /// Runs that did not reach the last time, because a call failed or the FMU ended the simulation. Each has the index of the run,
+    /// and a message with the time reached and the reason. A run that failed without a message is repeated with logging on after all
+    /// other runs, unless this takes much longer.
     pub errors: Vec<(usize, String)>,
-    /// Notes about runs that reached the last time: the FMU ended the simulation there, or its termination
-    /// failed.
+    /// Notes about runs that reached the last time: the FMU ended the simulation there, or `terminate` failed.
     pub notes: Vec<(usize, String)>,
-    /// Events of each run, in the order of runs and times, if they were [requested](Batch::events).
+    /// Events, sorted by run and time, if they were [requested](Batch::events).
     pub events: Vec<Occurrence>,
 }
 
@@ -187,9 +185,9 @@ impl System {
     /// Performs the runs.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if the batch is inconsistent or does not fit the FMU. Also returns
-    /// [`Error::Memory`], [`Error::Cancelled`], or [`Error::Fmu`] if no threads can be made. A failed run is
-    /// not an error here; see [`Runs::errors`].
+    /// Returns [`Error::Request`] if the batch is inconsistent or does not fit the FMU, [`Error::Memory`] if the results do not fit
+    /// in memory, [`Error::Cancelled`] if the caller cancels the runs, and [`Error::Fmu`] if no threads can be created. A failed run
+    /// is not an error here; see [`Runs::errors`].
     pub fn run(&self, batch: &Batch, watch: &Watch) -> Result<Runs, Error> {
         let planned = self.plan(batch)?;
         let size = planned.size();
@@ -199,7 +197,7 @@ impl System {
         Ok(Runs { size, trajectories, measures, exact, errors, notes, events })
     }
 
-    /// Checks a batch, for callers that provide the memory for its results.
+    /// Checks a batch. Used by callers that provide the memory for its results.
     ///
     /// # Errors
     /// Returns [`Error::Request`] as [`run`](Self::run) does.
@@ -209,22 +207,22 @@ impl System {
     }
 }
 
-/// A checked [`Batch`]; it keeps its system loaded.
+/// A checked [`Batch`]. It keeps its system loaded.
 pub struct Planned<'a> {
     plan: plan::Plan<'a>,
     system: System,
 }
 
-/// Results of [`Planned::run`] that are not in memory of the caller.
+/// Results that [`Planned::run`] returns, in addition to those in the caller's memory.
 #[derive(Clone, Debug, Default)]
 pub struct Finished {
-    /// As [`Runs::errors`].
+    /// See [`Runs::errors`].
     pub errors: Vec<(usize, String)>,
-    /// As [`Runs::notes`].
+    /// See [`Runs::notes`].
     pub notes: Vec<(usize, String)>,
-    /// As [`Runs::exact`].
+    /// See [`Runs::exact`].
     pub exact: Vec<Option<Value>>,
-    /// As [`Runs::events`].
+    /// See [`Runs::events`].
     pub events: Vec<Occurrence>,
 }
 
@@ -235,7 +233,7 @@ impl Planned<'_> {
         Size {
             runs: plan.runs,
             outputs: plan.outputs.len(),
-            kept: plan.kept(),
+            kept: plan.stored_times(),
             measures: plan.measures.len(),
             exact: plan.exact_outputs.len(),
         }
@@ -246,8 +244,8 @@ impl Planned<'_> {
         self.plan.exact_outputs.iter().map(|(name, _)| name.as_str())
     }
 
-    /// Performs the runs and writes the results to memory of the caller, in the layout of [`Runs`]. Returns the
-    /// other results.
+    /// Performs the runs. Writes trajectories and statistics to the caller's memory, in the layout of [`Runs`], and returns the other
+    /// results.
     ///
     /// # Errors
     /// Same errors as [`System::run`].
@@ -264,6 +262,7 @@ impl Planned<'_> {
     }
 }
 
+/// Allocates zeros. Fails if memory does not suffice.
 fn zeros(count: Option<usize>) -> Result<Vec<f64>, Error> {
     match count {
         Some(count) if Vec::<f64>::new().try_reserve_exact(count).is_ok() => Ok(vec![0.0; count]),

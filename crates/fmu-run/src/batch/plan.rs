@@ -1,13 +1,13 @@
-//! Checks a batch and looks up its names.
+//! Checks a batch and looks up its variables.
 
 use super::exact::Input;
 use super::inputs::{Inputs, Numbers, checked, each_input, is_held, once};
-use super::integrated::Integrated;
+use super::model_exchange_plan::ModelExchangePlan;
 use super::{Batch, Measure, Trajectory};
 use crate::continuous::Integration;
 use crate::error::{Error, request};
-use crate::found::is_exact;
 use crate::instance::Tolerance;
+use crate::lookup::is_exact;
 use crate::selection::{Selection, Target};
 use crate::start::{Start, StartValues};
 use crate::system::System;
@@ -21,13 +21,13 @@ pub(super) struct Plan<'a> {
     pub runs: usize,
     pub inputs: Inputs<'a>,
     pub derivatives: Inputs<'a>,
-    /// Variables of both.
+    /// Variables of all inputs and input derivatives.
     pub set_in_steps: Arc<[Target]>,
     pub start: StartValues<'a>,
-    /// Inputs whose values numbers do not have.
+    /// Inputs whose values `f64` cannot represent.
     pub exact_inputs: Vec<Input>,
     pub outputs: Selection,
-    /// Outputs whose values numbers do not have.
+    /// Outputs whose values `f64` cannot represent.
     pub exact_outputs: Vec<(String, Target)>,
     pub every: Option<usize>,
     pub measures: &'a [Measure],
@@ -35,8 +35,8 @@ pub(super) struct Plan<'a> {
     pub read_before_set: bool,
     pub tolerance: Tolerance,
     pub interface: Interface,
-    /// Inputs and settings of Model Exchange.
-    pub integrated: Option<Integrated<'a>>,
+    /// Inputs and settings of Model Exchange; `None` in Co-Simulation.
+    pub model_exchange: Option<ModelExchangePlan<'a>>,
 }
 
 impl<'a> Plan<'a> {
@@ -61,7 +61,7 @@ impl<'a> Plan<'a> {
             read_before_set: batch.read_before_set,
             tolerance: batch.tolerance,
             interface,
-            integrated: None,
+            model_exchange: None,
         };
         if batch.every == Some(0) {
             return request("every must be at least 1".to_owned());
@@ -80,14 +80,14 @@ impl<'a> Plan<'a> {
                 plan.find_inputs(system, batch)?;
             }
             Interface::ModelExchange => {
-                plan.integrated = Integrated::of(system, batch, &mut plan.exact_inputs)?;
+                plan.model_exchange = ModelExchangePlan::of(system, batch, &mut plan.exact_inputs)?;
             }
         }
         Ok(plan)
     }
 
-    /// Returns the number of kept times.
-    pub fn kept(&self) -> usize {
+    /// Returns the number of times at which outputs are stored.
+    pub fn stored_times(&self) -> usize {
         self.every.map_or(0, |every| self.time.len().div_ceil(every))
     }
 
@@ -123,7 +123,7 @@ impl<'a> Plan<'a> {
                 Numbers::Shared(values) => values,
                 Numbers::EachRun(values) => of_run(values, times),
                 Numbers::Sampled { values, is_each: false, .. } => values,
-                Numbers::Sampled { grid, values, .. } => of_run(values, grid.length),
+                Numbers::Sampled { resampling, values, .. } => of_run(values, resampling.length),
             };
             values.iter().for_each(|value| hash.write_u64(value.to_bits()));
         }
@@ -134,7 +134,7 @@ impl<'a> Plan<'a> {
     }
 }
 
-/// Fails if settings of Model Exchange are given for Co-Simulation.
+/// Fails if settings for Model Exchange are given in Co-Simulation.
 fn check_of_co_simulation(batch: &Batch) -> Result<(), Error> {
     if batch.events || batch.integration != Integration::default() {
         return request(
@@ -145,6 +145,7 @@ fn check_of_co_simulation(batch: &Batch) -> Result<(), Error> {
     Ok(())
 }
 
+/// Fails unless there are at least two times, which are finite and increase.
 fn checked_time(time: &[f64]) -> Result<&[f64], Error> {
     if time.len() < 2 {
         return request(format!("time has {} values; a run needs at least two", time.len()));
@@ -162,7 +163,7 @@ fn checked_time(time: &[f64]) -> Result<&[f64], Error> {
     Ok(time)
 }
 
-/// Returns the number of runs; checks that all values for each run agree on it.
+/// Returns the number of runs. Fails if inputs and start values are given for different numbers of runs.
 fn runs(batch: &Batch) -> Result<usize, Error> {
     let mut found: Option<(&str, usize)> = None;
     let trajectories =

@@ -1,14 +1,16 @@
-//! Regular calls during runs.
+//! Regular calls of a function during runs.
 
 use std::time::{Duration, Instant};
 
-/// Clock for a loop of steps. Reading the time takes as long as a short step, so it is read only after several short steps.
+/// Clock for a loop of steps. Because reading the time takes as long as a short step, it is read only once in several short steps.
 pub(super) struct Pulse {
-    /// Number of steps until the time is read, and between two reads.
+    /// Number of steps until the time is read again.
     left: u32,
+    /// Number of steps between two reads of the time.
     every: u32,
-    /// Time of the last read, and the time at which the pulse was due last.
+    /// Time of the last read.
     read: Instant,
+    /// Time at which the last pulse was due.
     due: Instant,
 }
 
@@ -23,7 +25,7 @@ impl Pulse {
     /// Time between two pulses.
     pub const INTERVAL: Duration = Duration::from_millis(100);
 
-    /// Returns whether a pulse is due. It is called at each step.
+    /// Returns whether a pulse is due. Must be called at each step.
     #[inline]
     pub fn is_due(&mut self) -> bool {
         self.is_due_by(Instant::now)
@@ -55,7 +57,7 @@ mod tests {
     use std::cell::Cell;
     use std::time::Duration;
 
-    /// Returns the numbers of pulses and of reads of the clock in as many steps.
+    /// Returns the number of pulses, and the number of reads of the clock, in `steps` steps.
     fn count(pulse: &mut Pulse, now: &Cell<std::time::Instant>, steps: u32, step: Duration) -> [u32; 2] {
         let mut found = [0; 2];
         for _ in 0..steps {
@@ -77,7 +79,7 @@ mod tests {
         let now = Cell::new(pulse.read);
         let [pulses, reads] = count(&mut pulse, &now, 1_000_000, Duration::from_micros(1));
         assert!((9..=10).contains(&pulses) && reads < 1_000_000 / 60, "{pulses} {reads}");
-        // If steps become long, there is a pulse at each of them, after at most 64 + 32 + 16 + ...
+        // If steps become long, each of them has a pulse, after at most 64 + 32 + 16 + ... further steps.
         count(&mut pulse, &now, 128, Duration::from_secs(1));
         assert_eq!(count(&mut pulse, &now, 20, Duration::from_secs(1)), [20, 20]);
     }

@@ -1,4 +1,4 @@
-//! Performs a plan: each thread takes the next run, until none is left.
+//! Performs a plan: each thread performs one run after the other until none is left.
 
 use super::Finished;
 use super::plan::Plan;
@@ -12,20 +12,20 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{self, Duration};
 
-/// Messages with the number of their run.
+/// Messages with the index of their run.
 pub(super) type Messages = Vec<(usize, String)>;
 
-/// Maximum time for [`repeat_with_logging`], in addition to the time of the runs.
+/// Maximum duration of [`repeat_with_logging`], in addition to the duration of the runs.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// Results of a run, which the run fills.
+/// Memory for the results of a run.
 struct Row<'a> {
     run: usize,
     trajectories: &'a mut [f64],
     measures: &'a mut [f64],
 }
 
-/// Fills trajectories and statistics; returns errors and notes.
+/// Performs all runs. Fills trajectories and statistics, and returns the other results.
 pub(super) fn run(
     system: &System,
     plan: &Plan,
@@ -33,7 +33,8 @@ pub(super) fn run(
     [trajectories, measures]: [&mut [f64]; 2],
 ) -> Result<Finished, Error> {
     let begin = time::Instant::now();
-    let (trajectory, measured) = (plan.outputs.len() * plan.kept(), plan.outputs.len() * plan.measures.len());
+    let (trajectory, measured) =
+        (plan.outputs.len() * plan.stored_times(), plan.outputs.len() * plan.measures.len());
     let fits = trajectories.len() >= plan.runs * trajectory && measures.len() >= plan.runs * measured;
     assert!(fits, "there is too little memory for {} runs", plan.runs);
     let rows = split(trajectories, trajectory).zip(split(measures, measured));
@@ -86,9 +87,9 @@ pub(super) fn run(
     Ok(Finished { errors, notes, exact: arranged(plan, exact.into_iter().flatten()), events })
 }
 
-/// Returns the values of all runs in the order of [`Runs::exact`](super::Runs::exact).
+/// Sorts the values of all runs in the order of [`Runs::exact`](super::Runs::exact).
 fn arranged(plan: &Plan, found: impl Iterator<Item = Exact>) -> Vec<Option<Value>> {
-    let (outputs, kept) = (plan.exact_outputs.len(), plan.kept());
+    let (outputs, kept) = (plan.exact_outputs.len(), plan.stored_times());
     let mut all = vec![None; plan.runs * outputs * kept];
     for (run, values) in found {
         for (index, value) in values.into_iter().enumerate() {
@@ -99,8 +100,8 @@ fn arranged(plan: &Plan, found: impl Iterator<Item = Exact>) -> Vec<Option<Value
     all
 }
 
-/// Repeats runs that failed without a message, because many FMUs give reasons only with logging on. Repeats
-/// each run up to its failure, after all other runs, and keeps only the message.
+/// Repeats runs that failed without a message, because many FMUs log reasons only with logging on. Each run is repeated up to its
+/// failure, and only the message is used. Stops at the time `until`.
 fn repeat_with_logging(
     system: &System,
     plan: &Plan,
@@ -112,7 +113,7 @@ fn repeat_with_logging(
     let next = || silent.lock().unwrap_or_else(PoisonError::into_inner).next();
     let repeated = on_threads(system, plan.threads, watch, |number| {
         let mut worker = Worker::new(system, plan, watch, number, Some(until));
-        let mut trajectories = vec![0.0; plan.outputs.len() * plan.kept()];
+        let mut trajectories = vec![0.0; plan.outputs.len() * plan.stored_times()];
         let mut measures = vec![0.0; plan.outputs.len() * plan.measures.len()];
         while !watch.is_cancelled()
             && time::Instant::now() < until
@@ -130,8 +131,8 @@ fn repeat_with_logging(
     repeated.map(drop)
 }
 
-/// Calls `work` in as many threads with the number of the thread and returns the results. This thread is
-/// number 0; it calls the pulse while it waits for the others.
+/// Calls `work` in this number of threads, with the index of the thread, and returns the results. The calling thread has the index 0;
+/// while it waits for the others, it calls the pulse.
 fn on_threads<T: Send>(
     system: &System,
     threads: usize,
@@ -141,7 +142,7 @@ fn on_threads<T: Send>(
     if threads <= 1 {
         return Ok(vec![work(0)]);
     }
-    let others = system.kept().take_threads(threads - 1)?;
+    let others = system.pool().take_threads(threads - 1)?;
     let (found, running, arrived) = (Mutex::new(Vec::new()), Mutex::new(threads - 1), Condvar::new());
     others.pool().in_place_scope(|scope| {
         for number in 1..threads {
@@ -167,11 +168,11 @@ fn on_threads<T: Send>(
             }
         }
     });
-    system.kept().put_threads(others);
+    system.pool().put_threads(others);
     Ok(found.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// Counts a thread as arrived when it is dropped, also after a panic.
+/// Decrements the number of running threads when it is dropped, even after a panic.
 struct Arrival<'a>(&'a Mutex<usize>, &'a Condvar);
 
 impl Drop for Arrival<'_> {
@@ -181,7 +182,7 @@ impl Drop for Arrival<'_> {
     }
 }
 
-/// Returns the requested number of parts of equal length; parts after the end of the values are empty.
+/// Splits values into parts of this length. After the last complete part, the parts are empty.
 fn split(values: &mut [f64], length: usize) -> impl Iterator<Item = &mut [f64]> {
     let mut rest = values;
     std::iter::repeat_with(move || {

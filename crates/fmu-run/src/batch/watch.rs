@@ -1,4 +1,4 @@
-//! Progress of runs, for the caller.
+//! Lets the caller observe and cancel runs.
 
 use crate::messages::{Feed, Logged};
 use std::fmt;
@@ -8,12 +8,13 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 /// Function that is called ten times per second.
 type OnPulse = Box<dyn Fn(&Watch) + Send + Sync>;
 
-/// Access to the progress of [`System::run`](crate::System::run) for another thread, or for the thread that calls it.
+/// Shows the progress of [`System::run`](crate::System::run) and can cancel it, from the calling thread or another one.
 #[derive(Default)]
 pub struct Watch {
     pulse: Option<OnPulse>,
     pub(super) done: AtomicUsize,
     cancelled: AtomicBool,
+    /// Runs that the FMU has ended: index, end time in s, and outputs.
     pub(super) ended: Mutex<Vec<(usize, f64, Vec<f64>)>>,
     pub(super) listening: bool,
     /// Collects all messages during the runs.
@@ -30,8 +31,8 @@ impl fmt::Debug for Watch {
 }
 
 impl Watch {
-    /// Creates a watch whose function is called ten times per second, between steps, by the thread that called
-    /// [`System::run`](crate::System::run). It may [cancel](Self::cancel) the runs.
+    /// Creates a watch with a function that is called ten times per second, between steps, by the thread that called
+    /// [`System::run`](crate::System::run). The function may [cancel](Self::cancel) the runs.
     ///
     /// ```
     /// let watch = fmu_run::Watch::pulsing(|watch| eprintln!("{} runs are finished", watch.done()));
@@ -41,12 +42,12 @@ impl Watch {
         Self { pulse: Some(Box::new(pulse)), ..Self::default() }
     }
 
-    /// Creates a watch that receives all messages of the FMU. Logging is switched on.
+    /// Creates a watch that collects all messages of the FMU and switches logging on.
     pub fn listening() -> Self {
         Self { listening: true, ..Self::default() }
     }
 
-    /// Receives all messages of the FMU, too. Logging is switched on.
+    /// Collects all messages of the FMU, too, and switches logging on.
     #[must_use]
     pub fn and_listening(self) -> Self {
         Self { listening: true, ..self }
@@ -57,8 +58,8 @@ impl Watch {
         self.feed.get().map(|feed| feed.take()).unwrap_or_default()
     }
 
-    /// Returns the runs that the FMU has ended, in the order of their numbers, each with its end time in s and the outputs at
-    /// this time, which are NaN if they cannot be read.
+    /// Returns the runs that the FMU has ended, sorted by their index. Each has its index, the end time in s, and the outputs at this
+    /// time, which are NaN if they cannot be read.
     pub fn ended(&self) -> Vec<(usize, f64, Vec<f64>)> {
         let mut ended = lock(&self.ended).clone();
         ended.sort_unstable_by_key(|(run, ..)| *run);
@@ -70,7 +71,7 @@ impl Watch {
         self.done.load(Ordering::Relaxed)
     }
 
-    /// Cancels the runs: no further run begins, and current runs end after their step.
+    /// Cancels the runs: no further run begins, and current runs stop after the current step.
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
     }

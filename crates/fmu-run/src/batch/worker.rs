@@ -1,32 +1,32 @@
-//! A thread of a batch: performs one run after the other.
+//! The work of a thread of a batch, which performs one run after the other.
 
 use super::Occurrence;
+use super::input_rows::InputRows;
 use super::measure::Measured;
 use super::plan::Plan;
 use super::pulse::Pulse;
 use super::reuse::{Choice, Reuse};
-use super::signals::Signals;
 use super::watch::{Watch, lock};
 use crate::instance::Experiment;
 use crate::messages::{Feed, Logging};
-use crate::running::Running;
 use crate::system::System;
+use crate::system_instance::SystemInstance;
 use fmi_abi::Value;
 use fmi_client::Rejection;
 use std::sync::Arc;
 use std::time;
 
-/// Failure of a run before its last time.
+/// Failure of a run before the last time.
 #[derive(PartialEq)]
 pub(super) struct Failure {
-    /// Index of the time of the failure; `None` before the end of the initialization.
+    /// Index of the time of the failure; `None` if the initialization failed.
     pub at: Option<usize>,
     pub text: String,
-    /// Whether the FMU gave no reason.
+    /// Whether the FMU logged no message.
     pub is_silent: bool,
 }
 
-/// Values of a run at the kept times that it has reached, output by output at each time.
+/// Index of a run, and its values that `f64` cannot represent: for each stored time that it reached, the values of all such outputs.
 pub(super) type Exact = (usize, Vec<Value>);
 
 /// Instance and buffers of a thread.
@@ -34,40 +34,41 @@ pub(super) struct Worker<'a> {
     pub system: &'a System,
     pub plan: &'a Plan<'a>,
     pub watch: &'a Watch,
-    /// Deadline of a run that is repeated with logging on.
+    /// Deadline, if failed runs are repeated with logging on.
     deadline: Option<time::Instant>,
-    /// Collects all messages, and the number of the instance.
+    /// Collector of all messages, if the caller requests them, and the number of this thread's instance.
     pub feed: Option<(Arc<Feed>, usize)>,
-    /// Whether this thread called the runs; then it calls the pulse.
+    /// Whether this is the thread of the caller, which calls the pulse.
     is_caller: bool,
     pulse: Pulse,
     pub reuse: Reuse,
-    inputs: Signals<'a>,
-    derivatives: Signals<'a>,
-    /// Number of the run.
+    inputs: InputRows<'a>,
+    derivatives: InputRows<'a>,
+    /// Index of the current run.
     number: usize,
-    /// Values of the current run that are not numbers, and such values of finished runs.
+    /// Values of the current run that `f64` cannot represent.
     exact_of_run: Vec<Value>,
+    /// The same for finished runs.
     pub exact: Vec<Exact>,
     /// Events in Model Exchange.
     pub events: Vec<Occurrence>,
-    /// Orders of the input derivatives.
+    /// Orders of the input derivatives, which are all 1.
     orders: Vec<i32>,
-    /// Outputs at a time, in their order.
+    /// Numeric outputs at the current time.
     pub row: Vec<f64>,
-    /// Number of times that the run has reached.
+    /// Number of communication points that the run has reached.
     pub reached: usize,
     measured: Measured,
 }
 
-/// Index of the next kept value in a trajectory, and number of times until then.
+/// Position in the trajectories of a run: index of the next stored value, and number of communication points until then.
 #[derive(Default)]
 pub(super) struct Kept {
     index: usize,
     wait: usize,
 }
 
-/// Index of the time (`None` before the end of the initialization) and the error.
+/// Index of the time at which a run stopped (`None` if the initialization failed), and the error.
 pub(super) type Stopped = (Option<usize>, Rejection);
 
 impl<'a> Worker<'a> {
@@ -87,8 +88,8 @@ impl<'a> Worker<'a> {
             is_caller: number == 0,
             pulse: Pulse::default(),
             reuse: Reuse::default(),
-            inputs: Signals::new(&plan.inputs),
-            derivatives: Signals::new(&plan.derivatives),
+            inputs: InputRows::new(&plan.inputs),
+            derivatives: InputRows::new(&plan.derivatives),
             number: 0,
             exact_of_run: Vec::new(),
             exact: Vec::new(),
@@ -100,7 +101,7 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Returns whether the FMU logs its messages, and instances are new for each run, so that the messages are complete.
+    /// Returns whether logging is on. Each run then has a new instance, so that its messages are complete.
     pub fn is_logging(&self) -> bool {
         self.deadline.is_some() || self.feed.is_some()
     }
@@ -109,7 +110,7 @@ impl<'a> Worker<'a> {
         Logging { on: self.is_logging(), feed: self.feed.clone() }
     }
 
-    /// Performs a run over these times. May return a note if the run reaches the last time.
+    /// Performs a run over these times. If the run reaches the last time, the result may be a note about its end.
     pub fn run(
         &mut self,
         run: usize,
@@ -143,26 +144,28 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Performs a run in this instance, which can be used again if the run is complete.
+    /// Performs a run in this instance, and keeps the instance for later runs if the run is complete.
     pub fn perform(
         &mut self,
-        mut instance: Running,
+        mut instance: SystemInstance,
         run: usize,
         times: &[f64],
         trajectories: &mut [f64],
         measures: &mut [f64],
     ) -> Result<Option<String>, Failure> {
         let plan = self.plan;
-        let begin = self.system.kept().trust().may_keep().then(time::Instant::now);
+        let begin = self.system.pool().trust().may_keep().then(time::Instant::now);
         instance.forget_log();
         self.inputs.begin(&plan.inputs, run, plan.time.len());
         self.derivatives.begin(&plan.derivatives, run, plan.time.len());
         (self.reached, self.number) = (0, run);
         self.exact_of_run.clear();
         self.measured.begin();
-        let stopped = match &plan.integrated {
+        let stopped = match &plan.model_exchange {
             None => self.follow(times, &mut instance, run, trajectories).err(),
-            Some(integrated) => self.integrate(integrated, times, &mut instance, run, trajectories).err(),
+            Some(model_exchange) => {
+                self.integrate(model_exchange, times, &mut instance, run, trajectories).err()
+            }
         };
         if !self.is_repeated() && !plan.exact_outputs.is_empty() {
             self.exact.push((run, std::mem::take(&mut self.exact_of_run)));
@@ -174,7 +177,7 @@ impl<'a> Worker<'a> {
             lock(&self.watch.ended).extend(ended.map(|time| (run, time, self.row.clone())));
         }
         let filled = plan.every.map_or(0, |every| self.reached.div_ceil(every));
-        for trajectory in trajectories.chunks_mut(plan.kept().max(1)) {
+        for trajectory in trajectories.chunks_mut(plan.stored_times().max(1)) {
             trajectory[filled..].fill(f64::NAN);
         }
         let rejected = stopped.as_ref().is_some_and(|(_, rejection)| rejection.ended().is_none());
@@ -187,7 +190,7 @@ impl<'a> Worker<'a> {
         let is_usable = is_complete && self.reuse.observe(&mut instance);
         let mut terminated = if rejected { Ok(()) } else { instance.terminate() };
         if is_complete && !is_usable {
-            // The error comes from the comparison, not from the run.
+            // The instance became unusable when its values were read for the comparison, so this is not an error of the run.
             terminated = Ok(());
         } else if is_complete && terminated.is_ok() {
             self.keep(instance, run, begin.map(|begin| begin.elapsed()));
@@ -205,23 +208,23 @@ impl<'a> Worker<'a> {
         Err(Failure { at, text, is_silent: rejection.is_silent() })
     }
 
-    /// Returns the values of a check that numbers do not have.
+    /// Removes and returns the values of the current run that `f64` cannot represent.
     pub fn take_exact(&mut self) -> Vec<Value> {
         std::mem::take(&mut self.exact_of_run)
     }
 
-    /// Returns whether a run had the same values.
+    /// Returns whether the last finished run has this index and these values that `f64` cannot represent.
     pub fn has_exact(&self, run: usize, values: &[Value]) -> bool {
         let last = self.exact.last().filter(|(number, _)| *number == run);
         last.map_or(values.is_empty(), |(_, found)| found == values)
     }
 
-    /// Returns whether the caller does not observe the run.
+    /// Returns whether the run is not visible to the caller: it is repeated with logging on, or only checks the reset.
     pub fn is_repeated(&self) -> bool {
         self.deadline.is_some() || self.reuse.is_check
     }
 
-    /// Records the run and its time, so that messages of the FMU can be logged with both.
+    /// Records the index and the time of the run for the messages of the FMU.
     #[inline(always)]
     pub fn report_time(&self, run: usize, time: f64) {
         if let Some((feed, instance)) = &self.feed {
@@ -229,12 +232,12 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Runs an instance from the start values to the last time, or until the caller cancels or the deadline
+    /// Runs an instance in Co-Simulation from the start values to the last time, unless the caller cancels the run or the deadline
     /// passes.
     fn follow(
         &mut self,
         times: &[f64],
-        instance: &mut Running,
+        instance: &mut SystemInstance,
         run: usize,
         trajectories: &mut [f64],
     ) -> Result<(), Stopped> {
@@ -242,8 +245,8 @@ impl<'a> Worker<'a> {
         self.start(instance, run).map_err(|rejection| (None, rejection))?;
         instance.forget_log();
         let measures = !plan.measures.is_empty();
-        // Index of the next kept value in a trajectory, and number of times until then.
-        let (kept, mut index, mut wait) = (plan.kept(), 0, 0);
+        // Index of the next stored value in a trajectory, and number of communication points until then.
+        let (kept, mut index, mut wait) = (plan.stored_times(), 0, 0);
         let mut ended: Option<Rejection> = None;
         for (k, &time) in times.iter().enumerate() {
             let at = |rejection| (Some(k), rejection);
@@ -255,7 +258,7 @@ impl<'a> Worker<'a> {
             }
             self.report_time(run, time);
             if let Some(deadline) = self.deadline {
-                // Messages about earlier steps are not the reason of a later error.
+                // Drops messages about earlier steps, so that they do not become the reason of a later error.
                 instance.forget_log();
                 if time::Instant::now() > deadline {
                     return Ok(());
@@ -297,7 +300,7 @@ impl<'a> Worker<'a> {
                 let size = next - time;
                 if let Err(rejection) = instance.step(time, size) {
                     let Some(end) = rejection.ended() else { return Err(at(rejection)) };
-                    // Outputs can be read, but inputs no longer set (section 4.2.4 of FMI 2.0).
+                    // Now outputs can be read, but inputs can no longer be set (section 4.2.4 of FMI 2.0).
                     if instance.get(&plan.outputs, &mut self.row).is_err() {
                         self.row.fill(f64::NAN);
                     }
@@ -311,7 +314,7 @@ impl<'a> Worker<'a> {
         Ok(())
     }
 
-    /// Calls the pulse if it is due, and returns whether the run goes on after a step in Model Exchange.
+    /// Calls the pulse if it is due. Returns whether the run continues. Called after each step in Model Exchange.
     pub fn proceeds(&mut self) -> bool {
         if self.is_caller && self.pulse.is_due() {
             self.watch.pulse();
@@ -322,7 +325,7 @@ impl<'a> Worker<'a> {
     /// Reads the outputs at a communication point in Model Exchange.
     pub fn record(
         &mut self,
-        instance: &mut Running,
+        instance: &mut SystemInstance,
         kept: &mut Kept,
         time: f64,
         trajectories: &mut [f64],
@@ -337,9 +340,10 @@ impl<'a> Worker<'a> {
         Ok(())
     }
 
-    /// Keeps the outputs of a time. Returns whether they belong to a trajectory.
+    /// Stores the outputs of a communication point in the trajectories, if it is one of the stored times, and adds them to the
+    /// statistics. Returns whether it is one.
     pub fn keep_row(&mut self, kept: &mut Kept, time: f64, trajectories: &mut [f64]) -> bool {
-        let (plan, length) = (self.plan, self.plan.kept());
+        let (plan, length) = (self.plan, self.plan.stored_times());
         let keeps = kept.wait == 0 && kept.index < length;
         if keeps {
             for (output, value) in self.row.iter().enumerate() {
@@ -360,8 +364,8 @@ impl<'a> Worker<'a> {
         Experiment { start_time, stop_time, tolerance: self.plan.tolerance }
     }
 
-    /// Sets start values before Initialization Mode and inputs in it.
-    fn start(&mut self, instance: &mut Running, run: usize) -> Result<(), Rejection> {
+    /// Sets start values, enters Initialization Mode, sets the first values of the inputs, and leaves Initialization Mode.
+    fn start(&mut self, instance: &mut SystemInstance, run: usize) -> Result<(), Rejection> {
         let plan = self.plan;
         instance.begin(self.experiment(), &plan.start, run)?;
         self.set_values(instance, 0)?;
@@ -369,7 +373,7 @@ impl<'a> Worker<'a> {
     }
 
     #[inline(always)]
-    fn set_inputs(&mut self, instance: &mut Running, time: usize) -> Result<(), Rejection> {
+    fn set_inputs(&mut self, instance: &mut SystemInstance, time: usize) -> Result<(), Rejection> {
         self.set_values(instance, time)?;
         if self.derivatives.is_empty() {
             return Ok(());
@@ -379,7 +383,7 @@ impl<'a> Worker<'a> {
     }
 
     #[inline(always)]
-    fn set_values(&mut self, instance: &mut Running, time: usize) -> Result<(), Rejection> {
+    fn set_values(&mut self, instance: &mut SystemInstance, time: usize) -> Result<(), Rejection> {
         for input in &self.plan.exact_inputs {
             input.set(instance, self.number, time)?;
         }

@@ -1,14 +1,16 @@
-//! Detects events that follow each other without progress.
+//! Detects chattering: events that follow each other while time hardly advances.
 
-/// Counts the events in a short part of a run.
+/// Counts the events within a short time.
 #[derive(Debug)]
 pub(super) struct Chatter {
+    /// Time of the first counted event, s.
     since: f64,
     count: usize,
 }
 
-/// Number of events in such a part of the times of the run after which the model is said to chatter.
+/// Number of events within a short time from which on the model is said to chatter.
 pub(super) const MOST_EVENTS: usize = 1000;
+/// What a short time is, relative to the magnitude of the times of the run.
 const SHORT: f64 = 1e-9;
 
 impl Chatter {
@@ -16,8 +18,8 @@ impl Chatter {
         Self { since: time, count: 0 }
     }
 
-    /// Counts an event at this time, in a run whose times have the size `scale`. Returns the time of the first event if there are
-    /// too many in a short time.
+    /// Counts an event at this time, s. `scale` is the magnitude of the times of the run, s. Returns the time of the first counted
+    /// event if there are too many.
     pub fn count(&mut self, time: f64, scale: f64) -> Option<f64> {
         if time - self.since > SHORT * scale {
             (self.since, self.count) = (time, 0);

@@ -1,20 +1,20 @@
-//! Inputs as functions of time: polynomials between the times at which they are given.
+//! Inputs as functions of time: piecewise polynomials. A break is a time at which one polynomial follows another.
 
-/// Values of an input over time.
+/// An input as a function of time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Curve<'a> {
-    /// One value.
+    /// One value for all times.
     Constant(f64),
-    /// Values at times that do not decrease; equal times are a step.
+    /// Values at times that do not decrease. Two equal times are a step. If `is_held`, each value holds until the next time.
     Samples { times: &'a [f64], values: &'a [f64], slopes: Slopes<'a>, is_held: bool },
     /// The time derivative of the input with this index.
     RateOf(usize),
 }
 
-/// Time derivatives at the times of the values.
+/// Time derivatives of an input at the times of its values.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) enum Slopes<'a> {
-    /// None: the values are connected by lines.
+    /// No derivatives: the values are connected by lines.
     #[default]
     Lines,
     Constant(f64),
@@ -22,6 +22,7 @@ pub(crate) enum Slopes<'a> {
 }
 
 impl Slopes<'_> {
+    /// Returns the derivative at the time with this index.
     fn at(self, index: usize) -> Option<f64> {
         match self {
             Self::Lines => None,
@@ -31,11 +32,11 @@ impl Slopes<'_> {
     }
 }
 
-/// An input, with the polynomial that holds from the last break to the next.
+/// An input, with the polynomial between the last break and the next.
 #[derive(Debug)]
 struct Signal<'a> {
     curve: Curve<'a>,
-    /// Index of the first time after the last break.
+    /// Index of the first given time after the last break.
     next: usize,
     piece: Piece,
     /// Time of the next break, s.
@@ -54,7 +55,7 @@ impl Piece {
         Self { origin: 0.0, coefficients: [value, 0.0, 0.0, 0.0] }
     }
 
-    /// Returns the polynomial with these values at two times: a line, or the cubic that has the slopes, too.
+    /// Returns the polynomial with these values at two times: a line, or the cubic that also has these slopes.
     fn between([t0, t1]: [f64; 2], [v0, v1]: [f64; 2], slopes: Option<[f64; 2]>) -> Self {
         let h = t1 - t0;
         let mean = (v1 - v0) / h;
@@ -85,7 +86,7 @@ impl<'a> Signal<'a> {
         Self { curve, next: 0, piece: Piece::default(), until: f64::INFINITY }
     }
 
-    /// Passes all breaks up to this time.
+    /// Selects the polynomial that begins at or before this time.
     fn enter(&mut self, time: f64) {
         let (times, values, slopes, is_held) = match self.curve {
             Curve::Constant(value) => return self.piece = Piece::constant(value),
@@ -104,7 +105,7 @@ impl<'a> Signal<'a> {
             let [t, v] = [times, values].map(|of| [of[left], of[self.next]]);
             self.piece = Piece::between(t, v, slopes.at(left).zip(slopes.at(self.next)).map(|(a, b)| [a, b]));
         }
-        // A constant value has no break before it changes.
+        // While the value stays constant, there is no break.
         let mut after = self.next;
         if is_held {
             after += values[after..].iter().take_while(|other| **other == value).count();
@@ -119,30 +120,33 @@ impl<'a> Signal<'a> {
     }
 }
 
-/// All inputs of a run: those that move continuously, then those that change only at events.
+/// All inputs of a run: first the continuous ones, then those that change only at events.
 #[derive(Debug, Default)]
 pub(crate) struct Signals<'a> {
     all: Vec<Signal<'a>>,
+    /// Number of continuous inputs.
     moving: usize,
+    /// Whether a continuous input changes before the next break.
     is_moving: bool,
 }
 
-/// Passed breaks of inputs.
+/// What has happened at the breaks of inputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Break {
-    /// None.
+    /// No break.
     None,
-    /// Only the slopes of inputs have changed.
+    /// Slopes have changed, but no value has.
     Kink,
-    /// A value has changed, so that there is an event.
+    /// A value has changed, which is an event.
     Jump,
 }
 
-/// Relative change of a continuous input below which there is no event: lines of the same slope differ by rounding.
+/// Largest relative change of a continuous input that is not treated as an event, because rounding causes such changes where two
+/// polynomials meet.
 const SAME: f64 = 1e-9;
 
 impl<'a> Signals<'a> {
-    /// Creates the inputs from curves, of which the first `moving` are continuous.
+    /// Creates the inputs from curves. The first `moving` of them are continuous.
     pub fn new(curves: impl Iterator<Item = Curve<'a>>, moving: usize) -> Self {
         Self { all: curves.map(Signal::new).collect(), moving, is_moving: false }
     }
@@ -152,13 +156,13 @@ impl<'a> Signals<'a> {
         self.all.iter().map(|signal| signal.until).fold(f64::INFINITY, f64::min)
     }
 
-    /// Begins at this time.
+    /// Selects the polynomials for the start time, s.
     pub(super) fn begin(&mut self, time: f64) {
         self.all.iter_mut().for_each(|signal| signal.enter(time));
         self.find_moving();
     }
 
-    /// Passes the breaks up to this time. At the end of the run, continuous inputs keep their last slopes.
+    /// Passes the breaks up to this time, s. At the end of the run, continuous inputs keep their last slopes.
     pub(super) fn pass(&mut self, time: f64, is_end: bool) -> Break {
         if self.until() > time {
             return Break::None;
@@ -183,6 +187,7 @@ impl<'a> Signals<'a> {
         found
     }
 
+    /// Updates `is_moving`.
     fn find_moving(&mut self) {
         self.is_moving = (0..self.moving).any(|index| match self.all[index].curve {
             Curve::RateOf(of) => self.all[of].piece.coefficients[2..] != [0.0; 2],
@@ -202,13 +207,13 @@ impl<'a> Signals<'a> {
         }
     }
 
-    /// Writes the values of the continuous inputs.
+    /// Writes the values of the continuous inputs at this time to `row`.
     pub(super) fn moving(&self, time: f64, row: &mut Vec<f64>) {
         row.clear();
         row.extend((0..self.moving).map(|index| self.value(index, time)));
     }
 
-    /// Writes the values of all other inputs.
+    /// Writes the values of all other inputs at this time to `row`.
     pub(super) fn held(&self, time: f64, row: &mut Vec<f64>) {
         row.clear();
         row.extend((self.moving..self.all.len()).map(|index| self.value(index, time)));

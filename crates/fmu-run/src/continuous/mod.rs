@@ -1,24 +1,24 @@
-//! Model Exchange: the states of an FMU are integrated here, from event to event.
+//! Model Exchange: integrates the states of an FMU from event to event.
 //!
-//! [`inputs`] describes inputs as functions of time, [`model`] evaluates the FMU for the solver, [`march`] goes from one smooth interval to
-//! the next and handles the events between them, [`solve`] integrates an interval, and [`stepping`] locates events in its steps.
-//! The solvers are in the crate `ivp`. They have one step, because every event starts them again.
+//! [`inputs`] describes inputs as functions of time, [`model`] evaluates the FMU for the solver, [`simulation`] alternates between smooth
+//! intervals and events, [`solve`] integrates an interval, and [`stepping`] locates events in its steps.
+//! The solvers are in the crate `ivp`. Every event restarts them.
 
 mod chatter;
 mod inputs;
-mod march;
 mod model;
+mod simulation;
 mod solve;
 mod stepping;
 
 pub(crate) use inputs::{Curve, Signals, Slopes};
-pub(crate) use march::{Hooks, March};
 pub(crate) use model::Model;
+pub(crate) use simulation::{Hooks, Simulation};
 
 use crate::error::{Error, request};
 use std::str::FromStr;
 
-/// Method that integrates an FMU in Model Exchange.
+/// Method for integrating an FMU in Model Exchange.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Solver {
     /// [`Dop853`](Self::Dop853), and [`Bdf`](Self::Bdf) as soon as the model proves stiff.
@@ -30,8 +30,8 @@ pub enum Solver {
     Dop853,
     /// Backward differentiation formulas of order 1 to 5, for stiff models.
     Bdf,
-    /// The classical Runge-Kutta method, with fixed steps: from one communication point to the next, or shorter ones if there is a
-    /// [largest step](Integration::max_step).
+    /// The classical Runge-Kutta method with fixed steps, from one communication point to the next. The steps are shorter if there is
+    /// a [largest step](Integration::max_step).
     Rk4,
 }
 
@@ -65,8 +65,8 @@ pub struct Integration {
     pub solver: Solver,
     /// Relative tolerance; `None` means the [tolerance](crate::Batch::tolerance) for the FMU, or 1e-6 if there is none.
     pub rtol: Option<f64>,
-    /// Absolute tolerance of a state whose nominal value is 1; other states have a multiple of it. `None` means a hundredth of the
-    /// relative tolerance.
+    /// Absolute tolerance of a state whose nominal value is 1. For other states it is multiplied by the nominal value. `None` means a
+    /// hundredth of the relative tolerance.
     pub atol: Option<f64>,
     /// Largest step, s.
     pub max_step: Option<f64>,

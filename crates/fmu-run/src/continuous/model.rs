@@ -1,43 +1,44 @@
-//! An FMU in Continuous-Time Mode, as the solver needs it: derivatives, event indicators and the Jacobian.
+//! The functions of an FMU in Continuous-Time Mode that the solver needs: derivatives, event indicators and the Jacobian.
 
 use super::inputs::{Break, Signals};
 use crate::description::Description;
-use crate::running::Running;
 use crate::selection::Selection;
+use crate::system_instance::SystemInstance;
 use fmi_abi::{Interface, Status};
 use fmi_client::{Continuous, Rejection};
 use ivp::ivp::FirstOrderSystem;
 use ivp::matrix::Matrix;
 use std::cell::{RefCell, RefMut};
 
-/// Value of all derivatives where the FMU has none, so that the solver takes a shorter step.
+/// Value that all derivatives get where the FMU cannot evaluate them, so that the solver rejects the step and takes a shorter one.
 const FAR: f64 = 1e60;
-/// States beyond this result from [`FAR`]; the FMU is not called with them.
+/// Largest magnitude of a state. Larger ones result from [`FAR`], and the FMU is not called with them.
 const TOO_FAR: f64 = 1e40;
-/// Number of evaluations without a value after which the run fails, unless a step succeeds before.
+/// Number of successive evaluations that may fail without a successful step between them, before the run fails.
 const MOST_MISSES: usize = 1000;
 
-/// An FMU with its inputs. The solver and the march share it.
+/// An FMU with its inputs, shared by the solver and the event handling.
 pub(crate) struct Model<'a>(RefCell<Parts<'a>>);
 
 /// State of a [`Model`].
 pub(crate) struct Parts<'a> {
-    pub running: &'a mut Running,
+    pub instance: &'a mut SystemInstance,
     inputs: Signals<'a>,
-    /// Continuous inputs, and those that change only at events.
+    /// Continuous inputs.
     moving: &'a Selection,
     held: &'a Selection,
-    /// Value references of derivatives and states, if the FMU provides directional derivatives.
+    /// Value references of derivatives and states for the Jacobian, if the FMU provides directional derivatives.
     jacobian: Option<(Vec<u32>, Vec<u32>)>,
     pub nominals: Vec<f64>,
-    /// Whether the solver can take a shorter step.
+    /// Whether the solver can take a shorter step after a failed evaluation.
     retries: bool,
-    /// Time and states that the FMU has.
+    /// Time that the FMU has, s; `None` if the inputs must be set again.
     at: Option<f64>,
     x: Vec<f64>,
     row: Vec<f64>,
-    /// Number of evaluations without a value since the last step, and the reason of the last.
+    /// Number of failed evaluations since the last step.
     misses: usize,
+    /// Reason of the last failed evaluation.
     miss: Option<Rejection>,
     /// Error after which the FMU is not called any more.
     fault: Option<Rejection>,
@@ -45,14 +46,14 @@ pub(crate) struct Parts<'a> {
 
 impl<'a> Model<'a> {
     pub fn new(
-        running: &'a mut Running,
+        instance: &'a mut SystemInstance,
         description: &Description,
         inputs: Signals<'a>,
         [moving, held]: [&'a Selection; 2],
         retries: bool,
     ) -> Self {
         Self(RefCell::new(Parts {
-            running,
+            instance,
             inputs,
             moving,
             held,
@@ -73,7 +74,7 @@ impl<'a> Model<'a> {
     }
 }
 
-/// Returns the value references for directional derivatives of the derivatives with respect to the states.
+/// Returns the value references of the state derivatives and of the states, if the FMU provides directional derivatives.
 fn jacobian_of(description: &Description) -> Option<(Vec<u32>, Vec<u32>)> {
     description.offer(Interface::ModelExchange).filter(|offer| offer.directional_derivatives)?;
     let derivatives = description.elements(&description.derivatives);
@@ -85,23 +86,23 @@ fn jacobian_of(description: &Description) -> Option<(Vec<u32>, Vec<u32>)> {
 }
 
 impl Parts<'_> {
-    /// Begins at this time, before the initialization: sets the inputs.
+    /// Sets the inputs at the start time, s, in Initialization Mode.
     pub fn begin(&mut self, time: f64) -> Result<(), Rejection> {
         self.inputs.begin(time);
         self.set_inputs(time)
     }
 
-    /// Sets all inputs, in Initialization Mode or Event Mode.
+    /// Sets all inputs to their values at this time, s, in Initialization Mode or Event Mode.
     pub fn set_inputs(&mut self, time: f64) -> Result<(), Rejection> {
         self.at = None;
-        let Self { running, inputs, moving, held, row, .. } = self;
+        let Self { instance, inputs, moving, held, row, .. } = self;
         if !moving.is_empty() {
             inputs.moving(time, row);
-            running.set(moving, row)?;
+            instance.set(moving, row)?;
         }
         if !held.is_empty() {
             inputs.held(time, row);
-            running.set(held, row)?;
+            instance.set(held, row)?;
         }
         Ok(())
     }
@@ -111,6 +112,7 @@ impl Parts<'_> {
         self.inputs.until()
     }
 
+    /// Passes the breaks of inputs up to this time, s.
     pub(super) fn pass(&mut self, time: f64, is_end: bool) -> Break {
         let found = self.inputs.pass(time, is_end);
         if found != Break::None {
@@ -119,20 +121,20 @@ impl Parts<'_> {
         found
     }
 
-    /// Sets time, continuous inputs and states, unless the FMU has them.
+    /// Sets time, continuous inputs and states, unless the FMU has these values already.
     #[inline]
     pub fn set(&mut self, time: f64, x: &[f64]) -> Result<(), Rejection> {
         if self.at == Some(time) && self.x == x {
             return Ok(());
         }
-        let Self { running, inputs, moving, row, .. } = self;
-        running.sole().set_time(time)?;
+        let Self { instance, inputs, moving, row, .. } = self;
+        instance.sole().set_time(time)?;
         if !moving.is_empty() && (self.at.is_none() || inputs.is_moving()) {
             inputs.moving(time, row);
-            running.set(moving, row)?;
+            instance.set(moving, row)?;
         }
         if !x.is_empty() {
-            running.sole().set_continuous_states(x)?;
+            instance.sole().set_continuous_states(x)?;
         }
         self.at = Some(time);
         self.x.clear();
@@ -144,10 +146,10 @@ impl Parts<'_> {
     #[inline]
     fn derivatives(&mut self, time: f64, x: &[f64], values: &mut [f64]) -> Result<(), Rejection> {
         self.set(time, x)?;
-        self.running.sole().get_continuous(Continuous::Derivatives, values)
+        self.instance.sole().get_continuous(Continuous::Derivatives, values)
     }
 
-    /// Evaluates the derivatives at the beginning of a step, where a shorter one does not help.
+    /// Evaluates the derivatives at the beginning of a step and fails if one is not finite, because a shorter step would not help.
     pub fn check_derivatives(&mut self, time: f64, x: &[f64]) -> Result<(), Rejection> {
         let mut values = vec![0.0; x.len()];
         self.derivatives(time, x, &mut values)?;
@@ -157,10 +159,10 @@ impl Parts<'_> {
         }
     }
 
-    /// Reads the event indicators.
+    /// Reads the event indicators. Fails if one is NaN.
     pub fn indicators(&mut self, time: f64, x: &[f64], values: &mut [f64]) -> Result<(), Rejection> {
         self.set(time, x)?;
-        self.running.sole().get_continuous(Continuous::EventIndicators, values)?;
+        self.instance.sole().get_continuous(Continuous::EventIndicators, values)?;
         match values.iter().position(|value| value.is_nan()) {
             None => Ok(()),
             Some(index) => Err(missing("event indicator", index, values[index], time)),
@@ -173,15 +175,15 @@ impl Parts<'_> {
         if x.is_empty() {
             return Ok(());
         }
-        self.running.sole().get_continuous(Continuous::States, x)
+        self.instance.sole().get_continuous(Continuous::States, x)
     }
 
-    /// Reads the nominal values of the states. Values that are not above 0 count as 1.
+    /// Reads the magnitudes of the nominal values of the states. Values that are 0 or not finite are replaced by 1.
     pub fn read_nominals(&mut self) -> Result<(), Rejection> {
         if self.nominals.is_empty() {
             return Ok(());
         }
-        self.running.sole().get_continuous(Continuous::Nominals, &mut self.nominals)?;
+        self.instance.sole().get_continuous(Continuous::Nominals, &mut self.nominals)?;
         for nominal in &mut self.nominals {
             *nominal = nominal.abs();
             if !(*nominal > 0.0 && nominal.is_finite()) {
@@ -191,17 +193,17 @@ impl Parts<'_> {
         Ok(())
     }
 
-    /// Records an accepted step.
+    /// Forgets failed evaluations after a successful step.
     pub fn accepted(&mut self) {
         (self.misses, self.miss) = (0, None);
     }
 
-    /// Returns the reason why the FMU had no derivatives since the last step.
+    /// Returns the reason of the last failed evaluation since the last step.
     pub fn take_miss(&mut self) -> Option<Rejection> {
         self.miss.take()
     }
 
-    /// Returns the reason why derivatives could not be evaluated.
+    /// Returns the error after which the FMU is not called.
     pub fn take_fault(&mut self) -> Option<Rejection> {
         self.fault.take()
     }
@@ -210,8 +212,8 @@ impl Parts<'_> {
         self.fault.is_some()
     }
 
-    /// Evaluates the derivatives. If the FMU cannot, the solver gets [`FAR`] and takes a shorter step. After an error it gets 0, so
-    /// that its step succeeds and the march observes the error.
+    /// Evaluates the derivatives. If the FMU cannot evaluate them, the solver gets [`FAR`] and takes a shorter step. After an error
+    /// the solver gets 0, so that its step succeeds and `solout` can stop it.
     fn evaluate(&mut self, time: f64, x: &[f64], values: &mut [f64]) {
         if self.has_failed() {
             return values.fill(0.0);
@@ -233,7 +235,7 @@ impl Parts<'_> {
         self.misses += 1;
         if self.retries && self.misses < MOST_MISSES {
             values.fill(FAR);
-            // An estimate that is too far off is not a reason, but a consequence of one.
+            // The reason is an earlier failure, which caused this estimate of the states.
             if !is_far {
                 self.miss = Some(why);
             }
@@ -243,7 +245,7 @@ impl Parts<'_> {
         }
     }
 
-    /// Evaluates the Jacobian: by directional derivatives, else by differences.
+    /// Evaluates the Jacobian with directional derivatives if the FMU has them, otherwise with finite differences.
     fn jacobian(&mut self, time: f64, x: &[f64], j: &mut Matrix) {
         let n = x.len();
         let (mut before, mut after, mut moved) = (vec![0.0; n], vec![0.0; n], x.to_vec());
@@ -251,7 +253,7 @@ impl Parts<'_> {
             let columns = self.set(time, x).and_then(|()| {
                 (0..n).try_for_each(|column| {
                     let state = &states[column..=column];
-                    self.running.sole().directional_derivative(&derivatives, state, &[1.0], &mut after)?;
+                    self.instance.sole().directional_derivative(&derivatives, state, &[1.0], &mut after)?;
                     (0..n).for_each(|row| j[(row, column)] = after[row]);
                     Ok::<_, Rejection>(())
                 })
@@ -260,8 +262,8 @@ impl Parts<'_> {
                 self.jacobian = Some((derivatives, states));
                 return;
             }
-            // An FMU may promise directional derivatives that it does not have; differences replace them from here on.
-            self.running.forget_log();
+            // The FMU declares directional derivatives but does not have them; from here on, finite differences replace them.
+            self.instance.forget_log();
         }
         self.evaluate(time, x, &mut before);
         for column in 0..n {
@@ -275,6 +277,7 @@ impl Parts<'_> {
     }
 }
 
+/// Returns the error for a value that is not finite.
 fn missing(what: &str, index: usize, value: f64, time: f64) -> Rejection {
     Rejection::without_fmu("Model Exchange", &format!("{what} {} is {value} at t = {time} s", index + 1))
 }

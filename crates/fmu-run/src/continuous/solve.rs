@@ -1,24 +1,24 @@
-//! Smooth intervals: calls the solver.
+//! Integrates smooth intervals with the solver.
 
 use super::Solver;
-use super::march::{Arrival, Hooks, March, Settings};
 use super::model::Model;
+use super::simulation::{Arrival, Hooks, Settings, Simulation};
 use super::stepping::Stepping;
 use fmi_client::Rejection;
 use ivp::methods::{BDF, DOP853, DOPRI5, IntegrationResult, RK4, Tolerance};
 use ivp::status::Status;
 
-impl March<'_> {
-    /// Integrates to this time, or to an event before it.
+impl Simulation<'_> {
+    /// Integrates to the time `stop`, s, or to an event before it.
     pub(super) fn integrate(
         &mut self,
         model: &Model,
         hooks: &mut impl Hooks,
         stop: f64,
     ) -> Result<Arrival, Rejection> {
-        /// Part of the time that rounding may have changed.
+        /// Rounding error of times, relative to the magnitude of the times of the run.
         const ROUNDING: f64 = 1e-14;
-        /// Smallest first step after an event, as a part of the times of the run.
+        /// Smallest first step after an event, relative to the magnitude of the times of the run.
         const SMALL: f64 = 1e-13;
         loop {
             let near = ROUNDING * self.scale();
@@ -38,13 +38,13 @@ impl March<'_> {
             let (arrival, result) = result?;
             let reached = stop - self.time <= near;
             if reached && arrival.is_none_or(|of| of == Arrival::Stop) {
-                // The last step was cut short at the end; the next interval may begin with a full one.
+                // If the last step was shortened to end at `stop`, the next interval may begin with a full one.
                 let cut = result.steps.total <= 1;
                 self.step = Some(begin.1.filter(|_| cut).map_or(result.h, |step| step.max(result.h)));
                 self.time = stop;
                 return Ok(Arrival::Stop);
             }
-            // The estimate of the solver is far too small if a state is almost 0, as it often is at an event.
+            // At an event a state is often almost 0, and the solver's own estimate of the first step is then far too small.
             let small = Some((0.01 * self.taken).max(SMALL * self.scale()));
             if let Some(arrival) = arrival {
                 self.step = small;
@@ -66,16 +66,16 @@ impl March<'_> {
         }
     }
 
-    /// Calls the solver.
+    /// Calls the solver once. Returns why the interval ended, if it did, and the result of the solver.
     fn solve(
         &mut self,
         model: &Model,
         hooks: &mut impl Hooks,
         stop: f64,
     ) -> Result<(Option<Arrival>, IntegrationResult), Rejection> {
-        /// Steps for which the solver is called at most.
+        /// Maximum number of steps in one call of the solver.
         const STEPS: usize = 100_000;
-        /// Every step shows whether the model is stiff.
+        /// Number of steps between two tests for stiffness.
         const STIFF: usize = 1;
         let Settings { solver, rtol, atol, max_step, .. } = self.settings;
         let (time, x) = (self.time, self.x.clone());

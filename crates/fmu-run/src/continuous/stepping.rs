@@ -1,17 +1,18 @@
-//! Completed steps of the solver: locates events in them, reads outputs and informs the FMU.
+//! Processes each completed step of the solver: locates events in it, reads outputs and notifies the FMU.
 
-use super::march::{Arrival, Hooks, March};
 use super::model::Model;
+use super::simulation::{Arrival, Hooks, Simulation};
 use fmi_client::Rejection;
 use ivp::dense::StepInterpolant;
 use ivp::solout::{ControlFlag, SolOut};
 
-/// Parts of the first step after an event at which event indicators are evaluated, too: one may return to the side from which it came.
+/// Fractions of the first step after an event at which event indicators are also evaluated, because an indicator may quickly change
+/// its sign back.
 const PROBES: [f64; 4] = [1e-6, 1e-3, 0.1, 0.5];
 
 /// Observes the steps of the solver.
 pub(super) struct Stepping<'s, 'a, 'm, H> {
-    march: &'s mut March<'a>,
+    simulation: &'s mut Simulation<'a>,
     model: &'s Model<'m>,
     hooks: &'s mut H,
     stop: f64,
@@ -28,18 +29,19 @@ struct Point {
 }
 
 impl<'s, 'a, 'm, H: Hooks> Stepping<'s, 'a, 'm, H> {
-    pub fn of(march: &'s mut March<'a>, model: &'s Model<'m>, hooks: &'s mut H, stop: f64) -> Self {
-        Self { march, model, hooks, stop, arrival: None, failure: None }
+    pub fn of(simulation: &'s mut Simulation<'a>, model: &'s Model<'m>, hooks: &'s mut H, stop: f64) -> Self {
+        Self { simulation, model, hooks, stop, arrival: None, failure: None }
     }
 
-    /// Goes to the end of the interval, if the FMU has no states.
+    /// Processes the whole interval as one step, for an FMU without states.
     pub fn without_states(mut self) -> Result<Arrival, Rejection> {
-        let (begin, stop) = (self.march.time, self.stop);
+        let (begin, stop) = (self.simulation.time, self.stop);
         self.step([begin, stop], &[], &|_, _| ())?;
         Ok(self.arrival.unwrap_or(Arrival::Stop))
     }
 
-    /// Completes a step: locates an event in it, reads outputs at the communication points and reports the step to the FMU.
+    /// Processes a step: locates an event in it, reads outputs at the communication points and notifies the FMU. `at` writes the
+    /// states at a time within the step.
     fn step(
         &mut self,
         [begin, end]: [f64; 2],
@@ -48,33 +50,33 @@ impl<'s, 'a, 'm, H: Hooks> Stepping<'s, 'a, 'm, H> {
     ) -> Result<(), Rejection> {
         let mut end = Point { time: end, x: x.to_vec(), z: Vec::new() };
         let mut indicator = None;
-        if !self.march.z.is_empty() {
+        if !self.simulation.z.is_empty() {
             (end, indicator) = self.first_event(begin, end, at)?;
         }
         let mut between = vec![0.0; x.len()];
-        while self.march.times[self.march.next] < end.time.min(self.stop) {
-            let time = self.march.times[self.march.next];
+        while self.simulation.times[self.simulation.next] < end.time.min(self.stop) {
+            let time = self.simulation.times[self.simulation.next];
             at(time, &mut between);
             let mut parts = self.model.parts();
             parts.set(time, &between)?;
-            self.hooks.record(parts.running, self.march.next)?;
-            self.march.next += 1;
+            self.hooks.record(parts.instance, self.simulation.next)?;
+            self.simulation.next += 1;
         }
         let mut parts = self.model.parts();
         let mut requested = [false; 2];
-        if self.march.settings.reports_steps {
+        if self.simulation.settings.reports_steps {
             parts.set(end.time, &end.x)?;
-            requested = parts.running.sole().completed_integrator_step()?;
+            requested = parts.instance.sole().completed_integrator_step()?;
         }
         parts.accepted();
-        let march = &mut *self.march;
-        (march.taken, march.time, march.is_fresh) = (end.time - begin, end.time, false);
-        march.x.copy_from_slice(&end.x);
-        if !march.z.is_empty() {
-            march.z.copy_from_slice(&end.z);
+        let simulation = &mut *self.simulation;
+        (simulation.taken, simulation.time, simulation.is_fresh) = (end.time - begin, end.time, false);
+        simulation.x.copy_from_slice(&end.x);
+        if !simulation.z.is_empty() {
+            simulation.z.copy_from_slice(&end.z);
         }
         self.arrival = match requested {
-            _ if !self.hooks.proceed(march.time) => Some(Arrival::Cancel),
+            _ if !self.hooks.proceed(simulation.time) => Some(Arrival::Cancel),
             [_, true] => Some(Arrival::Terminate),
             [true, _] => Some(Arrival::Event(indicator)),
             _ => indicator.map(|indicator| Arrival::Event(Some(indicator))),
@@ -82,32 +84,34 @@ impl<'s, 'a, 'm, H: Hooks> Stepping<'s, 'a, 'm, H> {
         Ok(())
     }
 
-    /// Returns the first point after an event indicator has changed its sign, and the indicator; else the end of the step.
+    /// Returns the first point after an event indicator has changed its sign, and the index of the indicator. If none has, returns
+    /// the end of the step.
     fn first_event(
         &mut self,
         begin: f64,
         end: Point,
         at: &dyn Fn(f64, &mut [f64]),
     ) -> Result<(Point, Option<usize>), Rejection> {
-        let march = &*self.march;
-        let probes = PROBES.iter().filter(|_| march.is_fresh).map(|part| begin + part * (end.time - begin));
-        let points = march.times[march.next..].iter().copied().take_while(|time| *time < end.time);
+        let simulation = &*self.simulation;
+        let probes =
+            PROBES.iter().filter(|_| simulation.is_fresh).map(|part| begin + part * (end.time - begin));
+        let points = simulation.times[simulation.next..].iter().copied().take_while(|time| *time < end.time);
         let mut between: Vec<_> =
             probes.chain(points).filter(|time| *time > begin && *time < end.time).collect();
         between.sort_unstable_by(f64::total_cmp);
-        let mut before = Point { time: begin, x: march.x.clone(), z: march.z.clone() };
+        let mut before = Point { time: begin, x: simulation.x.clone(), z: simulation.z.clone() };
         for time in between.into_iter().chain([end.time]) {
             let after = if time == end.time {
                 let mut after = end.clone();
-                after.z.resize(march.z.len(), 0.0);
+                after.z.resize(simulation.z.len(), 0.0);
                 self.model.parts().indicators(time, &after.x, &mut after.z)?;
                 after
             } else {
                 self.point(time, at)?
             };
-            if march.changed(&after.z).next().is_some() {
+            if simulation.changed(&after.z).next().is_some() {
                 let found = self.locate(before, after, at)?;
-                let indicator = march.changed(&found.z).next();
+                let indicator = simulation.changed(&found.z).next();
                 return Ok((found, indicator));
             }
             before = after;
@@ -115,15 +119,17 @@ impl<'s, 'a, 'm, H: Hooks> Stepping<'s, 'a, 'm, H> {
         Ok((before, None))
     }
 
+    /// Evaluates states and event indicators at a time within the step.
     fn point(&self, time: f64, at: &dyn Fn(f64, &mut [f64])) -> Result<Point, Rejection> {
-        let mut point = Point { time, x: vec![0.0; self.march.x.len()], z: vec![0.0; self.march.z.len()] };
+        let mut point =
+            Point { time, x: vec![0.0; self.simulation.x.len()], z: vec![0.0; self.simulation.z.len()] };
         at(time, &mut point.x);
         self.model.parts().indicators(time, &point.x, &mut point.z)?;
         Ok(point)
     }
 
-    /// Narrows the interval in which the first event indicator changes its sign, and returns its end, where the sign has changed.
-    /// The Illinois method, with a bisection now and then.
+    /// Narrows the interval in which an event indicator first changes its sign, and returns its end, where the sign has changed. Uses
+    /// the Illinois method, with a bisection in every fourth iteration.
     fn locate(
         &self,
         mut before: Point,
@@ -138,14 +144,14 @@ impl<'s, 'a, 'm, H: Hooks> Stepping<'s, 'a, 'm, H> {
             if b - a <= 2.0 * f64::EPSILON * a.abs().max(b.abs()) || middle <= a || middle >= b {
                 break;
             }
-            let zeros = self.march.changed(&after.z).map(|index| {
+            let zeros = self.simulation.changed(&after.z).map(|index| {
                 let (low, high) = (weights[0] * before.z[index], weights[1] * after.z[index]);
                 a + (b - a) * low / (low - high)
             });
             let zero = zeros.fold(f64::INFINITY, f64::min);
             let time = if iteration % 4 != 3 && zero > a && zero < b { zero } else { middle };
             let point = self.point(time, at)?;
-            if self.march.changed(&point.z).next().is_some() {
+            if self.simulation.changed(&point.z).next().is_some() {
                 (after, weights) = (point, [0.5 * weights[0], 1.0]);
             } else {
                 (before, weights) = (point, [1.0, 0.5 * weights[1]]);
@@ -163,8 +169,8 @@ impl<H: Hooks> SolOut for Stepping<'_, '_, '_, H> {
         x: &mut [f64],
         interpolant: Option<&StepInterpolant<'_>>,
     ) -> ControlFlag {
-        if *end <= self.march.time {
-            // The call before the first step.
+        if *end <= self.simulation.time {
+            // The solver also calls this function before the first step.
             return ControlFlag::Continue;
         }
         if self.model.parts().has_failed() {

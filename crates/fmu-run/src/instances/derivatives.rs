@@ -1,12 +1,13 @@
 //! Directional derivatives, and derivatives of inputs and outputs with respect to time.
 
-use super::one::rows;
+use super::entry::rows;
 use super::{Instances, Mask};
 use crate::error::{Error, request};
 use crate::selection::Selection;
 
 impl Instances {
-    /// Computes the directional derivatives of unknowns, with a seed for each instance or one for all.
+    /// Computes the directional derivatives of unknowns into a row for each instance. There is one seed for all instances, or a seed
+    /// for each.
     ///
     /// # Errors
     /// Returns [`Error::Request`] unless all variables are Real, and each known is an input, a parameter or a
@@ -37,7 +38,7 @@ impl Instances {
         Ok(())
     }
 
-    /// Sets time derivatives of inputs, of order 1, in Co-Simulation. Only FMI 2.0 supports them.
+    /// Sets the first time derivatives of inputs, in Co-Simulation. Only FMI 2.0 supports them.
     ///
     /// # Errors
     /// Returns [`Error::Request`] unless all variables are Real inputs of an FMU that accepts input
@@ -60,7 +61,7 @@ impl Instances {
         Ok(())
     }
 
-    /// Reads time derivatives of outputs, of order 1, into a row for each instance, in Co-Simulation.
+    /// Reads the first time derivatives of outputs into a row for each instance, in Co-Simulation.
     ///
     /// # Errors
     /// Returns [`Error::Request`] unless all variables are Real.
@@ -75,7 +76,7 @@ impl Instances {
         Ok(())
     }
 
-    /// Returns the value references of Real variables of a single FMU.
+    /// Returns the value references of the variables. Fails unless all of them are Real and the system is a single FMU.
     fn real<'s>(&self, variables: &'s Selection) -> Result<&'s [u32], Error> {
         let why = "only Real variables have derivatives, of one FMU and not of a system";
         let references = self.system.sole().and_then(|_| variables.references());

@@ -1,8 +1,8 @@
-//! Values that numbers do not have: strings, bytes and integers of 64 bits.
+//! Values that `f64` cannot represent: strings, bytes and integers of 64 bits.
 
 use super::{Instances, Mask};
 use crate::error::{Error, request};
-use crate::found::is_exact;
+use crate::lookup::is_exact;
 use crate::selection::Target;
 use crate::start::exact;
 use fmi_abi::{BaseType, Value};
@@ -21,7 +21,7 @@ impl Instances {
         Ok(values)
     }
 
-    /// Sets a string, bytes or an integer of 64 bits, to a value for each instance or to one for all.
+    /// Sets a variable that is a string, bytes or an integer of 64 bits. There is one value for all instances, or a value for each.
     ///
     /// # Errors
     /// Returns [`Error::Request`] if the variable is read-only, or a value does not fit its type.

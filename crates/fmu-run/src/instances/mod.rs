@@ -1,9 +1,10 @@
-//! Instances of an FMU, controlled call by call: set, step, get, save and restore, all instances in parallel.
+//! Instances of an FMU that the caller controls with single calls (set, step, get, save, restore). Each call acts on all instances in
+//! parallel.
 
 mod derivatives;
+mod entry;
 mod exact;
-mod exchange;
-mod one;
+mod model_exchange;
 mod states;
 
 pub use states::States;
@@ -12,14 +13,14 @@ use crate::description::Description;
 use crate::error::{Error, request};
 use crate::instance::{Experiment, Tolerance};
 use crate::messages::{Feed, Logged, Logging};
-use crate::running::Running;
 use crate::selection::Selection;
 use crate::start::{Start, StartValues};
 use crate::system::System;
+use crate::system_instance::SystemInstance;
 use crate::threads::Threads;
+use entry::{Entry, Progress, each, empty, in_parts, rows};
 use fmi_abi::Interface;
 use fmi_client::{Event, Rejection};
-use one::{One, Own, each, empty, in_parts, rows};
 use std::sync::Arc;
 
 /// Settings for new instances.
@@ -37,7 +38,7 @@ pub struct Setup<'a> {
     pub stop_time: Option<f64>,
     /// Relative tolerance for solvers inside the FMU.
     pub tolerance: Tolerance,
-    /// Whether all messages of the FMU are collected, with its logging switched on; see [`Instances::take_messages`].
+    /// Whether logging is on and all messages of the FMU are collected for [`Instances::take_messages`].
     pub listening: bool,
     /// Number of threads; `None` uses one thread for each processor.
     pub threads: Option<usize>,
@@ -59,46 +60,47 @@ impl Default for Setup<'_> {
     }
 }
 
-/// Instances of one FMU, each with its own time. Every method acts on all of them, in several threads. Values
-/// are stored in rows, one for each instance: instances times variables, the last index varies fastest.
+/// Instances of one FMU, each with its own time. Every method acts on all of them, in several threads. Arrays of values have one row
+/// for each instance, with one value for each variable; the rows follow each other.
 ///
-/// If a call returns an error for an instance, the instance fails, and the others continue.
-/// [`errors`](Self::errors) contains the reason; values read from a failed instance are NaN.
-/// [`reset`](Self::reset) and [`restore`](Self::restore) make it usable again.
+/// If a call of the FMU returns an error, the instance fails, and all others continue. [`errors`](Self::errors) contains the reason;
+/// values read from a failed instance are NaN. [`reset`](Self::reset) and [`restore`](Self::restore) make it usable again.
 #[derive(Debug)]
 pub struct Instances {
     system: System,
     interface: Interface,
-    all: Vec<One>,
+    all: Vec<Entry>,
     begin: Begin,
-    /// Collects all messages, if the caller wants them.
+    /// Collects all messages, if the caller requests them.
     feed: Option<Arc<Feed>>,
     /// Threads in addition to the caller's.
     threads: Option<Threads>,
 }
 
 #[derive(Debug)]
+/// Start values and experiment, for [`Instances::reset`].
 struct Begin {
     start: StartValues<'static>,
     experiment: Experiment,
 }
 
-/// Selection of the instances for a call: all, or those with true.
+/// Instances on which a call acts: all, or those whose entry is true.
 pub type Mask<'a> = Option<&'a [bool]>;
 
 impl System {
-    /// Makes instances, sets their start values and initializes them. Instances for Model Exchange have
-    /// handled the events at the start and are in Continuous-Time Mode.
+    /// Creates instances, sets their start values and initializes them. Instances for Model Exchange have also handled the initial
+    /// event and are in Continuous-Time Mode.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if the settings do not fit the FMU. Returns [`Error::Fmu`] if the FMU does
-    /// not support the interface type or makes no instances.
+    /// Returns [`Error::Request`] if the settings do not fit the FMU. Returns [`Error::Fmu`] if the FMU does not support the
+    /// interface type, or if all instances fail.
     pub fn instances(&self, setup: &Setup) -> Result<Instances, Error> {
         let (system, start) = self.configured(&setup.start)?;
         system.instances_of(setup, &start, setup.listening.then(|| self.feed()))
     }
 
-    /// Makes instances as [`instances`](Self::instances) does, and returns the messages so far also if there is an error.
+    /// Creates instances as [`instances`](Self::instances) does. Appends the messages so far to `messages`, even if an error is
+    /// returned.
     ///
     /// # Errors
     /// Same errors as [`instances`](Self::instances).
@@ -110,7 +112,7 @@ impl System {
         made
     }
 
-    /// Makes instances, whose structural parameters have their values.
+    /// Creates instances of this system, whose structural parameters are already set.
     fn instances_of(
         &self,
         setup: &Setup,
@@ -172,7 +174,7 @@ impl Instances {
 
     /// Returns the time of each instance, s.
     pub fn times(&self) -> impl Iterator<Item = f64> {
-        self.all.iter().map(|one| one.own.time)
+        self.all.iter().map(|one| one.progress.time)
     }
 
     /// Returns the indices of the failed instances, each with the reason.
@@ -188,10 +190,10 @@ impl Instances {
 
     /// Returns the result of the last event of each instance.
     pub fn events(&self) -> impl Iterator<Item = Event> {
-        self.all.iter().map(|one| one.own.event)
+        self.all.iter().map(|one| one.progress.event)
     }
 
-    /// Replaces start values for the next [`reset`](Self::reset); start values of other variables stay.
+    /// Replaces start values for the next [`reset`](Self::reset). Start values of other variables stay as they are.
     ///
     /// # Errors
     /// Returns [`Error::Request`] if a variable is unknown, or if the values do not fit it or the number of
@@ -217,16 +219,16 @@ impl Instances {
     /// Resets the instances to their start values and initializes them.
     pub fn reset(&mut self, mask: Mask) {
         let (system, interface, begin, feed) = (&self.system, self.interface, &self.begin, &self.feed);
-        let reset = |index: usize, one: &mut One| {
+        let reset = |index: usize, one: &mut Entry| {
             one.error = None;
-            (one.own.time, one.own.event) = (begin.experiment.start_time, Event::default());
+            (one.progress.time, one.progress.event) = (begin.experiment.start_time, Event::default());
             let feed = feed.as_ref().map(|feed| (Arc::clone(feed), index));
             let logging = Logging { on: feed.is_some(), feed };
-            match Running::renewed(one.instance.take(), system, interface, &logging) {
+            match SystemInstance::renewed(one.instance.take(), system, interface, &logging) {
                 Ok(instance) => {
                     let instance = one.instance.insert(instance);
                     match initialize(instance, begin, index, interface) {
-                        Ok(event) => one.own.event = event,
+                        Ok(event) => one.progress.event = event,
                         Err(rejection) => one.error = Some(rejection.to_string()),
                     }
                 }
@@ -236,11 +238,11 @@ impl Instances {
         each(&mut self.threads, &mut self.all, mask, reset);
     }
 
-    /// Sets variables, from a row for each instance or from one row for all.
+    /// Sets variables, from one row for all instances or a row for each.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if a variable is read-only, an integer or a Boolean cannot have its value,
-    /// or an output feeds a variable.
+    /// Returns [`Error::Request`] if a variable is read-only or connected to an output, or if an integer or a Boolean cannot have its
+    /// value.
     ///
     /// # Panics
     /// Panics if the number of values is wrong.
@@ -265,9 +267,9 @@ impl Instances {
     /// Returns [`Error::Request`] if the size is not above 0 and finite.
     pub fn step(&mut self, size: f64, mask: Mask) -> Result<(), Error> {
         check_size(size)?;
-        self.alive(mask, |_, own, instance| {
-            instance.step(own.time, size)?;
-            own.time += size;
+        self.alive(mask, |_, progress, instance| {
+            instance.step(progress.time, size)?;
+            progress.time += size;
             Ok(())
         });
         Ok(())
@@ -278,24 +280,24 @@ impl Instances {
     /// # Errors
     /// Returns [`Error::Request`] if the time is not finite, or not after the time of an instance.
     pub fn step_to(&mut self, time: f64, mask: Mask) -> Result<(), Error> {
-        let steps = |index: usize, one: &One| one.error.is_none() && mask.is_none_or(|mask| mask[index]);
+        let steps = |index: usize, one: &Entry| one.error.is_none() && mask.is_none_or(|mask| mask[index]);
         let mut ahead = self.all.iter().enumerate().filter(|(index, one)| steps(*index, one));
-        if let Some((index, one)) = ahead.find(|(_, one)| !(time.is_finite() && time > one.own.time)) {
+        if let Some((index, one)) = ahead.find(|(_, one)| !(time.is_finite() && time > one.progress.time)) {
             return request(format!(
                 "to is {time} s; it must be after the time of each instance, and instance {index} is at {} s",
-                one.own.time
+                one.progress.time
             ));
         }
-        self.alive(mask, |_, own, instance| {
-            instance.step(own.time, time - own.time)?;
-            own.time = time;
+        self.alive(mask, |_, progress, instance| {
+            instance.step(progress.time, time - progress.time)?;
+            progress.time = time;
             Ok(())
         });
         Ok(())
     }
 
-    /// Sets variables, performs a step and reads other variables. Equals [`set`](Self::set),
-    /// [`step`](Self::step) and [`get`](Self::get), but starts the threads only once.
+    /// Sets variables, performs a step and reads other variables. Has the same effect as [`set`](Self::set), [`step`](Self::step) and
+    /// [`get`](Self::get), but distributes the work to the threads only once.
     ///
     /// # Errors
     /// Same errors as [`set`](Self::set) and [`step`](Self::step).
@@ -311,10 +313,10 @@ impl Instances {
         set.check(values)?;
         check_size(size)?;
         let inputs = rows(values, set.len(), self.len());
-        self.fill(get.len(), read, |index, own, instance, row| {
+        self.fill(get.len(), read, |index, progress, instance, row| {
             instance.set(set, inputs(index))?;
-            instance.step(own.time, size)?;
-            own.time += size;
+            instance.step(progress.time, size)?;
+            progress.time += size;
             instance.get(get, row)
         });
         Ok(())
@@ -331,27 +333,27 @@ impl Instances {
         self.feed.as_ref().map(|feed| feed.take()).unwrap_or_default()
     }
 
-    /// Calls `body` for each instance that has not failed. An error makes the instance fail.
+    /// Calls `body` for each instance in the mask that has not failed. An error makes the instance fail.
     fn alive(
         &mut self,
         mask: Mask,
-        body: impl Fn(usize, &mut Own, &mut Running) -> Result<(), Rejection> + Sync,
+        body: impl Fn(usize, &mut Progress, &mut SystemInstance) -> Result<(), Rejection> + Sync,
     ) {
         each(&mut self.threads, &mut self.all, mask, |index, one| {
-            one.with(|own, instance| body(index, own, instance));
+            one.with(|progress, instance| body(index, progress, instance));
         });
     }
 
-    /// Fills a row of values for each instance, with NaN for a failed instance.
+    /// Calls `body` to fill a row of values for each instance. The row of a failed instance is filled with NaN.
     fn fill(
         &mut self,
         length: usize,
         values: &mut [f64],
-        body: impl Fn(usize, &mut Own, &mut Running, &mut [f64]) -> Result<(), Rejection> + Sync,
+        body: impl Fn(usize, &mut Progress, &mut SystemInstance, &mut [f64]) -> Result<(), Rejection> + Sync,
     ) {
         assert_eq!(values.len(), length * self.all.len(), "a row of {length} values for each instance");
-        let body = |index: usize, one: &mut One, row: &mut [f64]| {
-            if !one.with(|own, instance| body(index, own, instance, row)) {
+        let body = |index: usize, one: &mut Entry, row: &mut [f64]| {
+            if !one.with(|progress, instance| body(index, progress, instance, row)) {
                 row.fill(f64::NAN);
             }
         };
@@ -366,9 +368,9 @@ fn check_size(size: f64) -> Result<(), Error> {
     request(format!("the size of a step is {size} s; it must be above 0 and finite"))
 }
 
-/// Initializes an instance: from the start values to the first step.
+/// Sets start values and initializes an instance, so that it can perform its first step. Returns the initial event of Model Exchange.
 fn initialize(
-    instance: &mut Running,
+    instance: &mut SystemInstance,
     begin: &Begin,
     index: usize,
     interface: Interface,

@@ -1,13 +1,12 @@
 //! Saved states of all instances.
 
-use super::one::{One, each};
+use super::entry::{Entry, each};
 use super::{Instances, Mask};
 use crate::error::{Error, request};
-use crate::running::Saved;
+use crate::system_instance::Saved;
 
-/// States that [`Instances`] have saved, one for each that had not failed. They are indices, not pointers, so
-/// the states of other instances are harmless: they lead to no state or to another own state. Freeing
-/// consumes the value, so freed states cannot be used.
+/// States that [`Instances`] have saved, one for each instance that had not failed. They contain indices instead of pointers, so
+/// restoring them in other instances by mistake cannot corrupt memory. Freeing consumes the value, so freed states cannot be used.
 ///
 /// ```compile_fail,E0382
 /// fn restore_a_freed_state(instances: &mut fmu_run::Instances) {
@@ -29,8 +28,8 @@ impl Instances {
         self.system.check_offer(self.interface, |offer| offer.saves_states, why)?;
         let mut states = vec![None; self.len()];
         let indices = std::sync::Mutex::new(&mut states);
-        self.alive(None, |index, own, instance| {
-            let saved = (instance.save()?, own.time);
+        self.alive(None, |index, progress, instance| {
+            let saved = (instance.save()?, progress.time);
             indices.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[index] = Some(saved);
             Ok(())
         });
@@ -40,8 +39,8 @@ impl Instances {
     /// Restores states that these instances have saved.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] and restores none if an instance was made again since, by a reset of an FMU that cannot be reset
-    /// or of an instance that had failed.
+    /// Returns [`Error::Request`] and restores nothing if an instance has been created again since the states were saved. A reset
+    /// does this if the FMU cannot be reset, or if the instance had failed.
     ///
     /// # Panics
     /// Panics if the number of states differs from the number of instances.
@@ -56,10 +55,10 @@ impl Instances {
                     .map_err(|why| Error::Request(format!("instance {index}: {why}")))?;
             }
         }
-        let back = |index: usize, one: &mut One| {
+        let back = |index: usize, one: &mut Entry| {
             let (Some((saved, time)), Some(instance)) = (states.0[index], &mut one.instance) else { return };
             match instance.restore(saved) {
-                Ok(()) => (one.own.time, one.error) = (time, None),
+                Ok(()) => (one.progress.time, one.error) = (time, None),
                 Err(rejection) => one.error = Some(rejection.to_string()),
             }
         };
@@ -76,8 +75,8 @@ impl Instances {
         }
     }
 
-    /// Serializes saved states to bytes, which another process can read. An entry is `None` if the instance
-    /// had no state, or its FMU returned an error.
+    /// Serializes saved states to bytes, which another process can de-serialize. An entry is `None` if the instance had no state, or
+    /// its FMU returned an error.
     ///
     /// # Errors
     /// Returns [`Error::Request`] if the FMU does not support it.
@@ -104,7 +103,7 @@ impl Instances {
         Ok(bytes.collect())
     }
 
-    /// De-serializes states from [`serialize`](Self::serialize), one or `None` for each instance.
+    /// De-serializes states that [`serialize`](Self::serialize) returned, one or `None` for each instance.
     ///
     /// # Errors
     /// Returns [`Error::Request`] if the number of states is wrong, and [`Error::Fmu`] if an instance rejects

@@ -1,4 +1,4 @@
-//! Systems whose structural parameters have other values than in the model description (section 2.3.2 of FMI 3.0).
+//! Systems whose structural parameters differ from the model description (section 2.3.2 of FMI 3.0).
 
 use super::{Component, Definition, System};
 use crate::description::Structural;
@@ -17,8 +17,8 @@ impl System {
         self.find(name).is_ok_and(|found| found.iter().any(|found| found.variable.is_structural()))
     }
 
-    /// Returns the system with the values of structural parameters among the start values, and the other start values. Arrays then
-    /// have other sizes, so that the system has other variables. [`run`](Self::run) and [`instances`](Self::instances) do this, too.
+    /// Returns the system with the structural parameters among the start values, and the other start values. The arrays of the new
+    /// system have other sizes, so it has other variables. [`run`](Self::run) and [`instances`](Self::instances) call this function.
     ///
     /// # Errors
     /// Returns [`Error::Request`] if a structural parameter has different values for several runs or instances.
@@ -55,10 +55,10 @@ impl System {
     }
 }
 
-/// Returns values that are the same for all runs or instances.
+/// Returns the values. Fails unless each is the same for all runs or instances.
 fn one_for_all(given: &StartValues) -> Result<Vec<(Target, Value)>, Error> {
     let all = given.values(0).map(|(target, value)| (target, value.clone()));
-    // The only types that structural parameters have are integers (section 2.4.7.4 of FMI 3.0).
+    // Structural parameters are always integers (section 2.4.7.4 of FMI 3.0).
     let numbers = given.numbers(0).map(|(target, number)| (target, Value::Integer(number as i128)));
     if !given.is_for_all() {
         return request("a structural parameter needs one value for all runs or instances".to_owned());

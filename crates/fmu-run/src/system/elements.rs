@@ -1,5 +1,5 @@
-//! Whole arrays: FMI 2.0 has only their elements, named `y[1]` or `A[2,3]` (section 2.2.9), and arrays of FMI 3.0 have the same
-//! names here.
+//! Finds whole arrays among variables. FMI 2.0 has only elements, named `y[1]` or `A[2,3]` (section 2.2.9), and this crate gives the
+//! elements of FMI 3.0 arrays the same names.
 
 use std::collections::HashMap;
 
@@ -12,7 +12,7 @@ pub struct Elements {
     pub sizes: Vec<usize>,
 }
 
-/// Finds the arrays among variables: names whose indices fill all dimensions, from 1 or from 0.
+/// Finds the arrays among these variables by name. The indices of an array must fill all dimensions, from 1 or from 0.
 pub(super) fn arrays<'a>(names: impl Iterator<Item = &'a str>) -> HashMap<String, Elements> {
     let mut found: HashMap<String, Vec<(Vec<usize>, &str)>> = HashMap::new();
     for name in names {
@@ -23,7 +23,7 @@ pub(super) fn arrays<'a>(names: impl Iterator<Item = &'a str>) -> HashMap<String
     found.into_iter().filter_map(|(array, elements)| Some((array, complete(elements)?))).collect()
 }
 
-/// Returns the name of the array and the indices, for an element. In `der(x[1])`, the array is `der(x)`.
+/// Splits the name of an element into the name of the array and the indices. In `der(x[1])`, the array is `der(x)`.
 fn split(name: &str) -> Option<(String, Vec<usize>)> {
     let end = name.rfind(']')?;
     let rest = &name[end + 1..];
@@ -36,6 +36,7 @@ fn split(name: &str) -> Option<(String, Vec<usize>)> {
     Some((format!("{}{rest}", &name[..begin]), indices.collect::<Option<_>>()?))
 }
 
+/// Returns the array that consists of these elements, if none is missing.
 fn complete(mut elements: Vec<(Vec<usize>, &str)>) -> Option<Elements> {
     elements.sort_unstable();
     let (first, last) = (&elements.first()?.0, &elements.last()?.0);
@@ -49,7 +50,7 @@ fn complete(mut elements: Vec<(Vec<usize>, &str)>) -> Option<Elements> {
         .zip(last)
         .map(|(first, last)| last.checked_add(1)?.checked_sub(*first))
         .collect::<Option<_>>()?;
-    // In sorted order, every element has the indices that follow from its number.
+    // In sorted order, the indices of every element follow from its number.
     let is_at = |(number, (indices, _)): (usize, &(Vec<usize>, &str))| {
         let mut rest = number;
         let own = indices.iter().zip(&sizes).zip(first).rev().all(|((index, size), first)| {

@@ -9,9 +9,9 @@ mod ssp;
 use crate::description::{Description, Variable};
 use crate::error::{Error, request};
 use crate::fmu::Loaded;
-use crate::found::{Found, is_exact};
-use crate::kept::Kept;
+use crate::lookup::{Found, is_exact};
 use crate::messages::Feed;
+use crate::pool::Pool;
 use crate::selection::Selection;
 pub use elements::Elements;
 use fmi_abi::description::Offer;
@@ -27,9 +27,8 @@ use std::sync::{Arc, OnceLock};
 /// Connected FMUs in Co-Simulation. A system runs like one FMU, also in parallel in [batches](System::run)
 /// and as [instances](System::instances). An [`Fmu`](crate::Fmu) is a system with one component.
 ///
-/// Variables are named `component.variable`, or by the names of the system's inputs and outputs. From one
-/// communication point to the next, each component steps with its inputs at the first point. [`Order`]
-/// determines when outputs are passed to inputs.
+/// Variables are named `component.variable`, or by the names of the system's inputs and outputs. In a step, each component keeps the
+/// values that its inputs had at the first communication point. [`Order`] determines when outputs are passed to inputs.
 #[derive(Clone, Debug)]
 pub struct System(Arc<Definition>);
 
@@ -37,8 +36,9 @@ pub struct System(Arc<Definition>);
 struct Definition {
     name: String,
     components: Vec<Component>,
-    /// Indices of the components by name, and the lengths of the names.
+    /// Indices of the components by name.
     by_name: HashMap<String, usize>,
+    /// Lengths of the names of the components, in bytes.
     lengths: BTreeSet<usize>,
     /// Names of the system's inputs and outputs, and the variables that they denote.
     connectors: BTreeMap<String, Vec<String>>,
@@ -48,8 +48,8 @@ struct Definition {
     exchange: Exchange,
     start: Vec<(String, StartValue)>,
     stop_time: Option<f64>,
-    kept: Kept,
-    /// Arrays by name.
+    pool: Pool,
+    /// Arrays by name, found when they are first needed.
     arrays: OnceLock<HashMap<String, Elements>>,
 }
 
@@ -70,7 +70,7 @@ pub struct Composition<'a> {
     pub components: Vec<(&'a str, &'a Fmu)>,
     /// Connections from outputs to inputs, as `component.variable`.
     pub connections: Vec<(&'a str, &'a str)>,
-    /// Time at which values are passed.
+    /// Determines when outputs are passed to inputs.
     pub order: Order,
 }
 
@@ -87,10 +87,9 @@ impl System {
     /// Connects FMUs.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] for duplicate names of components, unknown variables or wrong causalities.
-    /// It also reports connections that do not fit, inputs that are fed twice, and algebraic loops. Returns
-    /// [`Error::Fmu`] if an FMU does not support Co-Simulation, or a process may have only one instance of
-    /// it.
+    /// Returns [`Error::Request`] for duplicate names of components, unknown variables, wrong causalities, connections between
+    /// variables that do not match, inputs with two connections, and algebraic loops. Returns [`Error::Fmu`] if an FMU does not
+    /// support Co-Simulation, or occurs twice although a process may create only one instance of it.
     pub fn connect(composition: &Composition) -> Result<Self, Error> {
         let components =
             composition.components.iter().map(|(name, fmu)| ((*name).to_owned(), Arc::clone(fmu.loaded())));
@@ -124,8 +123,7 @@ impl System {
         }))
     }
 
-    /// Returns the sequence in which values are passed at a communication point: outputs and connected
-    /// inputs, by stage.
+    /// Returns the connections, from outputs to inputs, in the stages in which values are passed at a communication point.
     pub fn stages(&self) -> Vec<Vec<(&str, &str)>> {
         let stages = self.0.exchange.stages.iter();
         let pairs = stages.map(|stage| stage.outputs.names().iter().zip(stage.inputs.names()));
@@ -154,8 +152,8 @@ impl System {
         Ok(selection)
     }
 
-    /// Returns the elements of a whole array by its name: of an array of FMI 3.0, or of variables `y[1]`, `y[2]`, ... whose indices are
-    /// complete. `None` for other names, also for a variable.
+    /// Returns the elements of a whole array by its name: an array of FMI 3.0, or variables `y[1]`, `y[2]`, ... whose indices are
+    /// complete. Returns `None` for all other names, including variables.
     ///
     /// ```no_run
     /// # fn main() -> Result<(), fmu_run::Error> {
@@ -178,8 +176,8 @@ impl System {
         all.get(name)
     }
 
-    /// Returns the type of a variable if it has values that `f64` does not have: String, Binary, Int64 and UInt64. `None` for other
-    /// variables and for the names of arrays.
+    /// Returns the type of a variable if `f64` cannot represent all of its values: String, Binary, Int64 or UInt64. Returns `None`
+    /// for other variables and for arrays.
     ///
     /// # Errors
     /// Returns [`Error::Request`] if the name is unknown.
@@ -199,17 +197,17 @@ impl System {
         self.find_first(name)?.display_unit(name, unit)
     }
 
-    /// Frees the instances and the threads that earlier [runs](Self::run) have left for later ones. They are also freed with the
-    /// last clone of the system.
+    /// Frees the instances and the threads that earlier [runs](Self::run) have kept for later ones. They are also freed with the last
+    /// clone of the system.
     pub fn release(&self) {
-        self.0.kept.clear();
+        self.0.pool.clear();
     }
 
-    pub(crate) fn kept(&self) -> &Kept {
-        &self.0.kept
+    pub(crate) fn pool(&self) -> &Pool {
+        &self.0.pool
     }
 
-    /// Returns whether instances may exist while no run needs them.
+    /// Returns whether instances may be kept while no run uses them.
     pub(crate) fn may_be_idle(&self, interface: Interface) -> bool {
         let offers =
             self.components().iter().filter_map(|component| component.fmu.description.offer(interface));
@@ -220,7 +218,7 @@ impl System {
         &self.0.components
     }
 
-    /// Returns a feed for the messages of instances of this system.
+    /// Returns a collector for the messages of instances of this system.
     pub(crate) fn feed(&self) -> Arc<Feed> {
         Feed::of(self.components().iter().map(|component| component.name.clone()).collect())
     }
@@ -248,7 +246,8 @@ impl System {
         self.components().iter().try_for_each(|component| component.fmu.library(interface).map(drop))
     }
 
-    /// Returns the interface type of runs: the requested one, or Co-Simulation, or Model Exchange if a single FMU has nothing else.
+    /// Returns the interface type of runs: the requested one, or Co-Simulation by default. For a single FMU that has only Model
+    /// Exchange, the default is Model Exchange.
     pub(crate) fn interface(&self, asked: Option<Interface>) -> Result<Interface, Error> {
         let has_only_model_exchange = self.sole().is_some_and(|fmu| fmu.description.co_simulation.is_none());
         let interface = asked.unwrap_or(match has_only_model_exchange {
@@ -259,13 +258,13 @@ impl System {
         Ok(interface)
     }
 
-    /// Returns whether a process may have only one instance.
+    /// Returns whether a process may create only one instance.
     pub(crate) fn once_per_process(&self, interface: Interface) -> bool {
         self.components().iter().any(|component| component.fmu.once_per_process(interface))
     }
 
-    /// Returns the number of threads for this number of runs or instances: the requested number, or one for each processor, but at
-    /// most one for each run or instance.
+    /// Returns the number of threads for `count` runs or instances: the requested number, or one for each processor, but at most
+    /// `count`.
     pub(crate) fn threads(
         &self,
         interface: Interface,
@@ -275,7 +274,7 @@ impl System {
         if asked == Some(0) {
             return request("threads must be at least 1".to_owned());
         }
-        // Counting the processors takes longer than a short run.
+        // Returns early, because counting the processors takes longer than a short run.
         if count <= 1 || self.once_per_process(interface) {
             return Ok(1);
         }
@@ -283,10 +282,10 @@ impl System {
         Ok(threads.min(count))
     }
 
-    /// Returns the variables of this name: several if an input of the system feeds several.
+    /// Returns the variables with this name. There are several if an input of the system is connected to several inputs.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if there is none; the message suggests a similar name.
+    /// Returns [`Error::Request`] if there is none. The message suggests a similar name.
     pub(crate) fn find(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
         self.0.find(name)
     }
@@ -295,21 +294,22 @@ impl System {
         self.find(name).map(|found| found[0])
     }
 
-    /// Returns numeric variables of this name.
+    /// Returns the variables with this name. Fails unless they are numeric.
     pub(crate) fn find_numbers(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
         let found = self.find(name)?;
         found.iter().try_for_each(|found| found.check_number(name))?;
         Ok(found)
     }
 
-    /// Returns variables that accept a start value. Inputs that are fed by outputs do not.
+    /// Returns the variables with this name. Fails unless they accept a start value, which inputs that are connected to outputs do
+    /// not.
     pub(crate) fn find_startable(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
         let found = self.find(name)?;
         found.iter().try_for_each(|found| found.check_start(name))?;
         Ok(found)
     }
 
-    /// Fails unless it is a Real input of a single FMU that accepts input derivatives.
+    /// Returns the variables with this name. Fails unless they are Real inputs of a single FMU that accepts input derivatives.
     pub(crate) fn takes_input_derivative(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
         let offer = self.sole().and_then(|fmu| fmu.description.co_simulation.as_ref());
         if offer.is_none_or(|offer| !offer.input_derivatives) {
@@ -339,7 +339,7 @@ impl System {
     }
 }
 
-/// An FMU, unpacked and loaded once for any number of runs and instances, which keep it loaded. It is a
+/// An FMU, unpacked and loaded once for any number of runs and instances. It stays loaded while one of them exists. It is a
 /// [`System`] with one component.
 #[derive(Clone, Debug)]
 pub struct Fmu(System);
@@ -352,8 +352,7 @@ impl Fmu {
     /// ```
     ///
     /// # Safety
-    /// The functions of the library have the types of the FMI standard, and the library is sound when it is
-    /// loaded and called.
+    /// The functions of the library have the types of the FMI standard, and it is sound to load the library and to call them.
     ///
     /// # Errors
     /// Returns [`Error::Fmu`] if the file is not an FMU, has no library for this platform, or needs another
@@ -364,12 +363,11 @@ impl Fmu {
             .map(|loaded| Self(System::of_one(loaded)))
     }
 
-    /// Opens an FMU as [`open`](Self::open) does, and permits libraries that start another program
-    /// (`needsExecutionTool`), which must be installed. If the program is missing, the FMU reports it when it
-    /// runs.
+    /// Opens an FMU as [`open`](Self::open) does, even if its library starts another program (`needsExecutionTool`), which must be
+    /// installed. If the program is missing, the FMU reports an error when it runs.
     ///
     /// # Safety
-    /// The requirement of [`open`](Self::open), and the program may be started.
+    /// The requirement of [`open`](Self::open), and it is sound to start the program.
     ///
     /// # Errors
     /// Same errors as [`open`](Self::open).
@@ -388,7 +386,7 @@ impl Fmu {
     }
 }
 
-/// An FMU has the functions of its [`System`]: variables, runs, instances.
+/// Gives access to the functions of the [`System`]: variables, runs, instances.
 impl Deref for Fmu {
     type Target = System;
 
@@ -414,7 +412,7 @@ impl Definition {
             exchange: Exchange::default(),
             start: Vec::new(),
             stop_time: None,
-            kept: Kept::default(),
+            pool: Pool::default(),
             arrays: OnceLock::new(),
         }
     }
@@ -468,6 +466,7 @@ impl Definition {
         Ok(System(Arc::new(self)))
     }
 
+    /// Finds one end of a connection, and checks its causality.
     fn end(&self, name: &str, wanted: &str) -> Result<Found<'_>, Error> {
         let found = self.find(name)?[0];
         match found.variable.causality.as_str() {
@@ -476,6 +475,7 @@ impl Definition {
         }
     }
 
+    /// Finds a variable of a component by its name in the system.
     fn look_up(&self, name: &str) -> Option<Found<'_>> {
         let with = |component: usize, own: &str| {
             let description = &self.components[component].fmu.description;
@@ -485,7 +485,8 @@ impl Definition {
         match &*self.components {
             [component] if component.name.is_empty() => with(0, name),
             _ => {
-                // Names of components may have dots; the first component in the system counts.
+                // A name can be split at several dots, because names of components may contain dots. If several components match, the
+                // first one in the system is used.
                 let split = |length: &usize| {
                     let (component, own) = (name.get(..*length)?, name.get(*length..)?.strip_prefix('.')?);
                     Some((*self.by_name.get(component)?, own))
@@ -523,7 +524,7 @@ impl Definition {
         };
         let element = format!("{name}[");
         let of_array = names().find(|known| known.starts_with(&element));
-        // Long names take long to compare, and are hardly misspelled.
+        // Names that are too long for a message are not compared, because that takes long and they are rarely misspelled.
         let is_short = name.len() <= fmi_abi::SHOWN;
         let similar =
             || is_short.then(|| nearest(name, names().filter(|known| known.len() <= fmi_abi::SHOWN)));
@@ -533,15 +534,14 @@ impl Definition {
     }
 }
 
-/// Returns the most similar name, if one is similar enough. Derivatives rank lower, because users rarely mean
-/// them.
+/// Returns the most similar name, if one is similar enough. Derivatives rank lower, because users rarely ask for them.
 pub fn nearest(name: &str, names: impl Iterator<Item = String>) -> Option<String> {
     /// Minimum similarity.
     const SIMILAR: f64 = 0.8;
     let wanted = name.to_lowercase();
     let similarity = |known: &String| {
         let known = known.to_lowercase();
-        // Prefixes of a name match too, if they have at least two letters.
+        // A name of at least two letters that is a prefix of the other one ranks higher.
         let short =
             known.len().min(wanted.len()) > 1 && (wanted.starts_with(&known) || known.starts_with(&wanted));
         let derived = known.starts_with("der(") && !wanted.starts_with("der(");

@@ -1,35 +1,34 @@
-//! Sequence in which values are passed at a communication point.
+//! Determines the sequence in which values are passed from outputs to inputs at a communication point.
 
 use crate::description::Dependencies;
 use crate::error::{Error, request};
-use crate::found::Found;
+use crate::lookup::Found;
 use crate::selection::Selection;
 use fmi_abi::shown;
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// Time at which outputs are passed to the connected inputs.
+/// Determines when outputs are passed to the connected inputs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Order {
-    /// At each communication point, until all values are consistent. An output is read after the inputs on
-    /// which it depends directly, according to the model description. Circular dependencies are an algebraic
-    /// loop, which is an error.
+    /// Outputs are passed at each communication point, so that all values are consistent. An output is read after the inputs on which
+    /// it depends directly, according to the model description, have been set. Circular dependencies are an algebraic loop, which is
+    /// an error.
     #[default]
     Dependencies,
-    /// After a step, all outputs are read; before the next step, all inputs are set, as in FMPy and libcosim.
-    /// Outputs that depend directly on inputs lag by one step, so there are no algebraic loops.
+    /// All outputs are read after a step, and all inputs are set before the next step, as in FMPy and libcosim. Outputs that depend
+    /// directly on inputs lag by one step, so there are no algebraic loops.
     Jacobi,
 }
 
-/// Sequence of the exchange: all outputs of a stage are read and all its inputs are set, then the next stage
-/// follows.
+/// Stages of the data exchange. All outputs of a stage are read and all of its inputs are set before the next stage begins.
 #[derive(Debug, Default)]
 pub(crate) struct Exchange {
     pub order: Order,
     pub stages: Vec<Stage>,
 }
 
-/// Outputs and the connected inputs, in the same order.
+/// Outputs and the inputs that are connected to them, in the same order.
 #[derive(Debug, Default)]
 pub(crate) struct Stage {
     pub outputs: Selection,
@@ -39,7 +38,7 @@ pub(crate) struct Stage {
 /// A connection: an output of a component and the connected input.
 type Ends<'a> = (Found<'a>, Found<'a>);
 
-/// Returns the stages, each after the stages that it depends on.
+/// Returns the stages, sorted so that each stage follows the stages on which it depends.
 pub(super) fn stages(names: &[(String, String)], ends: &[Ends], order: Order) -> Result<Vec<Stage>, Error> {
     let levels = match order {
         Order::Jacobi => vec![0; ends.len()],
@@ -47,7 +46,7 @@ pub(super) fn stages(names: &[(String, String)], ends: &[Ends], order: Order) ->
     };
     let count = levels.iter().max().map_or(0, |last| last + 1);
     let mut stages: Vec<Stage> = (0..count).map(|_| Stage::default()).collect();
-    // Groups of the outputs and the inputs of each stage.
+    // For each stage, the groups of its outputs and of its inputs, see `Selection::push_to`.
     let mut known: Vec<[HashMap<_, _>; 2]> = (0..count).map(|_| Default::default()).collect();
     for (((from, to), (output, input)), level) in names.iter().zip(ends).zip(levels) {
         let [of_outputs, of_inputs] = &mut known[level];
@@ -57,17 +56,17 @@ pub(super) fn stages(names: &[(String, String)], ends: &[Ends], order: Order) ->
     Ok(stages)
 }
 
-/// The inputs on which outputs of a component depend directly. Outputs with the same dependencies share them.
+/// The direct dependencies of outputs of a component. Outputs with the same dependencies share a set.
 struct Set {
-    /// Connections to these inputs.
+    /// Connections to the inputs on which the outputs depend.
     before: Vec<usize>,
-    /// Length of the longest chain of connections that must precede the outputs, if it is known.
+    /// Length of the longest chain of connections that must be passed before the outputs are read; `None` until it is known.
     level: Option<usize>,
-    /// Whether the search for the level has begun and not ended.
+    /// Whether the search for the level has begun but not ended.
     is_open: bool,
 }
 
-/// Returns for each connection the index of the set of its output, and the sets.
+/// Returns the index of the set for the output of each connection, and the sets.
 fn sets(ends: &[Ends]) -> (Vec<usize>, Vec<Set>) {
     let mut inputs: HashMap<usize, Vec<(u32, usize)>> = HashMap::new();
     for (index, (_, to)) in ends.iter().enumerate() {
@@ -93,18 +92,19 @@ fn sets(ends: &[Ends]) -> (Vec<usize>, Vec<Set>) {
     (ends.iter().map(set).collect(), sets)
 }
 
-/// Returns the connections to inputs with these value references. `inputs` is sorted.
+/// Returns the connections to inputs whose value references are in the range. `inputs` is sorted.
 fn within<'a>(inputs: &'a [(u32, usize)], range: &Range<u32>) -> impl Iterator<Item = usize> + use<'a> {
     let [begin, end] =
         [range.start, range.end].map(|limit| inputs.partition_point(|(reference, _)| *reference < limit));
     inputs[begin..end].iter().map(|(_, index)| *index)
 }
 
-/// Returns the level of each connection: the length of the longest chain of connections that must precede it.
+/// Returns the level of each connection: the length of the longest chain of connections that must be passed before it. Searches depth
+/// first, without recursion, because chains may be long.
 fn levels(names: &[(String, String)], ends: &[Ends]) -> Result<Vec<usize>, Error> {
     let (set_of, mut sets) = sets(ends);
     for first in 0..ends.len() {
-        // The open connections, each with the number of connections before it that have been visited.
+        // The connections on the current path, each with the number of its predecessors that have been visited.
         let mut path = vec![(first, 0)];
         while let Some((connection, visited)) = path.last_mut() {
             let set = &mut sets[set_of[*connection]];
@@ -142,7 +142,7 @@ fn levels(names: &[(String, String)], ends: &[Ends]) -> Result<Vec<usize>, Error
 
 /// Returns the message for a cycle of connections.
 fn algebraic_loop(names: &[(String, String)], cycle: &[usize]) -> String {
-    /// Number of connections that the message lists.
+    /// Maximum number of connections in the message.
     const LISTED: usize = 10;
     let listed = cycle
         .iter()

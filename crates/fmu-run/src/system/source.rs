@@ -1,4 +1,5 @@
-//! Files that a system names. `source` is a URI (section 4.1 of SSP 1.0), and leads to files of the system only.
+//! Finds the files to which a system refers. The attribute `source` is a URI (section 4.1 of SSP 1.0). Files outside of the system
+//! are rejected.
 
 use fmi_abi::shown;
 use std::path::{Component, Path, PathBuf};
@@ -6,7 +7,7 @@ use std::path::{Component, Path, PathBuf};
 /// The directory of a system.
 pub(super) struct Base<'a> {
     pub directory: &'a Path,
-    /// Whether it was unpacked from an archive.
+    /// Whether the directory was unpacked from an archive.
     pub is_archive: bool,
 }
 
@@ -14,7 +15,7 @@ impl Base<'_> {
     /// Returns the path of a file of the system.
     ///
     /// # Errors
-    /// Fails if there is no such file in the directory. The message names the source.
+    /// Fails if there is no such file in the directory of the system. The message contains the source.
     pub fn find(&self, source: &str) -> Result<PathBuf, String> {
         let outside = || match self.is_archive {
             true => format!("{} is outside of the archive", shown(source)),
@@ -32,19 +33,19 @@ impl Base<'_> {
             Some(path) => path,
             None => {
                 let path = self.directory.join(relative(&decoded).ok_or_else(outside)?);
-                // Some tools write names without encoding them.
+                // If there is no such file, tries the name without decoding, because some tools do not encode names.
                 let literal = relative(source).map(|name| self.directory.join(name));
                 literal.filter(|literal| !path.exists() && literal.exists()).unwrap_or(path)
             }
         };
-        // A link may lead outside, too.
+        // Compares canonical paths, because a symbolic link may lead outside.
         let real = path.canonicalize().map_err(|_| missing())?;
         let directory = self.directory.canonicalize().map_err(|_| missing())?;
         if real.starts_with(directory) { Ok(real) } else { Err(outside()) }
     }
 }
 
-/// Decodes `%20` and other bytes of a URI.
+/// Decodes percent-encoded bytes, such as `%20`. Returns `None` if the result is not UTF-8 or contains control characters.
 fn decoded(source: &str) -> Option<String> {
     let mut bytes = Vec::with_capacity(source.len());
     let mut rest = source.as_bytes();
@@ -65,7 +66,7 @@ fn decoded(source: &str) -> Option<String> {
     String::from_utf8(bytes).ok().filter(|name| !name.contains(char::is_control))
 }
 
-/// Returns the scheme of a URI, such as `file`. A single letter is a drive of Windows.
+/// Returns the scheme of a URI, such as `file`. A single letter is not a scheme but a drive of Windows.
 fn scheme(uri: &str) -> Option<&str> {
     let (scheme, _) = uri.split_once(':')?;
     let is_scheme = scheme.len() > 1
@@ -83,7 +84,7 @@ fn of_file(uri: &str) -> PathBuf {
     PathBuf::from(drive.filter(|_| cfg!(windows)).unwrap_or(path))
 }
 
-/// Returns a relative path without `..`; `None` if it leads outside.
+/// Removes `..` from a relative path. Returns `None` if the path is absolute or leads outside.
 fn relative(name: &str) -> Option<PathBuf> {
     let name = name.replace('\\', "/");
     let mut path = PathBuf::new();

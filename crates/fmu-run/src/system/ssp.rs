@@ -13,16 +13,16 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Largest number of bytes of all names and values, which a system repeats for each element of nested systems, and of all parameter
-/// files, which several elements may name.
+/// Maximum memory of names and parameters, in bytes. Names of nested systems are repeated for each element, and several elements may
+/// refer to the same parameter file, so a small file may need much memory.
 const MAX_BYTES: usize = 128 << 20;
 
 /// Content of `SystemStructure.ssd`.
 struct Read<'a> {
     base: Base<'a>,
-    /// Components with the files of their FMUs, in their order.
+    /// Names of the components and paths of their FMUs, in the order of the file.
     components: Vec<(String, PathBuf)>,
-    /// Connectors of systems.
+    /// Connectors of all systems.
     connectors: HashSet<String>,
     connections: Vec<(String, String)>,
     start: Vec<(String, Value)>,
@@ -39,17 +39,17 @@ struct Value {
 }
 
 impl System {
-    /// Unpacks an SSP file, then loads and connects its FMUs. Systems may be nested. A connector of the outer
-    /// system is an input or output with its name. Start values come from parameter bindings. All files that the system names
-    /// must be in the archive; `path` may also be the directory of an unpacked system.
+    /// Unpacks an SSP file, then loads and connects its FMUs. Systems may be nested. A connector of the outer system is an input or
+    /// output of the system, with the same name. Start values are read from parameter bindings. All files to which the system refers
+    /// must be in the archive. `path` may also be the directory of an unpacked system.
     ///
     /// # Safety
     /// The requirement of [`Fmu::open`](crate::Fmu::open), for each FMU in the file.
     ///
     /// # Errors
-    /// Returns [`Error::Fmu`] if the file is not an SSP file, or one of its FMUs cannot be loaded. Returns
-    /// [`Error::Request`] as [`connect`](Self::connect) does, and for unsupported content: components that
-    /// are not FMUs, parameter mappings, signal dictionaries, transformations of connections.
+    /// Returns [`Error::Fmu`] if the file is not an SSP file, or one of its FMUs cannot be loaded. Returns the errors of
+    /// [`connect`](Self::connect), and [`Error::Request`] for unsupported content: components that are not FMUs, parameter mappings,
+    /// signal dictionaries, transformations of connections.
     pub unsafe fn open(path: &Path, order: Order) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
         let mut limits = Limits::default();
@@ -105,20 +105,21 @@ impl<'a> Read<'a> {
         }
     }
 
-    /// Takes bytes from the number that may still be read.
+    /// Subtracts from the number of bytes that may still be read.
     fn take(&mut self, bytes: usize) -> Result<(), String> {
         let remaining = self.remaining.checked_sub(bytes);
         self.remaining = remaining.ok_or("the names and parameters of its elements take too much memory")?;
         Ok(())
     }
 
-    /// Returns the name of an element in the system that is called `path`, which ends with a dot or is empty.
+    /// Returns the full name of an element. `path` is the name of its system, which ends with a dot or is empty.
     fn name(&mut self, path: &str, name: &str) -> Result<String, String> {
         self.take(path.len() + name.len() + size_of::<String>())?;
         Ok(format!("{path}{name}"))
     }
 
-    /// Reads a system; names of its elements begin with `path`. The depth of the file limits the recursion.
+    /// Reads a system. The names of its elements begin with `path`. The recursion is limited, because the XML parser limits the depth
+    /// of the file.
     fn system(&mut self, node: Node, path: &str) -> Result<(), String> {
         self.bindings(node, path)?;
         for connector in children(node, "Connectors") {
@@ -178,7 +179,7 @@ impl<'a> Read<'a> {
         Ok(())
     }
 
-    /// Reads the start values that are bound to an element; later values replace earlier ones.
+    /// Reads the start values that are bound to an element. Later values replace earlier ones.
     fn bindings(&mut self, node: Node, path: &str) -> Result<(), String> {
         for binding in children(node, "ParameterBindings") {
             let path = self.name(path, binding.attribute("prefix").unwrap_or_default())?;
@@ -224,8 +225,8 @@ impl<'a> Read<'a> {
         Ok(())
     }
 
-    /// Finds the connections between components, through all connectors of nested systems, and the connectors
-    /// of the outer system.
+    /// Finds the connections between components, which may lead through connectors of nested systems, and the connectors of the outer
+    /// system.
     fn connect(&self, definition: &mut Definition) {
         let is_own = |definition: &Definition, name: &str| definition.look_up(name).is_some();
         let mut connections = Vec::new();
@@ -240,19 +241,19 @@ impl<'a> Read<'a> {
         definition.set_connections(connections);
     }
 
-    /// Returns the origin of each connection: the start of the chain of connections that ends with it.
+    /// Returns the origin of each connection, which is the start of the chain of connections that ends with it.
     fn origins(&self) -> impl Iterator<Item = &str> {
         let mut first = HashMap::new();
         for (index, (_, to)) in self.connections.iter().enumerate() {
             first.entry(to.as_str()).or_insert(index);
         }
         let before = |index: usize| first.get(self.connections[index].0.as_str()).copied();
-        // For each connection the first one of its chain, if it is known.
+        // For each connection, the first connection of its chain, once it is known.
         let mut begins: Vec<Option<usize>> = vec![None; self.connections.len()];
         for index in 0..begins.len() {
             let (mut at, mut path) = (index, Vec::new());
             while begins[at].is_none() {
-                // In a circle, any connection counts as the first.
+                // In a cycle of connections, any of them may be the first.
                 begins[at] = Some(at);
                 path.push(at);
                 match before(at) {
@@ -266,9 +267,8 @@ impl<'a> Read<'a> {
         begins.into_iter().flatten().map(|index| self.connections[index].0.as_str())
     }
 
-    /// Returns the start values by variable, in the variable's unit. Omits values of inputs that outputs
-    /// feed, because outputs would overwrite them. Omits values of connectors without a connection, because
-    /// they have no effect.
+    /// Returns the start values by variable, in the variable's unit. Values of inputs that are connected to outputs are left out,
+    /// because the outputs overwrite them. Values of unconnected connectors are left out, because they have no effect.
     fn start_values(&self, definition: &Definition) -> Result<Vec<(String, StartValue)>, Error> {
         let mut all: Vec<(String, StartValue)> = Vec::new();
         for (name, Value { kind, text, unit }) in &self.start {

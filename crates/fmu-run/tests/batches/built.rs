@@ -25,12 +25,13 @@ const DESCRIPTION: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 </fmiModelDescription>
 "#;
 
-/// The FMU with a manner, in a directory with the record of its instances.
+/// The FMU with a manner. Its directory also contains the record of its instances.
 pub struct Recorded {
     pub fmu: Option<Fmu>,
     directory: TempDir,
 }
 
+/// Returns the library, compiled once.
 fn library() -> &'static Path {
     static COMPILED: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
     let (_, path) = COMPILED.get_or_init(|| {
@@ -48,7 +49,7 @@ fn library() -> &'static Path {
 }
 
 impl Recorded {
-    /// Opens the FMU with a manner and an attribute of its Co-Simulation.
+    /// Opens the FMU with a manner, and adds an attribute to its element CoSimulation.
     pub fn open(manner: &str, attribute: &str) -> Self {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("resets.fmu");
@@ -74,7 +75,7 @@ impl Recorded {
         self.fmu.as_ref().unwrap()
     }
 
-    /// Returns the numbers of instances made, reset and freed so far.
+    /// Returns how many instances have been created, reset and freed so far.
     pub fn counts(&self) -> [usize; 3] {
         let record = std::fs::read_to_string(self.directory.path().join("record")).unwrap_or_default();
         ['+', 'r', '-'].map(|of| record.matches(of).count())

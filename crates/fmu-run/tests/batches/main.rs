@@ -1,4 +1,4 @@
-//! Runs do not depend on earlier runs, on their order, or on the number of threads, even if the FMU does not reset everything.
+//! Runs do not depend on earlier runs, on their order, or on the number of threads, even if a reset of the FMU is incomplete.
 #![allow(unsafe_code, reason = "FMUs are opened")]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
@@ -8,7 +8,7 @@ use built::Recorded;
 use fmu_run::{Batch, Error, Measure, Runs, Start, Trajectory, Watch};
 use proptest::prelude::*;
 
-/// Manners in which a reset fails, or forgets a part of the earlier run. Only instances that take long to make are reset.
+/// What a reset leaves of the earlier run, and how it fails. "slow" instances take long to create; only these are reset.
 const MANNERS: [&str; 8] =
     ["good", "state", "parameter", "derived", "slow", "slow no reset", "slow unreadable", "slow parameter"];
 const MEASURES: [Measure; 7] = [
@@ -21,7 +21,7 @@ const MEASURES: [Measure; 7] = [
     Measure::End,
 ];
 
-/// Values of a run; `fails` is the number of its failing step.
+/// Values that a run sets. `fails` is the index of the step that fails.
 #[derive(Clone, Debug)]
 struct Case {
     factor: f64,
@@ -30,7 +30,7 @@ struct Case {
     u: Vec<f64>,
 }
 
-/// Expected results of a run by their bits: outputs, statistics, and whether it fails.
+/// Expected results of a run: the bits of its outputs and statistics, and whether it fails.
 #[derive(Debug, PartialEq)]
 struct Expected {
     outputs: Vec<u64>,
@@ -43,7 +43,7 @@ fn times(count: usize) -> Vec<f64> {
 }
 
 impl Case {
-    /// Calculates a run as the C code of the FMU does in a new instance.
+    /// Calculates the results in the same way as the C code of the FMU in a new instance.
     fn expected(&self, has_bias: bool) -> Expected {
         let time = times(self.u.len());
         let (gain, bias) = (2.0 * self.factor, if has_bias { self.bias } else { 0.0 });
@@ -61,7 +61,7 @@ impl Case {
     }
 }
 
-/// Statistics by their definitions, in the order of [`MEASURES`].
+/// Calculates the statistics from their definitions, in the order of [`MEASURES`].
 fn statistics(time: &[f64], values: &[f64]) -> Vec<f64> {
     let count = values.len() as f64;
     let end = values[values.len() - 1];
@@ -70,7 +70,7 @@ fn statistics(time: &[f64], values: &[f64]) -> Vec<f64> {
     }
     let peak = values.iter().fold(0.0, |peak: f64, value| peak.max(value.abs()));
     let first = values.iter().position(|value| value.abs() == peak).unwrap();
-    // The first of 0.0 and -0.0 counts.
+    // Of 0.0 and -0.0, which are equal, the first one is the result.
     let extreme = |is_beyond: fn(f64, f64) -> bool| {
         values.iter().fold(values[0], |found, value| if is_beyond(*value, found) { *value } else { found })
     };
@@ -85,12 +85,12 @@ fn statistics(time: &[f64], values: &[f64]) -> Vec<f64> {
     ]
 }
 
-/// Returns the bits of numbers, with the same bits for all NaN.
+/// Returns the bits of numbers. All NaN have the same bits.
 fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|value| if value.is_nan() { f64::NAN.to_bits() } else { value.to_bits() }).collect()
 }
 
-/// Runs all cases as one batch. Only some callers set the bias.
+/// Runs all cases as one batch. The bias is set only if `has_bias`.
 fn run(of: &Recorded, cases: &[Case], threads: usize, has_bias: bool) -> Vec<Expected> {
     let time = times(cases[0].u.len());
     let each = |value: fn(&Case) -> f64| cases.iter().map(value).collect::<Vec<_>>();
@@ -125,6 +125,7 @@ impl Inputs for [Case] {
     }
 }
 
+/// Returns the results of each run, for comparison with the expected ones.
 fn found(runs: &Runs, times: usize) -> Vec<Expected> {
     let results = runs.trajectories.chunks(times).zip(runs.measures.chunks(MEASURES.len())).enumerate();
     let found = results.map(|(run, (outputs, measures))| Expected {
@@ -140,7 +141,7 @@ fn value() -> impl Strategy<Value = f64> {
 }
 
 fn case(times: usize) -> impl Strategy<Value = Case> {
-    // Few values, so that successive runs often differ in one of them only.
+    // There are few values, so that successive runs often differ in only one parameter.
     let parameter = || prop_oneof![Just(0.0), Just(1.0), Just(2.5), -3.0..3.0];
     let fails = prop_oneof![4 => Just(None), 1 => (0..times).prop_map(Some)];
     let u =
@@ -148,7 +149,7 @@ fn case(times: usize) -> impl Strategy<Value = Case> {
     (parameter(), parameter(), fails, u).prop_map(|(factor, bias, fails, u)| Case { factor, bias, fails, u })
 }
 
-/// A batch: cases with the same number of times, threads, and whether the bias is set.
+/// A batch: cases with the same number of times, the number of threads, and whether the bias is set.
 fn batch() -> impl Strategy<Value = (Vec<Case>, usize, bool)> {
     let cases = (2..9_usize).prop_flat_map(|times| prop::collection::vec(case(times), 1..7));
     (cases, 1..4_usize, any::<bool>())
@@ -157,7 +158,7 @@ fn batch() -> impl Strategy<Value = (Vec<Case>, usize, bool)> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
 
-    /// Successive batches of an FMU, with failed runs and NaN among them, have the results of runs in new instances.
+    /// Successive batches have the same results as runs in new instances, even if some runs fail or have NaN.
     #[test]
     fn runs_are_independent(batches in prop::collection::vec(batch(), 1..12), manner in 0..MANNERS.len()) {
         let recorded = Recorded::open(MANNERS[manner], "");
@@ -184,12 +185,12 @@ fn instances_are_used_again_if_they_can_be_reset() {
         assert_eq!(run(&recorded, std::slice::from_ref(&case), 1, true), [case.expected(true)], "run {k}");
     }
     let [made, reset, freed] = recorded.counts();
-    // A new instance takes more than 0.4 ms and a run much less, so that the reset is checked soon.
+    // Creating an instance takes more than 1 ms and a run much less, so that checks of the reset are soon due.
     assert!(made < 15 && reset > 35 && freed < made, "{made} {reset} {freed}");
     recorded.fmu().release();
     let [made, _, freed] = recorded.counts();
     assert_eq!(made, freed);
-    // After the release, runs are possible.
+    // Runs are still possible after the release.
     assert_eq!(run(&recorded, &[single(3.0)], 1, true), [single(3.0).expected(true)]);
 }
 
@@ -246,7 +247,7 @@ fn threads_run_an_fmu_at_the_same_time() {
 #[test]
 fn a_pulse_cancels_runs() {
     let recorded = Recorded::open("good", "");
-    // As many steps as take much longer than the time between two pulses.
+    // All steps together take much longer than the time between two pulses.
     let time: Vec<f64> = (0..20_000_000).map(f64::from).collect();
     for threads in [1, 2] {
         let factor = [1.0; 64];
@@ -262,6 +263,6 @@ fn a_pulse_cancels_runs() {
         assert_eq!(recorded.fmu().run(&batch, &watch).unwrap_err(), Error::Cancelled);
         assert!(watch.done() < factor.len());
     }
-    // A cancelled run leaves nothing behind.
+    // A cancelled run does not affect later runs.
     assert_eq!(run(&recorded, &[single(3.0)], 1, true), [single(3.0).expected(true)]);
 }

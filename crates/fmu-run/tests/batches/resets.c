@@ -1,6 +1,5 @@
-/* An FMU for Co-Simulation, y' = gain * u + bias, whose guid {MANNER:FILE} selects what its reset forgets, and whether an instance
- * takes long to make. It writes a character to
- * the file for each new instance (+), reset (r) and freed instance (-). */
+/* An FMU for Co-Simulation, y' = gain * u + bias. Its guid {MANNER:FILE} selects what survives a reset, and whether creating an instance
+ * takes long. For each new instance (+), reset (r) and freed instance (-), it writes a character to the file. */
 #define _POSIX_C_SOURCE 199309L
 #include <fcntl.h>
 #include <stdlib.h>
@@ -67,7 +66,7 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return c != NULL ? fmi
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     Instance *i = c;
-    /* A value that is calculated from a parameter only once. */
+    /* With "derived", a value is calculated from a parameter only once, so that it survives a reset. */
     if (!has_manner(i, "derived") || i->gain == 0) i->gain = 2 * i->factor;
     return fmi2OK;
 }
@@ -98,7 +97,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
     Instance *i = c;
     for (size_t k = 0; k < n; k++) {
-        /* Reading an undocumented local variable is an error in this manner. */
+        /* With "unreadable", reading this local variable is an error, so that instances cannot be compared. */
         if (vr[k] == HIDDEN && has_manner(i, "unreadable")) return fmi2Error;
         value[k] = vr[k] == HIDDEN ? 0 : *variable(i, vr[k]);
     }

@@ -31,7 +31,7 @@ fn library() -> &'static Path {
     path
 }
 
-/// Returns numbers of states and event indicators.
+/// Returns the numbers of states and of event indicators.
 fn sizes(model: &str) -> (usize, usize) {
     let states = match model {
         "stair" => 0,
@@ -108,7 +108,7 @@ pub fn opened(model: &str, standard: Standard) -> Fmu {
     opened_with(model, standard, "")
 }
 
-/// Opens a model with further attributes of the interface type.
+/// Opens a model and adds attributes to its element ModelExchange.
 pub fn opened_with(model: &str, standard: Standard, attributes: &str) -> Fmu {
     let (xml, platform) = match standard {
         Standard::Fmi2 => (description2(model, attributes), "linux64"),

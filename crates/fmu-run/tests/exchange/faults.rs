@@ -1,8 +1,9 @@
-//! Models with faults end with an error that says what and when.
+//! Runs of faulty models end with an error that names the cause and the time.
 
 use crate::{VERSIONS, close, opened, run, tight};
 use fmu_run::{Batch, Error, Integration, Solver, Start, Watch};
 
+/// Runs a model and returns its error.
 fn why(model: &str, standard: fmu_run::Standard, solver: Solver) -> String {
     let runs = run(
         &opened(model, standard),
@@ -19,13 +20,14 @@ fn errors_name_cause_and_time() {
         for solver in [Solver::Auto, Solver::Dopri5, Solver::Bdf, Solver::Rk4] {
             let of = |model| why(model, standard, solver);
             let nan = of("nan");
-            // A fixed step cannot be shortened: this is its middle.
+            // A fixed step cannot be shortened, so the error occurs at its middle.
             let time = if solver == Solver::Rk4 { 1.625 } else { 0.5 };
             let expected =
                 format!("at 0.25 s: Model Exchange: the derivative of state 1 is NaN at t = {time}");
             assert!(nan.starts_with(&expected), "{nan}");
             let failing = of("failing");
-            // A trial step of the solver may call the FMU beyond the next communication point.
+            // The solver may evaluate the FMU beyond the next communication point when it tries a step, so an earlier point may be
+            // named.
             let is_early = failing.starts_with("at 0 s: fmi") || failing.starts_with("at 0.25 s: fmi");
             assert!(is_early && failing.ends_with("the valve is stuck"), "{failing}");
             let endless = of("endless");
@@ -64,7 +66,7 @@ fn a_discarded_state_shortens_the_step() {
     }
 }
 
-/// Without the cancellation, the stiff model would keep the explicit method busy for years.
+/// If the run were not cancelled, the explicit method would need years for this stiff model.
 #[test]
 fn a_run_can_be_cancelled() {
     for standard in VERSIONS {

@@ -3,11 +3,12 @@
 use crate::{VERSIONS, close, opened, tight, times};
 use fmu_run::{Batch, Integration, Solver, Start, Trajectory, Watch};
 
-/// x' = sin(w t) - x from 0.
+/// Returns the solution of x' = sin(w t) - x from x = 0.
 fn answer(w: f64, t: f64) -> f64 {
     ((w * t).sin() - w * (w * t).cos() + w * (-t).exp()) / (1.0 + w * w)
 }
 
+/// Returns the largest error for an input with `count` intervals, which are lines, or cubics if `slopes`.
 fn error(slopes: bool, count: usize, standard: fmu_run::Standard) -> f64 {
     const W: f64 = 5.0;
     let time = times(2.0, count);
@@ -38,7 +39,7 @@ fn results_converge_with_the_interpolation() {
     }
 }
 
-/// x' = sin(t) - p x, which is stiff. Each interval of the input begins with a new start of the solver.
+/// x' = sin(t) - p x, which is stiff. The solver restarts at the beginning of each interval of the input.
 #[test]
 fn a_stiff_model_follows_a_moving_input() {
     const P: f64 = 1e5;
@@ -66,7 +67,7 @@ fn a_stiff_model_follows_a_moving_input() {
 
 #[test]
 fn a_ramp_is_followed_exactly() {
-    // u = t until 1 s, then a step to 3 and constant.
+    // u = t until 1 s; then it steps to 3 and is constant.
     let (own, values) = ([0.0, 1.0, 1.0, 2.0], [0.0, 1.0, 3.0, 3.0]);
     for standard in VERSIONS {
         let batch = Batch {

@@ -1,4 +1,4 @@
-//! Model Exchange: models with known solutions, and models with faults. `models.c` describes each.
+//! Tests of Model Exchange with models that have known solutions, and with faulty models. `models.c` describes each.
 #![allow(unsafe_code, reason = "FMUs are opened")]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
@@ -11,7 +11,7 @@ use built::{opened, opened_with};
 use fmu_run::{Batch, Fmu, Integration, Runs, Solver, Standard, Start, Trajectory, Watch};
 
 const VERSIONS: [Standard; 2] = [Standard::Fmi2, Standard::Fmi3];
-const EXPLICIT: [Solver; 4] = [Solver::Auto, Solver::Dopri5, Solver::Dop853, Solver::Bdf];
+const SOLVERS: [Solver; 4] = [Solver::Auto, Solver::Dopri5, Solver::Dop853, Solver::Bdf];
 
 fn times(end: f64, count: usize) -> Vec<f64> {
     (0..=count).map(|k| end * k as f64 / count as f64).collect()
@@ -21,7 +21,7 @@ fn tight(solver: Solver) -> Integration {
     Integration { solver, rtol: Some(1e-9), ..Integration::default() }
 }
 
-/// Runs an FMU and keeps all values of y.
+/// Runs an FMU and stores y at all times.
 fn run(fmu: &Fmu, time: &[f64], batch: Batch) -> Runs {
     let batch = Batch { time, outputs: vec!["y"], every: Some(1), ..batch };
     fmu.run(&batch, &Watch::default()).unwrap()
@@ -37,7 +37,7 @@ fn linear_decay() {
     let rates = [0.5, 3.0, 40.0];
     for standard in VERSIONS {
         let fmu = opened("dahlquist", standard);
-        for solver in EXPLICIT {
+        for solver in SOLVERS {
             let batch = Batch {
                 start: vec![("p", Start::Each(&rates))],
                 integration: tight(solver),
@@ -80,7 +80,7 @@ fn stiff_and_not_stiff_oscillations() {
     }
 }
 
-/// x0 at 20 s for p = 1, and at 2000 s for p = 1000, by `scipy.integrate.solve_ivp` with Radau at rtol 1e-12.
+/// x0 at 20 s for p = 1, and at 2000 s for p = 1000, calculated by `scipy.integrate.solve_ivp` with Radau and rtol 1e-12.
 const VANDERPOL: [f64; 2] = [2.008149762, 1.706167732];
 
 #[test]
@@ -92,7 +92,7 @@ fn fixed_steps() {
         let runs = run(&fmu, &time, Batch { integration, ..Batch::default() });
         runs.trajectories[count]
     };
-    // One step of the classical method.
+    // Factor of x' = -x in one step of the classical Runge-Kutta method.
     let factor = |h: f64| 1.0 - h + h * h / 2.0 - h.powi(3) / 6.0 + h.powi(4) / 24.0;
     close(end(10, None), factor(0.1).powi(10), 1e-15);
     close(end(2, Some(0.1)), factor(0.1).powi(10), 1e-15);

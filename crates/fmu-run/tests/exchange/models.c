@@ -1,5 +1,5 @@
-/* Test models for Model Exchange, of FMI 2.0 and 3.0. The guid selects the model. They know their solutions, and reject calls that the
- * standard does not allow in their mode: discrete inputs in Continuous-Time Mode, states in Event Mode, and so on. */
+/* Test models for Model Exchange, of FMI 2.0 and 3.0. The guid selects the model. The models reject calls that the standard does not allow
+ * in their mode, such as setting discrete inputs in Continuous-Time Mode or states in Event Mode. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -11,19 +11,19 @@
 #include "fmi3Functions.h"
 
 #define MODELS(M) \
-    M(ball)      /* x'' = -9.81 from x = 1; at x <= 0 the speed is reversed and multiplied by p. The height stays as it is. */ \
-    M(zeno)      /* The ball, whose height becomes 0 at a hit: it bounces without end before 2.56 s. */ \
-    M(stair)     /* count = number of whole seconds; ends at p. It has no states. */ \
+    M(ball)      /* x'' = -9.81 from x = 1; at x <= 0 the speed is reversed and multiplied by p, and the height stays as it is. */ \
+    M(zeno)      /* The ball, but its height becomes 0 at a hit. It hits the ground infinitely often before 2.56 s. */ \
+    M(stair)     /* hits = number of full seconds; ends the simulation when hits = p. It has no states. */ \
     M(vanderpol) /* x0' = x1, x1' = p (1 - x0^2) x1 - x0, from (2, 0). */ \
     M(dahlquist) /* x' = -p x, from x = 1. */ \
     M(lag)       /* x' = u + n - p x, from x = 0. */ \
     M(nan)       /* x' = 1, and NaN from t = 0.5 on. */ \
     M(root)      /* x' = -sqrt(x), from x = 1; x < 0 is discarded. */ \
     M(zero)      /* x' = -x, with an event indicator that is always 0. */ \
-    M(endless)   /* An event at t = 0.5 asks for another iteration each time. */ \
-    M(relay)     /* x' = -1 if x > 0, else 1: the sign changes at once, for ever. */ \
-    M(announce)  /* From t = 0.5 on, the next event is now. */ \
-    M(swap)      /* x' = x, from x = 1. A step after which |x| > 2 asks for an event, where x becomes -x and y = -x. */ \
+    M(endless)   /* The event at t = 0.5 requests another iteration after each iteration. */ \
+    M(relay)     /* x' = -1 if x > 0, else 1: after 1 s the sign of x changes again and again. */ \
+    M(announce)  /* From t = 0.5 on, each event announces another one at the same time. */ \
+    M(swap)      /* x' = x, from x = 1. After the first step with |x| > 2 it requests an event, at which x becomes -x and y = -x. */ \
     M(ending)    /* x' = -x; ends the simulation at x = 0.5. */ \
     M(failing)   /* x' = 1; fails from t = 0.5 on. */
 
@@ -32,7 +32,7 @@ enum { MODELS(ITEM) COUNT };
 #define NAME(name) #name,
 static const char *const NAMES[] = {MODELS(NAME)};
 
-/* Value references: the input, its rate, a discrete input, a parameter, outputs, states and derivatives. */
+/* Value references: an input, its time derivative, a discrete input, a parameter, outputs, states and derivatives of states. */
 enum { U = 1, W, N, P, Y, RATE, HITS, X0, X1, D0, D1 };
 enum Mode { START, INITIALIZATION, EVENT, CONTINUOUS };
 

@@ -14,7 +14,7 @@ fn source() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/foreign")
 }
 
-/// Returns the library, compiled once; as C++, if `language` is `c++`.
+/// Returns the library, compiled once per language, `c` or `c++`.
 fn library(language: &'static str) -> &'static Path {
     static COMPILED: [OnceLock<(TempDir, PathBuf)>; 2] = [const { OnceLock::new() }; 2];
     let (_, path) = COMPILED[usize::from(language == "c++")].get_or_init(|| {
@@ -37,7 +37,7 @@ fn library(language: &'static str) -> &'static Path {
     path
 }
 
-/// Packs the FMU with a manner in a directory, with replacements in its model description.
+/// Packs the FMU with a manner in a directory. `changes` are replacements in its model description.
 pub fn built(manner: &str, standard: Standard, directory: &Path, changes: &[(&str, &str)]) -> PathBuf {
     let (xml, platform) = match standard {
         Standard::Fmi2 => ("foreign2.xml", "linux64"),

@@ -1,7 +1,7 @@
-/* An FMU of FMI 2.0 and 3.0 with the manners of other producers' FMUs. Its guid selects the manner, so that one library is
- * packed into many FMUs: see MANNERS, where a comment names tools in which each was observed.
+/* An FMU of FMI 2.0 and 3.0 that behaves like FMUs of other producers. Its guid selects the behaviour (manner), so that one library can be
+ * packed into many FMUs. MANNERS lists the manners and the tools in which they were observed.
  *
- * The model: y is the integral of u, plus `gain`. It is compiled without -lm, and as C++ too. */
+ * The model: y is the integral of u, plus `gain`. It is compiled without -lm, as C and as C++. */
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
 #endif
@@ -23,41 +23,41 @@
 #define MANNERS(M) \
     M(plain) \
     M(memory)              /* Needs the memory callbacks: OpenModelica 1.12 to 1.24, 20-sim. */ \
-    M(unchecked_memory)    /* Calls them without a check: HIFSuite, Vector. */ \
-    M(other_environment)   /* Hands its own pointer to the logger: UniFMU, Overture. */ \
-    M(null_environment)    /* Hands NULL to the logger: wrappers that copy only the functions. */ \
-    M(freed_environment)   /* Hands over the environment of an earlier instance: libraries with a global callback struct. */ \
-    M(thread)              /* Logs from its own thread: UniFMU and others with a server behind them. */ \
-    M(other_thread)        /* The same, with another environment: UniFMU. */ \
+    M(unchecked_memory)    /* Calls the memory callbacks without checking for NULL: HIFSuite, Vector. */ \
+    M(other_environment)   /* Passes its own pointer to the logger: UniFMU, Overture. */ \
+    M(null_environment)    /* Passes NULL to the logger: wrappers that copy only the functions. */ \
+    M(freed_environment)   /* Passes the environment of an earlier instance: libraries with a global callback struct. */ \
+    M(thread)              /* Logs from its own thread: UniFMU and other FMUs that connect to a server. */ \
+    M(other_thread)        /* Logs from its own thread and passes its own pointer: UniFMU. */ \
     M(free)                /* Logs while it is freed: OpenModelica. */ \
-    M(format)              /* Leaves the format to the importer: OpenModelica, FMU SDK. */ \
-    M(percent)             /* Logs finished text that contains percent signs: Reference FMUs with paths of resources. */ \
+    M(format)              /* Passes a printf format with arguments to the logger: OpenModelica, FMU SDK. */ \
+    M(percent)             /* Logs text that contains percent signs, without arguments: Reference FMUs with paths of resources. */ \
     M(chatty)              /* Logs each step: OpenModelica. */ \
-    M(null_texts)          /* Hands NULL as category and message. */ \
+    M(null_texts)          /* Passes NULL as category and message. */ \
     M(resources)           /* Reads a file of its resources by URI: Dymola, OpenModelica. */ \
-    M(tolerance)           /* Has a solver with the tolerance of the experiment: Dymola. */ \
+    M(tolerance)           /* Has a solver that uses the tolerance of the experiment: Dymola. */ \
     M(stop_time)           /* Needs a stop time: exports of tools with a fixed simulation interval. */ \
     M(pending)             /* Performs steps in a thread and returns fmi2Pending: FMUs that run asynchronously. */ \
     M(warning)             /* Returns fmi2Warning from every call: Hopsan. */ \
-    M(discard)             /* Returns fmi2Discard from the last steps: Dymola at an event that it cannot pass. */ \
-    M(once)                /* Exists once per process: JModelica, 20-sim. */ \
+    M(discard)             /* Returns fmi2Discard from t = 0.5 on: Dymola at an event that it cannot handle. */ \
+    M(once)                /* Allows only one instance per process: JModelica, 20-sim. */ \
     M(directory)           /* Changes the working directory: tools that read tables by relative paths. */ \
     M(locale)              /* Changes the locale: exports with a GUI toolkit. */ \
-    M(rounding)            /* Changes the rounding and unmasks exceptions: Fortran runtimes, Altair. */ \
+    M(rounding)            /* Changes the rounding mode and unmasks floating-point exceptions: Fortran runtimes, Altair. */ \
     M(output)              /* Prints to stdout: Hopsan, PythonFMU. */ \
-    M(libm)                /* Needs libm without linking it: many C exports. */ \
+    M(libm)                /* Uses libm but is not linked to it: many C exports. */ \
     M(exceptions)          /* Throws and catches C++ exceptions: JModelica, CATIA, HIFSuite. */ \
-    M(no_reset)            /* Cannot be reset: many. */ \
+    M(no_reset)            /* Returns an error from reset: many tools. */ \
     M(huge_state)          /* Reports a serialized state of 2^46 bytes. */ \
     M(endless_state)       /* Reports a serialized state of SIZE_MAX bytes. */ \
-    M(growing_state)       /* Reports another size with each call. */
+    M(growing_state)       /* Reports another size of the serialized state with each call. */
 
 #define ITEM(name) name##_,
 enum { MANNERS(ITEM) COUNT };
 #define NAME(name) #name,
 static const char *const NAMES[] = {MANNERS(NAME)};
 
-/* Value references, of both FMI versions. */
+/* Value references in both FMI versions. */
 enum { U = 1, Y, GAIN, TOLERANCE, STOP, LABEL, ECHO, COUNTER, WIDE, WIDE_OUT, BYTES, BYTES_OUT, SIZE, VECTOR, SUM, VALVE, NATURAL };
 
 typedef struct {
@@ -115,7 +115,7 @@ static void *talk(void *argument) {
 static void step_model(Instance *i, double time, double size) {
     double error = i->manner == tolerance_ ? (i->has_tolerance ? i->tolerance : 1e-2) : 0.0;
     i->y += i->u * size * (1.0 + error);
-    if (i->manner == libm_) i->y += sin(time) - sin(time); /* Resolved when it is called. */
+    if (i->manner == libm_) i->y += sin(time) - sin(time); /* `sin` is resolved when it is called. */
     i->time = time + size;
     i->counter++;
 }
@@ -128,7 +128,7 @@ static void *compute(void *argument) {
     return NULL;
 }
 
-/* Decodes a URI, as the standard requires. */
+/* Reads `gain` from a file. In FMI 2.0 the location is a URI, which must be decoded; in FMI 3.0 it is a path. */
 static void read_resources(Instance *i, const char *location) {
     char path[4096], *to = path;
     const char *from = location;
@@ -178,7 +178,7 @@ static int manner_of(const char *guid) {
     return -1;
 }
 
-/* Completes an instance; NULL if it cannot exist. */
+/* Completes an instance. Returns NULL if there may not be another one. */
 static Instance *begin(Instance *i, int manner, const char *name, const char *resources, void *environment, int logging) {
     i->manner = manner, i->environment = environment, i->logging = logging;
     i->name = strdup(name);
@@ -341,7 +341,7 @@ fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status 
     return fmi2OK;
 }
 
-/* States of both FMI versions: copies of the instance. */
+/* States in both FMI versions are copies of the instance. */
 static int get_state(Instance *i, void **state) {
     if (*state == NULL) *state = malloc(sizeof *i);
     memcpy(*state, i, sizeof *i);
@@ -467,7 +467,7 @@ fmi3Status fmi3SetUInt64(fmi3Instance c, const fmi3ValueReference vr[], size_t n
     Instance *i = (Instance *)c;
     (void)n_value;
     for (size_t k = 0; k < n; k++) {
-        /* Sections 2.3.2 and 2.3.3: only in Configuration Mode. */
+        /* A structural parameter can only be set in Configuration Mode (sections 2.3.2 and 2.3.3). */
         if (vr[k] == SIZE && (!i->configuring || value[k] > 8)) return fmi3Error;
         *(vr[k] == SIZE ? &i->size : &i->natural) = value[k];
     }

@@ -1,4 +1,4 @@
-//! FMUs with the manners of other producers: `foreign.c` names each, and tools in which it was observed.
+//! FMUs that behave like FMUs of other producers. `foreign.c` describes each manner and names tools in which it was observed.
 #![allow(unsafe_code, reason = "FMUs are opened")]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
@@ -14,7 +14,7 @@ fn times() -> Vec<f64> {
     (0..11).map(|k| f64::from(k) / 10.0).collect()
 }
 
-/// Runs an FMU with u = 1; returns y at the end.
+/// Runs an FMU with u = 1 for 1 s, and returns y at the end or the error.
 fn end(fmu: &Fmu) -> Result<f64, String> {
     let time = times();
     let batch = Batch {
@@ -73,7 +73,7 @@ fn errors_have_the_messages_of_fmus_with_another_environment() {
     for (standard, function) in VERSIONS.into_iter().zip(["fmi2DoStep", "fmi3DoStep"]) {
         let expected = format!("at 0.5 s: {function}: the stranger gives up");
         assert_eq!(end(&opened("other_environment", standard)), Err(expected));
-        // With several instances, the thread tells to which one a message belongs.
+        // With several instances, a message is attributed to an instance by the thread that logs it.
         let fmu = opened("other_environment", standard);
         let mut others = fmu.instances(&Setup { count: 3, ..Setup::default() }).unwrap();
         others.step(0.6, None).unwrap();
@@ -256,7 +256,7 @@ fn the_rounding_of_an_fmu_does_not_reach_the_caller() {
         one.get(&fmu.select(&["y"]).unwrap(), &mut value);
         let third = std::hint::black_box(1.0_f64) / std::hint::black_box(3.0);
         assert_eq!(third.to_bits(), 0x3fd5_5555_5555_5555, "{standard}");
-        // An unmasked exception would end the process.
+        // If the FMU's unmasked exceptions remained, this division would end the process.
         assert!((std::hint::black_box(1.0_f64) / std::hint::black_box(value[0])).is_infinite());
     }
 }
@@ -316,8 +316,8 @@ fn exact_values_are_start_values_inputs_and_outputs() {
     two.set_values("wide", &[small.clone(), large.clone()], None).unwrap();
     two.set_values("label", &["x".into()], Some(&[false, true])).unwrap();
     assert_eq!(two.values("wide_out").unwrap(), [Some(small), Some(large)]);
-    assert_eq!(two.texts("echo").unwrap().map_or_none(), ["none", "x"]);
-    // A number that f64 rounds is an error.
+    assert_eq!(two.texts("echo").unwrap().or_empty(), ["none", "x"]);
+    // Values that do not fit the type are errors, and so are numbers that f64 may have rounded.
     for (name, value, why) in [
         ("wide", Value::Real(1.5), "its value cannot be 1.5"),
         ("wide", Value::Real(1e17), "may not be the one that is meant"),
@@ -337,13 +337,13 @@ fn exact_values_are_start_values_inputs_and_outputs() {
     assert!(two.errors().all(|(_, why)| why.contains("wide_out")) && rounded[1].is_nan(), "{rounded:?}");
 }
 
-/// Strings of all instances.
-trait Texts {
-    fn map_or_none(self) -> Vec<String>;
+/// Helper for the strings of all instances.
+trait OrEmpty {
+    fn or_empty(self) -> Vec<String>;
 }
 
-impl Texts for Vec<Option<String>> {
-    fn map_or_none(self) -> Vec<String> {
+impl OrEmpty for Vec<Option<String>> {
+    fn or_empty(self) -> Vec<String> {
         self.into_iter().map(|text| text.unwrap_or_default()).collect()
     }
 }

@@ -1,4 +1,4 @@
-//! Files that are opened as an FMU, FMUs and others.
+//! Opens FMUs and other files as an FMU.
 
 use crate::built::{built, packed};
 use crate::end;
@@ -65,7 +65,7 @@ fn messages_say_what_a_file_is() {
         assert!(found.contains(why), "{found}");
         assert!(!found.contains('\n'), "{found}");
     }
-    // SAFETY: it is not loaded.
+    // SAFETY: the file is rejected, so no library is loaded.
     let system =
         unsafe { System::open(&archive("fmu.ssp", &[("modelDescription.xml", &one)]), Order::Jacobi) };
     assert!(system.unwrap_err().to_string().contains("is not a system (SSP) but an FMU; open it with Fmu"));
@@ -75,13 +75,13 @@ fn messages_say_what_a_file_is() {
 fn unusual_archives_are_read() {
     for standard in [Standard::Fmi2, Standard::Fmi3] {
         let directory = tempfile::tempdir().unwrap();
-        // An unpacked FMU, whose files stay.
+        // Opens an unpacked FMU. Its files must not be removed.
         let unpacked = directory.path().join("unpacked");
         let archive = built("resources", standard, directory.path(), &[]);
         zip::ZipArchive::new(std::fs::File::open(archive).unwrap()).unwrap().extract(&unpacked).unwrap();
         assert_eq!(opened(&unpacked).and_then(|fmu| end(&fmu)), Ok(3.5));
         assert!(unpacked.join("modelDescription.xml").is_file());
-        // Backslashes, and ISO-8859-1.
+        // Opens an archive with backslashes in its names, and with a model description in ISO-8859-1.
         let text = std::fs::read_to_string(unpacked.join("modelDescription.xml")).unwrap();
         let text = text
             .replace("UTF-8", "ISO-8859-1")

@@ -1,9 +1,9 @@
-//! Malformed files, written by code: what a reader must survive, each smaller than 200 kB except where it needs to be larger.
+//! Generates malformed files, which a reader must survive. Each is smaller than 200 kB unless it has to be larger.
 
 use std::io::{Cursor, Write};
 use zip::write::SimpleFileOptions;
 
-/// Files of one kind, each with its name.
+/// Files of one kind, with their names.
 pub type Files = Vec<(&'static str, Vec<u8>)>;
 
 fn description(version: u8, attributes: &str, interface: &str, rest: &str) -> Vec<u8> {
@@ -38,7 +38,7 @@ fn arrays(count: usize, attributes: &str) -> String {
     (1..=count).map(array).collect()
 }
 
-/// Model descriptions of both FMI versions.
+/// Returns model descriptions of both FMI versions.
 pub fn descriptions() -> Files {
     let deep = |tag: &str, count| format!("<{tag}>").repeat(count);
     let identifier =
@@ -98,7 +98,7 @@ pub fn descriptions() -> Files {
     ]
 }
 
-/// A system with these components of the FMU `m`, elements and connections.
+/// Returns the beginning of a system with these elements; `closed` adds the connections and the end.
 fn system(elements: &str, rest: &str) -> Vec<u8> {
     format!(
         "<ssd:SystemStructureDescription xmlns:ssd=\"http://ssp-standard.org/SSP1/SystemStructureDescription\" version=\"1.0\" name=\"S\">\
@@ -107,6 +107,7 @@ fn system(elements: &str, rest: &str) -> Vec<u8> {
     .into_bytes()
 }
 
+/// Adds connections to a system and closes its elements.
 fn closed(mut text: Vec<u8>, connections: &str) -> Vec<u8> {
     let end = format!(
         "<ssd:Connections>{connections}</ssd:Connections></ssd:System></ssd:SystemStructureDescription>"
@@ -126,7 +127,7 @@ fn connection(from: (&str, &str), to: (&str, &str)) -> String {
     )
 }
 
-/// Returns connections from output to input, of components in a row; in a circle, if `closes`.
+/// Returns a system of components that are connected in a chain, from output to input; in a cycle, if `closes`.
 pub fn chain(count: usize, closes: bool) -> Vec<u8> {
     let components: String = (0..count).map(|number| component(&format!("c{number}"), "m")).collect();
     let end = if closes { count } else { count - 1 };
@@ -137,13 +138,14 @@ pub fn chain(count: usize, closes: bool) -> Vec<u8> {
     closed(system(&components, ""), &(0..end).map(connect).collect::<String>())
 }
 
-/// Returns connections between connectors that do not exist.
+/// Returns a system with connections between connectors that do not exist.
 pub fn unrelated(count: usize) -> Vec<u8> {
     let connect = |number: usize| connection(("", &format!("a{number}")), ("", &format!("a{}", number + 1)));
     closed(system(&component("c", "m"), ""), &(0..count).map(connect).collect::<String>())
 }
 
-/// `SystemStructure.ssd` of systems in which `m` is a directory with an FMU and `p.ssv` a file with parameters.
+/// Returns contents of `SystemStructure.ssd`. In the directory of the system, `m` is a directory with an FMU, and `p.ssv` is a file
+/// with parameters.
 pub fn systems() -> Files {
     let nested = |count: usize, name: &str| {
         let begin = format!("<ssd:System name=\"{name}\"><ssd:Elements>").repeat(count);
@@ -194,7 +196,7 @@ pub fn systems() -> Files {
     ]
 }
 
-/// Parameter sets (SSV).
+/// Returns parameter sets (SSV).
 pub fn parameters() -> Files {
     let set = |parameters: &str| {
         format!("<ssv:ParameterSet xmlns:ssv=\"http://ssp-standard.org/SSP1/SystemStructureParameterValues\" version=\"1.0\" name=\"p\"><ssv:Parameters>{parameters}</ssv:Parameters></ssv:ParameterSet>").into_bytes()
@@ -222,7 +224,7 @@ fn packed(entries: impl IntoIterator<Item = (String, Vec<u8>)>) -> Vec<u8> {
     archive.finish().unwrap().into_inner()
 }
 
-/// Replaces bytes of an archive.
+/// Replaces all occurrences of bytes in an archive.
 fn replaced(archive: Vec<u8>, from: &[u8], to: &[u8]) -> Vec<u8> {
     assert_eq!(from.len(), to.len());
     let mut archive = archive;
@@ -237,7 +239,7 @@ fn replaced(archive: Vec<u8>, from: &[u8], to: &[u8]) -> Vec<u8> {
     archive
 }
 
-/// Archives of FMUs and systems.
+/// Returns archives of FMUs and systems.
 pub fn archives() -> Files {
     let one = |name: &str| packed([(name.to_owned(), b"x".to_vec())]);
     let link = {
@@ -245,10 +247,10 @@ pub fn archives() -> Files {
         archive.add_symlink("modelDescription.xml", "/etc/passwd", SimpleFileOptions::default()).unwrap();
         archive.finish().unwrap().into_inner()
     };
-    // It declares 2 GB.
+    // Declares 2 GB, but is smaller.
     let bomb = packed([("modelDescription.xml".to_owned(), vec![b' '; 70_000])]);
     let bomb = replaced(bomb, &70_000_u32.to_le_bytes(), &(2_u32 << 30).to_le_bytes());
-    // Declares less than it has.
+    // Declares fewer bytes than it contains.
     let declared = |size: u32| [b"x\x9c".to_vec(), size.to_le_bytes().to_vec()].concat();
     let liar = packed([("modelDescription.xml".to_owned(), vec![b' '; 70_000])]);
     let size = 70_000_u32.to_le_bytes();

@@ -1,12 +1,12 @@
-//! What is done with an untrusted file, for the tests and for libFuzzer: reading succeeds or is an error of one line.
+//! Reads untrusted files, in the tests and in libFuzzer. Each file is read successfully or gives an error message of one line.
 
 use fmu_run::{Description, Fmu, Order, System};
 use std::path::Path;
 
-/// The orders in which a system is opened.
+/// The orders of data exchange with which a system is opened.
 pub const ORDERS: [Order; 2] = [Order::Dependencies, Order::Jacobi];
 
-/// Asserts that the message of an error is one line that a terminal shows as it is.
+/// Asserts that an error message is one line that does not contain control characters.
 fn check<T>(result: Result<T, String>) {
     if let Err(why) = result {
         assert!(!why.trim().is_empty(), "a message is empty");
@@ -22,7 +22,7 @@ pub fn description(bytes: &[u8]) {
     check(Description::parse(&text).map_err(|why| fmu_run::Error::Fmu(why).to_string()));
 }
 
-/// Opens a directory as a system, after writing one of its files. The directory contains the other files of the system.
+/// Writes one file of a system to its directory, and opens the directory. It already contains the other files.
 pub fn file_of_system(directory: &Path, name: &str, bytes: &[u8]) {
     std::fs::write(directory.join(name), bytes).unwrap();
     for order in ORDERS {
@@ -31,7 +31,7 @@ pub fn file_of_system(directory: &Path, name: &str, bytes: &[u8]) {
     }
 }
 
-/// Opens an archive as an FMU and as a system, in an empty directory.
+/// Writes an archive to an empty directory, and opens it as an FMU and as a system.
 pub fn archive(directory: &Path, bytes: &[u8]) {
     let path = directory.join("archive");
     std::fs::write(&path, bytes).unwrap();

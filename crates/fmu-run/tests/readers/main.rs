@@ -1,4 +1,4 @@
-//! Files that may hurt: malformed descriptions, systems and archives under limits of memory, and mutations of them.
+//! Reads malformed descriptions, systems and archives, and mutations of them, in processes with limited memory.
 #![allow(unsafe_code, reason = "FMUs are opened")]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
@@ -16,14 +16,15 @@ use std::process::Command;
 use std::time::Instant;
 use tempfile::TempDir;
 
-/// Megabytes of address space in which all files are read. The process itself needs about 20.
+/// Limits of the address space in which all files are read, in MB. The process itself needs about 20 MB.
 const LIMITS: [u64; 4] = [48, 80, 128, 256];
-/// Environment variable with the directory in which the child process works.
+/// Environment variable that contains the directory in which the child process works.
 const DIRECTORY: &str = "READERS_DIRECTORY";
-/// Environment variable with the number of mutations of each kind.
+/// Environment variable that contains the number of mutations of each kind of files.
 const MUTATIONS: &str = "READERS_MUTATIONS";
 
-/// The directory of a system with the FMU `m`, parameters, and a secret file next to it.
+/// Creates a directory for a system, with the FMU `m`, parameters, a pipe and a link. Next to it are secret files, which the system
+/// must not read.
 fn system(outer: &Path) -> PathBuf {
     let directory = outer.join("system");
     std::fs::create_dir_all(&directory).unwrap();
@@ -40,7 +41,7 @@ fn system(outer: &Path) -> PathBuf {
     directory
 }
 
-/// Writes the files that one kind of inputs replaces.
+/// Restores the files that the tests replace.
 fn reset(directory: &Path) {
     std::fs::write(directory.join("p.ssv"), corpus::parameters().remove(0).1).unwrap();
     let names = corpus::systems();
@@ -48,7 +49,7 @@ fn reset(directory: &Path) {
     std::fs::write(directory.join("SystemStructure.ssd"), bound).unwrap();
 }
 
-/// Runs an ignored test of this file in a process with a limit of memory and of processor time.
+/// Runs an ignored test of this file in a process with limits of memory and processor time.
 fn run_limited(test: &str, megabytes: u64, mutations: usize) {
     let outer = TempDir::new().unwrap();
     system(outer.path());
@@ -61,8 +62,8 @@ fn run_limited(test: &str, megabytes: u64, mutations: usize) {
         .env(MUTATIONS, mutations.to_string())
         .env("TMPDIR", outer.path())
         .env("RUST_BACKTRACE", "0")
-        // Otherwise the thread of the test has an arena of its own, which needs more address space than some limits allow, and
-        // each allocation takes a page.
+        // Otherwise the thread of the test would have a separate arena, which needs more address space than some limits allow, so
+        // each allocation would take a page.
         .env("MALLOC_ARENA_MAX", "1")
         .output()
         .unwrap();
@@ -80,7 +81,7 @@ fn directory() -> PathBuf {
     PathBuf::from(std::env::var_os(DIRECTORY).expect("a parent process starts this test"))
 }
 
-/// Calls `read` with each file, and prints its name, so that the parent process knows which one was the last.
+/// Calls `read` with each file. Prints its name first, so that the parent process can report the last file.
 fn each(kind: &str, files: &Files, mut read: impl FnMut(&[u8])) {
     for (name, bytes) in files {
         println!("{kind}: {name}");
@@ -88,7 +89,7 @@ fn each(kind: &str, files: &Files, mut read: impl FnMut(&[u8])) {
     }
 }
 
-/// Writes the small files to a directory for each target of libFuzzer, which starts from them.
+/// Writes the small files to a directory for each libFuzzer target, as its initial corpus.
 #[test]
 #[ignore = "make fuzz starts it"]
 fn write_corpus() {
@@ -131,7 +132,7 @@ fn malformed_files_are_errors_whatever_memory_there_is() {
     }
 }
 
-/// Changes bytes, repeats or removes parts, and inserts tokens of XML.
+/// Mutates a file: changes bytes, repeats or removes parts, and inserts XML tokens.
 fn mutated(random: &mut Random, original: &[u8]) -> Vec<u8> {
     const TOKENS: [&str; 16] = [
         "<",
@@ -180,12 +181,12 @@ fn read_mutations() {
     let count: usize = std::env::var(MUTATIONS).unwrap().parse().unwrap();
     let mut random = Random(1);
     let mut mutate = |files: &Files, read: &dyn Fn(&[u8])| {
-        // Large files take time, and small ones find as much.
+        // Only small files are mutated, because large ones take more time and do not find more.
         let small: Vec<_> = files.iter().filter(|(_, bytes)| bytes.len() < 5000).collect();
         for _ in 0..count {
             let (_, original) = small[random.below(small.len())];
             let bytes = mutated(&mut random, original);
-            // For the parent process, if this one ends.
+            // Stored so that the input can be found if it ends this process.
             std::fs::write(outer.join("input"), &bytes).unwrap();
             read(&bytes);
         }
@@ -209,14 +210,14 @@ fn mutations_of_malformed_files_are_errors() {
     run_limited("read_mutations", 256, mutations());
 }
 
-/// Returns how many seconds it takes to open a system.
+/// Returns how long it takes to open a system, s.
 fn seconds(directory: &Path, system: &[u8]) -> f64 {
     let begin = Instant::now();
     harness::file_of_system(directory, "SystemStructure.ssd", system);
     begin.elapsed().as_secs_f64() / harness::ORDERS.len() as f64
 }
 
-/// Repeats the tests and writes their figures to the page about robustness.
+/// Repeats the tests and writes their results to the page about robustness.
 #[test]
 #[ignore = "writes a page; run it with --profile bench, and READERS_MUTATIONS=20000"]
 fn write_figures() {

@@ -1,18 +1,19 @@
-//! Inputs with their own times.
+//! Interpolates inputs that are given at their own times.
 
 use crate::error::{Error, request};
 
-/// Position of each communication point among the times of an input.
-pub(super) struct Grid {
+/// Maps the communication points to the times of an input.
+pub(super) struct Resampling {
     /// Number of times of the input.
     pub length: usize,
-    /// Index of the last time that is not after the communication point, and how far the point is on the way to the next time,
-    /// from 0 to 1.
+    /// For each communication point, the index of the last time of the input that is not after it, and the fraction of the way to the
+    /// next time, from 0 to 1.
     at: Vec<(usize, f64)>,
 }
 
-impl Grid {
-    /// Checks the times of an input: finite and not decreasing. Equal times are a step, whose last value holds from there on.
+impl Resampling {
+    /// Checks that the times of an input are finite and do not decrease. Two equal times are a step; the value at the second of them
+    /// holds from there on.
     pub fn of(name: &str, times: &[f64], points: &[f64]) -> Result<Self, Error> {
         if times.is_empty() {
             return request(format!("{name} has no times"));
@@ -25,7 +26,7 @@ impl Grid {
             return request(format!("the times of {name} decrease: {after} follows {before}"));
         }
         let at = (0..points.len()).map(|k| {
-            // A communication point that rounding puts before a time of the input is at this time.
+            // If a communication point is only a rounding error before a time of the input, it counts as this time.
             let step = if k > 0 {
                 points[k] - points[k - 1]
             } else {
@@ -44,7 +45,7 @@ impl Grid {
         Ok(Self { length: times.len(), at: at.collect() })
     }
 
-    /// Returns the value at a communication point: on the line between two values, or the earlier one if they are held.
+    /// Returns the value at a communication point: interpolated linearly, or the earlier value if values are held.
     #[inline]
     pub fn value(&self, values: &[f64], point: usize, is_held: bool) -> f64 {
         let (index, way) = self.at[point];
@@ -60,29 +61,32 @@ impl Grid {
 
 #[cfg(test)]
 mod tests {
-    use super::Grid;
+    use super::Resampling;
 
     #[test]
     fn values_between_times() {
         let points = [-1.0, 0.0, 0.25, 0.5, 1.0, 3.0];
         let (times, values) = ([0.0, 0.5, 0.5, 1.0], [1.0, 2.0, 5.0, 6.0]);
-        let grid = Grid::of("u", &times, &points).unwrap();
+        let resampling = Resampling::of("u", &times, &points).unwrap();
         let all = |is_held| {
-            points.iter().enumerate().map(|(k, _)| grid.value(&values, k, is_held)).collect::<Vec<_>>()
+            points.iter().enumerate().map(|(k, _)| resampling.value(&values, k, is_held)).collect::<Vec<_>>()
         };
         assert_eq!(all(false), [1.0, 1.0, 1.5, 5.0, 6.0, 6.0]);
         assert_eq!(all(true), [1.0, 1.0, 1.0, 5.0, 6.0, 6.0]);
-        assert_eq!(grid.indices(), [0, 0, 0, 2, 3, 3]);
+        assert_eq!(resampling.indices(), [0, 0, 0, 2, 3, 3]);
     }
 
     #[test]
     fn rounding_of_times_does_not_delay_a_step() {
-        // The sum is below 0.3 by one bit.
+        // The last point is the largest number below 0.3.
         let points: Vec<_> = (0..4).map(|k| 0.1 * f64::from(k) - 1e-17).collect();
         let points = [points[0], 0.1, 0.2, f64::from_bits(0.3_f64.to_bits() - 1)];
-        let grid = Grid::of("u", &[0.0, 0.3], &points).unwrap();
-        assert_eq!((grid.value(&[1.0, 2.0], 3, true), grid.value(&[1.0, 2.0], 3, false)), (2.0, 2.0));
-        assert!((grid.value(&[0.0, 3.0], 1, false) - 1.0).abs() < 1e-15);
+        let resampling = Resampling::of("u", &[0.0, 0.3], &points).unwrap();
+        assert_eq!(
+            (resampling.value(&[1.0, 2.0], 3, true), resampling.value(&[1.0, 2.0], 3, false)),
+            (2.0, 2.0)
+        );
+        assert!((resampling.value(&[0.0, 3.0], 1, false) - 1.0).abs() < 1e-15);
     }
 
     #[test]
@@ -90,7 +94,9 @@ mod tests {
         for (times, why) in
             [(&[][..], "no times"), (&[0.0, f64::NAN], "must be finite"), (&[0.0, 1.0, 0.5], "decrease")]
         {
-            assert!(Grid::of("u", times, &[0.0, 1.0]).is_err_and(|error| error.to_string().contains(why)));
+            assert!(
+                Resampling::of("u", times, &[0.0, 1.0]).is_err_and(|error| error.to_string().contains(why))
+            );
         }
     }
 }

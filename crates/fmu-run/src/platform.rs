@@ -1,12 +1,12 @@
-//! Detection of the machine for which a library was built, from the first bytes of the file.
+//! Finds the platform for which a library was built, from the headers of the file.
 
 use std::env::consts::{ARCH, OS};
 use std::path::Path;
 
-/// Returns the machine of a library and this machine, if they differ.
+/// Returns a message that names the platform of a library and this platform, if they differ.
 pub(crate) fn mismatch(library: &Path) -> Option<String> {
     let bytes = std::fs::read(library).ok()?;
-    let (system, processors) = made_for(&bytes)?;
+    let (system, processors) = target_of(&bytes)?;
     let here = match OS {
         "linux" => "Linux",
         "macos" => "macOS",
@@ -18,8 +18,8 @@ pub(crate) fn mismatch(library: &Path) -> Option<String> {
         .then(|| format!("it is for {system} on {}, and this is {here} on {ARCH}", processors.join(" and ")))
 }
 
-/// Returns the operating system and the processors by Rust's names; `None` for unknown formats.
-fn made_for(bytes: &[u8]) -> Option<(&'static str, Vec<&'static str>)> {
+/// Returns the operating system and the processors, as named by `std::env::consts::ARCH`. Returns `None` for unknown formats.
+fn target_of(bytes: &[u8]) -> Option<(&'static str, Vec<&'static str>)> {
     let at = |index: usize| bytes.get(index..)?.first_chunk::<4>().copied();
     let number = |index| at(index).map(u32::from_le_bytes);
     let half = |index| number(index).map(|word| word & 0xffff);
@@ -31,7 +31,7 @@ fn made_for(bytes: &[u8]) -> Option<(&'static str, Vec<&'static str>)> {
         _ => None,
     };
     Some(match at(0)? {
-        // The class gives the word width, the byte after it the byte order; e_machine is the processor.
+        // The bytes 4 and 5 are the class (word width) and the byte order; e_machine at offset 18 is the processor.
         [0x7f, b'E', b'L', b'F'] => {
             let [class, order, ..] = at(4)?;
             let machine = if order == 2 { half(18)?.swap_bytes() >> 16 } else { half(18)? };
@@ -49,7 +49,7 @@ fn made_for(bytes: &[u8]) -> Option<(&'static str, Vec<&'static str>)> {
             };
             ("Linux", vec![processor])
         }
-        // Offset 0x3c contains the offset of the PE header, which contains the machine.
+        // The offset of the PE header is at 0x3c. The machine follows the signature of the header.
         [b'M', b'Z', ..] => {
             let header = number(0x3c)? as usize;
             let processor = match (at(header)?, half(header.checked_add(4)?)?) {
@@ -62,7 +62,7 @@ fn made_for(bytes: &[u8]) -> Option<(&'static str, Vec<&'static str>)> {
             ("Windows", vec![processor])
         }
         [0xce | 0xcf, 0xfa, 0xed, 0xfe] => ("macOS", vec![mach(number(4)?)?]),
-        // A file for several processors: their number, then 20 bytes for each.
+        // A universal binary: the number of processors, then 20 bytes for each.
         [0xca, 0xfe, 0xba, 0xbe] => {
             let count = u32::from_be_bytes(at(4)?).min(16) as usize;
             let processors = (0..count).map(|index| mach(u32::from_be_bytes(at(8 + 20 * index)?)));
@@ -74,34 +74,34 @@ fn made_for(bytes: &[u8]) -> Option<(&'static str, Vec<&'static str>)> {
 
 #[cfg(test)]
 mod tests {
-    use super::made_for;
+    use super::target_of;
 
-    /// Checks headers as in their specifications. The tests of the Python package check files of linkers.
+    /// Checks headers that are made from the specifications. The tests of the Python package check files that linkers wrote.
     #[test]
     fn headers() {
         let elf = |class, order, machine: [u8; 2]| {
             let mut bytes = [b"\x7fELF".as_slice(), &[class, order], &[0; 12], &machine].concat();
             bytes.resize(64, 0);
-            made_for(&bytes).expect("ELF")
+            target_of(&bytes).expect("ELF")
         };
         assert_eq!(elf(2, 1, [62, 0]), ("Linux", vec!["x86_64"]));
         assert_eq!(elf(1, 1, [243, 0]), ("Linux", vec!["riscv32"]));
         assert_eq!(elf(2, 2, [0, 22]), ("Linux", vec!["s390x"]));
         assert_eq!(elf(2, 1, [2, 1]), ("Linux", vec!["loongarch64"]));
         let mach = [&[0xcf, 0xfa, 0xed, 0xfe, 0x0c, 0, 0, 1][..], &[0; 24]].concat();
-        assert_eq!(made_for(&mach), Some(("macOS", vec!["aarch64"])));
-        // For a truncated file, nothing beyond its end is read.
+        assert_eq!(target_of(&mach), Some(("macOS", vec!["aarch64"])));
+        // In a truncated file, nothing beyond its end may be read.
         let mut pe = vec![0; 0x48];
         pe[..2].copy_from_slice(b"MZ");
         pe[0x3c] = 0x40;
         pe[0x40..0x46].copy_from_slice(b"PE\0\0\x64\xaa");
-        assert_eq!(made_for(&pe), Some(("Windows", vec!["aarch64"])));
+        assert_eq!(target_of(&pe), Some(("Windows", vec!["aarch64"])));
         for bytes in [&pe[..], &mach, b"\xca\xfe\xba\xbe\0\0\0\x02", b"MZ", b"#!/bin/sh\n"] {
             for length in 0..bytes.len() {
-                let _ = made_for(&bytes[..length]);
+                let _ = target_of(&bytes[..length]);
             }
         }
         pe[0x3c..0x40].fill(0xff);
-        assert_eq!(made_for(&pe), None);
+        assert_eq!(target_of(&pe), None);
     }
 }

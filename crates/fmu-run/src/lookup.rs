@@ -1,21 +1,22 @@
-//! Variables of components, and whether a caller may set them.
+//! Variables found by name, and checks whether a caller may set them.
 
 use crate::description::{Description, Variable};
 use crate::error::{Error, request};
 use fmi_abi::BaseType;
 
-/// A variable of a component.
+/// A variable of a component that was found by its name.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Found<'a> {
     /// Index of the component.
     pub component: usize,
     pub variable: &'a Variable,
     pub description: &'a Description,
-    /// Name of the output that feeds the variable.
+    /// Name of the output that is connected to the variable.
     pub source: Option<&'a str>,
 }
 
 impl Found<'_> {
+    /// Fails if the values of the variable are strings or bytes.
     pub fn check_number(self, name: &str) -> Result<(), Error> {
         match self.variable.base {
             BaseType::String | BaseType::Binary => request(format!("{name} is not a number")),
@@ -23,7 +24,7 @@ impl Found<'_> {
         }
     }
 
-    /// Fails if an output feeds the variable.
+    /// Fails if the variable is connected to an output.
     pub fn check_own(self, name: &str) -> Result<(), Error> {
         match self.source {
             Some(output) => request(format!("{name} is fed by {output}, it cannot be set")),
@@ -47,8 +48,8 @@ impl Found<'_> {
         request(format!("{name} is read-only: it is {kind}"))
     }
 
-    /// Fails if the variable accepts no start value. Variables with a start value and variables set from
-    /// outside do (section 2.2.7 of FMI 2.0, 2.4.7.5 of FMI 3.0).
+    /// Fails if the variable does not accept a start value. Variables accept one if they have a start value already, or if a caller
+    /// may set them (section 2.2.7 of FMI 2.0, 2.4.7.5 of FMI 3.0).
     pub fn check_start(self, name: &str) -> Result<(), Error> {
         self.check_own(name)?;
         let constant = self.variable.variability.as_deref() == Some("constant");
@@ -59,6 +60,7 @@ impl Found<'_> {
         request(format!("{name} is read-only: it is {kind}"))
     }
 
+    /// Returns factor and offset of the conversion: value in `unit` = factor * value of the variable + offset.
     pub fn display_unit(self, name: &str, unit: &str) -> Result<(f64, f64), Error> {
         let Some(own) = &self.variable.unit else {
             return request(format!("{name} has no unit, its values cannot be in {unit}"));
@@ -76,11 +78,12 @@ impl Found<'_> {
     }
 }
 
-/// Returns whether a type has values that `f64` has not.
+/// Returns whether `f64` cannot represent all values of this type.
 pub(crate) fn is_exact(base: BaseType) -> bool {
     matches!(base, BaseType::String | BaseType::Binary | BaseType::Int64 | BaseType::UInt64)
 }
 
+/// Prepends the indefinite article.
 pub(crate) fn article(word: &str) -> String {
     let vowel = word.starts_with(['a', 'e', 'i', 'o', 'u']);
     format!("{} {word}", if vowel { "an" } else { "a" })

@@ -1,49 +1,54 @@
-//! A run in Model Exchange: smooth intervals, events between them, outputs at the communication points.
+//! A run in Model Exchange: integrates the smooth intervals, handles the events between them, and reads outputs at the communication
+//! points.
 
 use super::chatter::{Chatter, MOST_EVENTS};
 use super::inputs::Break;
 use super::model::Model;
 use super::{Integration, Solver};
-use crate::running::Running;
+use crate::system_instance::SystemInstance;
 use fmi_client::Rejection;
 
-/// What the caller does during a run.
+/// Functions of the caller that are called during a run.
 pub(crate) trait Hooks {
     /// Reads outputs at the communication point with this index.
-    fn record(&mut self, running: &mut Running, index: usize) -> Result<(), Rejection>;
+    fn record(&mut self, instance: &mut SystemInstance, index: usize) -> Result<(), Rejection>;
 
-    /// Returns whether the run goes on; called after each step.
+    /// Returns whether the run continues; called after each step.
     fn proceed(&mut self, time: f64) -> bool;
 
-    /// Observes the outputs before (`false`) and after (`true`) an event.
-    fn event(&mut self, running: &mut Running, time: f64, is_after: bool) -> Result<(), Rejection>;
+    /// Called before an event (`is_after` is false) and after it, so that the caller can read outputs.
+    fn event(&mut self, instance: &mut SystemInstance, time: f64, is_after: bool) -> Result<(), Rejection>;
 
-    /// Returns whether an input that is set only at events changes at this communication point, and is not a number.
+    /// Returns whether a string, bytes or a 64-bit integer among the inputs changes at this communication point.
     fn changes(&self, index: usize) -> bool;
 
-    /// Sets these inputs, in Event Mode.
-    fn set_exact(&mut self, running: &mut Running, index: usize) -> Result<(), Rejection>;
+    /// Sets these inputs to their values at this communication point, in Event Mode.
+    fn set_exact(&mut self, instance: &mut SystemInstance, index: usize) -> Result<(), Rejection>;
 }
 
-/// Position of a run.
-pub(crate) struct March<'a> {
+/// State of a run.
+pub(crate) struct Simulation<'a> {
     /// Communication points, s.
     pub(super) times: &'a [f64],
-    /// Index of the next one whose outputs are not read.
+    /// Index of the first communication point whose outputs have not been read.
     pub next: usize,
+    /// Time that has been reached, s.
     pub(super) time: f64,
+    /// Continuous states.
     pub(super) x: Vec<f64>,
-    /// Event indicators, and whether they were above 0 after the last event or step.
+    /// Event indicators.
     pub(super) z: Vec<f64>,
+    /// Whether each event indicator was above 0 after the last event or step.
     pub(super) above: Vec<bool>,
     /// Time of the next event that the FMU has announced, s.
     event: Option<f64>,
-    /// Sizes of the next step, if it is known, and of the last, s.
+    /// Suggested size of the next step, s; `None` lets the solver choose.
     pub(super) step: Option<f64>,
+    /// Size of the last step, s.
     pub(super) taken: f64,
     pub(super) settings: Settings,
     chatter: Chatter,
-    /// Whether no step was taken since the last event.
+    /// Whether no step has been performed since the last event.
     pub(super) is_fresh: bool,
 }
 
@@ -53,16 +58,16 @@ pub(super) struct Settings {
     pub rtol: f64,
     pub atol: f64,
     pub max_step: Option<f64>,
-    /// Whether the FMU has to know of completed steps.
+    /// Whether the FMU must be notified of completed integrator steps.
     pub reports_steps: bool,
 }
 
-/// End of a smooth interval.
+/// Reason why a smooth interval ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Arrival {
-    /// At the requested time.
+    /// The requested time was reached.
     Stop,
-    /// At an event: by this event indicator, or by the FMU after a step.
+    /// An event occurred: at this event indicator, or because the FMU requested it after a step.
     Event(Option<usize>),
     /// The FMU ended the simulation.
     Terminate,
@@ -70,7 +75,7 @@ pub(super) enum Arrival {
     Cancel,
 }
 
-impl<'a> March<'a> {
+impl<'a> Simulation<'a> {
     pub fn new(
         times: &'a [f64],
         [states, indicators]: [usize; 2],
@@ -95,7 +100,7 @@ impl<'a> March<'a> {
         }
     }
 
-    /// Performs the run after Initialization Mode. Returns early if the caller cancels it.
+    /// Performs the run, from the end of Initialization Mode. Returns early if the caller cancels it.
     pub fn run(&mut self, model: &Model, hooks: &mut impl Hooks) -> Result<(), Rejection> {
         self.update(model, true)?;
         loop {
@@ -103,7 +108,7 @@ impl<'a> March<'a> {
             if self.times[self.next] <= self.time {
                 let mut parts = model.parts();
                 parts.set(self.time, &self.x)?;
-                hooks.record(parts.running, self.next)?;
+                hooks.record(parts.instance, self.next)?;
                 self.next += 1;
                 if is_end {
                     return Ok(());
@@ -124,23 +129,24 @@ impl<'a> March<'a> {
         self.times[self.times.len() - 1]
     }
 
-    /// Returns the size of the times of the run, s, to which rounding is relative.
+    /// Returns the magnitude of the times of the run, s, to which rounding errors are relative.
     pub(super) fn scale(&self) -> f64 {
         let (first, last) = (self.times[0], self.last());
         (last - first).max(first.abs()).max(last.abs())
     }
 
-    /// Returns the time at which the next smooth interval ends at the latest.
+    /// Returns the latest time, s, at which the next smooth interval may end.
     fn stop(&self, model: &Model) -> f64 {
         let mut stop = self.last().min(model.parts().until()).min(self.event.unwrap_or(f64::INFINITY));
-        // Without states, no step shows an event before; a fixed step ends at the communication points.
+        // Without states there are no solver steps in which events could be located, so each interval ends at a communication point.
+        // Fixed steps end there, too.
         if self.x.is_empty() || self.settings.solver == Solver::Rk4 {
             stop = stop.min(self.times[self.next]);
         }
         stop.max(self.time)
     }
 
-    /// Handles what happens at the end of a smooth interval.
+    /// Passes breaks of inputs and handles an event at the end of a smooth interval.
     fn arrive(&mut self, model: &Model, hooks: &mut impl Hooks, arrival: Arrival) -> Result<(), Rejection> {
         let is_point = self.times[self.next] <= self.time;
         let is_end = is_point && self.next + 1 == self.times.len();
@@ -150,7 +156,7 @@ impl<'a> March<'a> {
         if is_sure || model.parts().until() <= self.time {
             let mut parts = model.parts();
             parts.set(self.time, &self.x)?;
-            hooks.event(parts.running, self.time, false)?;
+            hooks.event(parts.instance, self.time, false)?;
         }
         let passed = model.parts().pass(self.time, is_end);
         if !is_sure && passed != Break::Jump {
@@ -162,27 +168,27 @@ impl<'a> March<'a> {
         }
         {
             let mut parts = model.parts();
-            parts.running.sole().enter_event_mode()?;
+            parts.instance.sole().enter_event_mode()?;
             parts.set_inputs(self.time)?;
             if exact {
-                hooks.set_exact(parts.running, self.next)?;
+                hooks.set_exact(parts.instance, self.next)?;
             }
         }
         self.update(model, false)?;
         let mut parts = model.parts();
         parts.set(self.time, &self.x)?;
-        hooks.event(parts.running, self.time, true)
+        hooks.event(parts.instance, self.time, true)
     }
 
-    /// Iterates an event in Event Mode, enters Continuous-Time Mode and reads what has changed.
+    /// Completes an event in Event Mode, enters Continuous-Time Mode and reads the values that have changed.
     fn update(&mut self, model: &Model, is_first: bool) -> Result<(), Rejection> {
         let mut parts = model.parts();
-        let event = parts.running.sole().event()?;
+        let event = parts.instance.sole().event()?;
         if event.terminate {
             drop(parts);
             return self.end(model);
         }
-        parts.running.sole().enter_continuous_time_mode()?;
+        parts.instance.sole().enter_continuous_time_mode()?;
         if event.states_changed || is_first {
             parts.states(&mut self.x)?;
         }
@@ -198,17 +204,17 @@ impl<'a> March<'a> {
         Ok(())
     }
 
-    /// Returns the error for a requested end.
+    /// Returns the error for an end of the simulation that the FMU requests.
     fn end(&self, model: &Model) -> Result<(), Rejection> {
         Err(model
             .parts()
-            .running
+            .instance
             .sole()
             .rejection("Model Exchange", fmi_abi::Status::Discard, Vec::new())
             .at_end(self.time))
     }
 
-    /// Returns the error for too many events since this time.
+    /// Returns the error for too many events since this time, s.
     fn chattering(&self, arrival: Arrival, since: f64) -> Rejection {
         let cause = match arrival {
             Arrival::Event(Some(index)) => {
@@ -224,7 +230,7 @@ impl<'a> March<'a> {
         Rejection::without_fmu("Model Exchange", &text)
     }
 
-    /// Returns the event indicators that are on another side of 0 than after the last event.
+    /// Returns the event indicators that have changed their sign since the last event or step.
     pub(super) fn changed(&self, z: &[f64]) -> impl Iterator<Item = usize> {
         self.above
             .iter()

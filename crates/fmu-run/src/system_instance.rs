@@ -1,7 +1,7 @@
-//! Instances of the components of a system, which run together.
+//! An instance of a system: one instance of each component.
 
-use crate::found::is_exact;
 use crate::instance::{Experiment, Instance};
+use crate::lookup::is_exact;
 use crate::messages::Logging;
 use crate::selection::{Selection, Target};
 use crate::start::StartValues;
@@ -11,22 +11,22 @@ use fmi_client::Rejection;
 use std::ops::{Deref, DerefMut};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A state that instances of all components have saved.
+/// Index of a state that the instances of all components have saved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Saved {
     generation: u64,
     state: fmi_client::Saved,
 }
 
-/// Values of all variables at one time.
+/// Values of all variables at one time, except bytes.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Observed {
+    /// Numbers, as bits.
     bits: Vec<u64>,
     values: Vec<Value>,
 }
 
-/// Instances of the components. A single one is part of the value, because with thousands of instances each step in memory
-/// counts.
+/// Instances of the components. A single instance is stored inline, because with thousands of instances each indirection costs time.
 #[derive(Debug)]
 enum Components {
     One(Instance),
@@ -55,41 +55,41 @@ impl DerefMut for Components {
     }
 }
 
-/// One instance of each component; each function acts on all of them. A single FMU is a system with one
-/// component and no connections.
+/// An instance of a system. Each function acts on the instances of all components. A single FMU is a system with one component and no
+/// connections.
 #[derive(Debug)]
-pub(crate) struct Running {
-    /// Differs from the numbers of all other values: states belong to the instances that saved them.
+pub(crate) struct SystemInstance {
+    /// Unique number. Saved states contain it, because they can only be restored in the instances that saved them.
     generation: u64,
     components: Components,
     system: System,
     /// Whether inputs must be updated before the next get or step ([`Order::Dependencies`]).
     is_due: bool,
-    /// Outputs after the last step ([`Order::Jacobi`]). `saved` contains them for each saved state.
+    /// Outputs after the last step ([`Order::Jacobi`]).
     passed: Vec<f64>,
+    /// The value of `passed` for each saved state.
     saved: Vec<Vec<f64>>,
     /// Buffers, reused by all calls.
     row: Vec<f64>,
     buffer: Vec<f64>,
 }
 
-impl Running {
-    /// Resets used instances or creates new ones. The error contains the reason, and whether the FMU gave it.
+impl SystemInstance {
+    /// Resets used instances or creates new ones. The error contains the reason, and whether the FMU logged no message.
     pub fn renewed(
         used: Option<Self>,
         system: &System,
         interface: Interface,
         logging: &Logging,
     ) -> Result<Self, (String, bool)> {
-        // Some FMUs cannot be reset. The old instances are freed before new ones are made, because some FMUs
-        // permit only one.
+        // If an FMU cannot be reset, the old instances are freed before new ones are created, because some FMUs permit only one.
         match used.and_then(Self::reset) {
             Some(used) => Ok(used),
             None => Self::new(system, interface, logging),
         }
     }
 
-    /// Creates new instances. The error contains the reason, and whether the FMU gave it.
+    /// Creates new instances. The error contains the reason, and whether the FMU logged no message.
     pub fn new(system: &System, interface: Interface, logging: &Logging) -> Result<Self, (String, bool)> {
         let components = system.components().iter().enumerate();
         let components = components.map(|(index, component)| {
@@ -98,7 +98,7 @@ impl Running {
         Ok(Self::of(system, components.collect::<Result<_, _>>()?))
     }
 
-    /// Returns these instances of the components of the system.
+    /// Combines instances of all components of a system, in their order.
     pub fn of(system: &System, mut components: Vec<Instance>) -> Self {
         let only = if components.len() == 1 { components.pop() } else { None };
         let components = only.map_or(Components::Several(components), Components::One);
@@ -115,7 +115,7 @@ impl Running {
         }
     }
 
-    /// Resets the instances, if their FMUs can.
+    /// Resets the instances. Returns `None` if an FMU cannot be reset.
     pub fn reset(mut self) -> Option<Self> {
         if !self.is_alive() {
             return None;
@@ -125,7 +125,7 @@ impl Running {
         Some(self)
     }
 
-    /// Reads all values except bytes. If an FMU returns an error, it may not be usable any more.
+    /// Reads all values except bytes. After an error of an FMU, the instances may no longer be usable.
     pub fn observe(&mut self) -> Result<Observed, Rejection> {
         let mut seen = Observed::default();
         for (instance, component) in self.components.iter_mut().zip(self.system.components()) {
@@ -167,7 +167,7 @@ impl Running {
             self.components[target.component].set_values(target.base, &[target.reference], value)?;
         }
         let numbers: Vec<_> = start.numbers(number).collect();
-        // One call sets values that must be consistent, such as the elements of an array that must increase.
+        // All values of a type are set with one call, because an FMU may require that they are consistent, for example increasing.
         let together = |(one, _): &(Target, f64), (next, _): &(Target, f64)| {
             (one.component, one.base) == (next.component, next.base)
         };
@@ -188,9 +188,8 @@ impl Running {
         self.stepped()
     }
 
-    /// Passes outputs to inputs in Initialization Mode, where the dependencies may differ from the later ones.
-    /// Repeats until no value changes; with [`Order::Jacobi`], at most once for each component, as libcosim
-    /// does.
+    /// Passes outputs to inputs in Initialization Mode, where the dependencies may differ from the ones in later modes. Repeats this
+    /// until no value changes. With [`Order::Jacobi`] it passes them at most as many times as there are components, as in libcosim.
     fn agree(&mut self) -> Result<(), Rejection> {
         let Exchange { order, stages } = self.system.exchange();
         let order = *order;
@@ -217,12 +216,13 @@ impl Running {
         }
     }
 
-    /// Updates the inputs, if necessary.
+    /// Updates the connected inputs, if necessary.
     #[inline(always)]
     fn pass_on(&mut self) -> Result<(), Rejection> {
         if self.is_due { self.pass_all_on(|_| ()) } else { Ok(()) }
     }
 
+    /// Updates the connected inputs, stage by stage. `observe` gets the outputs of each stage.
     fn pass_all_on(&mut self, mut observe: impl FnMut(&[f64])) -> Result<(), Rejection> {
         let Self { components, system, row, buffer, .. } = self;
         for stage in &system.exchange().stages {
@@ -235,7 +235,7 @@ impl Running {
         Ok(())
     }
 
-    /// Updates the records after a step or the initialization.
+    /// Prepares the next exchange of values after a step or the initialization.
     #[inline]
     fn stepped(&mut self) -> Result<(), Rejection> {
         let Self { components, system, passed, buffer, .. } = self;
@@ -251,8 +251,7 @@ impl Running {
         Ok(())
     }
 
-    /// Performs a step. Returns an error also if an FMU ends the simulation; the other FMUs have then done
-    /// the step.
+    /// Performs a step. Also returns an error if an FMU ends the simulation, but only after all other FMUs have performed the step.
     #[inline(always)]
     pub fn step(&mut self, time: f64, size: f64) -> Result<(), Rejection> {
         if let [instance] = &mut *self.components
@@ -273,7 +272,7 @@ impl Running {
             }
             stepped => stepped.map(drop),
         })?;
-        // An FMU that has ended accepts no more inputs.
+        // An FMU that has ended the simulation does not accept inputs.
         ended.map_or_else(|| self.stepped(), Err)
     }
 
@@ -325,12 +324,12 @@ impl Running {
         self.each(|_, instance| instance.terminate())
     }
 
-    /// Saves the states of all instances under one index.
+    /// Saves the states of all instances.
     pub fn save(&mut self) -> Result<Saved, Rejection> {
         self.keep(|_, instance| instance.save())
     }
 
-    /// Returns the index of a state, if these instances have saved it.
+    /// Returns the index of a state. Fails if other instances have saved it.
     fn own(&self, saved: Saved) -> Result<fmi_client::Saved, Rejection> {
         if saved.generation == self.generation {
             return Ok(saved.state);
@@ -342,7 +341,7 @@ impl Running {
         ))
     }
 
-    /// Fails if other instances, which are freed, have saved a state.
+    /// Fails if the state was saved by earlier instances, which are freed.
     pub fn check_own(&self, saved: Saved) -> Result<(), Rejection> {
         self.own(saved).map(drop)
     }
@@ -358,13 +357,13 @@ impl Running {
     }
 
     pub fn forget(&mut self, saved: Saved) -> Result<(), Rejection> {
-        // The instances that saved another state are freed, and their states with them.
+        // If earlier instances saved the state, it was freed with them.
         let Ok(saved) = self.own(saved) else { return Ok(()) };
         self.each(|_, instance| instance.forget(saved))
     }
 
-    /// Serializes a saved state. For a single FMU, returns its bytes. For a system, returns the bytes of all
-    /// components, each after its length, and the outputs of the last step.
+    /// Serializes a saved state. For a single FMU, returns the bytes of the FMU. For a system, returns the length and the bytes of
+    /// each component, followed by the outputs of the last step.
     pub fn serialize(&mut self, saved: Saved) -> Result<Vec<u8>, Rejection> {
         let saved = self.own(saved)?;
         if self.system.sole().is_some() {
@@ -406,7 +405,8 @@ impl Running {
         saved
     }
 
-    /// Stores a state of each instance, with the outputs of the last step. On an error, stores none.
+    /// Calls `state`, which saves or de-serializes a state, for each instance, and stores the outputs of the last step. After an
+    /// error no state is stored.
     fn keep(
         &mut self,
         mut state: impl FnMut(usize, &mut Instance) -> Result<fmi_client::Saved, Rejection>,

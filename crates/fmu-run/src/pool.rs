@@ -1,9 +1,9 @@
-//! Instances and threads that a system keeps from one run to the next.
+//! Instances and threads that a system reuses in later runs.
 //!
-//! An instance that was reset should behave like a new one (fmi2Reset, section 2.1.6 of FMI 2.0), but in many
-//! FMUs something survives: a parameter, a state, or a value calculated from a parameter. A run must not
-//! depend on earlier runs, so an instance is used again only if a new one takes long, and only after checks: the same run in a reset
-//! instance and in a new one gives the same bits. [`Trust`] counts the checks for each variable whose value differed before the reset.
+//! A reset should make an instance behave like a new one (fmi2Reset, section 2.1.6 of FMI 2.0), but in many FMUs something survives:
+//! a parameter, a state, or a value calculated from a parameter. Because a run must not depend on earlier runs, an instance is reused
+//! only if creating one takes long, and only after checks. In a check, a reset instance and a new one perform the same run, and all
+//! results must be bit-identical. [`Trust`] counts the checks for each variable whose value differed in the run before the reset.
 
 use crate::error::Error;
 use crate::instance::{Instance, Tolerance};
@@ -14,9 +14,9 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Instances and threads without work.
+/// Idle instances and threads of a system.
 #[derive(Debug, Default)]
-pub(crate) struct Kept {
+pub(crate) struct Pool {
     idle: Mutex<Vec<Idle>>,
     threads: Mutex<Option<Threads>>,
     trust: Mutex<Trust>,
@@ -32,10 +32,10 @@ pub(crate) struct Idle {
     pub took: Duration,
 }
 
-/// Maximum number of idle instances of a system.
+/// Maximum number of idle entries of a system.
 const MOST_IDLE: usize = 256;
 
-impl Kept {
+impl Pool {
     pub fn take(&self) -> Option<Idle> {
         lock(&self.idle).pop()
     }
@@ -47,8 +47,8 @@ impl Kept {
         }
     }
 
-    /// Returns idle threads if there are this many, otherwise new ones. [`put_threads`](Self::put_threads) keeps them; calls at the
-    /// same time have different threads, so that they do not wait for each other.
+    /// Returns the idle threads if there are this many, otherwise new ones. The caller returns them with
+    /// [`put_threads`](Self::put_threads). Concurrent calls get different threads, so that they do not wait for each other.
     pub fn take_threads(&self, count: usize) -> Result<Threads, Error> {
         let threads = lock(&self.threads).take();
         threads
@@ -75,21 +75,21 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Values that a run sets, by their bits.
+/// Values that a run sets. Numbers are stored as bits, to compare them exactly.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Given {
-    /// Start and stop time, and tolerance.
+    /// Start and stop time as bits, and tolerance.
     pub experiment: ([u64; 2], Tolerance),
     pub numbers: Vec<(Target, u64)>,
     pub values: Vec<(Target, Value)>,
-    /// Variables that are set at each time, and a hash of their values.
+    /// Variables that are set during the run, and a hash of their values.
     pub inputs: (Arc<[Target]>, u64),
 }
 
-/// A difference between successive runs of an instance, which the reset has to remove.
+/// A difference between successive runs of an instance, whose effect the reset must remove.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Change {
-    /// The instance was stepped.
+    /// The instance has performed steps.
     Steps,
     /// Start time, stop time or tolerance differ.
     Experiment,
@@ -97,12 +97,12 @@ pub(crate) enum Change {
     Inputs,
     /// The start value of a variable differs.
     Value(Target),
-    /// A variable was set, and is not set in the next run.
+    /// A variable was set in the run, but is not set in the next one.
     Unset(Target),
 }
 
 impl Given {
-    /// Returns the changes from this run to the next.
+    /// Returns the differences between this run and the next.
     pub fn changes(&self, next: &Self) -> Vec<Change> {
         let mut changes = vec![Change::Steps];
         if self.experiment != next.experiment {
@@ -125,9 +125,10 @@ impl Given {
     }
 }
 
+/// Adds the differences between the start values of two runs.
 fn add<T: PartialEq>(changes: &mut Vec<Change>, now: &[(Target, T)], next: &[(Target, T)], all: &Given) {
     for (index, (target, value)) in now.iter().enumerate() {
-        // Usually, both runs set the same variables in the same order.
+        // Looks at the same index first, because successive runs usually set the same variables in the same order.
         let same = next.get(index).filter(|(other, _)| other == target);
         match same.or_else(|| next.iter().find(|(other, _)| other == target)) {
             Some((_, other)) if other == value => {}
@@ -142,38 +143,40 @@ fn add<T: PartialEq>(changes: &mut Vec<Change>, now: &[(Target, T)], next: &[(Ta
     changes.extend(new.map(|(_, (target, _))| Change::Value(*target)));
 }
 
-/// Experience with resets of an FMU.
+/// What the checks have shown about resets of an FMU.
 #[derive(Debug, Default)]
 pub(crate) struct Trust {
-    /// Whether a reset failed, or left something of the earlier run.
+    /// Whether a reset failed, or something of an earlier run survived it.
     forgets: bool,
-    /// Number of checks by change in which a reset instance behaved like a new one.
+    /// For each change, the number of checks in which a reset instance behaved like a new one.
     proofs: HashMap<Change, u32>,
-    /// Shortest time that a new instance took.
+    /// Shortest time that the creation of an instance took.
     fastest: Option<Duration>,
-    /// Time spent on new instances and on checks.
+    /// Time spent on creating instances, and on checks.
     creating: Duration,
     checking: Duration,
 }
 
 impl Trust {
-    /// Time below which a new instance is made for each run, because no check can prove that a reset forgets nothing.
+    /// If an instance is created faster than this, each run gets a new one, because no check can prove that a reset removes
+    /// everything.
     const LONG: Duration = Duration::from_millis(1);
-    /// Number of checks in which a change has to occur. The values of one run may hide what a reset forgets.
+    /// Number of checks that must include a change. One is not enough, because the values of a run may hide what a reset leaves.
     const PROOFS: u32 = 3;
 
-    /// Returns whether an instance is worth keeping.
+    /// Returns whether instances may be kept: no reset has failed, and creating an instance takes long.
     pub fn may_keep(&self) -> bool {
         !self.forgets && self.fastest.is_some_and(|fastest| fastest >= Self::LONG)
     }
 
+    /// Returns whether enough checks have included each of these changes.
     pub fn proves(&self, changes: impl IntoIterator<Item = Change>) -> bool {
         let is_proven = |change| self.proofs.get(&change).is_some_and(|proofs| *proofs >= Self::PROOFS);
         self.may_keep() && changes.into_iter().all(is_proven)
     }
 
-    /// Returns whether a check, which takes as long as a run, is worthwhile. So at most as much time is spent on checks as on new
-    /// instances.
+    /// Returns whether it is time for a check, which takes as long as a run. The time spent on checks never exceeds the time spent on
+    /// creating instances.
     pub fn is_check_due(&self, run: Duration) -> bool {
         self.may_keep() && self.creating >= self.checking + run
     }

@@ -1,12 +1,12 @@
 //! Values of the inputs in Co-Simulation.
 
-use super::grid::Grid;
 use super::inputs::{Inputs, Numbers};
+use super::resampling::Resampling;
 
 /// Inputs of a run.
-pub(super) struct Signals<'a> {
+pub(super) struct InputRows<'a> {
     values: Vec<Signal<'a>>,
-    /// Values at a time.
+    /// Buffer for the values of all inputs at a time.
     row: Vec<f64>,
 }
 
@@ -15,10 +15,10 @@ pub(super) struct Signals<'a> {
 enum Signal<'a> {
     Constant(f64),
     Values(&'a [f64]),
-    Sampled(&'a Grid, &'a [f64], bool),
+    Sampled(&'a Resampling, &'a [f64], bool),
 }
 
-impl<'a> Signals<'a> {
+impl<'a> InputRows<'a> {
     pub fn new(inputs: &Inputs) -> Self {
         Self { values: Vec::new(), row: vec![0.0; inputs.values.len()] }
     }
@@ -30,9 +30,9 @@ impl<'a> Signals<'a> {
             Numbers::Constant(value) => Signal::Constant(*value),
             Numbers::Shared(values) => Signal::Values(values),
             Numbers::EachRun(values) => Signal::Values(&values[run * times..][..times]),
-            Numbers::Sampled { grid, values, is_held, is_each, .. } => {
-                let first = if *is_each { run * grid.length } else { 0 };
-                Signal::Sampled(grid, &values[first..][..grid.length], *is_held)
+            Numbers::Sampled { resampling, values, is_held, is_each, .. } => {
+                let first = if *is_each { run * resampling.length } else { 0 };
+                Signal::Sampled(resampling, &values[first..][..resampling.length], *is_held)
             }
         }));
     }
@@ -41,14 +41,14 @@ impl<'a> Signals<'a> {
         self.values.is_empty()
     }
 
-    /// Returns the values at the time with this index.
+    /// Returns the values of all inputs at the time with this index.
     #[inline(always)]
     pub fn at(&mut self, time: usize) -> &[f64] {
         for (value, signal) in self.row.iter_mut().zip(&self.values) {
             *value = match signal {
                 Signal::Constant(value) => *value,
                 Signal::Values(values) => values[time],
-                Signal::Sampled(grid, values, is_held) => grid.value(values, time, *is_held),
+                Signal::Sampled(resampling, values, is_held) => resampling.value(values, time, *is_held),
             };
         }
         &self.row

@@ -1,62 +1,67 @@
-//! An instance among others, and the work on all of them in several threads.
+//! One of many instances, and functions that process all of them in several threads.
 
 use super::Mask;
 use crate::error::Error;
 use crate::instance::Instance;
-use crate::running::Running;
+use crate::system_instance::SystemInstance;
 use crate::threads::Threads;
 use fmi_client::{Event, Rejection};
 
 #[derive(Debug)]
-pub(super) struct One {
-    /// The instance; `None` if it could not be made again.
-    pub instance: Option<Running>,
-    /// Reason why the instance failed, if it did.
+/// An instance with its state.
+pub(super) struct Entry {
+    /// The instance; `None` if it could not be created again.
+    pub instance: Option<SystemInstance>,
+    /// Reason why the instance has failed, if it has.
     pub error: Option<String>,
-    pub own: Own,
+    /// Time and last event.
+    pub progress: Progress,
 }
 
 /// Time and last event of an instance.
 #[derive(Debug, Default)]
-pub(super) struct Own {
+pub(super) struct Progress {
     pub time: f64,
     pub event: Event,
 }
 
-impl One {
+impl Entry {
     /// Calls `body` if the instance has not failed. Returns whether the instance is still usable.
     #[inline]
-    pub fn with(&mut self, body: impl FnOnce(&mut Own, &mut Running) -> Result<(), Rejection>) -> bool {
-        let Self { instance: Some(instance), error: error @ None, own } = self else { return false };
-        if let Err(rejection) = body(own, instance) {
-            *error = Some(format!("at {} s: {rejection}", own.time));
+    pub fn with(
+        &mut self,
+        body: impl FnOnce(&mut Progress, &mut SystemInstance) -> Result<(), Rejection>,
+    ) -> bool {
+        let Self { instance: Some(instance), error: error @ None, progress } = self else { return false };
+        if let Err(rejection) = body(progress, instance) {
+            *error = Some(format!("at {} s: {rejection}", progress.time));
             return false;
         }
         true
     }
 }
 
-/// Allocates entries for the instances of a system, if there is enough memory for them and for their data.
-pub(super) fn empty(count: usize, components: usize) -> Result<Vec<One>, Error> {
-    /// Minimum of further memory per component: allocations of its FMU and of its log.
+/// Allocates entries for the instances of a system. Fails if memory does not suffice for them and for their data.
+pub(super) fn empty(count: usize, components: usize) -> Result<Vec<Entry>, Error> {
+    /// Minimum of further memory per component, in bytes: allocations of its FMU and of its log.
     const COMPONENT: usize = 256;
     let too_many = || Error::Memory(format!("{count} instances need more memory than there is"));
     let mut all = Vec::new();
     all.try_reserve_exact(count).map_err(|_| too_many())?;
-    let each = size_of::<Running>() + components * (size_of::<Instance>() + COMPONENT);
+    let each = size_of::<SystemInstance>() + components * (size_of::<Instance>() + COMPONENT);
     let needed = count.checked_mul(each).ok_or_else(too_many)?;
-    // Freed immediately; it only tests whether so much memory is available.
+    // Freed immediately, because it only tests whether so much memory is available.
     Vec::<u8>::new().try_reserve_exact(needed).map_err(|_| too_many())?;
-    all.resize_with(count, || One { instance: None, error: None, own: Own::default() });
+    all.resize_with(count, || Entry { instance: None, error: None, progress: Progress::default() });
     Ok(all)
 }
 
-/// Calls `body` for each instance in the mask.
+/// Calls `body` with the index of each instance in the mask, and the instance.
 pub(super) fn each(
     threads: &mut Option<Threads>,
-    all: &mut [One],
+    all: &mut [Entry],
     mask: Mask,
-    body: impl Fn(usize, &mut One) + Sync,
+    body: impl Fn(usize, &mut Entry) + Sync,
 ) {
     if let Some(mask) = mask {
         assert_eq!(mask.len(), all.len(), "a Boolean for each instance");
@@ -68,23 +73,23 @@ pub(super) fn each(
     });
 }
 
-/// Calls `body` for each instance and its row of `length` values. This thread and each thread of the pool get
-/// a part of the instances.
+/// Calls `body` with the index of each instance, the instance, and its row of `length` values. This thread and each thread of the
+/// pool process a part of the instances.
 pub(super) fn in_parts(
     threads: &mut Option<Threads>,
-    all: &mut [One],
+    all: &mut [Entry],
     length: usize,
     values: &mut [f64],
-    body: impl Fn(usize, &mut One, &mut [f64]) + Sync,
+    body: impl Fn(usize, &mut Entry, &mut [f64]) + Sync,
 ) {
-    let work = |first: usize, all: &mut [One], values: &mut [f64]| {
+    let work = |first: usize, all: &mut [Entry], values: &mut [f64]| {
         let mut rows = values.chunks_exact_mut(length.max(1));
         for (k, one) in all.iter_mut().enumerate() {
             body(first + k, one, rows.next().unwrap_or_default());
         }
     };
     if let Some(of_parent) = threads.take_if(|threads| !threads.are_here()) {
-        // Without threads, this one does all the work.
+        // If threads cannot be created, this one does all the work.
         *threads = Threads::new(of_parent.count()).ok();
     }
     let Some(threads) = threads else { return work(0, all, values) };
@@ -100,7 +105,7 @@ pub(super) fn in_parts(
     threads.share(|| work(0, own, own_values), others);
 }
 
-/// Returns the row of an instance, from a row for each instance or one row for all.
+/// Returns a function that returns the row of an instance. `values` contains one row for all instances or a row for each.
 pub(super) fn rows<'v>(values: &'v [f64], length: usize, instances: usize) -> impl Fn(usize) -> &'v [f64] {
     let each = values.len() == length * instances;
     assert!(

@@ -1,4 +1,4 @@
-//! Checks inputs and settings of runs in Model Exchange.
+//! Checks the inputs and settings of runs in Model Exchange.
 
 use super::exact::Input;
 use super::inputs::{Numbers, checked, each_input, is_held};
@@ -11,33 +11,36 @@ use crate::system::System;
 use fmi_abi::{BaseType, Interface, Standard};
 use std::sync::Arc;
 
-/// Inputs and settings of runs in Model Exchange.
-pub(super) struct Integrated<'a> {
+/// Checked inputs and settings of runs in Model Exchange.
+pub(super) struct ModelExchangePlan<'a> {
     pub description: Arc<Description>,
-    /// Continuous inputs, and all others that have numbers; `sources` contains both, in this order.
+    /// Continuous inputs.
     pub moving: Selection,
+    /// All other numeric inputs.
     pub held: Selection,
+    /// Values of the continuous inputs, then of the others.
     sources: Vec<Source<'a>>,
     pub integration: Integration,
     pub rtol: f64,
+    /// Whether the FMU must be notified of completed integrator steps.
     pub reports_steps: bool,
     pub keeps_events: bool,
 }
 
 /// Values of an input.
 enum Source<'a> {
-    /// Values, with their derivatives if there are any, and whether they are held.
+    /// Values, and their time derivatives if there are any.
     Numbers { values: Numbers<'a>, slopes: Option<Numbers<'a>>, is_held: bool },
-    /// The derivative of another input.
+    /// The time derivative of the input with this index.
     RateOf(usize),
 }
 
 /// Relative tolerance if neither the caller nor the model description has one.
 const RTOL: f64 = 1e-6;
 
-impl<'a> Integrated<'a> {
-    /// Checks the inputs and settings, and adds the inputs whose values numbers do not have to `exact`. Fails for a system of
-    /// several FMUs, because it runs in Co-Simulation only.
+impl<'a> ModelExchangePlan<'a> {
+    /// Checks the inputs and settings. Adds the inputs whose values `f64` cannot represent to `exact`. Fails for a system of several
+    /// FMUs, which can only run in Co-Simulation.
     pub fn of(system: &System, batch: &'a Batch, exact: &mut Vec<Input>) -> Result<Option<Self>, Error> {
         batch.integration.check()?;
         if batch.read_before_set {
@@ -53,7 +56,7 @@ impl<'a> Integrated<'a> {
             Standard::Fmi2 => !offer.can(&["completedIntegratorStepNotNeeded"]),
             Standard::Fmi3 => offer.can(&["needsCompletedIntegratorStep"]),
         });
-        let mut integrated = Self {
+        let mut model_exchange = Self {
             description,
             moving: Selection::default(),
             held: Selection::default(),
@@ -63,8 +66,8 @@ impl<'a> Integrated<'a> {
             reports_steps,
             keeps_events: batch.events,
         };
-        integrated.find_inputs(system, batch, exact)?;
-        Ok(Some(integrated))
+        model_exchange.find_inputs(system, batch, exact)?;
+        Ok(Some(model_exchange))
     }
 
     fn find_inputs(
@@ -90,7 +93,7 @@ impl<'a> Integrated<'a> {
             }
             Ok(())
         })?;
-        // Inputs that the model description declares as derivatives of given ones, unless the caller has values for them.
+        // Inputs that are declared as the derivatives of other inputs get the slopes of these, unless the caller has given values.
         let declared = self.description.variables.iter().filter(|of| {
             of.causality == "input"
                 && !is_held(of)
@@ -125,7 +128,7 @@ impl<'a> Integrated<'a> {
     }
 }
 
-/// Returns the derivatives of an input, which must be at the times of its values.
+/// Returns the time derivatives of an input, if given. They must be given at the same times as its values.
 fn slopes<'a>(name: &str, values: &Trajectory, batch: &'a Batch) -> Result<Option<Numbers<'a>>, Error> {
     let mut given = batch.input_derivatives.iter().filter(|(of, _)| *of == name);
     let Some((_, slopes)) = given.next() else { return Ok(None) };
@@ -142,7 +145,7 @@ fn slopes<'a>(name: &str, values: &Trajectory, batch: &'a Batch) -> Result<Optio
     checked(name, BaseType::Real, *slopes, false, batch.time).map(Some)
 }
 
-/// Returns the values of a run.
+/// Returns the times and the values of a run.
 fn of_run<'a>(numbers: &'a Numbers<'a>, run: usize, points: &'a [f64]) -> (&'a [f64], &'a [f64]) {
     let part =
         |values: &'a [f64], length, is_each| &values[if is_each { run * length } else { 0 }..][..length];
@@ -154,7 +157,7 @@ fn of_run<'a>(numbers: &'a Numbers<'a>, run: usize, points: &'a [f64]) -> (&'a [
     }
 }
 
-impl<'a> Integrated<'a> {
+impl<'a> ModelExchangePlan<'a> {
     /// Returns the inputs of a run as functions of time.
     pub fn signals(&'a self, run: usize, points: &'a [f64]) -> Signals<'a> {
         let curve = |source: &'a Source<'a>| match source {

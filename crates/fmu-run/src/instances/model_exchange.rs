@@ -1,13 +1,13 @@
 //! The functions of Model Exchange.
 
-use super::one::rows;
+use super::entry::rows;
 use super::{Instances, Mask};
 use crate::error::{Error, request};
 use crate::selection::Selection;
 use fmi_client::Continuous;
 
 impl Instances {
-    /// Sets the time, s, of each instance or one time of all, in Model Exchange.
+    /// Sets the time, s, in Model Exchange: one time for all instances, or a time for each.
     ///
     /// # Errors
     /// Returns [`Error::Request`] if a time is not finite.
@@ -19,14 +19,14 @@ impl Instances {
             return request(format!("time is {time}; it must be finite"));
         }
         let row = rows(times, 1, self.len());
-        self.alive(mask, |index, own, instance| {
-            own.time = row(index)[0];
-            instance.sole().set_time(own.time)
+        self.alive(mask, |index, progress, instance| {
+            progress.time = row(index)[0];
+            instance.sole().set_time(progress.time)
         });
         Ok(())
     }
 
-    /// Sets the continuous states from a row for each instance or one row for all, in Model Exchange.
+    /// Sets the continuous states, in Model Exchange, from one row for all instances or a row for each.
     ///
     /// # Panics
     /// Panics if the number of values is wrong.
@@ -46,7 +46,7 @@ impl Instances {
         });
     }
 
-    /// Returns the number of values of this quantity.
+    /// Returns the number of values of this quantity in an instance.
     pub fn continuous(&self, what: Continuous) -> usize {
         self.description().map_or(0, |description| match what {
             Continuous::EventIndicators => description.event_indicators,
@@ -54,9 +54,9 @@ impl Instances {
         })
     }
 
-    /// Handles an event with all its iterations and returns to Continuous-Time Mode, in Model Exchange.
-    /// [`events`](Self::events) returns the results. In Event Mode, before the iterations, sets variables
-    /// from a row for each instance or one row for all.
+    /// Handles an event in Model Exchange: enters Event Mode, sets variables, iterates until the event is complete, and returns to
+    /// Continuous-Time Mode. The values are one row for all instances or a row for each. [`events`](Self::events) returns the
+    /// results.
     ///
     /// # Errors
     /// Same errors as [`set`](Self::set).
@@ -66,17 +66,17 @@ impl Instances {
     pub fn handle_events(&mut self, (set, values): (&Selection, &[f64]), mask: Mask) -> Result<(), Error> {
         set.check(values)?;
         let row = rows(values, set.len(), self.len());
-        self.alive(mask, |index, own, instance| {
+        self.alive(mask, |index, progress, instance| {
             instance.sole().enter_event_mode()?;
             instance.set(set, row(index))?;
-            own.event = instance.sole().event()?;
+            progress.event = instance.sole().event()?;
             instance.sole().enter_continuous_time_mode()
         });
         Ok(())
     }
 
-    /// Reports a completed step of the integrator, in Model Exchange. Writes two values for each instance to
-    /// `wanted`: whether it requests an event, and the end of the simulation.
+    /// Notifies the FMU of a completed integrator step, in Model Exchange. Writes two values for each instance to `wanted`, 1 or 0:
+    /// whether the FMU requests an event, and whether it requests the end of the simulation.
     ///
     /// # Panics
     /// Panics if `wanted` does not have two values for each instance.

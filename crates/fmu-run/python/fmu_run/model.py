@@ -1,0 +1,283 @@
+"""Variables and functions that FMUs and systems of FMUs have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fmu_run._native import Instances, Loaded, numbers
+from fmu_run.arguments import Interface, Log, Measure, Solver, Start, Trajectory
+from fmu_run.runs import Runs
+
+_Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable of the model description.
+
+    Attributes
+    ----------
+    name
+        Name in the FMU or the system.
+    type
+        Real, Integer, Boolean, String, Enumeration, or one of FMI 3.0's other types.
+    causality
+        input, output, parameter, local and so on.
+    variability
+        fixed, tunable, discrete, continuous and so on; None if not declared.
+    start
+        Start value as a string, as it is written in the model description; None if not declared.
+    unit
+        Unit of the variable or of its declared type; None if not declared.
+    description
+        Description; empty if not declared.
+    min, max
+        Smallest and largest value, in `unit`, of the variable or of its declared type; None if not declared.
+    display_unit
+        Display unit of the variable or of its declared type; None if not declared.
+    """
+
+    name: str
+    type: str
+    causality: str
+    variability: str | None
+    start: str | None
+    unit: str | None
+    description: str
+    min: float | None
+    max: float | None
+    display_unit: str | None
+
+
+class Model:
+    """Functions that FMUs and systems of FMUs have in common."""
+
+    def __init__(self, loaded: Loaded):
+        self._loaded = loaded
+        #: dict[str, Variable]: the variables by name, in the order of the model description. As in FMI 2.0, each element of an array of
+        #: FMI 3.0 is a variable: T[3]. Clocks are omitted.
+        self.variables = {fields[0]: Variable(*fields) for fields in loaded.variables()}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Unload the FMUs and remove the unpacked files as soon as all instances are freed. Further calls have no effect."""
+        self._loaded.close()
+
+    def run(
+        self,
+        time: ArrayLike,
+        *,
+        outputs: Sequence[str],
+        inputs: Mapping[str, Trajectory] | None = None,
+        input_derivatives: Mapping[str, ArrayLike] | None = None,
+        start: Mapping[str, Start] | None = None,
+        every: int | None = None,
+        measures: Sequence[Measure] = (),
+        threads: int | None = None,
+        read_before_set: bool = False,
+        progress: Callable[[int, int], Any] | None = None,
+        tolerance: float | Literal["default"] | None = "default",
+        log: Log | None = None,
+        interface: Interface | None = None,
+        solver: Solver = "auto",
+        rtol: float | None = None,
+        atol: float | None = None,
+        max_step: float | None = None,
+        events: bool = False,
+    ) -> Runs:
+        """Run the FMU once, or as many times as an argument has values for separate runs.
+
+        If the FMU rejects a call or ends a run early, all other runs continue. `Runs.errors` contains the errors, and `Runs.check`
+        raises the first one. A run that fails without a message is repeated with logging on after all other runs, only to get the
+        message. After Ctrl-C, each run completes its current step and stops.
+
+        Parameters
+        ----------
+        time
+            (times,): the communication points, s. At each of them the inputs are set, the outputs are read, and a step to the next one
+            is performed.
+        outputs
+            Names of the variables to read, of any type except Clock. The name of an array stands for all of its elements, and its results
+            are (runs, times, ...), where the dimensions of the array come last. In FMI 2.0, y[1], y[2] and so on are the array y.
+        inputs
+            Values of inputs by name: one number, (times,) for all runs, or (runs, times) for each run. Values may have a unit,
+            {"theta1": (angles, "deg")}. Inputs that are not named keep their start values.
+
+            An input may have its own times: {"u": (times, values)}, where the values have the shape (times,) or (runs, times). Between
+            these times, a continuous variable is interpolated linearly, and any other keeps the earlier value. Two equal times are a
+            step. Before the first and after the last time, the value is constant.
+
+            Strings and bytes are given in the same shapes. For a whole array, the dimensions of the array follow the dimensions above;
+            a constant array has only its own dimensions. In Model Exchange, the value "der(u)" stands for the derivative of the input u.
+        input_derivatives
+            First time derivatives of inputs by name, in the same shapes. In Co-Simulation, they are for FMUs of FMI 2.0 that can
+            interpolate inputs. In Model Exchange, they are for any continuous input, which is then interpolated by cubics instead of lines.
+        start
+            Start values of parameters, states and so on by name: one value for all runs, or (runs,) for each run. Values are numbers,
+            strings, bytes, enumeration items, or numbers with a unit, {"k1": (1.9, "N.m/deg")}. A whole array has its own shape for all
+            runs, {"A": np.eye(3)}, or (runs, ...). A structural parameter, which determines the sizes of arrays, has one value for all
+            runs.
+        every
+            Store the outputs only at every `every`-th time, beginning with the first. Default: they are stored at all times, or at none
+            if there are measures.
+        measures
+            Statistics of each numeric output over all times: min, max, peak (the largest magnitude), time_of_peak (s), mean and rms (of
+            the samples), and end (the last value). If a value is NaN, all of them except end are NaN.
+        threads
+            Number of threads. Default: one for each processor, or one if the FMU allows only one instance per process.
+        read_before_set
+            Read the outputs of a time before its inputs are set, as FMPy does.
+        progress
+            Function that is called ten times per second with the number of finished runs and the number of all runs.
+        tolerance
+            Relative tolerance of a solver inside the FMU; also the default of rtol. Default: the tolerance of the default experiment in
+            the model description, as in FMPy. With None, the FMU chooses.
+        log
+            Receiver of the messages of the FMU, which switches its logging on: a function that is called with the index of the run, the
+            status, the category and the message, or a `logging.Logger`. The index is None if the message cannot be attributed to a run,
+            because the FMU logs from another thread with an unknown environment.
+        interface
+            "co-simulation" or "model-exchange". Default: Co-Simulation, or Model Exchange if the FMU has only that. In Model Exchange,
+            fmu_run integrates the states from event to event. Continuous inputs are interpolated linearly between their values, even
+            between two communication points, so that results converge as the tolerance of the solver decreases. All other inputs change
+            in Event Mode. Systems only run in Co-Simulation.
+        solver
+            Method in Model Exchange: "dop853" or "dopri5" (Runge-Kutta of order 8 or 5), "bdf" (for stiff models), "auto" (dop853, and
+            bdf as soon as the model proves stiff), or "rk4" (Runge-Kutta of order 4 with one step between two communication points, or
+            several equal steps if `max_step` is shorter).
+        rtol, atol
+            Relative and absolute tolerance of the solver in Model Exchange. Default of rtol: `tolerance`, or 1e-6 if there is none.
+            Default of atol: a hundredth of rtol. For each state, atol is multiplied by the nominal value.
+        max_step
+            Largest step of the solver, s. Choose it so that no event indicator changes its sign twice within one step and between the
+            same two communication points, because such a pair of events is not detected.
+        events
+            Store the outputs before and after each event in `Runs.events`.
+
+        Returns
+        -------
+        Runs
+            The results, with the errors of failed runs.
+
+        Raises
+        ------
+        ValueError
+            For invalid arguments.
+        FmuError
+            If the FMU is closed.
+
+        Examples
+        --------
+        >>> runs = fmu.run(np.arange(0, 1, 1e-3), outputs=["y"], start={"k": [1.0, 2.0]})
+        >>> runs["y"].shape
+        (2, 1000)
+        """
+        return Runs(
+            *self._loaded.run(
+                time,
+                outputs,
+                inputs,
+                input_derivatives,
+                start,
+                every,
+                measures,
+                threads,
+                read_before_set,
+                progress,
+                tolerance,
+                log,
+                interface,
+                solver,
+                (rtol, atol, max_step),
+                events,
+            )
+        )
+
+    def converted(self, name: str, values: ArrayLike, unit: str) -> float | _Array:
+        """Convert values to the unit of a variable.
+
+        Parameters
+        ----------
+        name
+            Name of the variable.
+        values
+            Numbers in `unit`.
+        unit
+            A display unit of the variable.
+
+        Returns
+        -------
+        float or array
+            The numbers in the variable's unit, in the shape of `values`.
+
+        Raises
+        ------
+        ValueError
+            If the FMU does not have the variable, or the variable does not have the unit.
+        """
+        factor, offset = self._loaded.display_unit(name, unit)
+        array: _Array = numbers("values", values)
+        found = (array - offset) / factor
+        return float(found) if found.ndim == 0 else found
+
+    def instances(
+        self,
+        count: int = 1,
+        *,
+        interface: Interface = "co-simulation",
+        start: Mapping[str, Start] | None = None,
+        start_time: float = 0.0,
+        stop_time: float | None = None,
+        threads: int | None = 1,
+        tolerance: float | Literal["default"] | None = "default",
+        log: Log | None = None,
+    ) -> Instances:
+        """Create instances, set their start values and initialize them.
+
+        Parameters
+        ----------
+        count
+            Number of instances.
+        interface
+            The interface type. New instances for Model Exchange have handled the initial event and are in Continuous-Time Mode.
+        start
+            Start values of parameters, states, inputs and so on by name, as in `run`: one for all instances, or (count,) for each.
+        start_time
+            Start time, s.
+        stop_time
+            Stop time, s; None if it is unknown.
+        threads
+            Number of threads; None means one for each processor. Several threads are faster if a call takes much longer than waking a
+            thread, which takes about 0.01 ms: with hundreds of instances, or for slow models. After a call, the threads poll for work for
+            0.05 ms before they sleep.
+        tolerance, log
+            As in `run`. The index of a message is the index of the instance, and messages are passed on at the end of each call.
+
+        Returns
+        -------
+        Instances
+            The initialized instances.
+
+        Raises
+        ------
+        ValueError
+            For invalid arguments.
+        MemoryError
+            If memory does not suffice for the instances.
+        FmuError
+            If the FMU does not have this interface type, or if all instances fail.
+        """
+        return Instances(self._loaded, count, interface, start, start_time, stop_time, threads, tolerance, log)
