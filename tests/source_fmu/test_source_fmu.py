@@ -129,9 +129,9 @@ def test_every_processor_equals_the_library(
     assert MEMORY * 65536 < int(printed["block"][0]) < (MEMORY + 1) * 65536
     # 3 is fmi2Error. The instance remains usable.
     assert printed["full"] == ["3", "3"]
-    # How many states fit depends a little on where the first are, but saving and freeing again and again loses no memory.
+    # How many states fit depends a little on where other memory is, but saving and freeing a hundred times loses none.
     states = [int(count) for count in printed["states"]]
-    assert len(states) == 102 and min(states) > 20 and max(states[-10:]) == max(states)
+    assert min(states) > 20 and len(states[2:]) == 100 and len(set(states[2:])) == 1
     rejected = [
         line for line in printed["log"] if "free one, or compile the FMU with a larger FMU_MEMORY_PAGES" in line
     ]
