@@ -287,6 +287,8 @@ fuzz: need-rust need-nightly
 
 sanitize: need-rust need-nightly $(VENV)/tests.stamp source-fmu fmu
 	@command -v valgrind >/dev/null || $(call stop,valgrind is missing; on Debian: apt install valgrind)
+	@$(CARGO) +nightly miri --version >/dev/null 2>&1 || \
+	  $(call stop,Miri is missing; install it with: rustup component add --toolchain nightly miri rust-src)
 	@dev/sanitize
 
 clean:
