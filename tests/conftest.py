@@ -1,4 +1,4 @@
-"""Fixtures that several test directories share. pyproject.toml lists the directories from which tests import modules."""
+"""Fixtures that several test directories share. pyproject.toml lists further directories from which tests import modules."""
 
 from __future__ import annotations
 

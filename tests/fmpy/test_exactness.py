@@ -125,7 +125,7 @@ AMPLITUDE, FREQUENCY, PHASE = np.array([0.3, 0.2]), np.array([14.0, 23.0]), np.a
 END = 1.0
 #: Repeated step sizes, in units of their mean.
 SPACING = {"even": [1.0, 1.0, 1.0, 1.0], "uneven": [0.4, 1.5, 0.8, 1.3]}
-#: Errors are evaluated from this time on, because two samples do not suffice for the parabola, and the effect on the rates must decay.
+#: Errors are evaluated from this time on. They are larger before it, because the first two samples do not define a parabola.
 FROM = 0.3
 
 

@@ -90,8 +90,8 @@ class WebAssembly:
 
 
 def test_the_page_equals_sources_and_fmus(testbed, page, packed):
-    """Except for the added parts, the page in the FMU equals the page in the sources. Also in the FMU for FMI 3.0, the page contains
-    the FMUs for FMI 2.0."""
+    """Except for the added parts, the page in the FMU equals the page in the sources. In the FMU for FMI 3.0, the page contains the
+    modules for FMI 2.0, too."""
     assert LIVE.sub("", page) == (ROOT / TESTBED.path).read_text(encoding="utf-8")
     directory = testbed.parents[testbed.parent.name == "fmi3"]
     for offset, name in enumerate([testbed.name, "prw_controller.fmu"]):

@@ -130,7 +130,7 @@ def test_discrete_inputs_that_fmpy_sets_in_continuous_time_mode(rods) -> None:
 
 
 def test_a_switch_in_fmpy(rods) -> None:
-    """Uses FMPy's Euler method, of which a step ends at the event. CVode steps beyond the event, and FMPy then sets the new value
+    """Uses FMPy's Euler method, because it ends a step at the event. CVode steps beyond the event, and FMPy then sets the new value
     outside of Event Mode."""
     switches = [(0.0, 3, 0), (0.6, 3, 0), (0.6, 0, 3), (2.0, 0, 3)]
     result = heated(rods[0], switches, solver="Euler", output_interval=1e-3)

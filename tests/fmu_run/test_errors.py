@@ -84,7 +84,7 @@ def test_rejected_runs_do_not_affect_the_others(fmu):
     np.testing.assert_array_equal(runs["roll"][0], runs["roll"][4])
     with pytest.raises(fmu_run.FmuError, match=r"run 1: .*k1 must not be below 1e-300.* \(2 of 5 runs failed\)"):
         runs.check()
-    # If an input is rejected during the run, the message has the time.
+    # If an input is rejected during the run, the message begins with the time.
     angle = np.where(TIME > 0.45, np.inf, 0.0)
     one = fmu.run(TIME, inputs={"theta1": angle}, outputs=["roll"])
     assert re.match(r"at 0\.5 s: .*theta1", one.errors[0]), one.errors

@@ -77,7 +77,7 @@ def test_headers(content: bytes, targets: tuple[Target, ...], exports: set[str],
 
 
 def linux(elf: lief.ELF.Binary, target: Target, exports: set[str]) -> None:
-    """Checks that every Linux with the glibc version GLIBC or a newer one can load the library."""
+    """Checks the exports, and that every Linux with the glibc version GLIBC or a newer one can load the library."""
     assert elf.header.machine_type == ELF_MACHINE[target.processor]
     assert {symbol.name for symbol in elf.exported_symbols} == exports
     assert all(LINUX_LIBRARIES.fullmatch(library) for library in elf.libraries), elf.libraries
@@ -95,7 +95,7 @@ def linux(elf: lief.ELF.Binary, target: Target, exports: set[str]) -> None:
 
 
 def windows(pe: lief.PE.Binary, exports: set[str], name: str, others: set[str]) -> None:
-    """Checks that every Windows from 10 on can load the library."""
+    """Checks the exports, and that every Windows from 10 on can load the library."""
     assert pe.header.machine == lief.PE.Header.MACHINE_TYPES.AMD64
     assert {entry.name for entry in pe.get_export().entries} == exports
     assert pe.get_export().name == name
@@ -108,7 +108,7 @@ def windows(pe: lief.PE.Binary, exports: set[str], name: str, others: set[str]) 
 
 
 def macos(content: bytes, targets: tuple[Target, ...], exports: set[str], name: str) -> None:
-    """Checks that every macOS, from the oldest version of the targets on, can load the library."""
+    """Checks the exports, and that every macOS from the oldest version of the targets on can load the library."""
     fat = lief.MachO.parse(list(content))
     parts = [fat.at(index) for index in range(fat.size)]
     wanted = {MACHO_PROCESSOR[target.processor]: target for target in targets}

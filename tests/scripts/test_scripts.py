@@ -50,7 +50,7 @@ def run(*command: object, **environment: str) -> str:
 
 
 def rows(page: str) -> dict[str, list[float]]:
-    """Returns the figures of all rows of Markdown tables, by the label of the row."""
+    """Returns the numbers in all rows of Markdown tables, by the label of the row. Rows with other cells are left out."""
     found = re.findall(r"^\| ([^|]+) \|((?: *[\d.,e+]+ \|)+)$", page, re.MULTILINE)
     return {label: [float(figure.replace(",", "")) for figure in figures.split("|")[:-1]] for label, figures in found}
 
