@@ -33,7 +33,7 @@ def windows(directory: Path) -> dict[str, str]:
 
 
 def need(*programs: str) -> None:
-    """Installs the Debian packages of missing programs. Exits if that fails, and names the packages."""
+    """Installs the Debian packages of missing programs. If that fails, exits and names the packages."""
     missing = " ".join(sorted({PACKAGES[program] for program in programs if not shutil.which(program)}))
     if missing:
         apt = f"apt-get update -qq && apt-get install -y -qq --no-install-recommends {missing}"

@@ -1,4 +1,5 @@
-/* Steps with the FMU's C sources, which are part of this program. Prints a hash of the outputs, and the memory use. */
+/* Steps with the FMU's C sources, which are part of this program, and prints a hash of the outputs and the memory use. Also fills the
+   memory with saved states, and damages an instance. If THREADS is defined, steps one instance in each of that many threads. */
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -136,7 +137,7 @@ static void fill(Instance *fmu) {
     }
 }
 
-/* Saves and frees states often, which would show that memory is lost. */
+/* Saves and frees states often. If this lost memory, the printed number of states would fall. */
 static void fill_often(Instance *fmu) {
     int i, count;
     for (i = 0; i < 100; i++) {
