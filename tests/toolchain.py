@@ -11,6 +11,7 @@ from pathlib import Path
 WINE = "/usr/lib/wine/wine64"
 #: Programs and their Debian packages.
 PACKAGES = {
+    "gcc": "gcc libc6-dev",
     "x86_64-w64-mingw32-gcc": "gcc-mingw-w64-x86-64",
     "aarch64-linux-gnu-gcc": "gcc-aarch64-linux-gnu libc6-dev-arm64-cross",
     "qemu-aarch64": "qemu-user",
