@@ -21,7 +21,12 @@ use std::collections::BTreeMap;
 use std::ops::Deref;
 use std::sync::{Arc, Mutex, PoisonError};
 
-create_exception!(fmu_run, FmuError, PyException, "An FMU cannot be loaded or run, is closed, or has rejected a call.");
+create_exception!(
+    fmu_run,
+    FmuError,
+    PyException,
+    "An FMU cannot be loaded or run, is closed, or has rejected a call."
+);
 
 /// An unpacked and loaded FMU or system; `None` after it was closed.
 #[pyclass(frozen, module = "fmu_run._native")]

@@ -29,7 +29,10 @@ impl Instances {
     /// # Panics
     /// Panics if the number of values is wrong.
     pub fn set_values(&mut self, name: &str, values: &[Value], mask: Mask) -> Result<(), Error> {
-        assert!(values.len() == 1 || values.len() == self.len(), "one value is required, or a value for each instance");
+        assert!(
+            values.len() == 1 || values.len() == self.len(),
+            "one value is required, or a value for each instance"
+        );
         let mut targets = Vec::new();
         for found in self.system.find(name)? {
             found.check_settable(name)?;

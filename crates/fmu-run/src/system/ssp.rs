@@ -47,9 +47,9 @@ impl System {
     /// The requirement of [`Fmu::open`](crate::Fmu::open), for each FMU in the file.
     ///
     /// # Errors
-    /// Returns [`Error::Fmu`] if the file is not an SSP file, or one of its FMUs cannot be loaded. Returns the errors of
-    /// [`connect`](Self::connect), and [`Error::Request`] for unsupported content: components that are not FMUs, parameter mappings,
-    /// signal dictionaries, transformations of connections.
+    /// Returns [`Error::Fmu`] if the file is not an SSP file, if one of its FMUs cannot be loaded, and for unsupported content:
+    /// components that are not FMUs, parameter mappings, signal dictionaries, transformations of connections. Returns
+    /// [`Error::Request`] if a start value does not fit its variable. Also returns the errors of [`connect`](Self::connect).
     pub unsafe fn open(path: &Path, order: Order) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
         let mut limits = Limits::default();
