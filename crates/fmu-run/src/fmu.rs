@@ -22,8 +22,8 @@ pub(crate) struct Loaded {
     pub description: Arc<Description>,
     files: Arc<Files>,
     co_simulation: Option<Arc<Library>>,
-    /// Library for Model Exchange. If only the library for Co-Simulation can be loaded, this is the reason why the one for Model
-    /// Exchange cannot.
+    /// Library for Model Exchange, if the FMU has one. `Err` contains the reason why it cannot be loaded, although the library for
+    /// Co-Simulation can.
     model_exchange: Result<Option<Arc<Library>>, String>,
 }
 

@@ -144,7 +144,7 @@ fn add<T: PartialEq>(changes: &mut Vec<Change>, now: &[(Target, T)], next: &[(Ta
     changes.extend(new.map(|(_, (target, _))| Change::Value(*target)));
 }
 
-/// Results of all checks whether an FMU can be reset.
+/// Results of the checks of whether an FMU can be reset.
 #[derive(Debug, Default)]
 pub(crate) struct Trust {
     /// Whether a reset has failed, or something of an earlier run may have survived it.
@@ -162,8 +162,8 @@ impl Trust {
     /// If an instance is created faster than this, each run gets a new one, because no check can prove that a reset removes
     /// everything.
     const LONG: Duration = Duration::from_millis(1);
-    /// Number of checks that must include a change. One is not enough, because with some values what survives a reset has no
-    /// effect.
+    /// Number of checks that must include a change. One is not enough, because a value that survives a reset may happen to have no
+    /// effect in one run.
     const PROOFS: u32 = 3;
 
     /// Returns whether instances may be kept: no reset has failed, and creating an instance takes long.

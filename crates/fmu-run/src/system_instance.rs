@@ -190,8 +190,8 @@ impl SystemInstance {
     }
 
     /// Passes outputs to inputs in Initialization Mode, where the dependencies may differ from the ones in later modes, and repeats
-    /// this until no value changes. Fails if the values do not converge. With [`Order::Jacobi`] it does not fail, but repeats this
-    /// at most as many times as there are components, as in libcosim.
+    /// this until no value changes. Fails if the values do not converge. With [`Order::Jacobi`] they need not converge, but are
+    /// passed at most as many times as there are components, as in libcosim.
     fn agree(&mut self) -> Result<(), Rejection> {
         let Exchange { order, stages } = self.system.exchange();
         let order = *order;

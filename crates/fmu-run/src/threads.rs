@@ -29,7 +29,7 @@ fn count_forks() {
 #[cfg(not(unix))]
 fn count_forks() {}
 
-/// A pool of threads. A forked process inherits the object but not the threads, so they would never do any work there.
+/// A pool of threads. A forked process inherits the object but not the threads, so work for the pool would never be done there.
 #[derive(Debug)]
 pub(crate) struct Threads {
     process: u32,

@@ -45,7 +45,7 @@ class Task:
         Inputs by name with their bounds (low, high), or only names. In the latter case the bounds are `min` and `max` of the model
         description, or infinite if it has none.
     observations
-        Numeric variables that are observed after each step, in the same forms.
+        Numeric variables that are observed after each step, in one of the forms of `actions`.
     reward
         Function (observation before, action, observation after) -> (n,).
     step
@@ -55,7 +55,7 @@ class Task:
     terminated
         Function with the arguments of `reward` -> (n,) of bool: whether the episode terminates.
     inputs
-        Names of the inputs, if the actions are not inputs. Actions may then have any names.
+        Names of the inputs that `to_inputs` calculates, if the actions are not inputs. Actions may then have any names.
     to_inputs
         Function that converts actions to inputs: (actions, previous inputs (n, inputs)) -> (n, inputs).
     start

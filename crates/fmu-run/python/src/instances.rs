@@ -295,7 +295,7 @@ impl Instances {
     /// mask : (n,) of bool, optional
     ///     Selected instances; all by default.
     /// start : dict, optional
-    /// Start values by name, which replace earlier ones, in the forms of `Fmu.instances`.
+    ///     Start values by name, which replace earlier ones, in the forms of `Fmu.instances`.
     #[pyo3(signature = (mask=None, *, start=None))]
     fn reset(&self, py: Python, mask: Optional, start: Optional) -> PyResult<()> {
         let (mask, start) = (self.mask(mask)?, Start::of(&self.system, start.as_ref())?);
@@ -448,8 +448,9 @@ impl Instances {
     /// Parameters
     /// ----------
     /// variables, values : optional
-    /// Values to set in Event Mode before the iterations, as in `set`. Discrete inputs can be set only in Event Mode. mask : (n,)
-    /// of bool, optional Selected instances; all by default.
+    ///     Numbers to set in Event Mode before the iterations, in the forms of `set`. Discrete inputs can be set only in Event Mode.
+    /// mask : (n,) of bool, optional
+    ///     Selected instances; all by default.
     #[pyo3(signature = (variables=None, values=None, *, mask=None))]
     fn handle_events(
         &self,

@@ -25,11 +25,11 @@ use crate::start::Start;
 use crate::system::System;
 use fmi_abi::{Interface, Value};
 
-/// Specification of runs. The number of runs is the number of values or time series that an input or a start value has for separate
-/// runs. If none has several, there is one run.
+/// Specification of one or several runs. If an input or a start value has a separate value or time series for each run, their
+/// number is the number of runs; otherwise there is one run.
 ///
 /// In each run, start values are set before Initialization Mode, and the first values of the inputs in Initialization Mode. Then,
-/// in Co-Simulation, inputs are set, outputs are read, and a step to the next time is performed at each time.
+/// in Co-Simulation, at each time inputs are set, outputs are read, and a step to the next time is performed.
 ///
 /// In Model Exchange, the states are integrated between events. Continuous inputs are interpolated between their values by lines, or
 /// by cubics if their [derivatives](Self::input_derivatives) are given. All other inputs change in Event Mode.
@@ -37,8 +37,8 @@ use fmi_abi::{Interface, Value};
 pub struct Batch<'a> {
     /// Communication points, s. They must be finite and increasing, and at least two.
     pub time: &'a [f64],
-    /// Inputs and their values. Inputs that are not listed keep their start values. The exception is an input of Model Exchange
-    /// that is declared as the time derivative of a listed input, which it then follows.
+    /// Inputs and their values. Inputs that are not listed keep their start values. But in Model Exchange, an input that is
+    /// declared as the time derivative of a listed input follows that input, unless it has a value in `start`.
     pub inputs: Vec<(&'a str, Trajectory<'a>)>,
     /// First time derivatives of inputs. In Co-Simulation they are set together with the inputs (only FMI 2.0). In Model Exchange
     /// they belong to a continuous input, and are constant or given at the same times as its values.
@@ -52,7 +52,7 @@ pub struct Batch<'a> {
     pub every: Option<usize>,
     /// Statistics of each numeric output, over all times.
     pub measures: Vec<Measure>,
-    /// Number of threads; `None` uses one thread for each processor.
+    /// Maximum number of threads; `None` means one for each processor.
     pub threads: Option<usize>,
     /// Whether outputs are read directly after a step, before the next inputs are set. This is the order of section 4.2.4 of FMI 2.0
     /// and of FMPy. Outputs that depend directly on inputs then lag by one step.

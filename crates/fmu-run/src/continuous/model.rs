@@ -14,7 +14,7 @@ use std::cell::{RefCell, RefMut};
 const FAR: f64 = 1e60;
 /// Largest magnitude of a state. Larger ones result from [`FAR`], and the FMU is not called with them.
 const TOO_FAR: f64 = 1e40;
-/// Number of failed evaluations since the last successful step at which the run fails.
+/// The run fails at this number of failed evaluations since the last successful step.
 const MOST_MISSES: usize = 1000;
 
 /// An FMU with its inputs, shared by the solver and the event handling.

@@ -43,7 +43,7 @@ impl Entry {
 
 /// Allocates entries for the instances of a system. Fails if memory does not suffice for them and for their data.
 pub(super) fn empty(count: usize, components: usize) -> Result<Vec<Entry>, Error> {
-    /// Least further memory that a component needs, in bytes, for allocations of its FMU and its log.
+    /// Minimum memory for allocations of a component's FMU and of its log, in bytes.
     const COMPONENT: usize = 256;
     let too_many = || Error::Memory(format!("{count} instances need more memory than there is"));
     let mut all = Vec::new();

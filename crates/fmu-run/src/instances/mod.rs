@@ -40,7 +40,7 @@ pub struct Setup<'a> {
     pub tolerance: Tolerance,
     /// Whether logging is on and all messages of the FMU are collected for [`Instances::take_messages`].
     pub listening: bool,
-    /// Number of threads; `None` uses one thread for each processor.
+    /// Maximum number of threads; `None` means one for each processor.
     pub threads: Option<usize>,
 }
 

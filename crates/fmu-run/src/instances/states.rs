@@ -80,7 +80,7 @@ impl Instances {
     /// state, or if its FMU returns an error.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if the FMU does not support it.
+    /// Returns [`Error::Request`] if the FMU does not support it, or if an instance has been created again since the states were saved.
     pub fn serialize(&mut self, states: &States) -> Result<Vec<Option<Vec<u8>>>, Error> {
         let why = "cannot serialize its state (canSerializeFMUstate is not true)";
         self.system.check_offer(self.interface, |offer| offer.serializes_states, why)?;

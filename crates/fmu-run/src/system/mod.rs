@@ -88,9 +88,9 @@ impl System {
     ///
     /// # Errors
     /// Returns [`Error::Request`] if there are no components, and for empty or duplicate names of components, unknown variables,
-    /// wrong causalities, strings and bytes, variables that do not match, inputs with two connections, and algebraic loops. Returns
-    /// [`Error::Fmu`] if an FMU does not support Co-Simulation, or occurs twice although a process may create only one instance of
-    /// it.
+    /// wrong causalities, connected strings or bytes, connected variables that do not match, inputs with two connections, and
+    /// algebraic loops. Returns [`Error::Fmu`] if an FMU does not support Co-Simulation, or occurs twice although a process may
+    /// create only one instance of it.
     pub fn connect(composition: &Composition) -> Result<Self, Error> {
         let components =
             composition.components.iter().map(|(name, fmu)| ((*name).to_owned(), Arc::clone(fmu.loaded())));

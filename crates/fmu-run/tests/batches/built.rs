@@ -25,8 +25,8 @@ const DESCRIPTION: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 </fmiModelDescription>
 "#;
 
-/// The FMU of `resets.c` with one of its manners, and the directory with its record: a file to which it writes when an instance is
-/// created, reset or freed.
+/// The FMU of `resets.c` with one of its manners, and the directory with its record: a file to which the FMU writes when an
+/// instance is created, reset or freed.
 pub struct Recorded {
     pub fmu: Option<Fmu>,
     directory: TempDir,

@@ -8,8 +8,8 @@ use built::Recorded;
 use fmu_run::{Batch, Error, Measure, Runs, Start, Trajectory, Watch};
 use proptest::prelude::*;
 
-/// Manners of the FMU: what of the earlier run survives a reset, or whether the reset or the comparison fails. Creating a "slow"
-/// instance takes long; only slow instances are reset.
+/// Manners of the FMU, which determine which values survive a reset, and whether the reset or the comparison of instances fails.
+/// Creating a "slow" instance takes long; only slow instances are reset.
 const MANNERS: [&str; 8] =
     ["good", "state", "parameter", "derived", "slow", "slow no reset", "slow unreadable", "slow parameter"];
 const MEASURES: [Measure; 7] = [

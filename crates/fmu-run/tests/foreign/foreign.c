@@ -50,7 +50,7 @@
     M(no_reset)            /* Returns an error from reset: many tools. */ \
     M(huge_state)          /* Reports a serialized state of 2^46 bytes. */ \
     M(endless_state)       /* Reports a serialized state of SIZE_MAX bytes. */ \
-    M(growing_state)       /* Reports another size of the serialized state with each call. */
+    M(growing_state)       /* Reports a larger size of the serialized state with each call. */
 
 #define ITEM(name) name##_,
 enum { MANNERS(ITEM) COUNT };
