@@ -17,7 +17,7 @@ pub struct Variable {
     pub reference: u32,
     /// Start value as written in the model description, if there is one.
     pub start: Option<Arc<str>>,
-    /// Name of the continuous state whose time derivative this variable is, if there is one.
+    /// Name of the continuous state or input whose time derivative this variable is, if there is one.
     pub derivative_of: Option<String>,
     /// Further attributes, shared by the elements of an array.
     attributes: Arc<Attributes>,

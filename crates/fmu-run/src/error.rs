@@ -5,7 +5,7 @@ use std::fmt;
 /// Maximum number of characters of an error message; longer messages are shortened.
 const LONGEST: usize = 1000;
 
-/// Error that prevents all runs. The error of a single run is [part of the results](crate::Runs::errors).
+/// Error of a whole call. The error of a single run is [part of the results](crate::Runs::errors).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Error {
     /// A file is not an FMU, an FMU cannot be run on this machine, all instances fail, an FMU rejects a serialized state, or no

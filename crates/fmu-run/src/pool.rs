@@ -48,8 +48,8 @@ impl Pool {
         }
     }
 
-    /// Returns the idle threads if there are this many, otherwise new ones. The caller returns them with
-    /// [`put_threads`](Self::put_threads). Concurrent calls get different threads, so that they do not wait for each other.
+    /// Returns the idle threads if they belong to this process and there are this many, otherwise new ones. The caller returns them
+    /// with [`put_threads`](Self::put_threads). Concurrent calls get different threads, so that they do not wait for each other.
     pub fn take_threads(&self, count: usize) -> Result<Threads, Error> {
         let threads = lock(&self.threads).take();
         threads
@@ -166,7 +166,7 @@ impl Trust {
     /// effect in one run.
     const PROOFS: u32 = 3;
 
-    /// Returns whether instances may be kept: no reset has failed, and creating an instance takes long.
+    /// Returns whether instances may be kept: no reset and no check has failed, and creating an instance takes long.
     pub fn may_keep(&self) -> bool {
         !self.forgets && self.fastest.is_some_and(|fastest| fastest >= Self::LONG)
     }

@@ -11,7 +11,7 @@ use fmi_client::Rejection;
 use std::ops::{Deref, DerefMut};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Index of a state that the instances of all components have saved.
+/// Identifies a state that the instances of all components have saved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Saved {
     generation: u64,

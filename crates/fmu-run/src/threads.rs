@@ -55,7 +55,8 @@ impl Threads {
         self.pool().current_num_threads()
     }
 
-    /// Time for which threads poll for work before they sleep. Waking a thread takes about as long.
+    /// Time for which threads poll for work before they sleep, because waking a sleeping thread takes long compared with a short
+    /// step.
     const AWAKE: Duration = Duration::from_micros(50);
 
     /// Calls `own` in this thread and the other functions in the threads of the pool. Returns when all calls have returned.

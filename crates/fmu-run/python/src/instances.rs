@@ -478,7 +478,8 @@ impl Instances {
     ///
     /// Returns
     /// -------
-    /// (n, 2): whether an instance requests an event, and whether it requests the end of the simulation, as 1 or 0
+    /// (n, 2): whether an instance requests an event, and whether it requests the end of the simulation, as 1 or 0; NaN if it has
+    /// dropped out
     fn completed_integrator_step<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.only(Interface::ModelExchange)?;
         self.read(py, &[2], None, |all, values| {

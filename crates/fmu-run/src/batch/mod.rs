@@ -57,7 +57,7 @@ pub struct Batch<'a> {
     /// Whether outputs are read directly after a step, before the next inputs are set. This is the order of section 4.2.4 of FMI 2.0
     /// and of FMPy. Outputs that depend directly on inputs then lag by one step.
     pub read_before_set: bool,
-    /// Relative tolerance for solvers inside the FMU.
+    /// Relative tolerance for solvers inside the FMU; in Model Exchange also the default of [`Integration::rtol`].
     pub tolerance: Tolerance,
     /// Interface type; `None` means Co-Simulation, or Model Exchange if the FMU has only that.
     pub interface: Option<Interface>,
@@ -122,7 +122,7 @@ pub struct Size {
     pub outputs: usize,
     /// Number of [kept](Batch::every) times: the length of a trajectory.
     pub kept: usize,
-    /// Number of statistics.
+    /// Number of statistics of each output.
     pub measures: usize,
     /// Number of outputs in [`Runs::exact`], which are not among `outputs`.
     pub exact: usize,

@@ -6,8 +6,8 @@ use crate::error::{Error, request};
 pub(super) struct Resampling {
     /// Number of times of the input.
     pub length: usize,
-    /// For each communication point, the index of the last time of the input that is not after it, and the fraction of the way to the
-    /// next time, from 0 to 1.
+    /// For each communication point, the index of the last time of the input that is not after it (0 if there is none), and the
+    /// fraction of the way to the next time, from 0 to 1.
     at: Vec<(usize, f64)>,
 }
 
