@@ -32,7 +32,8 @@ impl Found<'_> {
         }
     }
 
-    /// Fails if the variable cannot be set after the initialization, or is connected to an output.
+    /// Fails if a caller may not set the variable, because it is connected to an output, is a structural parameter, or is neither
+    /// an input nor a parameter.
     pub fn check_settable(self, name: &str) -> Result<(), Error> {
         self.check_own(name)?;
         if self.variable.is_structural() {

@@ -79,7 +79,7 @@ impl Shared {
     /// Waits until no other thread uses the instances. If another thread of the parent process used them during the fork, their
     /// lock is never released in this process, so this function fails.
     fn lock(&self) -> PyResult<MutexGuard<'_, fmu_run::Instances>> {
-        /// Maximum time that a thread needs from locking the instances to storing its process.
+        /// Maximum time that a thread needs from locking the instances to storing the number of its process.
         const BETWEEN_LOCK_AND_STORE: Duration = Duration::from_secs(1);
         let found = match self.instances.try_lock() {
             Ok(found) => found,

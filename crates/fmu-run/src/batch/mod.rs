@@ -25,8 +25,8 @@ use crate::start::Start;
 use crate::system::System;
 use fmi_abi::{Interface, Value};
 
-/// Specification of one or several runs. If an input or a start value has a separate value or time series for each run, their
-/// number is the number of runs; otherwise there is one run.
+/// Specification of one or several runs. If an input or a start value has a separate value or time series for each run, the number
+/// of these determines the number of runs; otherwise there is one run.
 ///
 /// In each run, start values are set before Initialization Mode, and the first values of the inputs in Initialization Mode. Then,
 /// in Co-Simulation, at each time inputs are set, outputs are read, and a step to the next time is performed.

@@ -39,8 +39,8 @@ enum Source<'a> {
 const RTOL: f64 = 1e-6;
 
 impl<'a> ModelExchangePlan<'a> {
-    /// Checks the inputs and settings. Adds the inputs whose values `f64` cannot represent to `exact`. Fails for a system of several
-    /// FMUs, which can only run in Co-Simulation.
+    /// Checks the inputs and settings. Adds the inputs whose values `f64` cannot represent to `exact`. Fails for a system of
+    /// connected FMUs, which can run only in Co-Simulation.
     pub fn of(system: &System, batch: &'a Batch, exact: &mut Vec<Input>) -> Result<Option<Self>, Error> {
         batch.integration.check()?;
         if batch.read_before_set {

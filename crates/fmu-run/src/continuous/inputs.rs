@@ -162,8 +162,8 @@ impl<'a> Signals<'a> {
         self.find_moving();
     }
 
-    /// Passes the breaks up to this time, s. At the end of the run, continuous inputs keep their last polynomials, so that their
-    /// slopes are the last ones of the run.
+    /// Passes the breaks up to this time, s. At the end of the run, continuous inputs keep their last polynomials, because
+    /// otherwise their rates would become 0 there.
     pub(super) fn pass(&mut self, time: f64, is_end: bool) -> Break {
         if self.until() > time {
             return Break::None;

@@ -12,7 +12,7 @@ use std::cell::{RefCell, RefMut};
 
 /// Value that all derivatives get where the FMU cannot evaluate them, so that the solver rejects the step and takes a shorter one.
 const FAR: f64 = 1e60;
-/// Largest magnitude of a state. Larger ones result from [`FAR`], and the FMU is not called with them.
+/// Largest magnitude of a state with which the FMU is called. Larger states result from [`FAR`].
 const TOO_FAR: f64 = 1e40;
 /// The run fails at this number of failed evaluations since the last successful step.
 const MOST_MISSES: usize = 1000;

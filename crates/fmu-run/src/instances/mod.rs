@@ -1,5 +1,5 @@
-//! Instances of an FMU that the caller controls with single calls (set, step, get, save, restore). Each call acts on all instances in
-//! parallel.
+//! Instances of an FMU that the caller controls with single calls (set, step, get, save, restore). Each call acts on all or on
+//! selected instances, mostly in parallel.
 
 mod derivatives;
 mod entry;

@@ -228,7 +228,7 @@ impl System {
         &self.0.exchange
     }
 
-    /// Returns the FMU of a system with a single FMU.
+    /// Returns the FMU if the system is a single FMU and not a composition.
     pub(crate) fn sole(&self) -> Option<&Loaded> {
         self.components()
             .first()

@@ -239,7 +239,7 @@ fn replaced(archive: Vec<u8>, from: &[u8], to: &[u8]) -> Vec<u8> {
     archive
 }
 
-/// Returns archives of FMUs and systems.
+/// Returns archives that are opened as an FMU and as a system.
 pub fn archives() -> Files {
     let one = |name: &str| packed([(name.to_owned(), b"x".to_vec())]);
     let link = {
@@ -250,8 +250,8 @@ pub fn archives() -> Files {
     // The entry declares 2 GB, but has 70 kB.
     let bomb = packed([("modelDescription.xml".to_owned(), vec![b' '; 70_000])]);
     let bomb = replaced(bomb, &70_000_u32.to_le_bytes(), &(2_u32 << 30).to_le_bytes());
-    // Declares fewer bytes than it contains.
     let declared = |size: u32| [b"x\x9c".to_vec(), size.to_le_bytes().to_vec()].concat();
+    // The entry declares fewer bytes than it contains.
     let liar = packed([("modelDescription.xml".to_owned(), vec![b' '; 70_000])]);
     let size = 70_000_u32.to_le_bytes();
     let liar = replaced(liar, &size, &10_u32.to_le_bytes());

@@ -1,4 +1,5 @@
-//! Reads malformed descriptions, systems and archives, and mutations of them, in processes with limited memory.
+//! Reads malformed model descriptions, systems, parameter sets and archives, and mutations of them, in processes with limited
+//! memory.
 #![allow(unsafe_code, reason = "FMUs are opened")]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
@@ -133,7 +134,7 @@ fn malformed_files_are_errors_whatever_memory_there_is() {
     }
 }
 
-/// Mutates a file one to five times: changes bytes, repeats or removes parts, and inserts tokens that may confuse a parser.
+/// Mutates a file one to four times: changes bytes, repeats or removes parts, and inserts tokens that may confuse a parser.
 fn mutated(random: &mut Random, original: &[u8]) -> Vec<u8> {
     const TOKENS: [&str; 16] = [
         "<",
@@ -182,12 +183,12 @@ fn read_mutations() {
     let count: usize = std::env::var(MUTATIONS).unwrap().parse().unwrap();
     let mut random = Random(1);
     let mut mutate = |files: &Files, read: &dyn Fn(&[u8])| {
-        // Only small files are mutated, because large ones take more time and do not find more.
+        // Only small files are mutated, because large ones take more time and do not find more faults.
         let small: Vec<_> = files.iter().filter(|(_, bytes)| bytes.len() < 5000).collect();
         for _ in 0..count {
             let (_, original) = small[random.below(small.len())];
             let bytes = mutated(&mut random, original);
-            // Stored so that the input can be found if it ends this process.
+            // The input is stored outside of this process, because it may end the process.
             std::fs::write(outer.join("input"), &bytes).unwrap();
             read(&bytes);
         }
