@@ -11,9 +11,9 @@ pub enum Severity {
     /// Information.
     #[default]
     Note,
-    /// The standard allows it, but importers fail.
+    /// The standard does not forbid the observed behaviour, but importers fail.
     Fragile,
-    /// The standard requires it.
+    /// The standard forbids the observed behaviour.
     Violation,
 }
 
@@ -66,7 +66,8 @@ pub enum Proof {
 /// Violation of a rule by an FMU.
 #[derive(Clone, Default, Serialize)]
 pub struct Finding {
-    /// Name of the rule: the topic, a dot, the fault.
+    /// Topic of the rule, a dot, and the name of the rule within the topic; if the process ended, the end may follow, as in
+    /// `states.fresh-process.crash`.
     pub name: String,
     /// Severity of the finding.
     pub severity: Severity,
@@ -81,9 +82,9 @@ pub struct Finding {
     /// Call sequence that reproduces the finding; empty for a finding in the files of the FMU.
     #[serde(skip)]
     pub sequence: CallSequence,
-    /// Program in C that reproduces the finding.
+    /// Program in C that reproduces the finding; empty if there is none.
     pub c: String,
-    /// Whether the program shows the finding.
+    /// Whether the program shows the finding, or why it was not run.
     pub proof: Proof,
     /// Criterion that a run violates if it reproduces the finding.
     #[serde(skip)]
@@ -118,7 +119,7 @@ impl Finding {
     }
 }
 
-/// Returns a description of the end of a process before its last step; `None` if the last step returned.
+/// Returns a description of the end of a process before its last step returned; `None` if the last step returned.
 pub fn ending(run: &Run, sequence: &CallSequence) -> Option<String> {
     let name = run
         .at
@@ -165,7 +166,7 @@ pub struct Event {
     pub terminate: bool,
     /// Whether the continuous states have changed.
     pub states_changed: bool,
-    /// Time of the next time event.
+    /// Time of the next time event, if it is defined.
     pub next: Option<f64>,
 }
 

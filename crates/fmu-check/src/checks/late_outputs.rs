@@ -32,8 +32,9 @@ pub fn accepts_any_size(checker: &Checker, trajectory: &Trajectory) -> bool {
         && !checker.description.event_mode()
 }
 
-/// Compares steps with steps of half the size. If an output is late by a step of any size, it equals the output of the half steps one half
-/// step earlier. No error of a solver has this pattern. An FMU that allows only one step size is compared with its Model Exchange instead.
+/// Compares steps with steps of half the size. If an output is late by a step of any size, it equals the output of the half steps
+/// one half step earlier. No error of a solver has this pattern. An FMU that does not accept steps of any size is compared with
+/// its Model Exchange instead.
 pub fn late(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let outputs = checker.outputs_and_states();

@@ -1,4 +1,4 @@
-//! Checks that an FMU leaks no memory, threads or files, and changes no settings of the process.
+//! Checks that an FMU leaks no memory, threads or files, changes no settings of the process, and prints nothing.
 
 use crate::call_sequence::{End, Measured, Run, Step, Values};
 use crate::checker::Checker;
@@ -50,7 +50,8 @@ pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     settings(checker, trajectory)
 }
 
-/// Number of repetitions before the first measurement, because the first cycles may allocate memory that later ones use.
+/// Maximum number of repetitions before the first measurement. They are needed because the first cycles may allocate memory that
+/// later ones use.
 const WARM_UP: usize = 200;
 
 /// Maximum number of repetitions between the measurements.

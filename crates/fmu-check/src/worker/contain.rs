@@ -1,5 +1,5 @@
-//! Confines the processes of an FMU: each call sequence runs in a separate session, cannot send signals to the processes of the
-//! checker, and its descendants are ended after it.
+//! Handles interrupts, and confines the processes of an FMU. On Linux, each call sequence runs in a separate session and cannot
+//! send signals to the processes of the checker, and its descendants are ended after it.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -42,7 +42,7 @@ pub fn end_group(leader: u32) {
     unsafe { libc::kill(-(leader as libc::pid_t), libc::SIGKILL) };
 }
 
-/// Does nothing: Windows has no process groups.
+/// Does nothing: Windows has no function that ends a process group.
 #[cfg(not(unix))]
 pub fn end_group(_: u32) {}
 
@@ -79,7 +79,8 @@ mod linux {
         }
     }
 
-    /// Returns whether the process at the other end of the standard input has ended.
+    /// Returns whether the other end of the standard input is closed, because the checker has ended or needs this server no
+    /// longer.
     pub fn abandoned() -> bool {
         let mut poll = libc::pollfd { fd: 0, events: 0, revents: 0 };
         // SAFETY: one descriptor.
@@ -160,8 +161,8 @@ mod linux {
         orphans
     }
 
-    /// Starts a session, and installs a filter for system calls. It ends this process with SIGSYS if the process sends a signal
-    /// to a process of the checker or to all processes.
+    /// Starts a session, and installs a filter for system calls. The filter ends this process with SIGSYS if the process sends a
+    /// signal to a process of the checker or to all processes.
     pub fn isolate(checker: libc::pid_t) {
         // SAFETY: starts a session; the other calls only return numbers.
         let (server, group, caller) = unsafe {

@@ -1,7 +1,8 @@
 //! Settings of the process that an FMU must not change.
 
-/// Returns the settings, each with its value: working directory and its files, environment, locale, floating-point control and, on
-/// Unix, signals, limits, timers, standard streams, the mask for new files, scheduling and the seeds of random numbers.
+/// Returns the settings, each with its value: the working directory and its files, the environment, and the control words of the
+/// floating-point units. On Unix also the locale, signals, limits, timers, standard streams, the mask for new files, the priority
+/// and the seed of random numbers; on Linux also POSIX timers, scheduling and the name of the thread.
 pub fn settings() -> Vec<String> {
     let mut found = Vec::new();
     found.push(format!("working directory {}", std::env::current_dir().unwrap_or_default().display()));
@@ -76,7 +77,7 @@ mod unix {
     use fmi_abi::c_types::{c_char, c_int, c_uint};
     use std::sync::atomic::{AtomicPtr, Ordering};
 
-    /// Signals with a handler that importers may need.
+    /// Signals whose handlers importers may need.
     const SIGNALS: [(&str, c_int); 17] = [
         ("SIGSEGV", libc::SIGSEGV),
         ("SIGFPE", libc::SIGFPE),
@@ -98,7 +99,8 @@ mod unix {
     ];
 
     pub fn settings() -> Vec<String> {
-        // SAFETY: sets the mask and sets it back; the process has no other thread that creates files. Returns a number and names.
+        // SAFETY: sets the mask and sets it back; the process has no other thread that creates files. The other functions only
+        // return values.
         let (mask, priority, locale, of_thread) = unsafe {
             let mask = libc::umask(0);
             libc::umask(mask);

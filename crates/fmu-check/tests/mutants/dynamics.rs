@@ -30,8 +30,8 @@ fn findings(fmi: u32, faults: &str, topics: &str) -> Vec<Value> {
     findings
 }
 
-/// Asserts that each of the faults is found. It is expected as the fault, the name of the rule, and a part of an observation. The
-/// program of the finding must show it, too.
+/// Asserts that each of the faults is found. `expected` has the fault, the name of the rule, and a part of an observation for
+/// each. The program of the finding must show it, too.
 fn found(fmi: u32, topics: &str, expected: &[(&str, &str, &str)]) {
     let faults: Vec<&str> = expected.iter().map(|(fault, ..)| *fault).collect();
     let findings = findings(fmi, &faults.join(","), topics);
