@@ -292,7 +292,8 @@ impl Values {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     pub id: u32,
-    /// Status that the function returned; for an instantiation, 1 for an instance and 0 for NULL.
+    /// Status that the function returned. It is 1 for an instantiation that returned an instance, 0 for one that returned NULL,
+    /// and 0 for FreeInstance.
     pub status: Option<i32>,
     /// Whether the library lacks the function.
     pub missing: bool,

@@ -66,8 +66,8 @@ pub enum Proof {
 /// Violation of a rule by an FMU.
 #[derive(Clone, Default, Serialize)]
 pub struct Finding {
-    /// Topic of the rule, a dot, and the name of the rule within the topic; if the process ended, the end may follow, as in
-    /// `states.fresh-process.crash`.
+    /// Name of the rule, which begins with its topic and a dot. If a process ended, it is the topic or a rule, followed by the
+    /// end, as in `states.crash` or `states.fresh-process.crash`.
     pub name: String,
     /// Severity of the finding.
     pub severity: Severity,
@@ -82,9 +82,9 @@ pub struct Finding {
     /// Call sequence that reproduces the finding; empty for a finding in the files of the FMU.
     #[serde(skip)]
     pub sequence: CallSequence,
-    /// Program in C that reproduces the finding; empty if there is none.
+    /// Program in C that should reproduce the finding; empty if there is none.
     pub c: String,
-    /// Whether the program shows the finding, or why it was not run.
+    /// Whether the program shows the finding; if not, the reason.
     pub proof: Proof,
     /// Criterion that a run violates if it reproduces the finding.
     #[serde(skip)]

@@ -152,7 +152,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     let (scratch, mut checker) = opened(path, options, begin)?;
     simulate(&mut checker)?;
     let session = Session { path, options, baseline, begin };
-    // The report is written after every check, so that the findings so far are not lost if this process is killed.
+    // The report is written after every check, so that earlier findings are not lost if this process is killed.
     let write_report = || match &options.out {
         Some(directory) => session.report(&checker, session.wanted_findings(&checker)).write(directory),
         None => Ok(()),

@@ -5,7 +5,7 @@
 use crate::finding::{Finding, Severity};
 use fmi_abi::Standard;
 
-/// Topics of the rules.
+/// Topics of the checks. The rules of the topics `arrays` and `*` belong to every check.
 pub const TOPICS: [&str; 15] = [
     "description",
     "package",

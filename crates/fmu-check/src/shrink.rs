@@ -78,8 +78,8 @@ fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
 }
 
 /// Returns the shortest sequence found that still satisfies `reproduces` and, if the standard allows the original sequence, is
-/// allowed, too. Calls of `pinned` functions are not removed and, if there are any such functions, neither are changes of the
-/// process or the directory. If `compared` is set, corresponding calls of compared simulations are removed together.
+/// allowed, too. Calls of `pinned` functions are not removed; if `pinned` is not empty, neither are the steps `FreshProcess` and
+/// `Elsewhere`. If `compared` is set, corresponding calls of compared simulations are removed together.
 pub fn shrink(
     description: &Description,
     sequence: &CallSequence,

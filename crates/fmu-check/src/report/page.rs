@@ -58,7 +58,7 @@ pub fn page(report: &Report) -> String {
             if !finding.c.is_empty() {
                 let _ = writeln!(
                     text,
-                    "<details><summary>Program in C with {} calls that reproduces the finding</summary><pre>{}</pre></details>",
+                    "<details><summary>Program in C for this finding, with {} calls</summary><pre>{}</pre></details>",
                     finding.steps.1,
                     escape(&finding.c)
                 );

@@ -79,8 +79,8 @@ mod linux {
         }
     }
 
-    /// Returns whether the other end of the standard input is closed, because the checker has ended or needs this server no
-    /// longer.
+    /// Returns whether the other end of the standard input is closed, because the checker has ended or no longer needs this
+    /// server.
     pub fn abandoned() -> bool {
         let mut poll = libc::pollfd { fd: 0, events: 0, revents: 0 };
         // SAFETY: one descriptor.

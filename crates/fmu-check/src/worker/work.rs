@@ -53,8 +53,8 @@ pub fn work(job: Job, file: File) {
     executor.write(&Last { bytes: std::mem::take(&mut locked(&executor.bytes)) });
 }
 
-/// Makes a link with this name in the working directory, which leads to the directory of the FMU; returns the setting with the
-/// paths through the link.
+/// In the working directory, makes a link with this name to the directory of the FMU; returns the setting with the paths through
+/// the link.
 fn elsewhere(setting: &Setting, name: &str) -> Setting {
     let directory = setting.resources.parent().unwrap_or(&setting.resources);
     let there = std::env::current_dir().unwrap_or_default().join(name);

@@ -55,8 +55,8 @@ pub fn sample(description: &Description, max_count: usize) -> Vec<usize> {
 }
 
 /// Returns the first difference between corresponding reads: the name of the variable and both values, or `a call` and both
-/// statuses if only one of two calls failed or they failed differently. Floating-point numbers differ if their difference exceeds
-/// the tolerance, relative to the larger magnitude or the nominal value.
+/// statuses if the statuses differ. Floating-point numbers differ if their difference exceeds the tolerance, relative to the
+/// larger magnitude or the nominal value.
 pub fn difference(
     description: &Description,
     run: &Run,

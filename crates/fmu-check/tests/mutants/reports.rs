@@ -41,8 +41,11 @@ fn nothing_passes_unchecked() {
             let printed = String::from_utf8_lossy(&output.stdout).into_owned();
             let all = [printed, "report.json".into(), "junit.xml".into(), "report.html".into()];
             for (index, text) in all.into_iter().enumerate() {
-                let text =
-                    if index == 0 { text } else { std::fs::read_to_string(out.join(text)).expect("it") };
+                let text = if index == 0 {
+                    text
+                } else {
+                    std::fs::read_to_string(out.join(text)).expect("a report")
+                };
                 assert!(text.contains(name) && text.contains(why), "{name}: {text}");
             }
         }
