@@ -16,8 +16,8 @@ fn rule(name: &'static str, criterion: impl Criterion) -> Broken {
     (name, Arc::new(criterion))
 }
 
-/// Returns the violations of these rules in a run whose last step has returned: for arrays all of them, for other rules the first
-/// of each.
+/// Returns the violations of these rules in a run whose last step has returned: all violations of the rules for arrays, and the
+/// first violation of each other rule.
 pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -> Vec<Finding> {
     let all = all_steps(sequence);
     let mut broken: Vec<Broken> = processes(&all, run).into_iter().collect();

@@ -8,7 +8,7 @@ use std::sync::Arc;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// Information.
+    /// Information; importers work nevertheless.
     #[default]
     Note,
     /// The standard does not forbid the observed behaviour, but importers fail.

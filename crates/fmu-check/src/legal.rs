@@ -1,5 +1,5 @@
-//! Checks that the standard allows all calls of a sequence, except for the calls that are marked as forbidden. So no call that is
-//! forbidden by mistake causes a finding.
+//! Checks that the standard allows all calls of a sequence, except for the calls that are marked as forbidden. So a forbidden
+//! call that a check makes by mistake never causes a finding.
 
 use crate::call_sequence::{Arg, Make, NULL_INSTANCE, Numbered, Step};
 use crate::description::Description;

@@ -122,8 +122,9 @@ pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     discrete(checker, trajectory)
 }
 
-/// Returns two lists: at most 60 continuous knowns, which are inputs and, in Model Exchange, states; and all these states. States
-/// are left out if one of them is an array, so that each state is an element of the state vector.
+/// Returns two lists: at most 60 continuous knowns, which are inputs and, in Model Exchange, states; and all states, even those
+/// beyond the first 60 knowns. States are left out if one of them is an array, so that each state is an element of the state
+/// vector.
 fn continuous_knowns(checker: &Checker, trajectory: &Trajectory) -> (Vec<usize>, Vec<usize>) {
     let description = &checker.description;
     let scalar = !trajectory.is_stepped() && description.states_count() == Some(description.states().len());

@@ -201,8 +201,9 @@ impl Compared<'_> {
         if found.len() < 3 { None } else { found.into_iter().next() }
     }
 
-    /// Returns the step after which an element of a continuous variable differs most, and its values in Co-Simulation and Model Exchange,
-    /// if the error of a solver does not explain the difference. Compares only the steps before the first state event.
+    /// Returns the step after which an element of a continuous variable differs most, and its values in Co-Simulation and Model
+    /// Exchange, if the error of a solver does not explain the difference. Compares only the steps before the first event that is
+    /// not a time event.
     fn continuous(&self, variable: usize) -> Option<(usize, String, String)> {
         let first_state_event =
             (0..self.count).find(|step| self.events(*step).is_none_or(|(states, _)| states > 0.0));

@@ -225,9 +225,9 @@ fn late_step(full: &[f64], half: &[f64], is_float: bool) -> Option<usize> {
     steps.clone().filter(|_| is_late).max_by(|one, other| off(*one).abs().total_cmp(&off(*other).abs()))
 }
 
-/// If the effect of the changed inputs is late by a step of any size, returns the effect. Such an effect is zero after the first step with
-/// the new inputs, and after the second step it is equal for both step sizes. The effect of an input on a state depends on the step size,
-/// so it is not reported if a first-order solver shows it late.
+/// If the effect of the changed inputs is late by a step of any size, returns the effect. Such an effect is zero after the first
+/// step with the new inputs, and after the second step it is equal for both step sizes. A first-order solver also shows the
+/// effect of an input on a state a step late, but this effect depends on the step size, so it is not reported.
 fn late_effect(full: &[f64], half: &[f64], is_float: bool) -> Option<f64> {
     // The inputs change after this step.
     let at = (full.len() - 1) / 2;

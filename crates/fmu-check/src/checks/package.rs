@@ -64,7 +64,7 @@ fn directories(standard: Standard) -> Vec<String> {
 /// Returns the path of the library for this platform.
 ///
 /// # Errors
-/// Fails if the FMU has no library for this platform, or one for another processor.
+/// Fails if the FMU has no library for this platform, or if that library is for another processor or cannot be read.
 pub fn library(directory: &Path, standard: Standard, offer: &Offer) -> Result<PathBuf, String> {
     let name = format!("{}{DLL_SUFFIX}", offer.identifier);
     let expected = directories(standard);

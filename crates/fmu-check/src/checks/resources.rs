@@ -126,8 +126,8 @@ fn check_leaks(
 /// Describes memory that remains after the repetitions.
 fn leaked_memory((before, after, times): (Measured, Measured, usize), what: &str) -> Option<String> {
     let grown = after.memory.saturating_sub(before.memory);
-    // The smallest block of glibc is 32 bytes, and glibc may keep a few blocks. With other C libraries, the resident memory is measured,
-    // which consists of pages.
+    // The smallest block of glibc is 32 bytes, and glibc may keep a few blocks. If the C library does not report the allocated
+    // memory, the resident memory is measured, which consists of pages.
     let allowed = if before.exact { 16 * times as u64 + 4096 } else { 64 * times as u64 + (4 << 20) };
     (grown > allowed)
         .then(|| format!("{grown} bytes remain after {times} {what}: {} for each", grown / times as u64))

@@ -293,7 +293,7 @@ pub fn time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         checker.check("results.time", writer.sequence, move |run| {
             reads.iter().find_map(|(reads, time, step)| {
                 let value = *value_of(run, reads, index)?.numbers().first()?;
-                // A step may end early, and returns lastSuccessfulTime (section 4.2.1 of FMI 3.0).
+                // A step may end early, at the lastSuccessfulTime that it returns (section 4.2.1 of FMI 3.0).
                 let reached = step.and_then(|id| run.outcome(id)?.written.get(3)?.numbers().first().copied());
                 let time = reached.unwrap_or(*time);
                 is_other_time(value, time)

@@ -46,7 +46,7 @@ static void *library;
 static char library_path[5000];
 /* Output of this program; the standard output belongs to the library. */
 static FILE *out;
-/* Whether output is switched off, the loader resolves all symbols of the library, and several threads run. */
+/* Whether output is switched off; whether the loader resolves all symbols when it loads the library; whether several threads run. */
 static bool quiet, bind_now, threads;
 /* Time at which the alarm of this program is due. */
 static double alarm_ends;

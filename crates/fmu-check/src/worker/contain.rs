@@ -10,7 +10,8 @@ pub fn interrupted() -> bool {
     INTERRUPTED.load(Ordering::Relaxed)
 }
 
-/// Handles SIGINT, SIGTERM and SIGHUP: the first signal ends the check in order, the same signal again ends the process.
+/// Handles SIGINT, SIGTERM and SIGHUP: the first signal stops the check, which still writes its report; the same signal again
+/// ends the process.
 #[cfg(unix)]
 pub fn listen_for_interrupts() {
     extern "C" fn interrupt(_: libc::c_int) {

@@ -224,8 +224,8 @@ impl Executor {
         outcome.status = Some(status);
         let is_string = |array: &PassedArray| matches!(array.content, Content::Output(Kind::Pointer, _));
         if THREADS.load(Ordering::Relaxed) && arrays.iter().any(is_string) {
-            // Gives other threads time to overwrite the strings before this one copies them, in case the FMU has one buffer for
-            // all instances.
+            // Gives other threads time to overwrite the strings before this thread copies them, in case the FMU has one buffer
+            // for all instances.
             std::thread::sleep(std::time::Duration::from_micros(20));
         }
         let succeeded = status == 0 || status == 1;

@@ -21,7 +21,7 @@ pub fn serve() -> Result<(), String> {
     adopt_descendants();
     let result = jobs();
     if abandoned() {
-        // The checker has ended. If it was killed, it has not removed its directory.
+        // The checker has ended. If it was killed, it has not removed its temporary directory.
         if let Some(scratch) = std::env::var_os(SCRATCH) {
             let _ = std::env::set_current_dir("/");
             let _ = std::fs::remove_dir_all(Path::new(&scratch));

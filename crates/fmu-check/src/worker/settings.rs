@@ -208,8 +208,8 @@ mod unix {
     /// Seed that the importer has set.
     const SEED: c_uint = 4711;
 
-    /// Number of random numbers from the importer's seed among which the next ones are searched, because an FMU may use some of
-    /// them.
+    /// How many random numbers that follow from the importer's seed are searched for the next ones, because an FMU may have used
+    /// some of them.
     const SEARCHED: usize = 5_000_000;
 
     /// State of the generator; NULL before the first measurement, which sets the importer's seed.

@@ -110,7 +110,7 @@ fn sound() {
     }
 }
 
-/// Asserts that every fault in the source is tested, and that the documentation states their number.
+/// Asserts that every fault in the source is tested, and that the documentation states the numbers of faults and of variants.
 #[test]
 fn no_fault_is_forgotten() {
     let source = include_str!("spring.c");

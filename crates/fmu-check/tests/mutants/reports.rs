@@ -108,8 +108,8 @@ fn a_quick_check_is_quick() {
 }
 
 /// Asserts that a check of 100,000 variables needs at most 1 GB of memory, and that its processor time does not grow with the
-/// square of their number. The limit of processor time is ten times what the check needs, while quadratic work needs a thousand
-/// times as much as the check.
+/// square of their number. The limit is ten times the processor time that the check needs, while quadratic work would need a
+/// thousand times that time.
 #[cfg(target_os = "linux")]
 #[test]
 fn many_variables_take_little_time_and_memory() {
