@@ -105,7 +105,7 @@ pub struct Builder {
     pub terminals: Vec<Terminal>,
     /// Settings of cargo for this build, such as `profile.release.lto=false`.
     pub settings: Vec<String>,
-    /// Start values that the library reads from another file when it is compiled, see [`Variant::start`].
+    /// Start values that are read from another file when the library is compiled, see [`Variant::start`].
     pub start: Vec<(String, String)>,
     /// Label in messages for a build with other parameter values than the default ones. `None` for the default values, whose
     /// description is kept with the sources.
@@ -138,8 +138,8 @@ impl Builder {
         }
     }
 
-    /// Compiles the libraries, checks the model with the library for this machine, writes the descriptions, packs the
-    /// FMUs, and reports them on stdout.
+    /// Compiles the libraries, checks the model with the library for this machine, writes the descriptions, packs the FMUs, and reports
+    /// them on stdout. With `options.guid`, only prints the guid; with `options.describe`, only writes a description.
     ///
     /// # Errors
     /// When the model contradicts itself, a library cannot be compiled or does not belong to the sources, or a file cannot
@@ -267,7 +267,8 @@ impl Builder {
         Ok(())
     }
 
-    /// Returns the FMI version in the options. Without one, returns the default versions that have all types of the model's variables.
+    /// Returns the FMI version in the options, or FMI 2.0 for C sources. Otherwise returns the default versions, without FMI 2.0 if it
+    /// lacks the type of a variable and FMI 3.0 is also a default version.
     fn versions(&self, options: &BuildOptions, model: &LoadedModel) -> Vec<Standard> {
         if let Some(fmi) = options.fmi.or(options.c_sources.then_some(Standard::Fmi2)) {
             return vec![fmi];
@@ -392,8 +393,8 @@ fn pack_in(out: &Path, parts: &Parts) -> Result<()> {
     Ok(())
 }
 
-/// Waits until no other build runs in the same workspace, and returns a lock that lasts until the file is closed. Returns `None` if
-/// the lock file cannot be created; the build then continues without a lock.
+/// Waits until no other build runs in the same workspace, and returns a lock that lasts until the file is closed. Returns `None` if the
+/// lock file cannot be created or locked; the build then continues without a lock.
 fn lock(directory: &Path) -> Option<fs::File> {
     fs::create_dir_all(directory).ok()?;
     let file = fs::File::create(directory.join(".fmu-package.lock")).ok()?;

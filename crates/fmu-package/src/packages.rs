@@ -111,7 +111,7 @@ mod tests {
     use super::Neighbourhood;
     use std::fs;
 
-    /// The FMU of a member of a workspace goes into the `target` of the workspace.
+    /// A package that is not in a workspace is its own workspace.
     #[test]
     fn the_workspace_of_a_member_is_found() {
         let directory = tempfile::tempdir().unwrap();

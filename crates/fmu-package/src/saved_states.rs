@@ -16,8 +16,8 @@ use fmi_abi::{BaseType, Causality, Interface, Standard, Value, Variability};
 const SAVED_BEFORE: [usize; 5] = [0, 1, 2, 5, 12];
 /// Number of steps that are compared after each saved state.
 const FOLLOWED: usize = 8;
-/// Number of steps in a simulation. One simulation uses the default step size; the steps of another one are longer, so that it reaches
-/// the end of the default experiment.
+/// Number of steps in a simulation. One simulation uses the default step size. If the model allows it, and that simulation ends before the
+/// default experiment, another one has longer steps.
 const STEPS: usize = SAVED_BEFORE[SAVED_BEFORE.len() - 1] + FOLLOWED;
 /// Tolerance relative to the largest value of a variable. A smaller difference may be a rounding error, because a model may calculate
 /// differently after its state was read.
@@ -176,7 +176,8 @@ impl<'a> Simulation<'a> {
         }
     }
 
-    /// Describes how the instance `other` differs from the instance whose state it has read; `None` if they agree.
+    /// Describes how the instance `other` differs from the instance whose state it has read; `None` if they agree, if the results of the
+    /// model are random, or if a state cannot be saved or restored.
     fn difference(
         &self,
         point: &Point,
