@@ -105,7 +105,7 @@ def measure(fmu: Path) -> dict[str, int]:
 
 
 def differences(counts: dict[str, int], table: dict[str, int]) -> list[str]:
-    """Returns a line for each use whose count left the tolerance of the table."""
+    """Returns a line for each use whose count left the tolerance of the table, or that only one of both contains."""
     found = [f"{use} is new in the measurement" for use in counts.keys() - table.keys()]
     found += [f"{use} is no longer measured" for use in table.keys() - counts.keys()]
     for use in counts.keys() & table.keys():
