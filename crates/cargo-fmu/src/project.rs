@@ -33,7 +33,7 @@ pub struct Project {
 }
 
 impl Project {
-    /// Finds the package with `cargo metadata`.
+    /// Finds the package with `cargo metadata`. Fails if it does not make a shared library or does not use fmu-export.
     pub fn find(options: &Package) -> Result<Self> {
         let manifest =
             options.manifest_path.iter().flat_map(|path| [OsStr::new("--manifest-path"), path.as_ref()]);

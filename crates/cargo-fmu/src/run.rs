@@ -21,8 +21,8 @@ use std::time::{Duration, Instant, SystemTime};
 pub struct Options {
     #[command(flatten)]
     package: Package,
-    /// Start value: a number, true, false, an enumeration item, or a string; for an array, one value for each element,
-    /// separated by commas; repeat the option for several variables
+    /// Start value: a number, true, false, an enumeration item, or a string; for an array, one value for all elements, or
+    /// one for each, separated by commas; repeat the option for several variables
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
     /// Inputs over time: a CSV file with a column time and one column for each input; two rows of the same time are a step
@@ -34,7 +34,7 @@ pub struct Options {
     /// Step size, s [default: from the model's default experiment]
     #[arg(long, value_name = "S")]
     step: Option<f64>,
-    /// Variables to show, with commas between the names [default: all outputs]
+    /// Variables to show, with commas between the names [default: all outputs except bytes]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     show: Vec<String>,
     /// Simulate the FMU for FMI 2.0 or for FMI 3.0 [default: 2, if FMI 2.0 has all types of the model]

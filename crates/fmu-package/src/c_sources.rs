@@ -12,7 +12,7 @@ use std::process::Command;
 /// The Rust target of a library that is translated to C or runs in a browser.
 pub const WEBASSEMBLY: &str = "wasm32-unknown-unknown";
 
-/// Linker arguments for this target. The stack of an instance has 64 KiB and comes first in memory, so an overflow traps instead of
+/// Linker arguments for [`WEBASSEMBLY`]. The stack of an instance has 64 KiB and comes first in memory, so an overflow traps instead of
 /// overwriting data.
 pub const LINKING: [&str; 2] = ["-Clink-arg=-zstack-size=65536", "-Clink-arg=--stack-first"];
 

@@ -39,7 +39,7 @@ pub struct BuildOptions {
     /// Directory for the FMU of FMI 2.0, with a directory fmi3 for the FMU of FMI 3.0 [default: target/fmu of the workspace]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Write only modelDescription.xml of FMI 2.0, into the directory modelDescription of the sources or DIR
+    /// Write only modelDescription.xml, of FMI 2.0 or of the version --fmi, into the directory modelDescription of the sources or DIR
     #[arg(long, conflicts_with_all = ["target", "binary"])]
     pub describe: bool,
     /// Print only the guid; to compile a library elsewhere, set the environment variable FMU_GUID to it
@@ -48,7 +48,7 @@ pub struct BuildOptions {
     /// Compile for this Rust target instead of this machine; repeat it for several
     #[arg(long, value_name = "TRIPLE")]
     pub target: Vec<String>,
-    /// Compile for Linux, Windows and macOS, Intel and ARM (needs Rust's libraries for them and cargo-zigbuild)
+    /// Compile for Linux and macOS on Intel and ARM, and for Windows on Intel (needs Rust's libraries for them and cargo-zigbuild)
     #[arg(long, conflicts_with_all = ["target", "describe", "c_sources"])]
     pub all_targets: bool,
     /// Add this compiled library, for example win64=model.dll, or the one in an FMU, x86_64-windows=model.fmu; repeat it for several

@@ -167,8 +167,9 @@ fn is_name(text: &str) -> bool {
 
 /// Returns `terminalsAndIcons.xml` of a model with these terminals, in an FMU with these files; `None` if there are no terminals.
 ///
-/// # Errors When two terminals, or two members of one, share a name, a member is not a variable that can be connected, an icon is missing,
-/// or a text is not a single line.
+/// # Errors
+/// When two terminals, or two members of one, share a name, a member is not a variable that can be connected, an icon is missing, or a
+/// text is not a single line.
 pub fn terminals(
     model: &LoadedModel,
     terminals: &[Terminal],

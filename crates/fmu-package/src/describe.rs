@@ -26,7 +26,8 @@ pub struct Changes {
 
 /// Returns `modelDescription.xml` of the model's FMU for this version of FMI.
 ///
-/// # Errors When the model contradicts itself, for example because a range is empty, a start value is outside its range or differs between
+/// # Errors
+/// When the model contradicts itself, for example because a range is empty, a start value is outside its range or differs between
 /// Co-Simulation and Model Exchange, or a dependency is not declared. Also when FMI 2.0 does not have the type of a variable, or when a
 /// variable has the same name as one that is generated for FMI 3.0.
 pub fn describe(model: &LoadedModel, fmi: Standard, changes: &Changes) -> Result<String> {

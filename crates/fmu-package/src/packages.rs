@@ -111,7 +111,7 @@ mod tests {
     use super::Neighbourhood;
     use std::fs;
 
-    /// A package that is not in a workspace is its own workspace.
+    /// The workspace of a package is its own directory, unless it is a member of a workspace above.
     #[test]
     fn the_workspace_of_a_member_is_found() {
         let directory = tempfile::tempdir().unwrap();

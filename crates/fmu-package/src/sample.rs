@@ -238,7 +238,7 @@ impl<'a> Sampler<'a> {
         offered[self.random.usize(..offered.len())]
     }
 
-    /// Does this number of steps in Co-Simulation and, after a single step, sets derivatives of the inputs, because factors may
+    /// Does this number of steps in Co-Simulation. If it is a single step, also sets derivatives of the inputs after it. Factors may
     /// depend on both.
     fn make_steps(&self, mut instance: Instance<'a>, point: &Point, steps: usize) -> Instance<'a> {
         if point.interface != Interface::CoSimulation {

@@ -1,8 +1,8 @@
 //! Checks that saved states are complete.
 //!
-//! A model lists the fields that saved states must contain after `memory in` of `variables!`. The compiler cannot detect that a field
-//! is missing there. So the model is simulated, some of its saved states are read into another instance, and this instance must have
-//! the same results as the first one when both continue with the same inputs.
+//! After `memory in` of `variables!`, a model lists the fields that its saved states must contain. The compiler cannot detect that a
+//! field is missing in this list. So the model is simulated, some of its saved states are read into another instance, and this instance
+//! must have the same results as the first one when both continue with the same inputs.
 
 use crate::check::Starts;
 use crate::instance::{Instance, Outcome, Saved};
