@@ -106,7 +106,7 @@ def bench(library: object, guid: str, *arguments: object, stdin: bytes = b"") ->
 
 
 def steps(guid: str, sources: Path | None) -> None:
-    """Compares steps of the FMU with the C programs, and its C sources, if they are given, with its library."""
+    """Compares steps of the FMU with the C programs. If the FMU's C sources are given, also compares them with its library."""
 
     def seconds(library: str, way: int, count: int, threads: int = 1) -> float:
         return bench(WORK / f"{library}.so", guid, way, count // 100 if QUICK else count, threads)[0]

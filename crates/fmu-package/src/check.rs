@@ -348,7 +348,10 @@ fn check_value(label: &str, variable_type: &Type, value: &Value) -> Result<()> {
         (Attributes::Other, Value::String(text)) => {
             // XML 1.0 forbids most other control characters, and discourages the rest (U+007F to U+009F).
             let is_possible = |c: char| !c.is_control() || matches!(c, '\t' | '\n' | '\r');
-            ensure!(text.chars().all(is_possible), "{label} has a character that XML lacks: {text:?}");
+            ensure!(
+                text.chars().all(is_possible),
+                "{label} has a control character that must not be in XML: {text:?}"
+            );
         }
         _ => {}
     }

@@ -337,7 +337,7 @@ impl Builder {
 
     /// Extracts the library for a platform from an FMU and returns its path.
     fn unpack_library(&self, fmu: &Path, platform: Platform) -> Result<PathBuf> {
-        let failed = || format!("cannot take the library for {platform} out of {}", fmu.display());
+        let failed = || format!("cannot extract the library for {platform} from {}", fmu.display());
         let mut archive = ZipArchive::new(fs::File::open(fmu).with_context(failed)?).with_context(failed)?;
         let is_library = |name: &String| {
             let mut parts = name.split('/');

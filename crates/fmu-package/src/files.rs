@@ -13,7 +13,7 @@ use zip::{CompressionMethod, DateTime, System, ZipArchive, ZipWriter};
 /// When two consecutive entries have the same name.
 pub fn zip(entries: &[(String, Vec<u8>)]) -> Result<Vec<u8>> {
     for pair in entries.windows(2) {
-        ensure!(pair[0].0 != pair[1].0, "{} is there twice", pair[0].0);
+        ensure!(pair[0].0 != pair[1].0, "{} occurs twice in the zip file", pair[0].0);
     }
     // These settings would otherwise depend on the clock or the machine.
     let options = SimpleFileOptions::default()

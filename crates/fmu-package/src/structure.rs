@@ -83,8 +83,8 @@ impl ModelStructure {
     /// or known in FMI 3.0: it has the index of its first element and the dependencies of all its elements.
     ///
     /// # Errors
-    /// When the model contradicts itself, reacts to a variable that it has not declared, or rejects its start values; if it is
-    /// `smooth`, also when it rejects every change of a variable.
+    /// When the model contradicts itself or rejects its start values, or when an unknown reacts to a variable that its `depends_on` does
+    /// not name. If the model is `smooth`, also when it rejects every change of a variable.
     pub fn of(model: &LoadedModel, fmi: Standard, tunable_parameters: bool) -> Result<Self> {
         let starts = checked_starts(model)?;
         let table = &model.table;

@@ -53,8 +53,8 @@ enum {
     WASM_RT_TRAP_CALL_INDIRECT
 };
 
-/* An instance contains all memory that its module can request. FMU_SMALL unused bytes follow it, so that for smaller
-   offsets than FMU_SMALL only the base must be checked. */
+/* An instance contains all memory that its module can request. FMU_SMALL unused bytes follow it, so that only
+   the base of an address must be checked if the offset is smaller than FMU_SMALL. */
 #define FMU_PAGE 65536u
 #define FMU_MEMORY (FMU_MEMORY_PAGES * FMU_PAGE)
 #define FMU_SMALL 4096u
