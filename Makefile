@@ -92,7 +92,7 @@ help:
 	@echo 'make test-platforms          build the release, run it on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       build the release twice and compare every byte'
 	@echo 'make study                   install the packages for prw identify, excite, sweep and check (see python/prw/tutorial.md)'
-	@echo 'make monte-carlo             identify 300 simulated rigs and 1820 with faults -> out/'
+	@echo 'make monte-carlo             identify 300 simulated rigs and 1820 with faults or friction -> out/'
 	@echo 'make fuzz                    search for calls that break the FMU, and for files that break the readers, 10 minutes each'
 	@echo '                             (FUZZ_SECONDS=600)'
 	@echo 'make sanitize                run the tests under address, leak, thread and real-time sanitizers and valgrind'

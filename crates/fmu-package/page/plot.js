@@ -149,7 +149,7 @@ function colourAt(target, name) {
   return colour;
 }
 
-/** Panels of curves, one below the other. The last one has the labels of the time axis. */
+/** Panels of curves, one below the other. Only the last one names the time axis. */
 class Plots {
   /** @param {Panel[]} panels @param {(time: number) => void} seek called with the time where a panel is touched @param {string} axis label of the abscissa */
   constructor(panels, seek, axis = "time (s)") {

@@ -53,7 +53,7 @@ class Session {
     return { fmu, inputs: fmu.group(this.inputs), outputs: fmu.group(this.outputs) };
   }
 
-  /** Whether the run has failed, for example because the FMU rejected a value. A run that the FMU terminated is not rejected. */
+  /** Whether the run has failed, for example because the FMU rejected a value. A run that the FMU terminated has not failed. */
   get isRejected() {
     return this.error !== "" && this.ended === Infinity;
   }
