@@ -16,8 +16,8 @@ use fmi_abi::{BaseType, Causality, Interface, Standard, Value, Variability};
 const SAVED_BEFORE: [usize; 5] = [0, 1, 2, 5, 12];
 /// Number of steps that are compared after each saved state.
 const FOLLOWED: usize = 8;
-/// Number of steps in a simulation. One simulation uses the default step size. If the model allows it, and that simulation ends before the
-/// default experiment, another one has longer steps.
+/// Number of steps in a simulation. One simulation uses the default step size. If it ends before the default experiment, and the model
+/// allows other step sizes, a second simulation has longer steps and reaches the end of the experiment.
 const STEPS: usize = SAVED_BEFORE[SAVED_BEFORE.len() - 1] + FOLLOWED;
 /// Tolerance relative to the largest value of a variable. A smaller difference may be a rounding error, because a model may calculate
 /// differently after its state was read.
