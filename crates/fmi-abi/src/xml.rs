@@ -18,7 +18,8 @@ const ATTRIBUTE: usize = 200;
 /// Parses the content of an XML file. Error messages begin with `name`.
 ///
 /// # Errors
-/// Fails if the file is not well-formed, has a document type definition, or would take too much memory or time.
+/// Fails if the file is not well-formed, has a document type definition or elements that are nested too deep, or would
+/// take too much memory or time.
 pub fn parse<'a>(text: &'a str, name: &str) -> Result<Document<'a>, String> {
     let count = |byte: u8| text.bytes().filter(|other| *other == byte).count();
     let bytes = ELEMENT * count(b'<') + ATTRIBUTE * count(b'=') + 2 * text.len();

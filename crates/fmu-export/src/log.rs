@@ -26,8 +26,8 @@ impl Message {
         Category::of(self.status).name()
     }
 
-    /// Returns the message on one line. Characters that `printf`, FMI (section 2.1.5 of FMI 2.0) or C strings would
-    /// interpret are replaced by `_`.
+    /// Returns the message on one line. Control characters, and characters that `printf` or FMI (section 2.1.5 of FMI
+    /// 2.0) would interpret, are replaced by `_`.
     pub fn printable(&self) -> CString {
         let special = |c: char| matches!(c, '%' | '#') || c.is_control();
         let safe: String = self.message.chars().map(|c| if special(c) { '_' } else { c }).collect();
@@ -104,7 +104,8 @@ impl Logger {
         self.enabled = if on { bit(Category::All) } else { self.always };
     }
 
-    /// Enables or disables these categories. The importer requests this by a call with a list of categories.
+    /// Enables or disables these categories; categories that cannot be disabled stay enabled. The importer requests
+    /// this by a call with a list of categories.
     pub fn set(&mut self, categories: u8, on: bool) {
         if on {
             self.enabled |= categories;

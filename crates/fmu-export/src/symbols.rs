@@ -61,7 +61,7 @@ macro_rules! symbols {
                 function: fmi2String,
                 reason: fmi2String,
             ) -> fmi2Status {
-                // SAFETY: the C code around the module guarantees the contract of this function.
+                // SAFETY: the code around the module guarantees the contract of this function, as above.
                 unsafe { $crate::fmi2::broken::<__fmu_model>(c, function, reason) as _ }
             }
         }

@@ -106,7 +106,7 @@ impl Type {
         Self { base: BaseType::Float32, ..Self::real(name, unit) }
     }
 
-    /// Creates an integer type.
+    /// Creates an integer type with the base type `i32`.
     pub const fn integer(name: &'static str) -> Self {
         Self::whole(name, BaseType::Integer)
     }

@@ -1,4 +1,5 @@
-//! Functions without an instance argument: versions, creation and release (sections 2.1.4 and 2.1.5 of FMI 2.0).
+//! Functions that do not return a status: versions, creation and release of instances (sections 2.1.4 and 2.1.5 of FMI
+//! 2.0).
 
 use super::types::*;
 use crate::boundary::{Arguments, Callback, ImporterLog, free, instantiate, string};

@@ -298,7 +298,7 @@ fn reject_step<T>(point: f64, step_size: f64) -> Outcome<T> {
 }
 
 /// Tolerance by which the last step may end after the stop time, relative to the simulated time. It exists because
-/// importers that count in nanoseconds round the size of each step, for example of 1/60 s, so their steps add up to
+/// importers that count in nanoseconds round the size of each step, for example of 1/60 s, so their steps can add up to
 /// more than the stop time.
 const STOP_TIME_ROUNDING: f64 = 1e-7;
 

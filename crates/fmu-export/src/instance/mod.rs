@@ -2,7 +2,7 @@
 //! instead of pointers.
 //!
 //! Every method checks all its arguments before it changes anything, or undoes its changes, so an error leaves the
-//! instance unchanged.
+//! instance unchanged, except for the records of rejected start values.
 
 mod co_simulation;
 mod derivatives;
@@ -79,8 +79,8 @@ struct State<M> {
     mode: Mode,
     /// Whether [`calculate`](crate::Model::calculate) of the model must be called before a value is read.
     stale: bool,
-    /// Whether the model has made a step or entered Continuous-Time Mode. After a de-serialization this is unknown,
-    /// and false.
+    /// Whether the model has made a step or entered Continuous-Time Mode. After a de-serialization this is unknown, so
+    /// the value is false.
     started: bool,
     /// Whether the model has requested the end of the simulation.
     ended: bool,
@@ -307,7 +307,7 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    /// Applies a change that may fail to the model, and undoes it after an error.
+    /// Applies a change to the model, and undoes the change if it fails.
     ///
     /// The change applies to the model itself, and a copy is the backup, not the other way around. A copy may lack
     /// allocated memory and cached results of the original, so this way an accepted change does not make the instance
