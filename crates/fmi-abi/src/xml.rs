@@ -4,9 +4,9 @@ use roxmltree::Document;
 
 /// Maximum depth of nested elements.
 const MAX_DEPTH: usize = 250;
-/// Maximum number of comparisons that the parser may make for a file, and the number that each byte of the file adds
-/// to it. The parser compares all attributes of an element with each other, and its namespaces with the namespaces of
-/// the elements around it, so without a limit the time could grow quadratically.
+/// Maximum number of comparisons that the parser may make for an empty file, and the number by which each byte of a
+/// file raises this maximum. The parser compares all attributes of an element with each other, and the namespaces of an
+/// element with the namespaces of the elements around it, so without a limit the time could grow quadratically.
 const COMPARISONS: usize = 1 << 22;
 const COMPARISONS_PER_BYTE: usize = 8;
 /// Maximum number of bytes that [`reserve`] accepts.

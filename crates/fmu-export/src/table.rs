@@ -552,8 +552,8 @@ macro_rules! variables {
                         )
                     };
                     // Below, each field is bound to a variable of its own name, so that the compiler's messages refer
-                    // to the author's line. The function hides any constant of this name, which would be a pattern in
-                    // a `match` and not a variable.
+                    // to the author's line. The empty function hides any constant of this name, because in a `match` a
+                    // constant would be compared, and not bound.
                     $( #[allow(dead_code)] fn $first() {} )?
                     $(
                         let variable = variable.stored(

@@ -201,7 +201,7 @@ impl Type {
         let Attributes::Binary { max_size, .. } = &mut self.attributes else {
             panic!("max_size is for Binary")
         };
-        assert!(largest <= *max_size, "max_size: a mebibyte is the largest");
+        assert!(largest <= *max_size, "max_size must be at most 1 MiB");
         *max_size = largest;
         self
     }

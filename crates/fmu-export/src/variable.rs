@@ -433,7 +433,7 @@ impl<M> Variable<M> {
             _ => {}
         }
         if self.length() == 0 {
-            return Some("an array has at least one element");
+            return Some("an array must have at least one element");
         }
         let is_set = self.state
             || matches!(self.causality, Parameter | Input)

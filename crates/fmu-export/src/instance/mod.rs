@@ -54,7 +54,7 @@ pub(crate) struct Instance<M> {
     pub strings: Vec<std::ffi::CString>,
     /// Binary values that the last call has returned, which the importer may read until the next call.
     pub bytes: Vec<Vec<u8>>,
-    /// Reusable buffer for models with arrays: the indices of all elements of the variables of a call.
+    /// Reusable buffer for models with arrays: the indices of all array elements and scalars that a call accesses.
     pub elements: Vec<u32>,
 }
 
