@@ -285,9 +285,9 @@ impl ModelDescription {
         Self::parse_configured(xml, &HashMap::new())
     }
 
-    /// Reads a `modelDescription.xml` for an instance in which structural parameters have other values than their
-    /// start values. `structure` maps their value references to these values, which determine the sizes of arrays
-    /// (section 2.4.7.5.1 of FMI 3.0).
+    /// Reads a `modelDescription.xml` for an instance in which structural parameters have other values than their start
+    /// values. `structure` maps their value references to these values, which determine the sizes of arrays (section
+    /// 2.4.7.2 of FMI 3.0).
     ///
     /// # Errors
     /// Fails for the same reasons as [`parse`](Self::parse).
@@ -461,7 +461,7 @@ fn variables(
         };
         let declared = of_type.attribute("declaredType").and_then(|name| types.get(name));
         let base = base_of(standard, of_type.tag_name().name());
-        // A size is a number, or the value of a structural parameter (section 2.4.7.5.1 of FMI 3.0).
+        // A size is a number, or the value of a structural parameter (section 2.4.7.2 of FMI 3.0).
         let size = |dimension: Node| {
             let parameter = || nodes.get(*by_reference.get(&number(dimension, "valueReference")?)?).copied();
             let configured = || structure.get(&number(dimension, "valueReference")?).copied();

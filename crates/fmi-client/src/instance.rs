@@ -363,7 +363,7 @@ impl Instance {
         keeping_environment(|| call!(self, fmi2ExitInitializationMode(), fmi3ExitInitializationMode()))
     }
 
-    /// Enters Configuration Mode, where structural parameters are set (section 2.3.2 of FMI 3.0).
+    /// Enters Configuration Mode, where structural parameters are set (section 2.3.6 of FMI 3.0).
     ///
     /// # Errors
     /// The FMU rejects the call, or is of FMI 2.0, which does not have this mode.

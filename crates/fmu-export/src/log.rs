@@ -84,7 +84,7 @@ pub(crate) struct Logger {
 }
 
 impl Logger {
-    /// Enables all categories if `logging_on` is true (section 2.1.3 of FMI 2.0, 2.3.1 of FMI 3.0). Otherwise enables
+    /// Enables all categories if `logging_on` is true (section 2.1.5 of FMI 2.0, 2.3.1 of FMI 3.0). Otherwise enables
     /// errors and, in FMI 2.0, warnings. In FMI 3.0 it enables discards instead of warnings, because most importers
     /// treat a discard like an error.
     pub fn new(standard: Standard, logging_on: bool) -> Self {

@@ -86,10 +86,10 @@ impl<M: Exported> Instance<M> {
         })
     }
 
-    /// Restores the state at the start of a failed step and returns `why`: an error, or a discard if a shorter step
-    /// may help. Section 4.2.1 of FMI 3.0 requires that a step with such a status leaves the state as it was before
-    /// the step. FMI 2.0 does not specify the state (section 2.1.3), so this crate applies the same rule to both
-    /// versions.
+    /// Restores the state at the start of a failed step and returns `why`: an error, or a discard if a shorter step may
+    /// help. Section 4.2.1 of FMI 3.0 requires that a discarded step leaves the state as it was before the step, and
+    /// FMI 2.0 does not specify the state (section 2.1.3). This crate applies the same rule to both versions, and also
+    /// to errors.
     #[cold]
     fn go_back<T>(&mut self, why: Outcome<T>) -> Outcome<T> {
         self.listen();

@@ -201,7 +201,7 @@ impl<M: Exported> Instance<M> {
         for (vr, order) in vr.iter().zip(orders) {
             let variable = self.variable(vr.index(), BaseType::Real)?;
             check_order(variable, *order)?;
-            // Maximum order: section 4.3.1 of FMI 2.0, 4.4.1 of FMI 3.0.
+            // Maximum order: section 4.3.1 of FMI 2.0, 4.4 of FMI 3.0.
             if order.unsigned_abs() > M::OUTPUT_DERIVATIVES {
                 return reject(format!(
                     "the order of the derivative of {} must be at most {} (maxOutputDerivativeOrder), it is {order}",
