@@ -1,4 +1,4 @@
-//! Parses the XML of untrusted files. It first checks that the parser will not need too much memory or time.
+//! Parses the XML of untrusted files. First checks that the parser will not need too much memory or time.
 
 use roxmltree::Document;
 

@@ -1,9 +1,9 @@
 //! Expands `printf` formats in log messages (section 2.1.5 of FMI 2.0), without trusting them.
 //!
-//! Many FMUs pass finished text as the format. Its percent signs look like conversions, but they have no arguments. So a conversion
-//! is expanded only if that is harmless: numbers are copied from registers and the stack, and strings are read through the kernel,
-//! which reports invalid pointers (only on Linux; elsewhere `%s` stays in the text). `%n`, which would write to memory, and unknown
-//! conversions stay in the text.
+//! Many FMUs pass finished text as the format. Percent signs in this text look like conversions, but have no arguments. So a
+//! conversion is expanded only if that is harmless: numbers are copied from registers and the stack, and strings are read through
+//! the kernel, which reports invalid pointers (only on Linux; elsewhere `%s` stays in the text). `%n`, which would write to memory,
+//! and unknown conversions stay in the text.
 #![cfg(any(all(unix, target_arch = "x86_64"), all(target_os = "linux", target_arch = "aarch64")))]
 
 use std::ffi::{CStr, CString};

@@ -66,8 +66,8 @@ macro_rules! symbols {
             }
         }
 
-        /// The C functions of FMI 3.0. They are absent in WebAssembly, because it is only used for FMI 2.0: in FMUs
-        /// with C sources and in pages.
+        /// The C functions of FMI 3.0. They are absent in WebAssembly, which is used only for FMI 2.0: in FMUs with C
+        /// sources and in pages.
         #[doc(hidden)]
         #[cfg(not(target_family = "wasm"))]
         #[allow(unsafe_code, non_snake_case, missing_docs, clippy::missing_safety_doc)]

@@ -31,7 +31,8 @@ use crate::instance::{FromOne, Instance, Reference};
 use fmi_abi::fmi3::types::fmi3Boolean;
 use std::mem::MaybeUninit;
 
-/// Name of this module in the macro [`call`], because it contains the fast paths for the most frequent arguments.
+/// Name of this module in the macro [`call`], because the module contains the fast paths for the most frequent
+/// arguments.
 pub(crate) use super::short as usual;
 
 /// Returns whether the pointers can be arrays of `count` elements: they are not NULL and are aligned, and the arrays

@@ -30,8 +30,8 @@ pub unsafe extern "C" fn fmi2Instantiate<M: Exported>(
     if functions.is_null() {
         return std::ptr::null_mut();
     }
-    // SAFETY: by contract, a pointer to the callbacks, which may have any alignment. They are copied, because the
-    // pointer may be invalid after this call.
+    // SAFETY: by contract, the pointer refers to the callbacks, and may have any alignment. The callbacks are copied,
+    // because the pointer may be invalid after this call.
     let functions = unsafe { functions.read_unaligned() };
     // SAFETY: by contract, each is NULL or a string.
     let (name, guid, resources) = unsafe { (string(instance_name), string(guid), string(resource_location)) };

@@ -409,8 +409,8 @@ struct Implicit<M>(std::marker::PhantomData<M>);
 impl<M: 'static> Implicit<M> {
     const TIME: &'static Variable<M> = &Variable::independent(&TIME).finished("time", "Simulation time");
 
-    /// Describes every event indicator. Its value is never read, because the model calculates the values of all
-    /// indicators together.
+    /// Describes every event indicator. The functions that read a value are never called, because the model calculates
+    /// the values of all indicators together.
     const INDICATOR: &'static Variable<M> = &Variable::local(&NUMBER)
         .read_by(
             shape_of_calculation(std::marker::PhantomData::<M>, |_| f64::NAN),

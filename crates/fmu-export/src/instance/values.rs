@@ -333,8 +333,7 @@ impl<M: Exported> Instance<M> {
     }
 }
 
-/// Returns whether a sum is finite. This implies that all its terms are finite, and is faster to check than each
-/// term.
+/// Returns whether a sum is finite. If it is, all its terms are finite, so one check replaces a check of each term.
 #[inline(always)]
 pub(super) fn is_finite(sum: f64) -> bool {
     // This takes half as many instructions as `f64::is_finite`.
