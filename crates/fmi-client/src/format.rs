@@ -8,7 +8,7 @@
 
 use std::ffi::{CStr, CString};
 
-/// A string argument of this many bytes or more is not expanded.
+/// Without a precision, a string argument of this many bytes or more is not expanded.
 const LONGEST: usize = 1 << 16;
 
 /// Arguments of a variadic call that have not been used yet.

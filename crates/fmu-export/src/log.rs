@@ -36,8 +36,8 @@ impl Message {
 }
 
 /// Messages of a model to the user. The log is a field of the model, and [`Model::log`](crate::Model::log) returns a
-/// reference to it. This crate delivers the messages at the end of each call of the importer. It replaces `%`, `#`
-/// and control characters by `_`, because importers would interpret them.
+/// reference to it. At the end of each call of the importer, this crate delivers the messages whose category is
+/// enabled. It replaces `%`, `#` and control characters by `_`, because importers would interpret them.
 ///
 /// ```
 /// # let mut log = fmu_export::Log::default();
