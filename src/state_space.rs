@@ -85,8 +85,8 @@ pub struct StateSpace {
 /// **positive** (printed negative).
 ///
 /// # Panics
-/// Panics if the parameters do not pass [`Parameters::check`], or if inertias differ so much that `M_II`
-/// cannot be inverted in double precision.
+/// Panics if inertias differ so much that `M_II` cannot be inverted in double precision. May panic or return NaN if the
+/// parameters do not pass [`Parameters::check`].
 #[allow(non_snake_case, reason = "the paper's symbols")]
 pub fn state_space(p: &Parameters) -> StateSpace {
     let block = |matrix: &Matrix4<f64>, row, column| matrix.fixed_view::<2, 2>(row, column).into_owned();
@@ -97,7 +97,7 @@ pub fn state_space(p: &Parameters) -> StateSpace {
     let K_1in = Matrix2::identity() * p.k1;
     let C_1in = Matrix2::identity() * p.c1;
 
-    // Scaled, because the determinant of very small or large entries underflows or overflows.
+    // Scaled, because the determinant of very small or large entries would underflow or overflow.
     let invert = |matrix: Matrix2<f64>| {
         let scale = matrix.amax();
         (matrix / scale).try_inverse().expect("checked parameters give regular blocks") / scale

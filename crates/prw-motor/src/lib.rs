@@ -83,7 +83,7 @@ impl Motors {
 /// Returns the functions sum over n of (-z)^n / (n + k)! for k = 0 to 3. The first is exp(-z); the others result from
 /// integrating it repeatedly.
 fn decays(z: f64) -> [f64; 4] {
-    // If z is small, the differences below lose digits, but a few terms of the series are accurate.
+    // If z is small, the differences below lose digits, but the series converges fast.
     if z < 0.5 {
         return std::array::from_fn(|k| {
             let first = [1.0, 1.0, 0.5, 1.0 / 6.0][k];

@@ -6,9 +6,9 @@
 
 use std::fmt;
 
-/// Type of a measured parameter; FMI calls it Real.
+/// Type of a measured parameter; FMI 2.0 calls it Real.
 pub type Real = f64;
-/// Type of a counted parameter; FMI calls it Integer.
+/// Type of a counted parameter; FMI 2.0 calls it Integer.
 pub type Integer = i32;
 
 /// Passes the table of parameters to the macro `$make`: description, name, type, range and unit of each.
@@ -101,7 +101,7 @@ impl Varied for Integer {
 }
 
 impl Parameters {
-    /// Returns the transmission ratio from the difference of the motors to roll, N / 2M of eq. (1).
+    /// Returns the transmission ratio from the difference theta5 - theta6 to roll, N / 2M of eq. (1).
     pub fn roll_ratio(&self) -> f64 {
         f64::from(self.N) / (2.0 * f64::from(self.M))
     }
