@@ -23,7 +23,7 @@
 //!
 //! Torque limiting: the goal of a motor is limited to the angle at which the couplings of a blocked wrist would reach
 //! the torque limit. If the torque exceeds the limit, this angle is behind the motor, so the motor turns back. Because a
-//! motor always moves so slowly that it can stop at its goal, its own motion does not exceed the limit.
+//! motor always moves so slowly that it can stop at its goal, its own motion does not cause a torque above the limit.
 
 use crate::motor::{Limits, MotorSetpoint};
 use crate::parameters::{InvalidParameter, Parameters};
@@ -102,7 +102,8 @@ pub struct Controller {
     pub now: f64,
 }
 
-/// Maximum number of samples in a step: one hour of samples at 1 kHz, which take less than a second to calculate.
+/// Maximum number of samples in a step or an event: one hour of samples at 1 kHz, which take less than a second to
+/// calculate.
 const MOST_SAMPLES: f64 = 3.6e6;
 /// Largest number of a sample; an `f64` cannot represent all larger integers.
 const LAST_SAMPLE: f64 = (1_u64 << 53) as f64;

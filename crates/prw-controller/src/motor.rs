@@ -38,7 +38,7 @@ impl MotorSetpoint {
 
     /// Chooses the acceleration for the next `period` s on the way to `goal` (rad; may be infinite).
     ///
-    /// Within its limits, the motor reaches the goal in the least number of samples. If the goal is behind the motor or
+    /// The motor needs at most a few samples more than the shortest time within its limits. If the goal is behind the motor or
     /// nearer than its stopping distance, the motor first stops and then turns back. Returns whether the motor is at rest
     /// at its goal, or will be within two samples.
     pub fn plan_acceleration(&mut self, goal: f64, limits: &Limits, period: f64) -> bool {
@@ -57,8 +57,8 @@ impl MotorSetpoint {
     }
 }
 
-/// Returns the rate v at the next sample, at most `limit`, from which the motor can just stop within the distance q. The
-/// units are those of [`MotorSetpoint::plan_acceleration`].
+/// Returns the rate v at the next sample, at most `limit`, from which the motor can just stop within the distance q. All
+/// values are in the units that [`MotorSetpoint::plan_acceleration`] defines.
 ///
 /// Until the next sample, a motor that reaches v covers v/2 (the part that depends on its current rate is already
 /// subtracted from q). Braking takes m = floor(v) whole samples, and one more for the remainder v - m, over the distance

@@ -315,7 +315,8 @@ fn an_event_that_fails_in_its_second_round() {
     fmu.step(0.0, 0.5);
 }
 
-/// Checks that a step with more than 10,000 events is discarded, and that a shorter step then succeeds.
+/// Checks that a step with more than 10,000 events is discarded. In FMI 3.0, it changes nothing and a shorter step then
+/// succeeds; in FMI 2.0, it ends early. An event with too many iterations is an error.
 #[test]
 fn more_events_than_a_step_may_have() {
     const EXPECTED: &str = "it has more than 10000 events; make shorter steps, or give the events hysteresis if the model chatters";
@@ -439,7 +440,7 @@ mod hasty {
     offer!(Hasty: CoSimulation);
 }
 
-/// Checks that such a step is fatal, because it contradicts the model description.
+/// Checks that a step that ends early is fatal if the model does not declare it, because it contradicts the model description.
 #[test]
 fn an_early_end_that_the_model_has_not_announced() {
     fn check<F: Either>() {

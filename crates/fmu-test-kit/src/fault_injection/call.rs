@@ -46,8 +46,8 @@ impl Call {
         status != Status::Ok && !early || self.function[4..].starts_with("Get")
     }
 
-    /// Calls the function. Panics if the result is invalid: an unexpected status, a value that is not finite, or more values
-    /// than requested.
+    /// Calls the function. Panics if the result is invalid, such as an unexpected status, a value that is not finite, a string
+    /// that is not UTF-8, or more or fewer values than requested.
     pub fn run<F: Caller>(&self, fmu: &F) -> CallResult {
         let (name, a) = (self.function, &self.arguments);
         let list = signature(name).expect("a function of the standard").arguments;
@@ -248,7 +248,7 @@ impl Array {
                     u64::from_le_bytes(fnv1a(string))
                 }
                 "Binary" => {
-                    let size = sizes.expect("their sizes come before").bits(index) as usize;
+                    let size = sizes.expect("an array of sizes must precede").bits(index) as usize;
                     // SAFETY: the FMU's bytes have this length and are valid until the next call.
                     let bytes = unsafe {
                         std::slice::from_raw_parts(std::ptr::with_exposed_provenance(bits as usize), size)
