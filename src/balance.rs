@@ -12,8 +12,8 @@ use nalgebra::Matrix3;
 pub struct Balance {
     /// Velocity unit, rad/s.
     pub(crate) scale: f64,
-    /// Base-2 logarithm of the factor by which a step of 1 s must be divided so that the norm of `A h` is 1/4. A
-    /// logarithm, because the product of the factor and a long step would overflow for stiff systems.
+    /// Base-2 logarithm of the factor by which a step of 1 s must be divided so that the norm of `A h` is 1/4. The
+    /// product of the factor itself and a long step would overflow for stiff systems.
     halvings: f64,
 }
 

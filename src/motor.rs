@@ -131,8 +131,8 @@ pub struct Motors {
     pub given_rate: [Option<f64>; 2],
     /// theta of the previous two samples, rad; the newer sample first.
     pub earlier: [PerSide; 2],
-    /// Motion at the end of the last step, during which the angles changed linearly. A rate that the importer sets
-    /// after the step replaces the rate.
+    /// Motion at the end of the last step, during which the angles changed linearly. If the importer then sets the rate
+    /// of a motor, that rate replaces the one at the end of the step.
     pub segment_end: Motions,
     /// Times of the samples.
     pub times: SampleTimes,

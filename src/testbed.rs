@@ -101,7 +101,7 @@ impl Testbed {
     }
 
     /// Does the same as [`step_to`](Self::step_to) with fewer checks, but only if the last two steps also had the size `h`
-    /// and their matrices are still available. Otherwise returns `None` and changes nothing, as at an overflow.
+    /// and their matrices are still in the cache. Otherwise, and at an overflow, returns `None` and changes nothing.
     #[inline(always)]
     pub fn step_fast(&mut self, h: f64) -> Option<StateBySide> {
         if !(self.motors.has_constant_step(h) && self.cache.has(h)) {

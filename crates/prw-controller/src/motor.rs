@@ -38,7 +38,7 @@ impl MotorSetpoint {
 
     /// Chooses the acceleration for the next `period` s on the way to `goal` (rad; may be infinite).
     ///
-    /// The motor needs at most a few samples more than the shortest time within its limits. If the goal is behind the motor or
+    /// Within its limits, the motor reaches the goal in the least number of samples. If the goal is behind the motor or
     /// nearer than its stopping distance, the motor first stops and then turns back. Returns whether the motor is at rest
     /// at its goal, or will be within two samples.
     pub fn plan_acceleration(&mut self, goal: f64, limits: &Limits, period: f64) -> bool {
