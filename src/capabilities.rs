@@ -24,7 +24,7 @@ impl Saved for Pair {
 
 saved!(for Motions { angle, rate, acceleration });
 
-/// Returns the error for the importer.
+/// Converts the error to the type of errors that the importer gets.
 fn rejected(error: InvalidParameter) -> Error {
     Error::new(error.to_string())
 }

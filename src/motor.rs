@@ -7,9 +7,9 @@ use crate::pair::PerSide;
 pub struct SampleTimes {
     /// Number of earlier samples: 0, 1, or 2 for two or more.
     pub count: i32,
-    /// Step from the previous sample to the current one, s.
+    /// Time from the previous sample to the current one, s.
     pub last_step: f64,
-    /// Step before that, s.
+    /// Time between the two samples before the current one, s.
     pub step_before: f64,
     /// The step size that leaves these fields unchanged; 0 if there is none.
     steady_step: f64,
@@ -304,8 +304,7 @@ impl Motors {
         }
     }
 
-    /// Returns the jumps from [`segment_end`](Self::segment_end) to the current samples, rad. The first samples are
-    /// not jumps.
+    /// Returns the jumps from [`segment_end`](Self::segment_end) to the current samples, rad; 0 for the first samples.
     #[inline]
     pub fn input_jumps(&self) -> PerSide {
         if self.times.count == 0 { PerSide::default() } else { self.theta() - self.segment_end.angle }

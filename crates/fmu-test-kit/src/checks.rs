@@ -99,7 +99,11 @@ pub fn output_derivatives_fit_steps<M: Exported>(
         // Allows for the rounding error and the truncation error of the difference.
         let tolerance = 1e-7 * (1.0 + y[0][i].abs() + expected.abs());
         let name = M::TABLE[*index as usize].name();
-        assert!((found[i] - expected).abs() < tolerance, "{label}: {name}' is {expected}, not {}", found[i]);
+        assert!(
+            (found[i] - expected).abs() < tolerance,
+            "{label}: {name}' must be {expected}, it is {}",
+            found[i]
+        );
     }
 }
 

@@ -2,7 +2,7 @@
 //! a busy machine.
 
 /// Returns the number of instructions that the work executes; a thousand take some milliseconds to count. The work runs in
-/// a copy of this process, which the kernel stops after each instruction, and leaves this process unchanged. Returns
+/// a copy of this process, so it leaves this process unchanged. The kernel stops the copy after each instruction. Returns
 /// `None` if this process may not trace another, as in some containers.
 ///
 /// # Panics

@@ -33,7 +33,7 @@ fn set_and_read<F: Either>(count: usize) {
         let marks = [1, 2, 3].iter().filter(|index| indices.contains(index)).count() as i32;
         assert_eq!(fmu.integer(Name::marks as u32), 10 * seconds + marks, "{indices:?}");
         if round == 0 {
-            assert_eq!(fmu.get([LEVEL]), [now[0]], "the level starts at rest");
+            assert_eq!(fmu.get([LEVEL]), [now[0]], "the level must start at rest");
         }
         // The model makes steps of size 0.5 with a later calculation, of size 2 without one, and of size 1 with `step_fast`.
         let size = [0.5, 2.0, 1.0][round % 3];

@@ -87,7 +87,7 @@ fn categories_that_do_not_exist() {
     fmu.rejected("NULL entry", |fmu| fmu.fmi2SetDebugLogging(1, 2, [c"logEvents".as_ptr(), null()].as_ptr()));
     fmu.rejected("NULL list", |fmu| fmu.fmi2SetDebugLogging(1, 3, null()));
     fmu.rejected("no UTF-8", |fmu| fmu.set_debug_logging(true, &[c"\xff"]));
-    assert_eq!(shown(&fmu), "WE", "no category was changed");
+    assert_eq!(shown(&fmu), "WE", "no category must be changed");
 }
 
 /// Checks that FMI 3.0 logs only errors if logging is off (section 2.3.1). Errors cannot be disabled.
@@ -96,7 +96,7 @@ fn logging_of_fmi3() {
     let fmu = fmi3::Importer::new::<Talker>(CoSimulation);
     let volume = Name::volume as u32;
     fmu.set(&[volume], &[10.5]);
-    assert_eq!(fmu.take_log(), [], "a warning is not an error");
+    assert_eq!(fmu.take_log(), [], "a warning must not be logged");
     fmu.ok(fmu.fmi3SetDebugLogging(1, 1, &c"logStatusWarning".as_ptr()));
     fmu.set(&[volume], &[10.6]);
     assert_eq!(fmu.take_log().len(), 1);

@@ -39,8 +39,8 @@ pub fn element_size(of: &str, function: &str) -> usize {
 }
 
 impl Call {
-    /// Returns whether a call with this status must leave the state unchanged. A step that ends early in FMI
-    /// 2.0 changes the state.
+    /// Returns whether a call with this status must leave the state unchanged. A step of FMI 2.0 that ends early returns
+    /// Discard, but changes the state.
     pub fn must_not_change(&self, status: Status) -> bool {
         let early = self.function == "fmi2DoStep" && status == Status::Discard;
         status != Status::Ok && !early || self.function[4..].starts_with("Get")
@@ -97,7 +97,7 @@ impl Call {
             if let [_, _, early, end] = values[..] {
                 let end = f64::from_bits(end);
                 assert!(end >= point && end <= point + size, "{end}: {self:?}");
-                assert!(early == 0 || end < point + size, "not early: {self:?}");
+                assert!(early == 0 || end < point + size, "an early return at the end of the step: {self:?}");
             }
         }
         CallResult { status, values }

@@ -296,7 +296,8 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
     fn replay(&mut self, index: usize, elsewhere: bool) {
         let Some(slot) = &mut self.instances[index] else { return };
         let end = slot.fmu.bytes();
-        let other = elsewhere.then(|| (self.make)(&slot.arguments).expect("an equal instance exists"));
+        let other =
+            elsewhere.then(|| (self.make)(&slot.arguments).expect("an equal instance must be possible"));
         let fmu = other.as_ref().unwrap_or(&slot.fmu);
         fmu.restore(&slot.saved);
         for (call, result) in &slot.since {
