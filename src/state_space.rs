@@ -100,7 +100,7 @@ pub fn state_space(p: &Parameters) -> StateSpace {
     // Scaled, because the determinant of very small or large entries would underflow or overflow.
     let invert = |matrix: Matrix2<f64>| {
         let scale = matrix.amax();
-        (matrix / scale).try_inverse().expect("checked parameters give regular blocks") / scale
+        (matrix / scale).try_inverse().expect("checked parameters must give invertible blocks") / scale
     };
     let C_I_inv = invert(C_I);
     let M_II_inv = invert(M_II);

@@ -45,8 +45,8 @@ proptest! {
         let system = state_space(&p);
         let decoupled = *Testbed::new(p).unwrap().system();
         let (pitch, roll) = (decoupled.pitch, decoupled.roll);
-        // Each 2 x 2 block of eq. (11) has equal diagonal entries, half the sum of the pitch and roll entries, and equal
-        // off-diagonal entries, half their difference.
+        // In each 2 x 2 block of eq. (11), both diagonal entries are half the sum of the pitch and roll entries, and both
+        // off-diagonal entries are half their difference.
         for row in 0..3 {
             for column in 0..3 {
                 let expect = |sign: f64| 0.5 * (pitch.a[(row, column)] + sign * roll.a[(row, column)]);

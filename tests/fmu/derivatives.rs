@@ -51,8 +51,8 @@ fn differences<F: Either>(fmu: &F, unknowns: &[u32], known: u32) -> Vec<(f64, f6
 }
 
 /// Checks that every derivative agrees with its difference, and is 0 if the model structure does not declare the dependency.
-/// After the initialization, the latter is not checked until the simulation has `started`, because the states then still
-/// depend on start values; nor for parameters, whose dependencies are declared only for the initialization.
+/// After the initialization, declarations are not checked until the simulation has `started`, because until then the states
+/// depend on start values. They are also not checked for parameters, which are declared only for the initialization.
 fn fit_differences<F: Either>(fmu: &F, mode: Mode, started: bool, label: &str) {
     let structure = &*STRUCTURE;
     let (unknowns, listed) = match mode {

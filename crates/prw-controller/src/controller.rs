@@ -18,7 +18,7 @@
 //! accumulates during a move.
 //!
 //! D damps the vibration of the couplings. Its filter is needed for a wrist that is so stiff that it follows the motors
-//! immediately: without the filter, the rate of the motors would be fed back with the gain Kd / sample_time, which is
+//! immediately. Without the filter, the rate of the motors would be fed back with the gain Kd / sample_time, which is
 //! far above 1 and would cause a limit cycle. With the filter, the gain at high frequencies is 1/2.
 //!
 //! Torque limiting: the goal of a motor is limited to the angle at which the couplings of a blocked wrist would reach

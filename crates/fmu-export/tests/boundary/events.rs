@@ -251,9 +251,9 @@ fn trouble(fmu: &impl Either, trouble: Trouble) {
     fmu.ok(fmu.set_item(TROUBLE, trouble as i32));
 }
 
-/// Checks that the first step reports an end of the simulation that an event at the start has requested: in FMI 2.0
-/// (section 4.2.3), and in FMI 3.0 if the importer has no Event Mode or ignores the result of fmi3UpdateDiscreteStates,
-/// as FMPy does.
+/// Checks that the first step reports the end of the simulation if an event at the start has requested it (section 4.2.3 of
+/// FMI 2.0). In FMI 3.0, this concerns importers that do not use Event Mode, or that ignore the result of
+/// fmi3UpdateDiscreteStates, as FMPy does.
 #[test]
 fn the_initial_event_ends_the_simulation() {
     let fmu = of_fmi2::<Grumbler>(|fmu| trouble(fmu, Trouble::End));
