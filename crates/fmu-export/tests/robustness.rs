@@ -51,7 +51,7 @@ fn every_guarantee_of_fmi3_holds_for_any_calls() {
     check_counts(&tally, &["fmi3InstantiateCoSimulation", "fmi3InstantiateModelExchange"]);
 }
 
-/// Runs the inputs that libFuzzer has collected, each with every test model in both FMI versions.
+/// Runs the inputs that libFuzzer has collected, each with every model of both lists.
 #[test]
 fn every_guarantee_holds_for_the_corpus() {
     let archive = include_bytes!("../fuzz/corpus.zip");

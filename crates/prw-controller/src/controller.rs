@@ -56,7 +56,7 @@ impl Inputs {
     }
 }
 
-/// Schedule of the samples: one at `epoch`, and one after every `period`. Times are products, not sums, so that rounding
+/// Schedule of the samples: one at `epoch`, and then one per `period`. Times are products, not sums, so that rounding
 /// errors do not accumulate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Schedule {

@@ -20,7 +20,7 @@ const DEG_PER_RAD: f64 = 180.0 / PI;
 /// Reads and checks a parameter file.
 ///
 /// # Errors
-/// The message names the file, the fault and, if only one parameter is invalid, the parameter.
+/// The message names the file and the fault, and the parameter if the fault concerns one.
 pub fn read(file: &Path) -> Result<Parameters, String> {
     let name = file.display();
     let json = fs::read_to_string(file).map_err(|error| format!("{name}: cannot be read: {error}"))?;
@@ -75,7 +75,7 @@ fn in_unit<T: Number>(entry: &Object<Value>, si: &str) -> Result<T, String> {
 
 /// A type that parameters have: [`Real`] or [`Integer`].
 trait Number: Sized {
-    /// Name of the values that are accepted, for error messages.
+    /// Description of the values that are accepted, for error messages.
     const KIND: &str;
 
     /// Returns the number if it has this type.

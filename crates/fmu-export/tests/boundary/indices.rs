@@ -11,8 +11,8 @@ const TOTAL: u32 = Name::total as u32;
 const SUM: u32 = Name::sum as u32;
 const LEVEL: u32 = Name::level as u32;
 
-/// Sets and reads `count` inputs per call, before the first step and between steps. Each input is twice the first one of a
-/// call. Asserts that all inputs have the values that were set, and that each setter had its side effect.
+/// Sets and reads `count` inputs per call, before the first step and between steps. Each input comes first in two of the
+/// calls. Asserts that all inputs have the values that were set, and that each setter had its side effect.
 fn set_and_read<F: Either>(count: usize) {
     let fmu = F::new::<Meter>(CoSimulation);
     fmu.initialize(0.0);

@@ -199,8 +199,8 @@ fn instances_do_not_mix() {
     }
 }
 
-/// Checks that a NULL logger suppresses the messages, and that calls still succeed or fail. All tests here pass NULL for the
-/// memory callbacks.
+/// Checks that a NULL logger suppresses the messages, and does not change the statuses of calls. All tests here pass NULL
+/// for the memory callbacks.
 #[test]
 fn no_logger() {
     let arguments = Arguments { logger: false, logging_on: 1, ..Arguments::new::<Talker>(ModelExchange) };

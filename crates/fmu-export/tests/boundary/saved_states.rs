@@ -159,7 +159,8 @@ fn restores(fmu: &Importer, bytes: &[u8]) -> bool {
     status == Status::Ok
 }
 
-/// Distance of the bytes that are changed, and of the lengths that are tried. Under Miri, which is slow, every tenth is tried.
+/// Distance between the bytes that are changed, and between the lengths that are tried. Under Miri, which is slow, every
+/// tenth is tried.
 const STRIDE: usize = if cfg!(miri) { 10 } else { 1 };
 
 /// Checks that any change of a byte is detected, and that the state of the handle then stays unchanged. Under Miri, only
