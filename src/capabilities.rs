@@ -125,10 +125,10 @@ impl ModelExchange for TestbedFmu {
     }
 }
 
-/// Defines the derivatives of variables that are not linear, such as a mechanical power (torque times rate). Linear
-/// variables need only a name in `moving_variables!`, because their partial derivatives do not depend on the state. Any
-/// other Real variable needs a line here, which calculates its change from the current [`Moving`] values and their
-/// changes; for a product `a * b` the change is `now.a * change.b + change.a * now.b`.
+/// Defines the derivatives of variables that are not linear functions of the states and of the motor motion, such as a
+/// mechanical power (torque times rate). Linear variables need only a name in `moving_variables!`, because their partial
+/// derivatives do not depend on the state. Any other Real variable needs a line here, which calculates its change from
+/// the current [`Moving`] values and their changes; for a product `a * b` it is `now.a * change.b + change.a * now.b`.
 macro_rules! products {
     ($($name:ident = |$now:ident, $change:ident| $value:expr;)*) => {
         const PRODUCTS: &[Name] = &[$(Name::$name),*];

@@ -11,8 +11,8 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Index, IndexMut, Mul, MulAssign, 
 /// A quantity of side 1 and the same quantity of side 2 (or pitch and roll). It is aligned like a
 /// vector register.
 ///
-/// The operators use vector instructions explicitly, because the compiler would handle the two numbers
-/// separately. The results are bit-identical with and without these instructions.
+/// On x86-64, the operators between two pairs use vector instructions explicitly, because the compiler would handle the
+/// two numbers separately. The results are bit-identical with and without these instructions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(align(16))]
 pub struct Pair([f64; 2]);

@@ -26,7 +26,7 @@ static STRUCTURE: LazyLock<ModelStructure> = LazyLock::new(|| {
 });
 
 /// Returns central differences of the values of the unknowns with respect to `known`, each with a bound of its rounding
-/// error. The values are linear in every known except the parameters of the equations, so only for these is the width small.
+/// error. The values are linear in every known except the parameters of the equations, so the width is small only for these.
 fn differences<F: Either>(fmu: &F, unknowns: &[u32], known: u32) -> Vec<(f64, f64)> {
     let [value] = fmu.get([known]);
     let is_linear = [&INPUTS[..], &STATES, &STARTS].concat().contains(&known);

@@ -65,8 +65,8 @@ pub fn allocations(work: impl FnOnce()) -> u64 {
     ALLOCATIONS.with(Cell::get) - start
 }
 
-/// Defines tests that a control loop with a model neither allocates, nor makes system calls, nor locks. The sources of
-/// the model must be in the package of the test. `make sanitize` runs the same loop under the RealtimeSanitizer.
+/// Defines tests of a control loop with a model, which must not allocate, make system calls, or lock. The sources of the
+/// model must be in the package of the test. `make sanitize` runs the same loop under the RealtimeSanitizer.
 #[macro_export]
 macro_rules! control_loop {
     ($model:ty) => {

@@ -3,8 +3,8 @@
 //!
 //! After every call, the importer checks that the status is valid, and that the serialized state is unchanged if the call
 //! was rejected or only reads. Values must be valid, nothing may be written after the end of an array, and messages must
-//! be clean. Sometimes the importer restores the last saved state of an instance, in it or in another instance, and
-//! repeats all calls after the save. All results and the final state must then be bit-identical.
+//! be clean. Sometimes the importer restores the last saved state of an instance, in the same or in another instance,
+//! and repeats all calls after the save. All results and the final state must then be bit-identical.
 //!
 //! The bytes come from [`random_bytes`] or from a fuzzer.
 
