@@ -81,8 +81,8 @@ pub struct StateSpace {
 ///
 /// The first block row of eq. (8) is `C_I q_I' + K_I q_I + C_I,II v_II + K_I,II q_II = f_I`. Solved for
 /// `q_I'`, it gives A11, A12 and A13 with **negative** signs. The paper prints positive signs, with which A
-/// has an eigenvalue at +183 1/s. Inserting `q_I'` into eq. (10) makes the first terms of D31 and D32
-/// **positive** (printed negative).
+/// would have two eigenvalues near +183.5 1/s. Inserting `q_I'` into eq. (10) makes the first terms of D31 and D32
+/// **positive**; the paper prints them negative.
 ///
 /// # Panics
 /// Panics if inertias differ so much that `M_II` cannot be inverted in double precision. May panic or return NaN if the

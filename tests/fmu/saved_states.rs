@@ -18,7 +18,7 @@ fn range_of(vr: u32) -> Range<usize> {
     begin..begin + 8
 }
 
-/// Checks impossible values of the first two `memory` fields: the number of samples, and the time since the last one.
+/// Checks impossible values of the first two `memory` fields: the number of samples, and the time between the last two.
 #[test]
 fn impossible_number_of_samples() {
     let fmu = in_mode(CoSimulation, StepComplete);
