@@ -191,7 +191,7 @@ fn wrong_types() {
     }
 }
 
-/// Checks that value references of FMI 3.0 begin with 1, and that all functions reject 0.
+/// Checks that value references of FMI 3.0 begin with 1, and that functions reject 0.
 #[test]
 fn value_references_count_from_1() {
     let (fmu, mut value) = (fmi3::Importer::initialized_at::<Oscillator>(0.0), 0.0);
