@@ -100,7 +100,7 @@ impl Instance {
         Ok(instance)
     }
 
-    /// Sets structural parameters (section 2.3.2 of FMI 3.0).
+    /// Sets structural parameters (section 2.3.6 of FMI 3.0).
     fn configure(&mut self) -> Result<(), Rejection> {
         if self.description.structure.is_empty() {
             return Ok(());

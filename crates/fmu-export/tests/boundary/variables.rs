@@ -1,4 +1,4 @@
-//! Values of Strings, Booleans, Enumerations, tunable parameters and time (section 2.2.7 of FMI 2.0, 2.2.6 of FMI 3.0).
+//! Values of Strings, Booleans, Enumerations, tunable parameters and time (section 2.2.7 of FMI 2.0, 2.4.7.4 of FMI 3.0).
 
 use crate::INTERFACES;
 use crate::models::grumbler::{self, Trouble};

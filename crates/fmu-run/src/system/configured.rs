@@ -1,4 +1,4 @@
-//! Systems whose structural parameters differ from the model description (section 2.3.2 of FMI 3.0).
+//! Systems whose structural parameters differ from the model description (section 2.3.6 of FMI 3.0).
 
 use super::{Component, Definition, System};
 use crate::description::Structural;
