@@ -13,8 +13,8 @@ at 1 kHz, its own noise, encoder positions and sensor offsets; see rig.py. The e
 
 A low share only counts if chance is an improbable cause: with true shares of 95 % and 99 %, its probability must be below 5 %.
 
-With --faulty, the rigs have faults. The exit status is 1 if, of the rigs with an interval that misses the true value by more than
-two of its widths, more than 1 % have the verdict "fits".
+With --faulty, the rigs have faults, and their motions last 6 s. The exit status is 1 if, of the rigs with an interval that misses
+the true value by more than two of its widths, more than 1 % have the verdict "fits".
 
 With --friction, the rigs are simulated by plant.py, which has other equations and friction in the input shafts, from none to gross.
 The exit status is 1 if less than 97 % of the rigs without friction have the verdict "fits". It is also 1 if, at any friction,
@@ -103,9 +103,9 @@ def braked(fmu: str, seed: int, motion: str, friction: float) -> tuple:
 def identified(fmu: str, simulated: rig.Rig, seed: int, channels, counts: int) -> tuple:
     """Identifies the parameters NAMES from simulated measurements of a rig.
 
-    Returns five values each of log(estimate / true value), its standard error, and whether the 95 % interval contains the true value.
-    Then follow the seconds, whether the verdict is "fits", and the largest distance of a true value from its interval, in widths of
-    the interval; it is negative if all intervals contain the true values."""
+    Returns three lists of five values: log(estimate / true value), its standard error, and whether the 95 % interval contains the
+    true value. Then follow the seconds, whether the verdict is "fits", and the largest distance of a true value from its interval, in
+    widths of the interval; the distance is negative if all intervals contain the true values."""
     columns = rig.measure(simulated, seed + 1_000_000, channels, counts)
     with Model(fmu) as model, threadpool_limits(1):
         begin = time.perf_counter()

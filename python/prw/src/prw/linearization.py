@@ -57,7 +57,7 @@ def linearize(
 
 
 class Linearizer:
-    """Linear models of one FMU, from one instance: call `at(parameters)` as often as needed. A context
+    """Linear models of one FMU, which is loaded only once: call `at(parameters)` as often as needed. A context
     manager; leaving it unloads the FMU.
 
     The testbed's `use_omega` and `start_at_rest` are set as for `linearize`.
@@ -155,7 +155,7 @@ class Linearizer:
         self.close()
 
     def _chosen(self, wanted: str | None) -> str:
-        """The interface type to use."""
+        """The interface type to use. Raises UserError if the FMU has no directional derivatives for it."""
         offers = self.loaded.directional
         directional = {name: offers[other] for name, other in FMU_RUN_NAMES.items() if other in offers}
         attribute = "providesDirectionalDerivative" + ("" if self.loaded.fmi_version == "2.0" else "s")

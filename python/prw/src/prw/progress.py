@@ -41,7 +41,7 @@ class Progress:
         return self
 
     def __call__(self, done: int) -> None:
-        """Report that `done` units are done; cheap enough for every thousand rows."""
+        """Report that `done` units are done. This is fast enough to be called every thousand rows."""
         now = time.monotonic()
         if now < self._next or not _is_wanted():
             return

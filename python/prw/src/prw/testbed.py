@@ -1,4 +1,4 @@
-"""The testbed FMU as an instance for Co-Simulation."""
+"""The testbed FMU, and its runs in Co-Simulation."""
 
 from __future__ import annotations
 
@@ -101,7 +101,8 @@ class Testbed:
         return {v.name: float(v.start or 0) for v in parameters}
 
     def with_starts(self, parameters: Mapping[str, Value]) -> dict[str, Value]:
-        """The value of every numeric parameter, in the FMU's units: `parameters`, and the start values of the others.
+        """The value of every parameter except strings and `use_omega`, in the FMU's units: `parameters`, and the start values
+        of the others.
         Raises UserError for a name that is not a parameter, or a value that is not a number."""
         known = {
             v.name: _value(v.type, v.start or "0")
@@ -119,8 +120,8 @@ class Testbed:
     def respond(
         self, motion: Motion, outputs: Sequence[str] = OUTPUTS, start: Mapping[str, float] = {}
     ) -> dict[str, Array]:
-        """Response to `motion` from rest at its first angles, or from the start values `start` (parameters by name, in
-        the FMU's units); each sample is one communication point.
+        """Response to `motion` with the start values `start` (parameters by name, in the FMU's units), by default from rest at
+        the first angles; each sample is one communication point.
 
         Returns `outputs` (any Real variables) by name, each (n,), in the FMU's units (N.m, rad, rad/s). Sample k is
         read at time[k], after the motors' angles (and rates, if the motion has them) of sample k were set, so all
@@ -141,7 +142,8 @@ def stopped(why: str) -> str:
 
 
 def driven_by(motion: Motion, start: Mapping[str, Any] = {}) -> dict[str, Any]:
-    """Arguments of `fmu_run.Fmu.run` for motors that follow `motion` from rest at its first angles, or from `start`."""
+    """Arguments of `fmu_run.Fmu.run` for motors that follow `motion`, with the start values `start`, by default from rest at the
+    first angles."""
     inputs = dict(zip(ANGLES, motion.theta.T))
     if motion.omega is not None:
         inputs.update(zip(RATES, motion.omega.T))

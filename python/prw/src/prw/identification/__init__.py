@@ -1,9 +1,10 @@
 """Estimates parameters of the testbed: the values with which the FMU comes closest to the measurements.
 
 The modules in the order of dependence: path (smoothed motor angles), experiment (spectra of inputs, measurements and their errors),
-model (the FMU's equations), response (the model's outputs), fit (least squares), verdict (whether the model explains the
-data), diagnosis (possible causes if not), statistics (standard errors and intervals), design (more informative
-experiments), results and report. `identify` below combines them.
+model (the FMU's equations), response (the model's outputs), fit (least squares), statistics (standard errors and intervals),
+verdict (whether the model explains the data), diagnosis (possible causes if not), design (more informative experiments),
+excitation (`prw.excite`), rounding (digits of numbers), findings and results (the return value), and report. `identify` below
+combines them.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ def identify(
     estimate
         Names of the parameters to estimate, or one name.
     priors
-        Prior knowledge by parameter: the standard deviation as a fraction of its start value
+        Prior knowledge by parameter: the standard deviation as a fraction of the parameter's start value
         (0.1 is 10 %, 1 the most), or (value, fraction). The parameter is then estimated, too.
     parameters
         Other start values, or values of fixed parameters, as for `prw.simulate`.
@@ -98,7 +99,7 @@ def identify(
     Raises
     ------
     UserError
-        A file cannot be read, a name is not known, or the FMU rejects a value.
+        A file cannot be read or has too few values, a name is not known, or the FMU rejects a value.
     """
     need("scipy", "threadpoolctl")
     # These imports are slow.
@@ -148,8 +149,8 @@ def identify(
         experiments = [prepare(each, quantum, how, how != "motors") for each, how in zip(measured, rates)]
         solution = fit(model, experiments, task, starts, seed)
         verdict = judge(solution)
-        # If the model does not explain a recording, it may be a simulation of the FMU, with jumps of the motors between
-        # steps. So the recording is then compared with the steps of the FMU.
+        # Recordings with very exact motor angles may be simulations of the FMU, in which the motors jump between steps. If the
+        # model does not explain the data, these recordings are compared with the FMU's own steps.
         exact = [may_be_simulated(experiment) for experiment in experiments]
         ways: tuple[Rates, ...] = ("inputs", "angles") if any(exact) else ()
         for way in ways:
@@ -201,7 +202,7 @@ def task_of(
             raise UserError(
                 f"{name} from {span[0]:g} to {span[1]:g}; the first must be below the second", argument="bounds"
             )
-    # The logarithm of 0 is not a number, so the search begins elsewhere.
+    # 0 has no logarithm, so the search for such a parameter begins at its prior or in the middle of its bounds.
     for name in chosen:
         if start[name] == 0 and name in beliefs:
             start[name] = beliefs[name].value

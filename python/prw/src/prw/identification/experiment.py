@@ -38,7 +38,7 @@ STILL = 1e-6
 #: them from the angles.
 Rates = Literal["motors", "inputs", "angles"]
 #: Fractions of a motor's range. If the noise is at most EXACT and the quantum at most DIGITS, a recording may come from
-#: a simulation. If the noise is at most ROUNDED, samples are used without smoothing.
+#: a simulation. The samples of a simulation are used without smoothing if the noise is at most ROUNDED.
 EXACT, DIGITS, ROUNDED = 1e-3, 1e-4, 1e-6
 #: DRAWS: number of draws of the encoders' errors. FURTHEST: number of neighbouring frequencies into which a spectral
 #: line of these errors leaks.
@@ -78,7 +78,7 @@ class Experiment:
     samplers
         Interpolation of each channel, with empty rows at missing values; None if no value is missing and `between` is None.
     paths
-        Paths of the two motors, or None if they are known exactly.
+        Paths of the two motors through the recorded samples, or None if the experiment is planned.
     notes
         Lines for the user.
     jumps
@@ -114,7 +114,8 @@ class Experiment:
 
     @property
     def needed_bins(self) -> int:
-        """Number of frequencies at which the model is needed: all if values are missing, because that mixes frequencies."""
+        """Number of frequencies at which the model is needed: all if values are missing or rows are uneven, because both mix
+        frequencies."""
         return self.bins if self.samplers is None else self.all_bins
 
     @property
@@ -235,7 +236,7 @@ def prepare(recording: Recording, quantum: float = 0.0, rates_of: Rates = "motor
 
 
 def may_be_simulated(experiment: Experiment) -> bool:
-    """Whether the motors' samples are so exact that they may come from a simulation."""
+    """Whether the motors' samples are evenly spaced and so exact that they may come from a simulation."""
     paths = experiment.paths or ()
     exact = [
         path.noise <= EXACT * reach and path.quantum <= DIGITS * reach

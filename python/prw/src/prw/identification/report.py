@@ -125,7 +125,7 @@ def _raised(number: str) -> str:
 
 
 def _percent(value: float | None) -> str:
-    """Formats a fraction as a percentage; None is the share of a channel that did not move."""
+    """Formats a fraction as a percentage; None, the explained share of a channel that did not move, becomes "at rest"."""
     if value is None:
         return "at rest"
     if not np.isfinite(value) or abs(value) > 10:

@@ -34,7 +34,7 @@ class Identification(Findings):
     """
 
     def summary(self, *, shown: bool = False) -> str:
-        """The result in a few lines, in SI; with `shown` parameters in display units."""
+        """The result in a few lines, in SI; if `shown` is true, parameters are in display units."""
         channels = ", ".join(dict.fromkeys(name for e in self.experiments for name in e.channels))
         seconds = sum(e.sampled[-1] - e.sampled[0] for e in self.experiments)
         lines = [f"identified  from {', '.join(self.files)}: {seconds:.4g} s with {channels}"]
