@@ -131,7 +131,7 @@ def _outputs(x: np.ndarray, tau: np.ndarray, parameters) -> dict[str, np.ndarray
     }
 
 
-#: Integration steps of `nonlinear` and `lagging` in one period of the recording.
+#: Integration steps of `nonlinear` and `lagging` between two samples of the recording.
 FINE = 16
 
 

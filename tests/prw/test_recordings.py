@@ -65,7 +65,7 @@ BAD = {
     ),
     "time repeated": (
         b"time,theta1,theta2\n0,1,1\n0,1,1\n",
-        "row 3, column time: 0 is the time of the row before again",
+        "row 3, column time: 0 repeats the time of the previous row",
     ),
     "latin-1": ("time,theta1,theta2,größe\n0,1,1,1\n".encode("latin-1"), "row 1: not UTF-8 text"),
     "latin-1 later": ("time,theta1,theta2,x\n0,1,1,1\n1,1,1,ß\n".encode("latin-1"), "row 3: not UTF-8 text"),

@@ -75,7 +75,7 @@ def spread_of(argument: str, name: str, given: Any, start: float) -> tuple[float
 
 
 def is_path(given: Any) -> bool:
-    """Whether the argument is a path."""
+    """Whether the argument is a string or a path."""
     return isinstance(given, (str, os.PathLike))
 
 

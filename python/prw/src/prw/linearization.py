@@ -173,8 +173,8 @@ class Linearizer:
         return variable is not None and (variable.causality, variable.type) == ("parameter", "Boolean")
 
     def _start(self, name: str, value: Any) -> Any:
-        """Returns the value if it has the type of the variable. Raises UserError otherwise, or if there is no such
-        variable."""
+        """Returns the value if it is a string for a String, or a number for another type. Raises UserError otherwise, or if there
+        is no such variable."""
         variables = self.loaded.variables
         if name not in variables:
             settable = [v.name for v in variables.values() if v.causality in ("parameter", "input")]

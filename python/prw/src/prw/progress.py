@@ -25,7 +25,7 @@ def _is_wanted() -> bool:
 
 
 class Progress:
-    """Reports the progress of a task that takes longer than two seconds, if that is wanted.
+    """Reports the progress of a task that takes longer than two seconds, in commands and interactive sessions.
 
     On a terminal one line is rewritten, and wiped on leaving the context; in a log a line is added every ten seconds.
     """

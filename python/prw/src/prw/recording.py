@@ -65,7 +65,7 @@ class Recording:
 
     @property
     def notes(self) -> list[str]:
-        """Notes for the user about probable mistakes in the recording."""
+        """Notes for the user, for example on probable mistakes in the recording."""
         return self.motion.notes
 
     def __getitem__(self, column: str) -> Array:

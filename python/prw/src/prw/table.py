@@ -142,7 +142,7 @@ def _rows(
                 where = _where(path, table.line_num)
                 values = [_number(f"{where}, column {n}", row[i], comma, n in may_be_empty) for n, i in columns]
             if increasing and values[0] <= previous:
-                message = "is the time of the row before again" if values[0] == previous else "runs backwards"
+                message = "repeats the time of the previous row" if values[0] == previous else "runs backwards"
                 raise UserError(
                     f"{_where(path, table.line_num)}, column time: {row[indices[0]].strip()} {message}"
                     f" (after {previous!r}); time must increase from row to row"

@@ -31,7 +31,7 @@ BUILT = CLONE / "target" / "fmu" / "prw_testbed.fmu"
 
 
 def default_fmu() -> Path:
-    """The path of the default testbed FMU, for any importer: `fmu_run.Fmu(prw.default_fmu())`.
+    """The path of the default testbed FMU, for any importer, as in `fmu_run.Fmu(prw.default_fmu())`.
 
     The environment variable PRW_FMU has precedence, then the FMU in the installed package, then the FMU that `make fmu`
     builds in the clone from which the package is installed. Raises UserError if there is none.
@@ -137,7 +137,7 @@ class Testbed:
 
 
 def stopped(why: str) -> str:
-    """The message about a run that the FMU has rejected."""
+    """The message about a run that failed. why: from fmu_run."""
     return f"the FMU stopped {why}" if why.startswith("at ") else f"the FMU stopped: {why}"
 
 

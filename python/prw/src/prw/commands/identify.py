@@ -79,7 +79,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             type=listed,
             default="",
             metavar="NAMES",
-            help=f"channels that may {effect}, with commas; this is then estimated, too",
+            help=f"channels that may {effect}, separated by commas; the {kind} is estimated, too",
         )
     parser.add_argument(
         "--write-anyway", action="store_true", help="write parameters even if the FMU does not explain the data"

@@ -53,7 +53,7 @@ def add_task_options(parser: argparse.ArgumentParser) -> None:
         type=listed,
         default=",".join(DEFAULT_ESTIMATE),
         metavar="NAMES",
-        help="parameters to estimate, with commas; all others stay fixed (default: %(default)s)",
+        help="parameters to estimate, separated by commas; all others stay fixed (default: %(default)s)",
     )
     parser.add_argument(
         "--set",

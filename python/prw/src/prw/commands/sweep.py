@@ -1,5 +1,5 @@
-"""Runs the FMU many times with different parameters, on all cores of this machine or on a Dask cluster, and writes one row
-for each run into runs.parquet: its parameters and each output's peak, rms and value at the end (SI).
+"""Runs the FMU many times with different parameters, on all cores of this machine or on a Dask cluster. Writes one row for
+each run into runs.parquet: the run's parameters, and each output's peak, rms and value at the end (SI).
 
 The values of --grid are run in all combinations. For each combination, the parameters of --random are drawn --runs times.
 A run that fails is recorded with its message.

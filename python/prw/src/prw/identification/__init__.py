@@ -1,10 +1,16 @@
 """Estimates parameters of the testbed: the values with which the FMU comes closest to the measurements.
 
-The modules in the order of dependence: path (smoothed motor angles), experiment (spectra of inputs, measurements and their errors),
-model (the FMU's equations), response (the model's outputs), fit (least squares), statistics (standard errors and intervals),
-verdict (whether the model explains the data), diagnosis (possible causes if not), design (more informative experiments),
-excitation (`prw.excite`), rounding (digits of numbers), findings and results (the return value), and report. `identify` below
-combines them.
+The modules in the order of dependence; `identify` below combines them::
+
+    path                 smoothed motor angles
+    experiment           spectra of inputs, of measurements and of the errors of both
+    model, response      the FMU's equations and outputs
+    fit, statistics      least squares; standard errors and intervals
+    verdict, diagnosis   whether the model explains the data, and possible causes if not
+    design, excitation   more informative experiments; `prw.excite`
+    rounding             digits of numbers
+    findings, results    the return value, as attributes, text and files
+    report               the HTML page
 """
 
 from __future__ import annotations

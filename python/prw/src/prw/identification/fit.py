@@ -4,7 +4,7 @@ Parameters are sought as logarithms, which keeps them positive and makes their e
 initial state of each experiment enter linearly; they are eliminated in every evaluation by projection (variable
 projection in the form of Kaufman, BIT 15 (1975) 49), so that the search is only over the other unknowns.
 
-Errors of the motors' encoders pass through the model: at every frequency the difference of measured and modelled
+Errors of the motors' encoders pass through the model. So at every frequency, the difference of measured and modelled
 spectra has the covariance of the channels' noise plus G P G^H, with the model's transfer G and the power P of the
 encoders' errors. The difference is weighted with the inverse of this covariance, which depends on the parameters, too.
 Without P the dampers are biased (errors in variables; Soderstrom, Automatica 43 (2007) 939, Sec. 8; Pintelon and
