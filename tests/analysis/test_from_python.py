@@ -124,7 +124,7 @@ def test_sources_that_are_not_recordings():
     for files, message in (
         (None, "None is not a recording"),
         ([None], "None is not a recording"),
-        ([], "files: there are none"),
+        ([], "files: at least one is needed"),
     ):
         with pytest.raises(prw.UserError, match=message):
             prw.identify(files)

@@ -129,7 +129,7 @@ def identify(
     one = is_path(files) or is_table(files) or isinstance(files, Recording) or not isinstance(files, Iterable)
     several = cast("list[Source]", [files] if one else list(cast("Iterable[Source]", files)))
     if not several:
-        raise UserError("there are none", argument="files")
+        raise UserError("at least one is needed", argument="files")
     delay, lag, gain = names_of("delay", delay), names_of("lag", lag), names_of("gain", gain)
     # There are many small matrices, with which more threads would be slower.
     with Model(fmu) as model, threadpool_limits(1):
