@@ -217,12 +217,13 @@ def write(found: dict, path: Path | None) -> None:
 
 
 def is_too_rare(hits: np.ndarray, least: float, expected: float) -> bool:
-    """Returns whether the share of hits is less than `least`, and so low a share has a probability below 5 % if `expected` is true."""
+    """Returns whether the share of hits is less than `least`, and so low a share has a probability below 5 % if the true share is
+    `expected`."""
     return bool(hits.mean() < least and binom.cdf(hits.sum(), hits.size, expected) < 0.05)
 
 
 def main() -> int:
-    """Runs the repetitions, prints and writes their results."""
+    """Runs the repetitions, prints and writes their results. Returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("fmu")
     parser.add_argument("--repetitions", type=int, default=300)

@@ -144,8 +144,8 @@ def test_intervals_allow_for_friction_that_is_too_small_to_be_found(fmu, frictio
 
 
 def test_an_equal_gain_of_the_torques_is_found_if_inertias_are_known(experiment, fmu):
-    """An equal gain looks like stiffer couplings with more inertia. If all inertias are estimated, it cannot be detected, so no fault
-    is reported with or without a gain."""
+    """An equal gain looks like stiffer couplings with more inertia. If all inertias are estimated, the gain cannot be detected, so no
+    fault is reported, with or without a gain."""
     columns = recording(experiment)
     gained = {**columns, **{name: 1.01 * columns[name] for name in ("tau1", "tau2")}}
     found = prw.identify(gained, starts=1, fmu=fmu)

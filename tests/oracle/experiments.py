@@ -82,7 +82,7 @@ def experiments() -> list[Experiment]:
 
 
 def another_testbed() -> dict[str, Any]:
-    """Returns parameters that all differ from Table 1; a parameter that is not named here is half as large."""
+    """Returns parameters that all differ from Table 1. If a parameter were not named here, it would be half as large."""
     named = {
         "J2": 5e-3,
         "J3": 0.02,

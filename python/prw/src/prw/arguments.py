@@ -69,7 +69,7 @@ def spread_of(argument: str, name: str, given: Any, start: float) -> tuple[float
     value, relative = positive(argument, value, name), positive(argument, relative, name)
     if relative > MAX_RELATIVE:
         raise UserError(
-            f"{name} has a standard deviation of {relative:.0%}; 100 % is the most, which is the fraction 1", argument=argument
+            f"{name} has a standard deviation of {relative:.0%}; 100 % is the most, a fraction of 1", argument=argument
         )
     return value, relative
 

@@ -39,7 +39,8 @@ PAGE_DIRECTORIES = ("crates/fmu-package/page", "docs/fmu-page/wrist")
 
 
 def page_file(name: str) -> Path:
-    """The path of a script, style sheet or table of the pages that show the wrist; if none exists, a path at which it is missing."""
+    """The path of a script, style sheet or table of the pages that show the wrist. If the file is missing, its path in the
+    package."""
     locations = [PACKAGE / "page" / name, *(CLONE / directory / name for directory in PAGE_DIRECTORIES)]
     return next((path for path in locations if path.is_file()), locations[0])
 

@@ -195,7 +195,7 @@ def simulate(
 
 def _sampling_error(fine: Array, coarse: Array) -> float:
     """The error of the output `fine` (n,) as a fraction of its peak. `coarse` is the same output of a run with every
-    other time, in which the error is four times as large, because it is second order in the step size."""
+    other time, in which the error is four times as large, because errors are second order in the step size."""
     peak = float(np.abs(fine).max())
     return float(np.abs(coarse - fine[::2]).max()) / 3 / peak if peak > ROUNDING else 0.0
 
@@ -208,8 +208,8 @@ def _rounded_up(number: float) -> float:
 
 
 def motion_of(source: Motion | Recording | Run | str | os.PathLike[str] | Table | None) -> Motion:
-    """The motion itself, the motion of a recording, a run, a file or columns, or the motion of Fig. 4. Raises UserError if a
-    file or column cannot be read."""
+    """The motion `source`, or the motion of a recording, a run, a file or columns; by default the motion of Fig. 4. Raises
+    UserError if a file or column cannot be read."""
     if source is None:
         return fig4()
     if isinstance(source, (Recording, Run)):

@@ -142,8 +142,9 @@ def layout(
     testbed: Testbed,
     fixed: Mapping[str, Any],
 ) -> dict[str, Array]:
-    """The values of the parameters that vary, (runs,) each: all combinations of the grid, each with all draws. A
-    distribution without a median is about the value in `fixed` or the FMU's start value. Raises UserError for invalid arguments."""
+    """The values of the parameters that vary, (runs,) each: all combinations of the grid, each with all draws. If
+    only a relative standard deviation is given, the median is the value in `fixed` or the FMU's start value. Raises UserError for
+    invalid arguments."""
     testbed.with_starts(fixed)
     starts = {**testbed.starts, **fixed}
     check_names("grid", grid, testbed.starts)

@@ -141,13 +141,13 @@ def _faded(time: Array, wave: Array) -> Array:
 
 
 def _assemble(name: str, time: Array, waves: Sequence[Array], pattern: str, limits: Limits) -> Motion:
-    """The waves (3, n) mixed for the two motors and scaled up to the limits."""
+    """The waves (3, n) mixed for the two motors, faded, and scaled to the limits."""
     motors = [shares[0] * waves[0] + shares[1] * waves[1] for shares in PATTERNS[pattern]]
     return _within(name, time, motors, limits)
 
 
 def _within(name: str, time: Array, motors: Sequence[Array], limits: Limits) -> Motion:
-    """The motors' waves (3, n), faded and scaled up to the limits."""
+    """The motors' waves (3, n), faded and scaled to the limits."""
     motors = [_faded(time, wave) for wave in motors]
     peaks = np.max([np.abs(wave).max(axis=1) for wave in motors], axis=0)
     scale = min(limit / peak for limit, peak in zip(limits, peaks))

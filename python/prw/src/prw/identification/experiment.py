@@ -162,7 +162,7 @@ class Experiment:
 
     @cached_property
     def channel_power(self) -> Array:
-        """Power (bins, c) of the channels' errors by encoders' steps."""
+        """Power (bins, c) of the channels' errors that are caused by the steps of encoders."""
         return _power(self.channel_errors)
 
     def observed(self, modelled: Complex) -> Complex:
@@ -302,7 +302,7 @@ def _power(errors: Complex) -> Array:
     """Mean power (bins, ...) of the spectra (d, bins, ...) of draws."""
     mean: Array = np.mean(np.abs(errors) ** 2, axis=0)
     # In a periodic motion, the spectrum of the errors consists of lines. The leakage of a line is correlated with the
-    # line, even if it is small, so each frequency gets at least the leakage of a line between two frequencies.
+    # line, even if the leakage is small, so each frequency gets at least the leakage of a line between two frequencies.
     leaked = 1 / (np.pi * np.arange(1, FURTHEST + 1)) ** 2
     spread = [np.convolve(column, [*leaked[::-1], 0.0, *leaked])[FURTHEST:-FURTHEST] for column in mean.T]
     power: Array = np.maximum(mean, np.column_stack(spread))
@@ -310,7 +310,7 @@ def _power(errors: Complex) -> Array:
 
 
 def _with_rates(errors: Array, rate_noise: float | None, step: float) -> Complex:
-    """Spectra (d, f) of draws (d, n) of an angle's errors. They are smaller if the rate was logged, with noise of the
+    """Spectra (d, f) of draws (d, n) of an angle's errors. The spectra are smaller if the rate was logged, with noise of the
     standard deviation rate_noise."""
     found = spectra(errors.T).T
     if rate_noise is None:
@@ -323,7 +323,7 @@ def _with_rates(errors: Array, rate_noise: float | None, step: float) -> Complex
 
 def _clear(theta: Array, errors: Array, rate_noise: float | None, step: float) -> int:
     """Number of frequencies, from 0, up to the highest one at which the angle theta (n,) moves clearly more than its
-    errors. errors: (d, n), draws of them."""
+    errors. errors: (d, n), draws of the errors."""
     n = len(theta)
     window = np.hanning(n - 1)
 

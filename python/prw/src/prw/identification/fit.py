@@ -233,8 +233,8 @@ class Comparison:
 
     def noise_ratios(self) -> Array:
         """Sums (3, c) over frequencies. The ratio of the first two is 1 if a channel's noise explains its residuals, and larger
-        if the noise is too small. Their difference is proportional to the score of the noise's variance. The third sum is the
-        information about the noise's variance, the inverse square of its standard error."""
+        if the noise is too small. Their difference is proportional to the derivative of the log likelihood with respect to the
+        noise's variance. The third sum is the information about the noise's variance, the inverse square of its standard error."""
         inverse = self._whiten.conj().swapaxes(-1, -2) @ self._whiten
         weighted = (inverse @ self._rest[:, :, None])[..., 0]
         expected, share = np.einsum("fcc->c", inverse).real, self.experiment.shares
@@ -262,7 +262,7 @@ class Solution:
     modelled
         (s, c) for each experiment, the FMU's outputs plus the offsets, SI.
     misfit
-        Sum of the squares of residuals and of differences from priors.
+        Sum of the squares of residuals and of weighted differences from priors.
     rivals
         Other minima that fit about as well, as (logarithms, misfit).
     tried
@@ -449,8 +449,8 @@ class Fitter:
 def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int = 6, seed: int = 0) -> Solution:
     """Estimate the parameters from `task.start` and `starts` - 1 other starting points; return the best solution.
 
-    If several minima fit equally well, the one nearest to task.start counts and the others are reported. Raises UserError
-    if a parameter is out of its bounds or the FMU rejects a value.
+    If several minima fit about equally well, the one nearest to task.start counts and the others are reported. Raises UserError
+    if a start value is out of its bounds or the FMU rejects a value.
     """
     for name in task.names:
         low, high = task.bounds[name]

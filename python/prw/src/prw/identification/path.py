@@ -26,8 +26,8 @@ DEGREE = 5
 ORDER = 3
 #: Range of log10 of the penalty: below, the path interpolates; above, the normal equations lose their digits.
 STIFFNESS = (-6.0, 10.0)
-#: RATIO: range of log10 of the weight of logged rates, s^2. GUESSES: start values of its search, by the number of
-#: blocks.
+#: RATIO: range of log10 of the weight of logged rates, s^2. GUESSES: start values of the search for this weight, by
+#: the number of blocks.
 RATIO = (-14.0, 4.0)
 GUESSES: dict[int, list[list[float]]] = {1: [[]], 2: [[-2.0], [-4.0], [-6.0]]}
 #: Divisor of the most probable penalty. Too little smoothing adds some noise, too much biases the parameters. The highest

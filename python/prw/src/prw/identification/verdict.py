@@ -1,6 +1,6 @@
 """Tests whether the model explains the data, and whether a fault would explain them.
 
-The residuals of a correct fit are noise. Three tests compare them with the motion. Local regression over frequency
+The residuals of a correct fit are noise, which three tests check. Local regression over frequency
 finds residuals that are coherent with the motors' spectra or the channel's own. Score tests (Rao, Proc. Cambridge Phil.
 Soc. 44 (1948) 50) find the effects of single faults: a delay, a lag or a gain of one channel or of several, friction,
 backlash. The third test compares the residuals' strength with the noise at frequencies at which the motors do not move.
@@ -151,7 +151,8 @@ class Verdict(NamedTuple):
     faults
         The tested faults that are possible, in decreasing order of significance.
     widening
-        (p,), standard deviations that are added because faults may be too small to be distinguished from chance.
+        (p,), standard deviations that are added in quadrature to the standard errors, because faults may be too small to be
+        distinguished from chance.
     """
 
     misfits: tuple[Misfit, ...]
