@@ -136,7 +136,7 @@ FINE = 16
 
 
 def nonlinear(simulated: Rig, backlash: float = 0.0, friction: float = 0.0) -> Rig:
-    """Returns the rig with a play of `backlash` rad between each motor and its shaft, and dry friction of `friction` N.m
+    """Returns the rig with `backlash` rad of play between each motor and its shaft, and with `friction` N.m of dry friction
     about pitch and roll. Its outputs are integrated by Heun's method in fine steps."""
     p, model = simulated.parameters, linear_model(simulated.parameters)
     count = (len(simulated.time) - 1) * FINE + 1

@@ -1,4 +1,4 @@
-"""The command `prw`: runs the subcommand, and reports errors that the user can fix in one line on stderr."""
+"""The command `prw`: runs the subcommand, and reports an error that the user can fix as one line on stderr."""
 
 from __future__ import annotations
 

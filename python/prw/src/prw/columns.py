@@ -86,8 +86,8 @@ def si_unit(name: str) -> str:
 
 ANGLES = ("theta1", "theta2")
 RATES = ("omega1", "omega2")
-#: Header of a column: `pitch [deg]`, `pitch (deg)`, `pitch_deg`, `pitch/deg` or `pitch deg`. Upper and lower case are
-#: equal, and `t` is the time.
+#: Header of a column: `pitch [deg]`, `pitch (deg)`, `pitch_deg`, `pitch/deg` or `pitch deg`. Case does not
+#: matter, and `t` is the time.
 NAMES = "|".join(sorted([*QUANTITIES, "t"], key=len, reverse=True))
 COLUMN = re.compile(rf"^\s*({NAMES})(?:\s*\[([^\]]*)\]|\s*\(([^)]*)\)|[\s_/,]+(\S+))?\s*$", re.IGNORECASE)
 #: Maximum number of column names quoted in an error message.

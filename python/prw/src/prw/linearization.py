@@ -50,7 +50,7 @@ def linearize(
     Raises
     ------
     UserError
-        The FMU is missing, has no directional derivatives, lacks a name or rejects a value.
+        The FMU is missing, has no directional derivatives, lacks a variable or rejects a value.
     """
     with Linearizer(fmu, outputs=outputs, fmi_type=fmi_type) as linearizer:
         return linearizer.at(parameters)

@@ -27,7 +27,7 @@ def _is_wanted() -> bool:
 class Progress:
     """Reports the progress of a task that takes longer than two seconds, in commands and interactive sessions.
 
-    On a terminal one line is rewritten, and wiped on leaving the context; in a log a line is added every ten seconds.
+    On a terminal, one line is rewritten, and cleared at the end; in a log, a line is added every ten seconds.
     """
 
     def __init__(self, label: str, total: int):

@@ -99,7 +99,7 @@ def identify(
     Returns
     -------
     Identification
-        Estimates, standard errors and doubts. Data that the model does not explain raise no error, nor do undetermined
+        Estimates, their standard errors, and reasons to doubt them. Data that the model does not explain raise no error, nor do undetermined
         parameters: see `fits`, `misfits` and `undetermined`.
 
     Raises
