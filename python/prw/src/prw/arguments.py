@@ -24,7 +24,7 @@ Table = Mapping[str, Any]
 
 
 def names_of(argument: str, given: str | Iterable[str]) -> tuple[str, ...]:
-    """One or more names, as a tuple."""
+    """One or more names, as a tuple. Raises UserError if `given` is neither a name nor a sequence."""
     if isinstance(given, str):
         return (given,)
     if not isinstance(given, Iterable):
@@ -62,7 +62,7 @@ def not_negative(argument: str, value: Any, name: str = "") -> float:
 
 def spread_of(argument: str, name: str, given: Any, start: float) -> tuple[float, float]:
     """The central value of a parameter and its relative standard deviation. `given` is (value, deviation), or only the
-    deviation; then the central value is `start`."""
+    deviation; then the central value is `start`. Raises UserError if a number is out of range."""
     value, relative = given if isinstance(given, Sequence) and len(given) == 2 else (start, given)
     if value is start and start == 0:
         raise UserError(f"{name} starts at 0; write (value, fraction)", argument=argument)
@@ -149,7 +149,7 @@ def in_own_unit(name: str, value: Any, loaded: fmu_run.Fmu) -> Any:
 
 def _value(path: Path, name: str, entry: Any, loaded: fmu_run.Fmu) -> float | int | bool:
     """An entry of the file, converted to the FMU's unit. The entry is a number in that unit, or a dict with a value and
-    its unit."""
+    its unit. Raises UserError for any other entry, or a unit that cannot be converted."""
     value, unit = (entry.get("value"), str(entry.get("unit", ""))) if isinstance(entry, dict) else (entry, "")
     if not isinstance(value, (int, float)):
         raise UserError(f"{path}: {name} is {value!r}, not a number", argument="parameters")

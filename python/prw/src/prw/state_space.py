@@ -63,7 +63,8 @@ class StateSpace:
         return np.ascontiguousarray(whole[:, :, kept], dtype=np.complex128)
 
     def moved(self, rates: Mapping[str, str]) -> tuple[str, ...]:
-        """The inputs that are not among `rates`: the columns of `transfer` and `response_at_hz`."""
+        """The inputs that are not among `rates`: the columns of `transfer` and `response_at_hz`. Raises UserError for names that are
+        not inputs."""
         for name in (*rates, *rates.values()):
             if name not in self.inputs:
                 raise UserError(f"{name} is not an input; there are {', '.join(self.inputs)}", argument="rates")

@@ -125,7 +125,7 @@ class Testbed:
 
         Returns `outputs` (any Real variables) by name, each (n,), in the FMU's units (N.m, rad, rad/s). Sample k is
         read at time[k], after the motors' angles (and rates, if the motion has them) of sample k were set, so all
-        values of a row belong to the same instant.
+        values of a row belong to the same instant. Raises UserError if the FMU rejects a value or the run fails.
         """
         try:
             runs = self.loaded.run(motion.time, outputs=outputs, **driven_by(motion, start))

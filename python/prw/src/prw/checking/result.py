@@ -67,7 +67,7 @@ def read_result(path: Path, units: Mapping[str, str], component: str | None) -> 
 def _choose(
     path: Path, columns: Mapping[str, Array], units: Mapping[str, str], component: str | None
 ) -> dict[str, Array]:
-    """The known columns in SI, by their names in QUANTITIES."""
+    """The known columns in SI, by their names in QUANTITIES. Raises UserError if the component is unclear or a unit is wrong."""
     candidates: dict[str, list[tuple[str, str, Array]]] = {}
     for title, values in columns.items():
         owner, name, unit = _known(title)
@@ -121,7 +121,7 @@ def _csv(path: Path) -> dict[str, Array]:
 
 
 def _mat(path: Path) -> dict[str, Array]:
-    """The columns of a .mat file by title."""
+    """The columns of a .mat file by title. Raises UserError if it cannot be read or contains no time."""
     need("scipy")
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError

@@ -99,8 +99,8 @@ def identify(
     Returns
     -------
     Identification
-        Estimates, their standard errors, and reasons to doubt them. Data that the model does not explain raise no error, nor do undetermined
-        parameters: see `fits`, `misfits` and `undetermined`.
+        Estimates, their standard errors, and reasons to doubt them. Data that the model does not explain raise no error, nor do
+        undetermined parameters: see `fits`, `misfits` and `undetermined`.
 
     Raises
     ------
@@ -183,7 +183,8 @@ def task_of(
     offsets: bool = True,
     distortions: tuple[Distortion, ...] = (),
 ) -> Task:
-    """The task that these arguments of `identify` describe, for an FMU with the parameters `known`."""
+    """The task that these arguments of `identify` describe, for an FMU with the parameters `known`. Raises UserError for a
+    name that is not known, or a value that is out of range."""
     from prw.columns import MEASURED
     from prw.identification.fit import Prior, Task
 

@@ -256,7 +256,8 @@ def _estimated(theta: Array, step: float) -> Array:
 
 
 def _measured(recording: Recording) -> tuple[tuple[str, ...], Array, tuple[str, ...]]:
-    """The channels that change, their values (s, c), and notes for the user."""
+    """The channels that change, their values (s, c), and notes for the user. Raises UserError if a channel has too few values, or
+    none changes."""
     if not recording.measured:
         raise UserError(
             f"{recording.source}: nothing measured; at least one column of {', '.join(MEASURED)} is needed, "
