@@ -1,6 +1,5 @@
-"""Adds the files of the page, which the FMU also contains, to the package. If the package is installed from a clone, it
-also adds the path of the clone, where `make fmu` writes the FMU. pyproject.toml has all other settings. The build
-writes nothing into the clone."""
+"""Adds the files of the page with an animation to the package and, if the package is installed from a clone, the path of the
+clone, in which `make fmu` writes the FMU. pyproject.toml has all other settings. The build writes nothing into the clone."""
 
 from __future__ import annotations
 
@@ -18,7 +17,7 @@ PAGE_FILES = ("live.css", "player.js", "plot.js", "animation.js", "wrist.js", "w
 
 
 class WithClone(build_py):
-    """Copies these files next to the modules."""
+    """Copies these files next to the modules, and writes the path of the clone. An editable installation needs neither."""
 
     def run(self) -> None:
         super().run()

@@ -8,7 +8,7 @@ import rig
 
 @pytest.fixture(scope="session")
 def model(fmu):
-    """One instance of the FMU for all tests that compute in this process."""
+    """The FMU's linear model, for all tests that calculate in this process."""
     from prw.identification.model import Model
 
     with Model(fmu) as instance:

@@ -13,10 +13,10 @@ at 1 kHz, its own noise, encoder positions and sensor offsets; see rig.py. The e
 
 A low share only counts if chance is an improbable cause: with true shares of 95 % and 99 %, its probability must be below 5 %.
 
-With --faulty, the rigs have faults. The exit status is 1 if, of the rigs with an interval that misses the true value by more than
-two of its widths, more than 1 % have the verdict "fits".
+With --faulty, the rigs have faults, and their motions last 6 s. The exit status is 1 if, of the rigs with an interval that misses
+the true value by more than two of its widths, more than 1 % have the verdict "fits".
 
-With --friction, the rigs are simulated by plant.py, which has other equations and friction in the input shafts, from none to gross.
+With --friction, plant.py simulates the rigs for 8 s, with other equations and with friction in the input shafts, from none to gross.
 The exit status is 1 if less than 97 % of the rigs without friction have the verdict "fits". It is also 1 if, at any friction,
 less than 92 % of the 95 % intervals of rigs with this verdict contain the true value.
 """
@@ -103,9 +103,9 @@ def braked(fmu: str, seed: int, motion: str, friction: float) -> tuple:
 def identified(fmu: str, simulated: rig.Rig, seed: int, channels, counts: int) -> tuple:
     """Identifies the parameters NAMES from simulated measurements of a rig.
 
-    Returns five values each of log(estimate / true value), its standard error, and whether the 95 % interval contains the true value.
-    Then follow the seconds, whether the verdict is "fits", and the largest distance of a true value from its interval, in widths of
-    the interval; it is negative if all intervals contain the true values."""
+    Returns three lists of five values: log(estimate / true value), its standard error, and whether the 95 % interval contains the
+    true value. Then follow the seconds, whether the verdict is "fits", and the largest distance of a true value from its interval, in
+    widths of the interval; the distance is negative if all intervals contain the true values."""
     columns = rig.measure(simulated, seed + 1_000_000, channels, counts)
     with Model(fmu) as model, threadpool_limits(1):
         begin = time.perf_counter()
@@ -158,7 +158,9 @@ def campaign(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[di
         rows.setdefault(fault, []).append({"size": size, "does_not_fit": rejected, "worst_miss_where_it_fits": worst})
         print(f"  {FAULTS[fault][0]:<40}{size:>8g}{rejected:>8.0%}{worst:>8.2g}", flush=True)
     good = missed <= 0.01 * grossly
-    print(f"  {grossly} intervals missed by more than two widths, {missed} of them where the verdict is that it fits")
+    print(
+        f"  {grossly} rigs with an interval that misses by more than two widths; {missed} of them have the verdict that it fits"
+    )
     if options.figure:
         draw(rows, options.figure)
     return {"commit": commit(), "rigs": rigs, "faults": rows, "missed_grossly": grossly, "unnoticed": missed}, good
@@ -170,7 +172,7 @@ def friction(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[di
     rigs, motions = options.friction, tuple(plant.MOTIONS)
     jobs = [(options.fmu, options.seed + i, motions[i % len(motions)], size) for size in FRICTIONS for i in range(rigs)]
     results = iter(pool.map(braked, *zip(*jobs)))
-    print(f"{rigs} rigs for each friction of the input shafts, N.m: accepted; of these, 95 % intervals hold")
+    print(f"{rigs} rigs for each friction of the input shafts, N.m: accepted; of these, intervals with the true value")
     print(f"  {'':8}{'accepted':>10}" + "".join(f"{name:>6}" for name in rig.NAMES) + f"{'all':>8}")
     rows, good = [], True
     for size in FRICTIONS:
@@ -217,12 +219,13 @@ def write(found: dict, path: Path | None) -> None:
 
 
 def is_too_rare(hits: np.ndarray, least: float, expected: float) -> bool:
-    """Returns whether the share of hits is less than `least`, and so low a share has a probability below 5 % if `expected` is true."""
+    """Returns whether the share of hits is less than `least`, and so low a share has a probability below 5 % if the true share is
+    `expected`."""
     return bool(hits.mean() < least and binom.cdf(hits.sum(), hits.size, expected) < 0.05)
 
 
 def main() -> int:
-    """Runs the repetitions, prints and writes their results."""
+    """Runs the repetitions, prints and writes their results. Returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("fmu")
     parser.add_argument("--repetitions", type=int, default=300)
@@ -249,7 +252,7 @@ def main() -> int:
         f"{options.repetitions} repetitions, {', '.join(SENSORS[options.sensors])}, {options.counts} counts a turn, "
         f"{np.median(seconds):.1f} s each"
     )
-    print(f"  {'':4}{'mean error':>12}{'its s.e.':>10}{'scatter':>10}{'claimed':>10}{'95 % intervals hold':>22}")
+    print(f"  {'':4}{'mean error':>12}{'its s.e.':>10}{'scatter':>10}{'claimed':>10}{'95 % coverage':>22}")
     rows, good = {}, not is_too_rare(fits, 0.97, 0.99)
     for i, name in enumerate(rig.NAMES):
         bias, scatter, claimed = errors[:, i].mean(), errors[:, i].std(), np.sqrt(np.mean(sigmas[:, i] ** 2))
@@ -261,7 +264,7 @@ def main() -> int:
             f"  {name:4}{bias:>12.4%}{scatter / np.sqrt(len(errors)):>10.4%}{scatter:>10.4%}{claimed:>10.4%}"
             f"{cover:>22.1%}"
         )
-    print(f"  the verdict is that it fits in {fits.mean():.1%}")
+    print(f"  {fits.mean():.1%} of the verdicts are that the model fits")
     whole = {"commit": commit(), "fits": float(fits.mean()), "repetitions": options.repetitions, "parameters": rows}
     write(whole, options.out)
     print("unbiased, intervals have the stated coverage" if good else "BIASED, intervals too narrow, or false alarms")

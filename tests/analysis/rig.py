@@ -33,7 +33,8 @@ class Rig(NamedTuple):
 
 
 def experiment(seed: int, duration: float = 10.0, rate: float = 1000.0, pattern: str = "independent") -> Rig:
-    """Simulates a random rig, with NAMES up to 30 % off Table 1, in a random motion of up to 30 deg. The patterns are:
+    """Simulates a random rig, with NAMES up to 30 % off Table 1, in a motion of at most 35 deg. All patterns except "fig4"
+    are random:
 
     * "independent", "equal" and "opposite" motions of the two motors, 40 sines from 0.1 to 20 Hz each
     * "fig4": the motion of the paper's Fig. 4, repeated
@@ -65,7 +66,8 @@ def experiment(seed: int, duration: float = 10.0, rate: float = 1000.0, pattern:
 def _moves(random: np.random.Generator, duration: float) -> tuple[np.ndarray, np.ndarray]:
     """Returns frequencies (m,) and waves (2, m) of minimum-jerk moves from point to point, and of three small sines for each motor.
 
-    The moves are approximated by a Fourier series up to 15 Hz, because `respond` takes sines. Its period exceeds the recording."""
+    The moves are approximated by a Fourier series up to 15 Hz, because `respond` takes sines. The period of the series exceeds
+    the recording."""
     period = duration + 4
     when, lines = np.linspace(0, period, 4096, endpoint=False), int(15 * period)
     waves = np.zeros((2, lines + 6), dtype=complex)
@@ -129,13 +131,13 @@ def _outputs(x: np.ndarray, tau: np.ndarray, parameters) -> dict[str, np.ndarray
     }
 
 
-#: Integration steps of `nonlinear` and `lagging` in one period of the recording.
+#: Integration steps of `nonlinear` and `lagging` between two samples of the recording.
 FINE = 16
 
 
 def nonlinear(simulated: Rig, backlash: float = 0.0, friction: float = 0.0) -> Rig:
-    """Returns the rig with a play of `backlash` rad between each motor and its shaft, and dry friction of `friction` N.m
-    about pitch and roll. It is integrated by Heun's method in fine steps."""
+    """Returns the rig with `backlash` rad of play between each motor and its shaft, and with `friction` N.m of dry friction
+    about pitch and roll. Its outputs are integrated by Heun's method in fine steps."""
     p, model = simulated.parameters, linear_model(simulated.parameters)
     count = (len(simulated.time) - 1) * FINE + 1
     fine = np.interp(np.arange(count) / FINE, np.arange(len(simulated.time)), simulated.time)
@@ -201,7 +203,8 @@ def measure(
     """Returns the columns that the sensors record, in SI.
 
     Angles of motors and shafts are quantised, and the zeros of shafts are unknown. Torques have `noise` N.m of noise, an offset, and
-    steps of a quarter of the noise. Pitch and roll have 1 mrad of noise and an offset, as from an inertial sensor."""
+    steps of a quarter of the noise. Pitch and roll have 1 mrad of noise and an offset, as from an inertial sensor.
+    log_rates: also records the motors' rates, with 0.02 rad/s of noise."""
     random = np.random.default_rng(seed)
     quantum = 2 * np.pi / counts
 

@@ -135,7 +135,7 @@ def test_command(prw: Any, tmp_path: Path) -> None:
 
 
 def test_film_of_the_readme() -> None:
-    """The film is small, its first and last positions are equal, and the axes do not move."""
+    """The film is small, its first and last positions look equal, and the axes do not move."""
     path = ROOT / "docs" / "wrist.gif"
     assert path.stat().st_size < 500_000
     images = frames_of(path)

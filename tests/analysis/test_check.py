@@ -1,4 +1,4 @@
-"""`prw.check` and `prw check` on files as other tools write them; their numbers are a solution of the tests, not of the FMU."""
+"""`prw.check` and `prw check` on files as other tools write them; the numbers in them come from the oracle, not from the FMU."""
 
 from __future__ import annotations
 
@@ -56,7 +56,8 @@ def character_matrix(strings, across):
 
 
 def write_modelica(path, columns, units=False, across=True):
-    """Writes a file in OpenModelica's format: MATLAB 4; constants in data_1, trajectories in data_2, aliases by index and sign."""
+    """Writes a file in OpenModelica's format: MATLAB 4; constants in data_1, trajectories in data_2. A negative index,
+    here of tau2, changes the sign."""
     time = columns["time"]
     names, infos, descriptions = (
         ["time", "testbed.k1"],
@@ -168,7 +169,7 @@ def test_of_two_rows_at_one_time_the_last_counts(right, fmu, tmp_path):
 
 
 def test_uneven_rows_are_interpolated(fmu, tmp_path):
-    """A solver with variable steps writes rows between the reference's times, up to 5 ms apart."""
+    """A solver with variable steps writes rows between the reference's times, up to 9 ms apart."""
     full, rng = fig4(), np.random.default_rng(1)
     rows = np.unique(np.append(np.cumsum(rng.integers(1, 6, 400)), [0, 1000]))
     rows = rows[(rows <= 1000) & ((rows % 10 != 0) | (rows % 1000 == 0))]

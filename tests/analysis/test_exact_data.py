@@ -27,7 +27,8 @@ def exact(simulated: rig.Rig) -> dict[str, np.ndarray]:
 
 
 def check(found: prw.Identification, simulated: float, worst: float) -> None:
-    """Checks that the interval of k1 contains the simulated value and that the relative standard error is below `worst`."""
+    """Checks that the data fit, that the interval of k1 contains the simulated value, and that the relative standard error is below
+    `worst`."""
     assert found.fits, (found.misfits, found.diagnosis)
     estimate = found.parameters["k1"]
     assert estimate.interval[0] < simulated < estimate.interval[1]
@@ -39,7 +40,7 @@ def test_a_run_is_taken_as_it_is(run, fmu):
     check(found, K1, 1e-6)
     assert all(abs(found.values[name] / run.parameters[name] - 1) < 1e-6 for name in rig.NAMES)
     left_out = [note for note in found.notes if "never changes and is left out" in note]
-    assert [note.split()[1] for note in left_out] == ["pitch", "pitch_rate"], "opposite motors"
+    assert [note.split()[1] for note in left_out] == ["pitch", "pitch_rate"], "opposite motors do not pitch the wrist"
 
 
 def test_a_run_without_rates(run, fmu):

@@ -104,7 +104,7 @@ def test_wrong_arguments(recording, fmu, options, message):
 
 
 def test_a_parameter_that_is_0(recording, fmu):
-    """The parameter can be fixed. If it is estimated, the search starts at a prior's value or between the bounds, not at 0."""
+    """A parameter that is 0 can be fixed. If it is estimated, the search starts at a prior's value or between the bounds, not at 0."""
     found = prw.identify(recording, estimate="k1", parameters={"c3": 0}, starts=1, fmu=fmu)
     assert found.values["c3"] == 0 and list(found.parameters) == ["k1"]
     expected = prw.identify(recording, estimate="c3", starts=1, fmu=fmu)
@@ -124,7 +124,7 @@ def test_sources_that_are_not_recordings():
     for files, message in (
         (None, "None is not a recording"),
         ([None], "None is not a recording"),
-        ([], "files: there are none"),
+        ([], "files: at least one is needed"),
     ):
         with pytest.raises(prw.UserError, match=message):
             prw.identify(files)

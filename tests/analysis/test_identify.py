@@ -58,7 +58,7 @@ def test_all_sensors(prw, tmp_path, experiment):
     assert np.linalg.eigvalsh(correlation)[0] > 0
     text = (out / "report.html").read_text(encoding="utf-8")
     assert text.count("<svg") == 6 and "prefers-color-scheme: dark" in text
-    assert not re.search(r'(src|href)="(?!#)', text), "nothing is loaded from elsewhere"
+    assert not re.search(r'(src|href)="(?!#)', text), "the page loads something from elsewhere"
     etree.HTML(text)
 
 
@@ -76,7 +76,7 @@ def test_only_torques_and_the_exchanged_couplings(prw, tmp_path, experiment):
 
 
 def test_several_experiments_in_motion_with_gaps_and_uneven_rows(prw, tmp_path, experiment):
-    """One recording is cut out of the motion, the other has lost rows; a slow camera measures pitch and roll."""
+    """The first recording is cut out of the motion, and its pitch and roll come from a slow camera. The second has lost rows."""
     measured = rig.measure(experiment, 8, log_rates=True)
     for name in ("pitch", "roll"):
         measured[name] = np.where(np.arange(len(measured["time"])) % 10 == 0, measured[name], np.nan)
@@ -132,7 +132,7 @@ def test_equal_motors_do_not_determine_the_roll_inertia(prw, tmp_path):
     assert result.returncode == 1
     assert "J3 has hardly any effect on the measurements" in result.stderr
     assert re.search(
-        r"an experiment with (opposite motors|only one motor|motors that move independently|a spectrum made for it)",
+        r"an experiment with (opposite motors|only one motor|motors that move independently|a spectrum made for these parameters)",
         result.stderr,
     )
     assert "`excite` proposes it for tau1,tau2 as" in result.stderr

@@ -31,7 +31,7 @@ def fixed(simulated: rig.Rig, model) -> dict[str, float]:
 
 @pytest.mark.parametrize("rows", [slice(None), slice(1234, 3235)], ids=["from rest", "in motion"])
 def test_perfect_sensors_leave_nothing(model, simulated, rows):
-    """The RMS of the residual is below 1e-6 of the signal, also if the recording starts and ends in motion."""
+    """The RMS of the residual is below 1e-6 of the signal's peak, also if the recording starts and ends in motion."""
     task = task_of(model.known, rig.NAMES, parameters=fixed(simulated, model), offsets=False)
     fitter = Fitter(model, [prepare(recording(simulated, rows))], task, dict.fromkeys(rig.ALL, 1.0))
     modelled = fitter.modelled(task.first())[0]

@@ -37,7 +37,7 @@ def test_grid_random_and_failures(prw, tmp_path, fmu):
 
 
 def test_dask_cluster(prw, tmp_path):
-    """The runs are divided into several tasks, and all runs of the last ones fail."""
+    """The runs are divided into several tasks, and all runs of the last task fail."""
     arguments = ["sweep", "--grid", "k1=150:-50:3", "--random", "c3=20%", "--runs", 20]
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:

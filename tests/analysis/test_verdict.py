@@ -15,7 +15,7 @@ def recording(simulated, channels=rig.ALL, **sensors) -> dict[str, np.ndarray]:
     return rig.measure(simulated, 5, channels, **sensors)
 
 
-#: Faults of monte_carlo.FAULTS with their sizes, the channels with misfits, and the diagnosis.
+#: Faults of monte_carlo.FAULTS with their sizes, channels that have misfits, and a part of the diagnosis.
 FAULTY_RIGS = {
     ("late", 1.0): (["tau1", "tau2"], "ms late"),
     ("late", 0.1): (["tau1", "tau2"], "ms late"),
@@ -24,7 +24,7 @@ FAULTY_RIGS = {
     ("backlash", 2.0): (["theta3"], "backlash at the motors of 0.002 +-"),
     ("friction", 0.15): (["pitch"], "friction about pitch and roll of 0.15"),
 }
-#: Changes of recorded columns, a channel with a misfit, and the diagnosis.
+#: Changes of recorded columns, a channel with a misfit, and a part of the diagnosis.
 FAULTY_COLUMNS = {
     "clipped": (lambda c: {n: np.clip(c[n], -3, 3) for n in ("tau1", "tau2")}, "tau1", "tau1 is cut off at 3"),
     "degrees": (lambda c: {"pitch": np.degrees(c["pitch"])}, "pitch", "pitch looks as if it were in degrees"),
@@ -72,7 +72,7 @@ def test_two_faults_are_both_named(experiment, fmu):
     assert first.startswith("friction about pitch and roll of 0.1")
     assert second.startswith("besides, tau1") and "ms late" in second and "(delay tau1,tau2" in second
     one = prw.identify(recording(simulated), starts=1, fmu=fmu)
-    assert len(one.diagnosis) == 1, "one fault has one cause"
+    assert len(one.diagnosis) == 1, "one fault must have one cause"
 
 
 def test_a_common_fault_is_found_if_parameters_compensate_for_each_single_one(fmu):
@@ -144,8 +144,8 @@ def test_intervals_allow_for_friction_that_is_too_small_to_be_found(fmu, frictio
 
 
 def test_an_equal_gain_of_the_torques_is_found_if_inertias_are_known(experiment, fmu):
-    """An equal gain looks like stiffer couplings with more inertia. If all inertias are estimated, it cannot be detected, so no fault
-    is reported with or without a gain."""
+    """An equal gain looks like stiffer couplings with more inertia. If all inertias are estimated, the gain cannot be detected, so no
+    fault is reported, with or without a gain."""
     columns = recording(experiment)
     gained = {**columns, **{name: 1.01 * columns[name] for name in ("tau1", "tau2")}}
     found = prw.identify(gained, starts=1, fmu=fmu)

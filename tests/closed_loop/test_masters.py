@@ -63,8 +63,8 @@ def test_the_motors_keep_their_limits(response, closed_loop):
 
 
 def test_systems_of_fmu_run_agree_with_all_masters(master, response, closed_loop):
-    """All masters use Jacobi's method. FMPy and libcosim are bit-identical to fmu_run. Ecos has other rounding errors. It reads the
-    torques, which depend directly on inputs, after it has set the next inputs, so torques are not compared."""
+    """All masters use Jacobi's method. FMPy and libcosim are bit-identical to fmu_run. Ecos has other rounding errors, and reads
+    the torques, which depend directly on inputs, after it has set the next inputs. So torques are not compared for Ecos."""
     own = by_fmu_run(closed_loop, starts_late=master.name == "FMPy")
     for name, column in zip(masters.RECORDED, own.T):
         if master.name != "Ecos":

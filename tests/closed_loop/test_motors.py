@@ -39,8 +39,8 @@ def test_the_validator_reports_nothing(name):
 
 @pytest.mark.parametrize("version, order", [("", "dependencies"), ("fmi3/", "jacobi")])
 def test_held_torques_cause_a_first_order_error(version, order):
-    """The order does not depend on when a master reads the torques. Masters that exchange all values at the end of a step (Jacobi),
-    such as FMPy and libcosim, read them before they set the new angles."""
+    """The order of the error does not depend on when a master reads the torques. Masters that exchange all values at the end of a
+    step (Jacobi), such as FMPy and libcosim, read the torques before they set the new angles."""
     connections = {f"motors.{name}": f"wrist.{name}" for name in FROM_MOTORS}
     connections |= {f"wrist.{name}": f"motors.{name}" for name in FROM_WRIST}
     fmus = {"motors": built(f"{version}prw_motor.fmu"), "wrist": built(f"{version}prw_testbed.fmu")}

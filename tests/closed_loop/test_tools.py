@@ -88,7 +88,8 @@ def test_the_errors_of_held_inputs_in_the_document():
 
 @pytest.fixture
 def validate(monkeypatch, tmp_path, fmu):
-    """Returns a function that runs the command with one importer and one master, and returns its status and both files."""
+    """Returns a function that runs the command with one importer and one master, and returns the exit status and the
+    contents of both files."""
     monkeypatch.chdir(ROOT)
     monkeypatch.setattr(runs, "IMPORTERS", [i for i in runs.IMPORTERS if i.name == "fmu_run"])
     monkeypatch.setattr(runs.masters, "MASTERS", runs.masters.MASTERS[:1])
@@ -114,7 +115,7 @@ def test_the_report(validate, fmu, closed_loop):
     shown = html.unescape(re.sub(r"<[^>]*>", " ", page))
     for row in found["rows"]:
         assert row["importer"] in shown and f"{row['share']:.1%}" in shown
-    # A stiffness that is off by 1 % exceeds the tolerance of every experiment.
+    # If k1 or k2 is off by 1 %, the results exceed the tolerances of every experiment.
     for name, shares in found["sensitivity"].items():
         assert shares["k1"] > 1.4 and shares["k2"] > 1.4, name
         assert f"{shares['c3']:.1f}" in shown

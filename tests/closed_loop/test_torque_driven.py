@@ -58,7 +58,7 @@ def test_co_simulation_converges_to_the_machine(example, monkeypatch):
 
 
 def test_the_document_has_the_errors_that_the_example_prints(example, monkeypatch):
-    """The references of the motors jump. An independent solution confirms the errors."""
+    """The references of the motors jump. An independent solution confirms the errors for two communication steps."""
     monkeypatch.chdir(ROOT)
     figure, found = example.main()
     stated = {h: [f"{share:.1f} %" if share < 100 else "unstable" for share in shares] for h, shares in found.items()}
@@ -144,7 +144,7 @@ def test_a_compiler_of_modelica_accepts_the_text(name):
     modelica = pytest.importorskip("rumoca")
     text = (MODELS / name).read_text(encoding="utf-8")
     assert not modelica.validate_source(text, filename=name)
-    assert modelica.validate_source(text.replace("equation", "equations", 1), filename=name), "it reads the text"
+    assert modelica.validate_source(text.replace("equation", "equations", 1), filename=name), "a wrong text is accepted"
 
 
 def test_the_models_use_the_names_of_the_fmu():

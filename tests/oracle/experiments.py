@@ -17,8 +17,8 @@ from lagrange import OUTPUTS, REAL, linear_model, table_1, varied
 from reference import follow, integrate
 
 #: Tolerances of angles, rates and torques, as fractions of the largest value of the variables of the same kind. In
-#: Co-Simulation, torques have wider tolerances, because many importers read them before they set the next rates of the
-#: motors, which are constant during a step. So the torques of these importers lag one step.
+#: Co-Simulation, torques have wider tolerances unless the motors turn at constant rates, because many importers read the
+#: torques before they set the next rates of the motors. So the torques of these importers lag one step.
 RelativeTolerances = Mapping[str, tuple[float, float, float]]
 STEP_SIZES = {"CoSimulation": 1e-3, "ModelExchange": 1e-3}
 FAST_MOTION: RelativeTolerances = {"CoSimulation": (5e-4, 1e-3, 2e-2), "ModelExchange": (5e-4, 1e-3, 2e-3)}
@@ -27,7 +27,7 @@ EXACT: RelativeTolerances = {"CoSimulation": (1e-6,) * 3, "ModelExchange": (1e-5
 TOLERANCE_GROUPS = (("pitch", "roll", "theta3", "theta4"), ("pitch_rate", "roll_rate"), ("tau1", "tau2"))
 #: Interval in s between rows of the reference, and between samples of motors that do not turn at constant rates.
 INTERVAL, SAMPLE_TIME = 0.01, 1e-3
-#: Duration in s of the experiments, and of the move from point to point.
+#: Duration in s of all experiments except rate_step, and of the move from point to point.
 STOP, MOVE_DURATION = 1.0, 0.4
 
 Function = Callable[[float], Any]
@@ -82,7 +82,7 @@ def experiments() -> list[Experiment]:
 
 
 def another_testbed() -> dict[str, Any]:
-    """Returns parameters that all differ from Table 1; a parameter that is not named here is half as large."""
+    """Returns parameters that all differ from Table 1. If a parameter were not named here, it would be half as large."""
     named = {
         "J2": 5e-3,
         "J3": 0.02,
@@ -168,7 +168,7 @@ def experiment_from_motion(
 
 
 def rate_step() -> Experiment:
-    """Motor 1 turns at 0.5 rad/s from the start; motor 2 and the wrist are at rest at the start."""
+    """Motor 1 turns at 0.5 rad/s from the start. Motor 2 stays at rest, and the wrist starts at rest."""
     t, speed = times(0.5, INTERVAL), np.array([0.5, 0.0])
     parameters = with_counts(table_1())
     model = linear_model({key: float(value) for key, value in parameters.items()})

@@ -4,8 +4,8 @@ Nothing here comes from eqs. (8)-(11). M, Delta and K are the second derivatives
 which are exact, because T, V and the Rayleigh function are quadratic forms. The caller chooses the number type: floats
 for speed, or mpmath numbers for more digits.
 
-These errata of the paper are applied; its text confirms them: theta7 is pitch and theta8 is roll (eq. 1, eq. 4a, Sec. 4), the
-last spring of eq. (6) is k2 (K of eq. 8), and Table 1 is per degree.
+Three errors of the paper are corrected. Its other equations and its text confirm the corrections: theta7 is pitch and theta8 is
+roll (eq. 1, eq. 4a, Sec. 4), the last spring of eq. (6) is k2 (K of eq. 8), and Table 1 is per degree.
 """
 
 from __future__ import annotations

@@ -78,6 +78,6 @@ def test_the_parameter_sets_are_valid_and_complete(texts):
 
 
 def test_a_motor_brakes_in_whole_samples():
-    """Braking from 0.09 rad/s at 30 rad/s2 takes three samples. Half a sample at this rate is added."""
+    """Braking from 0.09 rad/s at 30 rad/s2 takes three samples. The distance in the curve also contains half a sample at this rate."""
     rates, reached = Law().braking_curve()
     assert np.interp(0.09, rates, reached) == pytest.approx(0.09 / 2 * 1e-3 + 0.09**2 / 2 / 30)

@@ -1,4 +1,4 @@
-"""Compares the oracle with numbers that were derived by hand, and its two methods with each other."""
+"""Compares the oracle with known numbers and physical laws, and its two methods with each other."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 
     python tests/oracle/write_experiments.py [DIRECTORY]
 
-The content of DIRECTORY, by default modelDescription, becomes part of the FMU.
+The content of modelDescription, which is the default DIRECTORY, becomes part of the FMU.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ LAYER = "org.fmi-standard.fmi-ls-ref"
 FILES, ABOUT = Path("extra", LAYER), Path("documentation", "fmi-ls-ref.txt")
 LS = "http://fmi-standard.org/fmi-ls-manifest"
 SSV, SSC = (f"http://ssp-standard.org/SSP1/SystemStructure{kind}" for kind in ("ParameterValues", "Common"))
-#: Decimals of all numbers. The last one is at most a hundredth of the smallest tolerance.
+#: Decimals of all numbers in the tables. The last one is at most a hundredth of the smallest tolerance.
 DECIMALS = 8
 #: Every experiment starts at rest, so start values of states are ignored. They equal the defaults of the FMU.
 START = {"start_at_rest": True} | {

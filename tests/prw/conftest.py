@@ -1,4 +1,4 @@
-"""Fixtures: an FMU without derivatives, and a pendulum in C of either version of FMI."""
+"""Fixtures: an FMU without directional derivatives, and a pendulum in C for each FMI version."""
 
 from __future__ import annotations
 

@@ -69,7 +69,8 @@ def test_the_point_of_operation_does_not_matter(testbed: Path) -> None:
 
 
 def test_flags_that_are_given_have_an_effect(testbed: Path) -> None:
-    """If use_omega is false, the rates are 0 at the first sample. If start_at_rest is true, the states follow the motors."""
+    """If use_omega is false, the inputs omega1 and omega2 have no effect. If start_at_rest is true, the states at the start follow the
+    motor angles."""
     model = prw.linearize(
         {"use_omega": False, "start_at_rest": True}, fmu=testbed, fmi_type="CoSimulation", outputs=["pitch"]
     )
@@ -104,8 +105,8 @@ def test_pitch_and_roll_are_separate(testbed: Path) -> None:
         (1, 7 / 4),
     ):
         assert mode.mixing < 1e-10 * np.abs(mode.A).max()
-        # The poles are the roots of det([c1 + c2, -c2; -c2, c2 + load] s + [k1 + k2, -k2; -k2, k2]), with inertia s^2 in the last
-        # entry.
+        # The poles are the roots of det([c1 + c2, -c2; -c2, c2 + load] s + [k1 + k2, -k2; -k2, k2]), with inertia s^2 added to the
+        # last entry.
         first, second = np.poly1d([p["c1"] + p["c2"], p["k1"] + p["k2"]]), np.poly1d([p["c2"], p["k2"]])
         poles = (first * (np.poly1d([inertia, p["c2"] + load, p["k2"]])) - second * second).roots
         np.testing.assert_allclose(np.sort_complex(mode.poles()), np.sort_complex(poles), rtol=1e-10)
@@ -132,7 +133,7 @@ def test_the_response_to_sines(pendulum: Path) -> None:
 
 
 def test_one_instance_for_many(pendulum: Path) -> None:
-    """An instance can be used after an error, and returns to its start values if none are given."""
+    """A Linearizer can be used after an error, and uses the FMU's start values if none are given."""
     with prw.Linearizer(pendulum, outputs=["rate"]) as linearizer:
         for k in (1.0, 16.0):
             assert linearizer.at({"stiffness": k, "angle": 0.0}).A[1, 0] == -k
@@ -211,8 +212,8 @@ def test_an_fmu_in_place_of_the_parameters(testbed: Path) -> None:
 
 
 def test_each_one_gets_the_messages_of_its_own_fmu(testbed: Path, tmp_path: Path) -> None:
-    """A Linearizer gets its messages also after others are closed. A message to a closed one would end the process, so the test runs in
-    a separate one."""
+    """A Linearizer gets the messages of its FMU also after other Linearizers are closed. A message to a closed one could crash the
+    process, so the test runs in a separate process."""
     program = f"""
 import gc, prw
 first = prw.Linearizer({str(testbed)!r})

@@ -65,7 +65,7 @@ BAD = {
     ),
     "time repeated": (
         b"time,theta1,theta2\n0,1,1\n0,1,1\n",
-        "row 3, column time: 0 is the time of the row before again",
+        "row 3, column time: 0 repeats the time of the previous row",
     ),
     "latin-1": ("time,theta1,theta2,größe\n0,1,1,1\n".encode("latin-1"), "row 1: not UTF-8 text"),
     "latin-1 later": ("time,theta1,theta2,x\n0,1,1,1\n1,1,1,ß\n".encode("latin-1"), "row 3: not UTF-8 text"),
@@ -188,7 +188,7 @@ def test_headers_as_others_write_them(file: Any, header: Any) -> None:
 
 
 def test_headers_of_other_tools(tmp_path: Path) -> None:
-    """Reads a file with a preamble, other names with units, counts of an encoder, and the encoding that Excel writes."""
+    """Reads a file with a preamble, other names with units, counts of an encoder, and encodings other than UTF-8."""
     rows = "".join(f"{k / 100};{k};{2 * k};{k % 7}\n" for k in range(30))
     path = tmp_path / "run.csv"
     path.write_text("type;float\ncapture;2026\n\nX;Motor 1;Motor 2;T [mNm]\n" + rows, encoding="utf-16")
@@ -257,7 +257,8 @@ def moving(rows: Any) -> str:
 
 
 def test_a_gap_is_an_error_or_a_note(file: Any) -> None:
-    """Motor motion in a gap of 0.2 s is unknown, which is an error. A smooth path bridges a gap of 20 ms."""
+    """Motor motion in a gap of 0.2 s is unknown, which is an error. A smooth path bridges a gap of 20 ms. If the motors rest in
+    a gap of 0.2 s, there is only a note."""
     with pytest.raises(UserError, match=r"no rows from 0.299 to 0.5 s, 0.201 s instead of the usual 0.001 s"):
         read_motion(file(moving([*range(300), *range(500, 900)])))
     measured = read(file(moving([*range(300), *range(320, 900)])))
@@ -291,7 +292,7 @@ def test_a_recording_with_measurements(tmp_path: Path) -> None:
 
 
 def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
-    """A dict, a DataFrame and the CSV file that it writes give the same recording, also with the time as index."""
+    """A dict, a DataFrame and the CSV file that the DataFrame writes give the same recording, also with the time as index."""
     time = np.arange(4) * 1e-3
     table: dict[str, Any] = {
         "time": time,

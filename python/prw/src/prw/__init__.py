@@ -6,7 +6,7 @@ it, run it with thousands of parameter sets, animate it, and compare results of 
     run = prw.simulate("motors.csv", {"k1": 100.0})  # or a prw.Motion; by default the paper's experiment
     run["roll"]  # (n,) rad, at run.time
 
-The public functions; the modules of this package are internal::
+These functions are public; the modules of this package are internal::
 
     simulate, read, animate, sweep     runs and recordings
     identify, excite                   parameters from measurements, and motions to measure with
@@ -14,9 +14,9 @@ The public functions; the modules of this package are internal::
     check                              another tool's results against a reference
     default_fmu                        the path of the FMU
 
-Everything is in SI (s, rad, rad/s, N.m, kg.m2). Functions write files only to paths that they are given, and print only the progress
-of long work at a Python prompt or in a notebook. An error that the caller can fix is a `prw.UserError`; its message names the
-cause and the remedy.
+Everything is in SI (s, rad, rad/s, N.m, kg.m2), except that a linear model has the units of its FMU. Functions write files
+only to paths that they are given, and print only the progress of long work at a Python prompt or in a notebook. An error
+that the caller can fix is a `prw.UserError`; its message names the cause and, if it is not obvious, the remedy.
 """
 
 import lazy_loader

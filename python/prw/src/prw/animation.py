@@ -43,7 +43,7 @@ def animate(
         Seconds of the run per second of the animation (default: 1, or the speed at which the animation lasts 6 s
         or 40 s if it would be shorter or longer).
     captions
-        Lines with the time (s) of the run from which each is shown, in order.
+        (time, line) each, in order: the line is shown from that time (s) of the run on.
 
     Returns
     -------
@@ -53,7 +53,8 @@ def animate(
     Raises
     ------
     UserError
-        The run lacks an output, `path` has another suffix or cannot be written, or a package is missing.
+        The run lacks an output, `path` has another suffix or cannot be written, a package is missing, the speed is not positive, or the
+        animation would be too long.
     """
     suffix = "" if path is None else suffix_of(Path(path))
     need("matplotlib")

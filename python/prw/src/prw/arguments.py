@@ -1,5 +1,4 @@
-"""Checks and conversions of arguments; each error names its argument. Values of parameters are given by name, or in a file such
-as `prw identify` writes."""
+"""Checks and conversions of arguments. Values of parameters are given by name, or in a file such as `prw identify` writes."""
 
 from __future__ import annotations
 
@@ -25,7 +24,7 @@ Table = Mapping[str, Any]
 
 
 def names_of(argument: str, given: str | Iterable[str]) -> tuple[str, ...]:
-    """One or more names, as a tuple."""
+    """One or more names, as a tuple. Raises UserError if `given` is neither a name nor a sequence."""
     if isinstance(given, str):
         return (given,)
     if not isinstance(given, Iterable):
@@ -48,14 +47,14 @@ def counted(argument: str, value: Any) -> int:
 
 
 def positive(argument: str, value: Any, name: str = "") -> float:
-    """A finite number above 0; name: the parameter or channel that it belongs to."""
+    """The value as a float. Raises UserError unless it is finite and above 0. name: the parameter or channel that has the value."""
     if not isinstance(value, Real) or not 0 < float(value) < math.inf:
         raise UserError(f"{name} {value!r} is not a positive number".lstrip(), argument=argument)
     return float(value)
 
 
 def not_negative(argument: str, value: Any, name: str = "") -> float:
-    """A finite number that is 0 or above; name: the parameter that it belongs to."""
+    """The value as a float. Raises UserError unless it is finite and 0 or above. name: the parameter that has the value."""
     if not isinstance(value, Real) or not 0 <= float(value) < math.inf:
         raise UserError(f"{name} {value!r} is not a number of 0 or more".lstrip(), argument=argument)
     return float(value)
@@ -63,20 +62,20 @@ def not_negative(argument: str, value: Any, name: str = "") -> float:
 
 def spread_of(argument: str, name: str, given: Any, start: float) -> tuple[float, float]:
     """The central value of a parameter and its relative standard deviation. `given` is (value, deviation), or only the
-    deviation; then the central value is `start`."""
+    deviation; then the central value is `start`. Raises UserError if a number is out of range."""
     value, relative = given if isinstance(given, Sequence) and len(given) == 2 else (start, given)
     if value is start and start == 0:
         raise UserError(f"{name} starts at 0; write (value, fraction)", argument=argument)
     value, relative = positive(argument, value, name), positive(argument, relative, name)
     if relative > MAX_RELATIVE:
         raise UserError(
-            f"{name} has a standard deviation of {relative:.0%}; 100 % is the most, as a fraction 1", argument=argument
+            f"{name} has a standard deviation of {relative:.0%}; 100 % is the most, a fraction of 1", argument=argument
         )
     return value, relative
 
 
 def is_path(given: Any) -> bool:
-    """Whether the argument is a path."""
+    """Whether the argument is a string or a path."""
     return isinstance(given, (str, os.PathLike))
 
 
@@ -95,7 +94,7 @@ def columns_of(table: Any) -> dict[str, Any]:
 
 
 def numbers_of(where: str, values: Any) -> NDArray[np.float64]:
-    """A column (n,). Raises UserError that begins with `where`."""
+    """The values as a column (n,) of floats. Raises a UserError whose message begins with `where`."""
     array = np.asarray(values)
     if array.dtype.kind in "mM":
         raise UserError(f"{where}: has dates or durations; write seconds as numbers")
@@ -108,13 +107,13 @@ def numbers_of(where: str, values: Any) -> NDArray[np.float64]:
     return array
 
 
-#: Values by name, in SI or as (value, unit), or the path of a JSON file with them.
+#: Values by name, in the FMU's units (SI for the testbed) or as (value, unit), or the path of a JSON file with them.
 Given = Mapping[str, Any] | str | os.PathLike[str] | None
 
 
 def values_of(given: Given, loaded: fmu_run.Fmu) -> dict[str, Any]:
-    """Values by name in the units of the FMU. Raises UserError for a file that cannot be read, or a unit that the FMU does not
-    have."""
+    """Values by name in the units of the FMU. Raises UserError for a file that cannot be read, an entry in it that is not a number,
+    or a unit that cannot be converted."""
     if given is None:
         return {}
     if isinstance(given, Mapping):
@@ -138,7 +137,8 @@ def values_of(given: Given, loaded: fmu_run.Fmu) -> dict[str, Any]:
 
 
 def in_own_unit(name: str, value: Any, loaded: fmu_run.Fmu) -> Any:
-    """(value, unit) in the unit of the FMU's variable; a value without a unit is returned unchanged. Raises UserError."""
+    """(value, unit) in the unit of the FMU's variable; a value without a unit is returned unchanged. Raises UserError
+    for a unit that cannot be converted."""
     if not (isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], str)) or name not in loaded.variables:
         return value
     try:
@@ -149,7 +149,7 @@ def in_own_unit(name: str, value: Any, loaded: fmu_run.Fmu) -> Any:
 
 def _value(path: Path, name: str, entry: Any, loaded: fmu_run.Fmu) -> float | int | bool:
     """An entry of the file, converted to the FMU's unit. The entry is a number in that unit, or a dict with a value and
-    its unit."""
+    its unit. Raises UserError for any other entry, or a unit that cannot be converted."""
     value, unit = (entry.get("value"), str(entry.get("unit", ""))) if isinstance(entry, dict) else (entry, "")
     if not isinstance(value, (int, float)):
         raise UserError(f"{path}: {name} is {value!r}, not a number", argument="parameters")

@@ -1,4 +1,4 @@
-"""The command `prw`: runs the subcommand, and reports errors that the user can fix in one line on stderr."""
+"""The command `prw`: runs the subcommand, and reports an error that the user can fix as one line on stderr."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from prw.commands import check, excite, identify, linearize, simulate, sweep
 from prw.commands.options import Formatter
 from prw.errors import UserError, one_line
 
-#: The subcommands by name. Each module has a docstring, which is the description, HELP in one line, run(arguments), and
-#: optionally add_options(parser) and EXAMPLES.
+#: The subcommands by name. Each is a module with a docstring (the description), HELP (one line), run(arguments) and,
+#: optionally, add_options(parser) and EXAMPLES.
 _MODULES = (simulate, check, linearize, identify, excite, sweep)
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in _MODULES}
 #: The option for each argument of a function, if their names differ.
@@ -27,7 +27,8 @@ OPTIONS = {"parameters": "--set", "priors": "--prior", "skip": "--skip-lines"}
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `prw` with the arguments argv (default: the process's). Returns the exit status: 0, the `status` of a
-    UserError (1, or 3 if the model does not explain the data), or 130 after an interrupt."""
+    UserError (1, or 3 if the model does not explain the data), or 130 after an interrupt. For wrong options, `--help` and
+    `--version`, argparse raises SystemExit."""
     return run("prw", "Simulate the pitch-roll wrist testbed through its FMU.", COMMANDS, argv)
 
 

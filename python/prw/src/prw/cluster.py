@@ -33,8 +33,9 @@ def on_cluster(
     address: str,
     progress: Callable[[int], None],
 ) -> Statistics:
-    """The statistics of runs on the Dask cluster at `address`. If a worker dies, its task is tried twice more; then its
-    runs are recorded as failed."""
+    """The statistics of runs on the Dask cluster at `address`. A task that fails is tried twice more, and a task whose worker
+    dies is tried again as often as Dask's settings allow; then its runs are recorded as failed. Raises UserError if the
+    cluster does not respond, has no workers, or its workers lack a package."""
     total = len(next(iter(values.values())))
     measured = {f"{name}_{measure}": np.full(total, np.nan) for name in OUTPUTS for measure in MEASURES}
     errors: dict[int, str] = {}

@@ -41,8 +41,8 @@ class Channel(NamedTuple):
     quantity
         A key of UNITS.
     noise
-        Standard deviation in SI that is assumed before anything is measured. It belongs to a torque sensor of 20 N.m with
-        0.1 %, or to an encoder or inertial sensor with 0.06 deg and 0.6 deg/s.
+        Standard deviation in SI that is assumed before anything is measured: 0.1 % of a torque sensor of 20 N.m, and 0.06 deg
+        and 0.6 deg/s of an encoder or inertial sensor.
     """
 
     quantity: str
@@ -66,7 +66,7 @@ QUANTITIES = {"time": "time", **MOTORS, **{name: channel.quantity for name, chan
 
 def factor(name: str, unit: str) -> float:
     """The factor from `unit` to SI for column `name`. A unit may be divided, as in rev/10000 for the counts of an
-    encoder. Raises UserError for a unit of another quantity."""
+    encoder. Raises UserError for an unknown unit or a unit of another quantity."""
     whole, slash, count = unit.partition("/")
     if slash and count.strip().isdigit() and int(count) > 0:
         return factor(name, whole) / int(count)
@@ -86,8 +86,8 @@ def si_unit(name: str) -> str:
 
 ANGLES = ("theta1", "theta2")
 RATES = ("omega1", "omega2")
-#: Header of a column: `pitch [deg]`, `pitch (deg)`, `pitch_deg`, `pitch/deg` or `pitch deg`. Upper and lower case are
-#: equal, and `t` is the time.
+#: Header of a column: `pitch [deg]`, `pitch (deg)`, `pitch_deg`, `pitch/deg` or `pitch deg`. Case does not
+#: matter, and `t` is the time.
 NAMES = "|".join(sorted([*QUANTITIES, "t"], key=len, reverse=True))
 COLUMN = re.compile(rf"^\s*({NAMES})(?:\s*\[([^\]]*)\]|\s*\(([^)]*)\)|[\s_/,]+(\S+))?\s*$", re.IGNORECASE)
 #: Maximum number of column names quoted in an error message.

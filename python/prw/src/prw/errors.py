@@ -6,13 +6,13 @@ import importlib.util
 import unicodedata
 from typing import Any
 
-#: Maximum number of characters of a message.
+#: Number of characters after which a message is cut.
 LONGEST = 1000
 
 
 def one_line(text: str, longest: int = LONGEST) -> str:
-    """The string, cut to `longest` characters. Characters that a terminal would interpret or cannot show become
-    escapes."""
+    """The string; if it has more than `longest` characters, the rest becomes "...". Characters that a terminal would interpret
+    or cannot show become escapes."""
     cut = text if len(text) <= longest else text[:longest] + "..."
     return "".join(c if c.isprintable() or unicodedata.category(c) == "Zs" else _escaped(c) for c in cut)
 
@@ -29,7 +29,7 @@ class UserError(ValueError):
     message
         The cause and the remedy.
     argument
-        The argument of the function that the message concerns; `prw` names its option instead.
+        The function's argument that is wrong; `prw` names the option for this argument instead.
     given
         The value of the argument.
     """

@@ -1,4 +1,4 @@
-"""Atomic writing of result files and of tables, and the files of the pages."""
+"""Atomic writing of result files and tables, reading of small files, and the files of the pages."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ except ImportError:  # Windows
 #: Number of rows that are written with one call.
 BLOCK = 8192
 
-#: The package, and the clone around it or from which it was installed.
+#: The directory of the package, and the clone that contains it or from which it was installed.
 PACKAGE = Path(__file__).parent
 _INSTALLED_FROM = PACKAGE / "clone.txt"
 CLONE = (
@@ -39,7 +39,8 @@ PAGE_DIRECTORIES = ("crates/fmu-package/page", "docs/fmu-page/wrist")
 
 
 def page_file(name: str) -> Path:
-    """A script, style sheet or table of the pages that show the wrist."""
+    """The path of a script, style sheet or table of the pages that show the wrist. If the file is missing, its path in the
+    package."""
     locations = [PACKAGE / "page" / name, *(CLONE / directory / name for directory in PAGE_DIRECTORIES)]
     return next((path for path in locations if path.is_file()), locations[0])
 
@@ -103,7 +104,8 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def _lock(descriptor: int) -> None:
-    """Lock a file until the process ends or closes it. Raises OSError if another process has locked it."""
+    """Lock a file until the process ends or closes it. Raises OSError if another process has locked it. Does
+    nothing on Windows."""
     if fcntl is not None:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
@@ -144,7 +146,7 @@ def write_table(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
     ):
         file.write((",".join(columns) + "\n").encode("ascii"))
         for start in range(0, len(table), BLOCK):
-            # JSON: [[1.0,2.0],[3.0,4.0]], with null for NaN. Brackets become line ends.
+            # JSON: [[1.0,2.0],[3.0,4.0]], with null for a number that is not finite. Brackets become line ends.
             rows = orjson.dumps(table[start : start + BLOCK], option=orjson.OPT_SERIALIZE_NUMPY)
             file.write(rows[2:-2].replace(b"],[", b"\n").replace(b"null", b"nan") + b"\n")
             progress(start)

@@ -1,5 +1,5 @@
-"""Draws the frames of an animation, the testbed in 3D with plots of its angles and torques below, and writes them as
-GIF, MP4, or an HTML page that loads no other file."""
+"""Draws the frames of an animation, the testbed in 3D with plots of its angles and torques below, and writes them as GIF or
+MP4. Also writes an HTML page that draws the animation itself and loads no other file."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def write_gif(path: Path, frames: Iterable[Image.Image], rate: int, colours: Ite
 
 
 def write_page(path: Path, title: str, signals: Mapping[str, Array], speed: float, captions: Sequence[Any]) -> None:
-    """Write an HTML page with plots of the columns, among them `time`, and the wrist in 3D, which the reader can turn."""
+    """Write an HTML page with plots of the signals, (n,) by name, among them `time`, and the wrist in 3D, which the user can turn."""
     files = {name: page_file(name).read_text(encoding="utf-8") for name in (*SCRIPTS, "live.css", "wrist.json")}
     columns = {name: base64.b64encode(np.asarray(one, "<f8").tobytes()).decode() for name, one in signals.items()}
     run = {"title": title, "columns": columns, "speed": speed, "captions": [list(one) for one in captions]}
@@ -114,7 +114,7 @@ SIZE, DPI = (720, 405), 92
 SHOWN_TWIST = 0.9
 #: Largest factor on the twist.
 MAX_TWIST_FACTOR = 100.0
-#: Direction of the viewer, deg: from the left of motor 2, and above.
+#: Direction of the viewer, deg: in front of the testbed, on the side of motor 2, and above.
 AZIMUTH, ELEVATION = -64, 20
 #: Directions to the viewer and to the lamp in matplotlib's axes.
 VIEWER = np.array([np.cos(np.deg2rad(AZIMUTH)), np.sin(np.deg2rad(AZIMUTH)), np.tan(np.deg2rad(ELEVATION))])
@@ -168,8 +168,8 @@ class _Animation(FuncAnimation):
 def drawn(
     run: Run, speed: float, count: int, rate: int, target: Path | None, captions: Sequence[tuple[float, str]]
 ) -> FuncAnimation:
-    """The animation of `count` frames, `rate` per second, `speed` times as fast as the run, written to `target`; see
-    `prw.animate`."""
+    """The animation of `count` frames, `rate` per second, `speed` times as fast as the run, written to `target` if that
+    is given; see `prw.animate`."""
     time = run.time
     signals = angles_and_torques(run)
     frame = _Frame(time, signals, speed, captions)
@@ -193,7 +193,7 @@ def drawn(
 
 
 def angles_and_torques(run: Run) -> dict[str, Array]:
-    """The moving variables, (n,) each by name. Raises UserError if one is missing."""
+    """The moving variables, (n,) each by name. Raises UserError if one is missing or has values that are not finite."""
     for name in MEASURED:
         if name not in run:
             raise UserError(f"the run has no {name}, which an animation shows; ask for it with `outputs=`")
@@ -250,7 +250,7 @@ class _Frame:
         ]
 
     def _panel(self, number: int, panel: Panel) -> list[Moving]:
-        """Axes with the whole curves in pale colours, and the moving parts on them."""
+        """Adds axes with the whole curves in pale colours. Returns the parts that move on them."""
         axis = self.figure.add_axes((0.055 + 0.328 * number, 0.105, 0.265, 0.18))
         axis.set_title(panel.title)
         values = {name: panel.factor * self.signals[name] for name in panel.curves}
@@ -336,6 +336,6 @@ def _bright(colour: ArrayLike, level: ArrayLike) -> Array:
 
 
 def _round_below(value: float) -> float:
-    """1, 2 or 5 times a power of ten, the largest up to value; 1 at least."""
+    """The largest number up to value that is 1, 2 or 5 times a power of ten, but at least 1."""
     power = 10.0 ** float(np.floor(np.log10(max(value, 1))))
     return max(float(step * power) for step in (1.0, 2.0, 5.0) if step * power <= max(value, 1))

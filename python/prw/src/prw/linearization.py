@@ -50,14 +50,14 @@ def linearize(
     Raises
     ------
     UserError
-        The FMU is missing, has no directional derivatives, lacks a name or rejects a value.
+        The FMU is missing, has no directional derivatives, lacks a variable or rejects a value.
     """
     with Linearizer(fmu, outputs=outputs, fmi_type=fmi_type) as linearizer:
         return linearizer.at(parameters)
 
 
 class Linearizer:
-    """Linear models of one FMU, from one instance: call `at(parameters)` as often as needed. A context
+    """Linear models of one FMU, which is loaded only once: call `at(parameters)` as often as needed. A context
     manager; leaving it unloads the FMU.
 
     The testbed's `use_omega` and `start_at_rest` are set as for `linearize`.
@@ -155,7 +155,7 @@ class Linearizer:
         self.close()
 
     def _chosen(self, wanted: str | None) -> str:
-        """The interface type to use."""
+        """The interface type to use. Raises UserError if the FMU has no directional derivatives for it."""
         offers = self.loaded.directional
         directional = {name: offers[other] for name, other in FMU_RUN_NAMES.items() if other in offers}
         attribute = "providesDirectionalDerivative" + ("" if self.loaded.fmi_version == "2.0" else "s")
@@ -173,8 +173,8 @@ class Linearizer:
         return variable is not None and (variable.causality, variable.type) == ("parameter", "Boolean")
 
     def _start(self, name: str, value: Any) -> Any:
-        """Returns the value if it has the type of the variable. Raises UserError otherwise, or if there is no such
-        variable."""
+        """Returns the value if it is a string for a String, or a number for another type. Raises UserError otherwise, or if there
+        is no such variable."""
         variables = self.loaded.variables
         if name not in variables:
             settable = [v.name for v in variables.values() if v.causality in ("parameter", "input")]

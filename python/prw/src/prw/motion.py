@@ -37,7 +37,7 @@ class Motion:
     Raises
     ------
     UserError
-        The shapes do not fit, or time does not increase.
+        A value is not a number, the shapes do not fit, or time does not increase.
     """
 
     time: Array
@@ -74,8 +74,8 @@ class Motion:
 def fig4(step: float = 1e-3, opposite: bool = True) -> Motion:
     """The paper's experiment (Sec. 4, Fig. 4): theta1' = sin(10 pi t) = -theta2'.
 
-    The angles are the integrals from zero, (1 - cos(10 pi t)) / (10 pi). Angle and rate are the true values at each
-    communication point, so the torque there is the true one, and the path between two points is second-order accurate.
+    The angles are the integrals from zero, (1 - cos(10 pi t)) / (10 pi). Angles and rates are exact at each communication
+    point, and the path between two points is second-order accurate in `step`.
 
     Parameters
     ----------

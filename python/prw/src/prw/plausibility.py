@@ -11,15 +11,15 @@ from prw.columns import ANGLES, RATES
 from prw.errors import UserError
 from prw.motion import Array
 
-#: Motor speed in rad/s that no wrist move reaches. It is exceeded if the file is in degrees but is read as radians.
+#: Motor speed in rad/s that no wrist move reaches. It is usually exceeded if the file is in degrees but is read as radians.
 PLAUSIBLE_SPEED = 30.0
 #: Motor angle in rad that no wrist move reaches.
 PLAUSIBLE_ANGLE = 4 * np.pi
-#: Motion of a motor, in rad, below which its rate is not checked.
+#: Motion of a motor, in rad, below which its rate is not compared with its angle. Near a gap, a tenth of this counts as motion.
 SMALL_MOVE = 0.02
-#: Rate in rad/s below which a motor counts as at rest.
+#: Rate in rad/s up to which a motor counts as at rest in the first row.
 SLOW = 0.1
-#: Time between two samples in s that is probably a mistake. It is exceeded if the file is in milliseconds but is read as seconds.
+#: Mean time between two samples in s above which the unit is probably wrong: milliseconds that are read as seconds.
 SLOW_SAMPLING = 0.5
 #: Rows are missing if the time between two rows is more than this multiple of the median.
 MISSING = 5.0
@@ -89,7 +89,7 @@ def notes_on_values(time: Array, theta: Array, omega: Array | None, units: Mappi
 
 
 def _mismatch(time: Array, theta: Array, omega: Array, side: int) -> str:
-    """Returns a note if the integral of the rate omega (n,) differs from the motion of the angle theta (n,), else an empty string."""
+    """Returns a note if the integral of the rate omega (n,) clearly differs from the motion of theta (n,), else an empty string."""
     turned = theta - theta.mean()
     if np.ptp(theta) < SMALL_MOVE:
         return ""

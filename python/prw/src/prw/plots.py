@@ -1,4 +1,4 @@
-"""Figures of a simulation. Colours are from Okabe and Ito's set, distinguishable with any colour vision and in grey."""
+"""Figures of a simulation. Colours are from Okabe and Ito's set, which can be distinguished with any colour vision."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ STYLE: Any = {
     "axes.axisbelow": True,
     "lines.linewidth": 1.3,
     "legend.frameon": False,
-    # SVG keeps text, and a figure always gives the same file.
+    # SVG files contain text as text, and the identifiers in the file of a figure are always the same.
     "svg.fonttype": "none",
     "svg.hashsalt": "prw",
 }
@@ -42,7 +42,7 @@ PAGE_STYLE: Any = {
     "xtick.labelsize": 8,
     "ytick.labelsize": 8,
 }
-#: Number of intervals to which a long curve is reduced, each drawn by its extremes. The figure has fewer pixels.
+#: Number of intervals into which a long curve is divided. Only the extremes in each are drawn, because a figure has fewer pixels.
 INTERVALS = 4000
 #: If all curves of a panel are below this, the scale is -1 to 1, so that rounding errors look like zero.
 ROUNDING = 1e-9
@@ -68,7 +68,7 @@ class ShownFigure(Figure):
 
 
 def motion_panel(motion: Motion, angles: bool) -> Panel:
-    """The motors: their angles in degrees, or their velocities as in Fig. 4 if the motion has them."""
+    """The motors: their angles in degrees or, if `angles` is false and the motion has them, their velocities as in Fig. 4."""
     if angles or motion.omega is None:
         label, (y1, y2) = "θ₁, θ₂  (deg)", np.rad2deg(motion.theta.T)
         return Panel("Motor angles", label, [("motor 1", y1), ("motor 2", y2)])

@@ -25,9 +25,9 @@ def _is_wanted() -> bool:
 
 
 class Progress:
-    """Reports the progress of a task that takes longer than two seconds, if that is wanted.
+    """Reports the progress of a task that takes longer than two seconds, in commands and interactive sessions.
 
-    On a terminal one line is rewritten, and wiped on leaving the context; in a log a line is added every ten seconds.
+    On a terminal, one line is rewritten, and cleared at the end; in a log, a line is added every ten seconds.
     """
 
     def __init__(self, label: str, total: int):
@@ -41,7 +41,7 @@ class Progress:
         return self
 
     def __call__(self, done: int) -> None:
-        """Report that `done` units are done; cheap enough for every thousand rows."""
+        """Report that `done` units are done. This is fast enough to be called every thousand rows."""
         now = time.monotonic()
         if now < self._next or not _is_wanted():
             return

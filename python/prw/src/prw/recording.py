@@ -24,7 +24,7 @@ IN_MEMORY = Path("recording")
 
 @dataclass(frozen=True)
 class Recording:
-    """One recorded experiment, in SI: a mapping from the names of time, motors and measured outputs to values, (n,).
+    """One recorded experiment, in SI. `recording[name]` is a column (n,): the time, a motor or a measured output.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Recording:
     units
         The unit of each column in the file.
     source
-        The file, or "recording" if there is none.
+        The file, or a name if there is none.
     """
 
     source: Path
@@ -65,7 +65,7 @@ class Recording:
 
     @property
     def notes(self) -> list[str]:
-        """Notes for the user about probable mistakes in the recording."""
+        """Notes for the user, for example on probable mistakes in the recording."""
         return self.motion.notes
 
     def __getitem__(self, column: str) -> Array:
@@ -90,12 +90,13 @@ def read(
 ) -> Recording:
     """Read a recorded experiment from a CSV file, or from a DataFrame or a dict of arrays with the same columns.
 
-    Its columns: time (s), theta1, theta2 (rad) and, if present, omega1, omega2 (rad/s) and any of tau1, tau2
-    (N.m), theta3, theta4, pitch, roll (rad), pitch_rate, roll_rate (rad/s), in any order; others are ignored. The file is
-    UTF-8 text (or UTF-16 with a byte order mark) and has a header line, which may follow comments that begin with `#`. Columns are separated
-    by commas, semicolons or tabs; with semicolons, numbers may have a decimal comma. Time may be uneven but must increase. If rows are
-    missing, a note reports it; if they are missing for too long while the motors move, the recording is rejected. A measured column
-    may have empty cells.
+    The columns are time (s), theta1, theta2 (rad) and, if present, omega1, omega2 (rad/s) and any of tau1, tau2 (N.m), theta3,
+    theta4, pitch, roll (rad), pitch_rate, roll_rate (rad/s), in any order; other columns are ignored. Time may be uneven but must
+    increase. If rows are missing, a note reports it; if they are missing for too long while the motors move, the recording is
+    rejected. A measured column may have empty cells.
+
+    By default, a file is UTF-8 text, or UTF-16 with a byte order mark. It has a header line, which may follow comments that begin
+    with `#`. Columns are separated by commas, semicolons or tabs; with semicolons, numbers may have a decimal comma.
 
     Parameters
     ----------

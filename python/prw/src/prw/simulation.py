@@ -21,7 +21,7 @@ from prw.testbed import OUTPUTS, Testbed
 
 #: Sampling error, as a fraction of the peak, above which there is a warning.
 DOUBTFUL = 0.01
-#: Minimum number of times from which the sampling error is estimated.
+#: The sampling error is estimated if a second run, with every other time, has at least this number of times.
 MIN_TIMES = 8
 #: Peak below which an output is a rounding error.
 ROUNDING = 1e-12
@@ -44,7 +44,7 @@ class Run(Mapping[str, Array]):
         The value of every parameter of the FMU in this run, in SI.
     sampling_errors
         The largest error of each output that is caused by the sampling of the motors, as a fraction of the output's
-        peak. The errors are estimated by a second run, with every other time.
+        peak. The errors are estimated by a second run, with every other time; empty if that run would be too short.
     """
 
     def __init__(
@@ -93,13 +93,13 @@ class Run(Mapping[str, Array]):
         return len(self._outputs)
 
     def recording(self) -> Recording:
-        """The run as a recording of its outputs."""
+        """The run as a recording of those outputs that can also be measured."""
         measured = {name: self[name] for name in MEASURED if name in self}
         return Recording(Path(self.motion.name), self.motion, measured, dict.fromkeys(self, ""))
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
-        """Write time (s), the motors' angles (rad) and, if given, rates (rad/s), and the outputs (SI) to `path`, a
-        row each time. Numbers keep all their digits. Raises UserError if the file cannot be written."""
+        """Write time (s), the motors' angles (rad) and, if given, rates (rad/s), and the outputs (SI) to `path`,
+        one row for each time. Numbers keep all their digits. Raises UserError if the file cannot be written."""
         write_table(Path(path), {**self.motion.columns, **self._outputs})
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -113,8 +113,8 @@ class Run(Mapping[str, Array]):
     def plot(self, title: str | None = None, *, angles: bool = True) -> Figure:
         """Motors, pitch and roll, and torques over time, if the run has them; save it with `.savefig(path)`.
 
-        angles: show angles, in degrees, of motors and wrist. Otherwise velocities only, as in Fig. 4. Raises UserError
-        without matplotlib.
+        angles: show the angles of motors and wrist, in degrees. If false, the wrist's angles are left out, and the motors'
+        rates, if they are known, replace their angles, as in Fig. 4. Raises UserError without matplotlib.
         """
         need("matplotlib")
         from prw.plots import draw_response
@@ -151,7 +151,7 @@ def simulate(
     ----------
     motion
         The motion of the motors, or a recording of it (a CSV file, a DataFrame or a dict of arrays as `prw.read` takes it;
-        only its motors matter here), or a run to repeat. Default: the paper's experiment of Fig. 4.
+        only its motors matter here), or a run whose motion is repeated. Default: the paper's experiment of Fig. 4.
     parameters
         Values of parameters by name, in SI or with a unit as in (1.9, "N.m/deg"), or the path of a JSON file that `prw
         identify` has written. Other parameters keep the FMU's start values.
@@ -195,21 +195,21 @@ def simulate(
 
 def _sampling_error(fine: Array, coarse: Array) -> float:
     """The error of the output `fine` (n,) as a fraction of its peak. `coarse` is the same output of a run with every
-    other time, in which the error is four times as large, because it is second order in the step size."""
+    other time, in which the error is four times as large, because errors are second order in the step size."""
     peak = float(np.abs(fine).max())
     return float(np.abs(coarse - fine[::2]).max()) / 3 / peak if peak > ROUNDING else 0.0
 
 
 def _rounded_up(number: float) -> float:
-    """The next number of two digits."""
+    """The number, rounded up to two significant digits."""
     digits = 10.0 ** (np.floor(np.log10(number)) - 1)
-    # The subtraction prevents that a rounding error of the division raises the number.
+    # Without the subtraction, a rounding error of the division could raise the number.
     return float(np.ceil(number / digits - 1e-9) * digits)
 
 
 def motion_of(source: Motion | Recording | Run | str | os.PathLike[str] | Table | None) -> Motion:
-    """The motion itself, the motion of a recording, a run, a file or columns, or the motion of Fig. 4. Raises UserError if a
-    file or column cannot be read."""
+    """The motion `source`, or the motion of a recording, a run, a file or columns; by default the motion of Fig. 4. Raises
+    UserError if a file or column cannot be read."""
     if source is None:
         return fig4()
     if isinstance(source, (Recording, Run)):

@@ -63,7 +63,8 @@ class StateSpace:
         return np.ascontiguousarray(whole[:, :, kept], dtype=np.complex128)
 
     def moved(self, rates: Mapping[str, str]) -> tuple[str, ...]:
-        """The inputs that are not among `rates`: the columns of `transfer` and `response_at_hz`."""
+        """The inputs that are not among `rates`: the columns of `transfer` and `response_at_hz`. Raises UserError for names that are
+        not inputs."""
         for name in (*rates, *rates.values()):
             if name not in self.inputs:
                 raise UserError(f"{name} is not an input; there are {', '.join(self.inputs)}", argument="rates")
@@ -71,7 +72,7 @@ class StateSpace:
 
     def response_at_hz(self, frequency: ArrayLike, rates: Mapping[str, str] | None = None) -> Complex:
         """The response to sines, for frequencies (k,) in Hz: complex amplitudes of outputs per input, (k, p, m).
-        rates: as for `transfer`. For frequencies in rad/s, `transfer(1j * omega)`, or python-control's own:
+        rates: as for `transfer`. For frequencies in rad/s, use `transfer(1j * omega)`, or python-control with
         `to_control().frequency_response(omega)`."""
         return self.transfer(2j * np.pi * np.atleast_1d(np.asarray(frequency, dtype=np.float64)), rates)
 

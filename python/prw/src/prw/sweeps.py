@@ -65,9 +65,9 @@ def sweep(
     threads
         Number of threads (default: one for each processor).
     scheduler
-        The address of a Dask cluster that makes the runs instead.
+        The address of the scheduler of a Dask cluster, which then makes the runs instead of this process.
     out
-        A directory for the table, as runs.parquet.
+        A directory, in which the table is written as runs.parquet.
 
     Returns
     -------
@@ -142,8 +142,9 @@ def layout(
     testbed: Testbed,
     fixed: Mapping[str, Any],
 ) -> dict[str, Array]:
-    """The values of the parameters that vary, (runs,) each: all combinations of the grid, each with all draws. The
-    draws are about the values in `fixed` or the FMU's start values. Raises UserError for invalid arguments."""
+    """The values of the parameters that vary, (runs,) each: all combinations of the grid, each with all draws. If
+    only a relative standard deviation is given, the median is the value in `fixed` or the FMU's start value. Raises UserError for
+    invalid arguments."""
     testbed.with_starts(fixed)
     starts = {**testbed.starts, **fixed}
     check_names("grid", grid, testbed.starts)

@@ -1,4 +1,4 @@
-"""Reads numbers from a CSV file. Every error names the file, the line and the column."""
+"""Reads numbers from a CSV file. Errors name the file and, where possible, the line and the column."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def read_table(
 
     An empty cell in a column of `may_be_empty` becomes NaN. increasing: whether the first column, the time, must
     increase. skip: lines above the header. encoding: of the file (default: UTF-8, or UTF-16 if the file begins with its byte order mark).
-    Raises UserError naming file, line and column.
+    Raises UserError naming the file and, where possible, the line and the column.
     """
     try:
         check_regular(path)
@@ -142,7 +142,7 @@ def _rows(
                 where = _where(path, table.line_num)
                 values = [_number(f"{where}, column {n}", row[i], comma, n in may_be_empty) for n, i in columns]
             if increasing and values[0] <= previous:
-                message = "is the time of the row before again" if values[0] == previous else "runs backwards"
+                message = "repeats the time of the previous row" if values[0] == previous else "runs backwards"
                 raise UserError(
                     f"{_where(path, table.line_num)}, column time: {row[indices[0]].strip()} {message}"
                     f" (after {previous!r}); time must increase from row to row"
@@ -156,7 +156,7 @@ def _rows(
 
 
 def _number(where: str, cell: str, comma: bool, may_be_empty: bool) -> float:
-    """The number in a cell, perhaps with a decimal comma. Raises UserError that begins with `where`."""
+    """The number in a cell, perhaps with a decimal comma. Raises a UserError whose message begins with `where`."""
     content = cell.strip()
     if may_be_empty and content.lower() in ("", "nan"):
         return math.nan

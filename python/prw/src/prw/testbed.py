@@ -1,4 +1,4 @@
-"""The testbed FMU as an instance for Co-Simulation."""
+"""The testbed FMU, and its runs in Co-Simulation."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ BUILT = CLONE / "target" / "fmu" / "prw_testbed.fmu"
 
 
 def default_fmu() -> Path:
-    """The path of the default testbed FMU, for any importer: `fmu_run.Fmu(prw.default_fmu())`.
+    """The path of the default testbed FMU, for any importer, as in `fmu_run.Fmu(prw.default_fmu())`.
 
     The environment variable PRW_FMU has precedence, then the FMU in the installed package, then the FMU that `make fmu`
     builds in the clone from which the package is installed. Raises UserError if there is none.
@@ -101,7 +101,8 @@ class Testbed:
         return {v.name: float(v.start or 0) for v in parameters}
 
     def with_starts(self, parameters: Mapping[str, Value]) -> dict[str, Value]:
-        """The value of every numeric parameter, in the FMU's units: `parameters`, and the start values of the others.
+        """The value of every parameter except strings and `use_omega`, in the FMU's units: `parameters`, and the start values
+        of the others.
         Raises UserError for a name that is not a parameter, or a value that is not a number."""
         known = {
             v.name: _value(v.type, v.start or "0")
@@ -119,12 +120,12 @@ class Testbed:
     def respond(
         self, motion: Motion, outputs: Sequence[str] = OUTPUTS, start: Mapping[str, float] = {}
     ) -> dict[str, Array]:
-        """Response to `motion` from rest at its first angles, or from the start values `start` (parameters by name, in
-        the FMU's units); each sample is one communication point.
+        """Response to `motion` with the start values `start` (parameters by name, in the FMU's units), by default from rest at
+        the first angles; each sample is one communication point.
 
         Returns `outputs` (any Real variables) by name, each (n,), in the FMU's units (N.m, rad, rad/s). Sample k is
         read at time[k], after the motors' angles (and rates, if the motion has them) of sample k were set, so all
-        values of a row belong to the same instant.
+        values of a row belong to the same instant. Raises UserError if the FMU rejects a value or the run fails.
         """
         try:
             runs = self.loaded.run(motion.time, outputs=outputs, **driven_by(motion, start))
@@ -136,12 +137,13 @@ class Testbed:
 
 
 def stopped(why: str) -> str:
-    """The message about a run that the FMU has rejected."""
+    """The message about a run that failed. why: from fmu_run."""
     return f"the FMU stopped {why}" if why.startswith("at ") else f"the FMU stopped: {why}"
 
 
 def driven_by(motion: Motion, start: Mapping[str, Any] = {}) -> dict[str, Any]:
-    """Arguments of `fmu_run.Fmu.run` for motors that follow `motion` from rest at its first angles, or from `start`."""
+    """Arguments of `fmu_run.Fmu.run` for motors that follow `motion`, with the start values `start`, by default from rest at the
+    first angles."""
     inputs = dict(zip(ANGLES, motion.theta.T))
     if motion.omega is not None:
         inputs.update(zip(RATES, motion.omega.T))

@@ -2,7 +2,7 @@
 
 wrist.json defines the bodies, also for the pages that show the wrist. The frame is the frame of eq. (4a). X is the pitch
 axis, along the input shafts from motor 1 to motor 2. Y is the roll axis, up to the gripper. Z points to the viewer. Lengths
-are not to scale: the roller-carriers have a radius of 0.8.
+are not to scale and have no unit; the roller-carriers have a radius of 0.8.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ COLOURS: dict[str, str] = PARTS["colours"]
 STEEL, DARK, PALE = COLOURS["steel"], COLOURS["dark"], COLOURS["pale"]
 #: Maximum number of corners of a face; the end of a roller has six.
 CORNERS = 6
-#: Sides of round bodies.
+#: Number of sides of a round body; the ring has twice as many.
 ROUND: int = PARTS["round"]
 
 
@@ -99,7 +99,7 @@ class Wrist:
 
 
 def _side(motor: int, side: int, colour: str) -> Iterable[Part]:
-    """The parts that turn about the pitch axis on one side, from the motor to its roller-carrier."""
+    """The parts of one side, from the motor to its roller-carrier. They turn about the pitch axis or are fixed."""
     shaft, middle, carrier = (f"theta{number + motor - 1}" for number in (1, 3, 5))
 
     def turning(name: str, *bodies: list[Face]) -> Part:

@@ -31,7 +31,7 @@ def check(
     Parameters
     ----------
     result
-        CSV, a .mat file as OpenModelica writes it, or one that MATLAB saved with `-v7` or earlier. Its columns are
+        CSV, a .mat file as OpenModelica writes it, or one that MATLAB saved with `-v7` or earlier. Columns are
         found by name, with or without a component, as in `testbed.roll`; unknown columns are ignored. Units
         are part of the names (`roll [deg]`) or in `units`, otherwise they are SI.
     experiment

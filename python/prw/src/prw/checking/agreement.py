@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 #: Times that differ by less than this, in s, are equal.
 SAME_TIME = 1e-9
-#: If a motor differs by more than this share of its largest angle or rate, the result belongs to another motion.
+#: If a motor differs by more than this share of the largest angle or rate of both motors, a note tells the user to look at the inputs.
 OTHER_MOTORS = 1e-2
 #: Relative difference up to which the ratio of result and reference is taken for the factor of a wrong unit or sign.
 NEAR = 0.02
@@ -117,7 +117,7 @@ class Agreement:
         return "\n".join([*lines, *(f"note        {note}" for note in self.notes)])
 
     def to_json(self, path: str | os.PathLike[str] | None = None) -> str:
-        """Everything in numbers, as JSON; written to `path`, too, if it is given."""
+        """The differences and the notes as JSON, also written to `path` if it is given."""
         content = {
             "result": str(self.source),
             "experiment": self.experiment.name,
@@ -200,8 +200,8 @@ def nearest(result: Result, known: Sequence[Experiment]) -> Experiment:
 
 
 def interpolated(time: Array, values: Array, at: Array) -> Array:
-    """Values (n,) at the times `time` (n,), interpolated to the times `at` (m,): the value of that row, if there is
-    one, else the cubic through the four nearest rows."""
+    """Values (n,) at the times `time` (n,), interpolated to the times `at` (m,): the value of the row with that time, if there
+    is one, else the cubic through the four nearest rows."""
     count = min(4, len(time))
     first = np.clip(np.searchsorted(time, at) - count // 2, 0, len(time) - count)
     nodes = first[:, None] + np.arange(count)
@@ -211,7 +211,7 @@ def interpolated(time: Array, values: Array, at: Array) -> Array:
         others = [j for j in range(count) if j != i]
         weight = np.prod((at[:, None] - t[:, others]) / (t[:, [i]] - t[:, others]), axis=1)
         found += weight * values[nodes[:, i]]
-    # A cubic misses the value at a row in which the curve has a corner.
+    # The value of a row is taken as it is, even if its time differs by a rounding error.
     near = np.clip(np.searchsorted(time, at - SAME_TIME), 0, len(time) - 1)
     same = np.abs(time[near] - at) <= SAME_TIME
     return np.where(same, values[near], found)
@@ -224,7 +224,7 @@ def _common_times(result: Result, experiment: Experiment) -> Array:
 
 
 def _notes(bare: Agreement, result: Result) -> list[str]:
-    """Missing outputs, and possible causes of differences."""
+    """Notes on missing times and outputs, and on possible causes of differences."""
     experiment, notes = bare.experiment, []
     if bare.time[0] > 0 or bare.time[-1] < experiment.stop_time - SAME_TIME:
         span = f"{bare.time[0]:g} to {bare.time[-1]:g} s"
@@ -260,7 +260,7 @@ def _notes(bare: Agreement, result: Result) -> list[str]:
 
 def _late_by(bare: Agreement, result: Result) -> float:
     """The communication step (s) by which the result is late, if everything agrees after a shift by this step, else 0.
-    Tries the steps of both interface types and of the result."""
+    Tries the steps of both interface types, and the median step of the result."""
     for step in {*bare.experiment.step.values(), float(np.median(np.diff(result.time)))}:
         inside = bare.time + step <= result.time[-1] + SAME_TIME
         allowed = bare.experiment.tolerance[bare.interface]

@@ -58,7 +58,7 @@ class Experiment:
 
 
 def read_experiments(fmu: Path) -> list[Experiment]:
-    """All experiments in the FMU file. Raises UserError if it has none."""
+    """All experiments in the FMU file. Raises UserError if it cannot be read or has none."""
     try:
         with zipfile.ZipFile(fmu) as archive:
             return [

@@ -16,7 +16,7 @@ from prw.errors import UserError, need
 from prw.motion import Array
 from prw.table import read_table
 
-#: The components before a name, separated by dots in Modelica and SSP, by slashes in Simulink.
+#: The title of a column: the components, which end with dots in Modelica and SSP and with slashes in Simulink, then the name.
 PREFIXED = re.compile(rf"^(.*[./:|])?((?:{NAMES}|tout).*)$", re.IGNORECASE)
 #: The default component if columns of several components have the same name.
 TESTBED = "testbed"
@@ -67,7 +67,7 @@ def read_result(path: Path, units: Mapping[str, str], component: str | None) -> 
 def _choose(
     path: Path, columns: Mapping[str, Array], units: Mapping[str, str], component: str | None
 ) -> dict[str, Array]:
-    """The known columns in SI, by their names in QUANTITIES."""
+    """The known columns in SI, by their names in QUANTITIES. Raises UserError if the component is unclear or a unit is wrong."""
     candidates: dict[str, list[tuple[str, str, Array]]] = {}
     for title, values in columns.items():
         owner, name, unit = _known(title)
@@ -98,7 +98,7 @@ def _choose(
 
 
 def _known(title: str) -> tuple[str, str, str]:
-    """The component, the name in QUANTITIES and the unit in the title of a column; the last two are "" if it is unknown."""
+    """The component, the name in QUANTITIES and the unit in the title of a column; the last two are "" if the name is unknown."""
     match = PREFIXED.match(title.strip())
     owner, name = (match[1] or "", match[2]) if match else ("", "")
     return owner[:-1], *column(re.sub(r"^tout\b", "time", name, flags=re.IGNORECASE))
@@ -121,7 +121,7 @@ def _csv(path: Path) -> dict[str, Array]:
 
 
 def _mat(path: Path) -> dict[str, Array]:
-    """The columns of a .mat file by title."""
+    """The columns of a .mat file by title. Raises UserError if it cannot be read or contains no time."""
     need("scipy")
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
@@ -152,8 +152,8 @@ def _is_time(title: str) -> bool:
 
 
 def _of_variable(name: str, value: Any) -> dict[str, Array]:
-    """The columns in a variable of MATLAB: a vector, or a structure with time as Simulink logs it (`time` and `signals`, each
-    with a label and values), or one with vectors as fields."""
+    """The columns in a variable of MATLAB: a vector, a structure with vectors as fields, or a structure with time as Simulink logs
+    it (`time`, and `signals` with a label and values each). Other variables have no columns."""
     if hasattr(value, "_fieldnames"):
         found: dict[str, Array] = {}
         for field in value._fieldnames:
@@ -174,7 +174,7 @@ def _of_variable(name: str, value: Any) -> dict[str, Array]:
 def _modelica(path: Path, content: Mapping[str, Any]) -> dict[str, Array]:
     """The trajectories in a file of OpenModelica or Dymola, by title. For each name, dataInfo contains the number N of
     the matrix data_N (0 for the time, which is in every matrix), and the column, which is negative if the sign must be
-    changed."""
+    changed. Variables that do not change are left out."""
     is_transposed = "".join(content["Aclass"][3]).strip().rstrip("\0") == "binTrans"
 
     def rows_of(name: str) -> Any:

@@ -3,7 +3,7 @@ of the testbed, calculated by a program that shares no code with the FMU. Report
 difference, its time, and whether it is within the tolerance, and draws the outputs that exceed it. Exit status 0 if all
 agree, else 1.
 
-FILE is CSV, a .mat file of OpenModelica, or one that MATLAB saved with -v7 or earlier. Columns are found by name, with
+FILE is CSV, a .mat file of OpenModelica, or a .mat file that MATLAB saved with -v7 or earlier. Columns are found by name, with
 or without a component (testbed.roll). Units are in the header, as in `roll [deg]`, or in --units; otherwise SI.
 """
 
@@ -32,7 +32,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="table of results")
     parser.add_argument("--experiment", metavar="NAME", help="the experiment (default: the nearest one)")
     parser.add_argument("--model-exchange", action="store_true", help="take the tolerances for Model Exchange")
-    parser.add_argument("--component", metavar="NAME", help="if several have a column of one name (default: testbed)")
+    parser.add_argument(
+        "--component", metavar="NAME", help="whose columns count if several have the same name (default: testbed)"
+    )
     parser.add_argument("--units", action=Named, metavar="NAME=UNIT,...", help="units of columns whose header has none")
     add_paths(parser, "directory of the figure")
 

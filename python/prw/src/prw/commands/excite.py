@@ -1,9 +1,9 @@
-"""Proposes motor motions within the motors' limits and ranks them by the standard errors of the parameters that are
-expected from measuring the given channels once, with unknown sensor offsets. The assumed noise is white, with standard
+"""Proposes motor motions within the motors' limits. Ranks them by the parameters' standard errors that are expected if the
+given channels are measured once and the sensors have unknown offsets. The assumed noise is white, with standard
 deviations of 0.02 N.m (torques), 0.001 rad (angles) and 0.01 rad/s (rates); --noise sets others. "typical" is the root
-mean square of a row. Kinds: multisines (slow,
-wide, and one whose spectrum is optimal for the parameters), chirps; with equal, opposite, single and independent
-motors. Each motion becomes a CSV file for `prw simulate` or for your motor controller (s, rad, rad/s).
+mean square of a row. The motions are slow multisines, wide multisines and chirps, each with equal, opposite, single and
+independent motors, and one multisine whose spectrum is optimal for the parameters. Each motion is written as a CSV file
+(s, rad, rad/s) for `prw simulate` or for your motor controller.
 """
 
 from __future__ import annotations

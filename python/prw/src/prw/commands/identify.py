@@ -79,7 +79,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             type=listed,
             default="",
             metavar="NAMES",
-            help=f"channels that may {effect}, with commas; this is then estimated, too",
+            help=f"channels that may {effect}, separated by commas; the {kind} is estimated, too",
         )
     parser.add_argument(
         "--write-anyway", action="store_true", help="write parameters even if the FMU does not explain the data"
@@ -102,7 +102,8 @@ def run(arguments: argparse.Namespace) -> None:
     found.report(report)
     found.to_json(numbers_)
     print(found.summary(shown=True))
-    # Parameters are written only if the model fits. Old ones are removed, so that they are never next to a new report.
+    # Parameters are written only if they are determined, and if the model fits or --write-anyway is given. Otherwise old files
+    # are removed, so that they are never next to a new report.
     wrong = not found.fits and not arguments.write_anyway
     if wrong or found.undetermined:
         parameters.unlink(missing_ok=True)

@@ -25,7 +25,7 @@ T = TypeVar("T")
 def call(function: Callable[..., T], arguments: argparse.Namespace, **others: Any) -> T:
     """Call the function with the options that have the names of its parameters, and with `others`.
 
-    Ignores the function's warnings about its results: commands print them as notes."""
+    Ignores the function's warnings about its results, because commands print these themselves."""
     names = inspect.signature(function).parameters
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", module=__name__)
@@ -33,7 +33,7 @@ def call(function: Callable[..., T], arguments: argparse.Namespace, **others: An
 
 
 def add_paths(parser: argparse.ArgumentParser, out: str = "directory to write into", directory: str = "") -> None:
-    """The options --fmu and --out. out: the help; directory: the default within DEFAULT_OUT."""
+    """Add the options --fmu and --out. out: the help of --out; directory: the default of --out within DEFAULT_OUT."""
     parser.add_argument("--fmu", type=Path, help=FMU)
     default = DEFAULT_OUT / directory
     parser.add_argument("--out", type=Path, default=default, metavar="DIR", help=f"{out} (default: %(default)s)")
@@ -53,7 +53,7 @@ def add_task_options(parser: argparse.ArgumentParser) -> None:
         type=listed,
         default=",".join(DEFAULT_ESTIMATE),
         metavar="NAMES",
-        help="parameters to estimate, with commas; all others stay fixed (default: %(default)s)",
+        help="parameters to estimate, separated by commas; all others stay fixed (default: %(default)s)",
     )
     parser.add_argument(
         "--set",
@@ -103,7 +103,7 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
 
 
 class Named(argparse.Action):
-    """Collects NAME=VALUE pairs, which commas separate or several options give, as a dict of `read(VALUE)` by name."""
+    """Collects NAME=VALUE pairs, separated by commas or from repeated options, in a dict of `read(VALUE)` by name."""
 
     def __init__(self, read: Callable[[str], Any] = str, **options: Any):
         super().__init__(default={}, **options)
@@ -144,7 +144,7 @@ def not_negative(string: str) -> float:
 
 
 def finite(string: str) -> float:
-    """A finite number, or NaN."""
+    """The number in the string, or NaN if there is none or it is not finite."""
     try:
         value = float(string)
     except ValueError:

@@ -138,7 +138,7 @@ def _summary(
 
 
 def _tidy(value: float) -> str:
-    # Smaller values are rounding errors.
+    # Values below 1e-12 are rounding errors.
     return "0" if value < 1e-12 else f"{value:.3g}"
 
 

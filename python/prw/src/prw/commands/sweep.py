@@ -1,8 +1,8 @@
-"""Runs the FMU many times with different parameters, on all cores of this machine or on a Dask cluster, and writes one row
-for each run into runs.parquet: its parameters and each output's peak, rms and value at the end (SI).
+"""Runs the FMU many times with different parameters, on all cores of this machine or on a Dask cluster. Writes one row for
+each run into runs.parquet: the run's parameters, and each output's peak, rms and value at the end (SI).
 
---grid parameters make all combinations; --random ones are drawn for each of --runs runs (per combination). A run that
-fails is recorded with its message.
+The values of --grid are run in all combinations. For each combination, the parameters of --random are drawn --runs times.
+A run that fails is recorded with its message.
 """
 
 from __future__ import annotations

@@ -1,9 +1,16 @@
 """Estimates parameters of the testbed: the values with which the FMU comes closest to the measurements.
 
-The modules in the order of dependence: path (smoothed motor angles), experiment (spectra of inputs, measurements and their errors),
-model (the FMU's equations), response (the model's outputs), fit (least squares), verdict (whether the model explains the
-data), diagnosis (possible causes if not), statistics (standard errors and intervals), design (more informative
-experiments), results and report. `identify` below combines them.
+The modules in the order of dependence; `identify` below combines them::
+
+    path                 smoothed motor angles
+    experiment           spectra of inputs, of measurements and of the errors of both
+    model, response      the FMU's equations and outputs
+    fit, statistics      least squares; standard errors and intervals
+    verdict, diagnosis   whether the model explains the data, and possible causes if not
+    design, excitation   more informative experiments; `prw.excite`
+    rounding             digits of numbers
+    findings, results    the return value, as attributes, text and files
+    report               the HTML page
 """
 
 from __future__ import annotations
@@ -68,7 +75,7 @@ def identify(
     estimate
         Names of the parameters to estimate, or one name.
     priors
-        Prior knowledge by parameter: the standard deviation as a fraction of its start value
+        Prior knowledge by parameter: the standard deviation as a fraction of the parameter's start value
         (0.1 is 10 %, 1 the most), or (value, fraction). The parameter is then estimated, too.
     parameters
         Other start values, or values of fixed parameters, as for `prw.simulate`.
@@ -92,13 +99,13 @@ def identify(
     Returns
     -------
     Identification
-        Estimates, standard errors and doubts. Data that the model does not explain raise no error, nor do undetermined
-        parameters: see `fits`, `misfits` and `undetermined`.
+        Estimates, their standard errors, and reasons to doubt them. Data that the model does not explain raise no error, nor do
+        undetermined parameters: see `fits`, `misfits` and `undetermined`.
 
     Raises
     ------
     UserError
-        A file cannot be read, a name is not known, or the FMU rejects a value.
+        A file cannot be read or has too few values, a name is not known, or the FMU rejects a value.
     """
     need("scipy", "threadpoolctl")
     # These imports are slow.
@@ -122,7 +129,7 @@ def identify(
     one = is_path(files) or is_table(files) or isinstance(files, Recording) or not isinstance(files, Iterable)
     several = cast("list[Source]", [files] if one else list(cast("Iterable[Source]", files)))
     if not several:
-        raise UserError("there are none", argument="files")
+        raise UserError("at least one is needed", argument="files")
     delay, lag, gain = names_of("delay", delay), names_of("lag", lag), names_of("gain", gain)
     # There are many small matrices, with which more threads would be slower.
     with Model(fmu) as model, threadpool_limits(1):
@@ -148,8 +155,8 @@ def identify(
         experiments = [prepare(each, quantum, how, how != "motors") for each, how in zip(measured, rates)]
         solution = fit(model, experiments, task, starts, seed)
         verdict = judge(solution)
-        # If the model does not explain a recording, it may be a simulation of the FMU, with jumps of the motors between
-        # steps. So the recording is then compared with the steps of the FMU.
+        # Recordings with very exact motor angles may be simulations of the FMU, in which the motors jump between steps. If the
+        # model does not explain the data, these recordings are compared with the FMU's own steps.
         exact = [may_be_simulated(experiment) for experiment in experiments]
         ways: tuple[Rates, ...] = ("inputs", "angles") if any(exact) else ()
         for way in ways:
@@ -176,7 +183,8 @@ def task_of(
     offsets: bool = True,
     distortions: tuple[Distortion, ...] = (),
 ) -> Task:
-    """The task that these arguments of `identify` describe, for an FMU with the parameters `known`."""
+    """The task that these arguments of `identify` describe, for an FMU with the parameters `known`. Raises UserError for a
+    name that is not known, or a value that is out of range."""
     from prw.columns import MEASURED
     from prw.identification.fit import Prior, Task
 
@@ -201,7 +209,7 @@ def task_of(
             raise UserError(
                 f"{name} from {span[0]:g} to {span[1]:g}; the first must be below the second", argument="bounds"
             )
-    # The logarithm of 0 is not a number, so the search begins elsewhere.
+    # 0 has no logarithm, so the search for such a parameter begins at its prior or in the middle of its bounds.
     for name in chosen:
         if start[name] == 0 and name in beliefs:
             start[name] = beliefs[name].value

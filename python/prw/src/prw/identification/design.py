@@ -1,8 +1,8 @@
 """Motor motions for identification, and the information about the parameters that each of them gives.
 
 The information is calculated as in the fit (see `statistics`), with unknown offsets and initial state, for a planned
-experiment. Multisines have harmonics of 1/duration with Schroeder's
-phases (IEEE Trans. Inf. Theory 16 (1970) 85), which keep their peaks low. All motions start and end at rest.
+experiment. Multisines have harmonics of 1/duration with Schroeder's phases (IEEE Trans. Inf. Theory 16 (1970) 85), which
+keep their peaks low. All motions start and end at rest.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from prw.testbed import ANGLE_OF, OUTPUTS
 
 #: Seconds in which a motion fades in and out.
 FADE = 0.5
-#: Maximum number of frequencies in a multisine.
+#: A multisine with more harmonics than this is thinned out to at most twice this number.
 MAX_LINES = 60
 #: Highest frequency in Hz of the slow multisine, and of all motions.
 SLOW, WIDEST = 4.0, 40.0
@@ -46,7 +46,7 @@ class Limits(NamedTuple):
 def motions(
     model: Model, task: Task, limits: Limits, duration: float, rate: float, noise: Mapping[str, float]
 ) -> list[Motion]:
-    """All candidates within `limits`: each kind with equal, opposite, single and independent motors.
+    """All candidates within `limits`: each kind with equal, opposite, single and independent motors, and an optimal multisine.
 
     duration: s. rate: samples per second. noise: standard deviations by channel, SI; the optimal multisine is made for
     these channels.
@@ -141,13 +141,13 @@ def _faded(time: Array, wave: Array) -> Array:
 
 
 def _assemble(name: str, time: Array, waves: Sequence[Array], pattern: str, limits: Limits) -> Motion:
-    """The waves (3, n) mixed for the two motors and scaled up to the limits."""
+    """The waves (3, n) mixed for the two motors, faded, and scaled to the limits."""
     motors = [shares[0] * waves[0] + shares[1] * waves[1] for shares in PATTERNS[pattern]]
     return _within(name, time, motors, limits)
 
 
 def _within(name: str, time: Array, motors: Sequence[Array], limits: Limits) -> Motion:
-    """The motors' waves (3, n), faded and scaled up to the limits."""
+    """The motors' waves (3, n), faded and scaled to the limits."""
     motors = [_faded(time, wave) for wave in motors]
     peaks = np.max([np.abs(wave).max(axis=1) for wave in motors], axis=0)
     scale = min(limit / peak for limit, peak in zip(limits, peaks))
@@ -196,8 +196,9 @@ def typical_error(information: Array) -> float:
 
 #: Sensors that come in pairs.
 SENSORS = (("tau1", "tau2"), ("theta3", "theta4"), ("pitch", "roll"))
-#: Estimates are limited to the start values divided and multiplied by this factor.
+#: For advice, estimates are limited to the start values divided and multiplied by this factor.
 REACH = 10.0
+#: Duration in s, and samples per second, of a proposed experiment.
 DURATION, RATE = 10.0, 1000.0
 #: Descriptions of the patterns in messages.
 DESCRIBED = {
@@ -210,7 +211,8 @@ DESCRIBED = {
 
 def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) -> list[str]:
     """Experiments that would determine all parameters, each with the largest expected standard error: the best motion with
-    the same sensors, and the best pair of sensors with the same motions. Experiments that do not help are not named."""
+    the same sensors, and the best pair of sensors with the same motions. Experiments that do not help are not named;
+    if none helps, the advice is to fix a parameter or to give it a prior."""
     task = replace(solution.task, distortions=())
     first = np.log([task.start[name] for name in task.names])
     point = np.clip(solution.logarithms[: len(first)], first - np.log(REACH), first + np.log(REACH))
@@ -223,7 +225,7 @@ def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) 
     trials = {}
     for motion in motions(model, task, limits, DURATION, RATE, {name: noise[name] for name in channels}):
         more = information(model, [planned(motion, channels)], task, point, noise)
-        described = DESCRIBED.get(motion.name.rsplit("_", 1)[1], "a spectrum made for it")
+        described = DESCRIBED.get(motion.name.rsplit("_", 1)[1], "a spectrum made for these parameters")
         reason = f"; `excite` proposes it for {','.join(channels)} as {motion.name}"
         trials[f"an experiment with {described}", reason] = _worst(have + more)
     sentences = _best(trials)
@@ -233,7 +235,9 @@ def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) 
             wider = [_measured_wholly(e, (*e.channels, *(c for c in pair if c not in e.channels))) for e in experiments]
             worst = _worst(prior + information(model, wider, task, point, noise))
             trials[f"measuring {' and '.join(pair)} as well in the same motion", ""] = worst
-    return [*sentences, *_best(trials)] or ["no single motion or pair of sensors; fix one of them or give it a prior"]
+    return [*sentences, *_best(trials)] or [
+        "fix a parameter or give it a prior; no single motion or pair of sensors is enough"
+    ]
 
 
 def _best(trials: Mapping[tuple[str, str], float]) -> list[str]:
@@ -254,7 +258,8 @@ def _worst(information: Array) -> float:
 
 
 def _limits(experiments: Sequence[Experiment]) -> Limits:
-    """Limits of the motors: the largest values in the experiments, but not less than small defaults."""
+    """Limits of the motors: the largest angle and rate in the experiments, and an acceleration of 40/s times that rate, but not
+    less than small defaults."""
     angle = max(np.abs(e.theta - e.theta.mean(axis=0)).max() for e in experiments)
     rate = max(np.abs(e.omega).max() for e in experiments)
     return Limits(max(angle, 0.1), max(rate, 1.0), max(40 * rate, 50.0))

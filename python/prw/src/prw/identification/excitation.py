@@ -62,8 +62,8 @@ def excite(
 ) -> list[Excitation]:
     """Motions within the motors' limits, in increasing order of the expected standard errors.
 
-    Kinds: multisines (slow, wide, and one whose spectrum is optimal for the parameters) and chirps, with equal,
-    opposite, single and independent motors.
+    Slow multisines, wide multisines and chirps, each with equal, opposite, single and independent motors, and one multisine
+    whose spectrum is optimal for the parameters.
 
     Parameters
     ----------
@@ -120,5 +120,5 @@ def excite(
             errors = dict(zip(task.names, np.sqrt(np.diag(covariance_of(found))).tolist()))
             left = [str(combination) for combination in undetermined(task.names, found)]
             ranking.append(Excitation(motion, design.typical_error(found), errors, left, assumed))
-    # If all motions leave a combination open, the mean error of the parameters decides.
+    # Motions that leave a combination undetermined are ordered by the geometric mean of the parameters' errors.
     return sorted(ranking, key=lambda e: (e.typical_error, float(np.mean(np.log(list(e.expected_errors.values()))))))

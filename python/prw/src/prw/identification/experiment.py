@@ -38,7 +38,7 @@ STILL = 1e-6
 #: them from the angles.
 Rates = Literal["motors", "inputs", "angles"]
 #: Fractions of a motor's range. If the noise is at most EXACT and the quantum at most DIGITS, a recording may come from
-#: a simulation. If the noise is at most ROUNDED, samples are used without smoothing.
+#: a simulation. The samples of a simulation are used without smoothing if the noise is at most ROUNDED.
 EXACT, DIGITS, ROUNDED = 1e-3, 1e-4, 1e-6
 #: DRAWS: number of draws of the encoders' errors. FURTHEST: number of neighbouring frequencies into which a spectral
 #: line of these errors leaks.
@@ -78,7 +78,7 @@ class Experiment:
     samplers
         Interpolation of each channel, with empty rows at missing values; None if no value is missing and `between` is None.
     paths
-        Paths of the two motors, or None if they are known exactly.
+        Paths of the two motors through the recorded samples, or None if the experiment is planned.
     notes
         Lines for the user.
     jumps
@@ -114,7 +114,8 @@ class Experiment:
 
     @property
     def needed_bins(self) -> int:
-        """Number of frequencies at which the model is needed: all if values are missing, because that mixes frequencies."""
+        """Number of frequencies at which the model is needed: all if values are missing or rows are uneven, because both mix
+        frequencies."""
         return self.bins if self.samplers is None else self.all_bins
 
     @property
@@ -161,7 +162,7 @@ class Experiment:
 
     @cached_property
     def channel_power(self) -> Array:
-        """Power (bins, c) of the channels' errors by encoders' steps."""
+        """Power (bins, c) of the channels' errors that are caused by the steps of encoders."""
         return _power(self.channel_errors)
 
     def observed(self, modelled: Complex) -> Complex:
@@ -235,7 +236,7 @@ def prepare(recording: Recording, quantum: float = 0.0, rates_of: Rates = "motor
 
 
 def may_be_simulated(experiment: Experiment) -> bool:
-    """Whether the motors' samples are so exact that they may come from a simulation."""
+    """Whether the motors' samples are evenly spaced and so exact that they may come from a simulation."""
     paths = experiment.paths or ()
     exact = [
         path.noise <= EXACT * reach and path.quantum <= DIGITS * reach
@@ -255,7 +256,8 @@ def _estimated(theta: Array, step: float) -> Array:
 
 
 def _measured(recording: Recording) -> tuple[tuple[str, ...], Array, tuple[str, ...]]:
-    """The channels that change, their values (s, c), and notes for the user."""
+    """The channels that change, their values (s, c), and notes for the user. Raises UserError if a channel has too few values, or
+    none changes."""
     if not recording.measured:
         raise UserError(
             f"{recording.source}: nothing measured; at least one column of {', '.join(MEASURED)} is needed, "
@@ -301,7 +303,7 @@ def _power(errors: Complex) -> Array:
     """Mean power (bins, ...) of the spectra (d, bins, ...) of draws."""
     mean: Array = np.mean(np.abs(errors) ** 2, axis=0)
     # In a periodic motion, the spectrum of the errors consists of lines. The leakage of a line is correlated with the
-    # line, even if it is small, so each frequency gets at least the leakage of a line between two frequencies.
+    # line, even if the leakage is small, so each frequency gets at least the leakage of a line between two frequencies.
     leaked = 1 / (np.pi * np.arange(1, FURTHEST + 1)) ** 2
     spread = [np.convolve(column, [*leaked[::-1], 0.0, *leaked])[FURTHEST:-FURTHEST] for column in mean.T]
     power: Array = np.maximum(mean, np.column_stack(spread))
@@ -309,7 +311,7 @@ def _power(errors: Complex) -> Array:
 
 
 def _with_rates(errors: Array, rate_noise: float | None, step: float) -> Complex:
-    """Spectra (d, f) of draws (d, n) of an angle's errors. They are smaller if the rate was logged, with noise of the
+    """Spectra (d, f) of draws (d, n) of an angle's errors. The spectra are smaller if the rate was logged, with noise of the
     standard deviation rate_noise."""
     found = spectra(errors.T).T
     if rate_noise is None:
@@ -322,7 +324,7 @@ def _with_rates(errors: Array, rate_noise: float | None, step: float) -> Complex
 
 def _clear(theta: Array, errors: Array, rate_noise: float | None, step: float) -> int:
     """Number of frequencies, from 0, up to the highest one at which the angle theta (n,) moves clearly more than its
-    errors. errors: (d, n), draws of them."""
+    errors. errors: (d, n), draws of the errors."""
     n = len(theta)
     window = np.hanning(n - 1)
 

@@ -2,9 +2,9 @@
 
 Parameters are sought as logarithms, which keeps them positive and makes their errors relative. Sensor offsets and the
 initial state of each experiment enter linearly; they are eliminated in every evaluation by projection (variable
-projection in the form of Kaufman, BIT 15 (1975) 49), so that the search is only over the parameters.
+projection in the form of Kaufman, BIT 15 (1975) 49), so that the search is only over the other unknowns.
 
-Errors of the motors' encoders pass through the model: at every frequency the difference of measured and modelled
+Errors of the motors' encoders pass through the model. So at every frequency, the difference of measured and modelled
 spectra has the covariance of the channels' noise plus G P G^H, with the model's transfer G and the power P of the
 encoders' errors. The difference is weighted with the inverse of this covariance, which depends on the parameters, too.
 Without P the dampers are biased (errors in variables; Soderstrom, Automatica 43 (2007) 939, Sec. 8; Pintelon and
@@ -29,9 +29,9 @@ from prw.motion import Array
 from prw.progress import Progress
 from prw.state_space import Complex, StateSpace
 
-#: Step of the logarithms in central differences; the relative error of the sensitivities is then 1e-8.
+#: Step of the logarithms in central differences; the relative error of the sensitivities is then about 1e-8.
 DIFFERENCE = 1e-4
-#: Relative singular value below which a direction of the initial state is not estimated.
+#: Relative singular value below which a direction of the offsets and the initial state is not estimated.
 UNDETERMINED = 1e-9
 #: Fitting and estimating the noise alternate for at most ROUNDS rounds (FEW_ROUNDS for the comparison of causes), until
 #: the noise changes by less than SETTLED. In each round the noise is estimated at most NOISE_ROUNDS times.
@@ -43,7 +43,7 @@ INSIDE = 1e-6
 FINE, COARSE = {"ftol": 1e-12, "xtol": 1e-9, "max_nfev": 100}, {"ftol": 1e-5, "xtol": 1e-4, "max_nfev": 25}
 #: Two minima are the same if no parameter differs by more than this fraction.
 SAME = 0.01
-#: Another minimum is reported if its -2 log likelihood exceeds the least one by at most this.
+#: Another minimum is reported if its misfit, at the same noise, exceeds the least misfit by less than this.
 RIVAL = 9.0
 
 
@@ -94,7 +94,7 @@ class Task:
         return {**self.start, **dict(zip(self.names, np.exp(logarithms).tolist()))}
 
     def first(self) -> Array:
-        """Logarithms (p,) of the start values of `names`, and no distortion."""
+        """Logarithms of the start values of `names`, then zeros, which mean no distortion: (p,)."""
         return np.append(np.log([self.start[name] for name in self.names]), np.zeros(len(self.distortions)))
 
     def span(self) -> tuple[Array, Array]:
@@ -130,8 +130,8 @@ class Comparison:
         noise: Mapping[str, float],
         faults: Sequence[Complex],
     ):
-        """noise: standard deviations by channel, SI. faults: spectra (needed_bins, c) that the channels may contain with an
-        unknown factor."""
+        """noise: standard deviations by channel, SI. faults: spectra (needed_bins, c) that the channels may contain, each
+        with an unknown factor."""
         self.experiment, self.response = experiment, response
         bins, channels = experiment.bins, len(experiment.channels)
         share = experiment.shares
@@ -167,12 +167,13 @@ class Comparison:
 
     @property
     def spread(self) -> float:
-        """Twice the logarithm of the determinants of all covariances."""
+        """Twice the sum of the logarithms of all covariances' determinants."""
         diagonal = np.einsum("fcc->fc", self._whiten).real
         return float(-4 * np.log(diagonal).sum())
 
     def project(self, table: Array) -> Array:
-        """Removes the effect of offsets and initial state from real and imaginary parts (2, bins, c, ...)."""
+        """Removes the effects of the linear unknowns, such as offsets and initial state, from real and imaginary parts (2, bins, c,
+        ...)."""
         flat = table.reshape(len(self._basis), -1)
         return (flat - self._basis @ (self._basis.T @ flat)).reshape(table.shape)
 
@@ -232,8 +233,8 @@ class Comparison:
 
     def noise_ratios(self) -> Array:
         """Sums (3, c) over frequencies. The ratio of the first two is 1 if a channel's noise explains its residuals, and larger
-        if the noise is too small: the score of the likelihood with respect to its variance. The third sum is the
-        information about the noise's variance, the inverse square of its standard error."""
+        if the noise is too small. Their difference is proportional to the derivative of the log likelihood with respect to the
+        noise's variance. The third sum is the information about the noise's variance, the inverse square of its standard error."""
         inverse = self._whiten.conj().swapaxes(-1, -2) @ self._whiten
         weighted = (inverse @ self._rest[:, :, None])[..., 0]
         expected, share = np.einsum("fcc->c", inverse).real, self.experiment.shares
@@ -261,9 +262,9 @@ class Solution:
     modelled
         (s, c) for each experiment, the FMU's outputs plus the offsets, SI.
     misfit
-        Sum of the squares of residuals and of differences from priors.
+        Sum of the squares of residuals and of weighted differences from priors.
     rivals
-        Other minima that fit as well, as (logarithms, misfit).
+        Other minima that fit about as well, as (logarithms, misfit).
     tried
         Number of starting points.
     evaluations
@@ -307,7 +308,8 @@ class Fitter:
         noise: Mapping[str, float] = {},
         faults: Sequence[Sequence[Complex]] = (),
     ):
-        """noise: of all channels, by name, SI; default: a twentieth of their motion. faults: of each experiment, see Comparison."""
+        """noise: of all channels, by name, SI; default: as given in the task, else a twentieth of the values' standard deviation.
+        faults: of each experiment, see Comparison."""
         self.model, self.experiments, self.task, self.faults = model, experiments, task, faults
         self.channels = tuple(dict.fromkeys(name for e in experiments for name in e.channels))
         spread = dict.fromkeys(self.channels, 1e-12)
@@ -407,7 +409,8 @@ class Fitter:
         return point
 
     def _judged_noise(self, point: Array) -> dict[str, float]:
-        """Each channel's noise over all experiments: given, or estimated from its residuals at the present noise."""
+        """Each channel's noise over all experiments: given, or estimated from its residuals at the present noise, but
+        not below `finest`."""
         sums, freedom = dict.fromkeys(self.channels, np.zeros(3)), dict.fromkeys(self.channels, 0.0)
         for experiment, comparison in zip(self.experiments, self.compare(point)):
             taken = 1 + int(self.task.offsets) + 6 / len(experiment.channels)
@@ -446,8 +449,8 @@ class Fitter:
 def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int = 6, seed: int = 0) -> Solution:
     """Estimate the parameters from `task.start` and `starts` - 1 other starting points; return the best solution.
 
-    If several minima fit equally well, the one nearest to task.start counts and the others are reported. Raises UserError
-    if a parameter is out of its bounds or the FMU rejects a value.
+    If several minima fit about equally well, the one nearest to task.start counts and the others are reported. Raises UserError
+    if a start value is out of its bounds or the FMU rejects a value.
     """
     for name in task.names:
         low, high = task.bounds[name]
@@ -492,7 +495,8 @@ def refitted(
     solution: Solution, distortions: tuple[Distortion, ...], faults: Sequence[Sequence[Complex]] = ()
 ) -> Solution:
     """Repeat the fit with further distortions as unknowns, or with faults of each experiment, just accurately enough to
-    compare causes. It starts from the solution and, if it diverges, from the start values."""
+    compare causes. The fit starts from the solution. If a parameter then differs from its start value by more than a factor of
+    e, the fit is repeated from the start values, and the better one counts."""
     task = replace(solution.task, distortions=(*solution.task.distortions, *distortions))
     starts = [np.append(solution.logarithms, np.zeros(len(distortions))), task.first()]
     found = []

@@ -42,7 +42,7 @@ class Parameter(NamedTuple):
 
 
 class Parameters:
-    """The parameters that the model description of the testbed declares.
+    """The numeric parameters that the model description of the testbed declares, without the initial states.
 
     Attributes
     ----------
@@ -73,8 +73,8 @@ class Parameters:
         return {name: parameter.start for name, parameter in self.real.items()}
 
     def for_building(self, values: Mapping[str, float]) -> str:
-        """All parameters in the format of modelDescription/parameters.json, for `build_fmu --parameters`; `values` are
-        in SI and are written in their display units."""
+        """All parameters in the format of modelDescription/parameters.json, for `build_fmu --parameters`. `values` of the Real
+        ones are in SI and are written in their display units; Integers have their start values."""
         lines = []
         for name, parameter in {**self.real, **self.counts}.items():
             value = values[name] / parameter.factor if name in self.real else parameter.start
@@ -83,7 +83,7 @@ class Parameters:
         return "{\n" + ",\n".join(lines) + "\n}\n"
 
     def ssv(self, values: Mapping[str, float], title: str) -> str:
-        """All parameters as a parameter set of SSP 1.0 in SI, with the units' definitions."""
+        """All parameters as a parameter set of SSP 1.0 in SI, with the units' definitions. Integers have their start values."""
         for prefix, space in (("ssv", SSV), ("ssc", SSC)):
             ElementTree.register_namespace(prefix, space)
         root = ElementTree.Element(f"{{{SSV}}}ParameterSet", version="1.0", name=title)

@@ -1,9 +1,9 @@
 """Smooth paths of the motors through quantised or noisy samples of their angles (and rates).
 
 A simulation can derive rates only from past angles. The steps of an encoder then cause noise in the torque that is far
-above the noise of the sensor. Identification knows the whole recording. The path is a quintic spline. Its coefficients are
-the most probable ones if the jerk is a white process and the samples contain white noise. The variances of both are
-estimated by maximum likelihood; the variance of an encoder's errors is at least quantum^2 / 12.
+above the noise of the sensor. Identification knows the whole recording, so it can draw a smooth path: a quintic spline, whose
+coefficients are the most probable ones if the jerk is a white process and the samples contain white noise. The variances
+of both are estimated by maximum likelihood; the variance of an encoder's errors is at least quantum^2 / 12.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ DEGREE = 5
 ORDER = 3
 #: Range of log10 of the penalty: below, the path interpolates; above, the normal equations lose their digits.
 STIFFNESS = (-6.0, 10.0)
-#: RATIO: range of log10 of the weight of logged rates, s^2. GUESSES: start values of its search, by the number of
-#: blocks.
+#: RATIO: range of log10 of the weight of logged rates, s^2. GUESSES: start values of the search for this weight, by
+#: the number of blocks.
 RATIO = (-14.0, 4.0)
 GUESSES: dict[int, list[list[float]]] = {1: [[]], 2: [[-2.0], [-4.0], [-6.0]]}
 #: Divisor of the most probable penalty. Too little smoothing adds some noise, too much biases the parameters. The highest
@@ -107,14 +107,14 @@ def quantum_of(values: Array) -> float:
 
 def rough_noise(values: Array) -> float:
     """An upper estimate of the standard deviation of white noise on smooth values (n,). Third differences nearly remove smooth
-    values, and multiply the variance of the noise by 20."""
+    values, and multiply the variance of the noise by 20. Infinite for fewer than four values."""
     return float(np.std(np.diff(values, 3)) / np.sqrt(20)) if len(values) > 3 else np.inf
 
 
 def rounding(values: Array, quantum: float, random: np.random.Generator) -> Array:
     """Draw an encoder's errors at the values (n,). An encoder has the same error at the same angle, and so in every
     period of a motion."""
-    # `values` contain remainders of the samples' errors. A random zero and scale avoid rounding to the same grid.
+    # `values` still contain a part of the samples' errors, so a random offset and scale avoid rounding to the same grid.
     level = values * (1 + random.uniform(-RESCALED, RESCALED)) / quantum + random.uniform()
     return (np.rint(level) - level) * quantum
 
@@ -165,7 +165,7 @@ def _fit(spline: _Spline, blocks: list[Block], least: float) -> _Fit:
     rights = [rows.T @ values for rows, values in blocks]
 
     def solve(penalty: float, weights: list[float]) -> tuple[Array, float, float]:
-        """Coefficients, misfit with penalty, and logarithm of the determinant."""
+        """Coefficients, misfit with penalty, and the logarithm of the determinants in the likelihood."""
         normal = penalty * spline.penalty + sum(w * n for w, n in zip(weights, normals))
         factor = cholesky_banded(normal, overwrite_ab=True, check_finite=False)
         right = sum(w * r for w, r in zip(weights, rights))

@@ -71,7 +71,7 @@ def figures(found: Findings) -> list[dict[str, str]]:
 def _curves(time: Array, modelled: Array, residual: Array, unit: str) -> str:
     """Draws one second of the measured and the modelled values and the whole residual, (n,) each at the times (n,) s, as SVG."""
     measured, unit = modelled + residual, unit.replace("N.m", "N m")
-    # The curves differ most where the values are largest.
+    # The curves usually differ most where the values are largest.
     centre = time[np.argmax(np.abs(measured - measured.mean()))]
     part = (time >= centre - CLOSE / 2) & (time <= centre + CLOSE / 2)
     with matplotlib.rc_context({**PAGE_STYLE, "font.family": "sans-serif"}):
@@ -125,7 +125,7 @@ def _raised(number: str) -> str:
 
 
 def _percent(value: float | None) -> str:
-    """Formats a fraction as a percentage; None is the share of a channel that did not move."""
+    """Formats a fraction as a percentage; None, the explained share of a channel that did not move, becomes "at rest"."""
     if value is None:
         return "at rest"
     if not np.isfinite(value) or abs(value) > 10:

@@ -2,11 +2,11 @@
 
 Between two samples the motors follow the cubic that has their angles and rates at both; over such a step eq. (11) is
 solved exactly by one matrix exponential. Summed over a recording of n samples, x[k+1] = Ad x[k] + G0 u[k] + G1 u[k+1]
-becomes z X = Ad X + (G0 + z G1) U + z d with z = exp(2 pi i f h) and d = x[0] - x[n]: an experiment that starts
-and ends anywhere differs from a periodic one by six numbers (Pintelon and Schoukens, System Identification: A Frequency
+becomes z X = Ad X + (G0 + z G1) U + z d with z = exp(2 pi i f h) and d = x[0] - x[n]. So an experiment that
+starts and ends in any state differs from a periodic one by six numbers (Pintelon and Schoukens, System Identification: A Frequency
 Domain Approach, 2nd ed., Sec. 6.3.2).
 
-A recording that the FMU simulated in Co-Simulation is compared with the FMU's own steps: during a step each angle
+A recording that the FMU simulated in Co-Simulation is compared with the FMU's own steps. During a step, each angle
 follows its rate, and at the start of the next step the states jump in proportion to the difference between the angle
 and this extrapolation.
 """
@@ -111,7 +111,7 @@ class Response:
         self._resolvent = np.linalg.inv(self._z * np.eye(6) - model.A)
         self._states = self._resolvent @ ((model.before + self._z * model.after) @ self._motors)
         from_motors: Complex = model.C @ self._states + model.D @ self._motors
-        #: Spectra of the channels (f, c), periodic.
+        #: Spectra of the channels (f, c) without transients.
         self.outputs: Complex = from_motors[..., 0]
         #: Transfer from the motors' angles, whose rates follow, to the channels: (f, c, 2).
         self.transfer: Complex = from_motors[..., 1:]

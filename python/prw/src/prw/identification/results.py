@@ -34,7 +34,7 @@ class Identification(Findings):
     """
 
     def summary(self, *, shown: bool = False) -> str:
-        """The result in a few lines, in SI; with `shown` parameters in display units."""
+        """The result in a few lines, in SI; if `shown` is true, parameters are in display units."""
         channels = ", ".join(dict.fromkeys(name for e in self.experiments for name in e.channels))
         seconds = sum(e.sampled[-1] - e.sampled[0] for e in self.experiments)
         lines = [f"identified  from {', '.join(self.files)}: {seconds:.4g} s with {channels}"]
@@ -58,7 +58,7 @@ class Identification(Findings):
         return "\n".join([*lines, *(f"note        {note}" for note in self.notes_in(shown=shown))])
 
     def report(self, path: str | os.PathLike[str]) -> None:
-        """Write the report, an HTML page that loads no other file: estimates, doubts, residuals. Raises UserError without
+        """Write the report, an HTML page that loads no other file: verdict, estimates, notes, residuals. Raises UserError without
         jinja2 or matplotlib, or if the file cannot be written."""
         need("jinja2", "matplotlib")
         from prw.identification.report import page

@@ -7,7 +7,8 @@ import math
 
 def rounded(value: float, error: float, *others: float) -> list[str]:
     """The value, its standard error with two significant digits, and other values such as the ends of its interval, all with the
-    decimals of the error. Small and large numbers have powers of ten.
+    decimals of the error. Small and large numbers have powers of ten. If the value or the error is not finite, or the error is
+    not positive, all numbers have five significant digits.
 
     >>> rounded(2.9491, 1.5)
     ['2.9', '1.5']
@@ -18,7 +19,7 @@ def rounded(value: float, error: float, *others: float) -> list[str]:
     """
     if not (math.isfinite(error) and error > 0 and math.isfinite(value)):
         return [f"{number:.5g}" for number in (value, error, *others)]
-    # The error with two digits may have one digit more before the point than the error itself, as 0.0996.
+    # Rounding to two digits may increase the exponent of the error: 0.0996 becomes 0.10.
     place = math.floor(math.log10(float(f"{error:.1e}"))) - 1
     numbers = (value, error, *others)
     if abs(value) >= 1e-4 and place < 5:
@@ -27,7 +28,7 @@ def rounded(value: float, error: float, *others: float) -> list[str]:
 
 
 def _nearest(number: float, place: int) -> float:
-    """The number, rounded to a power of ten. Adding 0.0 turns -0.0 into 0.0."""
+    """The number, rounded to a multiple of 10**place. Adding 0.0 turns -0.0 into 0.0."""
     return round(number, -place) + 0.0
 
 

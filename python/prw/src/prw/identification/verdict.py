@@ -1,6 +1,6 @@
 """Tests whether the model explains the data, and whether a fault would explain them.
 
-The residuals of a correct fit are noise. Three tests compare them with the motion. Local regression over frequency
+The residuals of a correct fit are noise, which three tests check. Local regression over frequency
 finds residuals that are coherent with the motors' spectra or the channel's own. Score tests (Rao, Proc. Cambridge Phil.
 Soc. 44 (1948) 50) find the effects of single faults: a delay, a lag or a gain of one channel or of several, friction,
 backlash. The third test compares the residuals' strength with the noise at frequencies at which the motors do not move.
@@ -23,7 +23,7 @@ from prw.state_space import Complex
 from prw.testbed import OUTPUTS
 
 #: Probability below which a coherence with the motion is a misfit. It is small, because the steps of encoders are not normally
-#: distributed; 1e-8 occurs in slow motion.
+#: distributed: in slow motion, probabilities of 1e-8 occur in correct fits.
 CHANCE = 1e-10
 #: Ratios of the size of a fault to its standard error. Above CLEAR the fault is significant, and above SMALL it widens
 #: intervals. Friction always widens them, because every bearing has some.
@@ -40,7 +40,7 @@ PIECE, MAX_PIECES = 16, 6
 CLEARLY_MOVING = 30.0
 #: A direction is left out if less than this share of it is independent of the others.
 NEW = 0.02
-#: Share of its greatest magnitude above which a rate counts as clearly positive or negative.
+#: Share of a rate's greatest magnitude in which the sign of the rate changes smoothly, as the hyperbolic tangent.
 TURNING = 0.02
 
 
@@ -50,7 +50,7 @@ PAIRS = (("tau1", "tau2"), ("theta3", "theta4"), ("pitch", "roll"), ("pitch_rate
 
 def groups(solution: Solution, kind: str, channels: Sequence[str] = ()) -> list[tuple[str, ...]]:
     """Groups of channels (default: all) that may share a fault of a kind and have no distortion of this kind yet:
-    single channels, pairs, and all together, except for gains."""
+    single channels, pairs and, except for gains, all together."""
     channels, known = channels or solution.fitter.channels, set(solution.task.distortions)
     found: list[tuple[str, ...]] = [(name,) for name in channels]
     found += [pair for pair in PAIRS if set(pair) <= set(channels)]
@@ -149,9 +149,10 @@ class Verdict(NamedTuple):
     misfits
         Unexplained residuals; none if the model fits.
     faults
-        The tested faults, in decreasing order of significance.
+        The tested faults that are possible, in decreasing order of significance.
     widening
-        (p,), standard deviations that are added because faults may be too small to be distinguished from chance.
+        (p,), standard deviations that are added in quadrature to the standard errors, because faults may be too small to be
+        distinguished from chance.
     """
 
     misfits: tuple[Misfit, ...]
@@ -235,7 +236,8 @@ class _Score:
                 self._variance += comparison.score_variance(solution.jacobians[other] @ self._shift)
 
     def chance(self, count: int) -> float:
-        """Probability of this score along all directions in a correct fit, with noise estimated from `count` values."""
+        """Probability of a score at least as large, along all directions, in a correct fit with noise estimated from `count`
+        values."""
         values, vectors = np.linalg.eigh(self._information)
         whiten = vectors[:, values > NEW] / np.sqrt(values[values > NEW])
         k = whiten.shape[1]
@@ -343,7 +345,8 @@ def _sign(rate: Array) -> Array:
 
 def _strength(solution: Solution, i: int) -> tuple[Array, Array]:
     """Ratio (c,) of the channels' noise in the band to the noise at frequencies at which the motors do not move, and the
-    relative standard error of the former, which is large if encoders' errors hide the noise."""
+    relative standard error of the former, which is large if encoders' errors hide the noise. If there are too few such
+    frequencies, the ratio is 1."""
     experiment, comparison, found = solution.fitter.experiments[i], solution.comparisons[i], []
     values = experiment.values
     assert values is not None
