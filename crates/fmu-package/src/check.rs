@@ -144,7 +144,10 @@ fn check_info(info: &Info) -> Result<()> {
         ensure!(value.is_finite(), "the {name} of the default experiment must be finite, it is {value}");
     }
     for (name, value) in [("step size", info.step_size), ("tolerance", info.tolerance)] {
-        ensure!(is_positive(value), "the {name} of the default experiment must be > 0, it is {value}");
+        ensure!(
+            is_positive(value),
+            "the {name} of the default experiment must be finite and > 0, it is {value}"
+        );
     }
     ensure!(
         info.stop_time >= info.start_time,
@@ -168,7 +171,7 @@ fn check_type(variable_type: &Type) -> Result<()> {
                 ensure!(min <= max, "its range is empty: min {min} is above max {max}");
             }
             if let Some(nominal) = *nominal {
-                ensure!(is_positive(nominal), "the nominal value must be > 0, it is {nominal}");
+                ensure!(is_positive(nominal), "the nominal value must be finite and > 0, it is {nominal}");
             }
             check_unit(unit)
         }

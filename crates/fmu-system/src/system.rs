@@ -49,7 +49,7 @@ impl<'a> System<'a> {
     pub fn check(&'a self) -> Result<CheckedSystem<'a>> {
         let mut checked = CheckedSystem { system: self, fmus: Vec::new(), units: BTreeMap::new() };
         for (what, value) in [("stop time", self.stop_time), ("step size", self.step_size)] {
-            ensure!(value.is_finite() && value > 0.0, "the {what} must be > 0, it is {value}");
+            ensure!(value.is_finite() && value > 0.0, "the {what} must be finite and > 0, it is {value}");
         }
         for (index, (component, path)) in self.components.iter().enumerate() {
             ensure!(

@@ -136,8 +136,8 @@ fn wrong_systems_are_rejected() {
             |s| s.start.push(("plant.u", "inf".into())),
             "the start value of plant.u must be a finite number, it is inf",
         ),
-        (|s| s.stop_time = f64::INFINITY, "the stop time must be > 0, it is inf"),
-        (|s| s.step_size = 0.0, "the step size must be > 0, it is 0"),
+        (|s| s.stop_time = f64::INFINITY, "the stop time must be finite and > 0, it is inf"),
+        (|s| s.step_size = 0.0, "the step size must be finite and > 0, it is 0"),
         (|s| s.components[1].0 = "law", "two components are named law"),
         (
             |s| s.components[1].0 = "a.plant",

@@ -102,7 +102,7 @@ impl<M: Exported> Instance<M> {
         if let Some(index) = now.iter().position(|nominal| !(nominal.is_finite() && *nominal > 0.0)) {
             let name = M::TABLE[M::STATES[index].state as usize].name();
             return reject(format!(
-                "the nominal value of {name} must be > 0, the model returns {}",
+                "the nominal value of {name} must be finite and > 0, the model returns {}",
                 now[index]
             ));
         }
