@@ -12,7 +12,7 @@ pub(super) struct Resampling {
 }
 
 impl Resampling {
-    /// Checks that the times of an input are finite and do not decrease. Two equal times are a step; the value at the second of them
+    /// Checks that the times of an input are finite and do not decrease. Two equal times make a jump; the value at the second of them
     /// holds from there on.
     pub fn of(name: &str, times: &[f64], points: &[f64]) -> Result<Self, Error> {
         if times.is_empty() {

@@ -5,7 +5,7 @@
 pub(crate) enum Curve<'a> {
     /// One value for all times.
     Constant(f64),
-    /// Values at times that do not decrease. Two equal times are a step. If `is_held`, each value holds until the next time.
+    /// Values at times that do not decrease. Two equal times make a jump. If `is_held`, each value holds until the next time.
     Samples { times: &'a [f64], values: &'a [f64], slopes: Slopes<'a>, is_held: bool },
     /// The time derivative of the input with this index.
     RateOf(usize),
