@@ -270,7 +270,10 @@ fn two_builds_give_the_same_fmu_with_the_committed_description() {
     let mut zip = zip::ZipArchive::new(std::io::Cursor::new(one)).unwrap();
     let mut read = |name: &str| std::io::read_to_string(zip.by_name(name).unwrap()).unwrap();
     let described = description(&[]).replace(fmu_package::NO_GUID, &guid);
-    assert!(read("modelDescription.xml") == described, "the description in the FMU differs from the description of the sources");
+    assert!(
+        read("modelDescription.xml") == described,
+        "the description in the FMU differs from the description of the sources"
+    );
     for name in ["license.txt", "third-party.txt", "LICENSE-APACHE", "LICENSE-MIT"] {
         assert!(!read(&format!("documentation/licenses/{name}")).is_empty(), "{name}");
     }

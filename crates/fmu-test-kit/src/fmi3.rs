@@ -27,7 +27,8 @@ fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi3Instance
     // FMI 3.0 needs a path, not a URI.
     let path = arguments.resource_location.map(|location| {
         let bytes = location.to_bytes_with_nul();
-        CStr::from_bytes_with_nul(bytes.strip_prefix(b"file://").unwrap_or(bytes)).expect("the terminating NUL is kept")
+        CStr::from_bytes_with_nul(bytes.strip_prefix(b"file://").unwrap_or(bytes))
+            .expect("the terminating NUL is kept")
     });
     let resources = pointer(path);
     let environment = match arguments.environment {

@@ -76,8 +76,8 @@ pub enum Trajectory<'a> {
     /// A time series for each run, concatenated; the index of the time varies fastest.
     EachRun(&'a [f64]),
     /// Values at the input's own times, which must not decrease: one time series for all runs, or one for each run, concatenated.
-    /// Between two times, a continuous variable is interpolated linearly and any other keeps the earlier value. Two equal times are a
-    /// step. Before the first and after the last time, the value is constant.
+    /// Between two times, a continuous variable is interpolated linearly and any other keeps the earlier value. Two equal times make a
+    /// jump. Before the first and after the last time, the value is constant.
     Sampled {
         /// Times, s.
         times: &'a [f64],

@@ -82,9 +82,7 @@ def _causes(solution: Solution, verdict: Verdict) -> list[_Cause]:
     signs = [fault for fault in verdict.faults if fault.clear > CLEAR and fault.signs]
     for fault in sorted(signs, key=lambda fault: -fault.gain)[:1]:
         size = f"{fault.size:.2g} +- {fault.error:.1g} {fault.unit}"
-        message = (
-            f"{fault.name} of {size} would explain at least a part of the misfit: the residual follows the sign of a rate"
-        )
+        message = f"{fault.name} of {size} would explain at least a part of the misfit: the residual follows the sign of a rate"
         causes.append(_Cause(fault.gain, fault.name, message, False, partial(_with_fault, solution, fault.name)))
     return sorted(causes, key=lambda cause: -cause.gain)
 
@@ -194,7 +192,9 @@ def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
             good = judge(found).fits
             then = "with that, the data fit" if good else "that explains a part of the misfit"
             channels = ",".join(distortion.channel for distortion in new)
-            message = f"{_sizes(found, new)}: {then} (`identify` estimates it, too, with the argument {kind}: {channels})"
+            message = (
+                f"{_sizes(found, new)}: {then} (`identify` estimates it, too, with the argument {kind}: {channels})"
+            )
             yield _Cause(gain, kind, message, good, partial(refitted, solution, new))
 
 
