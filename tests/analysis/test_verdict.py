@@ -165,7 +165,11 @@ def test_the_command_reports_and_writes_no_parameters(prw, tmp_path, experiment)
     result = prw("identify", "run.csv", "--starts", 1)
     reported = [line for line in result.stderr.splitlines() if not line.startswith("looking for ")]  # progress
     assert result.returncode == 3 and len(reported) == 1, result.stderr
-    assert "tau1, tau2" in result.stderr and "argument delay: tau1,tau2)" in result.stderr and "--write-anyway" in result.stderr
+    assert (
+        "tau1, tau2" in result.stderr
+        and "argument delay: tau1,tau2)" in result.stderr
+        and "--write-anyway" in result.stderr
+    )
     assert result.stdout.index("DOES NOT EXPLAIN") < result.stdout.index("k1 ")
     assert not (out / "identified.json").exists()
     page = (out / "report.html").read_text(encoding="utf-8")

@@ -68,7 +68,6 @@ def test_examples(prw: Any, tmp_path: Path, name: Any) -> None:
     assert ("omega1" in columns) == (motion.omega is not None)
     slope = backward_slope(motion.time, motion.theta) if motion.omega is None else motion.omega
     expected, _ = follow(linear_model(table_1()), motion.time, motion.theta, slope)
-    # The table has twelve digits.
     assert_close(columns, expected, 1e-10)
     for output in ("tau1", "tau2", "pitch_rate"):
         assert abs(columns[output][0]) < 1e-12, "starts with a jump"

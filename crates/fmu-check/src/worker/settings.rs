@@ -1,7 +1,7 @@
 //! Settings of the process that an FMU must not change.
 
 /// Returns the settings, each with its value: working directory and its files, environment, locale, floating-point control and, on
-/// Unix, signals, limits, timers, standard streams, the mask for new files, scheduling and the seeds of random numbers.
+/// Unix, signals, limits, timers, standard streams, the umask, scheduling and the seeds of random numbers.
 pub fn settings() -> Vec<String> {
     let mut found = Vec::new();
     found.push(format!("working directory {}", std::env::current_dir().unwrap_or_default().display()));

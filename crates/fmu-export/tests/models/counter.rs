@@ -96,7 +96,9 @@ impl CoSimulation for Counter {
         // A tick at the end of the step belongs to this step even if a rounding error puts it just after the end.
         let end = step.time + step.size + 1e-9 * self.period;
         if end - self.next > MOST * self.period || end + self.period == end {
-            return Err(Error::new(format!("a step may have {MOST} periods, and they must not vanish")));
+            return Err(Error::new(format!(
+                "a step may have at most {MOST} periods, and the time must change if a period is added"
+            )));
         }
         // A step that fails must leave the model as it was.
         let mut counter = self.clone();
