@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 
 import fmpy
 import numpy as np
@@ -15,6 +16,7 @@ import rig
 from built import ROOT, program
 from lxml import etree
 
+from prw.identification.findings import Findings
 from prw.identification.report import _prose
 from prw.identification.rounding import rounded
 
@@ -211,3 +213,19 @@ def test_options_in_the_report_are_code():
     assert (
         str(_prose("add `--delay tau1`; k1 < 2 +- 1 N.m/deg")) == "add <code>--delay tau1</code>; k1 &lt; 2 ± 1 N·m/deg"
     )
+
+
+@pytest.mark.parametrize(
+    "rival, exchanged",
+    [
+        ({"k1": 54.0, "k2": 132.0, "c1": 0.42, "c2": 0.53}, True),
+        ({"k1": 54.0, "k2": 132.0, "c1": 0.42, "c2": 0.60}, False),
+        ({"c3": 0.7}, False),
+    ],
+)
+def test_only_exchanged_couplings_are_called_exchanged(rival, exchanged):
+    estimates = {"k1": 132.0, "k2": 54.0, "c1": 0.53, "c2": 0.42, "c3": 0.35}
+    logarithms = np.log([estimates[name] for name in rival])
+    solution = SimpleNamespace(task=SimpleNamespace(names=list(rival)), logarithms=logarithms)
+    found = Findings._exchanged(SimpleNamespace(solution=solution), np.log([*rival.values()]))
+    assert found is exchanged

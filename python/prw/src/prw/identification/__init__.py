@@ -92,7 +92,7 @@ def identify(
     Returns
     -------
     Identification
-        Estimates, standard errors and doubts. Data that the model does not explain raise no error, nor do undetermined
+        Estimates, standard errors, notes and warnings. Data that the model does not explain raise no error, nor do undetermined
         parameters: see `fits`, `misfits` and `undetermined`.
 
     Raises

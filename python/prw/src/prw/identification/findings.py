@@ -19,7 +19,7 @@ from prw.motion import Array
 
 #: If residuals and given noise differ by more than this factor, a note reports it.
 UNLIKE = 1.5
-#: An estimate that is off its prior by this many standard deviations contradicts it.
+#: An estimate that differs from its prior by this many standard deviations contradicts it.
 CONTRADICTION = 3.0
 #: Relative standard error above which a parameter is reported as not determined.
 HOPELESS = 1.0
@@ -250,4 +250,4 @@ class Findings:
         index = {name: i for i, name in enumerate(self.solution.task.names)}
         pairs = [(a, b) for a, b in (("k1", "k2"), ("k2", "k1"), ("c1", "c2"), ("c2", "c1")) if {a, b} <= index.keys()]
         differences = [abs(point[index[a]] - self.solution.logarithms[index[b]]) for a, b in pairs]
-        return bool(pairs) and max(differences) < 0.05
+        return bool(pairs) and bool(max(differences) < 0.05)

@@ -58,7 +58,7 @@ class Identification(Findings):
         return "\n".join([*lines, *(f"note        {note}" for note in self.notes_in(shown=shown))])
 
     def report(self, path: str | os.PathLike[str]) -> None:
-        """Write the report, an HTML page that loads no other file: estimates, doubts, residuals. Raises UserError without
+        """Write the report, an HTML page that loads no other file: estimates, notes, residuals. Raises UserError without
         jinja2 or matplotlib, or if the file cannot be written."""
         need("jinja2", "matplotlib")
         from prw.identification.report import page
