@@ -36,8 +36,7 @@ def draw(value: float, unlike: int, rng: np.random.Generator, count: int) -> np.
 
 
 def wrists(count: int, unlike: int) -> VectorEnv:
-    """Environments of `unlike` different wrists. The action is the rate of both motors; the reward is the negative
-    squared error after MOVE."""
+    """Environments of `unlike` different wrists. Action: rate of both motors. Reward: negative squared error after MOVE."""
     task = Task(
         fmu="target/fmu/prw_testbed.fmu",
         actions={"rate": (-RATE, RATE)},
