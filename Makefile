@@ -36,10 +36,12 @@ LOCKED ?= --locked
 
 # Rust target of the page in the FMU and of the C sources.
 WEBASSEMBLY := wasm32-unknown-unknown
+# Rust target for which `make test` compiles without linking, because some modules are for one system only.
+WINDOWS := x86_64-pc-windows-gnu
 # make does not pass its job server on to these programs, so rustc would warn that it cannot connect to it.
 NO_JOBS := env -u MAKEFLAGS -u MFLAGS
-HAS_WEBASSEMBLY = ls "$$($(NO_JOBS) rustc --print target-libdir --target $(WEBASSEMBLY))" 2>/dev/null | grep -q libstd
-ADD_WEBASSEMBLY = $(HAS_WEBASSEMBLY) || rustup target add $(WEBASSEMBLY)
+add_target = ls "$$($(NO_JOBS) rustc --print target-libdir --target $(1))" 2>/dev/null | grep -q libstd || rustup target add $(1)
+ADD_WEBASSEMBLY = $(call add_target,$(WEBASSEMBLY))
 
 # Directory of the compiled programs that build FMUs. If empty, cargo compiles them.
 PROGRAMS ?=
@@ -54,7 +56,7 @@ TWO_JOBS = $(if $(findstring jobserver,$(MAKEFLAGS)),,-j2)
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-fmu check check-release test compile-tests test-rust test-crates test-docs test-python test-fmu test-newest-fmpy test-page fmu bench instructions figures docs reference experiments validation closed-loop closed-loop-fmus test-closed-loop importer-fmus test-importers examples test-examples test-faults release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo demo-fmu check check-release test compile-tests test-rust test-crates test-docs check-windows test-python test-fmu test-newest-fmpy test-page fmu bench instructions figures docs reference experiments validation closed-loop closed-loop-fmus test-closed-loop importer-fmus test-importers examples test-examples test-faults release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -124,7 +126,7 @@ check-release: $(VENV)/importers.stamp need-rust
 # the Rust tests compiled.
 test: need-rust need-python
 	@$(MAKE) --no-print-directory $(TWO_JOBS) PROGRAMS=target/debug test-crates test-python $(VENV)/importers.stamp \
-	  $(VENV)/examples.stamp test-docs importer-fmus source-fmu
+	  $(VENV)/examples.stamp test-docs check-windows importer-fmus source-fmu
 	$(PY) dev/platforms/bill_of_materials.py --check
 	PROGRAMS=target/debug $(PYTEST) $(FMU_TESTS) tests/closed_loop tests/importers tests/examples
 	$(PYTEST) -m small tests/source_fmu
@@ -150,6 +152,10 @@ test-crates: compile-tests headers
 test-docs: compile-tests
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc $(LOCKED) --workspace --no-deps --quiet
 	$(NO_JOBS) $(CARGO) test $(LOCKED) --workspace --doc --quiet
+
+check-windows: compile-tests
+	@$(call add_target,$(WINDOWS))
+	$(CARGO) clippy $(LOCKED) --workspace --target $(WINDOWS) --quiet -- -D warnings
 
 # ruff and mypy; pyproject.toml lists the files.
 test-python: $(VENV)/tests.stamp
@@ -281,6 +287,8 @@ fuzz: need-rust need-nightly
 
 sanitize: need-rust need-nightly $(VENV)/tests.stamp source-fmu fmu
 	@command -v valgrind >/dev/null || $(call stop,valgrind is missing; on Debian: apt install valgrind)
+	@$(CARGO) +nightly miri --version >/dev/null 2>&1 || \
+	  $(call stop,Miri is missing; install it with: rustup component add --toolchain nightly miri rust-src)
 	@dev/sanitize
 
 clean:

@@ -1,4 +1,4 @@
-"""Paths of the project and of the files that `make` has built, and a check for installed packages."""
+"""Paths of the project and of the files that `make` has built, the programs that build FMUs, and a check for installed packages."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SCRIPT = re.compile(r'\nbegin\("([^"]*)"\)\.catch\(showFailure\);\n')
 
 
 def built(name: str, target: str = "closed-loop-fmus") -> Path:
-    """Returns the path of a file in target/fmu, which `make TARGET` builds."""
+    """Returns the path of a file in target/fmu. If it is missing, exits and names the make target that builds it."""
     path = FMUS / name
     if not path.exists():
         pytest.exit(f"{path} is missing; build it with `make {target}`", returncode=1)

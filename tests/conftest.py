@@ -1,4 +1,4 @@
-"""Fixtures that several test directories share. pyproject.toml lists the directories from which tests import modules."""
+"""Fixtures that several test directories share. pyproject.toml lists further directories from which tests import modules."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def fmu() -> Path:
 
 @pytest.fixture(scope="session", params=["", "fmi3/"], ids=["fmi2", "fmi3"])
 def version(request: pytest.FixtureRequest) -> str:
-    """The directory of the FMUs in target/fmu, for FMI 2.0 and then for FMI 3.0."""
+    """The directory of the FMUs in target/fmu: "" for FMI 2.0, and then "fmi3/" for FMI 3.0."""
     return str(request.param)
 
 
@@ -55,7 +55,8 @@ def unpack() -> Iterator[Callable[[Path], str]]:
 
 @pytest.fixture
 def prw(tmp_path: Path, fmu: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Returns a function that runs `prw` with arguments, in this process and a temporary directory. A warning is an error."""
+    """Returns a function that runs `prw` with arguments, in this process and a temporary directory. A UserWarning or RuntimeWarning is
+    an error."""
     # The import is here because the environment of the platform tests has no prw.
     from prw.cli import main
 

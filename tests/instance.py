@@ -53,7 +53,7 @@ class Instance:
         return np.array(self.fmi.getReal([self.variables[name].valueReference for name in names]))
 
     def start(self, theta=(0.0, 0.0), rate=None, time=0.0, **parameters) -> None:
-        """Initializes at rest at the motor angles theta (2,) rad. If `rate` (2,) rad/s is given, use_omega is true.
+        """Initializes at the motor angles theta (2,) rad, by default at rest. use_omega is true if and only if `rate` (2,) rad/s is given.
 
         `parameters` are set by name before initialization.
         """
@@ -72,8 +72,8 @@ class Instance:
     def run(self, t, theta, rate=None, derivative=None):
         """Steps through the times t (n,) after a call of `start`, and sets the motor angles theta (n, 2) at each time.
 
-        If given, rate (n, 2) sets omega, and derivative (n, 2) sets the input derivatives. Returns (at, after) like `follow` of
-        the oracle."""
+        If given, rate (n, 2) sets omega1 and omega2, and derivative (n, 2) the input derivatives of the angles. Returns (at, after)
+        like `follow` of the oracle."""
         angles = [self.variables[name].valueReference for name in ("theta1", "theta2")]
         rates = [self.variables[name].valueReference for name in ("omega1", "omega2")]
         t = [float(s) for s in t]

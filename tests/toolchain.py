@@ -11,6 +11,7 @@ from pathlib import Path
 WINE = "/usr/lib/wine/wine64"
 #: Programs and their Debian packages.
 PACKAGES = {
+    "gcc": "gcc libc6-dev",
     "x86_64-w64-mingw32-gcc": "gcc-mingw-w64-x86-64",
     "aarch64-linux-gnu-gcc": "gcc-aarch64-linux-gnu libc6-dev-arm64-cross",
     "qemu-aarch64": "qemu-user",
@@ -33,7 +34,7 @@ def windows(directory: Path) -> dict[str, str]:
 
 
 def need(*programs: str) -> None:
-    """Installs the Debian packages of missing programs. Exits if that fails, and names the packages."""
+    """Installs the Debian packages of missing programs. If that fails, exits and names the packages."""
     missing = " ".join(sorted({PACKAGES[program] for program in programs if not shutil.which(program)}))
     if missing:
         apt = f"apt-get update -qq && apt-get install -y -qq --no-install-recommends {missing}"

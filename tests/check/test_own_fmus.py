@@ -1,4 +1,4 @@
-"""On the packed FMUs, fmu-check only reports the notes that docs/checking.md lists with their reasons."""
+"""fmu-check reports exactly the notes on the packed FMUs that docs/checking.md lists, plus `package.glibc` where it applies."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CHECK = FMUS.parent / "debug" / "cargo-fmu"
 
 
 def listed(model: str) -> list[tuple[str, str, str]]:
-    """Returns severity, name and observation of the notes on an FMU in the documentation."""
+    """Returns severity, name and observation of the notes that the documentation lists for an FMU."""
     rows = read_table(ROOT / "docs" / "checking.md", "This project's FMUs").rows
     return [("note", name.strip("`"), observation) for name, fmu, observation, _ in rows if fmu == model]
 
@@ -32,13 +32,13 @@ def needs_new_system(fmu: Path) -> bool:
 @pytest.mark.parametrize("model", ["prw_testbed", "prw_controller", "prw_motor"])
 def test_only_listed_notes_are_found(version: str, model: str) -> None:
     fmu = built(f"{version}{model}.fmu")
-    # The check takes about 20 seconds. It may take longer, because a busy machine must still reach every topic.
+    # The check takes about 20 seconds. The limits are much longer, so that it reaches every topic on a busy machine, too.
     command = [CHECK, "fmu", "check", "--fmu", fmu, "--json", "--no-shrink", "--repeat", "0.3", "--time", "1500"]
     run = subprocess.run(command, capture_output=True, text=True, timeout=1800)
     report = json.loads(run.stdout)
     assert report["interfaces"] == ["Co-Simulation", "Model Exchange"], run.stderr
     assert report["unreached"] == []
-    # The start of an observation is cut off: it is a function, whose name depends on the FMI version.
+    # An observation begins with a function, whose name depends on the FMI version, so the part up to “ with ” is cut off.
     found = [
         (finding["severity"], finding["name"], observed.split(" with ", 1)[-1])
         for finding in report["findings"]

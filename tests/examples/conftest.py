@@ -1,4 +1,4 @@
-"""Imports the examples as modules and runs them in the repository root."""
+"""Runs the tests in the project's directory, and checks that the FMUs of the examples are built."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from built import ROOT, built
 
 @pytest.fixture(autouse=True)
 def in_the_project(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Changes to the directory in which the examples find the FMUs."""
+    """Changes to the directory from which the examples find the FMUs, and exits if an FMU is missing."""
     monkeypatch.chdir(ROOT)
     for name in ("prw_testbed.fmu", "prw_controller.fmu"):
         built(name)

@@ -1,4 +1,4 @@
-"""Runs the examples, and checks their results by independent means: the oracle's equations and the paper's poles."""
+"""Runs the examples, and checks their results, mostly by independent means: the oracle's equations and the poles of eq. (11)."""
 
 from __future__ import annotations
 
@@ -75,7 +75,9 @@ def quiet() -> Any:
 
 
 def vibration(quiet: Any, rates: np.ndarray, **changed: float) -> float:
-    """Returns the largest error after the move, deg, in the exact solution of the Lagrange equations. changed: parameters."""
+    """Returns the largest error of pitch and roll after the move, deg, in the exact solution of the Lagrange equations.
+
+    changed: parameters that differ from Table 1."""
     still = np.zeros((round(quiet.AFTER / quiet.STEP) + 1, 2))
     slope = np.vstack([rates, still])
     theta = np.vstack([np.zeros(2), np.cumsum(quiet.STEP * slope[:-1], axis=0)])
@@ -158,7 +160,7 @@ def learned() -> Any:
 
 
 def test_shapers_leave_no_vibration_of_the_nominal_wrist(learned: Any) -> None:
-    """The oracle calculates the vibration. After a quintic without a shaper some remains."""
+    """The oracle calculates the vibration. With one impulse, which is the quintic without a shaper, vibration remains."""
     left = {}
     for impulses in (1, 2, 3):
         slope = np.append(learned.shaped(impulses, 0.25), 0.0)

@@ -1,4 +1,4 @@
-"""Fixtures: the FMU's description, and instances of it that are freed at the end of a test."""
+"""Fixtures: the FMU's description and files, its instances, which are freed at the end of a test, and the oracle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The model descriptions are valid for FMPy and the schemas. Both FMI versions have the same variables and results."""
+"""The model descriptions are valid for FMPy and the schemas. Both FMI versions have the same variables, except `time`, and results."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
 INPUTS = ("theta1", "theta2", "omega1", "omega2")
 
 
-#: Start values with twisted couplings and moving carriers. MOTORS are the inputs.
+#: Start values with twisted couplings and moving carriers.
 START = {
     "start_at_rest": False, "theta3_start": 0.5, "theta4_start": -0.3, "theta5_start": 0.1, "theta6_start": 0.4,
     "omega5_start": 3.0, "omega6_start": -2.0, "k1": 130.0,
@@ -59,8 +59,8 @@ def test_the_oracle_has_all_parameters_and_outputs(description):
 
 def test_attributes_that_importers_need(description):
     """OMSimulator counts the variables with the attribute `derivative` to know how many states there are. OpenModelica 1.27.0
-    passes all Booleans in one array and garbles all but the first: the second arrives as false, and with `start_at_rest`
-    false a testbed with turned motors would not start at rest."""
+    passes all Booleans in one array and garbles all but the first, which arrive as false. So `start_at_rest` is the first:
+    if it were false, a testbed with turned motors would not start at rest."""
     variables = description.modelVariables
     attributed = {v.name for v in variables if v.derivative is not None}
     assert attributed == {d.variable.name for d in description.derivatives}
@@ -68,7 +68,7 @@ def test_attributes_that_importers_need(description):
 
 
 def test_units_and_nominal_values_are_in_the_types(fmu3):
-    """fmi-sim 0.7 rejects FMUs whose variables have these attributes themselves."""
+    """fmi-sim 0.7 rejects FMUs whose variables have these attributes themselves, so their types have them instead."""
     root = etree.fromstring(ZipFile(fmu3).read("modelDescription.xml"))
     units = {
         by_name.get("name")
@@ -94,8 +94,8 @@ def test_the_terminals_are_valid_and_only_in_fmi3(fmu, fmu3):
 
 
 def test_the_variables_are_the_same(fmu, fmu3):
-    """Compares names, causality, variability, start values, units and ranges. FMI 3.0 has the additional variable `time`.
-    Value references start at 0 in FMI 2.0. They start at 1 in FMI 3.0, because OMSimulator 3.0.0 needs that."""
+    """Compares names, types, causality, variability, `initial`, start values, units and ranges. FMI 3.0 has the additional variable
+    `time`. Value references start at 0 in FMI 2.0, but at 1 in FMI 3.0, because OMSimulator 3.0.0 needs that."""
 
     def variables(path, first):
         kind = {"Real": "Float64", "Integer": "Int32"}
@@ -146,7 +146,7 @@ def test_results_are_bit_identical(fmu, fmu3, options):
 
 
 def test_dependencies_are_the_sparsity_of_the_equations(description, model):
-    """Each output and state derivative lists exactly the states and inputs on which it depends."""
+    """The dependencies of each output and state derivative are exactly the states and inputs on which it depends."""
     knowns = (*STATES, *INPUTS)
     rows = dict(zip((f"der({s})" for s in STATES), np.hstack([model.a, model.b_angle, model.b_rate])))
     zeros = np.zeros(4)

@@ -1,4 +1,4 @@
-"""The page in the FMU and its figures are up to date and self-contained, and the programs on the page run as printed."""
+"""The pages in the FMUs and their figures are up to date, and the pages load nothing. The Python programs on the testbed's page run."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_the_pages_are_up_to_date(which):
 def test_the_fmu_contains_page_and_icons(which):
     path, page = built(f"prw_{which.text}.fmu"), text_of(which)
     with zipfile.ZipFile(path) as archive:
-        # build_fmu adds the scripts that run the FMU; test_page.py tests them.
+        # build_fmu adds the parts that run the FMU, before and after this text; test_page.py tests them.
         main = page[page.index("<main>") + len("<main>") : page.index("</body>")]
         assert main in archive.read("documentation/index.html").decode()
         for icon in ("model.png", "documentation/model.svg"):
@@ -134,7 +134,7 @@ def rate(t):
 
 
 def test_reported_errors_of_model_exchange_in_fmpy(fmu, model):
-    """The percentages in docs/compatibility.md are the errors that arise because FMPy holds inputs over a step."""
+    """The percentages in docs/compatibility.md are the errors that arise because FMPy holds inputs between communication points."""
     reported = (
         (ROOT / "docs/compatibility.md").read_text(encoding="utf-8").split("For two sines")[1].split("[fmu_run]")[0]
     )
@@ -151,12 +151,12 @@ def test_reported_errors_of_model_exchange_in_fmpy(fmu, model):
         exact = integrate(model, t, angle, rate)
         error = {name: np.max(np.abs(result[name] - exact[name])) / np.max(np.abs(exact[name])) for name in OUTPUTS}
         found += [100 * error["roll"], 100 * max(error["tau1"], error["tau2"])]
-    # The document states one digit.
+    # The document states one significant digit.
     assert percents == [float(f"{value:.1g}") for value in found]
 
 
 def test_numbers_are_up_to_date(found):
-    """Numbers may differ by 5 %, because deviations are stated with two digits, and the last digit may depend on the machine."""
+    """Numbers may differ by 5 %, because some are stated with two digits, and the last digit may depend on the machine."""
     committed, fresh = (
         json.loads((ROOT / COMMITTED / "numbers.json").read_text(encoding="utf-8")),
         json.loads(numbers(found)),
@@ -177,7 +177,7 @@ def test_numbers_are_up_to_date(found):
 
 
 def write(directory: Path, found) -> dict[str, bytes]:
-    """Writes the files that `make figures` commits. Returns their content by name."""
+    """Writes the figures and numbers that `make figures` commits, without the films. Returns their content by name."""
     (directory / "numbers.json").write_text(numbers(found), encoding="utf-8")
     for name, drawn in figures(found).items():
         if drawn.for_page:
@@ -193,7 +193,7 @@ def written(found, tmp_path_factory):
 
 
 def test_figures_are_up_to_date(written):
-    """Coordinates in the committed figures differ by at most a fiftieth of a point from figures drawn with the current FMU."""
+    """Coordinates in the committed SVG files differ by at most a fiftieth of a point from figures drawn with the current FMU."""
     made_with = json.loads((ROOT / COMMITTED / "numbers.json").read_text(encoding="utf-8"))["made_with"]
     if made_with != f"matplotlib {matplotlib.__version__}":
         pytest.skip(f"the figures were drawn by {made_with}")
@@ -206,7 +206,7 @@ def test_figures_are_up_to_date(written):
 
 
 def in_the_last_digit(value, random):
-    """Changes results in the last digit, as another processor may. Times and steps are quotients, which do not differ."""
+    """Changes results in the last digit, as another processor may. Times and steps stay, because they are quotients, which are exact."""
     if isinstance(value, np.ndarray):
         return value * (1 + EPSILON * random.integers(-2, 3, value.shape))
     if isinstance(value, dict):
@@ -222,7 +222,7 @@ def in_the_last_digit(value, random):
 
 
 def test_another_processor_writes_the_same_files(found, written, tmp_path, monkeypatch):
-    """`make figures` on another machine changes no committed file."""
+    """Results that differ in the last digit give the same files, so `make figures` on another machine changes no committed file."""
     random = np.random.default_rng(1)
     monkeypatch.setattr(plots, "COLUMN", plots.COLUMN * (1 + EPSILON))
     monkeypatch.setattr(bode, "CURVE", in_the_last_digit(bode.CURVE, random))

@@ -1,4 +1,4 @@
-"""Parameters a billion times smaller or larger than Table 1, step sizes from a nanosecond to hours, and a million steps.
+"""Steps with parameters up to a billion times smaller or larger than Table 1, with sizes from a nanosecond to hours; a million steps.
 
 PRW_EXTREME_CASES sets the number of random testbeds.
 """
@@ -16,7 +16,7 @@ from reference import augmented, exponential
 
 STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
 CASES = int(os.environ.get("PRW_EXTREME_CASES", "12"))
-#: Scaling and squaring of the largest of these systems loses more than 25 digits.
+#: Digits of the oracle. The scaling and squaring of the largest of these matrices loses more than 25 digits.
 DIGITS = 120
 
 many = np.vectorize(mpmath.mpf, otypes=[object])
@@ -40,9 +40,9 @@ class Exact:
         """Returns the states and outputs (14,) after a step, and their scales (14,), with which errors are compared.
 
         The arguments are the states x (6,), the motor angles theta (2,), their slopes (2,) and their jump (2,) at the
-        start of the step. An argument with a relative error of 1e-16 changes a result by at most 1e-16 of its scale.
-        The two sides have the same scale, because the FMU steps their sum and difference. The scale of an angle is at
-        least the angle at the start, to which its change is added.
+        start of the step. A relative error of 1e-16 in an argument changes a result by at most 1e-16 of the result's scale.
+        Both values of a pair, such as theta3 and theta4, have the same scale, because the FMU steps their sum and difference.
+        The scale of an angle is at least the angle at the start, to which the FMU adds the change during the step.
         """
         x, theta, slope = many(x), many(theta), many(slope)
         model, size = self.model, np.abs(x)
@@ -92,7 +92,8 @@ def check(instance, parameters, h, seed, steps=3):
 
 
 def random_parameters(rng):
-    """Scales each parameter of Table 1 separately by 1e-9 to 1e9. A third of the cases only has the scales 1e-9, 1 and 1e9."""
+    """Multiplies each Real parameter of Table 1 by a factor from 1e-9 to 1e9; in a third of the cases by 1e-9, 1 or 1e9. M and N are
+    drawn from a list."""
     ends = rng.uniform() < 1 / 3
     decades = rng.choice([-9, 0, 9], len(REAL)) if ends else rng.uniform(-9, 9, len(REAL))
     lobes, rollers = rng.choice([1, 4, 7, 1000, 2**31 - 1], 2)
@@ -138,7 +139,7 @@ def test_a_million_steps(instance, factors):
     with mpmath.workdps(DIGITS):
         exact = Exact(parameters, steps * h)
         true_values, size = exact.step(np.zeros(6), np.zeros(2), slope)
-        # Each step rounds the angles. The springs convert these errors to errors of the velocities.
+        # Each step rounds the angles, and the springs convert these errors to errors of the velocities.
         rate = mpmath.sqrt(abs(exact.model.a[4:, :4]).max())
         for velocity, angle in (4, 2), (5, 3), (10, 8), (11, 9):
             size[velocity] += rate * size[angle]

@@ -1,4 +1,5 @@
-"""Tests of the page in the FMU without a browser: its module gives bit-identical results, and the page loads no other file."""
+"""Tests of the pages in the FMUs without a browser: the WebAssembly module gives the same bits as the library, and the testbed's
+page loads no other file."""
 
 from __future__ import annotations
 
@@ -89,8 +90,8 @@ class WebAssembly:
 
 
 def test_the_page_equals_sources_and_fmus(testbed, page, packed):
-    """Except for the added parts, the page in the FMU equals the page in the sources. It runs the module for FMI 2.0,
-    also in the FMU for FMI 3.0."""
+    """Except for the added parts, the page in the FMU equals the page in the sources. In the FMU for FMI 3.0, the page contains the
+    modules for FMI 2.0, too."""
     assert LIVE.sub("", page) == (ROOT / TESTBED.path).read_text(encoding="utf-8")
     directory = testbed.parents[testbed.parent.name == "fmi3"]
     for offset, name in enumerate([testbed.name, "prw_controller.fmu"]):
@@ -105,7 +106,7 @@ def test_the_controllers_page_runs_it(controller):
     assert LIVE.sub("", page) == (ROOT / CONTROLLER.path).read_text(encoding="utf-8")
     script = script_of(page)
     assert len(PACKED.findall(script)) == 2 and "\n], ...[{},[]]).catch(" in script
-    # The testbed that runs next to the controller is the one in the testbed's FMU, except for its guid.
+    # The testbed that runs next to the controller has the description of the testbed's FMU, except for the guid.
     description, module = (zlib.decompress(base64.b64decode(part), wbits=-15) for part in PACKED.findall(script)[1])
     with zipfile.ZipFile(built("prw_testbed.fmu")) as archive:
         original = archive.read("modelDescription.xml")

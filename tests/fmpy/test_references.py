@@ -1,5 +1,4 @@
-"""In several importers, the packed FMUs agree with their reference experiments, and a testbed whose stiffness is wrong by 1 %
-does not."""
+"""In several importers, the packed testbeds agree with their reference experiments. If the stiffness k1 is wrong by 1 %, they do not."""
 
 from __future__ import annotations
 

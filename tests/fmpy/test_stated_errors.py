@@ -1,4 +1,4 @@
-"""Errors that the documents state for importers are repeated by calling the FMU in the same order as these importers.
+"""Calls the FMU in the same order as some importers, and compares the errors with those that the documents state for these importers.
 
 The motors move as in Fig. 4, the step is 1 ms, and the errors are in percent of the peak."""
 
@@ -39,7 +39,8 @@ def shares(exact, torque, roll) -> tuple[float, float]:
 
 
 def check_stated(name: str, *parts: str) -> None:
-    """Checks that the document contains the parts in this order and close together. Any kind of white space matches a space."""
+    """Checks that the document contains the parts in this order and close together. All kinds of white space are the same, and tags
+    and backticks are ignored."""
     text = re.sub(r"&#8239;|&#160;|\s", " ", (ROOT / name).read_text(encoding="utf-8"))
     text = re.sub(r"<[^>]*>|`", "", text).replace("  ", " ")
     assert re.search(".{0,160}?".join(map(re.escape, parts)), text), parts
@@ -67,8 +68,8 @@ def test_outputs_that_are_read_before_inputs_are_set(fmu, exact):
 def in_model_exchange(
     fmu, nodes, weights, rate_factor: float = 1.0, held: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Integrates with an explicit Runge-Kutta method in which each stage needs the slope of the stage before. Returns torque and roll.
-    rate_factor: multiplies the rates. held: sets inputs once for each step, after the outputs are read."""
+    """Integrates with an explicit Runge-Kutta method in which a stage needs only the slope of the previous stage. Returns torque and
+    roll. rate_factor: factor of the rates. held: whether inputs are set only once for each step, after the outputs are read."""
     with Fmu(fmu) as testbed:
         instance = testbed.instances(interface="model-exchange")
 
@@ -98,7 +99,7 @@ ODE4 = (0, 0.5, 0.5, 1), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 
 
 def test_fixed_steps_in_model_exchange(fmu, exact):
-    """Integrates with explicit Euler as OpenModelica, and with ode4 as Simulink with FMIKit."""
+    """Integrates with the explicit Euler method like OpenModelica, and with ode4 like Simulink with FMIKit."""
     torque, roll = shares(exact, *in_model_exchange(fmu, (0,), (1,)))
     check_stated("docs/compatibility.md", f"off by {roll:.1f} % in roll and", f"{torque:.1f} % in torque")
     check_stated(

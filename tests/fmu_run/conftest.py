@@ -17,5 +17,5 @@ def faulty_fmu(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="session")
 def faulty_fmu3(tmp_path_factory) -> Path:
-    """The FMU in C for FMI 3.0, for functions that FMI 2.0 does not have (faulty_fmu3.c)."""
+    """An FMU in C for FMI 3.0, whose parameter `behaviour` selects how its steps end (faulty_fmu3.c)."""
     return build(tmp_path_factory.mktemp("faulty_fmu3"), name="faulty_fmu3", platform=f"{platform.machine()}-linux")

@@ -1,5 +1,6 @@
 /* An FMU for Co-Simulation whose parameter `behaviour` selects how it misbehaves. It lacks the optional functions. COMPLETE adds
- * them for FMPy, which only loads FMUs with all functions. Some behaviours only log the reason of an error if logging is on. */
+ * them for FMPy, which only loads FMUs with all functions; they return errors. Some behaviours log the reason of an error only if
+ * logging is on. */
 #define _POSIX_C_SOURCE 199309L
 #include <stdlib.h>
 #include <string.h>
@@ -18,7 +19,7 @@ typedef struct {
     char label[64];
 } Instance;
 
-/* Instances that exist now, the most that existed at a time, and steps with logging on. */
+/* The number of instances now, the largest number until now, and the number of steps with logging on. */
 static int alive, most, logged_steps;
 
 const char *fmi2GetTypesPlatform(void) { return "default"; }

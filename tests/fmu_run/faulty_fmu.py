@@ -13,7 +13,9 @@ HERE = Path(__file__).parent
 
 
 def build(directory: Path, *flags: str, name: str = "faulty_fmu", platform: str = "linux64") -> Path:
-    """Compiles `name` with `flags` and packs it in `directory` for `platform`; returns the FMU."""
+    """Compiles the C file `name` of this directory with `flags`, and packs it with its description. Returns the FMU in `directory`.
+
+    platform: the directory in `binaries/`."""
     library, fmu = directory / f"{name}.so", directory / f"{name}.fmu"
     headers = Path(fmpy.__file__).parent / "c-code"
     common = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", "-I", headers]

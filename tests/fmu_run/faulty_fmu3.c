@@ -1,4 +1,4 @@
-/* An FMU for FMI 3.0 whose parameter selects how its steps end after 0.5 s. */
+/* An FMU for FMI 3.0 whose parameter selects how its steps from 0.5 s on end, or that fmi3Terminate fails. */
 #include <stdlib.h>
 #include <string.h>
 

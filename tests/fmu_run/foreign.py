@@ -1,4 +1,4 @@
-"""Packs FMUs in C that behave like FMUs of other producers. MANNERS in crates/fmu-run/tests/foreign/foreign.c lists how."""
+"""Packs FMUs in C that behave like FMUs of other producers, in the manners that crates/fmu-run/tests/foreign/foreign.c lists."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SOURCE = Path(__file__).parents[2] / "crates" / "fmu-run" / "tests" / "foreign"
 
 @functools.cache
 def library() -> bytes:
-    """Returns the library, which is compiled once."""
+    """Returns the library, which is compiled once for all FMUs."""
     headers = Path(fmpy.__file__).parent / "c-code"
     with tempfile.TemporaryDirectory() as directory:
         to = Path(directory) / "foreign.so"
@@ -25,7 +25,7 @@ def library() -> bytes:
 
 
 def foreign(directory: Path, manner: str, version: str = "2.0") -> Path:
-    """Returns the FMU with this manner, for this FMI version."""
+    """Packs the FMU with this manner and for this FMI version into the directory, and returns it."""
     fmu = directory / f"{manner}{version[0]}.fmu"
     platform = "linux64" if version == "2.0" else "x86_64-linux"
     with zipfile.ZipFile(fmu, "w") as archive:

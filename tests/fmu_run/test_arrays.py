@@ -1,4 +1,4 @@
-"""A model with arrays, which are scalars in FMI 2.0. The same program runs both FMUs. Results are bit-identical, also in FMPy."""
+"""A model with arrays, whose elements are scalars in FMI 2.0. Results of the FMUs for FMI 2.0 and 3.0 are bit-identical, also in FMPy."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 PIECES = range(1, 9)
 TEMPERATURES = [f"T[{piece}]" for piece in PIECES]
-#: One output of each type that can be read as a number.
+#: Variables of all types that can be read as numbers.
 OUTPUTS = [
     "mean",
     "means[2]",
@@ -33,7 +33,7 @@ OUTPUTS = [
 def rods(tmp_path_factory) -> tuple[Path, Path]:
     """The FMUs of crates/fmu-export/tests/models/rod.rs, for FMI 2.0 and FMI 3.0."""
     directory = tmp_path_factory.mktemp("rods")
-    # Built in the whole workspace, like the Rust tests. With --package, cargo would compile crates again with other features.
+    # Built with --workspace, like the Rust tests. With --package, cargo would compile crates again with other features.
     build = ["cargo", "build", "--quiet", "--locked", "--workspace", "--example", "rod"]
     subprocess.run(build, cwd=ROOT, check=True)
     examples = ROOT / "target/debug/examples"
@@ -71,8 +71,8 @@ def test_runs_are_bit_identical(rods) -> None:
     for name in OUTPUTS:
         assert np.array_equal(runs[0][name], runs[1][name]), name
     assert (runs[0]["limits[2,1]"] == 11).all() and (runs[0]["switches[1]"] == 3).all()
-    assert (runs[0]["hot[8]"][:, 1] == 1).all(), "starts at 40"
-    assert not np.array_equal(runs[0]["T[3]"][0], runs[0]["T[3]"][1]), "the capacity has an effect"
+    assert (runs[0]["hot[8]"][:, 1] == 1).all(), "the last piece starts at 40, which must be hot"
+    assert not np.array_equal(runs[0]["T[3]"][0], runs[0]["T[3]"][1]), "the capacity must have an effect"
 
 
 @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
@@ -104,7 +104,8 @@ def heated(rod: Path, switches: list[tuple[float, int, int]], **options) -> np.n
 
 
 def exact(time: np.ndarray, parts: list[tuple[float, float, list[float]]]) -> np.ndarray:
-    """Returns the exact temperatures (8, times). parts: begin, end and the powers of both heaters."""
+    """Returns the temperatures (8, times), integrated with a relative tolerance of 1e-11. parts: begin, end and the powers of both
+    heaters."""
     capacities, temperatures, found = 2.0 + 0.125 * np.arange(8), 20.0 + np.arange(8.0), []
 
     def rates(_: float, at: np.ndarray, heat: np.ndarray) -> np.ndarray:
@@ -125,12 +126,12 @@ def test_discrete_inputs_that_fmpy_sets_in_continuous_time_mode(rods) -> None:
     result = heated(rods[0], [(0.0, 3, 0), (2.0, 3, 0)], solver="CVode", output_interval=0.1, relative_tolerance=1e-9)
     found = np.array([result[name] for name in TEMPERATURES])
     np.testing.assert_allclose(found, exact(result["time"], [(0.0, 2.0, [10.0, 0.0])]), rtol=1e-6)
-    assert len(np.unique(result["hot[4]"])) == 2, "an indicator changes its sign"
+    assert len(np.unique(result["hot[4]"])) == 2, "hot[4] must change, because an indicator changes its sign"
 
 
 def test_a_switch_in_fmpy(rods) -> None:
-    """Uses FMPy's Euler method, which ends at the event. CVode steps beyond it, and FMPy then sets the new value outside of Event
-    Mode."""
+    """Uses FMPy's Euler method, because it ends a step at the event. CVode steps beyond the event, and FMPy then sets the new value
+    outside of Event Mode."""
     switches = [(0.0, 3, 0), (0.6, 3, 0), (0.6, 0, 3), (2.0, 0, 3)]
     result = heated(rods[0], switches, solver="Euler", output_interval=1e-3)
     time = result["time"]
@@ -138,7 +139,7 @@ def test_a_switch_in_fmpy(rods) -> None:
     found = np.array([result[name][kept] for name in TEMPERATURES])
     expected = exact(time[kept], [(0.0, 0.6, [10.0, 0.0]), (0.6, 2.0, [0.0, 5.0])])
     np.testing.assert_allclose(found, expected, rtol=2e-4)
-    assert len(np.unique(result["hot[4]"])) == 2, "an indicator changes its sign"
+    assert len(np.unique(result["hot[4]"])) == 2, "hot[4] must change, because an indicator changes its sign"
 
 
 def test_fmpy_reports_no_problem(rods) -> None:
@@ -169,8 +170,8 @@ def test_elements_of_stateful_instances(rods) -> None:
     assert of_fmi3[0][1].tolist() == [20.0, 2.0, 22.0, 23.0, 3.0, 25.0, 26.0, 27.0]
     assert of_fmi3[3].tolist() == [[10.0, 5.0, 3.0, 3.0], [10.0, 6.0, 3.0, 3.0]]
     assert of_fmi3[-1][:2] == ["the near half"] * 2 and of_fmi3[-1][2].startswith("zwei is ")
-    # The derivative of der(T[2]) with respect to T[2] is -2 times the conductance between neighbours divided by the capacity, and
-    # the derivative of der(T[3]) is +1 times this quotient.
+    # With respect to T[2], the derivative of der(T[2]) is -2 times the conductance between neighbours, 0.5, divided by the capacity
+    # of piece 2; the derivative of der(T[3]) is the conductance divided by the capacity of piece 3. `wall` has no effect on them.
     assert np.allclose(of_fmi3[6], [[-1.0 / 2.125, 0.5 / 2.25, 1 / 8]] * 2)
 
 
@@ -189,7 +190,8 @@ def test_states_and_indicators(rods) -> None:
 
 
 def test_whole_arrays_in_runs(rods) -> None:
-    """Runs with whole arrays equal runs with their elements, although FMI 2.0 has only the elements and FMI 3.0 only the arrays."""
+    """Runs with whole arrays equal runs with their elements, although the FMU for FMI 2.0 has only elements, and the FMU for FMI 3.0
+    only arrays."""
     time = np.linspace(0.0, 1.0, 11)
     limits, power = np.array([[10.0, 20.5], [11.0, 21.0]]), np.stack([3 + np.sin(time), np.cos(time)], axis=1)
     capacities = np.stack([np.linspace(1.0, 2.0, 8), np.linspace(2.0, 4.0, 8), np.full(8, 3.0)])

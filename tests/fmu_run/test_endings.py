@@ -57,7 +57,7 @@ def test_behaviours(request, behaviours, fixture, first, read_before_set):
         signal = np.where(np.arange(11) < count, first + TIME, np.nan)
         np.testing.assert_allclose(runs["y"][run], signal, atol=1e-15)
         np.testing.assert_allclose(thinned["y"][run], signal[::2], atol=1e-15)
-        # If the FMU ends the simulation, statistics include the results until then. A failed run has no statistics.
+        # If the FMU ends the simulation, statistics include the results until then. The statistics of a failed run are NaN.
         has_measures = runs.ok[run] or runs.errors[run].startswith("ended")
         measures = [signal[count - 1], signal[:count].mean()] if has_measures else [np.nan, np.nan]
         np.testing.assert_allclose([runs["y", "end"][run], runs["y", "mean"][run]], measures, atol=1e-14)

@@ -1,4 +1,4 @@
-"""Errors: invalid arguments, FMUs that cannot be loaded, and interrupted runs."""
+"""Errors, for example invalid arguments, FMUs that cannot be loaded, and interrupted runs; also units and values of all types."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_rejected_runs_do_not_affect_the_others(fmu):
     np.testing.assert_array_equal(runs["roll"][0], runs["roll"][4])
     with pytest.raises(fmu_run.FmuError, match=r"run 1: .*k1 must not be below 1e-300.* \(2 of 5 runs failed\)"):
         runs.check()
-    # If an input is rejected during the run, the message has the time.
+    # If an input is rejected during the run, the message begins with the time.
     angle = np.where(TIME > 0.45, np.inf, 0.0)
     one = fmu.run(TIME, inputs={"theta1": angle}, outputs=["roll"])
     assert re.match(r"at 0\.5 s: .*theta1", one.errors[0]), one.errors
@@ -161,7 +161,7 @@ def test_a_damaged_library(tmp_path, testbed):
         return content[:200] if name.startswith("binaries/") else content
 
     path = repacked(testbed, tmp_path / "damaged.fmu", change)
-    # The message comes from the operating system.
+    # The last part of the message comes from the operating system.
     with pytest.raises(fmu_run.FmuError, match=r"its library cannot be loaded: dlopen failed: .*\.so: "):
         fmu_run.Fmu(path)
 
@@ -344,7 +344,7 @@ def test_the_interface_type_must_exist(tmp_path, faulty_fmu):
 
 
 def test_arguments_of_wrong_types_are_named(fmu, testbed):
-    """Passes values of wrong types as each argument of each function."""
+    """Passes wrong values to the arguments of many functions. Each message names the argument or the variable, and no instance fails."""
     one, continuous = fmu.instances(3), fmu.instances(2, interface="model-exchange")
     system = {"source": {"wrist": fmu}, "connections": {}, "order": "jacobi"}
     nothing = object()
@@ -415,4 +415,4 @@ def test_arguments_of_wrong_types_are_named(fmu, testbed):
             named = [argument, *(value if isinstance(value, dict) else ())]
             assert any(str(name) in str(raised.value) for name in named), (argument, value, raised.value)
             assert "\n" not in str(raised.value)
-    assert one.errors == continuous.errors == {}, "no instance has failed"
+    assert one.errors == continuous.errors == {}, "an invalid argument must not make an instance fail"

@@ -1,5 +1,5 @@
-"""FMUs that behave like FMUs of other producers: messages, values of all types, inputs with their own times. The Rust tests of fmu-run
-test each `manner` separately."""
+"""FMUs that behave like FMUs of other producers: their messages, tolerances, values of all types, inputs with their own times, arrays
+and states. The Rust tests of fmu-run test each `manner` separately."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ VERSIONS = ["2.0", "3.0"]
 
 @pytest.fixture(params=VERSIONS)
 def made(request, tmp_path):
-    """Returns a function that opens the FMU with a manner, for FMI 2.0 and then for FMI 3.0."""
+    """Returns a function that opens the FMU with a manner. Each test runs once for FMI 2.0 and once for FMI 3.0."""
     opened = []
 
     def make(manner, version=request.param):
@@ -151,7 +151,7 @@ def test_exact_values(made, tmp_path):
         if not isinstance(value, list):
             with pytest.raises(ValueError, match=re.escape(why)):
                 fmu.run(TIME, outputs=["y"], start={name: value})
-    # A failed run lacks values, so the array has None in place of integers.
+    # A failed run lacks values, so its arrays contain objects, with None for missing values.
     failed = made("discard", "3.0").run(TIME, start={"wide": wide[0]}, outputs=["wide_out", "echo"])
     assert failed.errors and failed["wide_out"][0].tolist() == [wide[0]] * 6 + [None] * 5
     assert failed["echo"][0].tolist() == ["none"] * 6 + [None] * 5
@@ -234,7 +234,7 @@ print("alive")
 
 
 def test_python_survives(tmp_path):
-    """No manner ends the process, not even while instances are freed and the library is unloaded."""
+    """None of these manners ends the process, not even while instances are freed and the library is unloaded."""
     manners = [
         "unchecked_memory",
         "other_environment",

@@ -9,14 +9,14 @@ import sys
 import fmu_run
 import numpy as np
 
-#: Seconds after which a program has failed, because it hangs.
+#: Seconds after which a program is considered to hang.
 LIMIT = 60
 
 FORKED = """
 import os, sys, threading, warnings
 import fmu_run, numpy as np
 
-warnings.simplefilter("ignore")  # Python warns of a fork of a process with threads.
+warnings.simplefilter("ignore")  # Python warns if a process with threads forks.
 fmu = fmu_run.Fmu(sys.argv[1])
 time, stiffness = np.arange(50) * 1e-3, np.linspace(60.0, 240.0, 16)
 
@@ -41,7 +41,7 @@ expected = whole()
 for depth in range(3):
     child = os.fork()
     if child == 0:
-        # A child of a child has the same result.
+        # Each child checks its results and forks the next one; the last child only checks them.
         if whole() != expected:
             os._exit(1)
         if depth == 2:
@@ -78,7 +78,7 @@ for attempt in range(20):
             wrists.step(1e-3)
         except fmu_run.FmuError as error:
             os._exit(0 if "another thread used these instances when this process was forked" in str(error) else 1)
-        os._exit(2)  # No thread used them at that time.
+        os._exit(2)  # The worker did not use the instances during the fork.
     code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     if code != 2:
         break
@@ -94,12 +94,13 @@ def printed(program: str, path: object) -> str:
 
 
 def test_threads_in_forked_processes(testbed) -> None:
-    """Runs and instances with several threads work in a child and a grandchild, and afterwards in the parent."""
+    """Runs and instances with several threads work in three generations of forked processes, and afterwards in the parent."""
     assert printed(FORKED, testbed) == "same\n"
 
 
 def test_instances_in_use_by_another_thread(testbed) -> None:
-    """A forked child only has the thread that forked. Instances that another thread used at that time are lost; an error reports it."""
+    """A forked child has only the thread that forked. Instances that another thread used during the fork are lost in the child; an
+    error reports this."""
     assert printed(LOCKED, testbed) == "0\n"
 
 

@@ -91,7 +91,7 @@ def test_a_system_is_an_environment_with_the_bounds_of_its_description(task) -> 
 
 @pytest.mark.parametrize("mode", AutoresetMode)
 def test_environments_equal_instances(task, mode) -> None:
-    """Results are bit-identical, also in the second episode, if the parameters come from the same random generator."""
+    """Results are bit-identical, also in later episodes, if the parameters come from a random generator with the same seed."""
     count, envs = 4, VectorEnv(task, 4, autoreset_mode=mode)
     rng, actions = np.random.default_rng(3), np.random.default_rng(4).uniform(-1, 1, (50, count, 2))
 
@@ -160,7 +160,7 @@ def test_a_failure_ends_one_episode(task, mode, count) -> None:
         final, infos = infos["final_obs"][-1], infos["final_info"]
     else:
         final = after[-1]
-    assert np.array_equal(final, observed[-1]), "the last observation"
+    assert np.array_equal(final, observed[-1]), "the final observation must be the one before the failure"
     assert np.array_equal(infos["_error"], last) and "theta1" in infos["error"][-1]
     if mode == "Disabled":
         envs.reset(options={"reset_mask": last})
@@ -179,7 +179,7 @@ def test_a_failure_ends_one_episode(task, mode, count) -> None:
     ],
 )
 def test_termination_and_infinite_observations_end_the_episode(faulty_fmu, behaviour, slope, message) -> None:
-    """The FMU allows one instance in a process, so each environment is closed before the next one is created."""
+    """The FMU allows only one instance per process, so `with` closes the environment before the next test."""
     task = Task(
         fmu=faulty_fmu,
         actions="slope",
@@ -205,7 +205,7 @@ def test_termination_and_infinite_observations_end_the_episode(faulty_fmu, behav
 
 
 def test_inputs_from_actions(task) -> None:
-    """Calculates inputs from a rate and the previous inputs. Also checks an episode in which all instances fail."""
+    """Calculates inputs from a rate and the previous inputs. Also takes a step in which all instances fail."""
     by_rate = replace(
         task,
         actions={"rate": (-6.0, 6.0)},
@@ -277,7 +277,7 @@ def test_the_program_in_the_document(fmu, monkeypatch: pytest.MonkeyPatch) -> No
     exec(re.findall(r"^```python\n(.*?)^```", page, flags=re.M | re.S)[0], names)
     task, envs = names["task"], names["envs"]
     assert names["rewards"].shape == (1024,) and not names["terminated"].any()
-    assert np.allclose(names["rewards"], -1.0), "the wrist is at rest, 20 degrees from the goal"
+    assert np.allclose(names["rewards"], -1.0), "the wrist must be at rest, 20 degrees from the goal"
     envs.reset(seed=1)
     cost = np.zeros(1024)
     for step in range(1, task.length + 1):

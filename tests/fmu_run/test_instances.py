@@ -1,4 +1,4 @@
-"""Results of instances are bit-identical to `Fmu.run`, to direct calls with FMPy, and to each other."""
+"""Results of instances are bit-identical to `Fmu.run` and to direct calls with FMPy. Also tests their errors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
 
 
 def angles(time: np.ndarray, count: int) -> np.ndarray:
-    """Returns angles (times, count, 2) rad, with a different motion for each instance."""
+    """Returns angles (times, count, 2) rad: for each instance the same motion with another amplitude."""
     _, moves = motion(len(time))
     scale = np.linspace(0.5, 1.5, count)
     return np.stack([np.multiply.outer(moves[name], scale) for name in MOTORS], axis=2)
@@ -60,7 +60,7 @@ def test_advance_equals_three_calls(testbed) -> None:
 
 
 def test_derivatives_of_inputs_and_outputs(fmu) -> None:
-    """With linear inputs and their derivatives, instances equal a run. Output derivatives agree with difference quotients."""
+    """With linear inputs and their derivatives, an instance equals a run. Output derivatives agree with difference quotients."""
     time = np.arange(30) * 1e-3
     with fmu_run.Fmu(fmu) as loaded:
         slopes = {"theta1": 3.0, "theta2": -2.0}
@@ -287,7 +287,7 @@ def test_more_instances_than_memory(testbed) -> None:
 
 
 def test_python_threads_share_instances(testbed) -> None:
-    """Calls wait for each other without a deadlock. Instances outlive their FMU object."""
+    """Calls wait for each other without a deadlock. The instances still work after the FMU is closed."""
     fmu = fmu_run.Fmu(testbed)
     wrists = fmu.instances(64, threads=2)
     fmu.close()

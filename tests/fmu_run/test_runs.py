@@ -19,7 +19,7 @@ INPUTS = ["theta1", "theta2", "omega1", "omega2"]
 
 
 def motion(samples: int = 400, scale: float = 1.0) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Returns uneven times (samples,) s from 0.3 on, and the motors' angles and rates."""
+    """Returns uneven times (samples,) s after 0.3 s, and the motors' angles and rates by name."""
     time = 0.3 + np.cumsum(np.random.default_rng(3).uniform(2e-4, 3e-3, samples))
     angles = [scale * 0.4 * np.sin(9 * time), -scale * 0.3 * np.cos(14 * time)]
     rates = [scale * 3.6 * np.cos(9 * time), scale * 4.2 * np.sin(14 * time)]
@@ -214,7 +214,7 @@ def test_results_that_are_not_a_number_are_reported(testbed, faulty_fmu):
 
 
 def test_statistics_of_outputs_that_are_not_a_number(faulty_fmu):
-    """One run has NaN at its end and one has only NaN. Their statistics are NaN, and the runs before and after them are not affected."""
+    """In one run the input becomes NaN, in another one it is always NaN. Their statistics are NaN, and other runs are not affected."""
     time, measures = np.arange(11) / 10, ["min", "max", "peak", "time_of_peak", "mean", "rms", "end"]
     slopes = np.array([np.ones(11), np.where(time < 0.35, -1.0, np.nan), np.full(11, np.nan), 2.0 * np.ones(11)])
     with fmu_run.Fmu(faulty_fmu) as fmu:
@@ -252,7 +252,7 @@ def test_the_programs_run(fmu, monkeypatch):
     runs = names["runs"].check()
     assert runs["roll"].shape == (1000, 2001) and abs(runs["roll"]).max() > 0.01
     assert names["torques"].shape == (1000, 2) and names["wrists"].errors == {}
-    assert len({*names["wrists"].time}) == 2, "some instances were restored"
+    assert len({*names["wrists"].time}) == 2, "some of the instances must be restored, but not all"
     assert names["peaks"]["tau1", "peak"].max() == abs(runs["tau1"]).max()
     assert names["rewards"].shape == (1024,) and (names["envs"].steps == 100).all()
     shapes = re.findall(r"^(?:([^\s#=][^#=]*?)|\s*(\w+) = .*?) +# (\([\d, ]+\))", text, flags=re.M)

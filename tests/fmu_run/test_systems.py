@@ -1,4 +1,4 @@
-"""Systems of testbed and controller are bit-identical to instances that the test connects."""
+"""Results of systems of testbed and controller are bit-identical to instances that the test connects."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def by_hand(fmus, order: str, steps: int, k1: float) -> np.ndarray:
     sensed, moved = wrist.get(SENSED), law.get(MOVED)
     for _ in range(steps):
         if order == "dependencies":
-            # Of the connected outputs, only the torques depend directly on the motor angles.
+            # The controller's outputs do not depend directly on its inputs, but the torques depend on them, so they are passed on first.
             wrist.set(MOVED, law.get(MOVED))
             law.set(SENSED, wrist.get(SENSED))
         by_name = {"testbed": wrist, "controller": law}
@@ -62,7 +62,7 @@ def test_a_system_equals_connected_instances(fmus, order) -> None:
     for k in range(150):
         assert np.array_equal(pairs.get(SHOWN), [run[k] for run in expected]), k
         pairs.step(1e-3)
-    # These times are exact multiples of the step, so runs and instances have the same times.
+    # These times are exact in binary, so runs and instances have the same times.
     time = np.arange(100) / 1024
     runs = loop.run(time, start=GOAL | {"testbed.k1": stiffness}, outputs=SHOWN, measures=["end"], every=1)
     again = loop.instances(2, start=GOAL | {"testbed.k1": stiffness})
@@ -183,7 +183,7 @@ def test_an_ssp_is_the_same_system(order, tmp_path) -> None:
     paths = {name: built(f"prw_{name}.fmu") for name in ("controller", "testbed")}
     pairs = fmu_run.System(paths, CONNECTIONS.items(), order=order)
     assert [sorted(stage) for stage in pairs.stages] == [sorted(stage) for stage in ssp.stages]
-    # Connectors have the names of the system, and start values come from the file.
+    # In an SSP the system names its connectors, for example `pitch`, and start values come from the file.
     found = ssp.run(time, outputs=["pitch", "roll"])
     assert all(np.array_equal(found[name], expected[f"testbed.{name}"]) for name in ("pitch", "roll"))
     assert ssp.stop_time == 1.0 and ssp.variables["pitch_ref"].unit == "rad" and ssp.name == "prw_closed_loop"

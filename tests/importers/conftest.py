@@ -32,7 +32,8 @@ def closed_loop() -> Path:
 
 @pytest.fixture
 def record(request):
-    """Returns a function that records the result of a test and checks that docs/compatibility.md contains it."""
+    """Returns a function that records the result of a test, and checks that docs/compatibility.md has a row for it: with the same tool,
+    version, FMU and way to run it, but perhaps with another result and date. The table "At a glance" must name the version, too."""
 
     def record(tool: str, package: str, fmu: str, run: str, seen: str) -> None:
         RESULTS.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""CasADi's DaeBuilder on the unpacked FMU, in Model Exchange: values, Jacobians and integration against the oracle."""
+"""CasADi's DaeBuilder on the unpacked FMU, in Model Exchange: values, Jacobians and integration are compared with the oracle."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def right(model, x, u):
 
 
 def share(found, expected) -> float:
-    """Returns the largest difference, relative to the largest value."""
+    """Returns the largest difference, relative to the largest expected value."""
     off = np.abs(np.array(found).reshape(np.shape(expected)) - expected).max()
     return float(off / (np.abs(expected).max() or 1.0))
 
@@ -74,7 +74,8 @@ def test_cvodes(testbed, version, unpack, model, record):
 
 
 def test_derivatives_with_respect_to_parameters(tunable, version, unpack, record):
-    """CasADi treats `fixed` parameters as constants. For the FMU built with `--tunable`, they are the input `p` of its functions."""
+    """CasADi treats `fixed` parameters as constants. In the FMU built with `--tunable` parameters are tunable, and CasADi makes them the
+    input `p` of its functions."""
     dae = casadi.DaeBuilder("testbed", unpack(tunable))
     physical = np.array([name in REAL for name in dae.p()])
     assert {name for name, real in zip(dae.p(), physical) if real} == set(REAL)

@@ -39,7 +39,7 @@ def test_fmutool_reports_no_error(testbed, version, record):
 
 
 def test_the_closed_loop_as_one_fmu(closed_loop, tmp_path, record):
-    """A container steps its FMUs like any master; FMPy runs the container."""
+    """The container is an FMU that steps the FMUs in it; FMPy runs the container."""
     (tmp_path / closed_loop.name).write_bytes(closed_loop.read_bytes())
     toolbox("fmucontainer", "-container", f"{closed_loop.name}:0.001", "-auto-local", directory=tmp_path)
     container = tmp_path / "prw_closed_loop.fmu"

@@ -61,7 +61,7 @@
         report.runs[value] = { parameters: { use_omega: true }, csv: await csv() };
       }
     }
-    // Sets a motor angle during a motion, and then a parameter, which does not change the inputs.
+    // Sets a motor angle during a motion, which ends the motion. Then sets a parameter, which leaves the inputs as they are.
     await go({ motion: "tour", speed: "1" });
     await until(() => parseFloat(clock.textContent) > 0.2 && parseFloat(clock.textContent) < 0.9);
     change(find("#live-theta1"), "30");

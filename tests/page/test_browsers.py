@@ -30,7 +30,8 @@ from prw.checking.experiments import read_experiments
 INPUTS = ("theta1", "theta2", "omega1", "omega2")
 CONTROLLED = {"pitch_ref", "roll_ref", "pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2"}
 WEBKIT = "/usr/lib/x86_64-linux-gnu/webkit2gtk-4.1/MiniBrowser"
-#: Commands that start a browser with a new profile and a window of 360, 1000 or 2000 px.
+#: Functions of a directory and a width in pixels that return a command: it starts a browser with a new profile in the directory, in a
+#: window of this width.
 BROWSERS = {
     "chromium": lambda home, width: [
         *("chromium", "--headless=new", "--no-sandbox", f"--user-data-dir={home}", f"--window-size={width},1000"),
@@ -125,7 +126,8 @@ def with_visitor(fmu: Path, address: str) -> str:
 
 
 def test_the_browser_is_bit_identical_to_the_library(fmu: Path, report: Any) -> None:
-    """Compares the CSV files of the reference experiments, of the page's motions, and of a run with a motor moved by hand."""
+    """Compares the CSV files of the reference experiments, of the page's motions, and of a run with a motor moved by hand with the
+    library."""
     assert report["errors"] == []
     assert {one.name for one in read_experiments(fmu)} | {
         "one",

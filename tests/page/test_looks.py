@@ -1,4 +1,4 @@
-"""The layout of the pages in windows of all sizes and on paper, and the contrast of their colours."""
+"""The layout of the pages in windows of several sizes and on paper, and the contrast of their colours."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ def box(page: Page, selector: str) -> dict[str, float]:
 def test_the_machine_comes_first(
     visit: Any, address: str, controller_address: str, which: str, width: int, height: int
 ) -> None:
-    """The machine is visible without scrolling, its plots are next to it or below, and nothing shifts or is wider than the window."""
+    """A part of the machine is visible without scrolling, on the testbed's page at least half. Its plots are next to it or below. Hardly
+    anything shifts while the page opens, and nothing is wider than the window."""
     page = visit(
         at=address if which == "testbed" else controller_address,
         script=SHIFTS,

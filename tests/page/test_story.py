@@ -1,4 +1,5 @@
-"""Each number in the sentences of the page's steps equals the result of the FMU in FMPy, at several values that a visitor can set."""
+"""The numbers in the sentences of the page's steps agree with the FMU in FMPy, or in the last step with the saved run, at several
+values that a visitor can set."""
 
 from __future__ import annotations
 
@@ -39,7 +40,7 @@ def set_number(page: Page, name: str, value: float) -> None:
 
 
 def run(fmu: Path, time: Any, theta1: Any, theta2: Any, rates: tuple[Any, Any], **start: float) -> Any:
-    """Simulates motor angles and rates (rad, rad/s) with FMPy."""
+    """Simulates the testbed with these motor angles and rates (rad, rad/s) in FMPy."""
     names = ("time", "theta1", "theta2", "omega1", "omega2")
     table = np.zeros(len(time), dtype=[(name, float) for name in names])
     for name, values in zip(names, (time, theta1, theta2, *rates)):
@@ -57,13 +58,13 @@ def run(fmu: Path, time: Any, theta1: Any, theta2: Any, rates: tuple[Any, Any], 
 
 
 def replayed(fmu: Path, csv: str, **start: float) -> Any:
-    """Simulates the motor motion of a saved run with FMPy."""
+    """Simulates the motor motion of a saved run with FMPy. Returns the results and the rows of the saved run."""
     rows = np.genfromtxt(io.StringIO(csv), delimiter=",", names=True, skip_header=2)
     return run(fmu, rows["time"], rows["theta1"], rows["theta2"], (rows["omega1"], rows["omega2"]), **start), rows
 
 
 def gain(fmu: Path, frequency: float, **start: float) -> float:
-    """Returns how far the wrist swings in FMPy, as a multiple of the swing of both motors."""
+    """Returns how far the wrist swings in pitch in FMPy, as a multiple of the swing of both motors."""
     turn = 2 * np.pi * frequency
     time = np.arange(0, 3 + 4 / frequency, 1e-3)
     theta, omega = 0.02 * (1 - np.cos(turn * time)), 0.02 * turn * np.sin(turn * time)
@@ -132,7 +133,7 @@ def test_resonance(visit: Any, fmu: Path) -> None:
         says = float(re.findall(r"The wrist swings ([\d.]+) times", text(page))[0])
         assert says == pytest.approx(gain(fmu, frequency, k2=np.rad2deg(1.5)), abs=0.006)
         assert ("This is the peak" in text(page)) == (frequency == 6.85)
-    # Without a peak, no sentence mentions one.
+    # Without a peak, the page states that there is none.
     field(page, "k2").fill("0.05")
     field(page, "k2").press("Enter")
     assert "No frequency makes it swing noticeably farther" in text(page) and "At the peak" not in text(page)
@@ -163,7 +164,8 @@ def test_stop_dead(visit: Any, fmu: Path) -> None:
 
 
 def test_the_comparison_stays_while_a_number_is_dragged(visit: Any) -> None:
-    """In this step the grey curve is always the other motion with the same parameters. In others it is the run before the change."""
+    """In the motion in two parts, the grey curve is always the motion in one go with the same parameters. In the motion “step”, it is
+    the run before the change."""
     page = visit("#try&motion=shaped", reduced_motion="reduce")
     page.wait_for_timeout(300)
     labels = (

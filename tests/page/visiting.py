@@ -67,8 +67,8 @@ def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> No
 
 
 def find_part(page: Page, cursor: str = "ns-resize") -> tuple[float, float]:
-    """Returns a position in the image at which the mouse cursor has this shape, and leaves the mouse there. Motor 1 has the cursor
-    "ns-resize", the gripper "move"."""
+    """Returns a position in the image at which the mouse cursor has this shape, and leaves the mouse there. The cursor is "ns-resize"
+    on a motor and "move" on the gripper. The search begins at the left, where motor 1 is in the view from the front."""
     scene = page.locator(".live-scene")
     box = scene.bounding_box()
     assert box

@@ -20,7 +20,7 @@ FMUS = (DIST / f"{MODEL}.fmu", DIST / FMI3)
 
 
 def pytest_configure() -> None:
-    """Exits early if anything is missing."""
+    """Exits early if dist/ does not contain a release."""
     if not FMUS[0].is_file():
         pytest.exit(f"{FMUS[0]} is missing; make it with `make release`", returncode=1)
 
@@ -33,7 +33,7 @@ def names(archive: Path) -> set[str]:
 
 
 def binaries(fmu: Path) -> dict[str, bytes]:
-    """Returns the libraries of an FMU by the name of the directory in `binaries/`."""
+    """Returns the libraries of an FMU, by the names of their directories in `binaries/`."""
     with zipfile.ZipFile(fmu) as archive:
         return {name.split("/")[1]: archive.read(name) for name in archive.namelist() if name.startswith("binaries/")}
 

@@ -86,7 +86,8 @@ def test_fmus_for_fmi_3_have_the_same_libraries_and_documents(model: str) -> Non
 
 
 def test_the_variants_of_the_fmu() -> None:
-    """One variant is for importers on ARM, which look in linux64. Another contains C sources, which tests/source_fmu compiles."""
+    """One variant is for importers on ARM that look for the library in linux64. Another one contains C sources, which
+    tests/source_fmu compiles."""
     fmu = DIST / f"{MODEL}.fmu"
     assert binaries(DIST / ARM)["linux64"] == binaries(fmu)["aarch64-linux"]
     assert files_except_binaries(ARM) == files_except_binaries(fmu.name)
@@ -118,7 +119,7 @@ def test_the_bills_of_materials(product: Product) -> None:
     components = {component["name"] for component in json.loads(text)["components"]}
     assert {"libc", "std"} <= components
     if product in (FMU, CONTROLLER_FMU):
-        # These packages are used to pack FMUs, and are not in their libraries.
+        # These packages are used to pack FMUs, so they must not be in the libraries.
         assert not {"clap", "zip", "serde_json", "anyhow"} & components
         assert (
             files_except_binaries(f"{product.name}.fmu")[f"documentation/licenses/{product.bill.name}"].decode() == text

@@ -48,15 +48,15 @@ class Installed:
         return run(self.scripts / program, *arguments, environment=self.environment, directory=self.directory)
 
     def pins(self, name: str) -> Path:
-        """Writes a list of requirements without hashes and returns its path. With hashes, pip would also require them for the wheels
-        of the release."""
+        """Writes a list of requirements without hashes and returns its path. With hashes in it, pip would require hashes of the
+        release's wheels, too."""
         versions = re.findall(r"^[\w.-]+==[^\\\n]*", (REQUIREMENTS / name).read_text(encoding="utf-8"), re.M)
         path = self.directory / name
         path.write_text("\n".join(versions), encoding="utf-8")
         return path
 
     def install(self, *packages: object) -> None:
-        """Installs packages in the versions of the other tests."""
+        """Installs packages in the versions that the other tests use."""
         self.run("pip", "install", "--quiet", "--only-binary=:all:", "--constraint", self.pins("study.txt"), *packages)
 
 
@@ -83,7 +83,7 @@ def test_the_experiment_of_fig_4(installed: Installed) -> None:
 
 @pytest.fixture(scope="session")
 def study(installed: Installed) -> Installed:
-    """The packages of identification and sweeps, and the examples of the documentation."""
+    """An environment with the packages for identification and sweeps, the examples, and the FMU where the examples expect it."""
     installed.install(f"{prw_wheel()}[study]")
     shutil.copytree(ROOT / "examples", installed.directory / "examples", ignore=shutil.ignore_patterns("*-fmu"))
     (installed.directory / "target" / "fmu").mkdir(parents=True)
@@ -100,7 +100,8 @@ def test_the_programs_in_the_readmes(study: Installed, page: str) -> None:
 
 
 def test_the_tutorial(study: Installed) -> None:
-    """Runs all commands except those that need the sources. If the tutorial builds an FMU, the FMU in the wheel replaces it."""
+    """Runs all programs and commands except `make` and `cargo`, which need the sources. The option `--fmu` is left out, so the FMU in
+    the wheel replaces FMUs that the tutorial builds."""
     done = []
     for language, block in BLOCK.findall((ROOT / "python" / "prw" / "tutorial.md").read_text()):
         if language == "python":
@@ -222,7 +223,8 @@ def zig_cc(target: str, *arguments: object) -> None:
 
 
 def test_c_programs_get_bit_identical_results(system: System, tmp_path: Path) -> None:
-    """The program tests the layout of types, Model Exchange, invalid arguments, and loading and unloading a hundred times."""
+    """The program tests the layout of types, invalid Booleans, Co-Simulation, Model Exchange, and loading and unloading a hundred
+    times."""
     tests = ROOT / "crates" / "fmu-export" / "tests" / "c"
     common = ("-std=c11", "-DTESTBED", f"-I{tests}", f"-I{Path(fmpy.__file__).parent / 'c-code'}", tests / "drive.c")
     guid = fmpy.read_model_description(str(FMUS[0])).guid

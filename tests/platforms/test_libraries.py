@@ -1,4 +1,4 @@
-"""The headers of the libraries in the FMUs and in the wheels: exports, imports, and the oldest system that loads them."""
+"""The headers of the libraries in the FMUs and in the wheels, for example exports, imports, and the oldest system that loads them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ def declared(version: int) -> set[str]:
 
 FMI2_FUNCTIONS = declared(2)
 FMI3_FUNCTIONS = declared(3)
-#: fmu_export_describe describes a library to the program that packs it, fmu_export_report_panics tells it the locations of panics.
+#: The program that packs a library calls two more functions: fmu_export_describe returns the library's description, and
+#: fmu_export_report_panics reports the locations of panics.
 FUNCTIONS = FMI2_FUNCTIONS | FMI3_FUNCTIONS | {"fmu_export_describe", "fmu_export_report_panics"}
 ELF_MACHINE = {"x86_64": lief.ELF.ARCH.X86_64, "aarch64": lief.ELF.ARCH.AARCH64}
 MACHO_PROCESSOR = {"x86_64": lief.MachO.Header.CPU_TYPE.X86_64, "aarch64": lief.MachO.Header.CPU_TYPE.ARM64}
@@ -45,7 +46,8 @@ def native(target: Target) -> bytes:
 
 
 def libraries() -> Iterator[object]:
-    """Yields all libraries, each with its targets, exports and name, and the names of further libraries that it may load."""
+    """Yields all libraries, each with its targets, exports, the name in its header (not compared on Linux), and the names of further
+    libraries that it may load."""
     for model in MODELS:
         for directory, content in binaries(DIST / f"{model}.fmu").items():
             name = f"@rpath/{model}.dylib" if "darwin" in directory else f"{model}.dll"
@@ -75,7 +77,7 @@ def test_headers(content: bytes, targets: tuple[Target, ...], exports: set[str],
 
 
 def linux(elf: lief.ELF.Binary, target: Target, exports: set[str]) -> None:
-    """Checks that every Linux with the glibc version GLIBC or a newer one can load the library."""
+    """Checks the exports, and that every Linux with the glibc version GLIBC or a newer one can load the library."""
     assert elf.header.machine_type == ELF_MACHINE[target.processor]
     assert {symbol.name for symbol in elf.exported_symbols} == exports
     assert all(LINUX_LIBRARIES.fullmatch(library) for library in elf.libraries), elf.libraries
@@ -93,7 +95,7 @@ def linux(elf: lief.ELF.Binary, target: Target, exports: set[str]) -> None:
 
 
 def windows(pe: lief.PE.Binary, exports: set[str], name: str, others: set[str]) -> None:
-    """Checks that every Windows from 10 on can load the library."""
+    """Checks the exports, and that every Windows from 10 on can load the library."""
     assert pe.header.machine == lief.PE.Header.MACHINE_TYPES.AMD64
     assert {entry.name for entry in pe.get_export().entries} == exports
     assert pe.get_export().name == name
@@ -106,7 +108,7 @@ def windows(pe: lief.PE.Binary, exports: set[str], name: str, others: set[str]) 
 
 
 def macos(content: bytes, targets: tuple[Target, ...], exports: set[str], name: str) -> None:
-    """Checks that every macOS, from the oldest version of the targets on, can load the library."""
+    """Checks the exports, and that every macOS from the oldest version of the targets on can load the library."""
     fat = lief.MachO.parse(list(content))
     parts = [fat.at(index) for index in range(fat.size)]
     wanted = {MACHO_PROCESSOR[target.processor]: target for target in targets}
@@ -130,7 +132,7 @@ def macos(content: bytes, targets: tuple[Target, ...], exports: set[str], name: 
 
 
 def is_signed(content: bytes, part: lief.MachO.Binary) -> None:
-    """Checks the signature, because ARM Macs end a process that loads a library whose pages differ from the hashes in it."""
+    """Checks the signature, because ARM Macs end a process that loads a library whose pages differ from the hashes in the signature."""
     signature = content[part.code_signature.data_offset :][: part.code_signature.data_size]
 
     def field(at: int, offset: int = 0) -> int:

@@ -1,4 +1,5 @@
-"""Imports have no cycles, so the modules of every Python package and every Rust crate can be read in some order."""
+"""The modules of every Python package and every Rust crate import each other without cycles, so there is an order in which each
+module comes after the modules that it uses."""
 
 from __future__ import annotations
 
@@ -65,7 +66,7 @@ def rust_paths(code: str) -> Iterator[str]:
 
 def rust_graph(source: Path) -> dict[str, set[str]]:
     """Returns the modules of a crate, each with the modules that it uses. The root is left out, because it only lists modules and
-    exports their items, and so are submodules that a module uses, because they belong together."""
+    exports their items. Paths that begin with a submodule's name are left out, because a module and its submodules belong together."""
     modules = {}
     for path in source.rglob("*.rs"):
         directories = path.relative_to(source).with_suffix("").parts
@@ -94,7 +95,8 @@ def test_rust_crates(source: str) -> None:
 
 
 def test_cycles_are_found(tmp_path: Path) -> None:
-    """There is a cycle through imports in a function and for types, and one through a group in braces, but none through a test."""
+    """Finds a Python cycle through imports in a function and for types. In Rust, finds paths in braces, but not in comments and tests.
+    The Rust modules have a cycle only if the use of a submodule by its module counts, too."""
     files = {
         "p/__init__.py": "",
         "p/a.py": "def f():\n    from p.b import g\n",

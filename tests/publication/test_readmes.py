@@ -1,4 +1,4 @@
-"""READMEs and pages have valid links on the project's page, in a crate and in its documentation."""
+"""Links in READMEs and pages are valid, also in a published crate, and the manifests of published crates are complete."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tools.documentation.sources import read_table
 LISTED = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
 FILES = [name for name in LISTED.split("\0") if name]
 PAGES = [name for name in FILES if name.endswith(".md") or name in ("CITATION.cff",)]
-#: Links lead to documentation or sources, not to package registries.
+#: Sites that pages may name: documentation and sources, but not package registries.
 HOSTS = {"docs.rs", "github.com", "rustup.rs", "semver.org"}
 LINK = re.compile(r"\]\(<?([^)>\s]+)[^)]*\)|^\[[^\]]+\]:\s*(\S+)|(?:href|src)=\"([^\"]+)\"", re.MULTILINE)
 
@@ -39,7 +39,7 @@ def published() -> list[Path]:
 
 
 def released() -> bool:
-    """Returns whether the newest section of the changelog has the day of a release."""
+    """Returns whether the newest section of the changelog has the date of a release."""
     newest = re.search(r"^## .*$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
     return newest is not None and re.search(r"\(\d", newest[0]) is not None
 
@@ -60,14 +60,14 @@ def test_the_published_crates() -> None:
         "fmu-package",
         "fmu-run",
         "fmu-system",
-    }, "a package without `publish = false`"
+    }, "update this list, or add `publish = false` to a package that is not published"
 
 
 @pytest.mark.parametrize("home", published(), ids=lambda directory: directory.name)
 def test_the_page_of_a_crate_is_complete(home: Path) -> None:
     readme = home / "README.md"
     package = tomllib.loads((home / "Cargo.toml").read_text(encoding="utf-8"))["package"]
-    # Manifests have no addresses before the pages exist; the registry itself adds the address of the documentation.
+    # Manifests have no addresses, because the pages do not exist yet; the registry adds the address of the documentation itself.
     assert not {"documentation", "homepage", "repository"} & package.keys() and package["readme"] == readme.name
     assert package["description"] and 0 < len(package["keywords"]) <= 5 and package["categories"]
     for name in ("LICENSE-MIT", "LICENSE-APACHE"):
@@ -103,7 +103,7 @@ def test_relative_links_have_targets(name: str) -> None:
 
 
 def test_the_marks_in_the_table_of_importers() -> None:
-    """The table "At a glance" contains only these marks, and each tool's name links to its section."""
+    """The table "At a glance" contains only the marks below, and each tool's name links to its section."""
     for tool, *marks in read_table(ROOT / "docs/compatibility.md", "At a glance").rows:
         assert re.fullmatch(r"\[[^\]]+\]\(#[\w-]+\)[\w .,-]{,20}", tool), tool
         assert set(marks) <= {"✓", "(✓)", "✗", "–", "?"}, tool

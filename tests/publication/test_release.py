@@ -1,4 +1,4 @@
-"""The notes and the tag of a release; dist/ keeps no file of an earlier release."""
+"""The notes, the tag and the version of a release; dist/ keeps no file of an earlier release."""
 
 from __future__ import annotations
 

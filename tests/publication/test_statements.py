@@ -1,5 +1,5 @@
-"""Statements in pages and messages that tests can check: make targets, paths, dependencies, install commands; and the reference
-of the Python packages."""
+"""Checks statements in pages, for example about make targets, numbers, paths, dependencies, install commands and messages; and that the
+docstrings of the Python packages make a reference."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ RULES = dict(re.findall(r"^([\w-]+):(?!=)(.*)$", MAKEFILE, re.MULTILINE))
 HELP = set(re.findall(r"^\t@echo 'make ([\w-]+)", MAKEFILE, re.MULTILINE))
 CODE = re.compile(r"^```.*?^```|`[^`\n]+`", re.DOTALL | re.MULTILINE)
 PATH = re.compile(r"`([\w.-]+/[\w./-]*|[\w-]+\.(?:rs|py|md|xml|lock))`")
-#: Directories that builds create; git does not track them.
+#: Directories that builds create and git does not track.
 MADE = ("out/", "dist/", "target/", ".venv")
 INSTALL = re.compile(r"(?:pip|cargo) install ([^`\n#;)]*)")
-#: The rows of the table of importers.
+#: The rows of the first table of importers.
 AT_A_GLANCE = read_table(ROOT / "docs/compatibility.md", "At a glance").rows
 TEXTS = [name for name in FILES if name.endswith((".md", ".py", ".rs", ".toml", ".html", ".yml", "Makefile"))]
 
@@ -99,7 +99,7 @@ def test_the_diagram_of_the_crates() -> None:
 
 
 def test_unsafe_code_is_where_the_page_states() -> None:
-    """The table lists the crates with unsafe code. The model in src/ has none, so it is not listed."""
+    """The table lists exactly the crates with unsafe code. So it does not list the model in src/, which has none."""
     sources = [name for name in FILES if re.match(r"(?:src|crates/.*/src)/.*\.rs$", name)]
     code = re.compile(r"^(?!\s*//).*\bunsafe (?:\{|fn|extern|impl|trait)", re.MULTILINE)
     found = {re.sub(r"/src/.*", "/src", name) for name in sources if code.search(text(name))}
@@ -158,7 +158,8 @@ def test_docstrings_make_a_reference_without_warnings(tmp_path: Path) -> None:
     ],
 )
 def test_messages_in_pages_are_in_the_sources(page: str, message: str, sources: str) -> None:
-    """Compares two consecutive words of each message, or its only word, because the sources insert names and numbers."""
+    """Looks for two consecutive words of each message, or its only word. The whole message is not in the sources, because they insert
+    names and numbers."""
     code = " ".join(text(name) for name in FILES if re.fullmatch(sources, name))
     # A string may continue on the next line.
     code = re.sub(r"\\\n\s*|\"\s*\n\s*f?\"|`", "", code)

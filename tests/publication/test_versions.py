@@ -34,7 +34,7 @@ def test_packages_have_this_version_and_require_it() -> None:
     asked = []
     for table, dependencies in tables.items():
         for name in own_packages().keys() & dependencies.keys():
-            # Without a version, the dependency is not published with the package.
+            # A dependency without a version is left out when the package is published.
             asked.append(dependencies[name].get("version"))
             assert asked[-1] in (None, VERSION), f"{table}: {name}"
     assert VERSION in asked
@@ -69,7 +69,7 @@ def test_the_changelog_and_the_citation_have_this_version_and_its_date() -> None
 
 
 def test_the_newest_section_of_the_changelog_is_in_groups() -> None:
-    """Readers look for changes that break their code first, so each entry belongs to a group."""
+    """Readers look first for changes that break their code, so each entry belongs to a group."""
     newest = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").split("\n## ")[1]
     before, *groups = re.split(r"^### (.*)$", newest, flags=re.MULTILINE)
     assert groups[::2] == [name for name in ("Breaking", "Added", "Changed", "Fixed") if name in groups]

@@ -1,4 +1,5 @@
-"""The GitHub workflows pass the linters, pin third-party actions, and have minimal permissions."""
+"""The GitHub workflows pass the linters and pin actions to commits. Crates have one source and allowed licences, and the files of
+Python requirements have hashes and can be installed."""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ import pytest
 from built import ROOT
 
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
-#: Files of requirements that are installed with hashes.
+#: Files in dev/requirements that contain hashes.
 REQUIREMENTS = ["demo", "study", "tests", "importers", "examples", "release", "test-platforms", "uv"]
 #: Requirements that must also be installable on Windows. A release is built on Linux and macOS.
 EVERYWHERE = [name for name in REQUIREMENTS if name not in ("release", "test-platforms")]
@@ -95,7 +96,7 @@ def test_python_requirements_have_hashes(name: str) -> None:
     assert entries and all("==" in entry and "--hash=sha256:" in entry for entry in entries)
 
 
-# The target directory is empty, because packages from another file would hide that this file lacks them.
+# The target directory is empty, because packages that are already installed would hide that the file lacks them.
 @pytest.mark.parametrize(
     "name, version, platform",
     [(name, OLDEST, "linux") for name in REQUIREMENTS]

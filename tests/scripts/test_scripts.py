@@ -50,7 +50,7 @@ def run(*command: object, **environment: str) -> str:
 
 
 def rows(page: str) -> dict[str, list[float]]:
-    """Returns the figures of all rows of Markdown tables, by the label of the row."""
+    """Returns the numbers in all rows of Markdown tables, by the label of the row. Rows with other cells are left out."""
     found = re.findall(r"^\| ([^|]+) \|((?: *[\d.,e+]+ \|)+)$", page, re.MULTILINE)
     return {label: [float(figure.replace(",", "")) for figure in figures.split("|")[:-1]] for label, figures in found}
 
@@ -68,7 +68,7 @@ def test_the_benchmarks(fmu: Path) -> None:
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the counts are for linux64")
 def test_no_use_takes_more_instructions_than_before(fmu: Path) -> None:
-    """Fails also if a use takes fewer, because the table would then hide a later rise."""
+    """Fails also if a use takes fewer instructions, because the table would then hide a later rise."""
     if why := instructions.why_not_measurable():
         pytest.skip(why)
     table = json.loads(instructions.TABLE.read_text(encoding="utf-8"))["instructions"]
@@ -105,7 +105,7 @@ def test_docs_are_written(tmp_path: Path) -> None:
 
 
 def test_figures_are_written(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Writes the files of `make figures`, with two figures and short films. An unchanged film is not replaced."""
+    """Writes the files of `make figures`, but with two figures and short films. An unchanged screencast is not replaced."""
     if shutil.which("chromium") is None:
         pytest.skip("chromium is not installed")
     built("prw_controller.fmu")
@@ -124,7 +124,7 @@ def test_figures_are_written(fmu: Path, tmp_path: Path, monkeypatch: pytest.Monk
     shown = figures.SCREENCAST.read_bytes()
     screencast.record(fmu, figures.SCREENCAST)
     assert figures.SCREENCAST.read_bytes() == shown
-    # A film that differs is replaced.
+    # A screencast that differs is replaced.
     with Image.open(figures.SCREENCAST) as kept:
         frames = [frame.convert("RGB") for frame in ImageSequence.Iterator(kept)]
     frames[1].paste("red", (0, 0, 5, 5))

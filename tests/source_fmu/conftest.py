@@ -1,4 +1,4 @@
-"""Fixtures: the unpacked FMUs that contain C sources, and compilers for them."""
+"""Fixtures: the C sources in the source FMU, and the environment of compiled programs. Also the compilers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The FMU as C sources: every compiler accepts them, and the results are bit-identical to the results of the library."""
+"""The FMU as C sources: several compilers accept them, and the results are bit-identical to the results of the library."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from fmpy.fmi2 import FMU2Slave
 HERE = Path(__file__).parent
 OUTPUTS = ("tau1", "tau2", "pitch", "roll")
 STRICT = ("-std=c99", "-pedantic-errors", "-Wall", "-Wextra", "-Werror")
-#: Default of FMU_MEMORY_PAGES, the memory of an instance in units of 64 KiB: the testbed
-#: starts with two, and two are for saved states.
+#: Default of FMU_MEMORY_PAGES, the memory of an instance in units of 64 KiB: two that the testbed needs from the beginning, and
+#: two more for saved states.
 MEMORY = 4
 
 
@@ -98,7 +98,7 @@ def test_the_sources_are_strict_c99(name: str, sources: Path, tmp_path: Path) ->
 
 #: Options for gcc that `make test` runs, too.
 SMALL = ("-std=c99", "-O0")
-#: Default options, and options that permit more optimization. In GNU mode, gcc fuses products and sums unless sources forbid it.
+#: Usual options, and options that permit more optimization. In GNU mode, gcc fuses products and sums unless sources forbid it.
 OPTIONS = {
     "gcc": [SMALL, ("-O2",), ("-O3", "-march=native")],
     "clang": [("-O2",), ("-O3", "-march=native")],
@@ -123,7 +123,7 @@ def test_every_processor_equals_the_library(
     printed = run(name, *options)
     assert printed["hash"] == [library_hash] * 4
     assert printed["allocations"] == ["after fmi2Instantiate: 0"]
-    # High-water marks of the steps.
+    # The most stack and memory that the steps have used.
     assert 1000 < int(printed["stack"][0]) < 32768
     assert 2 <= int(printed["memory"][0]) < MEMORY
     assert MEMORY * 65536 < int(printed["block"][0]) < (MEMORY + 1) * 65536
@@ -133,9 +133,9 @@ def test_every_processor_equals_the_library(
     states = [int(count) for count in printed["states"]]
     assert min(states) > 20 and len(states[2:]) == 100 and len(set(states[2:])) == 1
     rejected = [
-        line for line in printed["log"] if "free one, or compile the FMU with a larger FMU_MEMORY_PAGES" in line
+        line for line in printed["log"] if "free some, or compile the FMU with a larger FMU_MEMORY_PAGES" in line
     ]
-    assert len(rejected) == len(states) + len(printed["full"])
+    assert len(rejected) >= len(states) + len(printed["full"])
     # 4 is fmi2Fatal, which an instance with damaged memory returns from then on.
     assert printed["damaged"] == ["4", "4"]
     rest = [line for line in printed["log"] if line not in rejected]
@@ -214,7 +214,7 @@ def test_no_symbol_clashes_and_nothing_is_global(sources: Path, tmp_path: Path, 
         names = subprocess.run(["nm", "--defined-only", str(output)], check=True, capture_output=True, text=True).stdout
         symbols += [line.split()[1:] for line in names.splitlines()]
     kinds = {kind for kind, _ in symbols}
-    # t, T: functions; r: constants; d: constants that contain addresses, which the loader writes.
+    # t, T: functions; r, R: constants; d: constants that contain addresses, which the loader writes. Capitals are for public symbols.
     assert kinds <= {"t", "T", "r", "R", "d"}
     assert all("elem_segment_exprs" in name for kind, name in symbols if kind == "d")
     public = [name for kind, name in symbols if kind.isupper()]
@@ -252,7 +252,8 @@ def test_fmpy_compiles_and_runs_it(tmp_path: Path) -> None:
 
 
 def cargo_test(library: Path, *arguments: str, profile: str = "release", **environment: str) -> str:
-    """Runs Rust tests on a library compiled from the C sources, which must have the guid of the source FMU; returns their output."""
+    """Runs Rust tests on a library compiled from the C sources, and returns their output. The model in the tests is compiled with the
+    guid of the source FMU."""
     command = ["cargo", "test", "--locked", "--profile", profile, *arguments]
     guid = fmpy.read_model_description(str(SOURCE_FMU)).guid
     environment = {**os.environ, "FMU_LIBRARY": str(library), "FMU_GUID": guid, **environment}
@@ -273,7 +274,7 @@ def test_the_tests_of_the_library_pass(sources: Path, tmp_path: Path) -> None:
 
 @pytest.mark.small
 def test_random_sessions(sources: Path, tmp_path: Path) -> None:
-    """The small form of the test above. The Rust test is the one that `make test` compiled with the workspace."""
+    """Runs fewer sessions than the test above. `--workspace` uses the Rust test that `make test` has compiled."""
     library = tmp_path / "compiled.so"
     files = [str(sources / name) for name in ("prw_testbed.c", "prw_testbed_fmi2.c")]
     COMPILERS["gcc"].compile(sources, library, "-O0", "-fPIC", "-shared", "-DFMU_MEMORY_PAGES=64", *files, "-lm")
@@ -297,7 +298,7 @@ def test_random_sessions_with_sanitizers(sources: Path, tmp_path: Path) -> None:
 
 
 def test_a_panic_ends_its_instance_only(tmp_path: Path) -> None:
-    """Runs the tests of a model that panics in each of its functions, on several threads."""
+    """Runs, on several threads, the tests of a model that panics in most of its functions."""
     file = ROOT / "crates" / "fmu-export" / "tests" / "panics" / "library.rs"
     command = ["cargo", "run", "--locked", "--release", "--package", "fmu-package", "--example", "c_sources"]
     environment = {"WASM2C": str(ROOT / ".venv" / "bin" / "wasm2c"), **os.environ}

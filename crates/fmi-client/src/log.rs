@@ -4,7 +4,6 @@
 //! another instance, and some log from their own threads. So the environment is a number that is looked up, never a pointer that is
 //! dereferenced.
 
-use crate::format::Arguments;
 use crate::rejection::Message;
 use fmi_abi::Status;
 use fmi_abi::c_types::{c_char, c_int, c_void};
@@ -194,7 +193,7 @@ unsafe extern "C" fn log_of_fmi2(
 ) {
     // SAFETY: section 2.1.5 of FMI 2.0 requires NULL or NUL-terminated strings.
     let [category, format] = [category, message].map(|text| unsafe { string(text) });
-    let arguments = Arguments::new([a, b, c, d, e, f, g, h], [r, s, t, u, v, w, x, y]);
+    let arguments = crate::format::Arguments::new([a, b, c, d, e, f, g, h], [r, s, t, u, v, w, x, y]);
     let message = Message { status: Status::from_c(status), category, text: arguments.expand(&format) };
     store(environment.addr(), message);
 }

@@ -112,12 +112,12 @@ impl CheckedSystem<'_> {
         Element::new("ssd:Annotations").containing([annotation])
     }
 
-    /// Returns the connected inputs, and the variables of the system's outputs. Their units and enumerations
-    /// are defined in the file.
+    /// Returns the variables at both ends of all connections. Their units and enumerations are defined in the file.
     fn connected(&self) -> Result<Vec<FmuVariable<'_>>> {
         let System { inputs, outputs, connections, .. } = self.system;
-        let ends = connections.iter().map(|(_, to)| *to).chain(inputs.iter().map(|(_, to, _)| *to));
-        let ends = ends.chain(outputs.iter().map(|(_, from)| *from));
+        let ends = connections.iter().flat_map(|(from, to)| [*from, *to]);
+        let ends =
+            ends.chain(inputs.iter().map(|(_, to, _)| *to)).chain(outputs.iter().map(|(_, from)| *from));
         ends.map(|end| self.variable(end)).collect()
     }
 

@@ -65,6 +65,7 @@ fn fmus(directory: &Path) -> Vec<(&'static str, PathBuf)> {
         variable("r", "input", r#"Real unit="rad""#),
         variable("y", "input", r#"Real declaredType="Angle""#),
         variable("n", "input", "Integer"),
+        variable("bare", "input", "Real"),
         variable("gear", "input", r#"Enumeration declaredType="Gear""#),
         variable("other_gear", "input", r#"Enumeration declaredType="Other""#),
         variable("u", "output", r#"Real unit="rad""#),
@@ -193,6 +194,18 @@ fn the_ssp_is_complete_and_reproducible() {
     assert!(ssd.contains(r#"<ssc:Unit name="rad">"#) && !ssd.contains(r#"<ssc:Unit name="s">"#), "{ssd}");
     assert!(entry(&one, "resources/plant.ssv").contains(r#"<ssv:Boolean value="true"/>"#));
     assert!(entry(&one, "resources/experiment.ssv").contains(r#"<ssv:Real value="0.5" unit="rad"/>"#));
+}
+
+/// A connector names a unit only if the file defines it, also if the other end of the connection has no unit.
+#[test]
+fn the_units_of_all_connectors_are_defined() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut bare = system(directory.path());
+    bare.connections.push(("plant.delay", "law.bare"));
+    let ssp = directory.path().join("bare.ssp");
+    bare.check().unwrap().write_ssp(&ssp).unwrap();
+    let ssd = entry(&ssp, "SystemStructure.ssd");
+    assert!(ssd.contains(r#"<ssc:Real unit="s"/>"#) && ssd.contains(r#"<ssc:Unit name="s">"#), "{ssd}");
 }
 
 /// The schema does not allow an empty list of connectors.

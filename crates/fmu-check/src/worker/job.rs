@@ -31,6 +31,7 @@ pub struct Job {
 }
 
 /// Program that is run instead of a call sequence, with the directory of the FMU as its argument.
+#[cfg(target_os = "linux")]
 #[derive(Serialize, Deserialize)]
 pub struct Program {
     pub program: std::path::PathBuf,

@@ -98,12 +98,13 @@ fn digits_and_partial_derivatives() {
 
 /// Asserts that nothing is found in variants that the standard allows. In FMI 2.0, the FMU converts units, counts how often Event
 /// Mode is entered and has an input that acts from time zero on, and its solver carries the remainder of a step to the next one.
-/// In FMI 3.0, the solver takes one step of Euler's method. All variants have an event indicator that never changes.
+/// In another variant, the solver's error depends on the steps. In FMI 3.0, it takes one step of Euler's method. All variants have an event indicator that never changes.
 #[test]
 fn sound() {
     for (fmi, variants) in [
         (2, "harmless_carry,harmless_entries,harmless_source,harmless_units"),
-        (3, "harmless_euler,harmless_noise"),
+        (2, "harmless_noise"),
+        (3, "harmless_euler"),
     ] {
         let findings = findings(fmi, variants, "dynamics,start_values,derivatives");
         assert!(findings.is_empty(), "{variants}: {findings:#?}");

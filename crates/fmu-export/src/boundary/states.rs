@@ -103,7 +103,7 @@ fn check_memory<M: Exported>(instance: &mut Instance<M>, handle: *mut c_void, se
         // Collections may allocate twice as much as they contain.
         if !super::webassembly::has_memory([state, 2 * content.max(serialized)]) {
             return reject(
-                "the instance has no memory for another state; free one, or compile the FMU with a larger \
+                "the instance has no memory for another state; free some, or compile the FMU with a larger \
                  FMU_MEMORY_PAGES",
             );
         }
