@@ -7,7 +7,7 @@ PYTHON ?= python3
 INPUT  ?=
 ARGS   ?=
 FUZZ_SECONDS ?= 600
-# Number of rigs that `make monte-carlo` simulates: without a fault, for each fault and size, and for each friction of the shafts.
+# Numbers of rigs that `make monte-carlo` simulates: without a fault, for each fault and size, and for each friction of the shafts.
 RIGS ?= 300
 FAULTY ?= 50
 FRICTION ?= 40
@@ -70,6 +70,7 @@ help:
 	@echo 'make check                   check the changes since the last commit, in about a minute'
 	@echo 'make check-release           run every check and write a table        -> out/release-check.md'
 	@echo 'make test-rust               check the Rust code: format, lints, tests, documentation'
+	@echo 'make check-windows           check the Rust code for Windows with clippy'
 	@echo 'make test-python             check the Python code with ruff and mypy'
 	@echo 'make test-fmu                run the Python tests; make test runs these and the next three'
 	@echo 'make test-closed-loop        test the testbed with its controller, in several masters'
@@ -85,16 +86,16 @@ help:
 	@echo 'make reference               write the reference of the Python packages -> target/reference/index.html'
 	@echo 'make examples                install and build what the examples need (see docs/examples.md)'
 	@echo 'make experiments             update the reference experiments in the FMU'
-	@echo 'make validation              compare the FMUs with them in every installed importer -> out/validation.html, .json'
+	@echo 'make validation              compare the FMUs with these in every installed importer -> out/validation.html, .json'
 	@echo 'make closed-loop             run the FMU with a controller FMU in several masters -> out/closed_loop.png'
-	@echo 'make release                 build the files of a release -> dist/: FMUs and Python wheels for Linux, Windows and macOS,'
-	@echo '                             Intel and ARM, reference experiments, checksums, release notes'
+	@echo 'make release                 build the files of a release -> dist/: FMUs and Python wheels for Linux and macOS (Intel and'
+	@echo '                             ARM) and for Windows (Intel), reference experiments, checksums, release notes'
 	@echo 'make source-fmu              build the FMU as C sources for real-time targets -> $(SOURCE_FMU)'
-	@echo 'make test-source-fmu         compile them with every installed compiler and compare with the library'
+	@echo 'make test-source-fmu         compile the C sources with every installed compiler and compare with the library'
 	@echo 'make test-platforms          build the release, run it on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       build the release twice and compare every byte'
 	@echo 'make study                   install the packages for prw identify, excite, sweep and check (see python/prw/tutorial.md)'
-	@echo 'make monte-carlo             identify 300 simulated rigs and 1820 with faults -> out/'
+	@echo 'make monte-carlo             identify 300 simulated rigs and 1820 with faults or friction -> out/'
 	@echo 'make fuzz                    search for calls that break the FMU, and for files that break the readers, 10 minutes each'
 	@echo '                             (FUZZ_SECONDS=600)'
 	@echo 'make sanitize                run the tests under address, leak, thread and real-time sanitizers and valgrind'
@@ -141,7 +142,7 @@ compile-tests: need-rust
 	$(CARGO) clippy $(LOCKED) --workspace --all-targets -- -D warnings
 	$(CARGO) test $(LOCKED) --workspace --no-run --quiet
 
-# Many tests wait for a time limit, so there are two for each processor.
+# Many tests wait for a time limit, so two run at a time on each processor.
 test-crates: compile-tests headers
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
 	  set -x; $(NO_JOBS) $(CARGO) nextest run $(LOCKED) --workspace --test-threads $$((2 * $$(getconf _NPROCESSORS_ONLN))); \
@@ -266,7 +267,7 @@ test-reproducible: release
 study: $(VENV)/study.stamp fmu
 	@echo 'ready: $(VENV)/bin/prw identify, excite, sweep and check (with --help); python/prw/tutorial.md shows how'
 
-# Takes minutes; `make test` has the short version.
+# Takes minutes; `make test` runs a short version.
 monte-carlo: $(VENV)/study.stamp fmu
 	$(PY) tests/analysis/monte_carlo.py $(FMU) --repetitions $(RIGS) --out out/monte_carlo.json $(ARGS)
 	$(PY) tests/analysis/monte_carlo.py $(FMU) --faulty $(FAULTY) --figure $(FIGURE) --out out/detection.json $(ARGS)
@@ -294,8 +295,8 @@ sanitize: need-rust need-nightly $(VENV)/tests.stamp source-fmu fmu
 clean:
 	rm -rf $(VENV) $(DIST_VENV) target out dist
 
-# Environments are created once, and again if a requirement file changes. NAME.stamp states that dev/requirements/NAME.txt is
-# installed; the lines without a recipe state which files are installed before.
+# An environment is created once, and again if uv.txt changes. NAME.stamp states that dev/requirements/NAME.txt is installed,
+# which is repeated if that file changes; the lines without a recipe state which files are installed before.
 
 $(VENV)/made.stamp $(DIST_VENV)/made.stamp: dev/requirements/uv.txt | need-python
 	@echo 'creating $(@D) with $(PYTHON)'

@@ -57,10 +57,13 @@ fn run(options: &Options) -> Result<()> {
 
 /// Returns the directory of the project.
 fn project() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("crates/build-fmu is two levels below it")
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .ancestors()
+        .nth(2)
+        .expect("crates/build-fmu must be two levels below the project")
 }
 
-/// Returns the files from which the library and its description are built. The guid is a hash of them.
+/// Returns the files of this package from which the library and its description are built. The guid depends on them.
 fn sources(project: &Path) -> Sources {
     Sources {
         directory: project.to_owned(),

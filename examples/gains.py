@@ -23,8 +23,8 @@ KI, KD = np.linspace(1.0, 10.0, 10), np.linspace(0.0, 0.0225, 10)  # 1/s, s
 
 
 def settling(loop: fmu_run.System, wrists: int) -> np.ndarray:
-    """Settling times (Ki, Kd, wrists) in s: pitch and roll then stay within CLOSE of the goal. LENGTH if they do not
-    settle."""
+    """Settling times (Ki, Kd, wrists) in s, after which pitch and roll stay within CLOSE of the goal; LENGTH if they do
+    not settle."""
     numbers, count = np.random.default_rng(1), len(KI) * len(KD)
     start: dict[str, fmu_run.Start] = dict(GOAL)
     for name, share in TOLERANCES.items():

@@ -16,7 +16,8 @@ HERE = Path(__file__).parent
 
 
 def record(run: Path) -> str:
-    """Write the sensor signals of a simulated rig in point-to-point moves; returns its parameters."""
+    """Write the sensor signals of a simulated rig in point-to-point moves; returns the printed message, which
+    ends with the rig's parameters."""
     run.parent.mkdir(parents=True, exist_ok=True)
     paths = map(str, (HERE / "pretend_rig.py", HERE / "point_to_point.csv", run))
     command = [sys.executable, *paths, "--seed", "7", "--noise", "1"]

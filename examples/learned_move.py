@@ -55,7 +55,7 @@ def wrists(count: int, unlike: int) -> VectorEnv:
 
 
 def play(envs: VectorEnv, rates: np.ndarray, gains: np.ndarray, unlike: int, seed: int) -> tuple[np.ndarray, ...]:
-    """Pitch (times, n) in deg, and the return (n,), of motors' rates (n, times) with gains (n, 3) of the feedback."""
+    """Pitch (times, n) in deg and the return (n,) of runs with these motors' rates (n, times) and feedback gains (n, 3)."""
     noise, (observed, _) = np.random.default_rng(seed), envs.reset(seed=seed)
     wanted, pitch, total = np.zeros(envs.num_envs), [observed[:, 1]], np.zeros(envs.num_envs)
     for rate in rates.T:

@@ -20,7 +20,7 @@ START = (20.0, -15.0)  # deg
 #: different angles, and back to the start.
 TARGETS = ((55.0, 20.0), (85.0, -10.0), (85.0, 30.0), (40.0, 10.0), START)
 
-#: Start time (s), angles at the start and at the end (rad), and the longer distance of both motors (rad).
+#: Start time (s), angles at the start and at the end (rad), and the longer of the two motors' distances (rad).
 Move = tuple[float, list[float], list[float], float]
 
 

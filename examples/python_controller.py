@@ -16,7 +16,7 @@ OUTPUTS = ("theta1", "theta2", "omega1", "omega2")
 
 
 class PythonController(Fmi2Slave):
-    """Moves to a new reference on a minimum-jerk path, and integrates the remaining error at its end."""
+    """Moves to a new reference on a minimum-jerk path, and then integrates the remaining error."""
 
     description = "Point-to-point controller for the pitch-roll wrist testbed, written in Python"
 

@@ -6,14 +6,14 @@ use nalgebra::Matrix3;
 /// The velocity unit in which the Taylor series of a subsystem converges best, and how fast it converges.
 ///
 /// Angles and velocities differ in magnitude. With the velocity in this unit, the entries of the state matrix
-/// that couple them have the same magnitude. Therefore the norm of the matrix and the rounding error of the
-/// doublings are smaller. The unit is a power of 2, so the scaling is exact.
+/// that couple them have about the same magnitude. Therefore the norm of the matrix and the rounding error of the
+/// doublings are smaller than in rad/s. The unit is a power of 2, so the scaling is exact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Balance {
     /// Velocity unit, rad/s.
     pub(crate) scale: f64,
-    /// Base-2 logarithm of the factor by which a step of 1 s must be divided so that the norm of `A h` is 1/4.
-    /// The factor itself would overflow for long steps of stiff systems.
+    /// Base-2 logarithm of the factor by which a step of 1 s must be divided so that the norm of `A h` is 1/4. The
+    /// product of the factor itself and a long step would overflow for stiff systems.
     halvings: f64,
 }
 

@@ -24,7 +24,7 @@ impl Saved for Pair {
 
 saved!(for Motions { angle, rate, acceleration });
 
-/// Returns the error for the importer.
+/// Converts the error to the type of errors that the importer gets.
 fn rejected(error: InvalidParameter) -> Error {
     Error::new(error.to_string())
 }
@@ -72,8 +72,8 @@ impl Model for TestbedFmu {
         Ok(())
     }
 
-    /// Until the simulation has started, the state follows from the start parameters or from the motor
-    /// angles.
+    /// Until the simulation has started or the importer has set a state, the state follows from the start parameters
+    /// or from the motor angles.
     fn calculate_start(&mut self) {
         if !self.start.is_over {
             self.testbed.state = self.start.from(self.testbed.motors.theta());
@@ -125,10 +125,10 @@ impl ModelExchange for TestbedFmu {
     }
 }
 
-/// Defines the derivatives of variables that are not linear, such as a mechanical power (torque times rate). Linear
-/// variables need only a name in `moving_variables!`, because their derivatives do not depend on the state. Each other
-/// variable has a line here, which calculates its change from the current [`Moving`] values and their changes; for a
-/// product `a * b` the change is `now.a * change.b + change.a * now.b`.
+/// Defines the derivatives of variables that are not linear functions of the states and of the motor motion, such as a
+/// mechanical power (torque times rate). Linear variables need only a name in `moving_variables!`, because their partial
+/// derivatives do not depend on the state. Any other Real variable needs a line here, which calculates its change from
+/// the current [`Moving`] values and their changes; for a product `a * b` it is `now.a * change.b + change.a * now.b`.
 macro_rules! products {
     ($($name:ident = |$now:ident, $change:ident| $value:expr;)*) => {
         const PRODUCTS: &[Name] = &[$(Name::$name),*];
@@ -210,7 +210,7 @@ impl OutputDerivatives for TestbedFmu {
 /// Derivatives of the values that a getter returns, in Initialization Mode and later. In Co-Simulation, the
 /// rates that are estimated from the angles depend on the angles. Until the simulation has started, the
 /// states may depend on the angles too. Derivatives with respect to parameters are calculated separately. All
-/// others are entries of A, B, C and D of eq. (11).
+/// others are entries of A, B, C and D of eq. (11), factors of eq. (1), 0 or 1.
 impl Partials for TestbedFmu {
     fn partial(&self, unknown: Name, known: Name) -> Option<f64> {
         self.partials(Some((known, 0)), false)((unknown, 0))
@@ -281,8 +281,8 @@ impl TestbedFmu {
         })
     }
 
-    /// Returns the partial derivatives with respect to a motor angle. A change of the angle also changes the
-    /// estimated rate and, before the simulation has started, the states.
+    /// Returns the partial derivatives with respect to a motor angle. A change of the angle also changes the rate, if
+    /// it is estimated from samples, and the states, if the testbed is still to start at rest at the motor angles.
     #[inline(never)]
     fn sensitivities_to_angle(&self, motor: usize) -> Cow<'_, Row> {
         let mut theta = [0.0; 2];

@@ -105,8 +105,8 @@ pub struct Subsystem<T = f64> {
     pub load_damping: T,
     /// State matrix.
     pub a: Matrix3<T>,
-    /// Column of the input matrix for the motor angle. Equals `-a [1, 1, 0]`, because a testbed whose motors and shafts are all turned
-    /// by the same angle stays at rest.
+    /// Column of the input matrix for the motor angle. Equals `-a [1, 1, 0]`, because the subsystem stays at rest if its motor
+    /// and both shafts are turned by the same angle.
     pub b_angle: Vector3<T>,
     /// Column of the input matrix for the motor rate; also the jump of z when the motor angle jumps by 1 rad.
     pub b_rate: Vector3<T>,

@@ -31,7 +31,7 @@ pub fn sect(p: &Parameters, theta5: f64, theta6: f64) -> (f64, f64) {
 }
 
 /// Returns the kinetic energy `T = J2/2 (theta5'^2 + theta6'^2) + H3/2 theta7'^2 + J3/2 theta8'^2`, eq. (5),
-/// J.
+/// in J.
 ///
 /// The kinetic energy of the motors, `J1/2 (theta1'^2 + theta2'^2)`, is left out because their motion is an
 /// input. Eqs. (3) and (4) contain the load's inertia as a matrix in a frame with X along the pitch axis and
@@ -45,7 +45,7 @@ pub fn kinetic_energy(p: &Parameters, rates: &Angles) -> f64 {
 
 /// Returns the potential energy of the couplings,
 /// `V = k1/2 ((theta1 - theta3)^2 + (theta2 - theta4)^2) + k2/2 ((theta3 - theta5)^2 + (theta4 - theta6)^2)`,
-/// eq. (6), J.
+/// eq. (6), in J.
 ///
 /// The paper prints k1 in the last term; it is k2, as in K of eq. (8) and by symmetry.
 pub fn potential_energy(p: &Parameters, q: &Angles) -> f64 {
@@ -53,7 +53,7 @@ pub fn potential_energy(p: &Parameters, q: &Angles) -> f64 {
         + 0.5 * p.k2 * (square(q.theta3 - q.theta5) + square(q.theta4 - q.theta6))
 }
 
-/// Returns Rayleigh's dissipation function, eq. (7), W.
+/// Returns Rayleigh's dissipation function, eq. (7), in W.
 ///
 /// It is V of eq. (6) with angles replaced by rates and k by c, plus `c3/2 (theta7'^2 + theta8'^2)`. The dissipated
 /// power is twice this value.

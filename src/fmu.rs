@@ -86,7 +86,7 @@ impl TestbedFmu {
     }
 
     /// Returns the current motion of these motors. Model Exchange takes theta and omega as the importer sets
-    /// them (u of eq. (11)). Co-Simulation computes the motion from samples.
+    /// them (u of eq. (11)). Co-Simulation computes the motion with [`Motors::now`].
     #[inline]
     pub(crate) fn motions(&self, motors: &Motors) -> Motions {
         match self.interface {

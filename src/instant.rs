@@ -1,5 +1,5 @@
-//! The equations at one instant: sensor torques, rates, accelerations, and their derivatives with respect to
-//! the parameters.
+//! The equations at one instant: sensor torques, pitch and roll, rates of the shafts and their accelerations. Also the
+//! derivatives of torques, shaft rates and accelerations with respect to the Real parameters.
 //!
 //! With `q_I' = (c1 w + c2 v - k1 (q_I - u) - k2 (q_I - q_II)) / (c1 + c2)`, eq. (8) row 1, the sensor torque is
 //! `tau = k1 (q_I - u) + c1 (q_I' - w)`, eq. (9), and the motion of the SECT shafts splits into pitch and roll,

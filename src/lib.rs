@@ -20,9 +20,9 @@
 //!    and H(s), eqs. (14) and (15).
 //! 4. [`motor`]: the motion of a motor between samples of its angle.
 //! 5. [`decoupled`]: the same equations for pitch and roll, the mean and the half difference of the two
-//!    sides. Pitch and roll do not influence each other.
+//!    sides. Pitch and roll do not influence each other; a [`pair`] stores both.
 //! 6. [`propagator`]: the exact solution over one step during which the motor angles change linearly; its
-//!    matrices are computed with the scaling of [`balance`].
+//!    matrices are computed with the scaling of [`balance`] and the numbers of [`number`].
 //! 7. [`testbed`]: motors and state, advanced from one communication point to the next.
 //! 8. [`instant`]: torques, rates and accelerations at one instant, and their derivatives with respect to the
 //!    parameters.

@@ -2,14 +2,14 @@
 
 use crate::pair::PerSide;
 
-/// Times of the last two samples before the current one.
+/// Number of the samples before the current one, and the times between the last three samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SampleTimes {
     /// Number of earlier samples: 0, 1, or 2 for two or more.
     pub count: i32,
-    /// Step from the previous sample to the current one, s.
+    /// Time from the previous sample to the current one, s.
     pub last_step: f64,
-    /// Step before that, s.
+    /// Time between the two samples before the current one, s.
     pub step_before: f64,
     /// The step size that leaves these fields unchanged; 0 if there is none.
     steady_step: f64,
@@ -124,14 +124,15 @@ pub struct Motors {
     pub samples: [Sample; 2],
     /// Rates that the importer sets, rad/s; see [`omega_changed`](Self::omega_changed).
     pub omega: [f64; 2],
-    /// Whether the rates come from omega if no derivative is set. Otherwise they come from a backward
-    /// difference of the sampled angles. See [`use_omega_changed`](Self::use_omega_changed).
+    /// Whether the rates come from omega if no derivative is set. If false, they are estimated from the last samples
+    /// of the angles. See [`use_omega_changed`](Self::use_omega_changed).
     pub use_omega: bool,
     /// Derivatives of theta that the importer has set since the last step, rad/s.
     pub given_rate: [Option<f64>; 2],
     /// theta of the previous two samples, rad; the newer sample first.
     pub earlier: [PerSide; 2],
-    /// Motion at the end of the last step, during which the angles changed linearly.
+    /// Motion at the end of the last step, during which the angles changed linearly. If the importer then sets the rate
+    /// of a motor, that rate replaces the one at the end of the step.
     pub segment_end: Motions,
     /// Times of the samples.
     pub times: SampleTimes,
@@ -209,7 +210,7 @@ impl Motors {
         self.has_rates = true;
     }
 
-    /// Forgets the samples: the next sample is the first.
+    /// Forgets the earlier samples and the last step, so that the current angles are the first sample.
     pub fn forget_samples(&mut self) {
         let Self { omega, use_omega, given_rate, has_rates, .. } = *self;
         let samples = self.samples.map(|sample| Sample { is_new: false, ..sample });
@@ -277,8 +278,8 @@ impl Motors {
         !self.samples[motor].is_new && self.times.count > 0
     }
 
-    /// Returns the current motion of each motor: extrapolated from its new sample, or
-    /// [`segment_end`](Self::segment_end) if there is none.
+    /// Returns the current motion of each motor: [`segment_end`](Self::segment_end) if the motor
+    /// [is there](Self::is_at_segment_end), else extrapolated from its sample.
     pub fn now(&self) -> Motions {
         if self.is_at_segment_end(0) && self.is_at_segment_end(1) {
             return self.segment_end;
@@ -303,8 +304,7 @@ impl Motors {
         }
     }
 
-    /// Returns the jumps from [`segment_end`](Self::segment_end) to the current samples, rad. The first samples are
-    /// not jumps.
+    /// Returns the jumps from [`segment_end`](Self::segment_end) to the current samples, rad; 0 for the first samples.
     #[inline]
     pub fn input_jumps(&self) -> PerSide {
         if self.times.count == 0 { PerSide::default() } else { self.theta() - self.segment_end.angle }

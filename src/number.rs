@@ -22,7 +22,7 @@ pub trait Arithmetic:
     + ClosedMulAssign
     + Div<f64, Output = Self>
 {
-    /// Order of the last significant term in the series of exp(1/4). Later terms `0.25^n / n!` are below the
+    /// Order of the last term that is added in the series of exp(1/4). Later terms `0.25^n / n!` are below the
     /// precision.
     const TAYLOR_ORDER: i32;
 }
@@ -210,7 +210,7 @@ mod tests {
         value.into()
     }
 
-    /// Checks differences that `f64` rounds to 0.
+    /// Checks differences that `f64` rounds to 0, and a quotient.
     #[test]
     fn no_digit_of_thirty_is_lost() {
         let tiny = 2.0_f64.powi(-100);
@@ -218,7 +218,7 @@ mod tests {
         for third in [number(1.0).over(number(3.0)), number(1.0) / 3.0] {
             assert!((third * number(3.0) - number(1.0)).rounded().abs() < 1e-31);
         }
-        // 10^15 + 1 and 10^15 - 1 are exact, their product 10^30 - 1 has 100 bits.
+        // 10^15 + 1 and 10^15 - 1 are exact in `f64`, but their product 10^30 - 1 has 100 bits.
         let product = number(1e15 + 1.0) * number(1e15 - 1.0);
         assert_eq!((product - number(1e15) * number(1e15)).rounded(), -1.0);
         assert_eq!(product.over(number(1e15 - 1.0)).rounded(), 1e15 + 1.0);

@@ -11,8 +11,8 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Index, IndexMut, Mul, MulAssign, 
 /// A quantity of side 1 and the same quantity of side 2 (or pitch and roll). It is aligned like a
 /// vector register.
 ///
-/// The operators use vector instructions explicitly, because the compiler would handle the two numbers
-/// separately. The results are bit-identical in both cases.
+/// On x86-64, the operators between two pairs use vector instructions explicitly, because the compiler would handle the
+/// two numbers separately. The results are bit-identical with and without these instructions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(align(16))]
 pub struct Pair([f64; 2]);
@@ -30,8 +30,8 @@ impl Pair {
         Self([value; 2])
     }
 
-    /// Creates a pair of two equal numbers with one vector instruction. If it is stored, both halves are stored at once,
-    /// so that reading it soon after does not stall the processor.
+    /// Creates a pair of two equal numbers, on x86-64 with one vector instruction. If the pair is stored, both halves are
+    /// stored at once, so that reading it soon after does not stall the processor.
     #[inline]
     pub fn splat(value: f64) -> Self {
         #[cfg(target_arch = "x86_64")]
@@ -54,7 +54,7 @@ pub type PerSide = Pair;
 pub type PitchRoll = Pair;
 
 /// Returns the sum and the difference of the two sides, which are twice the quantities of pitch and roll. The
-/// step matrices contain the missing factor 1/2.
+/// missing factor 1/2 is in the step matrices, or the caller multiplies by it.
 #[inline]
 pub fn to_modes(sides: PerSide) -> PitchRoll {
     #[cfg(target_arch = "x86_64")]

@@ -113,7 +113,7 @@ impl Rounded {
         Self { growth, ramp: exact.ramp.map(T::rounded), keeps_velocity: f64::from(u8::from(keeps)) }
     }
 
-    /// Returns the change of z at the end of the step per unit jump of the motor angle at its start.
+    /// Returns the change of z at the end of the step per unit jump of the motor angle at the start of the step.
     fn after_jump(&self, system: &Subsystem) -> Vector3<f64> {
         let jump = system.b_rate;
         self.growth * jump + Vector3::new(jump.x, jump.y, jump.z * self.keeps_velocity)
@@ -121,7 +121,7 @@ impl Rounded {
 
     /// Computes the propagators of the pitch and the roll subsystem.
     ///
-    /// Up to 8 doublings cost an `f64` at most 3 digits; more doublings may cost all digits. Stiff testbeds have
+    /// Up to 8 doublings cost an `f64` at most 3 digits; more doublings may cost nearly all. Stiff testbeds have
     /// motions of very different rates. What remains after the fast motion is a small difference of large numbers, and
     /// so is the remainder of a strongly damped velocity. In these cases, twice the digits are used.
     fn pitch_and_roll(system: &Decoupled, h: f64) -> [Self; 2] {
@@ -164,7 +164,7 @@ impl Rounded {
 pub struct StepMatrices {
     half_growth: [[PitchRoll; 3]; 3],
     half_ramp: [PitchRoll; 3],
-    /// Change of z at the end of the step per unit jump of the motor angle at its start.
+    /// Change of z at the end of the step per unit jump of the motor angle at the start of the step.
     half_jump: [PitchRoll; 3],
     /// Half of [`Rounded::keeps_velocity`] of both subsystems. `keeps_velocities` is true if both are 1.
     half_kept: PitchRoll,
@@ -231,7 +231,7 @@ impl StepMatrices {
 
 const ZERO: PitchRoll = PitchRoll::both(0.0);
 
-/// The step matrices of the most recent step sizes. Importers use one step size or alternate among a few. The
+/// The step matrices of the most recent step sizes. Most importers use one step size or alternate among a few. The
 /// latter often happens by accident, because the differences of `np.arange(n) * 1e-3` vary in their last digits.
 ///
 /// An entry belongs to exactly one step size. Sizes that differ by rounding are not merged, because results
@@ -265,7 +265,8 @@ impl StepCache {
         (self.sizes, self.current_size) = ([0.0; _], 0.0);
     }
 
-    /// Returns the matrices of the last step size, if there are any.
+    /// Returns the current matrices; `None` if the cache has not allocated its memory. They are valid only for a step
+    /// size for which [`has`](Self::has) returns true.
     #[inline(always)]
     pub fn current(&self) -> Option<&StepMatrices> {
         self.entries.get(self.current)

@@ -10,7 +10,8 @@ pub struct Start {
     pub at_rest: bool,
     /// Initial state if `at_rest` is false: x of eq. (11), rad and rad/s.
     pub state: State,
-    /// Whether the simulation has started. If so, the state no longer follows from the other fields.
+    /// Whether the simulation has started or the importer has set a state. If so, the state no longer follows from the
+    /// other fields.
     pub is_over: bool,
 }
 

@@ -81,12 +81,12 @@ pub struct StateSpace {
 ///
 /// The first block row of eq. (8) is `C_I q_I' + K_I q_I + C_I,II v_II + K_I,II q_II = f_I`. Solved for
 /// `q_I'`, it gives A11, A12 and A13 with **negative** signs. The paper prints positive signs, with which A
-/// has an eigenvalue at +183 1/s. Inserting `q_I'` into eq. (10) makes the first terms of D31 and D32
-/// **positive** (printed negative).
+/// would have two eigenvalues near +183.5 1/s. Inserting `q_I'` into eq. (10) makes the first terms of D31 and D32
+/// **positive**; the paper prints them negative.
 ///
 /// # Panics
-/// Panics if the parameters do not pass [`Parameters::check`], or if inertias differ so much that `M_II`
-/// cannot be inverted in double precision.
+/// Panics if inertias differ so much that `M_II` cannot be inverted in double precision. May panic or return NaN if the
+/// parameters do not pass [`Parameters::check`].
 #[allow(non_snake_case, reason = "the paper's symbols")]
 pub fn state_space(p: &Parameters) -> StateSpace {
     let block = |matrix: &Matrix4<f64>, row, column| matrix.fixed_view::<2, 2>(row, column).into_owned();
@@ -97,10 +97,10 @@ pub fn state_space(p: &Parameters) -> StateSpace {
     let K_1in = Matrix2::identity() * p.k1;
     let C_1in = Matrix2::identity() * p.c1;
 
-    // Scaled, because the determinant of very small or large entries underflows or overflows.
+    // Scaled, because the determinant of very small or large entries would underflow or overflow.
     let invert = |matrix: Matrix2<f64>| {
         let scale = matrix.amax();
-        (matrix / scale).try_inverse().expect("checked parameters give regular blocks") / scale
+        (matrix / scale).try_inverse().expect("checked parameters must give invertible blocks") / scale
     };
     let C_I_inv = invert(C_I);
     let M_II_inv = invert(M_II);

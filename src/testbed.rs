@@ -85,13 +85,13 @@ impl Testbed {
     /// If an angle was set that differs by d from the extrapolated end of the previous step, the motor jumps by d. The
     /// jump passes through the dampers as an impulse: x jumps by B2 d, where B2 are the rate columns of B in eq. (11).
     ///
-    /// Returns false and changes nothing if the state would overflow.
+    /// Returns false and changes neither state nor motors if a state, an angle or a rate would overflow.
     #[must_use]
     pub fn step(&mut self, h: f64) -> bool {
         self.step_to(h).is_some()
     }
 
-    /// Does the same as [`step`](Self::step), but returns the new state, or `None` if it would overflow.
+    /// Does the same as [`step`](Self::step), but returns the new state, or `None` instead of false.
     #[inline]
     pub fn step_to(&mut self, h: f64) -> Option<StateBySide> {
         self.cache.prepare(&self.system, h);
@@ -100,8 +100,8 @@ impl Testbed {
         Some(state)
     }
 
-    /// Does the same as [`step_to`](Self::step_to) with fewer checks, but only if the last two steps also had the size `h`.
-    /// Returns `None` and changes nothing if they had not, or if the state would overflow.
+    /// Does the same as [`step_to`](Self::step_to) with fewer checks, but only if the last two steps also had the size `h`
+    /// and their matrices are still in the cache. Otherwise, and at an overflow, returns `None` and changes nothing.
     #[inline(always)]
     pub fn step_fast(&mut self, h: f64) -> Option<StateBySide> {
         if !(self.motors.has_constant_step(h) && self.cache.has(h)) {

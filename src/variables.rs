@@ -9,7 +9,7 @@ const ANGULAR_VELOCITY: Type = Type::real("AngularVelocity", &RAD_PER_S).nominal
 const ANGULAR_ACCELERATION: Type = Type::real("AngularAcceleration", &RAD_PER_S2).nominal(100.0);
 const TORQUE: Type = Type::real("Torque", &N_M).nominal(1.0);
 /// Smallest positive value that is allowed. FMI ranges include their ends, so a range "> 0" needs a smallest value.
-/// It is not smaller because C++ (`std::stod`) rejects numbers below about 1e-307, and because a value converted to
+/// It is not smaller because C++ (`std::stod`) rejects numbers below about 2e-308, and because a value converted to
 /// another unit must not underflow to 0.
 const MORE_THAN_0: f64 = 1e-300;
 const INERTIA: Type = Type::real("MomentOfInertia", &KG_M2).min(MORE_THAN_0).nominal(0.01);
@@ -102,8 +102,8 @@ variables! {
     M = parameter(&COUNT) in testbed.parameters.M;
     /// Number of rollers on each side of the roller-carriers
     N = parameter(&COUNT) in testbed.parameters.N;
-    // This Boolean precedes the other one: OpenModelica 1.27.0 passes the second Boolean of an array as
-    // false.
+    // This Boolean precedes `use_omega`, because OpenModelica 1.27.0 passes the second Boolean of an array as false, and
+    // false is the default of `use_omega` only.
     /// Start at rest at any initial motor angles (theta3 = theta5 = theta1, theta4 = theta6 = theta2, rates 0); if false, start at theta3_start ... omega6_start
     start_at_rest = parameter(&BOOLEAN) in start.at_rest;
     /// Co-Simulation: take the motor rates from omega1 and omega2 instead of differentiating theta1 and theta2

@@ -1,5 +1,5 @@
-//! Compares two libraries of the FMU: one compiled from its C sources, and one from the same Rust code. `make
-//! test-source-fmu` names the first in the environment variable `FMU_LIBRARY`.
+//! Compares a library that was compiled from the C sources of the FMU with the functions of this program, which are
+//! compiled from Rust. `make test-source-fmu` names the library in the environment variable `FMU_LIBRARY`.
 
 use fmu_test_kit::fault_injection::{random_bytes, record};
 use fmu_test_kit::functions_of;

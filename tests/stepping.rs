@@ -45,8 +45,8 @@ proptest! {
         let system = state_space(&p);
         let decoupled = *Testbed::new(p).unwrap().system();
         let (pitch, roll) = (decoupled.pitch, decoupled.roll);
-        // Each 2 x 2 block of eq. (11) has equal diagonal entries, half the sum of the pitch and roll entries, and equal
-        // off-diagonal entries, half their difference.
+        // In each 2 x 2 block of eq. (11), both diagonal entries are half the sum of the pitch and roll entries, and both
+        // off-diagonal entries are half their difference.
         for row in 0..3 {
             for column in 0..3 {
                 let expect = |sign: f64| 0.5 * (pitch.a[(row, column)] + sign * roll.a[(row, column)]);
@@ -140,9 +140,9 @@ proptest! {
         prop_assume!(fast > 0);
     }
 
-    /// Checks that step matrices are computed once for each step size, regardless of the calls in between, and that each step
-    /// uses the matrices of its size. The times are grids like `np.arange(n) * 1e-3`, whose differences vary in their last
-    /// digits.
+    /// Checks that step matrices are computed once for each of up to 8 step sizes, even if states are saved and restored in
+    /// between, and that steps use the matrices of their size. The times are grids like `np.arange(n) * 1e-3`, whose
+    /// differences vary in their last digits.
     #[test]
     fn matrices_are_computed_once_for_each_size(p in parameters(), dt in 1e-5..1e-2f64, first in 1..5000_i32) {
         let size = |k: i32| f64::from(k + 1) * dt - f64::from(k) * dt;
@@ -227,7 +227,7 @@ fn earlier_steps_do_not_matter() {
         testbed.state
     };
     let fresh = |p: Parameters, h| step(&mut Testbed::new(p).unwrap(), h);
-    // The list has more sizes than the cache, some of them nearly equal.
+    // The list has more sizes than the cache can store, some of them nearly equal.
     let sizes = || (0..12).flat_map(|i| [1e-3 + 1e-10 * f64::from(i), 1e-3, 1e-3 * f64::from(i % 3 + 1)]);
 
     let mut testbed = Testbed::new(p).unwrap();
@@ -247,7 +247,7 @@ fn earlier_steps_do_not_matter() {
 }
 
 /// Checks a testbed without load damping whose sides turn with their motors. They must keep turning, accurate to the last
-/// digits, for any stiffness, any small damping of the couplings and any step size.
+/// digits, for large ranges of stiffness, damping of the couplings at the motors, and step size.
 #[test]
 fn a_testbed_that_turns_keeps_turning() {
     let mut worst = 0.0_f64;

@@ -43,7 +43,7 @@ fn main() -> ExitCode {
 
 fn run(options: &Options) -> Result<()> {
     for (name, value) in [("step-size", options.step_size), ("stop-time", options.stop_time)] {
-        ensure!(value.is_finite() && value > 0.0, "--{name} must be > 0, it is {value}");
+        ensure!(value.is_finite() && value > 0.0, "--{name} must be finite and > 0, it is {value}");
     }
     for angle in &options.go_to {
         ensure!(angle.is_finite(), "--go-to must have finite numbers, not {angle}");

@@ -36,10 +36,12 @@ fn main() -> ExitCode {
     exit(builder.run(&Options::parse().build))
 }
 
-/// Returns the sources of the testbed, which runs next to the controller in its page.
+/// Returns the sources of the testbed, whose FMU runs with the controller on the controller's page.
 fn testbed() -> Sources {
-    let project =
-        Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("this package is in the project");
+    let project = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .ancestors()
+        .nth(2)
+        .expect("this package must be in the project");
     Sources {
         not_content: vec!["modelDescription.xml", "parameters.json"],
         licenses: vec!["LICENSE-APACHE", "LICENSE-MIT"],

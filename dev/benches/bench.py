@@ -1,9 +1,9 @@
 """Times the FMUs against programs in C and other tools; `make bench`.
 
 It prints Markdown tables and writes their numbers to dev/benches/ratios.json, from which `make docs` writes
-docs/performance.md. The programs of a table are measured alternately. Each time is the minimum of several rounds. If
-the environment variable BENCH_QUICK is set, the counts are small and the file is target/bench/quick.json, only to show
-that the benchmarks run.
+docs/performance.md. Each time is the minimum of several rounds. In the tables of steps and of runs, each round measures
+all programs, one after the other. If the environment variable BENCH_QUICK is set, the counts are small and the file is
+target/bench/quick.json, only to show that the benchmarks run.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def bench(library: object, guid: str, *arguments: object, stdin: bytes = b"") ->
 
 
 def steps(guid: str, sources: Path | None) -> None:
-    """Compares steps of the FMU with the C programs, and its C sources, if they are given, with its library."""
+    """Compares steps of the FMU with the C programs. If the FMU's C sources are given, also compares them with its library."""
 
     def seconds(library: str, way: int, count: int, threads: int = 1) -> float:
         return bench(WORK / f"{library}.so", guid, way, count // 100 if QUICK else count, threads)[0]
@@ -246,7 +246,7 @@ def many_runs() -> None:
 
 
 def exchange() -> None:
-    """Compares Model Exchange with FMPy's CVode, from the same loaded FMU, and one thread with two."""
+    """Compares Model Exchange with FMPy's CVode, which keeps its instance for all runs, and one thread with two."""
     grid = np.arange(SAMPLES) * STEP
     angle, rate = 0.3 * np.sin(14 * grid), 4.2 * np.cos(14 * grid)
     cases: dict[str, dict[str, np.ndarray]] = {

@@ -65,7 +65,7 @@ def total(file: Path) -> int:
 
 
 def of_steps(library: Path, guid: str, directory: Path) -> dict[str, float]:
-    """Instructions of the uses in uses.c."""
+    """Instructions per repetition of the uses in uses.c, by their names."""
     program, file = directory / "uses", directory / "steps"
     headers = Path(fmpy.__file__).parent / "c-code"
     source = ROOT / "dev" / "benches" / "c" / "uses.c"
@@ -80,7 +80,7 @@ def of_steps(library: Path, guid: str, directory: Path) -> dict[str, float]:
 
 
 def of_runs(fmu: Path, directory: Path) -> dict[str, float]:
-    """Instructions of the uses in count_runs.rs: the difference between many repetitions and one."""
+    """Instructions per unit of the uses in count_runs.rs, from the difference between many repetitions and one."""
     cargo = ("cargo", "build", "--locked", "--quiet", "--release", "--package", "fmu-run", "--example", "count_runs")
     subprocess.run(cargo, cwd=ROOT, check=True)
     program = ROOT / "target" / "release" / "examples" / "count_runs"
@@ -105,7 +105,7 @@ def measure(fmu: Path) -> dict[str, int]:
 
 
 def differences(counts: dict[str, int], table: dict[str, int]) -> list[str]:
-    """Returns a line for each use whose count left the tolerance of the table."""
+    """Returns a line for each use whose count left the tolerance of the table, or that only one of both contains."""
     found = [f"{use} is new in the measurement" for use in counts.keys() - table.keys()]
     found += [f"{use} is no longer measured" for use in table.keys() - counts.keys()]
     for use in counts.keys() & table.keys():

@@ -35,7 +35,7 @@ class Product:
 
     @property
     def bill(self) -> Path:
-        """Returns the list for tools."""
+        """The list for tools."""
         return self.directory / "bill-of-materials.cdx.json"
 
     @property
@@ -50,14 +50,14 @@ CONTROLLER_FMU = Product("FMU", CONTROLLER, CONTROLLER, ROOT / "crates" / "prw-c
 WHEEL = Product("package", "fmu_run", "fmu-run-python", ROOT / "crates" / "fmu-run" / "python")
 PRODUCTS = (FMU, CONTROLLER_FMU, WHEEL)
 
-#: Compiled-in code without a package in Cargo.lock: name, licence, copyright, and the libraries that contain them.
+#: Compiled-in code without a package in Cargo.lock: name, licence, copyright, and the libraries that contain it.
 NO_CRATES = (
     ("std", "MIT OR Apache-2.0", "The Rust Project Developers", "all, the Rust standard library"),
     ("libunwind", "Apache-2.0 WITH LLVM-exception", "The LLVM Project contributors", "Linux and Windows, from zig"),
     ("mingw-w64", "ZPL-2.1", "The mingw-w64 project", "Windows, start-up code, from zig"),
 )
 
-#: A line of a licence file that names a holder.
+#: A line of a licence file that names a copyright holder.
 HOLDER = re.compile(r"\s*Copyright\s+(?:\(c\)\s+|©\s+)?(?=[\dA-Z])(.+?)(?: or)?[.,]?\s*(?:\[.*\])?$")
 
 HEADER = """\
@@ -159,7 +159,7 @@ def _table(rows: Sequence[tuple[str, ...]]) -> str:
 
 
 def check(write: bool = False) -> None:
-    """Exits if a list is out of date, or writes it."""
+    """Exits with an error if a list is out of date; with `write`, writes the list instead."""
     for product in PRODUCTS:
         for path, content in ((product.bill, bill(product)), (product.notice, notice(product))):
             if path.is_file() and path.read_text("utf-8") == content:

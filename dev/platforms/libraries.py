@@ -20,7 +20,7 @@ import macos_linker
 from targets import GLIBC, LINUX, MODEL, MODELS, PACKERS, ROOT, TARGETS, WINDOWS, Target
 
 #: Compiles the standard library as well, without the code for backtraces, which would be a third of a library although
-#: importers print none.
+#: importers never print a backtrace.
 STD = ("-Zbuild-std=std,panic_unwind", "-Zbuild-std-features=panic-unwind")
 #: The earliest time in a zip file. A fixed time makes archives reproducible.
 EPOCH = "315532800"
@@ -94,7 +94,8 @@ def link(target: Target, name: str, exports: Sequence[str]) -> list[str]:
 
 
 def macos_sdk() -> Path:
-    """Returns the part of a macOS SDK that Rust links: zig's list of the functions in libSystem, declared for all Macs."""
+    """Makes the part of a macOS SDK that Rust links: zig's list of the functions in libSystem, declared for all Macs. Returns its
+    directory."""
     import ziglang
 
     text = (Path(ziglang.__file__).parent / "lib/libc/darwin/libSystem.tbd").read_text(encoding="utf-8")

@@ -1,5 +1,5 @@
-"""Builds dist/, the files of a release, atomically: FMUs for all platforms and as C sources, the closed loop, reference
-experiments, wheels, bills of materials, release notes, and the checksums of all of them.
+"""Builds the files of a release, and then replaces dist/ by them: FMUs for all platforms and as C sources, the closed
+loop, reference experiments, wheels, bills of materials, release notes, and the checksums of all of them.
 
     python dev/platforms/release.py              builds dist/
     python dev/platforms/release.py --tag TAG    exits with an error unless TAG names the newest version in the changelog

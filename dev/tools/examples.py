@@ -52,7 +52,7 @@ def without_times(page: str) -> str:
 
 
 def section(name: str) -> str:
-    """Runs one example, writes its figure, and returns its section of the page."""
+    """Runs one example, writes its figure if it has one, and returns its section of the page."""
     path = Path("examples", f"{name}.py")
     example, printed = runpy.run_path(str(path)), io.StringIO()
     title, _, about = example["__doc__"].strip().partition("\n\n")

@@ -9,7 +9,7 @@ MARK = b".catch(showFailure)"
 
 
 def has_page(path: str) -> bool:
-    """Returns False also if the file does not exist or is damaged."""
+    """Whether the FMU contains the page; False also if the file does not exist or is damaged."""
     try:
         with zipfile.ZipFile(path) as fmu:
             return MARK in fmu.read("documentation/index.html")

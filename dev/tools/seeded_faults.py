@@ -4,7 +4,7 @@
 
 The lists are in tests/faults. The faults go into a copy of the sources in target/faults. Run all lists before and after
 tests are deleted or merged. The faults of fmu-check's tests are in crates/fmu-check/tests/mutants and run with `make test`.
-Exit status 1 if a fault escaped.
+The exit status is 1 if a fault escaped, or if the tests fail without a fault.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def copy_sources() -> None:
 
 
 def tests_fail(arguments: str) -> bool:
-    """Whether `cargo test` with these arguments fails in the copy."""
+    """Whether `cargo test` with these arguments fails in the copy, or takes longer than TIMEOUT."""
     # FMPy, which is installed with this interpreter, brings the headers of the C programs.
     headers = next(Path(sys.prefix).glob("lib/python3*/site-packages/fmpy/c-code"), None)
     environment = {"FMI2_HEADERS": str(headers)} if headers else {}

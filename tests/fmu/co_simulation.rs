@@ -21,7 +21,7 @@ fn slave(p: &Parameters, use_omega: bool) -> Fmu {
 }
 
 /// A reference for steps with known motor angles and rates: the exact solution, including the jump if the angles at the
-/// start of a step are not those at the end of the last one.
+/// start of a step differ from the angles at the end of the last step.
 struct Follower<'a> {
     p: &'a Parameters,
     x: [f64; 6],
@@ -95,11 +95,11 @@ fn the_order_of_setting_does_not_matter() {
     let use_omega = |fmu: &Fmu| fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &1));
 
     let one = after_a_step(true, &[&omega, &derivative]);
-    assert_eq!(one.0, [3.0, 4.0], "a derivative takes precedence over omega");
+    assert_eq!(one.0, [3.0, 4.0], "a derivative must take precedence over omega");
     assert_eq!(one, after_a_step(true, &[&derivative, &omega]));
 
     let other = after_a_step(false, &[&omega, &use_omega]);
-    assert_eq!(other.0, [5.0, -6.0], "omega takes effect immediately");
+    assert_eq!(other.0, [5.0, -6.0], "omega must take effect immediately");
     assert_eq!(other, after_a_step(false, &[&use_omega, &omega]));
     assert_ne!(one.1, other.1);
 }
@@ -228,7 +228,7 @@ fn steps_out_of_the_range_of_numbers() {
 }
 
 /// Checks that a step is rejected if the motor angle at its end is in the range of numbers but the motor rate is not,
-/// because the state after it could not be saved.
+/// because a saved state with an infinite rate could not be restored.
 #[test]
 fn motors_out_of_the_range_of_numbers() {
     let fmu = in_mode(CoSimulation, StepComplete);

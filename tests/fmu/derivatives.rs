@@ -1,4 +1,4 @@
-//! Derivatives with respect to variables (section 2.1.9 of FMI 2.0) and with respect to time (section 4.2.1).
+//! Derivatives with respect to variables and with respect to time (sections 2.1.9 and 4.2.1 of FMI 2.0).
 
 use crate::exact::{
     INPUTS, LINEAR, STARTS, STATES, jacobian, parameters, real_parameters, set_parameters, start_at, unknowns,
@@ -26,7 +26,7 @@ static STRUCTURE: LazyLock<ModelStructure> = LazyLock::new(|| {
 });
 
 /// Returns central differences of the values of the unknowns with respect to `known`, each with a bound of its rounding
-/// error. The values are linear in every known except the parameters of the equations, so only for these is the width small.
+/// error. The values are linear in every known except the parameters of the equations, so the width is small only for these.
 fn differences<F: Either>(fmu: &F, unknowns: &[u32], known: u32) -> Vec<(f64, f64)> {
     let [value] = fmu.get([known]);
     let is_linear = [&INPUTS[..], &STATES, &STARTS].concat().contains(&known);
@@ -51,8 +51,8 @@ fn differences<F: Either>(fmu: &F, unknowns: &[u32], known: u32) -> Vec<(f64, f6
 }
 
 /// Checks that every derivative agrees with its difference, and is 0 if the model structure does not declare the dependency.
-/// After the initialization, the latter is not checked until the simulation has `started`, because the states then still
-/// depend on start values; nor for parameters, whose dependencies are declared only for the initialization.
+/// After the initialization, declarations are not checked until the simulation has `started`, because until then the states
+/// depend on start values. They are also not checked for parameters, which are declared only for the initialization.
 fn fit_differences<F: Either>(fmu: &F, mode: Mode, started: bool, label: &str) {
     let structure = &*STRUCTURE;
     let (unknowns, listed) = match mode {
@@ -63,7 +63,7 @@ fn fit_differences<F: Either>(fmu: &F, mode: Mode, started: bool, label: &str) {
         let mut listed = listed.iter().copied().flatten().filter(|variable| variable.index == unknown);
         listed.any(|variable| variable.dependencies.iter().any(|(vr, _)| *vr == known))
     };
-    // No function sets states in Co-Simulation.
+    // States can be set only in these two modes, not in Co-Simulation.
     let states = if matches!(mode, Event | ContinuousTime) { &STATES[..] } else { &[] };
     for known in [&INPUTS, states].concat().into_iter().chain(real_parameters()) {
         let is_listed = mode == Initialization || started && TABLE[known as usize].causality() != Parameter;
@@ -79,8 +79,8 @@ fn fit_differences<F: Either>(fmu: &F, mode: Mode, started: bool, label: &str) {
     }
 }
 
-/// Checks derivatives before the first step and after steps of different sizes: with no new motor angle, with one and with
-/// both, after the state is restored in another instance, and after the end of the simulation.
+/// Checks derivatives before the first step and between steps of different sizes: with no new motor angle, with one, and
+/// with both after the state is restored in another instance. The end of the simulation must not change the derivatives.
 fn co_simulation<F: Either>(use_omega: bool, at_rest: bool, with_rates: bool) {
     let label = format!("use_omega {use_omega}, start_at_rest {at_rest}, derivatives {with_rates}");
     let p = parameters(7);
@@ -151,7 +151,7 @@ fn model_exchange<F: Either>(use_omega: bool, at_rest: bool) {
     fit_differences(&fmu, Event, true, &label);
 }
 
-/// Checks every mode that has directional derivatives. In FMI 3.0, the test kit also compares the adjoint derivatives.
+/// Checks both interface types in both FMI versions. In FMI 3.0, the test kit also compares the adjoint derivatives.
 #[test]
 fn every_pair_fits_differences() {
     for [use_omega, at_rest] in [[false, false], [false, true], [true, false], [true, true]] {
@@ -176,7 +176,7 @@ enum Rates {
 }
 
 /// Checks output derivatives right after the initialization and after each step. The samples are the angles at the end of
-/// the last step, so the motors do not jump.
+/// the last step, so the motors do not jump. If rates are estimated from samples, the third sample differs and is not checked.
 #[test]
 fn output_derivatives_are_exact() {
     for rates in [Rates::Samples, Rates::Omega, Rates::Derivatives] {

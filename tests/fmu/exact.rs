@@ -30,7 +30,7 @@ pub const STARTS: [u32; 6] = [
     vr(Name::omega5_start),
     vr(Name::omega6_start),
 ];
-/// The variables of eqs. (1), (9) and (11), in the order of [`jacobian`].
+/// The variables of eqs. (1), (9) and (11), in the order of the rows of [`jacobian`].
 pub const LINEAR: [u32; 14] = [
     vr(Name::der_theta3),
     vr(Name::der_theta4),
@@ -58,7 +58,7 @@ pub fn unknowns() -> Vec<u32> {
 }
 
 /// Returns the partial derivatives of [`LINEAR`] with respect to [`STATES`] and [`INPUTS`]: A and B, the
-/// torque rows of C and D, and eq. (1).
+/// torque rows of C and D, eq. (1), and rows with a 1 for theta3 and theta4, which are states.
 pub fn jacobian(p: &Parameters) -> SMatrix<f64, 14, 10> {
     let system = state_space(p);
     let mut jacobian = SMatrix::<f64, 14, 10>::zeros();
@@ -111,7 +111,7 @@ pub fn start_at(fmu: &dyn Either, x: [f64; 6]) {
     fmu.set(&STARTS, &x);
 }
 
-/// Sets all parameters of eq. (11). The Reals are set in one call, because the FMU checks them together.
+/// Sets all parameters of the equations. The Reals are set in one call, because the FMU checks them together.
 pub fn set_parameters(fmu: &dyn Either, p: &Parameters) {
     let (mut reals, mut values) = (Vec::new(), Vec::new());
     for (name, value) in p.start_values() {
@@ -133,7 +133,7 @@ pub fn real_parameters() -> impl Iterator<Item = u32> {
     (0..).zip(TABLE).filter(move |(_, variable)| is_one(variable)).map(|(vr, _)| vr)
 }
 
-/// Returns random parameters that vary around Table 1, the same for the same seed.
+/// Returns random parameters, the same for the same seed. The Reals vary around Table 1.
 pub fn parameters(seed: u64) -> Parameters {
     let mut random = Random(seed);
     let [M, N] = [8.0, 14.0].map(|end| random.between(1.0, end) as i32);

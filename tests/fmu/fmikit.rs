@@ -104,9 +104,10 @@ fn both_versions_give_bit_identical_outputs() {
     assert_eq!(found, in_model_exchange::<fmi3::Importer>(&starts));
 }
 
-/// Checks that in FMIKit the testbed starts at rest only with start values. FMIKit reads the states before it sets the inputs
-/// and then sets the same states. The FMU cannot distinguish this from a start state that the user wants, so the testbed
-/// does not start at rest at the angles that are set later. Both remedies of the documentation give the start at rest.
+/// Checks that FMIKit starts the testbed at rest at other angles than 0 only if the user sets start values. FMIKit reads the
+/// states before it sets the inputs, and then sets the same states. The FMU cannot distinguish this from a start state that
+/// the user wants, so the testbed does not start at rest at the angles that are set later. Both remedies in the
+/// documentation give the start at rest.
 #[test]
 fn a_start_at_rest_needs_start_values() {
     let first = |parameters: &[(Name, f64)]| in_model_exchange::<fmu_test_kit::Importer>(parameters)[0];

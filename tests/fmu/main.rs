@@ -1,5 +1,5 @@
-//! Tests of the testbed FMU: physics, parameters and saved states. The tests of fmu-export cover the C functions, with test
-//! models.
+//! Tests of the testbed FMU: motion, start, derivatives, parameters, saved states and robustness. The tests of fmu-export
+//! cover the C functions, with test models.
 
 #![allow(unsafe_code)]
 

@@ -9,7 +9,8 @@ use fmu_test_kit::Either;
 use prw_testbed::BUILT_IN;
 use prw_testbed::variables::Name;
 
-/// Checks for each parameter that a simulation with its declared minimum runs, and that smaller values are rejected.
+/// Checks for each parameter with a declared minimum that a simulation with the minimum runs, and that smaller values are
+/// rejected.
 #[test]
 fn declared_minima_are_the_limits() {
     let mut found = 0;
@@ -36,7 +37,7 @@ fn declared_minima_are_the_limits() {
         assert!(torque != 0.0 && pitch != 0.0, "{}: {torque} {pitch}", variable.name());
         found += 1;
     }
-    assert_eq!(found, BUILT_IN.start_values().len(), "every parameter of Table 1 has a limit");
+    assert_eq!(found, BUILT_IN.start_values().len(), "every parameter of Table 1 must have a minimum");
 }
 
 /// Checks that one of c1 and c2 may be 0 but not both, in either order of setting them, and that parameters are rejected if

@@ -1,5 +1,5 @@
-//! Random sequences of calls, and loading and unloading of the library together with another FMU. The tests of fmu-export
-//! cover the rest of docs/robustness.md with test models.
+//! Random sequences of calls, and loading and unloading of the library, alone and together with another FMU. The tests of
+//! fmu-export cover other guarantees of docs/robustness.md with test models.
 
 use fmu_test_kit::fault_injection::{run, run_seeds};
 use fmu_test_kit::{Importer, fmi3};
@@ -8,7 +8,7 @@ use prw_testbed::TestbedFmu;
 #[test]
 fn every_guarantee_holds_for_any_calls() {
     let tally = run_seeds(4, &[("prw_testbed", run::<Importer, TestbedFmu>)]);
-    assert_eq!(tally.len(), 44, "every function is called");
+    assert_eq!(tally.len(), 44, "every function must be called");
     run_seeds(4, &[("prw_testbed in FMI 3.0", run::<fmi3::Importer, TestbedFmu>)]);
 }
 

@@ -1,4 +1,5 @@
-//! Serialized states (section 2.1.8 of FMI 2.0) with invalid values of the testbed's own fields are rejected.
+//! Serialized states (section 2.1.8 of FMI 2.0) with an impossible number of samples, or with impossible times between
+//! them, are rejected.
 
 use crate::{TABLE, in_mode};
 use fmu_export::BaseType;
@@ -17,7 +18,7 @@ fn range_of(vr: u32) -> Range<usize> {
     begin..begin + 8
 }
 
-/// Checks that impossible numbers of samples and times between them are rejected. They are the first `memory` fields.
+/// Checks impossible values of the first two `memory` fields: the number of samples, and the time between the last two.
 #[test]
 fn impossible_number_of_samples() {
     let fmu = in_mode(CoSimulation, StepComplete);

@@ -58,7 +58,7 @@ fn rest_in_co_simulation<F: Either>() {
             time += size;
         }
         fmu.set(&THETA, &[0.0; 2]);
-        assert_eq!(fmu.get(STATES), REST, "after the start, angles do not set the states");
+        assert_eq!(fmu.get(STATES), REST, "after the start, angles must not set the states");
     }
 }
 
@@ -140,7 +140,7 @@ fn late_parameters_and_states_in_event_mode() {
         x[4] += 0.25;
         fmu.ok(fmu.fmi2SetContinuousStates(x.as_ptr(), 6));
         fmu.set(&THETA, &[5.0; 2]);
-        assert_eq!(fmu.get(STATES), x, "states that the importer has set are kept");
+        assert_eq!(fmu.get(STATES), x, "states that the importer has set must be kept");
         fmu.enter_continuous_time();
         assert_eq!(fmu.get(STATES), x);
     }
@@ -207,7 +207,7 @@ fn states_in_event_mode_of_fmi3() {
     fmu.set(&[vr(Name::theta5)], &[9.0]);
     fmu.set(&THETA, &[0.0; 2]);
     assert_eq!(fmu.get(STATES), [0.7, -0.4, 9.0, -0.4, 0.0, 0.0]);
-    // A given start state applies even if it is set late.
+    // A given start state applies even if it is set after the initialization.
     let fmu = fmi3::Importer::new::<TestbedFmu>(ModelExchange);
     initialize(&fmu, |_| {});
     start_at(&fmu, GIVEN);

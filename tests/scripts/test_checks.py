@@ -29,6 +29,14 @@ def test_an_unknown_part_is_named() -> None:
     assert done.returncode == 2 and "no part has the target tests; choose from test," in done.stderr
 
 
+def test_every_crate_of_the_fmu_builds_it_again() -> None:
+    """The crates of the workspace that are linked into the FMU or that build it, according to cargo."""
+    command = ["cargo", "tree", "--locked", "--edges", "normal,build", "--prefix", "none", "--format", "{p}"]
+    packages = ["--package", "prw_testbed", "--package", "build_fmu"]
+    printed = subprocess.run([*command, *packages], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert {line.split()[0] for line in printed.splitlines() if f"({ROOT}" in line} == changed.OF_THE_FMU
+
+
 def test_a_change_is_checked_where_it_is() -> None:
     def lines(*names: str) -> list[str]:
         return [" ".join(command[command[0] == sys.executable :]) for command in changed.commands(list(names))]

@@ -19,7 +19,7 @@ const LIMIT: libc::rlim_t = 50_000;
 /// Number of builds that are killed, each at another time.
 const ROUNDS: u32 = 20;
 
-/// Builds the FMU and returns the path of the library in it.
+/// Builds the FMU, extracts its library and returns the path of the extracted file.
 fn library(directory: &Path) -> PathBuf {
     let out = directory.join("whole");
     let mut command = Command::new(env!("CARGO_BIN_EXE_build_fmu"));
@@ -100,7 +100,7 @@ fn the_old_fmu_remains_until_the_new_one_is_complete() {
     let begin = Instant::now();
     let output = build_fmu(&library, out).output().unwrap();
     assert!(output.status.success(), "{output:?}");
-    assert_eq!(names(), [""; 0], "what the killed process has left is removed");
+    assert_eq!(names(), [""; 0], "the temporary file of the killed process must be removed");
     killed_at_any_time(|| build_fmu(&library, out), begin.elapsed(), &fmu);
 }
 

@@ -68,7 +68,8 @@ pub fn arguments_of_build() -> Vec<OsString> {
     kept
 }
 
-/// Returns the content of the `Cargo.lock` that this command was tested with. It is empty if this command was not compiled in a clone.
+/// Returns the content of the `Cargo.lock` that this command was tested with. It is empty unless this command was compiled in a clone that
+/// still exists.
 pub fn tested_lock() -> String {
     let lock = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).map(|root| root.join("Cargo.lock"));
     lock.and_then(|lock| fs::read_to_string(lock).ok()).unwrap_or_default()

@@ -22,7 +22,7 @@ enum Column {
 }
 
 impl Table {
-    /// Reads a table with a column `time` and one column for each input.
+    /// Reads a table with a column `time` and a column for each input that it sets.
     pub fn read(file: &Path, description: &Description) -> Result<Self> {
         let path = || short(file);
         let text = fs::read(file).with_context(path)?;
@@ -108,7 +108,8 @@ impl Column {
     }
 }
 
-/// Returns the separator of the columns. Spreadsheets write semicolons where the comma is the decimal mark.
+/// Returns the separator of the columns: a semicolon or a tab if the first line has one and no comma, else a comma. Spreadsheets write
+/// semicolons where the comma is the decimal mark.
 fn delimiter(text: &[u8]) -> u8 {
     let first = text.split(|byte| *byte == b'\n').next().unwrap_or_default();
     let count = |of: u8| first.iter().filter(|byte| **byte == of).count();

@@ -65,7 +65,7 @@ pub fn new(options: &Options) -> Result<()> {
         Some(name) => name.clone(),
         None => directory.file_name().unwrap_or_default().to_string_lossy().into_owned(),
     };
-    // Cargo checks the name, and adds the crate to the workspace and the repository above it.
+    // Cargo checks the name, adds the crate to a workspace above it, and creates a git repository unless there is one above.
     let cargo = cargo();
     let mut command = Command::new(&cargo);
     command.args(["new", "--quiet", "--lib", "--edition", "2024", "--name", &name]).arg(directory);
@@ -82,7 +82,7 @@ pub fn new(options: &Options) -> Result<()> {
         let parent = path.parent().context("a file is in a directory")?;
         fs::create_dir_all(parent).with_context(|| format!("cannot create {}", parent.display()))?;
         let text = match options.from {
-            // The smallest model gets the name of the crate; others keep their names.
+            // The type of the smallest model gets the name of the crate; the types of the others keep their names.
             Begin::Lag => renamed(&renamed(text, "lag", &crate_name), "Lag", &camel(&crate_name)),
             _ if file.starts_with("tests/") => {
                 text.replace(&format!("use {model}::"), &format!("use {crate_name}::"))
@@ -140,7 +140,7 @@ enum Dependency {
 }
 
 impl Dependency {
-    /// Returns the source of fmu-export, in the version of this command, for a model in a directory.
+    /// Returns the source of fmu-export for a model in a directory.
     fn of(directory: &Path, repository: Option<&str>) -> Result<Self> {
         let package = Path::new(env!("CARGO_MANIFEST_DIR")).with_file_name("fmu-export");
         let is_there = package.join("Cargo.toml").is_file();

@@ -18,7 +18,7 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 
-/// Draws the variables. Variables share a panel if both their units and their labels are equal.
+/// Draws the variables. Variables share a panel if both their units and their labels are equal, up to as many as there are colours.
 pub fn plot(path: &Path, title: &str, time: &[f64], columns: &[Column]) -> Result<()> {
     let mut svg = String::new();
     let drawn: Vec<_> = columns.iter().filter(|column| is_drawn(column)).collect();
@@ -89,7 +89,7 @@ fn draw(
             };
         let mut mesh = chart.configure_mesh();
         if !labels.is_empty() {
-            // The grid has one line for each label, and none in between.
+            // The grid has a line at each integer, because the numbers of labels are integers.
             mesh.y_labels((high - low) as usize + 1);
         }
         mesh.light_line_style(TRANSPARENT)

@@ -33,7 +33,7 @@ pub struct Project {
 }
 
 impl Project {
-    /// Finds the package with `cargo metadata`.
+    /// Finds the package with `cargo metadata`. Fails if it does not make a shared library or does not use fmu-export.
     pub fn find(options: &Package) -> Result<Self> {
         let manifest =
             options.manifest_path.iter().flat_map(|path| [OsStr::new("--manifest-path"), path.as_ref()]);
@@ -75,8 +75,8 @@ fn nearest_manifest() -> Option<PathBuf> {
     directory.ancestors().map(|directory| directory.join("Cargo.toml")).find(|path| path.is_file())
 }
 
-/// Explains what to do if the path of fmu-export in a `Cargo.toml` does not exist; returns `None` if it exists. Cargo's own message
-/// names only the file that it cannot read.
+/// Explains what to do if the path of fmu-export in a `Cargo.toml` does not exist; returns `None` if it exists or none is given. Cargo's
+/// own message names only the file that it cannot read.
 fn missing_path(manifest: &Path) -> Option<String> {
     let content = fs::read_to_string(manifest).ok()?;
     let mut lines = content.lines().filter(|line| line.trim_start().starts_with("fmu-export"));

@@ -67,7 +67,7 @@ impl<'a> Column<'a> {
         self.values.push(value);
     }
 
-    /// Returns the number of values at the end that the run did not reach.
+    /// Returns the number of missing values at the end (NaN or `None`), because the run did not reach them.
     pub fn unreached(&self) -> usize {
         let is_missing = |index: &usize| match self.exact.get(*index) {
             Some(value) => value.is_none(),

@@ -21,8 +21,8 @@ use std::time::{Duration, Instant, SystemTime};
 pub struct Options {
     #[command(flatten)]
     package: Package,
-    /// Start value: a number, true, false, an enumeration item, or a string; for an array, one value for each element,
-    /// separated by commas; repeat the option for several variables
+    /// Start value: a number, true, false, an enumeration item, or a string; for an array, one value for all elements, or
+    /// one for each, separated by commas; repeat the option for several variables
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
     /// Inputs over time: a CSV file with a column time and one column for each input; two rows with the same time make a jump
@@ -34,7 +34,7 @@ pub struct Options {
     /// Step size, s [default: from the model's default experiment]
     #[arg(long, value_name = "S")]
     step: Option<f64>,
-    /// Variables to show, with commas between the names [default: all outputs]
+    /// Variables to show, with commas between the names [default: all outputs except bytes]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     show: Vec<String>,
     /// Simulate the FMU for FMI 2.0 or for FMI 3.0 [default: 2, if FMI 2.0 has all types of the model]
@@ -113,7 +113,7 @@ pub fn check(package: &Package, given: &[PathBuf], options: &fmu_check::Options)
     let mut good = true;
     for fmu in &fmus {
         let directory = fmu.parent().and_then(Path::file_name).unwrap_or_default();
-        // Reports of several FMUs have the same file names, so each FMU gets a directory.
+        // Reports of several FMUs have the same file names, so each goes into a directory with the name of the FMU's directory.
         let out = options.out.as_ref().filter(|_| fmus.len() > 1).map(|out| out.join(directory));
         let options = fmu_check::Options { out: out.or(options.out.clone()), ..options.clone() };
         good &= fmu_check::command(fmu, &options) == ExitCode::SUCCESS;
@@ -260,7 +260,7 @@ fn follow(
 /// Prints the warnings of the FMU, or all its messages.
 fn print_messages(watch: &Watch, all: bool) {
     for Logged { time, message, .. } in watch.take_messages() {
-        // Errors are left out here, because `simulate` prints the reason of a failure.
+        // Without `all`, errors are left out, because `simulate` prints the reason of a failure.
         if all || message.status == Status::Warning {
             let time = time.map_or_else(String::new, |time| format!("t = {time} s, "));
             println!("{time}{}: {}", message.category, message.text.trim());
@@ -285,7 +285,7 @@ fn times(options: &Options, description: &Description, table: Option<&Table>) ->
     Ok((0..=steps as u32).map(|number| start + f64::from(number) * step).collect())
 }
 
-/// Returns the variables that are shown: the outputs, or those with these names.
+/// Returns the variables that are shown: those with these names, or all outputs except bytes if there are no names.
 fn shown<'a>(names: &[String], description: &'a Description) -> Result<Vec<&'a Variable>> {
     if names.is_empty() {
         let is_shown =

@@ -92,7 +92,7 @@ fn develop(from: &str, arguments: &[&str], columns: &str, trajectory: &str) -> D
 }
 
 /// Asserts that Model Exchange has the same results as Co-Simulation, whose steps are separate code. Tolerances are relative to the
-/// peak of an output. They are larger for the motor and the house, whose steps are approximations.
+/// peak of an output. They are larger for the motor, the house and the tank, whose steps are approximations.
 fn compare_interfaces(fmu: &Path, from: &str) {
     let (outputs, end, tolerance) = match from {
         "ball" => (vec!["height", "velocity"], 3.0, 1e-8),
@@ -135,8 +135,8 @@ fn compare_interfaces(fmu: &Path, from: &str) {
     }
 }
 
-/// Returns the observations of a report, without the names of functions, which depend on the FMI version, and without the version
-/// of glibc, which depends on the system.
+/// Returns the observations of a report, without the names of functions, which depend on the FMI version, and without the finding about
+/// glibc, which depends on the system.
 fn findings(report: &Value) -> BTreeSet<String> {
     let all = report["findings"].as_array().unwrap().iter();
     let all = all.filter(|finding| finding["name"] != "package.glibc");
@@ -211,7 +211,7 @@ fn house() {
     let read = "logEvents: read 9 temperatures from winter.csv";
     assert!(directory.prints("my-house", &["run", "--log"]).contains(read));
     assert!(!directory.prints("my-house", &["run"]).contains(read));
-    // A run leaves out the page. A build adds it, with the resources that the model reads.
+    // A run leaves out the page, and a build adds it.
     let page = || {
         let fmu = fs::File::open(directory.path("my-house/target/fmu/my_house.fmu")).unwrap();
         let mut fmu = zip::ZipArchive::new(fmu).unwrap();
@@ -223,7 +223,7 @@ fn house() {
     assert!(page.contains("<h1>House</h1>") && page.contains(".catch(showFailure);"));
 }
 
-/// A run that fails prints the reason, and writes no files.
+/// A run whose start values the FMU rejects prints the reason, and writes no table.
 fn a_failed_run_fails(directory: &Directory) {
     for fmi in ["2", "3"] {
         let output = directory.fmu("my-ball", &["run", "--fmi", fmi, "--set", "gravity=1e6"]);

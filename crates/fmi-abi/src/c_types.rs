@@ -1,4 +1,4 @@
-//! C types from libc, or from Rust's standard library on targets without a C library.
+//! C types from libc or, in WebAssembly, from Rust's standard library.
 
 #[cfg(not(target_family = "wasm"))]
 pub use libc::{c_char, c_int, c_uint, c_void};

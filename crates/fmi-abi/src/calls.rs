@@ -1,5 +1,5 @@
-//! Calls functions of both FMI versions by name, with arguments as 64-bit words, and lists the types of their
-//! arguments for use at run time.
+//! Calls the functions on an instance by name, for both FMI versions, with arguments as 64-bit words, and lists the
+//! types of their arguments for use at run time.
 
 use crate::c_types::{c_int, c_void};
 use crate::{Rule, Standard};
@@ -14,8 +14,9 @@ pub struct Argument {
 }
 
 impl Argument {
-    /// For a pointer, returns the type of its target without the prefix `fmi2` or `fmi3`, and whether the function
-    /// only reads the target. Returns `None` for an argument that is not a pointer.
+    /// For a type that is written as a pointer, returns the type of its target without the prefix `fmi2` or `fmi3`, and
+    /// whether the function only reads the target. Returns `None` for other types, including handles such as
+    /// `fmi2FMUstate`.
     pub fn pointee(&self) -> Option<(&'static str, bool)> {
         // Macro expansion may add a space after the asterisk.
         let (mutability, of) = self.of.strip_prefix('*')?.trim_start().split_once(' ')?;
@@ -26,7 +27,7 @@ impl Argument {
     }
 }
 
-/// Signature of a function with an instance argument.
+/// Signature of a function that takes an instance and returns a status.
 #[derive(Debug)]
 pub struct Signature {
     /// States in which the function may be called.
@@ -76,7 +77,7 @@ macro_rules! calls {
             $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
         }
     ) => {
-        /// Signatures of the functions with an instance argument, in the order of [`Function`].
+        /// Signatures of the functions that take an instance and return a status, in the order of [`Function`].
         pub const SIGNATURES: &[Signature] = &[
             $(Signature {
                 rule: Function::$function.rule(),
@@ -84,10 +85,11 @@ macro_rules! calls {
             }),+
         ];
 
-        /// Names of the functions without an instance argument.
+        /// Names of all other functions: versions, creation and release of instances.
         pub const FREE: &[&str] = &[$(stringify!($free)),+];
 
-        /// Calls the function `name` at `address`. Each missing word is 0. Returns -1 if no function has this name.
+        /// Calls the function `name` at `address` and returns its status. `words` are the arguments after the instance;
+        /// missing words are 0. Returns -1 if [`SIGNATURES`] does not contain the function.
         ///
         /// # Safety
         /// The function at `address` has the type that the FMI standard defines for `name`, and the words are valid
@@ -133,7 +135,8 @@ pub const fn signatures(standard: Standard) -> &'static [Signature] {
     }
 }
 
-/// Returns the signature of the function with this name; `None` if there is none with an instance argument.
+/// Returns the signature of the function with this name; `None` if no function that takes an instance and returns a
+/// status has this name.
 pub fn signature(name: &str) -> Option<&'static Signature> {
     let standard = if name.starts_with("fmi3") { Standard::Fmi3 } else { Standard::Fmi2 };
     signatures(standard).iter().find(|of| of.rule.name == name)

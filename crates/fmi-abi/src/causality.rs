@@ -31,15 +31,15 @@ macro_rules! attribute {
 attribute! {
     /// Purpose of a variable: who sets it and who reads it (section 2.2.7 of FMI 2.0).
     Causality {
-        /// Set by the user before the simulation.
+        /// Set by the user: before the simulation or, if it is tunable, also during the simulation.
         Parameter = "parameter",
         /// Calculated from parameters.
         CalculatedParameter = "calculatedParameter",
-        /// Set by the importer during the simulation.
+        /// Set by the importer, before and during the simulation.
         Input = "input",
         /// Read by the importer.
         Output = "output",
-        /// Used only inside the model.
+        /// Calculated by the model. The importer may read it, but must not connect it to other models.
         Local = "local",
         /// The independent variable: the time.
         Independent = "independent",
@@ -53,9 +53,9 @@ attribute! {
         Constant = "constant",
         /// The variable does not change after initialization.
         Fixed = "fixed",
-        /// The variable changes only when the user changes a tunable parameter.
+        /// The variable changes only when the user sets a tunable parameter.
         Tunable = "tunable",
-        /// The variable changes at events or communication points.
+        /// The variable changes only at events or communication points.
         Discrete = "discrete",
         /// The variable may change at any time.
         Continuous = "continuous",

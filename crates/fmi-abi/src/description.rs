@@ -1,5 +1,5 @@
-//! Reads model descriptions, and accepts faulty ones as far as possible: missing attributes get the defaults of the
-//! FMI standard, and the faults are listed.
+//! Reads model descriptions, and accepts faulty ones as far as possible: missing attributes get the defaults of the FMI
+//! standard or stay empty, and each [`Fault`] is listed.
 
 use crate::{BaseType, Interface, Standard, is_c_identifier, shown};
 use roxmltree::Node;
@@ -21,7 +21,7 @@ pub struct Variable {
     pub name: String,
     /// Value reference.
     pub reference: u32,
-    /// Base type; `None` for a clock. Int32 of FMI 3.0 is Integer, Float64 is Real.
+    /// Base type; `None` for a clock or an unknown type. Int32 of FMI 3.0 is Integer, Float64 is Real.
     pub base: Option<BaseType>,
     /// `input`, `output` and so on; `local` by default.
     pub causality: String,
@@ -38,13 +38,14 @@ pub struct Variable {
     pub dimensions: Option<Vec<usize>>,
     /// Number of values: 1 for a scalar. `None` if it is unknown or [too large](Self::is_too_large).
     pub size: Option<usize>,
-    /// Whether the array and the arrays before it together have more than [`MAX_VALUES`] values.
+    /// Whether the array, together with the arrays before it that are not too large, has more than [`MAX_VALUES`]
+    /// values.
     pub is_too_large: bool,
     /// Smallest value of the variable or of its declared type, if given.
     pub min: Option<f64>,
     /// Largest value of the variable or of its declared type, if given.
     pub max: Option<f64>,
-    /// Nominal value of the variable or of its declared type; 1 by default.
+    /// Nominal value of the variable or of its declared type; 1 if it is missing or not positive.
     pub nominal: f64,
     /// Unit of the variable or of its declared type, if given.
     pub unit: Option<Arc<str>>,
@@ -209,7 +210,7 @@ impl Offer {
         names.iter().any(|name| matches!(self.attributes.get(*name).map(String::as_str), Some("true" | "1")))
     }
 
-    /// Returns the value of an attribute, if it is a positive number.
+    /// Returns the value of an attribute, if it is a positive and finite number.
     pub fn number(&self, name: &str) -> Option<f64> {
         let number: Option<f64> = self.attributes.get(name)?.trim().parse().ok();
         number.filter(|number| *number > 0.0 && number.is_finite())
@@ -219,13 +220,13 @@ impl Offer {
 /// Kinds of faults in a model description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// A required attribute is missing.
+    /// The name of the model, its guid or instantiation token, or a `modelIdentifier` is missing.
     Attribute,
     /// A variable has no value reference.
     Reference,
     /// A variable has no type.
     Type,
-    /// `ModelStructure` refers to an unknown variable.
+    /// `ModelStructure` refers to a variable that does not exist.
     Structure,
 }
 
@@ -264,7 +265,7 @@ pub struct ModelDescription {
     pub log_categories: Vec<String>,
     /// Units by name, each with the exponents of SI base units, factor and offset as written in the file.
     pub units: BTreeMap<String, Vec<(String, String)>>,
-    /// Display units by unit, each with name, factor and offset.
+    /// Display units by the name of the unit, each with name, factor and offset.
     pub display_units: BTreeMap<String, Vec<(String, f64, f64)>>,
     /// Names of the declared types.
     pub types: BTreeSet<String>,
@@ -278,15 +279,15 @@ impl ModelDescription {
     /// Reads a `modelDescription.xml`.
     ///
     /// # Errors
-    /// Fails if the string is not well-formed XML or would take too much memory, for other FMI versions, and if `modelIdentifier` is
-    /// not an identifier of C. The message names the fault.
+    /// Fails if the string is not well-formed XML or would take too much memory or time, if the FMI version is not
+    /// supported, and if `modelIdentifier` is not an identifier of C. The message names the reason.
     pub fn parse(xml: &str) -> Result<Self, String> {
         Self::parse_configured(xml, &HashMap::new())
     }
 
-    /// Reads a `modelDescription.xml` for an instance in which structural parameters have other values than their
-    /// start values. `structure` maps their value references to these values, which determine the sizes of arrays
-    /// (section 2.4.7.5.1 of FMI 3.0).
+    /// Reads a `modelDescription.xml` for an instance in which structural parameters have other values than their start
+    /// values. `structure` maps their value references to these values, which determine the sizes of arrays (section
+    /// 2.4.7.2 of FMI 3.0).
     ///
     /// # Errors
     /// Fails for the same reasons as [`parse`](Self::parse).
@@ -460,7 +461,7 @@ fn variables(
         };
         let declared = of_type.attribute("declaredType").and_then(|name| types.get(name));
         let base = base_of(standard, of_type.tag_name().name());
-        // A size is a number, or the value of a structural parameter (section 2.4.7.5.1 of FMI 3.0).
+        // A size is a number, or the value of a structural parameter (section 2.4.7.2 of FMI 3.0).
         let size = |dimension: Node| {
             let parameter = || nodes.get(*by_reference.get(&number(dimension, "valueReference")?)?).copied();
             let configured = || structure.get(&number(dimension, "valueReference")?).copied();
@@ -549,7 +550,7 @@ fn variable(
     }
 }
 
-/// Reads the start values as written. Strings of FMI 3.0 are child elements (section 2.4.7.5).
+/// Reads the start values as written. In FMI 3.0, strings and binary values are in child elements (section 2.4.7.5).
 fn start_values(node: Node, of_type: Node, base: Option<BaseType>) -> Vec<String> {
     let list = of_type.attribute("start");
     let start: Vec<String> = match base {
@@ -563,7 +564,8 @@ fn start_values(node: Node, of_type: Node, base: Option<BaseType>) -> Vec<String
     starts.filter_map(|child| Some(child.attribute("value")?.to_owned())).collect()
 }
 
-/// Returns the default of `initial`: the table of section 2.2.7 of FMI 2.0, 2.4.7.4 of FMI 3.0.
+/// Returns the default of `initial` from the table in section 2.2.7 of FMI 2.0, 2.4.7.4 of FMI 3.0; an empty string if
+/// there is none.
 fn default_initial(causality: &str, variability: &str) -> &'static str {
     match (causality, variability) {
         ("parameter" | "structuralParameter", _) | ("local" | "output", "constant") => "exact",

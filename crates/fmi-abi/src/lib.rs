@@ -41,7 +41,7 @@ macro_rules! table {
             $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
         }
     ) => {
-        /// The functions whose first argument is an instance.
+        /// The functions that take an instance and return a status.
         #[allow(non_camel_case_types, missing_docs)]
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Function { $($function),+ }
@@ -71,13 +71,13 @@ macro_rules! table {
             /// The names of all functions.
             pub const NAMES: &[&str] = &[$(stringify!($free),)+ $(stringify!($function),)+];
 
-            /// Finds the functions of a library by their names. `symbol` returns the address of the function with a
-            /// name, or `None` if the library lacks it. A missing function is replaced by one that returns Error, a
-            /// null pointer or nothing, as its type requires.
+            /// Finds the functions of a library by their names. `symbol` returns the address of the function with the
+            /// given name, or `None` if the library lacks it. A missing function is replaced by one that returns Error,
+            /// a null pointer or nothing, as its type requires.
             ///
             /// # Safety
-            /// Each address that `symbol` returns belongs to the function of that name and has the type of the FMI
-            /// standard. The library stays loaded while the functions are used.
+            /// Each address that `symbol` returns is the address of the function of that name, whose type is as in the
+            /// FMI standard. The library stays loaded while the functions are used.
             #[allow(unsafe_code)]
             pub unsafe fn find(mut symbol: impl FnMut(&'static str) -> Option<*const $crate::c_types::c_void>) -> Self {
                 Self {
@@ -110,7 +110,7 @@ macro_rules! table {
 }
 pub(crate) use table;
 
-/// The result of the function that replaces a missing one.
+/// Result of the function that replaces a missing one, for each result type other than a status.
 trait Absent {
     const RESULT: Self;
 }

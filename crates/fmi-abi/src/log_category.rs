@@ -11,7 +11,7 @@ pub enum Category {
     Events,
     /// A warning.
     Warning,
-    /// A status query without a result, or a step that ended early.
+    /// A status query without a result, or a step that did not reach its end.
     Discard,
     /// A rejected call.
     Error,

@@ -19,12 +19,12 @@ pub enum Mode {
     Event = 16,
     /// Model Exchange: Continuous-Time Mode.
     ContinuousTime = 32,
-    /// After the end of the simulation.
+    /// After the importer has ended the simulation (`fmi2Terminate`, `fmi3Terminate`).
     Terminated = 64,
     /// State of FMI 2.0 after an error. fmu-export never enters it, because a rejected call leaves the instance
     /// unchanged, but reads states that were serialized in this mode.
     Error = 128,
-    /// After a panic.
+    /// After a failure that makes the instance unusable; in fmu-export, after a panic.
     Fatal = 256,
 }
 
@@ -71,7 +71,7 @@ impl fmt::Display for Mode {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AllowedStates(u64);
 
-/// Bit offset of the 16 modes that belong to an FMI version and an interface type.
+/// Offset of the 16 bits that belong to an FMI version and an interface type.
 #[inline]
 const fn bit_offset(standard: Standard, interface: Interface) -> u32 {
     16 * (2 * standard as u32 + interface as u32)
@@ -90,7 +90,7 @@ const fn bits(letters: &str) -> u64 {
     while let [letter, tail @ ..] = rest {
         let mut known = 0;
         while MODES[known].letter != *letter {
-            known += 1; // An unknown letter leads past the end of `MODES`, which is a compile-time error.
+            known += 1; // An unknown letter leads past the end of `MODES`; in a constant, this is a compile-time error.
         }
         set |= MODES[known].mode as u64;
         rest = tail;
@@ -102,8 +102,8 @@ impl AllowedStates {
     /// The empty set.
     pub const NONE: Self = Self(0);
 
-    /// Creates a set of modes by their letters: I instantiated, N initialization, C step complete, F step
-    /// failed, M event, K continuous time, T terminated, E error.
+    /// Creates a set of modes from their letters: I instantiated, N initialization, C step complete, F step failed, M
+    /// event, K continuous time, T terminated, E error.
     pub const fn new(standard: Standard, co_simulation: &str, model_exchange: &str) -> Self {
         Self(
             bits(co_simulation) << bit_offset(standard, Interface::CoSimulation)

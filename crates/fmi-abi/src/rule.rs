@@ -30,7 +30,7 @@ impl Rule {
         Self { name, standard, tolerated }
     }
 
-    /// Returns all states in which the call is accepted.
+    /// Returns all states in which fmu-export accepts the call.
     pub const fn accepted(&self) -> AllowedStates {
         self.standard.union(self.tolerated)
     }

@@ -20,8 +20,8 @@ impl Standard {
         index.wrapping_add(self as u32)
     }
 
-    /// Returns the location of the resources as importers write it: a URI in FMI 2.0 (section 2.1.5), a path
-    /// with a final separator in FMI 3.0 (section 2.3.1).
+    /// Returns the location of the resources as importers write it: a URI in FMI 2.0 (section 2.1.5), a path with a
+    /// final separator in FMI 3.0 (section 2.3.1). Returns an empty string if the path contains NUL.
     pub fn resources(self, directory: &Path) -> CString {
         let resources = match self {
             Self::Fmi2 => uri(&directory.to_string_lossy()),

@@ -13,7 +13,7 @@ pub enum Status {
     /// A warning; the computation can continue. fmu-export reports warnings only in the log, because some
     /// importers stop on this status.
     Warning = 1,
-    /// The information is not available, or the step cannot be carried out.
+    /// The requested information is not available, or a calculation failed that may succeed with a smaller step.
     Discard = 2,
     /// The call was rejected.
     Error = 3,
@@ -22,8 +22,8 @@ pub enum Status {
 }
 
 impl Status {
-    /// Converts the status of a third-party library. An unknown value is an error, and so is `Pending`,
-    /// because no caller here waits for asynchronous steps.
+    /// Converts the status of a third-party library. An unknown value becomes `Error`. So does `fmi2Pending`, which
+    /// callers that wait for asynchronous steps must handle before.
     #[inline]
     pub const fn from_c(code: c_int) -> Self {
         match code {

@@ -1,12 +1,12 @@
-//! Parses the XML of untrusted files. It first checks that the parser will not need too much memory or time.
+//! Parses the XML of untrusted files. First checks that the parser will not need too much memory or time.
 
 use roxmltree::Document;
 
 /// Maximum depth of nested elements.
 const MAX_DEPTH: usize = 250;
-/// Maximum number of comparisons that the parser may make for a file, and the number that each byte of the file adds
-/// to it. The parser compares all attributes of an element with each other, and its namespaces with the namespaces of
-/// the elements around it, so without a limit the time could grow quadratically.
+/// Maximum number of comparisons that the parser may make for an empty file, and the number by which each byte of a
+/// file raises this maximum. The parser compares all attributes of an element with each other, and the namespaces of an
+/// element with the namespaces of the elements around it, so without a limit the time could grow quadratically.
 const COMPARISONS: usize = 1 << 22;
 const COMPARISONS_PER_BYTE: usize = 8;
 /// Maximum number of bytes that [`reserve`] accepts.
@@ -18,7 +18,8 @@ const ATTRIBUTE: usize = 200;
 /// Parses the content of an XML file. Error messages begin with `name`.
 ///
 /// # Errors
-/// Fails if the file is not well-formed, has a document type definition, or would take too much memory or time.
+/// Fails if the file is not well-formed, has a document type definition or elements that are nested too deep, or would
+/// take too much memory or time.
 pub fn parse<'a>(text: &'a str, name: &str) -> Result<Document<'a>, String> {
     let count = |byte: u8| text.bytes().filter(|other| *other == byte).count();
     let bytes = ELEMENT * count(b'<') + ATTRIBUTE * count(b'=') + 2 * text.len();

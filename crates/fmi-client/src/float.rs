@@ -1,7 +1,7 @@
 //! The floating-point environment (rounding mode and exception mask), which some FMUs change for the whole thread.
 
-/// Calls `body`, then restores the environment. Otherwise the caller's results would be rounded differently, or a division by zero
-/// could end the process.
+/// Calls `body`, then restores the environment. Otherwise the caller's results might be rounded differently, or a
+/// division by zero might end the process.
 #[cfg(target_arch = "x86_64")]
 pub(crate) fn keeping_environment<T>(body: impl FnOnce() -> T) -> T {
     use std::arch::asm;
@@ -11,7 +11,8 @@ pub(crate) fn keeping_environment<T>(body: impl FnOnce() -> T) -> T {
         asm!("stmxcsr [{}]", "fnstcw [{}]", in(reg) &raw mut sse, in(reg) &raw mut x87, options(nostack, preserves_flags));
     }
     let result = body();
-    // SAFETY: the registers had these values before; `fnclex` has cleared the exceptions that they could raise.
+    // SAFETY: the registers had these values before; `fnclex` clears pending exceptions, which they could raise
+    // otherwise.
     unsafe {
         asm!("fnclex", "ldmxcsr [{}]", "fldcw [{}]", in(reg) &raw const sse, in(reg) &raw const x87, options(nostack, preserves_flags));
     }

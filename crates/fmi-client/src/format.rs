@@ -1,13 +1,14 @@
 //! Expands `printf` formats in log messages (section 2.1.5 of FMI 2.0), without trusting them.
 //!
-//! Many FMUs pass finished text as the format. Its percent signs look like conversions, but they have no arguments. So a conversion
-//! is expanded only if that is harmless: numbers are copied from registers and the stack, and strings are read through the kernel,
-//! which reports invalid pointers. `%n`, which would write to memory, and unknown conversions stay in the text.
+//! Many FMUs pass finished text as the format. Percent signs in this text look like conversions, but have no arguments. So a
+//! conversion is expanded only if that is harmless: numbers are copied from registers and the stack, and strings are read through
+//! the kernel, which reports invalid pointers (only on Linux; elsewhere `%s` stays in the text). `%n`, which would write to memory,
+//! and unknown conversions stay in the text.
 #![cfg(any(all(unix, target_arch = "x86_64"), all(target_os = "linux", target_arch = "aarch64")))]
 
 use std::ffi::{CStr, CString};
 
-/// Maximum length of a string argument in bytes.
+/// Without a precision, a string argument of this many bytes or more is not expanded.
 const LONGEST: usize = 1 << 16;
 
 /// Arguments of a variadic call that have not been used yet.
@@ -55,8 +56,9 @@ impl Arguments {
         text + rest
     }
 
-    /// Parses the conversion after a percent sign and returns its length, without the sign. Returns `None` if there is none: a
-    /// percent-encoded character of a URI, or a percent sign before a space, is not a conversion.
+    /// Parses the conversion after a percent sign, and returns its length (without the sign) and its parts. Returns
+    /// `None` if there is no conversion: a percent-encoded character of a URI, or a percent sign before a space, is not
+    /// a conversion.
     fn parse<'a>(&mut self, text: &'a str) -> Option<(usize, Conversion<'a>)> {
         let bytes = text.as_bytes();
         if let [high, low, ..] = bytes
@@ -93,7 +95,7 @@ impl Arguments {
 
     /// Formats the next argument. Returns `None` if the conversion must stay in the text.
     fn convert(&mut self, of: &Conversion) -> Option<String> {
-        /// Maximum width and precision. Larger ones are almost certainly not meant as a conversion.
+        /// Maximum width and precision. Text with a larger one is almost certainly not meant as a conversion.
         const WIDEST: i32 = 200;
         let part = |number: Option<i32>, before: &str| {
             number.map(|number| format!("{before}{number}")).unwrap_or_default()
@@ -170,7 +172,7 @@ fn print(format: &str, value: Printed) -> Option<String> {
 #[cfg(target_os = "linux")]
 fn string_at(address: usize, limit: usize) -> Option<String> {
     use std::os::unix::fs::FileExt;
-    /// Smallest page size. Each read ends at a page boundary, because the next page may not be readable.
+    /// Smallest page size. No read crosses a page boundary, because the next page may not be readable.
     const PAGE: usize = 4096;
     let memory = std::fs::File::open("/proc/self/mem").ok().filter(|_| address >= PAGE)?;
     let (mut found, mut page) = (Vec::new(), [0; PAGE]);
@@ -249,7 +251,7 @@ mod tests {
         ] {
             assert_eq!(expand(text, &[1; 8], &[]), text);
         }
-        // Only 8 arguments can be read, so the ninth conversion stays.
+        // Only 8 integers can be read, so the ninth conversion stays.
         assert_eq!(expand(&"%d ".repeat(9), &[1; 8], &[]), "1 1 1 1 1 1 1 1 %d ");
     }
 }

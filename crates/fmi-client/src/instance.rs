@@ -1,5 +1,5 @@
-//! The life cycle of an instance, for all FMI versions. Safe functions wrap the C calls: they check lengths, keep the library loaded,
-//! and do not call the instance after fmi2Fatal.
+//! The life cycle, steps, events and derivatives of an instance, for both FMI versions. Safe functions wrap the C
+//! calls: they check lengths, keep the library loaded, and do not call the instance after a fatal error.
 
 use crate::float::keeping_environment;
 use crate::library::{Functions, Library};
@@ -40,7 +40,7 @@ pub struct Settings<'a> {
 }
 
 impl Settings<'_> {
-    /// Returns settings without optional capabilities.
+    /// Returns settings with the name "instance", and without a token, resources and optional capabilities.
     pub fn new(interface: Interface) -> Self {
         Self {
             name: "instance",
@@ -58,7 +58,7 @@ impl Settings<'_> {
 
 /// An instance, freed when dropped. It keeps its library loaded.
 pub struct Instance {
-    /// NULL after fmi2Fatal, when even freeing is forbidden (section 2.1.3 of FMI 2.0).
+    /// NULL after fmi2Fatal or fmi3Fatal, when even freeing is forbidden (section 2.1.3 of FMI 2.0).
     handle: *mut c_void,
     log: Arc<Log>,
     /// Callbacks, which must live as long as the instance (section 2.1.5 of FMI 2.0).
@@ -246,7 +246,7 @@ impl Instance {
         &self.library
     }
 
-    /// Returns the handle for a call, unless the FMU has returned fmi2Fatal.
+    /// Returns the handle for a call; an error if the FMU has returned fmi2Fatal or fmi3Fatal.
     #[inline]
     pub(crate) fn handle(&self, function: &'static str) -> Result<*mut c_void, Rejection> {
         if self.is_alive() {
@@ -300,8 +300,9 @@ impl Instance {
         self.log.take();
     }
 
-    /// Sets up the experiment in FMI 2.0, before the start values are set. Does nothing in FMI 3.0, where the times are passed when
-    /// entering Initialization Mode. Times are in s; the tolerance is relative.
+    /// Sets up the experiment in FMI 2.0. Does nothing in FMI 3.0, where
+    /// [`enter_initialization_mode`](Self::enter_initialization_mode) passes the experiment. Times are in s; the
+    /// tolerance is relative.
     ///
     /// # Errors
     /// The FMU rejects the call.
@@ -319,7 +320,7 @@ impl Instance {
         call!(self, fmi2SetupExperiment(has_tolerance, relative, start_time, has_stop, stop))
     }
 
-    /// Enters Initialization Mode.
+    /// Enters Initialization Mode. Only FMI 3.0 uses the arguments, because in FMI 2.0 [`set_up`](Self::set_up) passes them.
     ///
     /// # Errors
     /// The FMU rejects the call.
@@ -362,7 +363,7 @@ impl Instance {
         keeping_environment(|| call!(self, fmi2ExitInitializationMode(), fmi3ExitInitializationMode()))
     }
 
-    /// Enters Configuration Mode, where structural parameters are set (section 2.3.2 of FMI 3.0).
+    /// Enters Configuration Mode, where structural parameters are set (section 2.3.6 of FMI 3.0).
     ///
     /// # Errors
     /// The FMU rejects the call, or is of FMI 2.0, which does not have this mode.
@@ -373,7 +374,7 @@ impl Instance {
     /// Leaves Configuration Mode.
     ///
     /// # Errors
-    /// The FMU rejects the call.
+    /// The FMU rejects the call, or is of FMI 2.0.
     pub fn exit_configuration_mode(&mut self) -> Result<(), Rejection> {
         call!(fmi3 self, fmi3ExitConfigurationMode())
     }
@@ -381,12 +382,13 @@ impl Instance {
     /// Enters Step Mode after an event in Co-Simulation (FMI 3.0).
     ///
     /// # Errors
-    /// The FMU rejects the call.
+    /// The FMU rejects the call, or is of FMI 2.0.
     pub fn enter_step_mode(&mut self) -> Result<(), Rejection> {
         call!(fmi3 self, fmi3EnterStepMode())
     }
 
-    /// Sets time derivatives of inputs, each of the order in `orders`. FMI 3.0 does not have this function.
+    /// Sets time derivatives of inputs; `orders` contains the order of each. FMI 3.0 does not have this function, so
+    /// the call returns an error there.
     ///
     /// # Errors
     /// The FMU rejects the call.
@@ -409,6 +411,9 @@ impl Instance {
     ///
     /// # Errors
     /// The FMU rejects the call.
+    ///
+    /// # Panics
+    /// Panics if there are fewer values than variables.
     pub fn get_output_derivatives(&mut self, vr: &[u32], values: &mut [f64]) -> Result<(), Rejection> {
         let (orders, count) = (vec![1; vr.len()], values.len());
         assert!(count >= vr.len());
@@ -424,7 +429,8 @@ impl Instance {
     /// performs it asynchronously.
     ///
     /// # Errors
-    /// The FMU rejects the step, or ends the simulation (see [`Rejection::ended`]).
+    /// The FMU rejects the step, ends the simulation (see [`Rejection::ended`]), or ends the step early although this
+    /// is not allowed.
     #[inline]
     pub fn step(&mut self, time: f64, size: f64) -> Result<f64, Rejection> {
         // While there are saved states, one of them may be restored (section 4.2.2 of FMI 2.0, noSetFMUStatePriorToCurrentPoint).
@@ -543,10 +549,11 @@ impl Instance {
         call!(self, fmi2EnterContinuousTimeMode(), fmi3EnterContinuousTimeMode())
     }
 
-    /// Updates the discrete states until the FMU needs no further iteration. The instance must be in Event Mode.
+    /// Updates the discrete states until the FMU needs no further iteration or requests the end of the simulation. The
+    /// instance must be in Event Mode.
     ///
     /// # Errors
-    /// The FMU rejects a call, or the event does not end.
+    /// The FMU rejects a call, or the event does not end within 10,000 iterations.
     pub fn event(&mut self) -> Result<Event, Rejection> {
         let mut all = Event::default();
         for _ in 0..MOST_ITERATIONS {
@@ -657,8 +664,8 @@ impl Instance {
     }
 }
 
-/// Waits for the end of an asynchronous step and returns its status. It asks for the status repeatedly, because the importer passes
-/// no `stepFinished` callback (section 4.2.2 of FMI 2.0).
+/// Waits for the end of an asynchronous step and returns its status. Asks for the status repeatedly, because this crate
+/// passes no `stepFinished` callback (section 4.2.2 of FMI 2.0).
 #[cold]
 fn wait(functions: &fmi_abi::fmi2::Functions, handle: *mut c_void) -> c_int {
     const LONGEST_PAUSE: Duration = Duration::from_millis(1);

@@ -88,6 +88,6 @@ fn provide_symbols() {
     });
 }
 
-/// Does nothing, because on other systems each imported symbol names its library.
+/// Does nothing, because on Windows and macOS each imported symbol names its library.
 #[cfg(not(target_os = "linux"))]
 fn provide_symbols() {}

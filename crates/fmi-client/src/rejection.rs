@@ -16,8 +16,9 @@ pub struct Message {
     pub text: String,
 }
 
-/// A status other than OK or Warning, with the function that returned it and the messages of the FMU. It is boxed because every call
-/// returns a result, which should be small, and errors are rare.
+/// Error of a call: the function, its status, and the messages of the FMU. This crate also creates errors that do not
+/// come from the FMU. The content is boxed because every call returns a result, which should be small, and errors are
+/// rare.
 #[derive(Debug)]
 pub struct Rejection(Box<Rejected>);
 
@@ -87,7 +88,7 @@ impl std::fmt::Display for Rejection {
             return message.map_or(Ok(()), |message| write!(f, ": {message}"));
         }
         match message {
-            // Some FMUs include the function in the message.
+            // Some FMUs include the name of the function in the message.
             Some(message) if message.contains(function) => f.write_str(message),
             Some(message) => write!(f, "{function}: {message}"),
             None => write!(f, "{} returned {:?} without a message", function, status),
@@ -97,8 +98,8 @@ impl std::fmt::Display for Rejection {
 
 impl std::error::Error for Rejection {}
 
-/// Returns the message that explains an error: the last one with status Discard or worse, otherwise the last
-/// one.
+/// Returns the message that explains an error: the last one with status Discard or worse, otherwise the last one;
+/// `None` if there are no messages.
 pub fn reason(log: &[Message]) -> Option<&Message> {
     let severe = log.iter().rev().find(|message| message.status as i32 >= Status::Discard as i32);
     severe.or(log.last())

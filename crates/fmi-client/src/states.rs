@@ -12,7 +12,7 @@ impl Instance {
     /// Saves the state.
     ///
     /// # Errors
-    /// The FMU rejects the call.
+    /// The FMU rejects the call, or returns no state.
     pub fn save(&mut self) -> Result<Saved, Rejection> {
         let mut state = null_mut();
         call!(self, fmi2GetFMUstate(&mut state), fmi3GetFMUState(&mut state))?;
@@ -37,13 +37,13 @@ impl Instance {
     /// Restores a saved state.
     ///
     /// # Errors
-    /// The FMU rejects the call.
+    /// The FMU rejects the call, or there is no such state.
     pub fn restore(&mut self, saved: Saved) -> Result<(), Rejection> {
         let state = self.state(saved, "restore")?;
         call!(self, fmi2SetFMUstate(state), fmi3SetFMUState(state))
     }
 
-    /// Frees a saved state.
+    /// Frees a saved state. Does nothing if there is no such state.
     ///
     /// # Errors
     /// The FMU rejects the call.
@@ -62,7 +62,7 @@ impl Instance {
     /// Serializes a saved state to bytes.
     ///
     /// # Errors
-    /// The FMU rejects a call, or reports a size for which there is not enough memory.
+    /// There is no such state, or the FMU rejects a call, or reports a size for which there is not enough memory.
     pub fn serialize(&mut self, saved: Saved) -> Result<Vec<u8>, Rejection> {
         let (state, mut size) = (self.state(saved, "serialize")?, 0);
         call!(
@@ -83,7 +83,7 @@ impl Instance {
     /// Creates a saved state from serialized bytes.
     ///
     /// # Errors
-    /// The FMU rejects the bytes.
+    /// The FMU rejects the bytes, or returns no state.
     pub fn deserialize(&mut self, bytes: &[u8]) -> Result<Saved, Rejection> {
         let (from, size, mut state) = (bytes.as_ptr(), bytes.len(), null_mut());
         call!(
@@ -95,8 +95,8 @@ impl Instance {
     }
 }
 
-/// Returns `size` bytes that are 0, or `None` if memory does not suffice. The system provides their pages only when the FMU writes to
-/// them.
+/// Returns `size` bytes that are 0, or `None` if there is not enough memory. The system provides the memory pages only
+/// when the FMU writes to them.
 fn zeros(size: usize) -> Option<Vec<u8>> {
     if size == 0 {
         return Some(Vec::new());

@@ -198,17 +198,18 @@ impl Instance {
         self.check(function, code)
     }
 
-    /// Checks the number of values and returns it. FMI 2.0 has one value for each variable; FMI 3.0 has more if variables are arrays.
+    /// Checks that there are at least as many values as variables, and returns the number of values. In FMI 3.0 there
+    /// are more if variables are arrays.
     #[inline]
     fn checked_count(&self, vr: &[u32], values: usize) -> usize {
         assert!(values >= vr.len(), "{values} values for {} variables", vr.len());
         values
     }
 
-    /// Sets variables of one type to exact values.
+    /// Sets variables of one type to exact values, i.e. without conversion to `f64`.
     ///
     /// # Errors
-    /// The FMU rejects the values, or a string contains NUL.
+    /// The FMU rejects the values, a string contains NUL, or the type is Binary and the FMU is of FMI 2.0.
     ///
     /// # Panics
     /// Panics if there are fewer values than variables.
@@ -232,10 +233,11 @@ impl Instance {
         self.check(function, code)
     }
 
-    /// Reads `n` exact values of variables of one type. If some variables are arrays, there are more values than variables.
+    /// Reads `n` values of variables of one type exactly, i.e. without conversion to `f64`. If some variables are
+    /// arrays, there are more values than variables.
     ///
     /// # Errors
-    /// The FMU rejects the call.
+    /// The FMU rejects the call, or the type is Binary and the FMU is of FMI 2.0.
     ///
     /// # Panics
     /// Panics if there are fewer values than variables.

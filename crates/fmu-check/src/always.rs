@@ -1,5 +1,4 @@
-//! Rules that hold for every run: the FMU writes only to the arrays for results, returns the statuses of the standard, and
-//! logs valid messages.
+//! Rules that hold for every run, about writes to arrays, statuses, strings, logged messages and processes that are left.
 
 use crate::call_sequence::{CallSequence, Message, Numbered, Run, Step, Values, all_steps};
 use crate::description::Description;
@@ -17,7 +16,8 @@ fn rule(name: &'static str, criterion: impl Criterion) -> Broken {
     (name, Arc::new(criterion))
 }
 
-/// Returns the violations of these rules in a run whose last step has returned.
+/// Returns the violations of these rules in a run whose last step has returned: all violations of the rules for arrays, and the
+/// first violation of each other rule.
 pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -> Vec<Finding> {
     let all = all_steps(sequence);
     let mut broken: Vec<Broken> = processes(&all, run).into_iter().collect();
@@ -38,7 +38,8 @@ pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -
     found.filter(|finding| names.insert(finding.name.clone()) || finding.topic() == "arrays").collect()
 }
 
-/// Returns the rule that no process is alive after all instances were freed; `None` if the run left no process.
+/// Returns the rule that no process is alive after all instances were freed; `None` if the run left no process, or if the
+/// sequence does not free all instances.
 fn processes(all: &[&Numbered], run: &Run) -> Option<Broken> {
     if run.orphans.is_empty() {
         return None;
@@ -160,7 +161,8 @@ fn environment(numbered: &Numbered) -> Option<Broken> {
     }))
 }
 
-/// Returns the rule that a failed call logs a message; `None` if logging is switched off in the sequence.
+/// Returns the rule that a failed call logs a message; `None` if the sequence changes the logging or a step instantiates without
+/// logging, and for steps that need not log a message.
 fn silence(sequence: &CallSequence, numbered: &Numbered) -> Option<Broken> {
     let off = sequence.iter().any(|numbered| {
         matches!(&numbered.step, Step::Make(_, make) if !make.logging)

@@ -124,7 +124,7 @@ pub struct Make {
 pub struct Integration {
     pub begin: f64,
     pub end: f64,
-    /// Number of steps if there are no events. It defines the step size, but an event ends its step early.
+    /// Number of steps if there are no events. It defines the step size; a step that reaches an event ends early.
     pub steps: usize,
     /// Whether the method is Euler's method instead of the classical Runge-Kutta method.
     pub euler: bool,
@@ -143,7 +143,7 @@ pub enum Step {
     /// Instantiates the FMU; the instance gets this index.
     Make(usize, Make),
     Free(usize),
-    /// Calls a function whose first argument is the instance, or NULL, followed by `args`.
+    /// Calls a function with the instance, or NULL if `instance` is `None`, and then `args` as arguments.
     Call {
         instance: Option<usize>,
         function: String,
@@ -153,7 +153,7 @@ pub enum Step {
     Version(String),
     /// Integrates an instance of Model Exchange and handles its events.
     Integrate(usize, Integration),
-    /// Repeats steps this many times, or until the time limit.
+    /// Repeats steps this many times, or until `Setting::repetitions` seconds have passed.
     Repeat(usize, Vec<Numbered>),
     /// Runs call sequences at the same time, each in a separate thread.
     Parallel(Vec<Vec<Numbered>>),
@@ -172,7 +172,7 @@ pub enum Step {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Numbered {
     pub id: u32,
-    /// Whether the standard forbids the call. The state machine of `legal` ignores forbidden calls.
+    /// Whether the standard forbids the call or its arguments. The state machine of `legal` ignores forbidden calls.
     pub forbidden: bool,
     pub step: Step,
 }
@@ -292,7 +292,8 @@ impl Values {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     pub id: u32,
-    /// Status that the function returned; for an instantiation, 1 for an instance and 0 for NULL.
+    /// Status that the function returned. It is 1 for an instantiation that returned an instance, 0 for one that returned NULL,
+    /// and 0 for FreeInstance.
     pub status: Option<i32>,
     /// Whether the library lacks the function.
     pub missing: bool,
@@ -320,7 +321,7 @@ pub struct Measured {
     pub exact: bool,
     pub threads: usize,
     pub files: usize,
-    /// Working directory, floating-point control word, locale and signal handlers.
+    /// Settings of the process, such as the working directory and signal handlers, each with its value.
     pub settings: Vec<String>,
     /// Number of repetitions; 0 for a measurement.
     pub times: usize,
@@ -336,7 +337,7 @@ pub enum End {
     Crash(String),
     /// The process did not end within this limit in seconds.
     Hang(f64),
-    /// The process exited before the last step, with this status.
+    /// The process exited before the last step returned, with this status.
     Exit(i32),
     /// The library cannot be loaded, for this reason.
     Unloadable(String),
@@ -350,7 +351,7 @@ pub struct Run {
     /// Results by the number of the step.
     pub outcomes: HashMap<u32, Outcome>,
     pub end: End,
-    /// Number of the step in which the process ended, if that is not the last step.
+    /// Number of the first step without a result, in which the process ended; `None` if all steps have results.
     pub at: Option<u32>,
     /// Output on the standard output and the standard error.
     pub output: String,
@@ -367,7 +368,7 @@ impl Run {
         self.outcome(id)?.status
     }
 
-    /// Returns whether a step returned OK or Warning.
+    /// Returns whether a call returned OK or Warning.
     pub fn succeeds(&self, id: u32) -> bool {
         self.status(id).is_some_and(|status| status <= 1)
     }
@@ -392,6 +393,6 @@ pub struct Setting {
     pub soft: bool,
     /// Whether the loader resolves all symbols when it loads the library, as in some importers.
     pub now: bool,
-    /// Maximum duration of the repetitions of a step in seconds.
+    /// Maximum duration of a `Repeat` step in seconds.
     pub repetitions: f64,
 }

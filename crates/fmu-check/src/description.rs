@@ -36,7 +36,8 @@ impl Description {
     /// Parses a `modelDescription.xml`.
     ///
     /// # Errors
-    /// Fails if the string is not XML or has another FMI version.
+    /// Fails if `ModelDescription::parse` rejects the string, for example because it is not XML, or if it has another FMI version
+    /// or a draft of FMI 3.0.
     pub fn parse(text: &str) -> Result<Self, String> {
         let written = ModelDescription::parse(text)?;
         if written.standard == Standard::Fmi3 && written.version.contains('-') {
@@ -68,7 +69,7 @@ impl Description {
         Ok(description)
     }
 
-    /// Returns the rules that the description breaks.
+    /// Returns the broken rules that `ModelDescription::parse` does not report.
     fn evaluate(&self) -> Vec<Observation> {
         let mut wrong = Vec::new();
         if self.token.is_empty() {
@@ -133,14 +134,14 @@ impl Description {
         wrong
     }
 
-    /// Returns whether Co-Simulation is used with Event Mode, because the FMU has clocks and offers this mode (section 2.3.1 of
-    /// FMI 3.0, `eventModeUsed`).
+    /// Returns whether most checks use Co-Simulation with Event Mode (section 2.3.1 of FMI 3.0, `eventModeUsed`): only if the FMU
+    /// has clocks and offers this mode.
     pub fn event_mode(&self) -> bool {
         let has_clocks = self.variables.iter().any(|variable| variable.base.is_none() || variable.clocked);
         has_clocks && self.co_simulation.as_ref().is_some_and(|offer| offer.can(&["hasEventMode"]))
     }
 
-    /// Returns the variables with the type and value reference of this variable, including itself.
+    /// Returns the variables with the C type and value reference of this variable, including the variable itself.
     pub fn aliases(&self, index: usize) -> impl Iterator<Item = usize> + '_ {
         let variable = &self.variables[index];
         let (reference, kind) = (variable.reference, variable.base.map(|base| kind_of(self.standard, base)));

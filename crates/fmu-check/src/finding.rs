@@ -8,12 +8,12 @@ use std::sync::Arc;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// Information.
+    /// Information; importers work nevertheless.
     #[default]
     Note,
-    /// The standard allows it, but importers fail.
+    /// The standard does not forbid the observed behaviour, but importers fail.
     Fragile,
-    /// The standard requires it.
+    /// The standard forbids the observed behaviour.
     Violation,
 }
 
@@ -66,7 +66,8 @@ pub enum Proof {
 /// Violation of a rule by an FMU.
 #[derive(Clone, Default, Serialize)]
 pub struct Finding {
-    /// Name of the rule: the topic, a dot, the fault.
+    /// Name of the rule, which begins with its topic and a dot. If a process ended, it is the topic or a rule, followed by the
+    /// end, as in `states.crash` or `states.fresh-process.crash`.
     pub name: String,
     /// Severity of the finding.
     pub severity: Severity,
@@ -81,9 +82,9 @@ pub struct Finding {
     /// Call sequence that reproduces the finding; empty for a finding in the files of the FMU.
     #[serde(skip)]
     pub sequence: CallSequence,
-    /// Program in C that reproduces the finding.
+    /// Program in C that should reproduce the finding; empty if there is none.
     pub c: String,
-    /// Whether the program shows the finding.
+    /// Whether the program shows the finding; if not, the reason.
     pub proof: Proof,
     /// Criterion that a run violates if it reproduces the finding.
     #[serde(skip)]
@@ -118,7 +119,7 @@ impl Finding {
     }
 }
 
-/// Returns a description of the end of a process before its last step; `None` if the last step returned.
+/// Returns a description of the end of a process before its last step returned; `None` if the last step returned.
 pub fn ending(run: &Run, sequence: &CallSequence) -> Option<String> {
     let name = run
         .at
@@ -165,7 +166,7 @@ pub struct Event {
     pub terminate: bool,
     /// Whether the continuous states have changed.
     pub states_changed: bool,
-    /// Time of the next time event.
+    /// Time of the next time event, if it is defined.
     pub next: Option<f64>,
 }
 

@@ -1,4 +1,5 @@
-//! Checks that the standard allows a call sequence, so that no finding is caused by a forbidden call.
+//! Checks that the standard allows all calls of a sequence, except for the calls that are marked as forbidden. So a forbidden
+//! call that a check makes by mistake never causes a finding.
 
 use crate::call_sequence::{Arg, Make, NULL_INSTANCE, Numbered, Step};
 use crate::description::Description;
@@ -32,7 +33,7 @@ pub fn first_illegal(description: &Description, sequence: &[Numbered]) -> Option
 pub struct Modes(Objects);
 
 impl Modes {
-    /// Updates the states for the next step.
+    /// Updates the states for the next step, unless that step repeats other steps or starts threads.
     pub fn add(&mut self, description: &Description, next: &Numbered) {
         if !matches!(next.step, Step::Repeat(..) | Step::Parallel(_)) {
             walk(description, std::slice::from_ref(next), &mut self.0);
@@ -56,7 +57,7 @@ struct Objects {
     bytes: HashMap<usize, State>,
 }
 
-/// Returns the number of the first illegal step, and updates the objects up to that step.
+/// Returns the number of the first illegal step, and updates the objects up to and including that step.
 fn walk(description: &Description, sequence: &[Numbered], objects: &mut Objects) -> Option<u32> {
     for Numbered { step, id, .. } in sequence.iter().filter(|numbered| !numbered.forbidden) {
         let is_legal = match step {
@@ -130,7 +131,8 @@ impl Objects {
 }
 
 impl State {
-    /// Updates the state for a call; returns whether the arguments are allowed.
+    /// Updates the state for a call; returns whether its arguments are allowed and the calls that it requires have been made
+    /// before.
     fn call(&mut self, standard: Standard, function: &str, args: &[Arg]) -> bool {
         let real = |index: usize| match args.get(index) {
             Some(Arg::Real(bits)) => f64::from_bits(*bits),
@@ -188,7 +190,8 @@ impl State {
     }
 }
 
-/// Updates the saved and serialized states for a call; returns whether the states that it uses exist.
+/// Updates the saved and serialized states for a call; returns whether the states that it uses exist, and whether a state that it
+/// restores was saved by the same instance.
 fn saved_states(
     slots: &mut HashMap<usize, SavedState>,
     bytes: &mut HashMap<usize, State>,

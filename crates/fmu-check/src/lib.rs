@@ -58,8 +58,9 @@ const UNFINISHED: &str = "it is not finished";
 /// Topics that are not part of a quick check.
 const LONG: [&str; 2] = ["malformed", "resources"];
 
-/// Checks an FMU, prints the findings and writes the reports. Returns the exit status: 1 if a finding fails the check, otherwise
-/// 2 if the FMU, one of its interfaces or a topic was not checked, otherwise 0. After an interrupt it is 130.
+/// Checks an FMU, prints the findings and writes the reports; with `--explain`, only prints a rule. Returns the exit status: 1 if
+/// a finding fails the check; otherwise 2 if the FMU, or an interface or topic that must be checked, was not checked, or if a
+/// file cannot be read or written; otherwise 0. After an interrupt it is 130.
 ///
 /// The program must call [`run_worker_if_requested`] first in `main`, because the check starts the same program again to execute
 /// call sequences.
@@ -112,13 +113,14 @@ const ALWAYS: [&str; 6] = [
     "life_cycle.simulation", "life_cycle.crash", "life_cycle.hang",
 ];
 
-/// Returns the reason why a part was not checked. After an interrupt it is never the error itself, which only says that a process
-/// or a file is missing.
+/// Returns the reason why a part was not checked. After an interrupt this is the interrupt, because the error may only say that a
+/// process or a file is missing.
 fn stop(error: &anyhow::Error) -> String {
     if worker::interrupted() { Stop::Interrupted.to_string() } else { error.to_string() }
 }
 
-/// Finds a successful simulation for each interface type that has a library; records the interface types without one.
+/// Finds a successful simulation for each interface type that has a library, and records the interface types for which none
+/// succeeds as not checked.
 fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
     for (index, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
         if checker.setting.libraries[index].is_none() {
@@ -141,7 +143,8 @@ fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
 /// Checks an FMU. If `progress` is set, a line on the standard error shows the progress.
 ///
 /// # Errors
-/// Fails if the file is not an FMU of FMI 2.0 or 3.0, if the baseline cannot be read, or if a report cannot be written.
+/// Fails if the file is not an FMU of FMI 2.0 or 3.0, if the baseline cannot be read, or if a report or a temporary file cannot
+/// be written.
 pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<Report> {
     let begin = Instant::now();
     let baseline = options.baseline.as_deref().map(baseline::Baseline::read).transpose()?.unwrap_or_default();
@@ -149,7 +152,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     let (scratch, mut checker) = opened(path, options, begin)?;
     simulate(&mut checker)?;
     let session = Session { path, options, baseline, begin };
-    // The report is written after every check, so that the findings so far are not lost if this process is killed.
+    // The report is written after every check, so that earlier findings are not lost if this process is killed.
     let write_report = || match &options.out {
         Some(directory) => session.report(&checker, session.wanted_findings(&checker)).write(directory),
         None => Ok(()),
@@ -163,13 +166,13 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
 }
 
 /// Compares Co-Simulation with Model Exchange of an FMU that offers both, by simulations of at most 40 steps. Returns a
-/// description of the first difference that is too large to be an error of a solver; `None` if there is no such difference or the
-/// comparison is not possible.
+/// description of the first difference that is too large to be an error of a solver; `None` if there is no such difference, or if
+/// the simulations cannot be compared.
 ///
 /// The program must call [`run_worker_if_requested`] first in `main`.
 ///
 /// # Errors
-/// Fails if the file is not an FMU of FMI 2.0 or 3.0.
+/// Fails if the file is not an FMU of FMI 2.0 or 3.0, or if a temporary file cannot be written.
 pub fn compare_interfaces(path: &Path) -> anyhow::Result<Option<String>> {
     let options = Options { time: 20.0, ..Options::default() };
     let (_scratch, mut checker) = opened(path, &options, Instant::now())?;
@@ -185,7 +188,8 @@ pub fn compare_interfaces(path: &Path) -> anyhow::Result<Option<String>> {
     Ok(found.map(|finding| finding.observed))
 }
 
-/// Unpacks an FMU. Returns its temporary directory, and a checker that already has the findings in the files of the FMU.
+/// Unpacks an FMU. Returns the temporary directory with its files, and a checker that has recorded the findings in these files
+/// and the interface types that cannot be checked.
 fn opened(
     path: &Path,
     options: &Options,
@@ -234,7 +238,7 @@ fn is_wanted(options: &Options, topic: &str) -> bool {
     }
 }
 
-/// Arguments of a check that decide what is reported.
+/// Arguments of a check that its report needs.
 struct Session<'a> {
     path: &'a Path,
     options: &'a Options,
@@ -276,8 +280,8 @@ fn sort(findings: &mut [Finding]) {
     findings.sort_by(|one, other| other.severity.cmp(&one.severity).then_with(|| one.name.cmp(&other.name)));
 }
 
-/// Returns a finding if the XML declaration of a model description names another encoding than UTF-8, or if its bytes are not
-/// UTF-8.
+/// Returns an observation if the XML declaration of a model description names an encoding other than UTF-8, or if the description
+/// is not valid UTF-8.
 fn encoding(text: &[u8]) -> Option<rules::Observation> {
     let declaration = text.split(|byte| *byte == b'>').next().unwrap_or_default();
     let declaration = String::from_utf8_lossy(declaration);
@@ -295,7 +299,8 @@ fn encoding(text: &[u8]) -> Option<rules::Observation> {
     Some(("description.encoding", why))
 }
 
-/// Returns a successful simulation. If there is none, records a finding and returns the error [`NoTrajectory`].
+/// Returns a successful simulation. If there is none, records a finding and returns the error [`NoTrajectory`], unless a
+/// simulation succeeds with accessible memory after each array.
 fn simulation(checker: &mut Checker, interface: Interface) -> anyhow::Result<writer::Trajectory> {
     let trajectory = find_trajectory(checker, interface);
     let Some(NoTrajectory(_, sequence)) = trajectory.as_ref().err().and_then(|error| error.downcast_ref())
@@ -375,8 +380,8 @@ fn in_parallel<T: Sync>(items: &[T], progress: bool, each: impl Fn(&T, usize) ->
     }
 }
 
-/// Executes a check for a simulation if the check fits it. Without a simulation, only a check that is executed once per FMU is
-/// executed.
+/// Executes a check: with a simulation if the check fits the simulation, without one if the check is executed once per FMU. In
+/// other cases does nothing.
 fn execute_check(
     checker: &Checker,
     check: Check,
@@ -394,7 +399,8 @@ fn execute_check(
     }
 }
 
-/// Executes all checks of the wanted topics on several threads, and calls `write_report` after each check.
+/// Executes all checks of the wanted topics on several threads, and calls `write_report` after each check. Returns an error if a
+/// check or `write_report` fails; a check that is stopped does not fail.
 fn execute_checks(
     checker: &Checker,
     progress: bool,

@@ -1,4 +1,4 @@
-//! `fmu-check model.fmu`: reports the rules of the standard that an FMU breaks.
+//! `fmu-check model.fmu`: reports the rules that an FMU breaks, most of which are rules of the standard.
 
 use clap::Parser as _;
 use std::process::ExitCode;

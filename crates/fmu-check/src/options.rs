@@ -3,7 +3,7 @@
 use crate::rules;
 use std::path::PathBuf;
 
-/// Options of a check, which are options of the command.
+/// Options of a check, which are also the options of the command line.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Options {
     /// Checks only these topics, with commas between: description, package, functions, start_values, life_cycle,
@@ -18,7 +18,8 @@ pub struct Options {
     /// Maximum duration of the check in seconds, including the programs that reproduce findings.
     #[arg(long, default_value_t = 120.0)]
     pub time: f64,
-    /// Maximum duration of a call sequence in seconds; a longer one is a hang.
+    /// Maximum duration of a call sequence in seconds; a longer one is a hang if it also exceeds three times this limit when it
+    /// is repeated.
     #[arg(long, default_value_t = 10.0)]
     pub limit: f64,
     /// Megabytes of memory that the FMU may use.

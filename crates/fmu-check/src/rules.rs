@@ -1,10 +1,11 @@
-//! Rules, which are read from RULES.md, so that the program and its users read the same text. A section has the name of the
-//! findings, the requirement, and the severity and the section of the standard for FMI 2.0 and FMI 3.0.
+//! Rules, which are read from RULES.md, so that the program and its users read the same text. Each section of the page is a rule:
+//! its heading is the name, and its text has the requirement and, for FMI 2.0 and FMI 3.0, the severity and the section of the
+//! standard.
 
 use crate::finding::{Finding, Severity};
 use fmi_abi::Standard;
 
-/// Topics of the rules.
+/// Topics of the checks. The rules of the topics `arrays` and `*` belong to every check.
 pub const TOPICS: [&str; 15] = [
     "description",
     "package",
@@ -89,7 +90,7 @@ pub fn explain(name: &str) -> Option<String> {
 /// Returns the finding that an FMU breaks a rule.
 ///
 /// # Panics
-/// Panics if there is no such rule. A test checks all names in the sources.
+/// Panics if there is no such rule. A test checks the names in the sources.
 pub fn broken(standard: Standard, name: &str, observed: String) -> Finding {
     let rule = find(name).unwrap_or_else(|| panic!("no rule is called {name}"));
     let (severity, section) = rule.severity(standard).unwrap_or_default();
@@ -151,7 +152,7 @@ mod tests {
         assert!(explain("states.nothing").is_none());
     }
 
-    /// Checks that the sources name only rules that exist.
+    /// Checks that the sources of the checks, and the other sources that name rules, name only rules that exist.
     #[test]
     fn every_name_in_the_sources_is_a_rule() {
         let directory = concat!(env!("CARGO_MANIFEST_DIR"), "/src/checks");
@@ -160,7 +161,8 @@ mod tests {
         let others = others.map(|name| format!("{directory}/../{name}").into());
         for path in paths.chain(others) {
             let source: String = std::fs::read_to_string(&path).expect("a source");
-            // Names of rules; the end of a process, such as ".hang", is appended to them.
+            // String literals that are names of rules. The end of a process, such as ".hang", is a separate literal without a
+            // topic.
             let names = source.split('"').filter(|name| {
                 let topic = name.split_once('.').filter(|(_, rule)| !rule.is_empty());
                 topic.is_some_and(|(topic, _)| topic == "arrays" || super::TOPICS.contains(&topic))

@@ -53,15 +53,16 @@ fn worker(job: &Path, scratch: &Path, (phase, now): WorkerKind) -> anyhow::Resul
         .env(SCRATCH, scratch)
         // Uninitialized memory differs between the processes of a call sequence, so that results that depend on it differ, too.
         .env("MALLOC_PERTURB_", (1 + phase * 90).to_string())
-        // Switches off the cache of freed blocks for each thread, because mallinfo2 of glibc counts these blocks as allocated.
+        // Switches off the cache of freed blocks that each thread has, because mallinfo2 of glibc counts these blocks as
+        // allocated.
         .env("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0")
         .envs(now.then_some(("LD_BIND_NOW", "1")));
     Ok(command)
 }
 
 impl Workers {
-    /// Starts the first server, which removes the temporary directory if this process is killed. Other servers are started when
-    /// they are needed.
+    /// On Linux, starts the first server, which removes the temporary directory if this process is killed. Other servers are
+    /// started when they are needed.
     ///
     /// # Errors
     /// Fails if the server cannot be started.
@@ -91,8 +92,9 @@ impl Workers {
         Ok(run)
     }
 
-    /// Runs a program with the directory of the FMU as its argument, and confines it like a call sequence. Returns its exit
-    /// status, or 1 if a signal ended it or it started too many processes. Returns `None` if it did not end within the limit.
+    /// Runs a program with the directory of the FMU as its argument. Returns its exit status, or `None` if it did not end within
+    /// the limit. On Linux, the program is confined like a call sequence, and the result is 1 if a signal ended the program or it
+    /// started too many processes.
     pub fn program(
         &self,
         program: &Path,
@@ -104,7 +106,7 @@ impl Workers {
         {
             let program = Program { program: program.to_owned(), fmu: fmu.to_owned(), memory };
             let ended = self.process(&program, (0, false), limit)?;
-            // If a signal or too many processes ended the program, the FMU is at fault, too.
+            // If a signal or too many processes ended the program, the FMU is the cause, so the program has shown the finding.
             let is_fault = ended.flood.is_some() || ended.signal.is_some();
             Ok(if is_fault { Some(1) } else { ended.code })
         }
@@ -134,7 +136,7 @@ impl Workers {
                 idle().entry(kind).or_default().push(server);
                 Ok(ended)
             }
-            // The server has ended, so it does not return a result.
+            // There is no result, because the check was interrupted or the server has ended.
             Err(_) if interrupted() => Err(Stop::Interrupted.into()),
             Err(_) => Ok(Ended::from(server.0.wait()?)),
         }
@@ -217,7 +219,7 @@ impl Server {
 #[cfg(target_os = "linux")]
 impl Drop for Server {
     fn drop(&mut self) {
-        // `wait` closes the input of the server, which ends it.
+        // `wait` closes the input of the server, which makes the server end.
         let _ = self.0.wait();
     }
 }

@@ -31,8 +31,8 @@ fn units(sequence: &[Numbered]) -> Vec<Vec<u32>> {
     units
 }
 
-/// Returns the function and the arguments of a call, without its instance. Returns `None` for calls that only read and for other
-/// steps.
+/// Returns the function and the arguments of a call, or the arguments of an integration, without the instance. Returns `None` for
+/// calls that only read and for other steps.
 fn content(step: &Step) -> Option<String> {
     match step {
         Step::Call { function, args, .. } => {
@@ -46,7 +46,7 @@ fn content(step: &Step) -> Option<String> {
     }
 }
 
-/// Returns the sequence without the steps with these numbers. The steps of its threads are removed, too.
+/// Returns the sequence without the steps with these numbers, some of which may be steps of its threads.
 fn without(sequence: &[Numbered], ids: &[u32]) -> CallSequence {
     let kept = sequence.iter().filter(|numbered| !ids.contains(&numbered.id)).cloned();
     kept.map(|mut numbered| {
@@ -58,8 +58,8 @@ fn without(sequence: &[Numbered], ids: &[u32]) -> CallSequence {
     .collect()
 }
 
-/// Joins the units that have the same calls in compared simulations, because the results would differ if only one of the
-/// simulations lacked a call.
+/// Joins the units that have the same calls, because these calls may belong to compared simulations, whose results would differ
+/// if only one of them lacked a call.
 fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
     let contents: HashMap<u32, String> = all_steps(sequence)
         .into_iter()
@@ -78,8 +78,8 @@ fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
 }
 
 /// Returns the shortest sequence found that still satisfies `reproduces` and, if the standard allows the original sequence, is
-/// allowed, too. Calls of `pinned` functions are not removed. If `compared` is set, corresponding calls of compared simulations
-/// are removed together.
+/// allowed, too. Calls of `pinned` functions are not removed; if `pinned` is not empty, neither are the steps `FreshProcess` and
+/// `Elsewhere`. If `compared` is set, corresponding calls of compared simulations are removed together.
 pub fn shrink(
     description: &Description,
     sequence: &CallSequence,

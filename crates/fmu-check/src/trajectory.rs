@@ -9,7 +9,8 @@ use crate::writer::{Part, Point, Trajectory, Writer};
 use fmi_abi::Interface;
 use std::time::{Duration, Instant};
 
-/// Maximum duration of a simulation with long steps, because checks repeat the simulation many times.
+/// Maximum duration of a simulation with long steps, because checks repeat the simulation many times. The search for points in
+/// Model Exchange may take 16 times as long.
 const LONG: Duration = Duration::from_millis(250);
 
 /// Reason why a simulation failed, and its call sequence.
@@ -28,7 +29,7 @@ impl std::error::Error for NoTrajectory {}
 /// method with events.
 ///
 /// # Errors
-/// Fails with [`NoTrajectory`] if no simulation succeeds, or with [`Stop`](crate::run::Stop).
+/// Fails with [`NoTrajectory`] if no simulation succeeds, or with [`Stop`](crate::run::Stop) if the check is stopped.
 pub fn find_trajectory(checker: &Checker, interface: Interface) -> anyhow::Result<Trajectory> {
     let start = checker.description.start_time;
     let trajectory = Trajectory { interface, points: Vec::new(), end: start };
@@ -114,7 +115,7 @@ fn successful_steps(checker: &Checker, run: &Run, sequence: &CallSequence) -> (u
     (succeeded, false)
 }
 
-/// Fails if the process ended before the last step or the instantiation failed.
+/// Fails if the library cannot be loaded, the process ended before the last step returned, or the instantiation failed.
 fn made(checker: &Checker, run: &Run, writer: &Writer, make: u32) -> anyhow::Result<()> {
     match checker
         .lacks(run)
@@ -216,8 +217,8 @@ fn with_events(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<
     Ok(trajectory)
 }
 
-/// Integrates by Euler's method up to the end of the default experiment. The trajectory contains the first points, then every
-/// twentieth point and all points with events.
+/// Integrates by Euler's method, at most to about the end of the default experiment. The trajectory contains the first points,
+/// then every twentieth point and all points with events, at most 21 points.
 fn integrated(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<Trajectory> {
     let description = &checker.description;
     let (count, range) = (description.states_count().unwrap_or(0), range(description));

@@ -4,8 +4,9 @@ use crate::call_sequence::Values;
 use crate::description::{Description, Variable, kind_of};
 use fmi_abi::BaseType;
 
-/// Returns values of a variable that differ from its start values: near numbers, the next or previous integer, the other Boolean,
-/// a non-ASCII string, or bytes with NULs. Returns `None` if no such value is within the range.
+/// Returns values of a variable other than its start values: near numbers, the next or previous integer, the other Boolean, a
+/// non-ASCII string, or bytes with NULs. A floating-point number that starts at its maximum keeps its value. Returns `None` for
+/// clocks, for enumerations without a maximum, and if no other integer is within the range.
 pub fn other_values(description: &Description, index: usize) -> Option<Values> {
     let variable = &description.variables[index];
     let (starts, size) = (variable.starts(), variable.starts_count());
@@ -33,8 +34,9 @@ pub fn other_values(description: &Description, index: usize) -> Option<Values> {
     })
 }
 
-/// Returns values for at most 1000 inputs, near their start values and within their ranges. They change with `phase`. If
-/// `discrete` is set, Boolean inputs change, too.
+/// Returns values for at most 1000 inputs: floating-point inputs that are not discrete get values near their start values and
+/// within their ranges, which change with `phase`. If `discrete` is set, Boolean inputs change, too. Clocked inputs and inputs of
+/// other types are left out.
 pub fn input_values(description: &Description, phase: usize, discrete: bool) -> Vec<(usize, Values)> {
     let mut values = Vec::new();
     for (index, variable) in description.variables.iter().enumerate() {
@@ -63,8 +65,7 @@ pub fn input_values(description: &Description, phase: usize, discrete: bool) -> 
     values
 }
 
-/// Returns values for at most 1000 continuous inputs that differ from their start values by this fraction of their range or
-/// nominal value.
+/// Returns values for at most 1000 continuous inputs: their start values, changed with `near` by the fraction `by`.
 pub fn inputs_by(description: &Description, by: f64) -> Vec<(usize, Values)> {
     let is_continuous = |(_, variable): &(usize, &Variable)| {
         variable.causality == "input"
@@ -82,7 +83,8 @@ pub fn inputs_by(description: &Description, by: f64) -> Vec<(usize, Values)> {
     inputs.map(value).collect()
 }
 
-/// Returns a number within the range that differs from the start value by at most `by` times the range or the nominal value.
+/// Returns the number within the range of a variable that is nearest to `start + by * scale`. The scale is the nominal value or
+/// the magnitude of the start value (at most 1e6), whichever is larger, but at most the width of the range.
 pub fn near(variable: &Variable, start: f64, by: f64) -> f64 {
     let range = variable.min.zip(variable.max).map(|(min, max)| max - min).filter(|range| range.is_finite());
     let scale = range.unwrap_or(f64::INFINITY).min(variable.nominal.max(start.abs().min(1e6)));

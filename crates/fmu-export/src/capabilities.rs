@@ -19,9 +19,9 @@ pub trait CoSimulation: Model {
     const ENDS_EARLY: bool = false;
 
     /// Whether a [`step`](Self::step) that fails leaves the model unchanged, because it first checks everything that
-    /// can fail. If it does not, this crate copies the model before each step, in order to undo a failed one. For a
-    /// small model the copy takes only a few nanoseconds, so the declaration is worthwhile only for a model that must
-    /// be very fast.
+    /// can fail. If this is false, this crate copies the model before each call of `step`, in order to undo a failed
+    /// one. For a small model the copy takes only a few nanoseconds, so the declaration is worthwhile only for a model
+    /// that must be very fast.
     ///
     /// A model without heap memory is copied by `clone_from`. Of any other model, only the content of a serialized
     /// state is copied: the fields after `in`, and the `memory`, of the [table](crate::variables). This needs no
@@ -113,8 +113,8 @@ pub enum Stepped {
     /// An importer of FMI 3.0 can handle the event itself (`eventHandlingNeeded`). Otherwise, and in FMI 2.0,
     /// this crate calls [`ModelExchange::event`] and performs the rest of the step as another step.
     Event(f64),
-    /// The step ended at an earlier time, s, or at the next communication point, and the model requests the end of
-    /// the simulation. Requires [`ENDS_EARLY`](CoSimulation::ENDS_EARLY).
+    /// The step ended at an earlier time, s, or at the next communication point, and the model requests the end of the
+    /// simulation. Requires [`ENDS_EARLY`](CoSimulation::ENDS_EARLY) or [`EVENTS`](CoSimulation::EVENTS).
     Terminate(f64),
 }
 
@@ -134,8 +134,8 @@ pub trait ModelExchange: Model {
     /// function is called again as long as its result contains `again`.
     ///
     /// # Errors
-    /// Fails if the model cannot continue. This crate then undoes the event, so it may fail after it has changed the
-    /// model.
+    /// Fails if the model cannot continue. This crate then undoes the event, so the function may fail after it has
+    /// changed the model.
     fn event(&mut self, _time: f64) -> Result<Event, Error> {
         Ok(Event::default())
     }
@@ -259,8 +259,8 @@ pub trait OutputDerivatives: CoSimulation {
     /// Highest order (`maxOutputDerivativeOrder`). A call with a higher order returns an error to the importer.
     const HIGHEST: u32 = 1;
 
-    /// Returns the current time derivative of a Real variable that is not a parameter. The order is between 1
-    /// and [`HIGHEST`](Self::HIGHEST).
+    /// Returns the current time derivative of a Real variable that is neither a parameter nor the time. The order is
+    /// between 1 and [`HIGHEST`](Self::HIGHEST).
     fn output_derivative(&self, of: Self::Name, order: u32) -> f64;
 
     /// Returns the time derivative of an element. Elements count from 0, row by row; a scalar is its element 0. By

@@ -24,8 +24,8 @@ const VERSION: u32 = 1;
 #[doc(hidden)]
 pub type Receive = unsafe extern "C" fn(context: *mut c_void, json: *const u8, length: usize);
 
-/// Passes the description of a model to `receive`, or an empty string if the model panics. The model may read the
-/// files in the directory `resources`.
+/// Passes the description of a model to `receive`, or an empty string after a panic that the description cannot
+/// contain. The model may read the files in the directory `resources`.
 ///
 /// # Safety
 /// `receive` may be called with this context, and `resources` is NULL or a NUL-terminated string.

@@ -1,5 +1,5 @@
-//! Files for a model in WebAssembly, which has no file system. The page around the module stores them. There are none
-//! in an FMU with C sources.
+//! Files for a model in WebAssembly, which has no file system. The page around the module stores them. An FMU with C
+//! sources has no such files.
 
 #![cfg(target_family = "wasm")]
 
@@ -16,8 +16,8 @@ pub(crate) fn store(path: PathBuf, content: Vec<u8>) {
     FILES.with_borrow_mut(|files| files.push((path, content)));
 }
 
-/// Returns the content of a file. Fails with `Unsupported` if no file was stored, and with `NotFound` if this one was
-/// not.
+/// Returns the content of a file. Fails with `Unsupported` if no file was stored at all, and with `NotFound` if only
+/// this file was not stored.
 pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
     FILES.with_borrow(|files| match files.iter().find(|(name, _)| name == path) {
         Some((_, content)) => Ok(content.clone()),

@@ -26,9 +26,11 @@ pub struct Info {
     /// Whether outputs and derivatives are smooth functions of inputs, states and parameters: no branches, saturation,
     /// dead zones or events. Integer, Boolean and Enumeration parameters may still select between equations.
     ///
-    /// If true, an unknown that does not change when a known is perturbed near the start values is taken not to depend
-    /// on it, so fmu-package finds the exact dependencies numerically. If false, an unknown depends on the variables in
-    /// its [`depends_on`](crate::Variable::depends_on), or on every known if it has no `depends_on`.
+    /// An unknown with [`depends_on`](crate::Variable::depends_on) depends on the variables in this list. An unknown
+    /// without `depends_on` is taken to depend on all knowns if `smooth` is false. If `smooth` is true, fmu-package
+    /// finds its dependencies numerically: an unknown that does not change when a known is perturbed near the start
+    /// values is taken not to depend on it. Strings and binary values are not perturbed, so the unknown is taken to
+    /// depend on all of them.
     pub smooth: bool,
 }
 
@@ -81,9 +83,9 @@ impl Info {
     }
 }
 
-/// Creates the [`Info`] of a model with this name and identifier. Author, version and licence come from
-/// `Cargo.toml`. The guid comes from the environment variable `FMU_GUID`, in which fmu-package passes a hash
-/// of the model's sources to the compiler.
+/// Creates the [`Info`] of a model with this name and identifier. Author, version and licence come from `Cargo.toml`.
+/// The guid comes from the environment variable `FMU_GUID`, in which fmu-package passes a hash of the model's sources
+/// and of its build options to the compiler.
 ///
 /// If that variable is not set, the guid consists of zeros, and fmu-package rejects the library.
 ///

@@ -68,10 +68,11 @@ pub enum Crossing {
 /// Returns the part of a step up to an event: the time at which an indicator changes its sign in the direction
 /// `crossing`. Returns `None` if the indicator has not changed its sign in this direction at the end of the step.
 ///
-/// `indicator` integrates the model over a part of the step, which begins with the step and may have size 0, and
-/// returns the value of the indicator at its end. The returned part ends at most `tolerance` s after the change of
-/// sign, and never before it. An indicator that begins at zero is not searched. Two changes of sign within a step
-/// cancel each other, so they are not found; [`Step::parts`] splits a step into shorter ones.
+/// `indicator` integrates the model over a part of the step, which begins where the step begins and may have size 0,
+/// and returns the value of the indicator at its end. The returned part ends at most `tolerance` s (or the rounding
+/// error of the time, if that is larger) after the change of sign, and never before it. If the indicator begins at
+/// zero, no event is found. Two changes of sign within a step cancel each other, so they are not found; [`Step::parts`]
+/// splits a step into shorter ones.
 ///
 /// ```
 /// # use fmu_export::{Crossing, Step, find_event};

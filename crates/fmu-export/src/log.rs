@@ -26,8 +26,8 @@ impl Message {
         Category::of(self.status).name()
     }
 
-    /// Returns the message on one line. Characters that `printf`, FMI (section 2.1.5 of FMI 2.0) or C strings would
-    /// interpret are replaced by `_`.
+    /// Returns the message on one line. Control characters, and characters that `printf` or FMI (section 2.1.5 of FMI
+    /// 2.0) would interpret, are replaced by `_`.
     pub fn printable(&self) -> CString {
         let special = |c: char| matches!(c, '%' | '#') || c.is_control();
         let safe: String = self.message.chars().map(|c| if special(c) { '_' } else { c }).collect();
@@ -36,8 +36,8 @@ impl Message {
 }
 
 /// Messages of a model to the user. The log is a field of the model, and [`Model::log`](crate::Model::log) returns a
-/// reference to it. This crate delivers the messages at the end of each call of the importer. It replaces `%`, `#`
-/// and control characters by `_`, because importers would interpret them.
+/// reference to it. At the end of each call of the importer, this crate delivers the messages whose category is
+/// enabled. It replaces `%`, `#` and control characters by `_`, because importers would interpret them.
 ///
 /// ```
 /// # let mut log = fmu_export::Log::default();
@@ -84,7 +84,7 @@ pub(crate) struct Logger {
 }
 
 impl Logger {
-    /// Enables all categories if `logging_on` is true (section 2.1.3 of FMI 2.0, 2.3.1 of FMI 3.0). Otherwise enables
+    /// Enables all categories if `logging_on` is true (section 2.1.5 of FMI 2.0, 2.3.1 of FMI 3.0). Otherwise enables
     /// errors and, in FMI 2.0, warnings. In FMI 3.0 it enables discards instead of warnings, because most importers
     /// treat a discard like an error.
     pub fn new(standard: Standard, logging_on: bool) -> Self {
@@ -104,7 +104,8 @@ impl Logger {
         self.enabled = if on { bit(Category::All) } else { self.always };
     }
 
-    /// Enables or disables these categories. The importer requests this by a call with a list of categories.
+    /// Enables or disables these categories; categories that cannot be disabled stay enabled. The importer requests
+    /// this by a call with a list of categories.
     pub fn set(&mut self, categories: u8, on: bool) {
         if on {
             self.enabled |= categories;

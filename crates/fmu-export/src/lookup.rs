@@ -8,7 +8,7 @@ use std::path::Path;
 /// `x`: the first or the last of `ys` if `x` is outside of `xs`, NaN if there are no points.
 ///
 /// # Panics
-/// Panics if `ys` is shorter than `xs`.
+/// May panic if `ys` is shorter than `xs`.
 pub fn interpolate(xs: &[f64], ys: &[f64], x: f64) -> f64 {
     match xs.partition_point(|known| *known <= x) {
         _ if xs.is_empty() => f64::NAN,
@@ -35,7 +35,7 @@ impl LookupTable {
     ///
     /// # Errors
     /// Fails if the file cannot be read or does not contain such a table. The message contains the path and, for a
-    /// fault in the table, the line and the column.
+    /// wrong number, the line and the column.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let error = |reason: &dyn std::fmt::Display| Error::new(format!("{}{reason}", path.display()));
         let bytes = read_resource(path).map_err(|reason| error(&format_args!(": {reason}")))?;

@@ -29,11 +29,11 @@ use std::path::{Path, PathBuf};
 /// | set inputs, states, start values of outputs | sets the field and runs the `then` of the table; before the first step, also calls [`calculate_start`](Self::calculate_start) |
 /// | set parameters | as above, then [`update`](Self::update) once; an error undoes the change |
 /// | enter initialization | [`initialize`](Self::initialize), undone after an error. If any start value was rejected and not set again, this is an error and nothing is called |
-/// | get | [`calculate`](Self::calculate), if a value was set or a step was made since its last call; then the `by` of the table |
+/// | get | [`calculate`](Self::calculate), if a value, the state or the time has changed since its last call; then the `by` of the table |
 /// | step | [`CoSimulation::step_fast`](crate::CoSimulation::step_fast), then [`step_any_size`](crate::CoSimulation::step_any_size) and [`step`](crate::CoSimulation::step), until one of them makes the step; an error undoes it |
 /// | event | [`ModelExchange::event`](crate::ModelExchange::event); an error undoes it |
 /// | enter Continuous-Time Mode | [`ModelExchange::continuous_time_entered`](crate::ModelExchange::continuous_time_entered) |
-/// | save, restore | `clone_from` |
+/// | save, restore | `clone` or `clone_from` |
 /// | de-serialize | sets the fields and the memory of the table in a copy of the model, then calls its [`restored`](Self::restored) and [`update`](Self::update) |
 pub trait Model: Variables + Clone + Send + Sync {
     /// General data of the model.
@@ -45,9 +45,9 @@ pub trait Model: Variables + Clone + Send + Sync {
     /// Fails if the model cannot be created. The importer then gets the message instead of an instance.
     fn new(setup: &Setup) -> Result<Self, Error>;
 
-    /// Checks conditions between several values and updates fields that depend on parameters. This crate calls it
-    /// once after each call of the importer that changes parameters, and after a de-serialization. At that time, the
-    /// range of each single parameter has already been checked.
+    /// Checks conditions between several values and updates fields that depend on parameters. This crate calls it once
+    /// after each call of the importer that changes parameters, and after [`restored`](Self::restored). At that time,
+    /// the range of each single parameter has already been checked.
     ///
     /// Many importers, for example FMPy, set one parameter per call. So if a condition relates two parameters, an
     /// importer must be able to get from one valid pair of values to another by changing one parameter at a time,
@@ -62,7 +62,8 @@ pub trait Model: Variables + Clone + Send + Sync {
     }
 
     /// Checks the `memory` of the table after a de-serialization, because this crate cannot check its range, and
-    /// updates fields that depend on it. This crate calls [`update`](Self::update) afterwards.
+    /// updates fields that depend on it. This crate also calls the function when it undoes some failed steps (see
+    /// [`ATOMIC_STEP`](crate::CoSimulation::ATOMIC_STEP)), and always calls [`update`](Self::update) next.
     ///
     /// # Errors
     /// Fails if the state is impossible for the model. The bytes are then rejected.
@@ -82,14 +83,15 @@ pub trait Model: Variables + Clone + Send + Sync {
     /// Mode. The importer may set further values before it leaves this mode.
     ///
     /// # Errors
-    /// Fails if the model cannot start with these values. This crate then undoes the call, so it may fail after it
-    /// has changed the model.
+    /// Fails if the model cannot start with these values. This crate then undoes the call, so the function may fail
+    /// after it has changed the model.
     fn initialize(&mut self, _experiment: &Experiment) -> Result<(), Error> {
         Ok(())
     }
 
     /// Calculates values on which several variables depend. If values, the state or the time (s) have changed, this
-    /// crate calls it once before the next value is read.
+    /// crate calls it once before the next value is read. This crate also calls the function before each iteration of
+    /// an event.
     #[inline]
     fn calculate(&mut self, _time: f64) {}
 
@@ -149,10 +151,10 @@ impl Setup {
 }
 
 /// Reads a file in the directory of [`Setup::resources`]. Unlike `std::fs`, this function also works in a browser,
-/// where the page that runs the FMU contains the files.
+/// where the page that runs the FMU provides the files.
 ///
 /// # Errors
-/// Fails for the same reasons as [`std::fs::read`].
+/// Fails if the file cannot be read.
 pub fn read_resource(path: impl AsRef<Path>) -> std::io::Result<Vec<u8>> {
     #[cfg(target_family = "wasm")]
     let content = crate::files::read(path.as_ref());

@@ -14,7 +14,7 @@ pub trait StateVisitor {
     /// Visits a string.
     fn string(&mut self, value: &mut String);
     /// Visits the number of elements that follow, which have at least one byte each. If fewer bytes than elements
-    /// remain, the state becomes invalid and the length becomes 0.
+    /// remain when a state is read, the state becomes invalid and the length becomes 0.
     fn length(&mut self, value: &mut usize);
     /// Marks the state as invalid; it is then rejected.
     fn invalid(&mut self);
@@ -26,8 +26,9 @@ pub trait StateVisitor {
 
 /// A value that can be written to a serialized state and read back.
 ///
-/// It is implemented for numbers, Booleans and strings, and for options, boxes, tuples, arrays, vectors, queues and
-/// ordered maps of such values. [`saved!`](crate::saved) implements it for a struct.
+/// It is implemented for numbers of up to 64 bits, Booleans and strings, and for options, boxes, tuples of up to four
+/// values, arrays, vectors, queues and ordered maps of such values. [`saved!`](crate::saved) implements it for a
+/// struct.
 pub trait Saved {
     /// Passes every value to the visitor, always in the same order, for writing and for reading.
     fn visit(&mut self, visitor: &mut dyn StateVisitor);

@@ -44,7 +44,7 @@ pub struct Simulation<M> {
 }
 
 impl<M: Exported> Simulation<M> {
-    /// Creates a simulation of the model with its start values. The step size comes from
+    /// Creates a simulation of the model with its start values. The step size comes from the default experiment of
     /// [`INFO`](crate::Model::INFO).
     ///
     /// # Errors
@@ -75,11 +75,12 @@ impl<M: Exported> Simulation<M> {
         self
     }
 
-    /// Sets a variable, one element of an array, or all its elements to the same value; `name` is for example `x` or
-    /// `x[2]`. Set start values before the first step; set inputs and tunable parameters at any time.
+    /// Sets a variable, one element of an array, or all elements of an array to the same value; `name` is for example
+    /// `x` or `x[2]`. Set start values before the first call of [`initialize`](Self::initialize) or [`run`](Self::run);
+    /// set inputs and parameters at any time.
     ///
     /// # Errors
-    /// Fails if there is no such variable, or if the model rejects the value.
+    /// Fails if there is no such variable, if it cannot be set at this time, or if the value is rejected.
     pub fn set(&mut self, name: &str, value: impl Into<Value>) -> Result<&mut Self, Error> {
         let indices = indices::<M>(name)?;
         let values = vec![value.into(); indices.len()];
@@ -89,7 +90,8 @@ impl<M: Exported> Simulation<M> {
     /// Sets the elements of an array to these values, row by row.
     ///
     /// # Errors
-    /// Fails for the same reasons as [`set`](Self::set), and if the array has another number of elements.
+    /// Fails for the same reasons as [`set`](Self::set), and if the number of values differs from the number of
+    /// elements.
     pub fn set_array<V: Into<Value>>(
         &mut self,
         name: &str,
@@ -204,7 +206,8 @@ impl<M: Exported> Simulation<M> {
         Ok(values)
     }
 
-    /// Serializes the state of the model: its variables, and the fields that `memory` in its table lists.
+    /// Serializes the state of the simulation: the time, the variables whose values are fields of the model, and the
+    /// fields that `memory` in its table lists.
     ///
     /// # Errors
     /// Fails if the state cannot be saved.

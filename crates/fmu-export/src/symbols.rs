@@ -61,13 +61,13 @@ macro_rules! symbols {
                 function: fmi2String,
                 reason: fmi2String,
             ) -> fmi2Status {
-                // SAFETY: the C code around the module guarantees the contract of this function.
+                // SAFETY: the code around the module guarantees the contract of this function, as above.
                 unsafe { $crate::fmi2::broken::<__fmu_model>(c, function, reason) as _ }
             }
         }
 
-        /// The C functions of FMI 3.0. They are absent in WebAssembly, because it is only used for FMI 2.0: in FMUs
-        /// with C sources and in pages.
+        /// The C functions of FMI 3.0. They are absent in WebAssembly, which is used only for FMI 2.0: in FMUs with C
+        /// sources and in pages.
         #[doc(hidden)]
         #[cfg(not(target_family = "wasm"))]
         #[allow(unsafe_code, non_snake_case, missing_docs, clippy::missing_safety_doc)]

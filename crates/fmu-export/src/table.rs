@@ -39,7 +39,7 @@ pub unsafe trait Variables: Sized + 'static {
     /// Returns the index of a variable in the table; for an array, the index of its first element.
     fn index(name: Self::Name) -> usize {
         let line = Self::NAMES.iter().position(|known| *known == name);
-        index_of(Self::LINES, line.expect("the table has a line for each name"))
+        index_of(Self::LINES, line.expect("the table must have a line for each name"))
     }
 
     /// Returns the name of the variable at an index of the table, and the number of the element in its array; 0 for a
@@ -69,7 +69,7 @@ pub unsafe trait Variables: Sized + 'static {
     #[doc(hidden)]
     fn visit_memory(&mut self, visitor: &mut dyn StateVisitor);
 
-    /// Copies the memory of another model, and all its values that are in fields of the table.
+    /// Copies from another model its `memory`, and all values that are in fields after `in`.
     #[doc(hidden)]
     fn copy_values(&mut self, from: &Self);
 
@@ -462,9 +462,9 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 /// table contains an array, all its names must follow the structured naming convention (section 2.2.9 of FMI 2.0),
 /// for example `motor.current`, `axes[1].angle`, `'any text'`.
 ///
-/// A serialized state consists of the fields after `in` and the `memory`; see [`Saved`](crate::Saved). List in
-/// `memory` all other values that `initialize`, a step or an event changes. `build_fmu` of fmu-package rejects models
-/// in which such a value is missing.
+/// Of the model, a serialized state contains the fields after `in` and the `memory`; see [`Saved`](crate::Saved). List
+/// in `memory` all other values that `initialize`, a step or an event changes. `build_fmu` of fmu-package rejects
+/// models in which such a value is missing.
 ///
 /// The macro implements [`Variables`] for the model. It also defines an enum with the names of the lines, for
 /// [`Partials`](crate::Partials) and other capabilities. The enum is called `Name`, unless `names` gives it another
@@ -552,8 +552,8 @@ macro_rules! variables {
                         )
                     };
                     // Below, each field is bound to a variable of its own name, so that the compiler's messages refer
-                    // to the author's line. The function hides any constant of this name, which would be a pattern in
-                    // a `match` and not a variable.
+                    // to the author's line. The empty function hides any constant of this name, because in a `match` a
+                    // constant would be compared, and not bound.
                     $( #[allow(dead_code)] fn $first() {} )?
                     $(
                         let variable = variable.stored(

@@ -106,7 +106,7 @@ impl Type {
         Self { base: BaseType::Float32, ..Self::real(name, unit) }
     }
 
-    /// Creates an integer type.
+    /// Creates an integer type with the base type `i32`.
     pub const fn integer(name: &'static str) -> Self {
         Self::whole(name, BaseType::Integer)
     }
@@ -201,7 +201,7 @@ impl Type {
         let Attributes::Binary { max_size, .. } = &mut self.attributes else {
             panic!("max_size is for Binary")
         };
-        assert!(largest <= *max_size, "max_size: a mebibyte is the largest");
+        assert!(largest <= *max_size, "max_size must be at most 1 MiB");
         *max_size = largest;
         self
     }

@@ -46,7 +46,8 @@ pub struct Variable<M> {
     reinit: bool,
     /// Modes in which the importer may set this variable; derived from the other fields.
     pub(crate) settable: AllowedStates,
-    /// Modes in which setting a Real stores any finite value without further checks; none for other variables.
+    /// Modes in which setting this variable stores any finite value without further checks; none for a parameter, or
+    /// for a variable that is not a Real.
     pub(crate) takes_reals: AllowedStates,
     /// Modes in which setting a Real only writes the field and the `bool` after `then`, once the model has started.
     pub(crate) takes_fast: AllowedStates,
@@ -87,16 +88,16 @@ macro_rules! functions {
 }
 
 functions! {
-    /// Functions that read the element with a number; a scalar is its element 0. `reals` fills a slice with the
-    /// elements from this number on, and returns 0 if all values are finite. Only arrays have it, because each
-    /// function adds to the size of a library.
+    /// Functions that read the element with the given number; a scalar is its element 0. `reals` fills a slice with the
+    /// elements from this number on, and returns 0 if all values are finite, otherwise NaN. Only arrays have `reals`,
+    /// because each function adds to the size of a library.
     Read {
         real: fn(&M, usize) -> f64,
         reals: Option<fn(&M, usize, &mut [MaybeUninit<f64>]) -> f64>,
         value: fn(&M, usize) -> Value
     }
 
-    /// Functions that set the element with a number. `visit` passes the whole field to a visitor of serialized
+    /// Functions that set the element with the given number. `visit` passes the whole field to a visitor of serialized
     /// states.
     Store {
         real: fn(&mut M, usize, f64),
@@ -240,10 +241,10 @@ impl<M> Variable<M> {
     }
 
     /// Makes an output or local variable a continuous-time state. Its start value is exact, unless
-    /// [`calculated`](Self::calculated) follows.
+    /// [`calculated`](Self::calculated) or [`approx`](Self::approx) follows.
     ///
-    /// A state needs a field in the model (`in`). The field contains the value that was set last or that the last
-    /// step calculated.
+    /// A state needs a field in the model (`in`). The field contains the value that was set last or that the last step
+    /// or event calculated.
     #[must_use]
     pub const fn state(mut self) -> Self {
         self.state = true;
@@ -289,13 +290,14 @@ impl<M> Variable<M> {
         self
     }
 
-    /// Lists all inputs, states, parameters and start values on which an output or local variable depends. In the
-    /// table, write `depends_on(u, x)` or `depends_on(&[u, x])`; if it depends on none, write `depends_on(&[])`.
+    /// Lists all inputs, states, parameters and start values on which an output, a local variable or a calculated
+    /// parameter depends. In the table, write `depends_on(u, x)` or `depends_on(&[u, x])`; if it depends on none, write
+    /// `depends_on(&[])`.
     ///
     /// The list contains only direct dependencies (section 2.2.8 of FMI 2.0): the variables whose values change the
-    /// result at the same instant, or in Initialization Mode. An output that reacts to an input only through a step
-    /// or a state does not depend on that input. The time, which FMI 3.0 counts as a known, is [`Index::TIME`]. A
-    /// variable without a list is taken to depend on all knowns; see [`Info::smooth`](crate::Info::smooth).
+    /// result at the same instant, or in Initialization Mode. An output that reacts to an input only through a step or
+    /// a state does not depend on that input. The time, which FMI 3.0 counts as a known, is [`Index::TIME`]. A variable
+    /// without a list is taken to depend on all knowns, unless [`Info::smooth`](crate::Info::smooth) is true.
     #[must_use]
     pub const fn depends_on(mut self, knowns: &'static [Index]) -> Self {
         self.depends_on = Some(knowns);
@@ -346,7 +348,7 @@ impl<M> Variable<M> {
         self
     }
 
-    /// Returns the entry of the table for an element of this line, or for its only variable. If the line is a
+    /// Returns the entry of the table for an element of this line; a scalar is its element 0. If the line is a
     /// derivative, `first` is the index of the first element of its state.
     pub(crate) const fn spread(
         &self,
@@ -431,7 +433,7 @@ impl<M> Variable<M> {
             _ => {}
         }
         if self.length() == 0 {
-            return Some("an array has at least one element");
+            return Some("an array must have at least one element");
         }
         let is_set = self.state
             || matches!(self.causality, Parameter | Input)

@@ -55,7 +55,7 @@ fn drive() {
     ] {
         assert_eq!(values.remove(name), Some(expected as f64), "{name}");
     }
-    assert_eq!(OUTPUTS, [1, 2, 5, 6], "as in the C program");
+    assert_eq!(OUTPUTS, [1, 2, 5, 6], "must be the indices in the C program");
     for (prefix, expected) in [("cs", co_simulation()), ("me", model_exchange())] {
         for (i, expected) in expected.into_iter().enumerate() {
             assert_eq!(values.remove(format!("{prefix}{i}").as_str()), Some(expected), "{prefix}{i}");

@@ -1,4 +1,4 @@
-//! Random histories of all test models and of the models of `cargo fmu new`.
+//! Random histories of the test models, and of the models of `cargo fmu new`.
 #![allow(missing_docs)]
 
 mod models;

@@ -16,8 +16,8 @@ use std::ptr::null_mut;
 use std::sync::{Arc, Mutex};
 use valid_calls::ValidCall;
 
-/// Checks a log callback that calls all functions, for messages about rejected calls and events and of the model. Each of
-/// these calls must return an error, and the call that logs must then continue.
+/// Checks a log callback that calls all functions that take an instance. It receives messages about events, about a rejected
+/// call and from the model. Each call in the callback must return an error, and the call that logs must then continue.
 fn log_callback_calls_back<F: Either + 'static>(free: unsafe fn(&F)) {
     let arguments = Arguments { logging_on: 1, ..Arguments::new::<Talker>(CoSimulation) };
     let fmu = Box::new(F::make::<Talker>(&arguments).unwrap());
@@ -88,7 +88,7 @@ fn memory_that_was_never_written() {
     check::<fmi3::Importer, Palette>();
 }
 
-/// Frees instances and saved states of models with memory on the heap in any order.
+/// Frees one instance before its saved state, and another one after one of its two saved states.
 #[test]
 fn freed_in_any_order() {
     fn check<F: Either, M: Exported>() {

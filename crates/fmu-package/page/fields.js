@@ -126,7 +126,7 @@ class Fields {
     const start = startOf(one) * factor + offset;
     const isInteger = type !== "Real";
     const [least, most] = [one.min * factor + offset, one.max * factor + offset];
-    // A positive quantity has a logarithmic slider: from a tenth to ten times its start value.
+    // A Real that cannot be negative and starts above 0 has a logarithmic slider, from a tenth of its start value to ten times that value.
     const isLog = !ends && !isInteger && least >= 0 && start > 0;
     const size = roundAbove(Math.max(Math.abs(start), Math.abs(one.nominal * factor)));
     const [low, high] = ends || (isLog ? [start / 10, start * 10] : isInteger ? [start - size, start + 2 * size] : [Math.min(-size, start), Math.max(size, start)]);

@@ -366,7 +366,7 @@ class Trial {
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
   }
 
-  /** Returns the settings for a link: everything that differs from the page when it opens. */
+  /** Returns the settings for a link: the motion, the sliders of a run by hand, and everything else that differs from the page when it opens. */
   settings() {
     const { session, addOn, player } = this;
     const settings = new URLSearchParams({ motion: this.choice.value });
@@ -415,7 +415,7 @@ class Trial {
     }
   }
 
-  /** Applies the settings of a link or a step. All other settings get their values from the opening of the page. @param {URLSearchParams} settings */
+  /** Applies the settings of a link or a step. All other settings get the values that they had when the page opened. @param {URLSearchParams} settings */
   apply(settings) {
     const { session, addOn, player } = this;
     Object.assign(addOn.numbers, this.numbers);

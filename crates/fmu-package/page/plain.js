@@ -1,6 +1,6 @@
 // The add-on of models without their own, and the table of their variables.
 
-/** The add-on of a model without its own: a step and a sine of each input, and plots of all outputs. @param {Package} own @returns {AddOn} */
+/** The add-on of a model without its own: a step and a sine of at most six Real inputs, and plots of the outputs and inputs. @param {Package} own @returns {AddOn} */
 function plain({ description }) {
   const real = description.numbers("input");
   const length = description.stopTime - description.startTime;
@@ -10,7 +10,7 @@ function plain({ description }) {
     return Number.isFinite(below + above) ? Math.max(below, above) : roundAbove(Math.max(3 * Math.abs(startOf(one)), 3 * one.nominal) * one.factor) / one.factor;
   };
   const motions = real.filter((one) => one.type === "Real").slice(0, 6).flatMap((one) => {
-    // About a fifth of the slider's range, as a round number.
+    // About a fifth of the largest change that the slider allows, as a round number.
     const [start, size] = [startOf(one), roundAbove((reach(one) * one.factor) / 5) / one.factor];
     const end = start + size > one.max ? start - size : start + size;
     return [

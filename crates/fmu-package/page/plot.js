@@ -149,7 +149,7 @@ function colourAt(target, name) {
   return colour;
 }
 
-/** Panels of curves, one below the other. The last one has the labels of the time axis. */
+/** Panels of curves, one below the other. Only the last one names the time axis. */
 class Plots {
   /** @param {Panel[]} panels @param {(time: number) => void} seek called with the time where a panel is touched @param {string} axis label of the abscissa */
   constructor(panels, seek, axis = "time (s)") {
@@ -194,7 +194,7 @@ class Plots {
   }
 
   /**
-   * Draws the trajectories from `begin` to `end`, those after `now` pale.
+   * Draws the trajectories from `begin` to `end`, and the parts after `now` pale.
    * @param {Table} table @param {number} now @param {number} begin @param {number} end
    * @param {Comparison | null} [other] @param {Note[]} [notes]
    */
@@ -315,7 +315,7 @@ class Plots {
   }
 }
 
-/** Whether a curve is dashed, so that the two curves of a panel differ without colour. @param {Panel} panel @param {number} index */
+/** Whether a curve is dashed, so that neighbouring curves of a panel differ without colour. @param {Panel} panel @param {number} index */
 function isDashed(panel, index) {
   return panel.curves.slice(0, index).filter(({ isGoal }) => !isGoal).length % 2 === 1 && !panel.curves[index].isGoal;
 }

@@ -11,7 +11,7 @@
  * @typedef {{begin(start: Map<Variable, number | string>): void, step(time: number, inputs: Record<string, number>, table: Table): void}} Companion
  */
 
-/** Longest run by hand, s, and largest number of rows. */
+/** Length of a run by hand, s, unless the default experiment is longer; and the largest number of rows. */
 const [MAX_BY_HAND, MAX_ROWS] = [120, 300000];
 /** Calculation time per frame, ms. */
 const BUDGET = 10;
@@ -53,7 +53,7 @@ class Session {
     return { fmu, inputs: fmu.group(this.inputs), outputs: fmu.group(this.outputs) };
   }
 
-  /** Whether the FMU has rejected a value. A run that the FMU terminated is not rejected. */
+  /** Whether the run has failed, for example because the FMU rejected a value. A run that the FMU terminated has not failed. */
   get isRejected() {
     return this.error !== "" && this.ended === Infinity;
   }
@@ -81,7 +81,7 @@ class Session {
     return this.description.startTime + row * this.description.step;
   }
 
-  /** Calculates until a time, or until the calculation time of a frame is used up; returns the time reached. @param {number} time @param {(inputs: Record<string, number>) => void} follow */
+  /** Calculates until a time, or until the calculation time of a frame is used up; returns the time reached, or `time` after an error. @param {number} time @param {(inputs: Record<string, number>) => void} follow */
   advance(time, follow) {
     const stop = performance.now() + BUDGET;
     try {

@@ -12,7 +12,7 @@ use std::process::Command;
 /// The Rust target of a library that is translated to C or runs in a browser.
 pub const WEBASSEMBLY: &str = "wasm32-unknown-unknown";
 
-/// Linker arguments for this target. The stack of an instance has 64 KiB and comes first in memory, so an overflow traps instead of
+/// Linker arguments for [`WEBASSEMBLY`]. The stack of an instance has 64 KiB and comes first in memory, so an overflow traps instead of
 /// overwriting data.
 pub const LINKING: [&str; 2] = ["-Clink-arg=-zstack-size=65536", "-Clink-arg=--stack-first"];
 
@@ -22,7 +22,7 @@ const WASM2C: &str = "1.0.42";
 const RUNTIME: &str = include_str!("c/runtime.h");
 const FMI2: &str = include_str!("c/fmi2.c");
 
-/// Turns off warnings about unused parameters and constants, which occur in the generated code.
+/// Turns off the warnings of GCC and Clang about unused parameters and constants, which occur in the generated code.
 const UNUSED: &str = "#ifdef __GNUC__\n#pragma GCC diagnostic ignored \"-Wunused-parameter\"\n\
                       #pragma GCC diagnostic ignored \"-Wunused-const-variable\"\n#endif\n";
 
@@ -95,8 +95,8 @@ struct Names<'a> {
 }
 
 impl Names<'_> {
-    /// Returns the generated code without the unused get_func_type and without the runtime of wasm2c, which
-    /// `c/runtime.h` replaces.
+    /// Adapts the generated code to `c/runtime.h`, which replaces the runtime of wasm2c: removes that runtime and the unused
+    /// get_func_type, and fails if the code calls something that `c/runtime.h` lacks.
     fn code(&self, code: &str) -> Result<String> {
         let Names { identifier, prefix } = self;
         let declaration = format!(" w2c_{prefix}_f");
@@ -125,7 +125,8 @@ impl Names<'_> {
         ))
     }
 
-    /// Returns the generated header after adding macros, through which `c/fmi2.c` uses the generated functions and types.
+    /// Adds macros to the generated header, through which `c/fmi2.c` uses the generated functions and types. Removes the unused
+    /// get_func_type.
     fn header(&self, header: &str, code: &str) -> Result<String> {
         let Names { identifier, prefix } = self;
         for expected in ["u32 w2c_g0;", "wasm_rt_memory_t w2c_memory;", "wasm_rt_funcref_table_t w2c_T0;"] {
@@ -140,7 +141,7 @@ impl Names<'_> {
         let pages = number("wasm_rt_allocate_memory(&instance->w2c_memory, ")?;
         let functions = number("wasm_rt_allocate_funcref_table(&instance->w2c_T0, ")?;
         let mut names = String::new();
-        // Two more pages for saved states.
+        // Two more pages, for example for saved states.
         let memory = pages + 2;
         writeln!(names, "#ifndef FMU_MEMORY_PAGES\n#define FMU_MEMORY_PAGES {memory}\n#endif")?;
         let mut define = |name: &str, value: &str| writeln!(names, "#define {name} {value}");
@@ -176,7 +177,7 @@ impl Names<'_> {
     }
 }
 
-/// Removes `return` before a call in a void function, because strict C forbids it.
+/// Removes `return` before the call in the void functions `wrap_*`, because strict C forbids it there.
 fn without_void_returns(code: &str) -> String {
     let mut in_void = false;
     let lines = code.lines().map(|line| {

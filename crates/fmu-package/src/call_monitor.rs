@@ -13,11 +13,11 @@ pub(crate) struct CallMonitor {
     fault: Mutex<Option<String>>,
 }
 
-/// How often the time of the call in progress is checked.
+/// Interval at which the duration of the call in progress is checked.
 const INTERVAL: Duration = Duration::from_millis(200);
 
 impl CallMonitor {
-    /// Records that a call begins, which has this name in messages. The call ends when another one begins.
+    /// Records that a call begins, and its name for messages. The call before it then counts as ended.
     pub fn begin(&self, call: &'static str) {
         *lock(&self.call) = Some((call, Instant::now()));
     }

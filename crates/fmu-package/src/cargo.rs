@@ -40,7 +40,7 @@ impl LibraryBuild<'_> {
         let (cargo, target) = rustc_for(self.target);
         let mut command = Command::new(&cargo);
         command
-            // Cargo skips link-time optimization for a package that also has the crate type rlib.
+            // Only cdylib, because cargo skips link-time optimization for a package that also has the crate type rlib.
             .args(["rustc", "--lib", "--crate-type", "cdylib", "--locked", "--no-default-features"])
             .args(["--message-format", "json-render-diagnostics"])
             .args(["--profile", PROFILE, "--package", self.package])

@@ -235,7 +235,7 @@ fn check_unit(unit: &Unit) -> Result<()> {
     Ok(())
 }
 
-/// Checks the variables that a variable refers to: the state whose derivative it is, and the variables in its `depends_on`.
+/// Checks the variables that a variable refers to: the variable whose derivative it is, and the variables in its `depends_on`.
 fn check_references(table: &Table, variable: &Variable) -> Result<()> {
     let name = &variable.name;
     if let Some(index) = variable.differentiates {
@@ -262,7 +262,7 @@ fn check_references(table: &Table, variable: &Variable) -> Result<()> {
     Ok(())
 }
 
-/// Checks that each state has one derivative.
+/// Checks that each state has exactly one derivative.
 fn check_derivatives(table: &Table) -> Result<()> {
     for &(state, _) in &table.states {
         let count = table.find(|variable| variable.differentiates == Some(state)).len();
@@ -272,7 +272,8 @@ fn check_derivatives(table: &Table) -> Result<()> {
     Ok(())
 }
 
-/// Checks the start values of a new model, which must be the same for each interface type.
+/// Returns the start values of a new model, after checking that they fit their types and are the same for each interface type. Also checks
+/// that the model calculates all event indicators.
 fn check_starts(table: &Table) -> Result<Starts> {
     let (mut all, mut forgotten) = (Vec::new(), None);
     for (interface, start) in &table.starts {
@@ -318,7 +319,7 @@ fn check_starts(table: &Table) -> Result<Starts> {
     Ok(all.swap_remove(0).1.clone())
 }
 
-/// Checks that a value is in the range of its type.
+/// Checks that a value fits its type: the range, the items of an Enumeration, the size of bytes, and the characters of a string.
 fn check_value(label: &str, variable_type: &Type, value: &Value) -> Result<()> {
     match (&variable_type.attributes, value) {
         (Attributes::Real { min, max, .. }, Value::Real(real)) => {
@@ -345,9 +346,12 @@ fn check_value(label: &str, variable_type: &Type, value: &Value) -> Result<()> {
             ensure!(size <= *max_size, "{label} must have at most {max_size} bytes, it has {size}");
         }
         (Attributes::Other, Value::String(text)) => {
-            // XML 1.0 has no other control characters.
+            // XML 1.0 forbids most other control characters, and discourages the rest (U+007F to U+009F).
             let is_possible = |c: char| !c.is_control() || matches!(c, '\t' | '\n' | '\r');
-            ensure!(text.chars().all(is_possible), "{label} has a character that XML lacks: {text:?}");
+            ensure!(
+                text.chars().all(is_possible),
+                "{label} has a control character that must not be in XML: {text:?}"
+            );
         }
         _ => {}
     }

@@ -39,7 +39,7 @@ pub struct BuildOptions {
     /// Directory for the FMU of FMI 2.0, with a directory fmi3 for the FMU of FMI 3.0 [default: target/fmu of the workspace]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Write only modelDescription.xml of FMI 2.0, into the directory modelDescription of the sources or DIR
+    /// Write only modelDescription.xml, of FMI 2.0 or of the version --fmi, into the directory modelDescription of the sources or DIR
     #[arg(long, conflicts_with_all = ["target", "binary"])]
     pub describe: bool,
     /// Print only the guid; to compile a library elsewhere, set the environment variable FMU_GUID to it
@@ -48,7 +48,7 @@ pub struct BuildOptions {
     /// Compile for this Rust target instead of this machine; repeat it for several
     #[arg(long, value_name = "TRIPLE")]
     pub target: Vec<String>,
-    /// Compile for Linux, Windows and macOS, Intel and ARM (needs Rust's libraries for them and cargo-zigbuild)
+    /// Compile for Linux and macOS on Intel and ARM, and for Windows on Intel (needs Rust's libraries for them and cargo-zigbuild)
     #[arg(long, conflicts_with_all = ["target", "describe", "c_sources"])]
     pub all_targets: bool,
     /// Add this compiled library, for example win64=model.dll, or the one in an FMU, x86_64-windows=model.fmu; repeat it for several
@@ -105,7 +105,7 @@ pub struct Builder {
     pub terminals: Vec<Terminal>,
     /// Settings of cargo for this build, such as `profile.release.lto=false`.
     pub settings: Vec<String>,
-    /// Start values that the library reads from another file when it is compiled, see [`Variant::start`].
+    /// Start values that are read from another file when the library is compiled, see [`Variant::start`].
     pub start: Vec<(String, String)>,
     /// Label in messages for a build with other parameter values than the default ones. `None` for the default values, whose
     /// description is kept with the sources.
@@ -138,8 +138,8 @@ impl Builder {
         }
     }
 
-    /// Compiles the libraries, checks the model with the library for this machine, writes the descriptions, packs the
-    /// FMUs, and reports them on stdout.
+    /// Compiles the libraries, checks the model with the library for this machine, writes the descriptions, packs the FMUs, and reports
+    /// them on stdout. With `options.guid`, only prints the guid; with `options.describe`, only writes a description.
     ///
     /// # Errors
     /// When the model contradicts itself, a library cannot be compiled or does not belong to the sources, or a file cannot
@@ -267,7 +267,8 @@ impl Builder {
         Ok(())
     }
 
-    /// Returns the FMI version in the options. Without one, returns the default versions that have all types of the model's variables.
+    /// Returns the FMI version in the options, or FMI 2.0 for C sources. Otherwise returns the default versions, without FMI 2.0 if it
+    /// lacks the type of a variable and FMI 3.0 is also a default version.
     fn versions(&self, options: &BuildOptions, model: &LoadedModel) -> Vec<Standard> {
         if let Some(fmi) = options.fmi.or(options.c_sources.then_some(Standard::Fmi2)) {
             return vec![fmi];
@@ -336,7 +337,7 @@ impl Builder {
 
     /// Extracts the library for a platform from an FMU and returns its path.
     fn unpack_library(&self, fmu: &Path, platform: Platform) -> Result<PathBuf> {
-        let failed = || format!("cannot take the library for {platform} out of {}", fmu.display());
+        let failed = || format!("cannot extract the library for {platform} from {}", fmu.display());
         let mut archive = ZipArchive::new(fs::File::open(fmu).with_context(failed)?).with_context(failed)?;
         let is_library = |name: &String| {
             let mut parts = name.split('/');
@@ -392,8 +393,8 @@ fn pack_in(out: &Path, parts: &Parts) -> Result<()> {
     Ok(())
 }
 
-/// Waits until no other build runs in the same workspace, and returns a lock that lasts until the file is closed. Returns `None` if
-/// the lock file cannot be created; the build then continues without a lock.
+/// Waits until no other build runs in the same workspace, and returns a lock that lasts until the file is closed. Returns `None` if the
+/// lock file cannot be created or locked; the build then continues without a lock.
 fn lock(directory: &Path) -> Option<fs::File> {
     fs::create_dir_all(directory).ok()?;
     let file = fs::File::create(directory.join(".fmu-package.lock")).ok()?;

@@ -38,7 +38,7 @@ struct Member {
 }
 
 impl Terminal {
-    /// A terminal whose members are connected by name to the same members of another terminal.
+    /// A terminal whose members are connected by name to another terminal, which must have the same members.
     pub fn plug(name: &'static str) -> Self {
         Self::new(name, "plug")
     }
@@ -87,7 +87,7 @@ impl Terminal {
         self.member(member, variable, "outflow")
     }
 
-    /// Adds a variable as a member of a third-party kind.
+    /// Adds a variable as a member of any kind, for example of a kind that a third party has defined.
     #[must_use]
     pub fn member(mut self, member: &'static str, variable: &'static str, kind: &'static str) -> Self {
         self.members.push(Member { name: member, variable, kind });
@@ -168,8 +168,8 @@ fn is_name(text: &str) -> bool {
 /// Returns `terminalsAndIcons.xml` of a model with these terminals, in an FMU with these files; `None` if there are no terminals.
 ///
 /// # Errors
-/// When two terminals, or two members of one, share a name, a member is not a variable that can be connected, or an icon is
-/// missing.
+/// When two terminals, or two members of one, share a name, a member is not a variable that can be connected, an icon is missing, or a
+/// text is not a single line.
 pub fn terminals(
     model: &LoadedModel,
     terminals: &[Terminal],

@@ -22,7 +22,8 @@ pub const TARGETS: [&str; 5] = [
     "aarch64-apple-darwin",
 ];
 
-/// The glibc version that libraries for Linux require. Enterprise Linux 7 has this version, and later systems have newer ones.
+/// The glibc version that libraries for Linux require if cargo-zigbuild links them. Enterprise Linux 7 has this version, and later systems
+/// have newer ones.
 pub const GLIBC: &str = "2.17";
 
 /// Checks that the tools for these targets are installed; the error lists all missing tools and how to install them. cargo-zigbuild
@@ -58,7 +59,8 @@ pub fn rustc_for(target: Option<&str>) -> (OsString, Option<String>) {
 }
 
 /// Whether a target needs cargo-zigbuild to link for another system or processor, or with an old glibc. WebAssembly does not need it.
-/// Windows needs it only if MinGW is missing, which is preferred because its libraries need less of the system.
+/// `x86_64-pc-windows-gnu` needs it only if MinGW is missing, which is preferred because the libraries that it links need less of the
+/// system.
 fn needs_zigbuild(target: &str) -> bool {
     match target {
         "x86_64-pc-windows-gnu" => !runs(MINGW),
@@ -68,8 +70,8 @@ fn needs_zigbuild(target: &str) -> bool {
     }
 }
 
-/// Whether the compiler has the standard library of a target. Returns true if the compiler cannot be asked, because cargo then
-/// reports why.
+/// Whether the compiler has the standard library of a target. Returns true if the compiler cannot be started, because cargo then reports
+/// why.
 pub fn has_std(target: &str) -> bool {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let output = Command::new(rustc).args(["--print", "target-libdir", "--target", target]).output();

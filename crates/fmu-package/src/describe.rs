@@ -27,9 +27,9 @@ pub struct Changes {
 /// Returns `modelDescription.xml` of the model's FMU for this version of FMI.
 ///
 /// # Errors
-/// When the model contradicts itself: two variables have one name, a range is empty, a start value is outside its range or differs
-/// between Co-Simulation and Model Exchange, or a dependency is not declared. Also when FMI 2.0 does not have the type of a variable,
-/// or when a variable has the same name as one that is generated for FMI 3.0.
+/// When the model contradicts itself, for example because a range is empty, a start value is outside its range or differs between
+/// Co-Simulation and Model Exchange, or a dependency is not declared. Also when FMI 2.0 does not have the type of a variable, or when a
+/// variable has the same name as one that is generated for FMI 3.0.
 pub fn describe(model: &LoadedModel, fmi: Standard, changes: &Changes) -> Result<String> {
     let table = &model.table;
     let lacking = table.variables.iter().find(|variable| !variable.base().is_in_fmi2());
@@ -103,7 +103,7 @@ impl Description<'_> {
             Standard::Fmi3 => ("3.0", "instantiationToken"),
         };
         let indicators = self.table.model_exchange.as_ref().map(|offer| offer.indicators);
-        // There is no generationDateAndTime, because every build would give a different file.
+        // There is no generationDateAndTime, because with it every build would give a different file.
         Element::new("fmiModelDescription")
             .with("fmiVersion", version)
             .with("modelName", &info.name)
@@ -299,7 +299,7 @@ impl Description<'_> {
         let unknowns = lists.flat_map(|(name, unknowns)| {
             unknowns.iter().map(move |unknown| with_dependencies(name, "valueReference", unknown))
         });
-        // An element without a list of dependencies depends on everything.
+        // An event indicator without a list of dependencies depends on everything.
         let indicator = |number| {
             Element::new("EventIndicator").with("valueReference", position(self.table.indicator(number)))
         };

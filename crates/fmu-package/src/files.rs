@@ -13,7 +13,7 @@ use zip::{CompressionMethod, DateTime, System, ZipArchive, ZipWriter};
 /// When two consecutive entries have the same name.
 pub fn zip(entries: &[(String, Vec<u8>)]) -> Result<Vec<u8>> {
     for pair in entries.windows(2) {
-        ensure!(pair[0].0 != pair[1].0, "{} is there twice", pair[0].0);
+        ensure!(pair[0].0 != pair[1].0, "{} occurs twice in the zip file", pair[0].0);
     }
     // These settings would otherwise depend on the clock or the machine.
     let options = SimpleFileOptions::default()
@@ -48,8 +48,8 @@ pub fn unzip(zip: &[u8], name: &str) -> Result<Vec<u8>> {
 /// Beginning of the names of temporary files.
 const UNFINISHED: &str = ".unfinished-";
 
-/// Removes the temporary files that no process has locked, because their processes were killed. Failures are ignored: they only leave
-/// a file behind.
+/// Removes the temporary files that no process has locked, because their processes were killed. This is done only on Unix, where the files
+/// are locked. Failures are ignored: they only leave a file behind.
 fn remove_abandoned(directory: &Path) {
     for entry in fs::read_dir(directory).into_iter().flatten().flatten() {
         let is_temporary = entry.file_name().to_string_lossy().starts_with(UNFINISHED);
@@ -66,7 +66,7 @@ fn remove_abandoned(directory: &Path) {
 /// Writes a file under a temporary name next to `destination`, renames it when it is complete, and returns its size in bytes.
 ///
 /// # Errors
-/// When the directory or the file cannot be written; the destination then does not change.
+/// When the directory or the file cannot be written, or `write` fails; the destination then does not change.
 pub fn write_atomically(destination: &Path, write: impl FnOnce(&mut File) -> Result<()>) -> Result<u64> {
     let directory = match destination.parent() {
         Some(directory) if directory != Path::new("") => directory,

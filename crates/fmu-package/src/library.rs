@@ -78,7 +78,7 @@ pub fn check_guid(library: &[u8], guid: &str, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Returns the oldest version of glibc with which a library for Linux loads; `None` if it does not use glibc.
+/// Returns the oldest version of glibc with which a library for Linux loads; `None` if it is not for Linux or does not use glibc.
 pub fn needed_glibc(library: &[u8]) -> Option<(u32, u32)> {
     let file = File::parse(library).ok().filter(|file| file.format() == BinaryFormat::Elf)?;
     let strings = file.section_by_name(".dynstr")?.data().ok()?;

@@ -56,7 +56,7 @@ pub fn pack(destination: &Path, parts: &Parts) -> Result<u64> {
     let has_icon = content.iter().any(|file| file.name == ICON);
     for ContentFile { name, path } in content {
         let name = match (fmi, name.as_str()) {
-            // In FMI 3.0, `model.png` is stored under another name, unless the content already has that file.
+            // In FMI 3.0, `model.png` is stored as the icon. If the content already has an icon, `model.png` is left out.
             (Standard::Fmi3, "model.png") if has_icon => continue,
             (Standard::Fmi3, "model.png") => ICON,
             (_, name) => name,

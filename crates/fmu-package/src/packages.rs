@@ -111,7 +111,7 @@ mod tests {
     use super::Neighbourhood;
     use std::fs;
 
-    /// The FMU of a member of a workspace goes into the `target` of the workspace.
+    /// The workspace of a package is its own directory, unless it is a member of a workspace above.
     #[test]
     fn the_workspace_of_a_member_is_found() {
         let directory = tempfile::tempdir().unwrap();

@@ -12,8 +12,8 @@ use fmi_abi::{BaseType, Interface, Standard};
 /// point may happen to be next to a kink.
 const POINTS: usize = 16;
 
-/// Rejects a model whose partial derivatives differ from difference quotients of its values. They are compared at communication
-/// points and in Continuous-Time Mode if `running`, else in Initialization Mode.
+/// Rejects a model whose partial derivatives differ from difference quotients of its values. If `running`, they are compared in
+/// Continuous-Time Mode, or at communication points if the model offers only Co-Simulation; else in Initialization Mode.
 pub(crate) fn check(
     model: &LoadedModel,
     starts: &Starts,
@@ -102,8 +102,8 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    /// Returns for each unknown the derivative that the model provides and the difference quotient of its values; `None` if they agree
-    /// or cannot be compared.
+    /// Returns for each unknown the derivative that the model provides and the difference quotient at the first point at which they
+    /// differ. Returns `None` if they differ at fewer than two points, or if the model does not provide the derivative at every point.
     fn wrong(&self, points: &mut [Base], sizes: &[f64]) -> Vec<Option<(f64, f64)>> {
         let mut wrong: Vec<Vec<(f64, f64)>> = vec![Vec::new(); self.unknowns.len()];
         let mut is_provided = vec![true; self.unknowns.len()];
@@ -160,7 +160,8 @@ impl Check<'_> {
         wrong.into_iter().zip(is_provided).map(first).collect()
     }
 
-    /// Returns the unknowns at a point after setting the known to another value; `None` if the model rejects that value.
+    /// Returns the unknowns at a point after setting the known to another value; `None` if the model rejects that value, or if the known
+    /// cannot be varied at this point.
     fn values(&self, base: &mut Base, value: f64) -> Option<Vec<f64>> {
         let is_time = self.known == self.model.table.time();
         if is_time && base.point.interface == Interface::CoSimulation {
@@ -186,7 +187,7 @@ impl Check<'_> {
         let table = &self.model.table;
         let variable = table.variable(self.known)?;
         if self.running && instance.interface == Interface::ModelExchange {
-            // In Event Mode, any known can be set.
+            // In Event Mode, any input can be set.
             instance.enter_event_mode().ok()?;
         }
         if self.running && variable.state {

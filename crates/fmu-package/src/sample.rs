@@ -8,7 +8,7 @@ use anyhow::{Result, anyhow};
 use fmi_abi::{Causality, Interface, Standard, Value, Variability};
 use std::collections::BTreeMap;
 
-/// Values of all variables that an importer can set before the simulation, the start time, and the interface type.
+/// A point: the values of the variables that are set, the start time, and the interface type.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Point {
     /// By index; `None` for a variable that is not set.
@@ -25,7 +25,7 @@ pub(crate) struct FactorSample<'a> {
     pub instance: Instance<'a>,
 }
 
-/// A random draw: the point that it changes, whether it changes the time, and the variables that it changes.
+/// A random draw: the point that it changes (a new one without `before`), whether it draws the time, and the variables that it changes.
 struct Draw<'d> {
     before: Option<&'d Point>,
     time: bool,
@@ -44,9 +44,9 @@ pub(crate) struct Sampler<'a> {
     pub stuck: BTreeMap<u32, String>,
 }
 
-/// The number of points that are drawn with each [`Reach`].
+/// The largest number of points that are drawn with each [`Reach`].
 const ATTEMPTS: usize = 10;
-/// The number of reaches, each smaller than the one before.
+/// The number of reaches. From the third one on, each is smaller than the one before.
 const REACHES: usize = 10;
 
 /// The largest change of a variable, as a fraction of the usual change.
@@ -128,7 +128,7 @@ impl<'a> Sampler<'a> {
         self.draw_one_by_one(point, &draw)
     }
 
-    /// Changes one variable or array after the other. Each change is the largest that the model accepts.
+    /// Changes one variable or array after the other, each within the largest reach in which the model accepts a change.
     fn draw_one_by_one(&mut self, at: Point, draw: &Draw) -> Result<(Point, Instance<'a>)> {
         let table = &self.model.table;
         let values = match draw.before {
@@ -238,7 +238,7 @@ impl<'a> Sampler<'a> {
         offered[self.random.usize(..offered.len())]
     }
 
-    /// Does this number of steps in Co-Simulation and, after a single step, sets derivatives of the inputs, because factors may
+    /// Does this number of steps in Co-Simulation. If it is a single step, also sets derivatives of the inputs after it. Factors may
     /// depend on both.
     fn make_steps(&self, mut instance: Instance<'a>, point: &Point, steps: usize) -> Instance<'a> {
         if point.interface != Interface::CoSimulation {
@@ -265,8 +265,8 @@ impl<'a> Sampler<'a> {
     }
 }
 
-/// Returns an instance at a point. Sets values before Initialization Mode and in it, and states in Continuous-Time Mode, as an importer
-/// may do.
+/// Returns an instance at a point. Sets values before Initialization Mode and in it, as an importer may do. If `running`, also sets the
+/// states in Continuous-Time Mode, or does a step in Co-Simulation.
 pub(crate) fn model_at<'a>(
     model: &'a LoadedModel,
     point: &Point,
@@ -301,7 +301,7 @@ pub(crate) fn model_at<'a>(
     Ok(instance)
 }
 
-/// Returns whether a value is finite. Values that are not Real are finite.
+/// Returns whether a value is finite. Values that are not Real count as finite.
 pub(crate) fn is_finite(value: &Value) -> bool {
     !matches!(value, Value::Real(value) if !value.is_finite())
 }

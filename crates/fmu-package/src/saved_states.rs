@@ -1,8 +1,8 @@
 //! Checks that saved states are complete.
 //!
-//! A model lists the fields that saved states must contain after `memory in` of `variables!`. The compiler cannot detect that a field
-//! is missing there. So the model is simulated, some of its saved states are read into another instance, and this instance must have
-//! the same results as the first one when both continue with the same inputs.
+//! After `memory in` of `variables!`, a model lists the fields that its saved states must contain. The compiler cannot detect that a
+//! field is missing in this list. So the model is simulated, some of its saved states are read into another instance, and this instance
+//! must have the same results as the first one when both continue with the same inputs.
 
 use crate::check::Starts;
 use crate::instance::{Instance, Outcome, Saved};
@@ -16,8 +16,8 @@ use fmi_abi::{BaseType, Causality, Interface, Standard, Value, Variability};
 const SAVED_BEFORE: [usize; 5] = [0, 1, 2, 5, 12];
 /// Number of steps that are compared after each saved state.
 const FOLLOWED: usize = 8;
-/// Number of steps in a simulation. One simulation uses the default step size; the steps of another one are longer, so that it reaches
-/// the end of the default experiment.
+/// Number of steps in a simulation. One simulation uses the default step size. If it ends before the default experiment, and the model
+/// allows other step sizes, a second simulation has longer steps and reaches the end of the experiment.
 const STEPS: usize = SAVED_BEFORE[SAVED_BEFORE.len() - 1] + FOLLOWED;
 /// Tolerance relative to the largest value of a variable. A smaller difference may be a rounding error, because a model may calculate
 /// differently after its state was read.
@@ -176,7 +176,8 @@ impl<'a> Simulation<'a> {
         }
     }
 
-    /// Describes how the instance `other` differs from the instance whose state it has read; `None` if they agree.
+    /// Describes how the instance `other` differs from the instance whose state it has read; `None` if they agree, if the results of the
+    /// model are random, or if a state cannot be saved or restored.
     fn difference(
         &self,
         point: &Point,

@@ -1,4 +1,5 @@
-//! Checks that the continuous states of a model follow their derivatives, and that reading values changes nothing.
+//! Checks that the continuous states of a model follow their derivatives, and that states, parameters and exact outputs do not change when
+//! values are calculated.
 //!
 //! The author writes the steps of Co-Simulation and the derivatives of Model Exchange separately, and the compiler cannot detect that
 //! one of them has a wrong sign or factor, or uses the wrong state. So the change of each state in short steps is compared with its
@@ -19,13 +20,13 @@ const CHECKED_AFTER: [usize; 3] = [0, 1, 4];
 /// Sizes of steps, as fractions of the default step size. The smallest are for models with very fast states. The second one detects a
 /// model that ignores the size of the step and always uses the default step size.
 const SIZES: [f64; 8] = [1.0, 0.618, 0.25, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8];
-/// Largest relative difference at which the change of a state agrees with its derivative. They must agree in the shortest step or in
-/// two others.
+/// Largest relative difference at which the change of a state agrees with its derivative. They must agree in the shortest step that can be
+/// compared, or in two steps.
 const TOLERANCE: f64 = 0.01;
 /// Number of points at which a state must disagree to be rejected. It is accepted if it agrees at any point.
 const DISAGREEMENTS: usize = 3;
 
-/// Rejects a model whose states do not follow their derivatives, or change when they are read.
+/// Rejects a model whose states do not follow their derivatives, have derivatives in another unit, or change when values are calculated.
 pub(crate) fn check(model: &LoadedModel, starts: &Starts) -> Result<()> {
     let table = &model.table;
     check_units(table)?;
@@ -152,7 +153,7 @@ fn is_nan(value: &Value) -> bool {
     matches!(value, Value::Real(value) if value.is_nan())
 }
 
-/// Rejects a model whose states, inputs, parameters or exact outputs change when values are calculated again.
+/// Rejects a model whose states, parameters or exact outputs change when values are calculated again.
 fn check_reading(table: &Table, instance: &mut Instance) -> Result<()> {
     let before = instance.values();
     // The model calculates its values again after any value is set, even to the same value.

@@ -1,8 +1,8 @@
 //! The dependencies between variables, and their kinds (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
 //!
 //! The model is evaluated at points near its start values, which are the same in every build. If its equations are `smooth`, an unknown
-//! that does not react to a known at any point does not depend on it, and a factor that is the same at all points is constant. For
-//! other models this proves nothing, so an unknown depends on the variables in its `depends_on`, or on every known if it has no
+//! that does not react to a known at any point does not depend on it, unless its `depends_on` lists the known, and a factor that is the
+//! same at all points is constant. For other models this proves nothing, so an unknown depends on the variables in its `depends_on`, or on every known if it has no
 //! `depends_on`. The evaluations then only find wrong declarations.
 
 use crate::check::{Starts, check};
@@ -34,11 +34,11 @@ pub(crate) fn checked_starts(model: &LoadedModel) -> Result<&Starts> {
 /// The unknowns, each with its dependencies.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ModelStructure {
-    /// The outputs, by index.
+    /// The outputs, sorted by index.
     pub outputs: Vec<Unknown>,
     /// The derivatives of the states, in the order of the states; empty if no importer can use them.
     pub derivatives: Vec<Unknown>,
-    /// The variables that are calculated during initialization, by index.
+    /// The variables that are calculated during initialization, sorted by index.
     pub initial_unknowns: Vec<Unknown>,
 }
 
@@ -83,8 +83,8 @@ impl ModelStructure {
     /// or known in FMI 3.0: it has the index of its first element and the dependencies of all its elements.
     ///
     /// # Errors
-    /// When the model contradicts itself, reacts to a variable that it has not declared, or rejects its start values; if it is
-    /// `smooth`, also when it rejects every change of a variable.
+    /// When the model contradicts itself or rejects its start values, or when an unknown reacts to a variable that its `depends_on` does
+    /// not name. If the model is `smooth`, also when it rejects every change of a variable.
     pub fn of(model: &LoadedModel, fmi: Standard, tunable_parameters: bool) -> Result<Self> {
         let starts = checked_starts(model)?;
         let table = &model.table;
@@ -119,7 +119,7 @@ impl ModelStructure {
     }
 }
 
-/// The unknowns and the knowns, by index.
+/// The indices of the unknowns and of the knowns.
 struct Lists {
     outputs: Vec<u32>,
     derivatives: Vec<u32>,
@@ -179,7 +179,8 @@ fn of_arrays(table: &Table, unknowns: Vec<Unknown>) -> Vec<Unknown> {
     list
 }
 
-/// Adds the dependencies that the model declares, or that the evaluations cannot rule out.
+/// Adds the dependencies that the model declares, or that the evaluations cannot rule out. Fails if the evaluations find a dependency that
+/// is missing in `depends_on`.
 fn with_declared(table: &Table, found: Unknown, knowns: &[u32]) -> Result<Unknown> {
     let unknown = &table.variables[found.index as usize];
     let declared: Option<HashSet<u32>> =
@@ -286,7 +287,7 @@ fn factor_kind(factors: &[((usize, usize), f64)]) -> Option<DependencyKind> {
 
 /// The changes of unknowns after a known was changed, at several points.
 struct Reactions {
-    /// The change of the known; `None` unless it is a Real that is set.
+    /// The change of the known at each point; `None` unless the known is a Real that is set.
     changes: Vec<Option<f64>>,
     /// For each point and unknown, the value before and after.
     values: Vec<Vec<[Value; 2]>>,
@@ -305,7 +306,7 @@ impl Reactions {
             return pairs().any(|[before, after]| before != after).then_some(None);
         };
         let scale = reals.iter().flatten().fold(0.0, |scale: f64, value| scale.max(value.abs()));
-        // A smaller change is a rounding error, which occurs if the model adds terms that cancel.
+        // Smaller changes are taken as rounding errors, which occur if the model adds terms that cancel.
         if reals.iter().all(|[before, after]| (after - before).abs() <= 1e-10 * scale) {
             return None;
         }

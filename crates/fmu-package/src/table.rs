@@ -8,7 +8,7 @@ use std::str::FromStr;
 /// The version of the description's format that is read here.
 const VERSION: u64 = 1;
 
-/// A model.
+/// The description of a model.
 #[derive(Debug)]
 pub(crate) struct Table {
     pub info: Info,
@@ -172,7 +172,7 @@ impl Table {
         [co_simulation, model_exchange].into_iter().flatten()
     }
 
-    /// Returns `None` for a time or an event indicator that is not a variable of the model.
+    /// Returns the variable with this index; `None` for a time or an event indicator that is not a variable of the model.
     pub fn variable(&self, index: u32) -> Option<&Variable> {
         self.variables.get(index as usize)
     }
@@ -224,7 +224,7 @@ impl Variable {
         self.dimensions.iter().product()
     }
 
-    /// Whether it has a start value: inputs, and variables that are exact or approx (section 2.2.7 of FMI 2.0).
+    /// Whether it has a start value: inputs, and variables whose `initial` is exact or approx (section 2.2.7 of FMI 2.0).
     pub fn has_start(&self) -> bool {
         self.causality == Causality::Input || matches!(self.initial, Some(Initial::Exact | Initial::Approx))
     }

@@ -24,7 +24,7 @@ pub fn short(path: &Path) -> String {
     path.strip_prefix(current).unwrap_or(path).display().to_string()
 }
 
-/// Prints an error as one line, and returns the exit code.
+/// Prints the error, if there is one, and returns the exit code.
 pub fn exit(result: Result<()>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -2,7 +2,7 @@
 
 use crate::fingerprint::Fingerprint;
 
-/// The guid of libraries that were compiled without a guid, and of descriptions that are kept with the sources.
+/// The placeholder for the guid in libraries that were compiled without one, and in descriptions that are kept with the sources.
 pub const NO_GUID: &str = "{00000000-0000-0000-0000-000000000000}";
 
 /// The information from which a guid is computed, so that the library and the description belong together.

@@ -137,7 +137,7 @@ fn errors_name_the_file_and_leave_nothing() {
         (vec![sources.library("linux64", "none.so")], "none.so"),
         (
             vec![sources.library("linux64", "lib.so"), sources.library("linux64", "lib.dll")],
-            "linux64/model.so is there twice",
+            "linux64/model.so occurs twice",
         ),
     ] {
         let error = format!("{:#}", sources.pack(&fmu, &libraries).unwrap_err());

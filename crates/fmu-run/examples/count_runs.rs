@@ -14,9 +14,9 @@ const OUTPUTS: [&str; 4] = ["tau1", "pitch", "roll", "roll_rate"];
 fn main() -> Result<(), fmu_run::Error> {
     let arguments: Vec<String> = env::args().collect();
     let [_, path, name, count] = &arguments[..] else {
-        panic!("the arguments are FMU, USE and REPETITIONS");
+        panic!("expected the arguments FMU, USE and REPETITIONS");
     };
-    let count: usize = count.parse().expect("the repetitions are a number");
+    let count: usize = count.parse().expect("REPETITIONS must be a number");
     let open = || {
         // SAFETY: the FMU of this repository.
         unsafe { Fmu::open(Path::new(path)) }
@@ -41,7 +41,7 @@ fn main() -> Result<(), fmu_run::Error> {
     Ok(())
 }
 
-/// Runs a batch in one thread, with the times `np.arange(samples) * 1e-3`.
+/// Runs a batch in one thread, with `samples` communication points at intervals of 1 ms.
 fn run(fmu: &Fmu, samples: u32, runs: usize, measures: Vec<Measure>) -> Result<(), fmu_run::Error> {
     let time: Vec<f64> = (0..samples).map(|k| f64::from(k) * 1e-3).collect();
     let wave: Vec<f64> = time.iter().map(|t| 0.1 * (30.0 * t).sin()).collect();
@@ -61,7 +61,7 @@ fn run(fmu: &Fmu, samples: u32, runs: usize, measures: Vec<Measure>) -> Result<(
     Ok(())
 }
 
-/// Advances 64 stateful instances in one thread.
+/// Advances 64 stateful instances by this number of steps, in one thread.
 fn instances(fmu: &Fmu, steps: usize) -> Result<(), fmu_run::Error> {
     let mut wrists = fmu.instances(&Setup { count: 64, ..Setup::default() })?;
     let (motors, outputs) = (fmu.select(&MOTORS)?, fmu.select(&OUTPUTS)?);

@@ -1,5 +1,5 @@
-//! Arrays of FMI 3.0. In this crate each element is a variable, but the FMU has only the array, with one value reference. A call of
-//! the FMU gets or sets all values of an array (section 2.2.7.2 of FMI 3.0).
+//! Arrays of FMI 3.0. In this crate each element is a variable, but the FMU has only the array, with one value reference. Each call
+//! reads or sets all values of an array (section 2.2.7.2 of FMI 3.0).
 
 use fmi_abi::description::Variable;
 use fmi_abi::{BaseType, Value};
@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Maximum number of elements of all arrays together. The elements of further arrays are not variables.
+/// Maximum number of elements of all arrays together. If an array exceeds it, its elements are not variables.
 const MAX_ELEMENTS: usize = 1 << 20;
 /// Maximum memory of the elements of all arrays, in bytes.
 const MAX_BYTES: usize = 256 << 20;
@@ -21,7 +21,7 @@ pub(crate) struct Arrays {
     all: Vec<Array>,
     /// Index in `all` by value reference.
     by_reference: HashMap<u32, usize>,
-    /// Value reference of the first element.
+    /// Number of the first element of the first array.
     first: u32,
     /// For each element, the index of its array and its number in the array.
     elements: Vec<(u32, u32)>,
@@ -119,7 +119,8 @@ impl Arrays {
         &self.all
     }
 
-    /// Adds an array with this name. Returns the value references of its elements, or `None` if there are too many.
+    /// Adds an array with this name. Returns the numbers of its elements, or `None` if there are too many or they need too much
+    /// memory.
     pub fn push(&mut self, array: Array, name: &str) -> Option<Range<u32>> {
         let length = array.length()?;
         let begin = u32::try_from(self.elements.len()).ok()?.checked_add(self.first)?;
@@ -225,7 +226,7 @@ mod tests {
         let mut references: Vec<_> = description.variables.iter().map(|of| of.reference).collect();
         references.sort_unstable();
         references.dedup();
-        assert_eq!(references.len(), names.len(), "each has its own");
+        assert_eq!(references.len(), names.len(), "value references must be unique");
         let why = |name| description.why_missing(name).unwrap();
         assert!(why("huge").starts_with("is an array with too many elements"));
         assert!(why("more").starts_with("is an array with too many elements"));

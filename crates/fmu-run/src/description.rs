@@ -17,7 +17,7 @@ pub struct Variable {
     pub reference: u32,
     /// Start value as written in the model description, if there is one.
     pub start: Option<Arc<str>>,
-    /// Name of the continuous state whose time derivative this variable is, if there is one.
+    /// Name of the continuous state or input whose time derivative this variable is, if there is one.
     pub derivative_of: Option<String>,
     /// Further attributes, shared by the elements of an array.
     attributes: Arc<Attributes>,
@@ -30,7 +30,7 @@ pub struct Attributes {
     pub base: BaseType,
     /// `input`, `output`, `parameter` and so on; `local` by default.
     pub causality: String,
-    /// `fixed`, `tunable`, `discrete` or `continuous`, if given.
+    /// `constant`, `fixed`, `tunable`, `discrete` or `continuous`, if given.
     pub variability: Option<String>,
     /// Unit of the variable or of its declared type, if given.
     pub unit: Option<Arc<str>>,
@@ -100,7 +100,8 @@ pub struct Description {
     /// Arrays, whose elements are variables.
     pub(crate) arrays: Arc<Arrays>,
     indices: Index,
-    /// For each variable of the file, the range of its `variables`: one, or the elements of an array.
+    /// For each variable of the file, the range of its `variables`: one, or the elements of an array. The range is empty for a
+    /// clock, or for an array whose size is unknown or too large.
     spans: Vec<Range<usize>>,
     /// Structural parameters to which the caller has given values; they are set in Configuration Mode.
     pub(crate) structure: Vec<Structural>,
@@ -114,7 +115,7 @@ pub(crate) struct Structural {
     pub value: Value,
 }
 
-/// Gives access to the model description as it is written in the file.
+/// Gives access to the model description, in which arrays are not split into elements.
 impl Deref for Description {
     type Target = ModelDescription;
 
@@ -206,7 +207,7 @@ impl Description {
         }
     }
 
-    /// Returns the variable of this name.
+    /// Returns the variable with this name, if there is one.
     pub fn variable(&self, name: &str) -> Option<&Variable> {
         self.indices.find(name, |index| &self.variables[index].name).map(|index| &self.variables[index])
     }
@@ -223,7 +224,8 @@ impl Description {
         self.enumerations.get(of.declared_type.as_deref()?).map(Vec::as_slice)
     }
 
-    /// Checks that an output may be connected to an input of this or another FMU: types, units and enumeration items must be equal.
+    /// Checks that an output may be connected to an input of this or another FMU. Both must have the same [kind](Variable::kind),
+    /// and, if both declare them, the same units and enumeration items.
     ///
     /// # Errors
     /// Returns a message that names the difference.
@@ -245,7 +247,7 @@ impl Description {
 }
 
 impl Variable {
-    /// Returns whether the causality permits a caller to set the variable after the initialization.
+    /// Returns whether the variable is an input or a parameter, which a caller may set.
     pub(crate) fn is_settable(&self) -> bool {
         matches!(self.causality.as_str(), "input" | "parameter" | "structuralParameter")
     }
@@ -255,7 +257,7 @@ impl Variable {
         self.causality == "structuralParameter"
     }
 
-    /// Returns a noun with article for the type of the variable, for messages.
+    /// Returns the type of the variable as it is used in messages: `is a string`, `is binary`.
     pub(crate) fn kind_in_words(&self) -> &'static str {
         match self.kind() {
             "Boolean" => "a Boolean",
@@ -266,8 +268,8 @@ impl Variable {
         }
     }
 
-    /// Returns the type as in FMI 2.0, which has one type for all floating-point numbers and one for all
-    /// integers.
+    /// Returns the name of the type. As in FMI 2.0, there is one name for all floating-point types (`Real`) and one for all integer
+    /// types (`Integer`).
     pub fn kind(&self) -> &'static str {
         match self.base {
             BaseType::Real | BaseType::Float32 => "Real",
@@ -280,8 +282,8 @@ impl Variable {
     }
 }
 
-/// Adds the elements of an array to `arrays` and returns their value references. Returns one meaningless number for a scalar, and
-/// `None` for a clock or an array whose size is unknown or too large.
+/// Adds the elements of an array to `arrays` and returns their value references. Returns a meaningless range of length 1 for a
+/// scalar, and `None` for a clock or an array whose size is unknown or too large.
 fn elements_of(of: &Declared, arrays: &mut Arrays) -> Option<Range<u32>> {
     let (base, sizes) = (of.base?, of.dimensions.as_ref()?);
     match sizes.is_empty() {

@@ -2,17 +2,18 @@
 
 use std::fmt;
 
-/// Maximum number of characters of a message.
+/// Maximum number of characters of an error message; longer messages are shortened.
 const LONGEST: usize = 1000;
 
-/// Error that prevents all runs. The error of a single run is [part of the results](crate::Runs::errors).
+/// Error of a whole call. The error of a single run is [part of the results](crate::Runs::errors).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Error {
-    /// The file is not an FMU, or cannot be run on this machine.
+    /// A file is not an FMU, an FMU cannot be run on this machine, all instances fail, an FMU rejects a serialized state, or no
+    /// threads can be created.
     Fmu(String),
     /// The request does not fit the FMU, or is inconsistent.
     Request(String),
-    /// There is not enough memory for the results or the instances.
+    /// Memory does not suffice for the results or the instances.
     Memory(String),
     /// The caller has [cancelled](crate::Watch::cancel) the runs.
     Cancelled,

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 pub(crate) enum Files {
     /// A temporary directory, which is removed when dropped.
     Temporary(Scratch),
-    /// A directory that the caller has unpacked.
+    /// A directory of the caller, which contains the unpacked files.
     Own(PathBuf),
 }
 
@@ -44,11 +44,11 @@ impl Files {
         }
     }
 
-    /// Unpacks a zip file within these limits, or uses a directory where it is. If the content is of another kind, the error names
-    /// that kind.
+    /// Unpacks a zip file within these limits, or uses the files of a directory without copying them. If the content is of the
+    /// other kind, the error names that kind.
     pub fn open(path: &Path, kind: Kind, limits: &mut Limits) -> Result<Self, String> {
         let files = if path.is_dir() {
-            // The path must be absolute, because the FMU gets the path of its resources.
+            // The path must be absolute, because the location of the resources, which is passed to the FMU, is derived from it.
             let path = path.canonicalize().map_err(|error| format!("cannot be opened ({error})"))?;
             Self::Own(path)
         } else {

@@ -22,7 +22,8 @@ pub(crate) struct Loaded {
     pub description: Arc<Description>,
     files: Arc<Files>,
     co_simulation: Option<Arc<Library>>,
-    /// Library for Model Exchange. An error is the reason why this library cannot be loaded although the one for Co-Simulation can.
+    /// Library for Model Exchange, if the FMU has one. `Err` contains the reason why it cannot be loaded, although the library for
+    /// Co-Simulation can.
     model_exchange: Result<Option<Arc<Library>>, String>,
 }
 
@@ -53,7 +54,7 @@ impl Loaded {
         Ok(Self { description: Arc::new(description), files, co_simulation, model_exchange })
     }
 
-    /// Returns the FMU with these values of structural parameters, which change the sizes of arrays.
+    /// Returns a copy of the FMU with these values of structural parameters, which change the sizes of arrays.
     pub fn configured(&self, structure: Vec<Structural>) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", self.description.model_name));
         let description =
@@ -119,8 +120,8 @@ unsafe fn load(
     })
 }
 
-/// Returns the names of the directories in `binaries/` that may contain a library for this platform. The names of FMI 2.0 do not
-/// contain the processor, but many FMUs for ARM use them nevertheless.
+/// Returns the names of the directories in `binaries/` that may contain a library for this platform. FMI 2.0 has no names for ARM.
+/// Some FMUs for ARM use the names of FMI 3.0, others the names of FMI 2.0, such as `linux64`, so both are tried.
 fn directories(standard: Standard) -> Vec<String> {
     let system = if OS == "macos" { "darwin" } else { OS };
     let tuple = format!("{ARCH}-{system}");

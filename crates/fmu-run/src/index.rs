@@ -10,7 +10,7 @@ pub(crate) struct Index {
     table: HashTable<u32>,
 }
 
-/// All values are equal, because equal names in the same order give the same indices.
+/// Any two tables are equal, because the owner of a table also compares the names, and these determine the content of the table.
 impl PartialEq for Index {
     fn eq(&self, _: &Self) -> bool {
         true
@@ -23,7 +23,7 @@ impl Index {
         let all: Vec<&str> = names.collect();
         let mut table: HashTable<u32> = HashTable::with_capacity(all.len());
         for (index, name) in all.iter().enumerate() {
-            // There are fewer than 2^32 variables, because their value references have 32 bits.
+            // There are fewer than 2^32 names, because the memory for reading a model description is limited.
             let own = index as u32;
             let hash = |index: &u32| hasher.hash_one(all[*index as usize]);
             let same = |index: &u32| all[*index as usize] == *name;

@@ -20,8 +20,8 @@ pub struct Instance {
     _library: Arc<Library>,
     description: Arc<Description>,
     pub(crate) arrays: Arc<Arrays>,
-    /// Values of arrays that were set before Initialization Mode, because they cannot be read then; `None` from Initialization Mode
-    /// on.
+    /// Values of arrays that were set before Initialization Mode; `None` from Initialization Mode on. They are stored because
+    /// setting one element passes the whole array, and arrays cannot be read before Initialization Mode.
     pub(crate) array_starts: Option<ArrayStartValues>,
 }
 
@@ -36,7 +36,7 @@ pub(crate) struct Experiment {
 /// Relative tolerance of the solvers inside FMUs (section 2.1.6 of FMI 2.0, 2.3.3 of FMI 3.0).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Tolerance {
-    /// The tolerance of the default experiment in the model description, if there is one.
+    /// The tolerance of the default experiment in the model description; if there is none, the FMU chooses.
     #[default]
     Default,
     /// No tolerance: the FMU chooses.
@@ -67,8 +67,8 @@ impl Tolerance {
 }
 
 impl Instance {
-    /// Creates an instance for an interface type, with the name of its component. The error contains the reason, and whether the FMU
-    /// logged no message.
+    /// Creates an instance of a component for an interface type, and sets structural parameters. The error contains the reason, and
+    /// whether the FMU logged no message.
     pub(crate) fn new(
         fmu: &Loaded,
         (index, component): (usize, &str),
@@ -100,7 +100,7 @@ impl Instance {
         Ok(instance)
     }
 
-    /// Sets structural parameters (section 2.3.2 of FMI 3.0).
+    /// Sets structural parameters (section 2.3.6 of FMI 3.0).
     fn configure(&mut self) -> Result<(), Rejection> {
         if self.description.structure.is_empty() {
             return Ok(());

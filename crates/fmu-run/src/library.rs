@@ -1,4 +1,4 @@
-//! The shared library of an FMU, which keeps the files of the FMU while it is loaded.
+//! The shared library of an FMU. The files of the FMU are not removed while the library is loaded.
 
 use crate::files::Files;
 use fmi_abi::Standard;
@@ -6,7 +6,7 @@ use std::ffi::CString;
 use std::path::Path;
 use std::sync::Arc;
 
-/// A loaded library, with the files of its FMU.
+/// A loaded library and the files of its FMU.
 #[derive(Debug)]
 pub(crate) struct Library {
     pub client: Arc<fmi_client::Library>,

@@ -32,7 +32,8 @@ impl Found<'_> {
         }
     }
 
-    /// Fails if the variable cannot be set after the initialization.
+    /// Fails if a caller may not set the variable, because it is connected to an output, is a structural parameter, or is neither
+    /// an input nor a parameter.
     pub fn check_settable(self, name: &str) -> Result<(), Error> {
         self.check_own(name)?;
         if self.variable.is_structural() {
@@ -48,8 +49,9 @@ impl Found<'_> {
         request(format!("{name} is read-only: it is {kind}"))
     }
 
-    /// Fails if the variable does not accept a start value. Variables accept one if they have a start value already, or if a caller
-    /// may set them (section 2.2.7 of FMI 2.0, 2.4.7.5 of FMI 3.0).
+    /// Fails if the variable does not accept a start value, or is connected to an output. A variable that is not constant accepts
+    /// one if the model description contains its start value, or if it is an input or a parameter (section 2.2.7 of FMI 2.0,
+    /// 2.4.7.5 of FMI 3.0).
     pub fn check_start(self, name: &str) -> Result<(), Error> {
         self.check_own(name)?;
         let constant = self.variable.variability.as_deref() == Some("constant");
@@ -60,7 +62,8 @@ impl Found<'_> {
         request(format!("{name} is read-only: it is {kind}"))
     }
 
-    /// Returns factor and offset of the conversion: value in `unit` = factor * value of the variable + offset.
+    /// Returns factor and offset of the conversion: value in `unit` = factor * value of the variable + offset. Fails if `unit` is
+    /// neither the unit nor a display unit of the variable.
     pub fn display_unit(self, name: &str, unit: &str) -> Result<(f64, f64), Error> {
         let Some(own) = &self.variable.unit else {
             return request(format!("{name} has no unit, its values cannot be in {unit}"));

@@ -7,23 +7,23 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// A message of an FMU.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Logged {
-    /// Index of the run or the instance; `None` if the FMU logs from its own thread and passes an unknown environment to the
-    /// logger, so that the message cannot be attributed.
+    /// Index of the run or the instance. `None` if it is unknown, because several instances are alive and the FMU passes an unknown
+    /// environment to the logger.
     pub index: Option<usize>,
-    /// Name of the component in a system; empty for a single FMU.
+    /// Name of the component in a system; empty for a single FMU, or if the instance is unknown.
     pub component: String,
-    /// In runs, the time of the last communication point or solver step before the message, s.
+    /// In a known run, the time of the last communication point or solver step before the message, s; otherwise `None`.
     pub time: Option<f64>,
     /// The message.
     pub message: Message,
 }
 
-/// Collects the messages of all instances of a system. Each component of each instance has a number, because all of them share one
-/// callback: index of the instance * number of components + index of the component.
+/// Collects the messages of all instances of a system. Because all of them share one callback, each component of each instance is
+/// identified by a number: index of the instance * number of components + index of the component.
 #[derive(Debug)]
 pub(crate) struct Feed {
     components: Vec<String>,
-    /// Index and time, s, of the run that an instance performs, by the number of the instance.
+    /// Index and time, s, of the run that an instance performs, by the index of the instance.
     runs: Mutex<HashMap<usize, (usize, f64)>>,
     logged: Mutex<Vec<Logged>>,
 }
@@ -70,7 +70,7 @@ impl LogListener for Feed {
 pub(crate) struct Logging {
     /// Whether debug logging is on (`loggingOn`).
     pub on: bool,
-    /// Receiver of all messages, and the number of the instance.
+    /// Receiver of all messages, and the index of the instance.
     pub feed: Option<(Arc<Feed>, usize)>,
 }
 

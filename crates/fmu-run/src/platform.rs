@@ -3,7 +3,7 @@
 use std::env::consts::{ARCH, OS};
 use std::path::Path;
 
-/// Returns a message that names the platform of a library and this platform, if they differ.
+/// If a library is for another platform, returns a message that names its platform and this one.
 pub(crate) fn mismatch(library: &Path) -> Option<String> {
     let bytes = std::fs::read(library).ok()?;
     let (system, processors) = target_of(&bytes)?;
@@ -18,7 +18,8 @@ pub(crate) fn mismatch(library: &Path) -> Option<String> {
         .then(|| format!("it is for {system} on {}, and this is {here} on {ARCH}", processors.join(" and ")))
 }
 
-/// Returns the operating system and the processors, as named by `std::env::consts::ARCH`. Returns `None` for unknown formats.
+/// Returns the operating system and the processors of a library, which have the names of `std::env::consts::ARCH`. Returns `None`
+/// for unknown formats and processors.
 fn target_of(bytes: &[u8]) -> Option<(&'static str, Vec<&'static str>)> {
     let at = |index: usize| bytes.get(index..)?.first_chunk::<4>().copied();
     let number = |index| at(index).map(u32::from_le_bytes);
@@ -76,7 +77,8 @@ fn target_of(bytes: &[u8]) -> Option<(&'static str, Vec<&'static str>)> {
 mod tests {
     use super::target_of;
 
-    /// Checks headers that are made from the specifications. The tests of the Python package check files that linkers wrote.
+    /// Checks headers that this test creates as the specifications describe them. The tests of the Python package check files that
+    /// linkers wrote.
     #[test]
     fn headers() {
         let elf = |class, order, machine: [u8; 2]| {

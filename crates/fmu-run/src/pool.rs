@@ -3,7 +3,8 @@
 //! A reset should make an instance behave like a new one (fmi2Reset, section 2.1.6 of FMI 2.0), but in many FMUs something survives:
 //! a parameter, a state, or a value calculated from a parameter. Because a run must not depend on earlier runs, an instance is reused
 //! only if creating one takes long, and only after checks. In a check, a reset instance and a new one perform the same run, and all
-//! results must be bit-identical. [`Trust`] counts the checks for each variable whose value differed in the run before the reset.
+//! results must be bit-identical. [`Trust`] counts these checks for each [`Change`], for example for each variable whose value
+//! differed in the run before the reset.
 
 use crate::error::Error;
 use crate::instance::{Instance, Tolerance};
@@ -26,7 +27,7 @@ pub(crate) struct Pool {
 #[derive(Debug)]
 pub(crate) struct Idle {
     pub components: Vec<Instance>,
-    /// Values that were set in the run.
+    /// Values that the run has set.
     pub given: Given,
     /// Duration of the run.
     pub took: Duration,
@@ -47,8 +48,8 @@ impl Pool {
         }
     }
 
-    /// Returns the idle threads if there are this many, otherwise new ones. The caller returns them with
-    /// [`put_threads`](Self::put_threads). Concurrent calls get different threads, so that they do not wait for each other.
+    /// Returns the idle threads if they belong to this process and there are this many, otherwise new ones. The caller returns them
+    /// with [`put_threads`](Self::put_threads). Concurrent calls get different threads, so that they do not wait for each other.
     pub fn take_threads(&self, count: usize) -> Result<Threads, Error> {
         let threads = lock(&self.threads).take();
         threads
@@ -143,10 +144,10 @@ fn add<T: PartialEq>(changes: &mut Vec<Change>, now: &[(Target, T)], next: &[(Ta
     changes.extend(new.map(|(_, (target, _))| Change::Value(*target)));
 }
 
-/// What the checks have shown about resets of an FMU.
+/// Results of the checks of whether an FMU can be reset.
 #[derive(Debug, Default)]
 pub(crate) struct Trust {
-    /// Whether a reset failed, or something of an earlier run survived it.
+    /// Whether a reset has failed, or something of an earlier run may have survived it.
     forgets: bool,
     /// For each change, the number of checks in which a reset instance behaved like a new one.
     proofs: HashMap<Change, u32>,
@@ -161,10 +162,11 @@ impl Trust {
     /// If an instance is created faster than this, each run gets a new one, because no check can prove that a reset removes
     /// everything.
     const LONG: Duration = Duration::from_millis(1);
-    /// Number of checks that must include a change. One is not enough, because the values of a run may hide what a reset leaves.
+    /// Number of checks that must include a change. One is not enough, because a value that survives a reset may happen to have no
+    /// effect in one run.
     const PROOFS: u32 = 3;
 
-    /// Returns whether instances may be kept: no reset has failed, and creating an instance takes long.
+    /// Returns whether instances may be kept: no reset and no check has failed, and creating an instance takes long.
     pub fn may_keep(&self) -> bool {
         !self.forgets && self.fastest.is_some_and(|fastest| fastest >= Self::LONG)
     }
@@ -175,8 +177,8 @@ impl Trust {
         self.may_keep() && changes.into_iter().all(is_proven)
     }
 
-    /// Returns whether it is time for a check, which takes as long as a run. The time spent on checks never exceeds the time spent on
-    /// creating instances.
+    /// Returns whether it is time for a check, which takes about as long as a run of this duration. This limits the time spent on
+    /// checks to about the time spent on creating instances.
     pub fn is_check_due(&self, run: Duration) -> bool {
         self.may_keep() && self.creating >= self.checking + run
     }

@@ -7,15 +7,16 @@ use fmi_abi::BaseType;
 use fmi_client::Rejection;
 use std::collections::HashMap;
 
-/// Numeric variables that have been looked up by name. A row of values has one value for each, in the order of the names. Booleans
-/// are 0 or 1.
+/// Variables that have been looked up by name, and whose values are numbers or Booleans. A row has one value for each name, in
+/// their order. Booleans are 0 or 1.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selection {
     names: Vec<String>,
     groups: Vec<Group>,
-    /// Whether all variables are Real and belong to one component, so that a row is passed to the FMU unchanged.
+    /// Whether all variables are Real and belong to one component, and each name denotes one variable, so that a row is passed to
+    /// the FMU unchanged.
     is_direct: bool,
-    /// Reason why a caller cannot set the variables, if one of them is read-only or connected to an output.
+    /// Reason why a caller cannot set the variables: one of them is read-only, a structural parameter or connected to an output.
     read_only: Option<String>,
 }
 
@@ -44,12 +45,12 @@ impl Target {
 }
 
 impl Selection {
-    /// Returns the number of variables.
+    /// Returns the number of names, which is the number of values in a row.
     pub fn len(&self) -> usize {
         self.names.len()
     }
 
-    /// Returns whether there are no variables.
+    /// Returns whether there are no names.
     pub fn is_empty(&self) -> bool {
         self.names.is_empty()
     }
@@ -104,7 +105,8 @@ impl Selection {
         self.is_direct = group.base == BaseType::Real && group.indices.len() == self.names.len();
     }
 
-    /// Returns the value references, if all variables are Real and belong to one component.
+    /// Returns the value references if they correspond to the values of a row, because `is_direct` is true or there are no
+    /// variables.
     pub(crate) fn references(&self) -> Option<&[u32]> {
         match self.groups.first() {
             None => Some(&[]),
@@ -202,7 +204,8 @@ impl Selection {
     }
 }
 
-/// Checks that integers and Booleans can have these values. Values of Reals are left to the FMU.
+/// Checks that a Boolean, an enumeration or an integer can have these values. The FMU itself checks values of floating-point
+/// variables.
 pub(crate) fn fits(name: &str, base: BaseType, values: &[f64]) -> Result<(), Error> {
     let (low, high) = match base {
         BaseType::Boolean => (0.0, 1.0),

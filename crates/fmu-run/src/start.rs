@@ -19,7 +19,7 @@ pub enum Start<'a> {
     Text(&'a str),
     /// A string for each run or instance.
     EachText(&'a [String]),
-    /// One exact value for all runs or instances. It can have any type: also integers of 64 bits, and bytes.
+    /// One exact value for all runs or instances. It can have any type, for example bytes or an integer of 64 bits.
     Value(&'a Value),
     /// An exact value for each run or instance.
     EachValue(&'a [Value]),
@@ -46,7 +46,7 @@ pub(crate) struct StartValues<'a> {
 }
 
 impl<'a> StartValues<'a> {
-    /// Returns the start values of the system, some of which are replaced by the given values.
+    /// Returns the given start values, and the system's own start values of all other variables.
     pub fn of(system: &System, given: &[(&str, Start<'a>)]) -> Result<Self, Error> {
         let mut all = Self::default();
         for (name, value) in system.start() {
@@ -60,7 +60,7 @@ impl<'a> StartValues<'a> {
         Ok(all)
     }
 
-    /// Checks the given start values. Each variable may occur only once.
+    /// Checks the given start values. Each name may occur only once.
     pub fn given(system: &System, given: &[(&str, Start<'a>)]) -> Result<Self, Error> {
         let mut all = Self::default();
         for (index, (name, start)) in given.iter().enumerate() {
@@ -198,7 +198,8 @@ fn number_in(found: Found, name: &str, value: &Value) -> Result<f64, Error> {
     found.check_number(name)?;
     match value {
         Value::Real(number) => Ok(*number),
-        // Integers that are rounded here are out of range for the variable, so they are rejected later.
+        // A floating-point variable gets the nearest number. For other types, an integer that is rounded here is out of range, so
+        // it is rejected later.
         Value::Integer(number) => Ok(*number as f64),
         Value::Boolean(boolean) => Ok(f64::from(u8::from(*boolean))),
         Value::String(_) | Value::Binary(_) => {

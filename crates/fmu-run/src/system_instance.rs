@@ -11,14 +11,14 @@ use fmi_client::Rejection;
 use std::ops::{Deref, DerefMut};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Index of a state that the instances of all components have saved.
+/// Identifies a state that the instances of all components have saved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Saved {
     generation: u64,
     state: fmi_client::Saved,
 }
 
-/// Values of all variables at one time, except bytes.
+/// Values of all variables at one time, except variables that are bytes.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Observed {
     /// Numbers, as bits.
@@ -167,7 +167,8 @@ impl SystemInstance {
             self.components[target.component].set_values(target.base, &[target.reference], value)?;
         }
         let numbers: Vec<_> = start.numbers(number).collect();
-        // All values of a type are set with one call, because an FMU may require that they are consistent, for example increasing.
+        // Successive numbers of one type are set with one call, because an FMU may require that they are consistent, for example
+        // increasing.
         let together = |(one, _): &(Target, f64), (next, _): &(Target, f64)| {
             (one.component, one.base) == (next.component, next.base)
         };
@@ -188,8 +189,9 @@ impl SystemInstance {
         self.stepped()
     }
 
-    /// Passes outputs to inputs in Initialization Mode, where the dependencies may differ from the ones in later modes. Repeats this
-    /// until no value changes. With [`Order::Jacobi`] it passes them at most as many times as there are components, as in libcosim.
+    /// Passes outputs to inputs in Initialization Mode, where the dependencies may differ from the ones in later modes, and repeats
+    /// this until no value changes. Fails if the values do not converge. With [`Order::Jacobi`] they need not converge, but are
+    /// passed at most as many times as there are components, as in libcosim.
     fn agree(&mut self) -> Result<(), Rejection> {
         let Exchange { order, stages } = self.system.exchange();
         let order = *order;
@@ -341,7 +343,7 @@ impl SystemInstance {
         ))
     }
 
-    /// Fails if the state was saved by earlier instances, which are freed.
+    /// Fails if the state was saved by other instances, such as earlier ones that have been freed.
     pub fn check_own(&self, saved: Saved) -> Result<(), Rejection> {
         self.own(saved).map(drop)
     }
@@ -424,7 +426,7 @@ impl SystemInstance {
             }
             (kept, None) => return kept.and(Err(Rejection::without_fmu("save", "there is no instance"))),
         };
-        debug_assert_eq!(last + 1, self.components.len(), "all have kept one");
+        debug_assert_eq!(last + 1, self.components.len(), "each component must have a state");
         if !self.passed.is_empty() {
             self.saved.resize(self.saved.len().max(saved.index() + 1), Vec::new());
             self.saved[saved.index()].clone_from(&self.passed);

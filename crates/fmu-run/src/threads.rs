@@ -5,10 +5,10 @@ use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Arc, Once};
 use std::time::{Duration, Instant};
 
-/// Number of forks between the first process that loaded this library and this process.
+/// Number of forks between the process that first called [`process`] and this process.
 static FORKS: AtomicU32 = AtomicU32::new(0);
 
-/// Returns a number that identifies this process. A forked process gets another number.
+/// Returns a number that differs between a process and the processes that it forks. It is always 0 where processes cannot fork.
 pub fn process() -> u32 {
     static COUNTING: Once = Once::new();
     COUNTING.call_once(count_forks);
@@ -29,7 +29,7 @@ fn count_forks() {
 #[cfg(not(unix))]
 fn count_forks() {}
 
-/// A pool of threads. A forked process has the object but not the threads, so work for them would never be done there.
+/// A pool of threads. A forked process inherits the object but not the threads, so work for the pool would never be done there.
 #[derive(Debug)]
 pub(crate) struct Threads {
     process: u32,
@@ -55,10 +55,11 @@ impl Threads {
         self.pool().current_num_threads()
     }
 
-    /// Time for which threads poll for work before they sleep. Waking a thread takes about as long.
+    /// Time for which threads poll for work before they sleep, because waking a sleeping thread takes long compared with a short
+    /// step.
     const AWAKE: Duration = Duration::from_micros(50);
 
-    /// Calls `own` in this thread and each of the other functions in another thread. Returns when all calls have returned.
+    /// Calls `own` in this thread and the other functions in the threads of the pool. Returns when all calls have returned.
     pub fn share<'s>(&'s self, own: impl FnOnce(), others: impl Iterator<Item = impl FnOnce() + Send + 's>) {
         let running = AtomicUsize::new(0);
         self.pool().in_place_scope(|scope| {
@@ -72,7 +73,8 @@ impl Threads {
             }
             self.stay_awake();
             own();
-            // Polls for a short time, because this thread sleeps at the end of the scope if another one still works.
+            // Polls for a short time. Without this, the thread would sleep at the end of the scope while another thread still
+            // works.
             let begin = Instant::now();
             while running.load(Ordering::Acquire) > 0 && begin.elapsed() < Self::AWAKE {
                 std::thread::yield_now();

@@ -19,7 +19,7 @@ impl CheckedSystem<'_> {
     /// these files, the parameter set is named `default`.
     ///
     /// # Errors
-    /// Fails if the file cannot be written.
+    /// Fails if the file cannot be written, or if two FMUs have different enumerations with the same name.
     pub fn write_ssp(&self, destination: &Path) -> Result<u64> {
         let mut entries = vec![("SystemStructure.ssd".to_owned(), self.ssd()?.document()?.into_bytes())];
         for (name, bytes) in self.files()? {

@@ -43,9 +43,9 @@ impl<'a> System<'a> {
     /// Reads the FMUs and checks the connections against their model descriptions.
     ///
     /// # Errors
-    /// Fails if an FMU cannot be read, if two components share a name, or if two different FMUs share a file
-    /// name. Fails if a variable is unknown or has the wrong causality, or if the ends of a connection differ
-    /// in type or unit. Fails if an input is fed twice, or if a start value or time is invalid.
+    /// Fails if an FMU cannot be read, if a component's name is invalid or used twice, or if two different FMUs share a file name. Fails
+    /// if a variable is unknown or has the wrong causality, or if the ends of a connection differ in type or unit. Fails if an input is
+    /// fed twice, or if a start value or time is invalid.
     pub fn check(&'a self) -> Result<CheckedSystem<'a>> {
         let mut checked = CheckedSystem { system: self, fmus: Vec::new(), units: BTreeMap::new() };
         for (what, value) in [("stop time", self.stop_time), ("step size", self.step_size)] {

@@ -96,7 +96,7 @@ fn wrong_systems_are_rejected() {
     let rejection = |change: fn(&mut System)| {
         let mut system = system(directory.path());
         change(&mut system);
-        format!("{:#}", system.check().err().expect("it is wrong"))
+        format!("{:#}", system.check().err().expect("a wrong system must be rejected"))
     };
     for (change, message) in [
         ((|s| s.connections.push(("plant.y", "law.x"))) as fn(&mut System), "no FMU has a variable law.x"),

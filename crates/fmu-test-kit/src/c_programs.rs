@@ -7,11 +7,11 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Returns the directory with `fmi2Functions.h` and `fmi3Functions.h`. It is the value of the environment variable
-/// `FMI2_HEADERS`, or else a directory of the Python package fmpy in the `.venv` of `directory` or of one above it.
+/// Returns the directory of the headers of FMI 2.0 and FMI 3.0. It is the value of the environment variable
+/// `FMI2_HEADERS`, or else a directory of the Python package fmpy in the `.venv` of `directory` or of a directory above it.
 ///
 /// # Panics
-/// Panics if there is no such directory.
+/// Panics if none of these directories contains `fmi2Functions.h`.
 pub fn headers(directory: &Path) -> PathBuf {
     let named = std::env::var_os("FMI2_HEADERS").map(PathBuf::from);
     let in_venvs = directory.ancestors().flat_map(|directory| {
@@ -45,7 +45,8 @@ pub fn library(name: &str) -> PathBuf {
 /// Runs a program and returns its standard output.
 ///
 /// # Panics
-/// Panics with the message `missing` if the program cannot be started. Also panics if the program fails.
+/// Panics with the message `missing` if the program cannot be started. Also panics if the program fails, or if its output
+/// is not UTF-8.
 pub fn output(command: &mut Command, missing: &str) -> String {
     let output = command.output().unwrap_or_else(|error| panic!("{missing}: {command:?}: {error}"));
     let stderr = String::from_utf8_lossy(&output.stderr);
@@ -57,7 +58,7 @@ pub fn output(command: &mut Command, missing: &str) -> String {
 /// directory of `source` upwards, see [`headers`].
 ///
 /// # Panics
-/// Panics if the compiler reports an error or a warning.
+/// Panics if the compiler reports an error or a warning, or if the compiler or the headers are missing.
 pub fn compile(source: &Path, directory: &Path) -> PathBuf {
     let program = directory.join(source.file_stem().expect("a file"));
     output(c_compiler(&headers(source)).arg("-o").args([&program, source]).arg("-ldl"), NO_COMPILER);
@@ -92,7 +93,7 @@ fn c_compiler(headers: &Path) -> Command {
 pub fn command(program: &Path) -> Command {
     let runner = std::env::var("C_RUNNER").unwrap_or_default();
     let mut words = runner.split_whitespace().map(OsStr::new).chain([program.as_os_str()]);
-    let mut command = Command::new(words.next().expect("the program at least"));
+    let mut command = Command::new(words.next().expect("at least the program"));
     command.args(words);
     command
 }
@@ -104,7 +105,7 @@ pub fn command(program: &Path) -> Command {
 /// would grow by 50 times as much. With `make sanitize`, valgrind detects every leaked byte.
 ///
 /// # Panics
-/// Panics if the memory grows by more.
+/// Panics if the memory grows by more, or if the program fails.
 pub fn reload(program: &Path, names: &[&str]) {
     const ROUNDS: i64 = 3000;
     let mut command = command(program);

@@ -1,4 +1,4 @@
-//! Checks that steps stay fast after anything that may happen to an instance, such as a restored state.
+//! Checks that steps stay fast after incidents such as a rejected call, a reset or a restored state.
 //!
 //! The reference is the model itself, stepped without FMI. It is never copied or restored, so it keeps everything that makes
 //! it fast, such as cached matrices of its step sizes. Only steps of repeated sizes are compared, because an instance may
@@ -92,8 +92,8 @@ fn incidents<F: Either, M: Exported>(check: &mut dyn FnMut(Incident<'_, F>)) {
     }));
 }
 
-/// Checks that steps of an instance cost as much as steps of the model itself, after anything that may happen to the
-/// instance. Does nothing where instructions cannot be counted.
+/// Checks that steps of an instance cost about as much as steps of the model itself, after each of the incidents. Does
+/// nothing where instructions cannot be counted.
 ///
 /// The calls through FMI have a cost, too. It is measured as the difference between an instance and the model in steps of
 /// one size.

@@ -98,7 +98,8 @@ fn log_of<'a>(version: &Version<'a>) -> &'a Log {
 /// An instance of FMI 2.0 or FMI 3.0, as an importer uses it. A variable is identified by its index in the variable
 /// table.
 ///
-/// Methods that return neither a status nor a `Result` assert that the call succeeds.
+/// Unless their documentation says otherwise, methods that return neither a status nor a `Result` assert that their calls
+/// succeed.
 #[allow(clippy::missing_panics_doc, reason = "the functions that assert panic on purpose")]
 pub trait Either: Send {
     /// Returns the FMI version.
@@ -242,7 +243,7 @@ pub trait Either: Send {
         }
     }
 
-    /// Sets up to 16 Reals.
+    /// Sets Reals, in FMI 3.0 at most 16.
     fn try_set(&self, indices: &[u32], values: &[f64]) -> Status {
         let (count, value) = (indices.len(), values.as_ptr());
         assert_eq!(count, values.len());
@@ -304,7 +305,7 @@ pub trait Either: Send {
     /// Reads the directional derivatives of up to 16 unknowns with respect to up to 16 knowns.
     ///
     /// In FMI 3.0, also reads the adjoint derivatives of each unknown and asserts that their scalar product with the seed
-    /// equals the directional derivative. For one known, both must be bit-identical.
+    /// equals the directional derivative within rounding error. For one known, both must be bit-identical, except zeros.
     fn try_directional(&self, unknowns: &[u32], knowns: &[u32], seed: &[f64], results: &mut [f64]) -> Status {
         let [us, ks] = [unknowns.len(), knowns.len()];
         assert_eq!([seed.len(), results.len()], [ks, us]);
@@ -476,8 +477,8 @@ pub trait Either: Send {
         assert_eq!(status, Status::Ok, "log: {:#?}", self.take_log());
     }
 
-    /// Asserts that a call is rejected: it returns an error, logs one clean message that names the function, and leaves the
-    /// instance unchanged. Returns the message.
+    /// Asserts that a call is rejected: it returns an error, logs one clean message that begins with `fmi2` or `fmi3`, like
+    /// the name of a function, and leaves the instance unchanged. Returns the message.
     #[track_caller]
     fn rejected(&self, label: &str, call: impl FnOnce(&Self) -> Status) -> String
     where
@@ -532,7 +533,7 @@ pub trait Either: Send {
     /// Returns the serialized state; asserts success.
     #[track_caller]
     fn bytes(&self) -> Vec<u8> {
-        self.serialized().expect("the FMU serializes its state")
+        self.serialized().expect("the FMU must serialize its state")
     }
 
     /// Asserts that de-serializing these bytes is rejected and that the handle stays NULL; returns the message.
@@ -570,7 +571,7 @@ pub trait Either: Send {
     #[track_caller]
     fn forget(&self, mut state: *mut c_void) {
         self.ok(self.free_state(&mut state));
-        assert!(state.is_null(), "the handle is cleared");
+        assert!(state.is_null(), "the handle must be NULL");
     }
 
     /// Enters Initialization Mode; asserts success.

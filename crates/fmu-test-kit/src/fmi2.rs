@@ -66,7 +66,7 @@ fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi2Componen
 }
 
 /// Functions that exist only in FMI 2.0.
-#[allow(clippy::missing_panics_doc, reason = "that is what they are for")]
+#[allow(clippy::missing_panics_doc, reason = "the functions are for tests and panic on purpose")]
 impl Importer {
     /// Returns the version and the platform of the library; both functions need no instance (section 2.1.4 of FMI 2.0).
     pub fn version_and_platform(&self) -> [&CStr; 2] {

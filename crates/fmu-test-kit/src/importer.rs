@@ -96,8 +96,8 @@ pub(crate) unsafe fn remember(
 #[allow(missing_docs, reason = "as in the standards: section 2.1.5 of FMI 2.0, 2.3.1 of FMI 3.0")]
 pub struct Arguments<'a> {
     pub instance_name: Option<&'a CStr>,
-    /// Interface type. FMI 3.0 has a function for each type; here 0 is Model Exchange, 2 is Scheduled Execution
-    /// and any other value is Co-Simulation.
+    /// Interface type. It selects the function of FMI 3.0: 0 selects Model Exchange, 2 Scheduled Execution, and any
+    /// other value Co-Simulation.
     pub fmu_type: i32,
     /// The guid, or the instantiation token.
     pub guid: Option<CString>,

@@ -1,8 +1,8 @@
-//! Counts the instructions of some work. Unlike a duration, the count of the same program is the same in every run and on
-//! every machine.
+//! Counts the instructions of some work. Unlike a duration, the count of the same program is the same in every run, even on
+//! a busy machine.
 
 /// Returns the number of instructions that the work executes; a thousand take some milliseconds to count. The work runs in
-/// a copy of this process, which the kernel stops after each instruction, and leaves this process unchanged. Returns
+/// a copy of this process, so it leaves this process unchanged. The kernel stops the copy after each instruction. Returns
 /// `None` if this process may not trace another, as in some containers.
 ///
 /// # Panics

@@ -8,6 +8,8 @@
 //! * [`realtime`] checks that code may run in a control loop.
 //! * [`checks`] contains checks that every FMU must pass; [`history`] and [`costs`] contain checks of instances that have
 //!   already run for a while.
+//! * [`load`] and [`functions_of`] return the functions of an FMU's library, [`instructions()`] counts the instructions of
+//!   some work, and [`Random`] generates numbers.
 
 // Under Miri, the log callback is variadic as in C; see `fmi2`.
 #![cfg_attr(miri, feature(c_variadic))]

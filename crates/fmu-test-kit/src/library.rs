@@ -36,12 +36,12 @@ pub fn functions_of<M: Exported>() -> Functions {
     other_library().unwrap_or_else(fmu_export::fmi2::functions::<M>)
 }
 
-/// Returns the functions of the library that `FMU_LIBRARY` names; `None` if it is not set or empty.
+/// Returns the functions of the library that `FMU_LIBRARY` names; `None` if this variable is empty or not set.
 pub(crate) fn other_library() -> Option<Functions> {
     static LIBRARY: OnceLock<Option<Functions>> = OnceLock::new();
     *LIBRARY.get_or_init(|| {
         let path = std::env::var_os("FMU_LIBRARY").filter(|path| !path.is_empty())?;
         // SAFETY: the user who sets the variable guarantees that it names a suitable library.
-        Some(unsafe { load(Path::new(&path)) }.expect("FMU_LIBRARY names an FMU's library"))
+        Some(unsafe { load(Path::new(&path)) }.expect("FMU_LIBRARY must name an FMU's library"))
     })
 }

@@ -7,7 +7,7 @@ pub struct Random(pub u64);
 impl Random {
     /// Returns 64 random bits.
     pub fn bits(&mut self) -> u64 {
-        // Knuth's multiplier; the high bits have the better quality.
+        // Knuth's multiplier. The low bits are less random, so the high bits are mixed into them.
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         self.0 ^ (self.0 >> 33)
     }

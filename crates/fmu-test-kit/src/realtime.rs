@@ -60,13 +60,13 @@ pub fn allocations(work: impl FnOnce()) -> u64 {
     let before = ALLOCATIONS.with(Cell::get);
     drop(std::hint::black_box(Box::new(1)));
     let start = ALLOCATIONS.with(Cell::get);
-    assert_eq!(start - before, 2, "allocations are counted");
+    assert_eq!(start - before, 2, "the test must install the allocator `Counting`");
     work();
     ALLOCATIONS.with(Cell::get) - start
 }
 
-/// Defines tests that a control loop with a model neither allocates, nor makes system calls, nor locks. The sources of
-/// the model must be in the package of the test. `make sanitize` runs the same loop under the RealtimeSanitizer.
+/// Defines tests of a control loop with a model, which must not allocate, make system calls, or lock. The sources of the
+/// model must be in the package of the test. `make sanitize` runs the same loop under the RealtimeSanitizer.
 #[macro_export]
 macro_rules! control_loop {
     ($model:ty) => {
@@ -148,7 +148,7 @@ impl<F: Either> Loop<F> {
     }
 
     /// Performs a thousand steps of one size, alternating with a thousand steps of increasing sizes, and the rarer calls
-    /// in between. The largest step sizes run special code for stiff models.
+    /// in between. The largest step sizes reach code of the testbed that smaller ones do not.
     fn run(&mut self) {
         let _context = sanitizer::enter();
         for i in 0..1000 {
@@ -184,7 +184,7 @@ pub fn assert_no_allocation<M: Exported>() {
 pub fn assert_no_system_call<M: Exported>() {
     assert_eq!(without_kernel(&mut || ()), Ended::Exited(0));
     let caught = without_kernel(&mut || drop(std::fs::metadata("/")));
-    assert_eq!(caught, Ended::Killed(libc::SIGSYS), "system calls are detected");
+    assert_eq!(caught, Ended::Killed(libc::SIGSYS), "a system call must be detected");
     let (mut old, mut new) = (Loop::<Importer>::new::<M>(), Loop::<fmi3::Importer>::new::<M>());
     assert_eq!(without_kernel(&mut || old.run()), Ended::Exited(0));
     assert_eq!(without_kernel(&mut || new.run()), Ended::Exited(0));

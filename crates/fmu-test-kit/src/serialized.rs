@@ -5,7 +5,7 @@
 //! (plus 2 for FMI 3.0). The mode, the end flag, time, start time, stop time and tolerance follow, then the
 //! values and the `memory` fields of the variable table. The last 8 bytes are the FNV-1a checksum of all bytes before.
 //! Integers have 64 bits, little-endian. Before an optional value, there is a Boolean of one byte, which is
-//! true if the value exists.
+//! true if the value exists; the bytes of the value are present in both cases.
 
 use fmu_export::Mode;
 use std::ops::Range;

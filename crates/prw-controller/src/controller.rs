@@ -18,12 +18,12 @@
 //! accumulates during a move.
 //!
 //! D damps the vibration of the couplings. Its filter is needed for a wrist that is so stiff that it follows the motors
-//! immediately: without the filter, the rate of the motors would be fed back with the gain Kd / sample_time, which is
+//! immediately. Without the filter, the rate of the motors would be fed back with the gain Kd / sample_time, which is
 //! far above 1 and would cause a limit cycle. With the filter, the gain at high frequencies is 1/2.
 //!
 //! Torque limiting: the goal of a motor is limited to the angle at which the couplings of a blocked wrist would reach
 //! the torque limit. If the torque exceeds the limit, this angle is behind the motor, so the motor turns back. Because a
-//! motor always moves so slowly that it can stop at its goal, its own motion does not exceed the limit.
+//! motor always moves so slowly that it can stop at its goal, its own motion does not cause a torque above the limit.
 
 use crate::motor::{Limits, MotorSetpoint};
 use crate::parameters::{InvalidParameter, Parameters};
@@ -56,7 +56,7 @@ impl Inputs {
     }
 }
 
-/// Schedule of the samples: one at `epoch`, and one after every `period`. Times are products, not sums, so that rounding
+/// Schedule of the samples: one at `epoch`, and then one per `period`. Times are products, not sums, so that rounding
 /// errors do not accumulate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Schedule {
@@ -102,7 +102,8 @@ pub struct Controller {
     pub now: f64,
 }
 
-/// Maximum number of samples in a step: one hour of samples at 1 kHz, which take less than a second to calculate.
+/// Maximum number of samples in a step or an event: one hour of samples at 1 kHz, which take less than a second to
+/// calculate.
 const MOST_SAMPLES: f64 = 3.6e6;
 /// Largest number of a sample; an `f64` cannot represent all larger integers.
 const LAST_SAMPLE: f64 = (1_u64 << 53) as f64;

@@ -53,7 +53,7 @@ impl Model for Controller {
 
 impl CoSimulation for Controller {
     /// Each sample is an event for importers that handle events. Otherwise `step` takes the samples, and a sample at the end
-    /// of a step is taken in the next step, with its inputs.
+    /// of a step is taken in the next step, with the inputs of the next step.
     const EVENTS: Events = Events::StopIfHandled;
     const ATOMIC_STEP: bool = true;
 

@@ -1,9 +1,9 @@
 //! A controller for the pitch-roll wrist testbed, and the FMU made from it.
 //!
 //! [`Controller`] moves the two motors of the testbed so that the wrist reaches a reference pitch and roll. The
-//! inverse of eq. (1) gives the feed-forward, which a PI controller corrects from measured pitch and roll. Rate,
-//! acceleration and torque of the motors are limited. The table of [`variables`] and `fmu.rs` define the FMU; the
-//! other modules do not depend on FMI.
+//! inverse of eq. (1) gives the feed-forward, which a PI controller corrects from measured pitch and roll. Measured rates
+//! damp vibration. Rate, acceleration and torque of the motors are limited. The table of [`variables`] and `fmu.rs`
+//! define the FMU; the other modules do not depend on FMI.
 //!
 //! ```
 //! use prw_controller::controller::Inputs;

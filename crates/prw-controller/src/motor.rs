@@ -57,8 +57,8 @@ impl MotorSetpoint {
     }
 }
 
-/// Returns the rate v at the next sample, at most `limit`, from which the motor can just stop within the distance q. The
-/// units are those of [`MotorSetpoint::plan_acceleration`].
+/// Returns the rate v at the next sample, at most `limit`, from which the motor can just stop within the distance q. All
+/// values are in the units that [`MotorSetpoint::plan_acceleration`] defines.
 ///
 /// Until the next sample, a motor that reaches v covers v/2 (the part that depends on its current rate is already
 /// subtracted from q). Braking takes m = floor(v) whole samples, and one more for the remainder v - m, over the distance

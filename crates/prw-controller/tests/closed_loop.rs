@@ -8,8 +8,8 @@ fn invalid_numbers_are_rejected() {
     for (arguments, message) in [
         (&["--go-to", "nan", "60"][..], "--go-to must have finite numbers, not NaN"),
         (&["--go-to", "30", "inf"], "--go-to must have finite numbers, not inf"),
-        (&["--stop-time", "inf"], "--stop-time must be > 0, it is inf"),
-        (&["--step-size", "0"], "--step-size must be > 0, it is 0"),
+        (&["--stop-time", "inf"], "--stop-time must be finite and > 0, it is inf"),
+        (&["--step-size", "0"], "--step-size must be finite and > 0, it is 0"),
     ] {
         let program = env!("CARGO_BIN_EXE_build_closed_loop");
         let output = Command::new(program).args(arguments).arg("--out").arg(&directory).output().unwrap();

@@ -96,7 +96,7 @@ fn motors_back_off_from_a_blocked_wrist() {
     }
     let [one, _] = motions.last().unwrap();
     assert!((p.stiffness * one.angle - p.max_torque).abs() < 1e-6, "{one:?}");
-    // Anti-windup: the integral has paused while the motors backed off.
+    // Anti-windup: the integral has paused while the motors moved, and while the torque limited their goals.
     assert_eq!(c.integral, [0.0; 2]);
     let motions = run(&mut c, 2.0, rigid(reference));
     for motor in motions.iter().flatten() {
@@ -104,7 +104,7 @@ fn motors_back_off_from_a_blocked_wrist() {
     }
 }
 
-/// Checks that the motor turns back if the torque exceeds the limit, even if the motor did not cause it.
+/// Checks that the motors do not turn forward while the torque exceeds the limit, even if they did not cause the torque.
 #[test]
 fn torque_beyond_the_limit_reverses_the_motor() {
     let mut c = controller(|_| ());

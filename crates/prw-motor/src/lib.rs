@@ -9,7 +9,7 @@ use fmu_export::*;
 /// A value of motor 1 and of motor 2.
 type Pair = [f64; 2];
 
-/// Both motors: their inputs, states and parameters.
+/// Both motors: their inputs with slopes, states and parameters.
 #[derive(Clone, Debug)]
 pub struct Motors {
     /// Torques of the motors (`torque`) and of the wrist on the motors (`tau`), N.m.
@@ -80,10 +80,10 @@ impl Motors {
     }
 }
 
-/// Returns the functions sum over n of (-z)^n / (n + k)! for k = 0 to 3. The first is exp(-z); the others result from
-/// integrating it repeatedly.
+/// Returns the sums of (-z)^n / (n + k)! over all n from 0 on, for k = 0 to 3. The first sum is exp(-z); the others result
+/// from repeated integration of exp(-z).
 fn decays(z: f64) -> [f64; 4] {
-    // If z is small, the differences below lose digits, but a few terms of the series are accurate.
+    // If z is small, the differences below lose digits, but the series converges fast.
     if z < 0.5 {
         return std::array::from_fn(|k| {
             let first = [1.0, 1.0, 0.5, 1.0 / 6.0][k];

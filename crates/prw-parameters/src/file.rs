@@ -1,4 +1,5 @@
-//! Reads `modelDescription/parameters.json`, Table 1 of the paper as printed, or a file of the same format.
+//! Reads `modelDescription/parameters.json`, Table 1 of the paper as printed, or a file of the same format. Also converts the
+//! parameters to Rust code for the build script.
 //!
 //! This module uses no derive macros, because every build of the library begins by compiling it, and derive macros would take
 //! longer to compile than everything else in the build script.
@@ -19,7 +20,7 @@ const DEG_PER_RAD: f64 = 180.0 / PI;
 /// Reads and checks a parameter file.
 ///
 /// # Errors
-/// The message names the file, the parameter and the fault.
+/// The message names the file and the fault, and the parameter if the fault concerns one.
 pub fn read(file: &Path) -> Result<Parameters, String> {
     let name = file.display();
     let json = fs::read_to_string(file).map_err(|error| format!("{name}: cannot be read: {error}"))?;
@@ -74,13 +75,14 @@ fn in_unit<T: Number>(entry: &Object<Value>, si: &str) -> Result<T, String> {
 
 /// A type that parameters have: [`Real`] or [`Integer`].
 trait Number: Sized {
-    /// Name of the values that are accepted, for error messages.
+    /// Description of the values that are accepted, for error messages.
     const KIND: &str;
 
     /// Returns the number if it has this type.
     fn from_json(value: &Value) -> Option<Self>;
 
-    /// Multiplies the number by the factor of a unit conversion. Fails if the product is too large.
+    /// Multiplies a [`Real`] by the factor of a unit conversion; fails if the product is too large. An [`Integer`] has no
+    /// unit and stays unchanged.
     fn times(self, factor: f64) -> Result<Self, String>;
 }
 
@@ -182,7 +184,8 @@ mod tests {
         assert_eq!((p.M, p.N), (4, 7));
     }
 
-    /// The constant in the library is an expression that the build script has written, so it must have the same bits.
+    /// The constant in the library is an expression that the build script has written, so its numbers must have the same
+    /// bits as the parameters.
     #[test]
     fn the_expression_has_typed_numbers_with_the_same_bits() {
         let table_1 = parse(TABLE_1).unwrap();

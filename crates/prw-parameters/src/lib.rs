@@ -1,14 +1,14 @@
 //! The parameters of the testbed (Table 1 of the paper), in SI units.
 //!
-//! They are in a separate package because three programs need them: the model, its build script, which compiles the values
+//! They are in a separate package because three parts need them: the model, its build script, which compiles the values
 //! into the library, and `build_fmu`, which writes them into the model description. The file with the values is read only
 //! while an FMU is built, by the module `file`.
 
 use std::fmt;
 
-/// Type of a measured parameter; FMI calls it Real.
+/// Type of a measured parameter; FMI 2.0 calls it Real.
 pub type Real = f64;
-/// Type of a counted parameter; FMI calls it Integer.
+/// Type of a counted parameter; FMI 2.0 calls it Integer.
 pub type Integer = i32;
 
 /// Passes the table of parameters to the macro `$make`: description, name, type, range and unit of each.
@@ -54,7 +54,7 @@ macro_rules! parameters {
                 vec![$((stringify!($name).to_owned(), self.$name.to_string())),+]
             }
 
-            /// All parameters 0. Used for the direction of a derivative, in which some parameters are then set.
+            /// All parameters 0. Used for the direction of a derivative, in which one parameter is then set to 1.
             pub const ZERO: Self = Self { $($name: 0 as $kind,)+ };
 
             /// Returns other parameters, for tests. In the order of Table 1, every measured value is multiplied by exp of the
@@ -101,7 +101,7 @@ impl Varied for Integer {
 }
 
 impl Parameters {
-    /// Returns the transmission ratio from the difference of the motors to roll, N / 2M of eq. (1).
+    /// Returns the transmission ratio from the difference theta5 - theta6 to roll, N / 2M of eq. (1).
     pub fn roll_ratio(&self) -> f64 {
         f64::from(self.N) / (2.0 * f64::from(self.M))
     }
@@ -109,7 +109,7 @@ impl Parameters {
     /// Checks that the parameters are in the ranges in which the equations are valid.
     ///
     /// # Errors
-    /// The message names the parameter and its valid range.
+    /// The message names the invalid parameter and its range, or the two parameters that must not both be 0.
     pub fn check(&self) -> Result<(), InvalidParameter> {
         self.check_ranges()?;
         if self.c1 + self.c2 <= 0.0 {
@@ -128,7 +128,7 @@ impl Parameters {
 pub struct InvalidParameter(String);
 
 impl InvalidParameter {
-    /// Describes the reason, for the log of the FMU.
+    /// Creates an error with this reason, which the FMU logs.
     pub fn new(reason: impl Into<String>) -> Self {
         Self(reason.into())
     }

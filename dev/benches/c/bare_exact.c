@@ -13,7 +13,7 @@ typedef struct {
     double input[4], set_rate[2];
     Lanes z[3], u, w;    /* at the end of the last step; w from the parabola through the last samples */
     Lanes sample[2];     /* the last motor angles and the ones before them */
-    Lanes rate[3], bend[3]; /* weights of three samples (current, last, before) in the parabola's slope and curvature */
+    Lanes rate[3], bend[3]; /* weights of three samples (current, last, before) in the parabola's slope and quadratic term */
     double h1, h2;       /* the last steps */
     int samples, uneven, special, has_rate[2], use_omega;
 } State;
@@ -44,7 +44,7 @@ void *fmi2Instantiate(const char *n, int t, const char *g, const char *r, const 
     return i;
 }
 
-/* growth = exp(A h) and ramp = (integral of exp(A s) over 0..h) b: a Taylor series, doubled. */
+/* growth = exp(A h) and ramp = (integral of exp(A s) over 0..h) b: a Taylor series for a short step, which is then doubled. */
 static __attribute__((noinline)) void make_matrices(Instance *i, double h) {
     Lanes Ah[3][3], term[3][4], sum[3][4];
     double norm = 0;

@@ -1,6 +1,6 @@
 /* Times a Co-Simulation FMU of FMI 2.0 through its C interface. Prints seconds to stderr and outputs to stdout.
  *   bench LIBRARY GUID memory                       bytes of an instance instead of seconds
- *   bench LIBRARY GUID WAY STEPS THREADS            seconds per step; with 0 threads only the outputs of every step
+ *   bench LIBRARY GUID WAY STEPS THREADS            seconds per step; with 0 threads also the outputs of every step
  *   bench LIBRARY GUID RUNS SAMPLES STEP INPUTS OUTPUTS INSTANCES
  * The last form times RUNS runs of INSTANCES instances with the inputs in stdin, SAMPLES rows of doubles. It stores all
  * outputs, and prints those of the last instance in the last run. INPUTS and OUTPUTS are value references with commas. */

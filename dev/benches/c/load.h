@@ -1,5 +1,5 @@
-/* Loads an FMU for FMI 2.0, for the benchmarks. A function that the library lacks stays NULL: bare_exact.c and euler.c have no
- * fmi2Terminate, fmi2Reset and Model Exchange. */
+/* Loads an FMU for FMI 2.0, for the benchmarks. A function that the library lacks stays NULL: for example, bare_exact.c and
+ * euler.c have no fmi2Terminate, fmi2Reset and Model Exchange. */
 #pragma once
 #include <dlfcn.h>
 #include <stdio.h>

@@ -26,7 +26,7 @@ static void make_system(System *s) {
         for (int j = 0; j < 4; j++) s->D[i][j] = c1 * s->B[i][j];
         s->C[i][i] += k1, s->D[i][i] -= k1, s->D[i][2 + i] -= c1;
     }
-    /* force on theta5, theta6: c2 (theta3' - omega5) + k2 (theta3 - theta5) - load damping */
+    /* torques on theta5 and theta6; the first is c2 (theta3' - omega5) + k2 (theta3 - theta5) - load damping */
     double F[2][6], G[2][4];
     for (int i = 0; i < 2; i++) {
         for (int j = 0; j < 6; j++) F[i][j] = c2 * s->A[i][j];

@@ -84,7 +84,7 @@ def render(project: Path, page: Page) -> str:
 
 
 def _in_order(directory: Path) -> list[Path]:
-    """The files 0_header.html, 1_....html to the last."""
+    """The files N_NAME.html, in the order of their numbers N."""
     paths = sorted(directory.glob("*_*.html"), key=lambda path: int(path.stem.split("_")[0]))
     if not paths:
         raise UserError(f"{directory}: there are no files N_NAME.html; run this in the repository root")
@@ -114,7 +114,7 @@ def _program(name: str, text: str) -> str:
 
 
 def _roots(roots: Iterable[Sequence[float]]) -> str:
-    """Real and conjugate complex numbers as text: -174.873 and -9.68 ± 34.68 i."""
+    """Real and conjugate complex numbers as text: −174.87 and −9.68 ± 34.68 i."""
     parts = []
     for real, imaginary in roots:
         parts.append(f"{real:.2f}" + (f" ± {imaginary:.2f} i" if imaginary else ""))

@@ -13,7 +13,7 @@ TEMPLATE = "performance.md.j2"
 
 
 def render(project: Path) -> str:
-    """The page in Markdown. Depends on the project's files only. Raises FileNotFoundError if figures are missing."""
+    """The page in Markdown. Depends on the project's files only. Raises FileNotFoundError if a file with the numbers is missing."""
     import jinja2
 
     ratios, counted = (json.loads((project / path).read_text(encoding="utf-8")) for path in (RATIOS, INSTRUCTIONS))

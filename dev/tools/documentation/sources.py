@@ -41,7 +41,8 @@ def read_description(path: Path) -> Any:
 
 
 def read_table(path: Path, heading: str) -> Table:
-    """The first table below a heading of a Markdown file. Raises UserError if there is none, or if a cell is missing."""
+    """The first table below a heading of a Markdown file. Raises UserError if there is none, or if a row has fewer or more cells
+    than the header."""
     text = read(path)
     section = re.search(rf"^(#+) {re.escape(heading)}\n(.*?)(?=^#+ |\Z)", text, flags=re.M | re.S)
     table = section and re.search(r"^\|.*\|\n\|[-:| ]+\|\n(?:\|.*\|\n)+", section[2], flags=re.M)
@@ -61,5 +62,5 @@ def shown_unit(variable: Any) -> str:
 
 
 def format_start(variable: Any) -> str:
-    """The start value of a variable; a Real has eight digits."""
+    """The start value of a variable; a Real has at most eight significant digits."""
     return f"{float(variable.start):.8g}" if variable.type == "Real" else variable.start

@@ -32,7 +32,7 @@ def variable_table(description: Any, causality: str, title: str) -> str:
 
 
 def parameter_table(description: Any, printed: dict[str, Any]) -> str:
-    """The parameters with their start values, and the values and units that the paper prints."""
+    """The parameters with their start values and, unless `printed` is empty, the values and units that the paper prints."""
     rows = []
     for variable in description.modelVariables:
         if variable.causality != "parameter":

@@ -23,7 +23,7 @@ class Transfer(NamedTuple):
     Attributes
     ----------
     key
-        Letter of the plot in Fig. 5 and in file names.
+        Letter of the plot in file names; for H(s) also in Fig. 5.
     title
         Input and output.
     unit

@@ -192,7 +192,8 @@ def _packed(path: str) -> str:
 
 
 def _relative(points: str) -> str:
-    """The points of straight lines, all but the first of each line relative to the point before them."""
+    """The points of straight lines, all but the first of each line relative to the point before them. Other paths do not
+    change."""
     found = re.findall(r"([ML])(-?[\d.]+) (-?[\d.]+)", points)
     if "".join(f"{command}{x} {y}" for command, x, y in found) != points:
         return points

@@ -1,5 +1,5 @@
 """Runs the reference experiments with the testbed for FMI 2.0 and FMI 3.0 under every importer that is installed, and
-the closed loop under every master; compares the results with the reference, and finds out which changes of parameters
+the closed loop under every master. Compares the results with the reference, and finds out which changes of parameters
 the tolerances detect. Writes validation.html and validation.json."""
 
 from __future__ import annotations

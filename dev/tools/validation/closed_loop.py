@@ -1,5 +1,5 @@
 """Runs the closed loop, prw_closed_loop.ssp or OspSystemStructure.xml, under FMPy, libcosim and Ecos, if they are installed.
-Compares the results, and calculates the error of the coupling over the communication step. Writes closed_loop.csv,
+Compares the results, and calculates the error of the coupling for several communication steps. Writes closed_loop.csv,
 closed_loop.png, coupling.csv and coupling.png."""
 
 from __future__ import annotations
@@ -105,6 +105,6 @@ def _difference(first: dict[str, np.ndarray], other: dict[str, np.ndarray], name
         max(np.abs(first[key] - other[key]).max() for key in first if (key in torques) == wanted)
         for wanted in (False, True)
     )
-    # Torques depend on the motors at the same instant, so it matters whether a master reads before it sets.
+    # Torques depend on the motors at the same instant, so it matters whether a master reads them before it sets the inputs.
     when = ", read after the next inputs are set" if torque > 1e-6 > motion else ""
     return f"angles and rates within {motion:.1g} (rad, rad/s) of {name}, torques within {torque:.1g} N.m{when}"

@@ -1,8 +1,9 @@
 """Third-party co-simulation masters that run the closed loop: FMPy's SSP support, libcosim, Ecos.
 
 All three couple by Jacobi's method: during a step, every FMU gets the outputs that the others had at the beginning of
-the step. So with the same step size, their results must agree within rounding error. Each master runs in a separate
-process, because libraries in C++ start loggers and thread pools, and may crash.
+the step. So with the same step size, their results must agree within rounding error, except for the torques of Ecos,
+which it reads later. Each master runs in a separate process, because libraries in C++ start loggers and thread pools,
+and may crash.
 """
 
 from __future__ import annotations
@@ -108,8 +109,8 @@ MASTERS = (
 def run_separately(master: Tool, system: System) -> dict[str, np.ndarray]:
     """Run the system under the master in a separate process.
 
-    Returns `time` and RECORDED by name, each (steps,): the values at the end of every step. Raises UserError with the
-    output of the process if it fails, or if it logs a warning or an error.
+    Returns `time` and RECORDED by name, each (steps,): the values at the end of every step. Raises UserError with a
+    line of its output if the process fails, or if it logs a warning or an error.
     """
     with tempfile.TemporaryDirectory() as directory:
         result = Path(directory, "result.npy")

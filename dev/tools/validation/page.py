@@ -40,7 +40,7 @@ def page(found: Validation) -> str:
 
 
 def outcome(found: Validation) -> str:
-    """The number of runs that agree, and the versions used."""
+    """The number of runs that agree, the largest differences, and the date, the machine and the guid."""
     far = [row for row in found.rows if not row.agrees]
     worst = max((row for row in found.rows if row.agrees), key=lambda row: row.share, default=None)
     lines = [f"{len(found.rows) - len(far)} of {len(found.rows)} runs agree with the reference."]

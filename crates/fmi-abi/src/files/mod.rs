@@ -14,11 +14,11 @@ pub use unpack::{Entry, Limits, unpack};
 /// Maximum size of an XML file, in bytes.
 pub const MAX_XML: u64 = 256 << 20;
 
-/// Opens a file, if it is a regular file. Other files are rejected, because a pipe would wait for a writer, and a
-/// device may never end.
+/// Opens a file, if it is a regular file. Other files are rejected, because opening a pipe would wait for a writer, and
+/// reading a device may never end.
 ///
 /// # Errors
-/// Fails if there is no such file, or it is not a regular file.
+/// Fails if the file cannot be opened or is not a regular file.
 pub fn open(path: &Path) -> Result<File, String> {
     let message = |error: std::io::Error| format!("cannot be opened ({error})");
     if !std::fs::metadata(path).map_err(message)?.is_file() {
@@ -30,7 +30,7 @@ pub fn open(path: &Path) -> Result<File, String> {
 /// Reads a file of at most `most` bytes.
 ///
 /// # Errors
-/// Fails if the file cannot be opened or read, or has more bytes.
+/// Fails if the file cannot be opened or read, has more bytes, or would take too much memory.
 pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, String> {
     let file = open(path)?;
     let message = |error: std::io::Error| format!("cannot be read ({error})");
@@ -49,8 +49,8 @@ pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, String> {
 /// Reads and decodes an XML file.
 ///
 /// # Errors
-/// Fails for the same reasons as [`read`], and if the encoding is not UTF-8, UTF-16 with a byte order mark, or
-/// ISO-8859-1.
+/// Fails for the same reasons as [`read`], and if the encoding is none of these: UTF-8, UTF-16 with a byte order mark,
+/// ISO-8859-1 and similar encodings.
 pub fn read_xml(path: &Path) -> Result<String, String> {
     let bytes = read(path, MAX_XML)?;
     reserve(2 * bytes.len()).map_err(|why| format!("cannot be read: {why}"))?;

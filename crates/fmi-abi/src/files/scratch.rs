@@ -1,4 +1,4 @@
-//! Temporary directories that are removed even if the process is killed.
+//! Temporary directories. If a process is killed, a later process removes its directories.
 
 use std::fs::{self, File};
 use std::io;
@@ -22,7 +22,7 @@ impl Scratch {
     /// processes have left behind.
     ///
     /// # Errors
-    /// Fails if no directory can be created.
+    /// Fails if the directory or the lock file in it cannot be created.
     pub fn new(prefix: &str) -> io::Result<Self> {
         remove_abandoned(&std::env::temp_dir(), prefix);
         loop {
@@ -43,8 +43,8 @@ impl Scratch {
     }
 }
 
-/// Removes the directories whose lock no process holds. Failures are ignored, because a directory that remains does
-/// no harm.
+/// Removes the directories with this prefix whose lock no process holds. Failures are ignored, because a directory that
+/// remains does no harm.
 fn remove_abandoned(parent: &Path, prefix: &str) {
     for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
         let is_directory = entry.file_type().is_ok_and(|of| of.is_dir());

@@ -37,9 +37,10 @@ pub struct Entry<'a> {
 }
 
 /// Unpacks the ZIP file `path` into the directory `to`; messages call the file `what`, for example "an FMU". `wanted`
-/// returns whether an entry is extracted. Entries outside of the directory are never extracted, and neither are
-/// links, because they could lead outside. The unpacked bytes and entries are subtracted from `limits`. Permissions
-/// are ignored, because some tools write entries that the owner could not read, but programs stay executable.
+/// returns whether an entry is extracted. Entries outside of the directory are never extracted, and neither are links,
+/// because a link could lead outside. The number of all entries and the extracted bytes are subtracted from `limits`.
+/// Permissions are ignored, because some tools write entries that the owner could not read, but programs stay
+/// executable.
 ///
 /// # Errors
 /// Fails if the file is not a ZIP file or exceeds the limits, if an entry cannot be extracted, or if `wanted` fails.
@@ -84,8 +85,8 @@ fn check_count(count: u64, limits: Limits) -> Result<(), String> {
     reserve(bytes).map_err(|why| format!("cannot be unpacked: {why}"))
 }
 
-/// Returns the number of entries that the end of an archive declares, so that it can be checked before the directory
-/// is read. Returns `None` if the file has no such end.
+/// Returns the number of entries that the end of an archive declares, so that this number can be checked before the
+/// archive's directory is read. Returns `None` if the file has no such end, or cannot be read.
 fn declared_count(file: &mut File) -> Option<u64> {
     /// Total length of the record at the end, its longest comment, and the records before it in large archives.
     const LONGEST: u64 = 22 + 65_535 + 76;
@@ -208,7 +209,7 @@ mod tests {
             "has more than 2 MB when it is unpacked, the limit for archives"
         );
         assert_eq!(unpacked(3 << 20, 2).unwrap_err(), "has 3 entries; the limit for archives is 2");
-        assert!(!to.exists(), "nothing is written");
+        assert!(!to.exists(), "a rejected archive must not be unpacked");
         assert_eq!(unpacked(3 << 20, 3), Ok(()));
         // Changes the archive so that it declares smaller sizes than its files have.
         let bytes = std::fs::read(&path).unwrap();

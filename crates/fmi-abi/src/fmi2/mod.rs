@@ -5,9 +5,9 @@ pub mod types;
 use types::*;
 
 /// Passes the list of functions to the macro at the path `with`. Tokens after the path are passed on before the list.
-/// The list begins with the functions that have no instance argument, with their arguments and results. The functions
-/// on an instance follow as `name CS ME tolerated (arguments);`, where `CS` and `ME` are the states in which the
-/// standard allows the call in Co-Simulation and Model Exchange.
+/// The list begins with the functions that do not return a status: versions, creation and release of instances, with
+/// their arguments and results. The functions on an instance follow as `name CS ME tolerated (arguments);`, where `CS`
+/// and `ME` are the states in which the standard allows the call in Co-Simulation and Model Exchange.
 ///
 /// Each letter is a column of the tables in sections 4.2.4 and 3.2.3 of FMI 2.0: I instantiated, N initialization, C
 /// step complete, F step failed, M event, K continuous time, T terminated, E error. Fatal has no letter, because no
@@ -18,8 +18,8 @@ use types::*;
 /// Tolerated calls, for interface types that have the function:
 /// * fmi2Terminate after an error (FMI Library calls it when it destroys an instance);
 /// * fmi2EnterInitializationMode without fmi2SetupExperiment before it: the start time is then 0;
-/// * fmi2SetInteger, fmi2SetBoolean and fmi2SetString in Continuous-Time Mode, if each input already has the value
-///   (FMPy);
+/// * fmi2SetInteger, fmi2SetBoolean and fmi2SetString in Continuous-Time Mode, if each input already has the value that
+///   is set (FMPy);
 /// * fmi2SetTime in Initialization Mode and Event Mode, fmi2SetContinuousStates in Event Mode (OpenModelica makes
 ///   these calls in every run).
 #[doc(hidden)]

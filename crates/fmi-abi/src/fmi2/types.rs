@@ -90,11 +90,11 @@ pub type fmi2StepFinished = unsafe extern "C" fn(environment: fmi2ComponentEnvir
 pub struct fmi2CallbackFunctions {
     /// Receives log messages.
     pub logger: Option<fmi2CallbackLogger>,
-    /// Unused.
+    /// Unused by fmu-export.
     pub allocate_memory: Option<fmi2CallbackAllocateMemory>,
-    /// Unused.
+    /// Unused by fmu-export.
     pub free_memory: Option<fmi2CallbackFreeMemory>,
-    /// Unused.
+    /// Unused by fmu-export.
     pub step_finished: Option<fmi2StepFinished>,
     /// Passed to the logger.
     pub component_environment: fmi2ComponentEnvironment,

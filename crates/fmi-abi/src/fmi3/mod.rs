@@ -5,9 +5,9 @@ pub mod types;
 use types::*;
 
 /// Passes the list of functions to the macro at the path `with`. Tokens after the path are passed on before the list.
-/// The list begins with the functions that have no instance argument, with their arguments and results. The functions
-/// on an instance follow as `name CS ME tolerated (arguments);`, where `CS` and `ME` are the states in which the
-/// standard allows the call in Co-Simulation and Model Exchange.
+/// The list begins with the functions that do not return a status: versions, creation and release of instances, with
+/// their arguments and results. The functions on an instance follow as `name CS ME tolerated (arguments);`, where `CS`
+/// and `ME` are the states in which the standard allows the call in Co-Simulation and Model Exchange.
 ///
 /// Each letter is a state of sections 2.3, 3.2 and 4.2 of FMI 3.0: I instantiated, N Initialization Mode, C Step
 /// Mode, M Event Mode, K Continuous-Time Mode, T terminated. Fatal has no letter, because no call is allowed in it.
@@ -17,15 +17,17 @@ use types::*;
 /// In fmu-export, a call that returns an error changes nothing, so the importer may continue, although by section
 /// 2.3.1 of FMI 3.0 the instance would be terminated.
 ///
-/// No state allows fmi3ActivateModelPartition, because it belongs to Scheduled Execution, which is not supported.
-/// Some functions are allowed but return an error with the reason: functions of clocks, fmi3EvaluateDiscreteStates,
-/// and fmi3EnterConfigurationMode after the initialization, because there are no structural parameters.
+/// No state allows fmi3ActivateModelPartition, because it belongs to Scheduled Execution, which is not supported. Some
+/// functions are allowed, but fmu-export always returns an error with the reason: the functions of clocks,
+/// fmi3EvaluateDiscreteStates, fmi3GetNumberOfVariableDependencies and fmi3GetVariableDependencies. After the
+/// initialization, fmi3EnterConfigurationMode also returns an error, because there are no structural parameters.
 ///
 /// Tolerated calls, for interface types that have the function:
 /// * fmi3SetTime in Initialization Mode and Event Mode, fmi3SetContinuousStates in Event Mode, as in FMI 2.0;
 /// * the functions that return the number of states, the number of event indicators and the nominal values, in every
 ///   state, because the numbers never change and nominal values exist from the start;
-/// * functions that set discrete inputs in Continuous-Time Mode, if each input already has the value (FMPy);
+/// * functions that set discrete inputs in Continuous-Time Mode, if each input already has the value that is set
+///   (FMPy);
 /// * fmi3EnterEventMode in Event Mode, as in FMI 2.0 (OpenModelica);
 /// * fmi3EnterConfigurationMode and fmi3ExitConfigurationMode in instantiated, although there are no structural
 ///   parameters (FMIKit). Nothing changes, so the instance stays in instantiated.

@@ -1,4 +1,4 @@
-//! Evaluates runs: finds violations of rules, and processes that ended before the last step.
+//! Evaluates runs: finds violations of rules, and processes that ended before the last step returned.
 
 use super::{Checker, at};
 use crate::always;
@@ -9,7 +9,8 @@ use crate::writer::{Read, difference};
 use std::sync::Arc;
 
 impl Checker {
-    /// Records a finding if a run breaks a rule; returns whether it does.
+    /// Records a finding if a run breaks a rule; returns whether it does. Returns false for a run that ended before its last step
+    /// returned.
     pub fn record(&self, name: &str, run: &Run, sequence: &CallSequence, criterion: impl Criterion) -> bool {
         let observed = if run.end == End::Done { criterion(run) } else { None };
         let found = observed.map(|observed| {
@@ -100,7 +101,7 @@ impl Checker {
         }
     }
 
-    /// Records the finding of a run that ended before its last step.
+    /// Records the finding of a run that ended before its last step returned, unless this machine is the reason.
     fn ended(&self, rule: &str, sequence: &CallSequence, run: &Run, forbidden: bool) -> anyhow::Result<()> {
         let Some(observed) = ending(run, sequence) else { return Ok(()) };
         if self.lacks(run).is_some() {

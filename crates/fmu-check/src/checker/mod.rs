@@ -55,7 +55,7 @@ pub struct Checker {
     /// other call sequence is executed at the same time.
     exclusive: RwLock<()>,
     /// Functions that did not return even when their call sequence was repeated with three times the limit and no other call
-    /// sequence was executed.
+    /// sequence was executed at the same time.
     hung: Mutex<HashSet<String>>,
     executed: Mutex<u64>,
 }
@@ -108,7 +108,7 @@ impl Checker {
         Step::Version(if self.fmi3() { "fmi3GetVersion" } else { "fmi2GetVersion" }.to_owned())
     }
 
-    /// Returns `count`, or an eighth of it in a quick check.
+    /// Returns `count`, or an eighth of it (rounded up) in a quick check.
     pub fn at_most(&self, count: usize) -> usize {
         if self.quick { count.div_ceil(8) } else { count }
     }

@@ -10,8 +10,8 @@ use crate::worker::interrupted;
 use std::path::Path;
 use std::time::Instant;
 
-/// Functions for each topic whose calls are never removed from a call sequence. If one of two compared simulations lacked such
-/// a call, the results would differ for that reason.
+/// For each topic, the functions whose calls are not removed from a call sequence that compares simulations. If only one of two
+/// compared simulations lacked such a call, the results would differ for that reason.
 const PINNED: &[(&str, &[&str])] = &[
     ("states", STATES),
     ("reset", STATES),
@@ -74,7 +74,7 @@ impl Checker {
         finding.judge(proof);
     }
 
-    /// Writes the program of a finding, and returns whether a run of it shows the finding.
+    /// Writes the program of a finding, and returns the result of its runs.
     fn proof(&self, finding: &mut Finding, scratch: &Path, until: Instant) -> Proof {
         let over =
             |_| Proof::NotRun(if interrupted() { Stop::Interrupted } else { Stop::TimeOver }.to_string());

@@ -9,8 +9,9 @@ use crate::writer::Part::{Begin, Enter, Make};
 use crate::writer::{Read, Trajectory, Writer, value_of};
 use std::collections::HashSet;
 
-/// Returns the variables of the unknowns whose `dependencies` attribute lists neither the known nor an alias of it. An unknown without the
-/// attribute is left out, because it is declared to depend on every known.
+/// Returns the variables of the unknowns whose `dependencies` attribute lists neither the known nor an alias of it. An unknown
+/// without the attribute is left out, because it is declared to depend on every known. The known and its aliases are left out,
+/// too.
 fn undeclared<'a>(
     checker: &Checker,
     unknowns: impl IntoIterator<Item = &'a Unknown>,
@@ -59,8 +60,9 @@ impl Perturbed {
     }
 }
 
-/// Returns the indices of the points before which dependencies are tried: the second, the middle and the last point. The first point is
-/// not tried, because before the first step the initialization may still depend on the inputs.
+/// Returns the indices of the points before which dependencies are tried: the second, the middle and the last point, in a quick
+/// check only the middle one. The first point is not tried, because before the first step the initialization may still depend on
+/// the inputs.
 fn tried_points(checker: &Checker, trajectory: &Trajectory) -> Vec<usize> {
     let count = trajectory.points.len();
     let mut indices = vec![1.min(count), count / 2, count.saturating_sub(1)];
@@ -120,8 +122,9 @@ pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     discrete(checker, trajectory)
 }
 
-/// Returns the continuous knowns, which are inputs and, in Model Exchange, states; then only the states. States are left out if one of them
-/// is an array, so that each state is an element of the state vector.
+/// Returns two lists: at most 60 continuous knowns, which are inputs and, in Model Exchange, states; and all states, even those
+/// beyond the first 60 knowns. States are left out if one of them is an array, so that each state is an element of the state
+/// vector.
 fn continuous_knowns(checker: &Checker, trajectory: &Trajectory) -> (Vec<usize>, Vec<usize>) {
     let description = &checker.description;
     let scalar = !trajectory.is_stepped() && description.states_count() == Some(description.states().len());
@@ -137,7 +140,8 @@ fn continuous_knowns(checker: &Checker, trajectory: &Trajectory) -> (Vec<usize>,
     (inputs.chain(states.iter().copied()).take(checker.at_most(60)).collect(), states)
 }
 
-/// Checks the dependencies on discrete inputs of any type. They are set in Event Mode, except in Co-Simulation without Event Mode.
+/// Checks the dependencies on discrete inputs of any type that have no aliases. They are set in Event Mode, except in
+/// Co-Simulation without Event Mode.
 fn discrete(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let inputs = (0..description.variables.len()).filter(|index| {
@@ -172,7 +176,7 @@ fn discrete(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Returns the start values of a variable, and values that differ from them; `None` if its range has no other values.
+/// Returns the start values of a variable, and values that differ from them; `None` if `other_values` has none.
 fn start_and_other_values(description: &Description, index: usize) -> Option<[Values; 2]> {
     let variable = &description.variables[index];
     let other = other_values(description, index)?;
@@ -187,7 +191,8 @@ fn start_and_other_values(description: &Description, index: usize) -> Option<[Va
     Some([start, other])
 }
 
-/// Checks the dependencies of initial unknowns on inputs and on variables with `initial` = `exact`, such as parameters.
+/// Checks the dependencies of initial unknowns on numeric inputs and numeric variables with `initial` = `exact`, such as
+/// parameters.
 pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let knowns = (0..description.variables.len()).filter(|index| {

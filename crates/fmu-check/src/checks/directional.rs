@@ -9,8 +9,9 @@ use crate::checker::Checker;
 use crate::finding::Criterion;
 use crate::writer::Trajectory;
 
-/// Checks partial derivatives in the middle of a simulation: directional derivatives are linear in the seed, adjoint derivatives are the
-/// transposed directional ones, and both equal differences.
+/// Checks partial derivatives in the middle of a simulation. Requesting them must not change a variable. Directional derivatives
+/// must be linear in the seed and independent of the order of the variables, and adjoint derivatives must be the transposed
+/// directional ones. The directional derivatives, or the adjoint ones if there are no others, must equal differences.
 pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let [has_directional, has_adjoint] = declared(checker, trajectory.interface);
     let unknowns = unknowns(&checker.description, trajectory.interface);

@@ -7,9 +7,9 @@ use crate::values::inputs_by;
 use crate::writer::Part::Begin;
 use crate::writer::{Point, Trajectory, Writer};
 
-/// Pairs of arguments of `inputs_by`, for the inputs that are set in Event Mode and for the inputs that are set after it. `None` sets no
-/// inputs. Before, the inputs are set with 0.5. The changes are so small that an increase and a decrease are unlikely to both cause an
-/// event.
+/// Pairs of arguments of `inputs_by`, for the inputs that are set in Event Mode and for the inputs that are set after it. `None`
+/// sets no inputs. Before Event Mode, the inputs are set with 0.5. The changes are so small that an increase and a decrease are
+/// unlikely to both cause an event.
 const VARIANTS: [(Option<f64>, Option<f64>); 5] =
     [(None, None), (Some(0.501), None), (None, Some(0.501)), (Some(0.499), None), (None, Some(0.499))];
 
@@ -20,7 +20,8 @@ fn set_by(writer: &mut Writer, by: Option<f64>) {
     }
 }
 
-/// Checks that inputs that are set in Event Mode of Model Exchange affect the unknowns after it, if inputs that are set after it do.
+/// Checks that inputs that are set in Event Mode of Model Exchange affect the unknowns, if inputs that are set after Event Mode
+/// affect them.
 pub fn integrated(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let unknowns = Unknowns { directional: None, indicators: 0, ..Unknowns::new(checker, trajectory) };
     let Integrated { trajectory, chosen } = &integrate_with_events(checker, trajectory)?;
@@ -76,8 +77,8 @@ fn has_effect(
     })
 }
 
-/// Checks that inputs that are set in Event Mode of Co-Simulation affect the outputs after the next step, if inputs that are set in Step
-/// Mode do.
+/// Checks that inputs that are set in Event Mode of Co-Simulation affect the outputs after the next step, if inputs that are set
+/// in Step Mode affect them.
 pub fn stepped(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let Some(Point { size, .. }) = trajectory.points.first() else { return Ok(()) };

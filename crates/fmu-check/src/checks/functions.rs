@@ -24,8 +24,8 @@ fn symbols(checker: &Checker) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Checks that the library exports all functions of its interface types, that its own symbols can be resolved, and that it returns the
-/// right version.
+/// Checks that the library exports all functions of its interface types, that all symbols which the library needs can be
+/// resolved, and that the library returns the right version.
 pub fn present(checker: &Checker) -> anyhow::Result<()> {
     let modes: Vec<Mode> = (0..9).filter_map(|bit| Mode::from_number(1 << bit)).collect();
     let standard = checker.description.standard;
@@ -86,7 +86,8 @@ fn version(checker: &Checker) -> anyhow::Result<()> {
     })
 }
 
-/// Checks that the functions of declared capabilities succeed.
+/// Checks that the functions of declared capabilities succeed: saving and serializing states, and directional and adjoint
+/// derivatives.
 pub fn capabilities(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let (interface, mut calls) = (trajectory.interface, Vec::new());
     if checker.saves(interface) {

@@ -20,9 +20,9 @@ const POINTS: usize = 4;
 /// Number of intervals of the integration.
 const INTERVALS: usize = 40;
 
-/// Integrates Model Exchange from the start of the default experiment. The points are the ends of the intervals and the time events. A
-/// point has an event if the integration has handled one since the point before. So state events come somewhat late, as in an importer that
-/// does not locate them. If the integration fails, returns the usual simulation.
+/// Integrates Model Exchange from the start of the default experiment. The points are the ends of the intervals and the time
+/// events. A point has an event if the integration has handled one since the point before. So state events come somewhat late, as
+/// in an importer that does not locate them. If fewer than two intervals succeed, returns the usual simulation.
 pub fn integrate_with_events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<Integrated> {
     let description = &checker.description;
     let size = step_size(description);
@@ -65,7 +65,7 @@ struct Reached {
     states: Vec<f64>,
     /// Time of the first event, if there is one.
     event: Option<f64>,
-    /// Whether the interval has a state event.
+    /// Whether the interval has an event other than a time event.
     is_state_event: bool,
 }
 

@@ -15,7 +15,7 @@ const MAX_STEPS: usize = 40;
 /// Number of Runge-Kutta steps in a communication step. Another integration has twice as many, to estimate the error.
 const INTEGRATION_STEPS: usize = 4;
 
-/// Largest difference that is not a finding, relative to the range of the values of an output.
+/// Part of a difference that is always allowed, relative to the range of the values of an output.
 const TOLERANCE: f64 = 5e-3;
 
 /// Index of the simulation in Co-Simulation. One input may differ from its start value.
@@ -149,7 +149,7 @@ impl Compared<'_> {
         all.try_into().ok()
     }
 
-    /// Returns the number of state events in a step of Model Exchange, and whether the step has any event.
+    /// Returns the number of events other than time events in a step of Model Exchange, and whether the step has any event.
     fn events(&self, step: usize) -> Option<(f64, bool)> {
         let id = self.simulations[FINER].integrations.get(step)?;
         let numbers = self.run.written(*id)?.numbers();
@@ -174,9 +174,10 @@ impl Compared<'_> {
         quiet.or_else(|| self.discrete_near_events(variable))
     }
 
-    /// Returns the first step after which a discrete variable has a value that Model Exchange has neither after this step, nor after the
-    /// two steps before and the next one. Also returns the values of both. Co-Simulation may handle an event up to a step earlier or later
-    /// than Model Exchange, so such a difference must occur after at least three steps.
+    /// Returns the first step after which a discrete variable has a value that Model Exchange has neither after this step, nor
+    /// after the two steps before and the next one. Also returns the values in Co-Simulation and Model Exchange. Co-Simulation
+    /// may handle an event up to a step earlier or later than Model Exchange, so such a difference must occur after at least
+    /// three steps.
     fn discrete_near_events(&self, variable: usize) -> Option<(usize, String, String)> {
         let has_one_event = |step: usize| {
             let numbers = self.run.written(*self.simulations[FINER].integrations.get(step)?)?.numbers();
@@ -200,8 +201,9 @@ impl Compared<'_> {
         if found.len() < 3 { None } else { found.into_iter().next() }
     }
 
-    /// Returns the step after which an element of a continuous variable differs most, and its values in Co-Simulation and Model Exchange,
-    /// if the error of a solver does not explain the difference. Compares only the steps before the first state event.
+    /// Returns the step after which an element of a continuous variable differs most, and its values in Co-Simulation and Model
+    /// Exchange, if the error of a solver does not explain the difference. Compares only the steps before the first event that is
+    /// not a time event.
     fn continuous(&self, variable: usize) -> Option<(usize, String, String)> {
         let first_state_event =
             (0..self.count).find(|step| self.events(*step).is_none_or(|(states, _)| states > 0.0));

@@ -32,8 +32,9 @@ pub fn accepts_any_size(checker: &Checker, trajectory: &Trajectory) -> bool {
         && !checker.description.event_mode()
 }
 
-/// Compares steps with steps of half the size. If an output is late by a step of any size, it equals the output of the half steps one half
-/// step earlier. No error of a solver has this pattern. An FMU that allows only one step size is compared with its Model Exchange instead.
+/// Compares steps with steps of half the size. If an output is late by a step of any size, it equals the output of the half steps
+/// one half step earlier. No error of a solver has this pattern. An FMU that does not accept steps of any size is compared with
+/// its Model Exchange instead.
 pub fn late(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let outputs = checker.outputs_and_states();
@@ -224,9 +225,9 @@ fn late_step(full: &[f64], half: &[f64], is_float: bool) -> Option<usize> {
     steps.clone().filter(|_| is_late).max_by(|one, other| off(*one).abs().total_cmp(&off(*other).abs()))
 }
 
-/// If the effect of the changed inputs is late by a step of any size, returns the effect. Such an effect is zero after the first step with
-/// the new inputs, and after the second step it is equal for both step sizes. The effect of an input on a state depends on the step size,
-/// so it is not reported if a first-order solver shows it late.
+/// If the effect of the changed inputs is late by a step of any size, returns the effect. Such an effect is zero after the first
+/// step with the new inputs, and after the second step it is equal for both step sizes. A first-order solver also shows the
+/// effect of an input on a state a step late, but this effect depends on the step size, so it is not reported.
 fn late_effect(full: &[f64], half: &[f64], is_float: bool) -> Option<f64> {
     // The inputs change after this step.
     let at = (full.len() - 1) / 2;

@@ -1,4 +1,5 @@
-//! Checks that instances accept the call sequences that the standard allows, and reject a wrong token and a step beyond the stop time.
+//! Checks that instances accept the call sequences that the standard allows, and reject a wrong token and a step beyond the stop
+//! time. Also checks the events of Model Exchange.
 
 use super::Fits::{self, Always, Integrated, Several, Stepped};
 use crate::call_sequence::{Arg, NULL_INSTANCE, Step};
@@ -44,8 +45,8 @@ const WRITTEN_SEQUENCES: &[(Fits, WriteSequence)] = &[
     (Fits::EventMode, event_mode),
 ];
 
-/// Makes twenty instances, because some FMUs have only a fixed number of them. Four are simulated, and freed in another order than they
-/// were made.
+/// Makes twenty instances, because some FMUs support only a fixed number of them. Four are initialized, two of these are
+/// simulated, and all four are freed in an order other than the order of their instantiation.
 fn many(writer: &mut Writer, _: &Trajectory) {
     (4..20).for_each(|instance| drop(writer.write(instance, &[Make])));
     (0..4).for_each(|instance| drop(writer.write(instance, &[Begin])));
@@ -240,7 +241,7 @@ pub fn random(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
         for _ in 0..40 {
             calls.add(&mut writer, &mut random, can_save);
         }
-        // In the other half of these sequences, the instance is freed although it has a saved state.
+        // In about half of these sequences, the instance is freed although it still has a saved state.
         if calls.saved.is_some() && random.below(2) == 0 {
             writer.write(0, &[Drop(0)]);
         }
@@ -250,7 +251,8 @@ pub fn random(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     Ok(())
 }
 
-/// Checks events of Model Exchange: changed states are reported, the next time event is in the future, and event iterations end.
+/// Checks events of Model Exchange: changed states are reported, the next time event is in the future, and the event iteration
+/// after the initialization ends.
 pub fn events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     changed_states(checker, trajectory)?;
     next_event_time(checker, trajectory)?;
@@ -281,7 +283,8 @@ fn next_event_time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
     })
 }
 
-/// Checks that the next time event is in the future after an importer has skipped time events, which the standard forbids.
+/// Checks that the next time event is in the future after an importer has skipped time events, although the standard forbids
+/// skipping them.
 fn late_event(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let fmi3 = checker.fmi3();
     let late = trajectory.end.abs() * 10.0 + 10.0;

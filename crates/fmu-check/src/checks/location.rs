@@ -1,4 +1,4 @@
-//! Checks that an FMU runs in directories of any name.
+//! Checks that an FMU runs in directories whose names have a space or other characters that a URI must encode.
 
 use crate::call_sequence::{Run, Step};
 use crate::checker::Checker;

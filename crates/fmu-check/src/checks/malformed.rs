@@ -47,8 +47,8 @@ fn after(
     writer.sequence
 }
 
-/// Returns, for each function that the interface type allows, its signature, its name without prefix, and the parts that lead to the first
-/// of `MODES` in which it is allowed.
+/// Returns, for each function that the interface type and the capabilities of the FMU allow, its signature, its name without
+/// prefix, and the parts that lead to the first of `MODES` in which it is allowed.
 fn callable(
     checker: &Checker,
     trajectory: &Trajectory,
@@ -136,7 +136,7 @@ fn with_null(checker: &Checker, signature: &Signature, null: usize) -> Vec<Arg> 
     args.collect()
 }
 
-/// Passes value references that no variable has to all getters and setters, except the getter and the setter of Binary.
+/// Calls all getters and setters, except the getter and the setter of Binary, with value references that belong to no variable.
 pub fn references(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let description = &checker.description;
     let standard = description.standard;
@@ -246,7 +246,7 @@ pub fn values(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     });
     let is_input = |index: usize| description.variables[index].causality == "input";
     let size = |index: usize| description.variables[index].size.unwrap_or(1);
-    // Adds a call sequence that sets the values in Initialization Mode and, if `at_points` is true, at every point.
+    // Adds a call sequence that sets the values in Initialization Mode and, if `at_points` is true, at the first three points.
     let mut add = |values: Vec<(usize, Values)>, at_points: bool| {
         sequences.push(after(checker, trajectory, &[Part::Make, Part::Enter], |writer| {
             writer.set(0, &values);
@@ -312,7 +312,8 @@ pub fn times(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     Ok(sequences)
 }
 
-/// Passes malformed bytes as a serialized state: no bytes, equal bytes, and a state that is truncated, repeated or damaged.
+/// Passes malformed bytes as a serialized state: no bytes, bytes that are all equal, and a state that is truncated, repeated or
+/// damaged.
 pub fn bytes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let mut writer = checker.writer(trajectory);
     writer.write(0, &[Part::Begin, Part::Save(0)]);

@@ -58,7 +58,7 @@ pub enum Fits {
     Stepped,
     /// Simulations of Co-Simulation in FMI 3.0.
     Stepped3,
-    /// Simulations of Co-Simulation with Event Mode.
+    /// Simulations of Co-Simulation in FMI 3.0 of FMUs that offer Event Mode.
     EventMode,
     /// Simulations of Model Exchange.
     Integrated,

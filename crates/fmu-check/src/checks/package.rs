@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// Unpacks an FMU, and returns the findings in its ZIP file.
 ///
 /// # Errors
-/// Fails if the FMU cannot be unpacked, or if its files have more than `max_bytes`.
+/// Fails if the FMU cannot be unpacked, if its files have more than `max_bytes`, or if the user interrupts the check.
 pub fn unpack(path: &Path, directory: &Path, max_bytes: u64) -> anyhow::Result<Vec<Observation>> {
     let mut found = Vec::new();
     let mut names = HashSet::new();
@@ -64,7 +64,7 @@ fn directories(standard: Standard) -> Vec<String> {
 /// Returns the path of the library for this platform.
 ///
 /// # Errors
-/// Fails if the FMU has no library for this platform, or one for another processor.
+/// Fails if the FMU has no library for this platform, or if that library is for another processor or cannot be read.
 pub fn library(directory: &Path, standard: Standard, offer: &Offer) -> Result<PathBuf, String> {
     let name = format!("{}{DLL_SUFFIX}", offer.identifier);
     let expected = directories(standard);

@@ -43,8 +43,8 @@ fn set(checker: &Checker, references: Vec<u64>, kind: Kind, bits: Vec<u64>) -> V
     access(checker.description.standard, references, [Arg::In(kind, bits)], total)
 }
 
-/// Returns calls that set variables that cannot be set, and calls that set an input or tunable parameter together with an unknown
-/// reference.
+/// Returns calls that set variables that cannot be set, calls that set an input or tunable parameter together with an unknown
+/// reference, and calls that set an input together with an invalid value.
 fn variable_calls(checker: &Checker, interface: Interface) -> Vec<InvalidCall> {
     let description = &checker.description;
     let unknown = unknown_reference(checker);
@@ -119,7 +119,8 @@ fn not_settable(
     }
 }
 
-/// Returns calls that set one input to a valid value, and another one to NaN or beyond its maximum.
+/// Returns calls that set two inputs, the first to a valid value and the second to NaN or beyond its maximum. If there is only
+/// one input of this type, the calls set it twice.
 fn input_calls(
     checker: &Checker,
     variable: &Variable,
@@ -208,7 +209,7 @@ fn step_calls(checker: &Checker, time: f64, size: f64) -> Vec<InvalidCall> {
     steps.map(step).into_iter().chain(derivatives).collect()
 }
 
-/// Returns calls of Model Exchange with invalid times and states.
+/// Returns calls of Model Exchange with an invalid time or invalid states, and a call that enters Continuous-Time Mode again.
 fn integration_calls(states: &[f64]) -> Vec<InvalidCall> {
     let mode = "entering Continuous-Time Mode, which it is in";
     let mut calls = vec![
@@ -288,7 +289,7 @@ pub fn change_nothing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Res
     after_end(checker, trajectory)
 }
 
-/// Checks that an FMU rejects a value for an input after Terminate, which neither FMI version allows.
+/// Checks that an FMU rejects a value for an input after Terminate, because neither FMI version allows setters there.
 fn after_end(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let is_input = |index: &&usize| {
@@ -311,7 +312,8 @@ fn after_end(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     })
 }
 
-/// Checks that an invalid call is rejected, and that the simulation continues as if the call had not been made.
+/// Checks that an invalid call is rejected, unless it may be accepted, and that the simulation continues after the rejection as
+/// if the call had not been made.
 fn check_invalid_call(
     checker: &Checker,
     trajectory: &Trajectory,

@@ -42,7 +42,8 @@ fn start_values(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()
     others.try_for_each(|other| after_values(checker, trajectory, other, false))
 }
 
-/// Checks a reset after these values were set. If `initialized` is true, the instance is initialized between setting and reset.
+/// Checks a reset after these values were set. If `initialized` is true, the instance is initialized after they were set and
+/// before the reset.
 fn after_values(
     checker: &Checker,
     trajectory: &Trajectory,

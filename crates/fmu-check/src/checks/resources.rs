@@ -1,4 +1,4 @@
-//! Checks that an FMU leaks no memory, threads or files, and changes no settings of the process.
+//! Checks that an FMU leaks no memory, threads or files, changes no settings of the process, and prints nothing.
 
 use crate::call_sequence::{End, Measured, Run, Step, Values};
 use crate::checker::Checker;
@@ -50,7 +50,8 @@ pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     settings(checker, trajectory)
 }
 
-/// Number of repetitions before the first measurement, because the first cycles may allocate memory that later ones use.
+/// Maximum number of repetitions before the first measurement. They are needed because the first cycles may allocate memory that
+/// later ones use.
 const WARM_UP: usize = 200;
 
 /// Maximum number of repetitions between the measurements.
@@ -125,8 +126,8 @@ fn check_leaks(
 /// Describes memory that remains after the repetitions.
 fn leaked_memory((before, after, times): (Measured, Measured, usize), what: &str) -> Option<String> {
     let grown = after.memory.saturating_sub(before.memory);
-    // The smallest block of glibc is 32 bytes, and glibc may keep a few blocks. With other C libraries, the resident memory is measured,
-    // which consists of pages.
+    // The smallest block of glibc is 32 bytes, and glibc may keep a few blocks. If the C library does not report the allocated
+    // memory, the resident memory is measured, which consists of pages.
     let allowed = if before.exact { 16 * times as u64 + 4096 } else { 64 * times as u64 + (4 << 20) };
     (grown > allowed)
         .then(|| format!("{grown} bytes remain after {times} {what}: {} for each", grown / times as u64))

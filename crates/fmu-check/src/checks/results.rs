@@ -258,14 +258,15 @@ fn different_in_steps(description: &Description, index: usize, values: &[Vec<f64
     })
 }
 
-/// Checks that the independent variable is the time at the end of each step.
+/// Checks that the independent variable is the time at the end of each step or, in Model Exchange, at each point.
 pub fn time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let is_time = |index: &usize| description.variables[*index].causality == "independent";
     let Some(index) = (0..description.variables.len()).find(is_time) else { return Ok(()) };
     let mut runs = vec![(0.0, trajectory.points.clone())];
     if let (true, Some(first)) = (trajectory.is_stepped(), trajectory.points.first()) {
-        // Another start time, which an FMU may reject, and a step size that is not a multiple of the solver's step size.
+        // Another start time, which an FMU may reject, and a step size that is unlikely to be a multiple of the solver's step
+        // size.
         runs.push((trajectory.end - description.start_time, trajectory.points.clone()));
         let offer = description.co_simulation.as_ref();
         if offer.is_some_and(|offer| {
@@ -292,7 +293,7 @@ pub fn time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         checker.check("results.time", writer.sequence, move |run| {
             reads.iter().find_map(|(reads, time, step)| {
                 let value = *value_of(run, reads, index)?.numbers().first()?;
-                // A step may end early, and returns lastSuccessfulTime (section 4.2.1 of FMI 3.0).
+                // A step may end early, at the lastSuccessfulTime that it returns (section 4.2.1 of FMI 3.0).
                 let reached = step.and_then(|id| run.outcome(id)?.written.get(3)?.numbers().first().copied());
                 let time = reached.unwrap_or(*time);
                 is_other_time(value, time)

@@ -1,4 +1,5 @@
-//! Checks that freeing an instance does not affect others, and that the library can be unloaded and loaded again.
+//! Checks that freeing an instance does not affect others, that the library can be unloaded and loaded again, and that the
+//! process exits after two instances.
 
 use crate::call_sequence::Step;
 use crate::checker::Checker;

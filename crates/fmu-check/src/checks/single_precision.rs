@@ -137,7 +137,7 @@ fn is_unusual_single(number: f64) -> bool {
     number.is_finite() && rounded(number) == number && number.to_bits().trailing_zeros() < 40
 }
 
-/// Checks that an output has values with more digits than single precision.
+/// Checks that no output has only values of single precision.
 fn outputs(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let mut indices = checker.readable.clone();

@@ -14,9 +14,9 @@ const STEPS: usize = 8;
 /// Number of usual steps before the small ones, after which the states are likely to move.
 const BEFORE: usize = 4;
 
-/// Returns small step sizes for a usual step size. They contain an irrational factor, so that they are not multiples of the step size of a
-/// solver. Each size is less than `STEPS` times the next one. So one of them is shorter than the solver's step although `STEPS` such steps
-/// are longer, unless all sizes are longer than the solver's step.
+/// Returns small step sizes for a usual step size. They contain an irrational factor, so that they are not multiples of the step
+/// size of a solver. Each size is less than `STEPS` times the next one. So for one of them, a single step is shorter than the
+/// solver's step and `STEPS` steps together are longer, unless all sizes are longer than the solver's step.
 fn sizes(usual: f64) -> impl Iterator<Item = f64> {
     (1..=6).map(move |number| 0.618_033_988_749_895 * usual * 10_f64.powf(-0.5 * f64::from(number)))
 }

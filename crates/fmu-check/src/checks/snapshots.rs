@@ -29,7 +29,7 @@ pub struct Snapshot {
 }
 
 impl Unknowns {
-    /// Returns all unknowns of an FMU, at most 200 variables.
+    /// Returns the unknowns of an FMU, with at most 200 variables.
     pub fn new(checker: &Checker, trajectory: &Trajectory) -> Self {
         let description = &checker.description;
         let is_continuous = |index: &usize| {

@@ -9,7 +9,7 @@ use crate::values::inputs_by;
 use crate::writer::{Point, Trajectory, Writer};
 use std::sync::Arc;
 
-/// Smallest difference that is a finding, relative to the largest magnitude of the number in the simulation. Smaller differences are
+/// Difference that is always allowed, relative to the largest magnitude of the number in the simulation. Small differences are
 /// normal, because FMUs solve algebraic loops by iteration.
 const TOLERANCE: f64 = 1e-3;
 

@@ -121,8 +121,8 @@ fn values(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Checks that constants and parameters do not change while time advances. Other fixed variables are checked only if the model has no
-/// tunable variables.
+/// Checks that constants and parameters do not change while time advances. Other fixed variables are checked only if the model
+/// has no tunable variables and no fixed inputs, on which they may depend.
 fn constants(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let variables = &checker.description.variables;
     let tunable = variables.iter().any(|other| {
@@ -159,7 +159,8 @@ pub fn settable(checker: &Checker) -> Vec<usize> {
     indices
 }
 
-/// Checks that getters return the values that were set in Initialization Mode, before it, and at a communication point.
+/// Checks that getters return the values that were set in Initialization Mode, before it, and at a communication point. Also
+/// checks that the time of setting does not matter, and that inputs keep their values.
 pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let variable = |index: &usize| &description.variables[*index];

@@ -13,7 +13,8 @@ use fmi_abi::BaseType;
 /// Variables, by index, with their values.
 type Assigned = Vec<(usize, Values)>;
 
-/// Returns the start values of a variable; `None` if it is a clock or binary, or has fewer start values than elements.
+/// Returns the start values of a variable; `None` for a clock or a binary variable, and for numbers that do not have one start
+/// value for each element.
 fn starts(description: &Description, index: usize) -> Option<Values> {
     let variable = &description.variables[index];
     match variable.base? {

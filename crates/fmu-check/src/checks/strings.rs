@@ -67,8 +67,8 @@ pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<(
     })
 }
 
-/// Checks that two instances on different threads return the string that was set in them. The string is copied immediately, as importers
-/// do.
+/// Checks that each of two instances on different threads returns the string that was set in it. The worker copies the string
+/// immediately, as importers do.
 pub fn threads(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let values = [1, 2].map(|instance| strings(checker, instance));
     let Some((index, _)) = values[0].first().cloned() else { return Ok(()) };

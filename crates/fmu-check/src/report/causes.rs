@@ -48,7 +48,7 @@ pub fn explain(findings: &mut Vec<Finding>) {
         findings.push(cause);
         findings.extend(followers);
     }
-    // A finding whose cause has a cause, too, was not listed behind it, so it is added at the end.
+    // A finding whose cause also has a cause was not listed behind its cause, so it is added at the end.
     let listed: Vec<String> = findings.iter().map(|finding| finding.name.clone()).collect();
     findings.extend(consequences.into_iter().filter(|finding| !listed.contains(&finding.name)));
 }

@@ -20,7 +20,8 @@ pub struct Report {
     pub schema: u32,
     /// Version of fmu-check.
     pub version: &'static str,
-    /// Exit status: 1 if a finding fails the check, otherwise 2 if an interface or a topic was not checked, otherwise 0.
+    /// Exit status: 1 if a finding fails the check, otherwise 2 if an interface or a topic was not checked although it must be,
+    /// otherwise 0.
     pub status: u8,
     /// Path of the FMU.
     pub fmu: String,
@@ -48,7 +49,7 @@ pub struct Report {
     pub unreached: Vec<Unchecked>,
     /// Names in the baseline that match no finding and no unchecked interface or topic.
     pub unused: Vec<String>,
-    /// Findings, the most severe first.
+    /// Findings, the most severe first; findings that may follow from another one are listed behind it.
     pub findings: Vec<Finding>,
 }
 
@@ -192,7 +193,8 @@ impl Report {
         serde_json::to_string_pretty(self)
     }
 
-    /// Formats the report as JUnit: one test for each finding, which fails if the finding fails the check.
+    /// Formats the report as JUnit: one test for each finding, which fails if the finding fails the check, and one for each
+    /// unchecked interface type or topic.
     pub fn junit(&self) -> String {
         let escape = |text: &str| {
             let printable = |letter: &char| !letter.is_control() || *letter == '\n';

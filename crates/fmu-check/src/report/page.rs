@@ -13,8 +13,11 @@ pub fn escape(text: &str) -> String {
 pub fn page(report: &Report) -> String {
     let mut text = String::new();
     for (severity, what) in [
-        (Severity::Violation, "Violation: the standard requires it."),
-        (Severity::Fragile, "Fragile: no rule forbids it, but importers fail."),
+        (Severity::Violation, "Violation: the standard forbids the observed behaviour."),
+        (
+            Severity::Fragile,
+            "Fragile: the standard does not forbid the observed behaviour, but importers fail.",
+        ),
         (
             Severity::Note,
             "Note: importers work nevertheless, or the program of the finding does not show it.",
@@ -55,7 +58,7 @@ pub fn page(report: &Report) -> String {
             if !finding.c.is_empty() {
                 let _ = writeln!(
                     text,
-                    "<details><summary>Program in C with {} calls that reproduces the finding</summary><pre>{}</pre></details>",
+                    "<details><summary>Program in C for this finding, with {} calls</summary><pre>{}</pre></details>",
                     finding.steps.1,
                     escape(&finding.c)
                 );

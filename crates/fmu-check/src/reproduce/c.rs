@@ -97,8 +97,8 @@ fn head(finding: &Finding, description: &Description) -> String {
     lines.iter().map(|line| format!(" * {}\n", in_comment(line))).collect()
 }
 
-/// Prepares a string of a model description for a comment: puts it on one line, and replaces the characters that could end the
-/// comment, even as trigraphs or over continued lines.
+/// Prepares a string for a comment: puts it on one line, and replaces the characters that could end the comment, even as
+/// trigraphs or over continued lines.
 fn in_comment(text: &str) -> String {
     fmi_abi::one_line(&text.replace('\\', "/")).replace('\\', "/").replace("??", "? ?").replace("*/", "* /")
 }
@@ -126,7 +126,8 @@ fn shows(evidence: &Evidence) -> String {
         }
         Evidence::Same(expected, pairs) => {
             let same = |Expected { id, observed, .. }: &Expected| match is_paired(pairs, *id) {
-                // The values only have to differ from the other call of the pair, so only the status is compared.
+                // The values only have to differ from the values of the other call of the pair, so only the status is compared
+                // with the expected one.
                 true => {
                     let (status, _) = observed.split_once(';').unwrap_or_default();
                     format!("begins(result(\"r\", {id}), \"{status};\")")
@@ -301,7 +302,7 @@ impl Writer<'_> {
              \x20   int status = {call}({handle}{passed});\n\
              {}\x20   print(\"{name}: %d\", status);\n{}    print(\"\\n\"); release(before);\n}}\n",
             lines(parts.before),
-            // Gives other threads time to overwrite the strings before this one copies them.
+            // Gives other threads time to overwrite the strings before this thread copies them.
             if name.ends_with("GetString") { "    if (threads) usleep(20);\n" } else { "" },
             lines(after)
         )
@@ -451,7 +452,7 @@ fn number_of(kind: Kind, bits: u64) -> String {
     }
 }
 
-/// Returns a C string literal of at most 4000 bytes.
+/// Returns a C string literal of the first 4000 bytes.
 fn literal(bytes: &[u8]) -> String {
     let text = bytes.iter().take(4000).fold(String::new(), |mut text, byte| {
         let _ = match byte {

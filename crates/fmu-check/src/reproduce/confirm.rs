@@ -35,7 +35,8 @@ impl Proving<'_> {
         let directory = tempfile::tempdir_in(self.scratch)?;
         let (source, program) = (directory.path().join("repro.c"), directory.path().join("repro"));
         std::fs::write(&source, &finding.c)?;
-        // A hang must last as long as in the check. Everything else may take longer, because the machine may be busy.
+        // A hang must last as long as in the check, but at most 10 s. Everything else may take longer, because the machine may be
+        // busy.
         let ends = ["crash", "exit"].iter().any(|end| finding.name.ends_with(end));
         let patience = match finding.name.ends_with("hang") {
             true => self.limit.min(10.0),

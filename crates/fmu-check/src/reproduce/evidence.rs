@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 /// Comparison by which a program decides whether it reproduces the finding.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Evidence {
-    /// No known comparison.
+    /// No comparison is known.
     #[default]
     None,
     /// Crash, hang or exit, or a library that cannot be loaded.
@@ -32,7 +32,7 @@ pub enum Evidence {
 /// Maximum number of repetitions in a program.
 const REPETITIONS: usize = 500;
 
-/// Maximum number of calls among which pairs are searched.
+/// Maximum number of calls that are searched for pairs.
 const MOST_COMPARED: usize = 12;
 
 /// Quantity of a measurement.
@@ -101,7 +101,7 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
 }
 
 /// Returns the pairs of calls whose values only have to differ, because the criterion is fulfilled if they are equal. The program
-/// does not compare the values themselves, which may be different in every run.
+/// does not compare them with the values of this run, because they may be different in every run.
 fn unequal(criterion: &SharedCriterion, run: &Run, expected: &[Expected]) -> Vec<[u32; 2]> {
     let compared: Vec<&Outcome> = expected
         .iter()
@@ -114,7 +114,7 @@ fn unequal(criterion: &SharedCriterion, run: &Run, expected: &[Expected]) -> Vec
         criterion(&changed).is_none()
     };
     let mut pairs = Vec::new();
-    // A criterion that needs more calls does not only compare pairs.
+    // A criterion that needs more calls compares more than pairs.
     if compared.len() > MOST_COMPARED {
         return pairs;
     }
@@ -320,7 +320,9 @@ mod tests {
             let (one, other) = (run.written(1)?, run.written(3)?);
             one.differ(other).map(|_| "they differ".to_owned())
         });
-        let Evidence::Same(_, pairs) = evidence(&finding(criterion), &run()) else { panic!("no calls") };
+        let Evidence::Same(_, pairs) = evidence(&finding(criterion), &run()) else {
+            panic!("the evidence has no calls")
+        };
         assert_eq!(pairs, [[1, 3]]);
     }
 
@@ -328,7 +330,9 @@ mod tests {
     fn a_call_that_fails_must_fail_again() {
         let criterion: SharedCriterion =
             Arc::new(|run| run.status(2).filter(|status| *status == 3).map(|_| "it fails".to_owned()));
-        let Evidence::Same(expected, _) = evidence(&finding(criterion), &run()) else { panic!("a call") };
+        let Evidence::Same(expected, _) = evidence(&finding(criterion), &run()) else {
+            panic!("the evidence has no calls")
+        };
         assert_eq!(expected.iter().map(|result| result.observed.as_str()).collect::<Vec<_>>(), ["3;"]);
     }
 
@@ -336,7 +340,9 @@ mod tests {
     fn messages_are_compared_where_they_matter() {
         let criterion: SharedCriterion =
             Arc::new(|run| run.outcome(2)?.log.first().map(|_| "a message".to_owned()));
-        let Evidence::Same(expected, _) = evidence(&finding(criterion), &run()) else { panic!("a call") };
+        let Evidence::Same(expected, _) = evidence(&finding(criterion), &run()) else {
+            panic!("the evidence has no calls")
+        };
         assert_eq!(expected[0].observed, "3;3 - 6e6f;");
     }
 

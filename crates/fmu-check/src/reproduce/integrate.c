@@ -1,11 +1,11 @@
 /* Integrates an FMU in Model Exchange by Euler's method or the classical Runge-Kutta method, with steps of a fixed size and with events. */
 
-/* Reads a vector. */
+/* Reads a vector; returns the status. */
 static int vector(void *c, const char *name, double *x, int count) {
     return count ? ((int (*)(void *, double *, size_t))function(name))(c, x, (size_t)count) : 0;
 }
 
-/* Sets the time and the states. */
+/* Sets the time and, if there are states, the states; returns the status. */
 static int set(void *c, double time, const double *x, int count) {
     int status = ((int (*)(void *, double))function(FMI == 3 ? "fmi3SetTime" : "fmi2SetTime"))(c, time);
     if (status > 1 || !count) return status;
@@ -58,7 +58,7 @@ static int integrate(void *c, double begin, double end, int steps, bool euler, i
     double size = (end - begin) / steps, close = 1e-9 * size, time = begin, unused;
     double *room = calloc((size_t)(6 * n + 2 * nz + 1), sizeof *room), *x = room, *y = x + n, *k = y + n, *z = k + 4 * n, *now = z + nz;
     int status = 0;
-    /* The times of the first and the last event, and the number of state events. */
+    /* The times of the first and the last event, and the number of events other than time events. */
     events[0] = events[1] = INFINITY;
     events[2] = 0;
     while (time < end - close && status < 2) {

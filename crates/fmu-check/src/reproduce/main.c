@@ -41,7 +41,7 @@ static void phase(int number, const char *directory) {
     _exit(0);
 }
 
-/* Ends the processes that this one has adopted; returns whether there were any. */
+/* Ends the adopted processes that are still alive after 0.3 s; returns whether there were any. */
 static bool end_orphans(void) {
     bool found = false;
     struct dirent *entry;

@@ -46,7 +46,7 @@ static void *library;
 static char library_path[5000];
 /* Output of this program; the standard output belongs to the library. */
 static FILE *out;
-/* Whether output is switched off, the loader resolves all symbols of the library, and several threads run. */
+/* Whether output is switched off; whether the loader resolves all symbols when it loads the library; whether several threads run. */
 static bool quiet, bind_now, threads;
 /* Time at which the alarm of this program is due. */
 static double alarm_ends;
@@ -135,7 +135,7 @@ static void open_library(void) {
     if (!library) { print("%s\n", dlerror()); fflush(out); _exit(4); }
 }
 
-/* Unloads the library. The output crashes if the library has set a buffer of the standard output that was unloaded with it. */
+/* Unloads the library. The output crashes if the library has set a buffer of the standard output that is unloaded with it. */
 static __attribute__((unused)) void close_library(void) {
     dlclose(library);
     putchar('\n');
@@ -187,7 +187,7 @@ static __attribute__((unused)) bool noted(const char *kind) {
     return access(path, F_OK) == 0;
 }
 
-/* Its address is the environment pointer of all instances, which the library passes to the logger. */
+/* The address of this variable is the environment pointer of all instances, which the library must pass to the logger. */
 static char environment_of_importer;
 
 static void check_environment(const void *environment) {
@@ -356,8 +356,8 @@ static bool seed_is_kept(void) {
     return remaining > 0;
 }
 
-/* Writes the number of files in the working directory, limits, timers, standard streams, scheduling, whether the seed was kept, and
-   the environment. */
+/* Writes the mask for new files, the number of files in the working directory, the priority, whether the seed was kept, the locale of
+   the thread, limits, timers, standard streams and the environment. On Linux also writes the scheduling and the name of the thread. */
 static void put_settings(FILE *file) {
     int limits[] = {RLIMIT_NOFILE, RLIMIT_STACK, RLIMIT_CPU, RLIMIT_CORE, RLIMIT_AS, RLIMIT_DATA, RLIMIT_FSIZE, RLIMIT_NPROC, RLIMIT_MEMLOCK};
     int timers[] = {ITIMER_REAL, ITIMER_VIRTUAL, ITIMER_PROF};

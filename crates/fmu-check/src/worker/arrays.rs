@@ -20,7 +20,7 @@ pub enum Content {
     Saved(usize),
 }
 
-/// Returns the pointer or size that an array consists of.
+/// Returns the pointer or size that an array contains.
 pub fn word_of(array: &Guarded) -> u64 {
     array.bytes().try_into().map(usize::from_ne_bytes).unwrap_or_default() as u64
 }

@@ -1,5 +1,5 @@
-//! Confines the processes of an FMU: each call sequence runs in a separate session, cannot send signals to the processes of the
-//! checker, and its descendants are ended after it.
+//! Handles interrupts, and confines the processes of an FMU. On Linux, each call sequence runs in a separate session and cannot
+//! send signals to the processes of the checker, and its descendants are ended after it.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -10,7 +10,8 @@ pub fn interrupted() -> bool {
     INTERRUPTED.load(Ordering::Relaxed)
 }
 
-/// Handles SIGINT, SIGTERM and SIGHUP: the first signal ends the check in order, the same signal again ends the process.
+/// Handles SIGINT, SIGTERM and SIGHUP: the first signal stops the check, which still writes its report; the same signal again
+/// ends the process.
 #[cfg(unix)]
 pub fn listen_for_interrupts() {
     extern "C" fn interrupt(_: libc::c_int) {
@@ -42,7 +43,7 @@ pub fn end_group(leader: u32) {
     unsafe { libc::kill(-(leader as libc::pid_t), libc::SIGKILL) };
 }
 
-/// Does nothing: Windows has no process groups.
+/// Does nothing: Windows has no function that ends a process group.
 #[cfg(not(unix))]
 pub fn end_group(_: u32) {}
 
@@ -79,7 +80,8 @@ mod linux {
         }
     }
 
-    /// Returns whether the process at the other end of the standard input has ended.
+    /// Returns whether the other end of the standard input is closed, because the checker has ended or no longer needs this
+    /// server.
     pub fn abandoned() -> bool {
         let mut poll = libc::pollfd { fd: 0, events: 0, revents: 0 };
         // SAFETY: one descriptor.
@@ -160,8 +162,8 @@ mod linux {
         orphans
     }
 
-    /// Starts a session, and installs a filter for system calls. It ends this process with SIGSYS if the process sends a signal
-    /// to a process of the checker or to all processes.
+    /// Starts a session, and installs a filter for system calls. The filter ends this process with SIGSYS if the process sends a
+    /// signal to a process of the checker or to all processes.
     pub fn isolate(checker: libc::pid_t) {
         // SAFETY: starts a session; the other calls only return numbers.
         let (server, group, caller) = unsafe {

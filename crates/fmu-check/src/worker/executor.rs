@@ -24,7 +24,7 @@ pub static THREADS: AtomicBool = AtomicBool::new(false);
 /// Identifier of the process that executes the call sequence.
 pub static PROCESS: AtomicU32 = AtomicU32::new(0);
 
-/// Instance of the FMU: its handle, and the environment pointer that was passed to its instantiation.
+/// Instance of the FMU; `environment` is the environment pointer that was passed to its instantiation.
 pub struct Instance {
     pub handle: usize,
     pub environment: usize,
@@ -81,8 +81,8 @@ impl Executor {
         format!("{}{end}", if self.setting.fmi3 { "fmi3" } else { "fmi2" })
     }
 
-    /// Returns the address of a function, and loads the library first if necessary. Ends the process if the library cannot be
-    /// loaded.
+    /// Returns the address of a function, and loads the library first if necessary; `None` if the library lacks the function.
+    /// Ends the process if the library cannot be loaded.
     pub fn find(&self, co_simulation: bool, name: &str) -> Option<*const c_void> {
         let index = usize::from(!co_simulation);
         let mut libraries = locked(&self.libraries);
@@ -192,8 +192,8 @@ impl Executor {
         );
     }
 
-    /// Stores an instance. If an earlier instance with this index was not freed, its callbacks remain allocated, because the FMU
-    /// may still use them.
+    /// Stores an instance, or only removes the earlier one with this index if the handle is NULL. If an earlier instance with
+    /// this index was not freed, its callbacks remain allocated, because the FMU may still use them.
     fn store(&self, index: usize, instance: Instance) {
         let before = match instance.handle {
             0 => locked(&self.instances).remove(&index),
@@ -224,8 +224,8 @@ impl Executor {
         outcome.status = Some(status);
         let is_string = |array: &PassedArray| matches!(array.content, Content::Output(Kind::Pointer, _));
         if THREADS.load(Ordering::Relaxed) && arrays.iter().any(is_string) {
-            // Gives other threads time to overwrite the strings before this one copies them, in case the FMU has one buffer for
-            // all instances.
+            // Gives other threads time to overwrite the strings before this thread copies them, in case the FMU has one buffer
+            // for all instances.
             std::thread::sleep(std::time::Duration::from_micros(20));
         }
         let succeeded = status == 0 || status == 1;

@@ -21,7 +21,7 @@ struct Importer<'a> {
     time: f64,
     /// Times of all events.
     events: Vec<f64>,
-    /// Number of state events.
+    /// Number of events other than time events: state events, and events that the FMU requests after a step.
     state_events: usize,
 }
 
@@ -97,7 +97,7 @@ impl Importer<'_> {
         Ok(before.iter().zip(&now).any(|(before, now)| (*before > 0.0) != (*now > 0.0)))
     }
 
-    /// Advances by a step of this size, or to the first state event in it; returns whether there is one.
+    /// Advances by a step of this size, or to a state event within it; returns whether there is one.
     fn step(&mut self, mut size: f64) -> Result<bool, Failed> {
         let states = self.vector("GetContinuousStates", self.how.states)?;
         let before = self.vector("GetEventIndicators", self.how.indicators)?;
@@ -145,7 +145,8 @@ impl Importer<'_> {
         Ok(())
     }
 
-    /// Handles an event; fails if the model ends the simulation or has too many events.
+    /// Handles an event; fails if the model ends the simulation, has too many events, or defines a next event that is not later
+    /// than this one.
     fn event(&mut self, is_state_event: bool) -> Result<(), Failed> {
         self.events.push(self.time);
         self.state_events += usize::from(is_state_event);
@@ -170,7 +171,7 @@ impl Importer<'_> {
 }
 
 /// Integrates an instance. The values of the outcome are the times of the first and the last event, which are infinite if there
-/// is none, and the number of state events.
+/// is none, and the number of events other than time events.
 pub fn integrate(executor: &Executor, instance: usize, how: &Integration, outcome: &mut Outcome) {
     let fmi3 = executor.setting.fmi3;
     let mut importer =

@@ -14,7 +14,7 @@ pub const SCRATCH: &str = "FMU_CHECK_SCRATCH";
 /// Exit status of a worker that fails for a reason other than the FMU.
 pub const OWN_FAULT: i32 = 97;
 
-/// Exit status of a worker that has executed its call sequence.
+/// Exit status of a worker that has executed its call sequence, or has reported that it cannot load the library.
 pub const EXECUTED: i32 = 96;
 
 /// Least number of repetitions whose measurements are evaluated.
@@ -40,7 +40,7 @@ pub struct Program {
     pub memory: u64,
 }
 
-/// Results of a process. A process that exceeded the limit has neither an exit status nor a signal.
+/// Results of a process. A process that was ended because it exceeded a limit has neither an exit status nor a signal.
 #[derive(Default, Serialize, Deserialize)]
 pub struct Ended {
     /// Exit status.
@@ -55,7 +55,7 @@ pub struct Ended {
     pub orphans: Vec<String>,
     /// Number of processes at a time, if it exceeded the maximum.
     pub flood: Option<usize>,
-    /// Whether the process ended while it executed code of the FMU.
+    /// Whether the process ended while it executed code of the FMU; on systems other than Linux always true.
     pub inside: bool,
 }
 

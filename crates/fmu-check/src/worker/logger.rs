@@ -32,7 +32,7 @@ unsafe fn record(environment: *mut c_void, status: c_int, category: *const c_cha
 
 /// Logger of FMI 2.0. Stable Rust cannot define variadic functions, so this one has fixed arguments: six integers or pointers,
 /// then four floating-point numbers, which have separate registers. On Linux, and on macOS with Intel processors, variadic
-/// arguments are in the same registers.
+/// arguments are passed in the same way. On other systems, the format is recorded without the values.
 #[allow(clippy::too_many_arguments, reason = "the values of the message")]
 pub unsafe extern "C" fn log_of_fmi2(
     environment: *mut c_void,

@@ -176,7 +176,7 @@ impl Guarded {
     /// Sets a byte of the array.
     pub fn set(&self, index: usize, byte: u8) {
         let (map, open) = self.pages.open();
-        assert!(index < self.size && self.begin + index < open, "the index is within the array");
+        assert!(index < self.size && self.begin + index < open, "the index is outside the array");
         // SAFETY: the index lies within the array, and no call is under way.
         unsafe { map.add(self.begin + index).write(byte) };
     }

@@ -1,5 +1,5 @@
-//! Server process that forks a child process for every call sequence, because starting a program takes several times as long.
-//! The server adopts and ends the orphaned processes of a call sequence.
+//! Server process that forks a child process for every call sequence, because starting a program takes several times as long as a
+//! fork. The server adopts and ends the orphaned processes of a call sequence.
 
 use super::contain::{MOST_PROCESSES, abandoned, adopt_descendants, descendants, end_descendants, isolate};
 use super::job::{Ended, Program, SCRATCH, VARIABLE};
@@ -21,7 +21,7 @@ pub fn serve() -> Result<(), String> {
     adopt_descendants();
     let result = jobs();
     if abandoned() {
-        // The checker was killed, so it has not removed its directory.
+        // The checker has ended. If it was killed, it has not removed its temporary directory.
         if let Some(scratch) = std::env::var_os(SCRATCH) {
             let _ = std::env::set_current_dir("/");
             let _ = std::fs::remove_dir_all(Path::new(&scratch));
@@ -77,7 +77,7 @@ fn execute(job: &str, [output, outcomes]: [File; 2]) -> ! {
     if let Ok(Program { program, fmu, memory }) = serde_json::from_str(job) {
         limit(memory);
         let mut command = std::process::Command::new(program);
-        // The program has its files in the directory of this server, which is cleared after each job.
+        // The program writes its files to the directory of this server, which is cleared after each job.
         let here = std::env::current_dir().unwrap_or_default();
         command.arg(fmu).env("TMPDIR", here).env_remove(VARIABLE).env_remove(SCRATCH);
         end(Err(command.exec().to_string()));
@@ -116,7 +116,8 @@ fn wait(child: libc::pid_t, limit: f64) -> (Option<ExitStatus>, Option<usize>) {
     }
 }
 
-/// Writes the results of a process to the standard output, as a line of JSON, and clears its files for the next one.
+/// Writes the results of a process to the standard output, as a line of JSON, and clears its files and the working directory for
+/// the next process.
 fn pass_on(mut ended: Ended, files: &mut [File; 2]) -> std::io::Result<()> {
     let results = [(&mut ended.output, MOST_OUTPUT), (&mut ended.outcomes, u64::MAX)];
     for (file, (text, max_bytes)) in files.iter_mut().zip(results) {

@@ -1,7 +1,8 @@
 //! Settings of the process that an FMU must not change.
 
-/// Returns the settings, each with its value: working directory and its files, environment, locale, floating-point control and, on
-/// Unix, signals, limits, timers, standard streams, the umask, scheduling and the seeds of random numbers.
+/// Returns the settings, each with its value: the working directory and its files, the environment, and the control words of the
+/// floating-point units. On Unix also the locale, signals, limits, timers, standard streams, the umask, the priority
+/// and the seed of random numbers; on Linux also POSIX timers, scheduling and the name of the thread.
 pub fn settings() -> Vec<String> {
     let mut found = Vec::new();
     found.push(format!("working directory {}", std::env::current_dir().unwrap_or_default().display()));
@@ -76,7 +77,7 @@ mod unix {
     use fmi_abi::c_types::{c_char, c_int, c_uint};
     use std::sync::atomic::{AtomicPtr, Ordering};
 
-    /// Signals with a handler that importers may need.
+    /// Signals whose handlers importers may need.
     const SIGNALS: [(&str, c_int); 17] = [
         ("SIGSEGV", libc::SIGSEGV),
         ("SIGFPE", libc::SIGFPE),
@@ -98,7 +99,8 @@ mod unix {
     ];
 
     pub fn settings() -> Vec<String> {
-        // SAFETY: sets the mask and sets it back; the process has no other thread that creates files. Returns a number and names.
+        // SAFETY: sets the mask and sets it back; the process has no other thread that creates files. The other functions only
+        // return values.
         let (mask, priority, locale, of_thread) = unsafe {
             let mask = libc::umask(0);
             libc::umask(mask);
@@ -206,8 +208,8 @@ mod unix {
     /// Seed that the importer has set.
     const SEED: c_uint = 4711;
 
-    /// Number of random numbers from the importer's seed among which the next ones are searched, because an FMU may use some of
-    /// them.
+    /// How many random numbers that follow from the importer's seed are searched for the next ones, because an FMU may have used
+    /// some of them.
     const SEARCHED: usize = 5_000_000;
 
     /// State of the generator; NULL before the first measurement, which sets the importer's seed.

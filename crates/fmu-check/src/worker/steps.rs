@@ -12,7 +12,8 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 impl Executor {
-    /// Executes steps. Writes their outcomes to the file if `report` is set, otherwise returns them.
+    /// Executes steps. Writes their outcomes to the file if `report` is set, otherwise returns them. Of repeated steps, only the
+    /// outcomes of the last repetition are written.
     pub fn execute(&self, sequence: &[Numbered], report: bool) -> Vec<Outcome> {
         let mut outcomes = Vec::new();
         for numbered in sequence {
@@ -112,7 +113,7 @@ impl Executor {
                     // SAFETY: made by Box::leak, and nothing else refers to it.
                     in_fmu(|| drop(unsafe { Box::from_raw(std::ptr::from_ref(library).cast_mut()) }));
                 }
-                // Crashes if the library has set a buffer of the standard output that was unloaded with it.
+                // This output crashes if the library has set a buffer of the standard output that was unloaded with it.
                 #[cfg(unix)]
                 // SAFETY: writes an empty line, and the buffers of the C library.
                 in_fmu(|| unsafe {

@@ -11,8 +11,9 @@ pub const MOST_UPDATES: usize = 100;
 /// values have changed, the values of the continuous states have changed, the next event time is defined.
 const FLAGS: usize = 5;
 
-/// Repeats an update of the discrete states that has returned `status`, until no further one is needed; returns the last status.
-/// The flags that report the end of the simulation or a change remain set if any of the updates has set them.
+/// Repeats an update of the discrete states that has returned `status`, until no further one is needed, one fails, or there were
+/// `MOST_UPDATES`; returns the last status. The flags that report the end of the simulation or a change remain set if any of the
+/// updates has set them.
 pub fn iterate(
     function: &str,
     mut status: i32,

@@ -9,8 +9,8 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::Ordering;
 
-/// Writes the buffered output, and ends the process. The exit handlers of the library do not run, because only `Step::Quit` tests
-/// them.
+/// Writes the buffered output, and ends the process. On Unix, the exit handlers of the library do not run, because only
+/// `Step::Quit` tests them.
 pub fn end(result: Result<(), String>) -> ! {
     let status = match result {
         Ok(()) => EXECUTED,
@@ -53,8 +53,8 @@ pub fn work(job: Job, file: File) {
     executor.write(&Last { bytes: std::mem::take(&mut locked(&executor.bytes)) });
 }
 
-/// Makes a link of this name to the directory of the FMU in the working directory; returns the setting with the paths through the
-/// link.
+/// In the working directory, makes a link with this name to the directory of the FMU; returns the setting with the paths through
+/// the link.
 fn elsewhere(setting: &Setting, name: &str) -> Setting {
     let directory = setting.resources.parent().unwrap_or(&setting.resources);
     let there = std::env::current_dir().unwrap_or_default().join(name);
@@ -71,7 +71,8 @@ fn elsewhere(setting: &Setting, name: &str) -> Setting {
     }
 }
 
-/// Limits the memory and the size of files of this process, and ends it together with its parent process.
+/// Limits the size of files of this process on Unix. On Linux also limits its memory, and ends it together with its parent
+/// process.
 pub fn limit(memory: u64) {
     #[cfg(unix)]
     {

@@ -83,7 +83,7 @@ impl Writer<'_> {
         calls
     }
 
-    /// Writes parts of a simulation; returns the reads of each part that reads, of which there must be `N`.
+    /// Writes parts of a simulation; returns the reads of each part that reads. There must be `N` such parts.
     pub fn groups<const N: usize>(&mut self, instance: usize, parts: &[Part]) -> [Vec<Read>; N] {
         let groups = parts.iter().filter_map(|part| {
             let reads = self.write(instance, &[*part]).reads;
@@ -93,8 +93,8 @@ impl Writer<'_> {
         groups.try_into().unwrap_or_else(|_| panic!("the number of parts that read is not {N}"))
     }
 
-    /// Writes a point: in Co-Simulation sets inputs and advances a step; in Model Exchange sets time, states and inputs. If the
-    /// point has an event, the event follows.
+    /// Writes a point: in Co-Simulation sets inputs and advances a step; in Model Exchange sets time, states and inputs, and
+    /// completes the integrator step. If the point has an event, the event follows.
     pub fn point(&mut self, instance: usize, point: &Point) -> Vec<u32> {
         let mut ids = Vec::new();
         if self.trajectory.is_stepped() {

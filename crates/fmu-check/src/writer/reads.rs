@@ -4,7 +4,8 @@ use crate::call_sequence::{Run, Values};
 use crate::description::Description;
 use crate::finding::status_name;
 
-/// Step that reads variables. For each variable, it has the index and the number of values.
+/// Call that reads variables or a vector. `variables` has the index and the number of values of each variable; it is empty for a
+/// vector.
 #[derive(Clone, Debug)]
 pub struct Read {
     pub id: u32,
@@ -26,8 +27,8 @@ pub const MAX_READ: usize = 1000;
 
 /// Returns the indices of at most `max_count` variables to read. Clocks and variables of unknown size are left out, and so are
 /// clocked variables, because they can only be read while their clock is active (section 2.2.7 of FMI 3.0.2). If there are more
-/// variables, at most half of the sample are inputs, outputs, derivatives and the independent variable. Both parts are taken at
-/// equal distances.
+/// variables, at most half of the sample are inputs, outputs, derivatives and the independent variable. In both parts of the
+/// sample, the variables are equally spaced.
 pub fn sample(description: &Description, max_count: usize) -> Vec<usize> {
     let known = |index: &usize| {
         let variable = &description.variables[*index];
@@ -53,8 +54,9 @@ pub fn sample(description: &Description, max_count: usize) -> Vec<usize> {
     found
 }
 
-/// Returns the first difference between corresponding reads: the name of the variable and both values. Floating-point numbers differ
-/// if their relative difference is greater than the tolerance.
+/// Returns the first difference between corresponding reads: the name of the variable and both values, or `a call` and both
+/// statuses if the statuses differ. Floating-point numbers differ if their difference exceeds the tolerance, relative to the
+/// larger magnitude or the nominal value.
 pub fn difference(
     description: &Description,
     run: &Run,
@@ -106,7 +108,7 @@ pub fn values_of<'r>(run: &'r Run, reads: &'r [Read]) -> impl Iterator<Item = (u
     })
 }
 
-/// Returns the value of a variable in the first read that contains it.
+/// Returns the value of a variable in the first successful read that contains it.
 pub fn value_of(run: &Run, reads: &[Read], variable: usize) -> Option<Values> {
     reads.iter().find_map(|read| {
         let (_, begin, size) = read.parts().find(|(index, ..)| *index == variable)?;

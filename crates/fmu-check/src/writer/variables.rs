@@ -6,8 +6,8 @@ use crate::call_sequence::{Arg, Kind, Values};
 use crate::description::{kind_of, type_name};
 
 impl Writer<'_> {
-    /// Groups variables by type. Returns for each type its name in getters and setters, its C type, and the positions of its
-    /// variables in `indices`.
+    /// Groups variables by type, without clocks and variables of unknown size. Returns for each type its name in getters and
+    /// setters, its C type, and the positions of its variables in `indices`.
     fn by_type(&self, indices: &[usize]) -> Vec<(&'static str, Kind, Vec<usize>)> {
         let standard = self.description.standard;
         let mut groups: Vec<(&str, Kind, Vec<usize>)> = Vec::new();
@@ -62,7 +62,7 @@ impl Writer<'_> {
     }
 
     /// Reads the variables at these indices with a call for each type. In Initialization Mode, reads only the variables that may
-    /// be read there.
+    /// be read in this mode.
     pub fn read_these(&mut self, instance: usize, indices: &[usize]) -> Vec<Read> {
         if !self.modes.is_initializing(instance) {
             return self.read_anyway(instance, indices);

@@ -1,4 +1,4 @@
-//! FMUs without a fault, in which fmu-check must find nothing.
+//! FMUs without a fault, in which fmu-check must find nothing but notes.
 
 use super::wagon::{fmu, found, library};
 use std::process::Command;

@@ -30,8 +30,8 @@ fn findings(fmi: u32, faults: &str, topics: &str) -> Vec<Value> {
     findings
 }
 
-/// Asserts that each of the faults is found. It is expected as the fault, the name of the rule, and a part of an observation. The
-/// program of the finding must show it, too.
+/// Asserts that each of the faults is found. `expected` has the fault, the name of the rule, and a part of an observation for
+/// each. The program of the finding must show it, too.
 fn found(fmi: u32, topics: &str, expected: &[(&str, &str, &str)]) {
     let faults: Vec<&str> = expected.iter().map(|(fault, ..)| *fault).collect();
     let findings = findings(fmi, &faults.join(","), topics);
@@ -111,7 +111,7 @@ fn sound() {
     }
 }
 
-/// Asserts that every fault in the source is tested, and that the documentation states their number.
+/// Asserts that every fault in the source is tested, and that the documentation states the numbers of faults and of variants.
 #[test]
 fn no_fault_is_forgotten() {
     let source = include_str!("spring.c");

@@ -1,5 +1,5 @@
-//! Tests fmu-check with FMUs that have seeded faults: it must find each fault under the name of its rule, and nothing in an FMU
-//! without a fault.
+//! Tests fmu-check with FMUs that have seeded faults: it must find each fault under the name of its rule, and nothing but notes
+//! in an FMU without a fault.
 
 #![cfg(unix)]
 
@@ -17,7 +17,7 @@ use tempfile::TempDir;
 use wagon::{fmu, found, library, not_shown_without_fault, unpack};
 
 /// Asserts that a fault of the library, of its linking or of the description is found under this name, and that the program of
-/// the finding shows it.
+/// the finding shows it. The program must not show it in the FMU without the fault.
 fn caught(
     (fmi, fault, macro_name): (u32, &str, &str),
     topic: &str,

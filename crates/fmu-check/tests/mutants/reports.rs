@@ -4,8 +4,8 @@ use super::wagon::{UNLIMITED, check, fmu, found, library, not_shown_without_faul
 use std::process::Command;
 use tempfile::TempDir;
 
-/// Asserts that every report lists the interface types that were not checked, and that the check fails unless an option names
-/// them.
+/// Asserts that the output and the reports as JSON, JUnit and HTML list the interface types that were not checked, and that the
+/// check fails unless an option names them.
 #[test]
 fn nothing_passes_unchecked() {
     let both = "co-simulation,model-exchange";
@@ -41,8 +41,11 @@ fn nothing_passes_unchecked() {
             let printed = String::from_utf8_lossy(&output.stdout).into_owned();
             let all = [printed, "report.json".into(), "junit.xml".into(), "report.html".into()];
             for (index, text) in all.into_iter().enumerate() {
-                let text =
-                    if index == 0 { text } else { std::fs::read_to_string(out.join(text)).expect("it") };
+                let text = if index == 0 {
+                    text
+                } else {
+                    std::fs::read_to_string(out.join(text)).expect("a report")
+                };
                 assert!(text.contains(name) && text.contains(why), "{name}: {text}");
             }
         }
@@ -59,8 +62,8 @@ fn nothing_passes_unchecked() {
     assert_eq!(names, ["co-simulation", "model-exchange"]);
 }
 
-/// Asserts that a finding does not fail in any report if the baseline accepts it, but fails if the baseline accepts only another
-/// observation.
+/// Asserts that a finding does not fail the check or its JUnit test if the baseline accepts it, but fails if the baseline accepts
+/// only another observation.
 #[test]
 fn a_baseline_accepts_with_a_reason() {
     let directory = TempDir::new().expect("a directory");
@@ -105,8 +108,8 @@ fn a_quick_check_is_quick() {
 }
 
 /// Asserts that a check of 100,000 variables needs at most 1 GB of memory, and that its processor time does not grow with the
-/// square of their number. The limit of processor time is ten times what the check needs, while quadratic work needs a thousand
-/// times as much.
+/// square of their number. The limit is ten times the processor time that the check needs, while quadratic work would need a
+/// thousand times that time.
 #[cfg(target_os = "linux")]
 #[test]
 fn many_variables_take_little_time_and_memory() {
@@ -164,7 +167,7 @@ fn drafts_are_not_checked() {
     assert_eq!(output.status.code(), Some(2));
 }
 
-/// Asserts that the README shows the output of this check, in which the wagon rejects the step to the stop time.
+/// Asserts that the README shows the beginning of the output of this check, in which the wagon rejects the step to the stop time.
 #[test]
 fn the_readme_shows_real_output() {
     let directory = TempDir::new().expect("a directory");
@@ -182,7 +185,8 @@ fn the_readme_shows_real_output() {
     assert!(printed.lines().count() == 3 && readme.contains(&printed), "{printed}");
 }
 
-/// Asserts that a shortened call sequence has few calls and that its program reproduces the fault.
+/// Asserts that a shortened call sequence has few calls, that the reports contain the finding, and that its program does not show
+/// it in the FMU without the fault.
 #[test]
 fn programs_show_it() {
     let directory = TempDir::new().expect("a directory");

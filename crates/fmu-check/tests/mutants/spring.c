@@ -160,7 +160,7 @@ static void advance(Model *m, double h, bool euler) {
     m->v = v + (euler ? h * kv[0] : h / 6 * (kv[0] + 2 * kv[1] + 2 * kv[2] + kv[3]));
 }
 
-/* Integrates in Co-Simulation with inner steps of 1 ms and a shorter last one. */
+/* Integrates in Co-Simulation with inner steps of at most 1 ms, which end at the ticks of the clock. */
 static void integrate(Model *m, double end) {
     double size = end - m->time, inner = 1e-3;
     if (IS(harmless_euler)) { advance(m, size, true); m->time = end; discrete(m); return; }

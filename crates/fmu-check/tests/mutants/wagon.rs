@@ -66,5 +66,5 @@ pub fn not_shown_without_fault(out: &Path, name: &str, unpacked: &Path, fault: &
     let output = Command::new(&program).arg(unpacked).env("WAGON_FAULT", "none").output().expect("runs");
     let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
     let text: String = text.chars().rev().take(2000).collect::<Vec<_>>().into_iter().rev().collect();
-    assert_eq!(output.status.code(), Some(0), "{name} of {fault} in the FMU without it: {text}");
+    assert_eq!(output.status.code(), Some(0), "{name} is shown in the FMU without {fault}: {text}");
 }

@@ -1,4 +1,4 @@
-//! libFuzzer searches for calls of an FMU's functions, decoded from bytes, that violate a guarantee that
+//! libFuzzer searches for bytes that decode to calls after which an FMU violates one of its guarantees, which
 //! `fmu_test_kit::fault_injection` checks. The AddressSanitizer also detects invalid accesses to memory.
 #![no_main]
 
@@ -11,7 +11,7 @@ use libfuzzer_sys::fuzz_target;
 use std::sync::atomic::{AtomicU64, Ordering};
 use models::*;
 
-/// The test models in FMI 2.0 and FMI 3.0. Add new models at the end, because the last byte of each input in
+/// Test models in FMI 2.0 and FMI 3.0. Add new models at the end, because the last byte of each input in
 /// `corpus.zip` selects a model by its index.
 ///
 /// Any exported model can be added, for example `run::<Importer, prw_testbed::TestbedFmu>` with that crate as a dependency.

@@ -6,8 +6,9 @@ use fmi_abi::c_types::c_char;
 use std::ffi::CStr;
 use std::mem::MaybeUninit;
 
-/// Returns the importer's array of `length` values as a slice to read. Fails if the array is not empty and the
-/// pointer is NULL or not aligned; `argument` is the name of the array in the message.
+/// Returns the importer's array of `length` values as a slice to read. Fails if the array is not empty and the pointer
+/// is NULL or not aligned, or if the array would be larger than memory; `argument` is the name of the array in the
+/// message.
 ///
 /// # Safety
 /// `pointer` is NULL or points to `length` values that do not change during `'a`.
@@ -22,8 +23,8 @@ pub(crate) unsafe fn in_slice<'a, T>(pointer: *const T, length: usize, argument:
     Ok(unsafe { std::slice::from_raw_parts(pointer, length) })
 }
 
-/// Returns the importer's array of `length` values as a slice to write; see [`in_slice`]. Its previous content may be
-/// uninitialized.
+/// Returns the importer's array of `length` values as a slice to write; see [`in_slice`]. The previous content of the
+/// array may be uninitialized.
 ///
 /// # Safety
 /// `pointer` is NULL or points to `length` values that no other code uses during `'a`.
@@ -75,8 +76,8 @@ pub(crate) unsafe fn of_elements<M: Exported, R: Reference>(
     outcome
 }
 
-/// Returns the importer's memory for one value. Fails if the pointer is NULL or not aligned; `argument` is its name
-/// in the message.
+/// Returns the importer's memory for one value. Fails if the pointer is NULL or not aligned; `argument` is the name of
+/// the pointer in the message.
 ///
 /// # Safety
 /// `pointer` is NULL or points to a value that no other code uses during `'a`.

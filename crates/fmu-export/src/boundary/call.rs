@@ -17,12 +17,12 @@ compile_error!("an FMU must not end the importer's process: build with panic = \
 
 /// The object to which the importer's instance pointer points.
 ///
-/// Processors fetch cache lines of 64 bytes in pairs. The alignment puts adjacent instances into separate pairs, so
-/// that two threads that step them do not slow each other down.
+/// Many processors fetch cache lines of 64 bytes in pairs. The alignment puts adjacent instances into separate pairs,
+/// so that two threads that step them do not slow each other down.
 #[repr(align(128))]
 pub(crate) struct Component<M> {
-    /// Whether the importer's log callback is running. It must not call the instance, whose state forbids all calls
-    /// during this time.
+    /// Whether the importer's log callback is running. The callback must not call the instance, so the state of the
+    /// instance forbids all calls during this time.
     pub delivering: Cell<bool>,
     pub instance: UnsafeCell<Instance<M>>,
     pub importer: ImporterLog,

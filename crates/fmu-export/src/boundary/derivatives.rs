@@ -48,7 +48,7 @@ fn elements<M: Exported, R: Reference>(vr: &[R]) -> Vec<u32> {
     vr.iter().flat_map(|vr| elements_of::<M>(vr.index())).collect()
 }
 
-/// Computes time derivatives of outputs (section 4.2.2 of FMI 2.0, 4.2.4 of FMI 3.0). `count` is the number of
+/// Computes time derivatives of outputs (section 4.2.1 of FMI 2.0, 4.1.2 of FMI 3.0). `count` is the number of
 /// references and of orders.
 ///
 /// # Safety
@@ -71,7 +71,7 @@ pub(crate) unsafe fn output_derivatives<M: Exported, R: Reference>(
     };
     same("values", instance.count_elements(vr)?, value_count)?;
     if M::ARRAYS && R::ARRAYS {
-        // One order applies to the whole array (section 4.2.4 of FMI 3.0).
+        // One order applies to the whole array (section 4.1.2 of FMI 3.0).
         let of_elements =
             |(vr, order): (&R, &i32)| elements_of::<M>(vr.index()).map(|_| *order).collect::<Vec<_>>();
         let order: Vec<i32> = vr.iter().zip(order).flat_map(of_elements).collect();

@@ -17,8 +17,8 @@ pub(crate) enum Callback {
     Fmi3(fmi3LogMessageCallback),
 }
 
-/// The callback, if the importer has one, and the arguments that it gets with every call. They are copied, because
-/// the structure in which FMI 2.0 passes them may be invalid after `fmi2Instantiate`.
+/// The callback, if the importer has one, and the arguments that the callback gets with every call. The arguments are
+/// copied, because the structure in which FMI 2.0 passes them may be invalid after `fmi2Instantiate`.
 #[cfg_attr(
     target_family = "wasm",
     allow(dead_code, reason = "the C code around the module calls the importer")

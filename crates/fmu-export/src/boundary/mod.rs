@@ -1,6 +1,6 @@
-//! The code that the C functions of both FMI versions share: it turns the importer's pointers into an instance,
-//! slices and strings, and carries out calls on the instance. It also contains the bodies of functions that differ
-//! only in their names.
+//! The code that the C functions of both FMI versions share: it turns the importer's pointers into an instance, slices
+//! and strings, and carries out calls on the instance. It also contains the bodies of functions that differ between the
+//! FMI versions only in their names.
 
 mod arrays;
 mod call;

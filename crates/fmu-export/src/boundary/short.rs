@@ -14,7 +14,7 @@
 //! | set Reals | two angles in one call; one angle per call | 61; 90 |
 //! | step of the last size | a step | 34 |
 //! | step of any size | a step of one of four alternating sizes | 31 |
-//! | arrays of 1 or 2 variables besides 4 | one scalar per call | 216 for outputs, 112 for angles |
+//! | other array lengths: 1 and 2 for getting, 1 for setting | one scalar per call | 216 for outputs, 112 for angles |
 //!
 //! Getting and setting access fields by the offsets of [`offsets`](crate::offsets). Two more parts stored results in
 //! additional fields: the allowed state once the model has started, and the latest end of a step. They saved only 6
@@ -31,7 +31,8 @@ use crate::instance::{FromOne, Instance, Reference};
 use fmi_abi::fmi3::types::fmi3Boolean;
 use std::mem::MaybeUninit;
 
-/// Name of this module in the macro [`call`], because it contains the fast paths for the most frequent arguments.
+/// Name of this module in the macro [`call`], because the module contains the fast paths for the most frequent
+/// arguments.
 pub(crate) use super::short as usual;
 
 /// Returns whether the pointers can be arrays of `count` elements: they are not NULL and are aligned, and the arrays
@@ -193,7 +194,7 @@ pub(crate) unsafe fn fmi3DoStep<M: Exported>(
 }
 
 /// Makes a step, if no pointer is NULL and all are aligned. If `step` succeeds, it has reached its end without an
-/// event, so the results are the same for all steps.
+/// event, so all flags are false and the last successful time is `end`.
 #[inline(always)]
 unsafe fn fmi3_step(
     flags: [*mut fmi3Boolean; 3],

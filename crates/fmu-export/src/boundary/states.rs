@@ -10,8 +10,8 @@ use crate::instance::{Instance, Outcome, reject};
 use fmi_abi::c_types::c_void;
 use std::ptr::without_provenance_mut;
 
-/// Saves the current state, into the state of the handle if it is not NULL. The instance owns the saved state until the
-/// importer frees the state or the instance.
+/// Saves the current state. If the handle is not NULL, overwrites the state of the handle. The instance owns the saved
+/// state until the importer frees the state or the instance.
 pub unsafe fn get_state<M: Exported>(instance: &mut Instance<M>, state: *mut *mut c_void) -> Outcome {
     // SAFETY: by contract, `state` is NULL or points to an initialized handle.
     let handle = unsafe { out_value(state, "FMUstate")?.assume_init_mut() };
@@ -72,8 +72,8 @@ pub unsafe fn serialize<M: Exported, Byte>(
     Ok(())
 }
 
-/// De-serializes a state, into the state of the handle if it is not NULL. The instance owns the state until the
-/// importer frees the state or the instance.
+/// De-serializes a state. If the handle is not NULL, overwrites the state of the handle. The instance owns the state
+/// until the importer frees the state or the instance.
 pub unsafe fn deserialize<M: Exported, Byte>(
     instance: &mut Instance<M>,
     bytes: *const Byte,
@@ -94,8 +94,8 @@ pub unsafe fn deserialize<M: Exported, Byte>(
 }
 
 /// Rejects a further state in WebAssembly, where memory is limited, if there is too little memory for it. `serialized`
-/// is the length of the bytes from which the state is read, or 0. Accepts every state on other targets, and every state
-/// that overwrites another.
+/// is the length of the bytes from which the state is read, or 0. Accepts every state on other targets, and if `handle`
+/// is not NULL, because the state then overwrites another.
 fn check_memory<M: Exported>(instance: &mut Instance<M>, handle: *mut c_void, serialized: usize) -> Outcome {
     #[cfg(target_family = "wasm")]
     if handle.is_null() {

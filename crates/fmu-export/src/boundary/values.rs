@@ -11,9 +11,9 @@ use std::ffi::{CStr, CString};
 use std::fmt::Display;
 use std::mem::MaybeUninit;
 
-/// Defines the getters and setters of an FMI version under their C names. Each entry contains, after each name, the
-/// function below that implements it, and the base types of its variables. In FMI 3.0 the functions also take the
-/// number of values.
+/// Defines the getters and setters of an FMI version under their C names. Each entry contains the names of a getter and
+/// a setter, each followed by the function below that implements it, then the C type and the base types of the
+/// variables. In FMI 3.0 the functions also take the number of values.
 macro_rules! getters_and_setters {
     (
         $reference:ty, $value_count:tt;

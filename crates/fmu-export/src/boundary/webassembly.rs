@@ -1,4 +1,4 @@
-//! Functions for the code around a WebAssembly module, which is the C code of an FMU with C sources, or the scripts
+//! Functions for the code around a WebAssembly module. This code is the C code of an FMU with C sources, or the scripts
 //! of a page. In WebAssembly, a panic does not unwind, and the library cannot access the importer's memory and
 //! callbacks, so the code around the module must handle panics, arguments and log messages. Each instance has a
 //! separate module with its own memory.
@@ -40,8 +40,8 @@ pub(super) fn keep_panics() {
     std::panic::set_hook(Box::new(keep));
 }
 
-/// Returns whether blocks of memory with these sizes can be allocated at the same time, and another one for messages. They are
-/// separate because memory is fragmented: after a state was freed, another one must fit in its place.
+/// Returns whether blocks of memory with these sizes can be allocated at the same time, and another one for messages.
+/// The blocks are separate because memory is fragmented: after a state was freed, another one must fit in its place.
 pub(super) fn has_memory<const N: usize>(sizes: [usize; N]) -> bool {
     const MESSAGES: usize = 4096;
     let allocate = |size| {

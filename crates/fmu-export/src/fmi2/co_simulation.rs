@@ -57,8 +57,7 @@ fn status_kind(kind: fmi2StatusKind) -> Outcome<StatusKind> {
     StatusKind::from_c(kind).map_or_else(|| reject(format!("there is no fmi2StatusKind {kind}")), Ok)
 }
 
-/// Returns the status Discard for a query that concerns only asynchronous steps, or that another function must
-/// answer.
+/// Returns the status Discard for a query that concerns only asynchronous steps, or for which another function exists.
 fn no_status(kind: StatusKind) -> Outcome {
     discard(match kind {
         StatusKind::DoStepStatus | StatusKind::PendingStatus => {

@@ -1,4 +1,5 @@
-//! Functions without an instance argument: versions, creation and release (sections 2.1.4 and 2.1.5 of FMI 2.0).
+//! Functions that do not return a status: versions, creation and release of instances (sections 2.1.4 and 2.1.5 of FMI
+//! 2.0).
 
 use super::types::*;
 use crate::boundary::{Arguments, Callback, ImporterLog, free, instantiate, string};
@@ -29,8 +30,8 @@ pub unsafe extern "C" fn fmi2Instantiate<M: Exported>(
     if functions.is_null() {
         return std::ptr::null_mut();
     }
-    // SAFETY: by contract, a pointer to the callbacks, which may have any alignment. They are copied, because the
-    // pointer may be invalid after this call.
+    // SAFETY: by contract, the pointer refers to the callbacks, and may have any alignment. The callbacks are copied,
+    // because the pointer may be invalid after this call.
     let functions = unsafe { functions.read_unaligned() };
     // SAFETY: by contract, each is NULL or a string.
     let (name, guid, resources) = unsafe { (string(instance_name), string(guid), string(resource_location)) };

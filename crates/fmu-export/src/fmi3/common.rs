@@ -31,7 +31,7 @@ pub unsafe fn fmi3EnterInitializationMode<M: Exported>(
 }
 
 /// Accepts the call before the initialization, because FMIKit makes it there for every FMU with inputs. The call
-/// changes nothing: Configuration Mode exists for structural parameters (section 2.3.2 of FMI 3.0), which models of
+/// changes nothing: Configuration Mode exists for structural parameters (section 2.3.6 of FMI 3.0), which models of
 /// this crate do not have.
 pub unsafe fn fmi3EnterConfigurationMode<M: Exported>(instance: &mut Instance<M>) -> Outcome {
     if instance.mode() != Mode::Instantiated {

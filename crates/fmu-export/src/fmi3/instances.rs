@@ -1,4 +1,5 @@
-//! Functions without an instance argument: version, creation and release (sections 2.2.5 and 2.3.1 of FMI 3.0).
+//! Functions that do not return a status: version, creation and release of instances (sections 2.2.5 and 2.3.1 of FMI
+//! 3.0).
 
 use super::types::*;
 use crate::boundary::{Arguments, Callback, ImporterLog, free, instantiate, string};

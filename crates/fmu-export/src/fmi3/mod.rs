@@ -1,17 +1,18 @@
 //! Implementation of the C functions of FMI 3.0. The structure is the same as in [`fmi2`](crate::fmi2).
 //!
 //! A model needs nothing special for FMI 3.0. It has the same variables as in FMI 2.0, except that an array is one
-//! variable, whereas FMI 2.0 has one variable for each element. The instantiation token is the guid. Clocks,
-//! structural parameters, intermediate update and Scheduled Execution are not supported; their functions return an
-//! error with the reason.
+//! variable, whereas FMI 2.0 has one variable for each element. The instantiation token is the guid. Clocks, structural
+//! parameters, intermediate update and Scheduled Execution are not supported. Their functions return an error with the
+//! reason, except the functions of Configuration Mode before the initialization.
 //!
 //! Every model has an independent variable, the time, as FMI 3.0 requires. If the table does not contain it, it
 //! follows the table as an additional variable ([`independent`]). Then follows a local variable for each event
 //! indicator ([`indicator`]).
 //!
 //! [Value references](reference()) count from 1 in the order of the variables, and an array takes as many as it has
-//! elements. The reason is that OMSimulator 3.0.0 takes the value references of dependencies for indices in the list
-//! of variables, which count from 1 in FMI 2.0. With this numbering, both interpretations select the same variable.
+//! elements. The references count from 1 because OMSimulator 3.0.0 takes the value references of dependencies for
+//! indices in the list of variables, which count from 1 in FMI 2.0. Both interpretations then select the same variable,
+//! unless an array precedes it.
 //!
 //! # Safety
 //!

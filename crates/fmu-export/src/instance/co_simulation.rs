@@ -86,10 +86,10 @@ impl<M: Exported> Instance<M> {
         })
     }
 
-    /// Restores the state at the start of a failed step and returns `why`: an error, or a discard if a shorter step
-    /// may help. Section 4.2.1 of FMI 3.0 requires that a step with such a status leaves the state as it was before
-    /// the step. FMI 2.0 does not specify the state (section 2.1.3), so this crate applies the same rule to both
-    /// versions.
+    /// Restores the state at the start of a failed step and returns `why`: an error, or a discard if a shorter step may
+    /// help. Section 4.2.1 of FMI 3.0 requires that a discarded step leaves the state as it was before the step, and
+    /// FMI 2.0 does not specify the state (section 2.1.3). This crate applies the same rule to both versions, and also
+    /// to errors.
     #[cold]
     fn go_back<T>(&mut self, why: Outcome<T>) -> Outcome<T> {
         self.listen();
@@ -298,7 +298,7 @@ fn reject_step<T>(point: f64, step_size: f64) -> Outcome<T> {
 }
 
 /// Tolerance by which the last step may end after the stop time, relative to the simulated time. It exists because
-/// importers that count in nanoseconds round the size of each step, for example of 1/60 s, so their steps add up to
+/// importers that count in nanoseconds round the size of each step, for example of 1/60 s, so their steps can add up to
 /// more than the stop time.
 const STOP_TIME_ROUNDING: f64 = 1e-7;
 

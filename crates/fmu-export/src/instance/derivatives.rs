@@ -127,9 +127,9 @@ impl<M: Exported> Instance<M> {
     }
 
     /// Checks that a variable is a known. Knowns are inputs, parameters, states and the time; in Initialization Mode,
-    /// variables with `initial` "exact" take the place of the states (section 2.2.8 of FMI 2.0). Parameters are
-    /// knowns at any time, whether they are tunable or not: in FMI 2.0 they are knowns only in Initialization Mode,
-    /// but CasADi uses them later, too.
+    /// variables with `initial` "exact" take the place of the states (section 2.2.8 of FMI 2.0). Parameters are knowns
+    /// at any time, whether they are tunable or not. FMI 2.0 allows this only in Initialization Mode, but CasADi also
+    /// needs it later.
     #[inline]
     fn check_known<R: Reference>(&self, known: R, initial: bool) -> Outcome {
         let is_known = |of: &Variable<M>| {
@@ -201,7 +201,7 @@ impl<M: Exported> Instance<M> {
         for (vr, order) in vr.iter().zip(orders) {
             let variable = self.variable(vr.index(), BaseType::Real)?;
             check_order(variable, *order)?;
-            // Maximum order: section 4.3.1 of FMI 2.0, 4.4.1 of FMI 3.0.
+            // Maximum order: section 4.3.1 of FMI 2.0, 4.4 of FMI 3.0.
             if order.unsigned_abs() > M::OUTPUT_DERIVATIVES {
                 return reject(format!(
                     "the order of the derivative of {} must be at most {} (maxOutputDerivativeOrder), it is {order}",

@@ -3,10 +3,10 @@
 
 use std::mem::size_of;
 
-/// Objects with their handles. A handle is a number, which the importer stores as a pointer. It contains the index of
-/// a slot and its generation, which counts the objects that have been removed from the slot. So the handle of a
-/// removed object stays invalid, until the bits of the generation overflow. Handles of different collections differ,
-/// because each is combined with the address of an allocation that belongs to its collection.
+/// Objects with their handles. A handle is a number, which the importer stores as a pointer. The number contains the
+/// index of a slot and the generation of the slot, which counts the objects that have been removed from it. So the
+/// handle of a removed object stays invalid, until the bits of the generation overflow. Handles of different
+/// collections differ, because each is combined with the address of an allocation that belongs to its collection.
 #[derive(Debug)]
 pub(super) struct Handles<V> {
     slots: Vec<Slot<V>>,
@@ -40,8 +40,8 @@ impl<V> Handles<V> {
         Self { slots: Vec::new(), empty: None, identity: None }
     }
 
-    /// Returns a number with which all handles of this collection are combined. It differs in most bits from the
-    /// number of another collection.
+    /// Returns a number with which all handles of this collection are combined. The numbers of two collections differ
+    /// in most bits.
     fn secret(&self) -> usize {
         let address = self.identity.as_deref().map_or(NULL, |identity| (&raw const *identity).addr());
         // Fibonacci hashing spreads the address over the upper bits, and the rotation moves these bits to the index.

@@ -2,7 +2,7 @@
 //! instead of pointers.
 //!
 //! Every method checks all its arguments before it changes anything, or undoes its changes, so an error leaves the
-//! instance unchanged.
+//! instance unchanged, except for the records of rejected start values.
 
 mod co_simulation;
 mod derivatives;
@@ -54,7 +54,7 @@ pub(crate) struct Instance<M> {
     pub strings: Vec<std::ffi::CString>,
     /// Binary values that the last call has returned, which the importer may read until the next call.
     pub bytes: Vec<Vec<u8>>,
-    /// Reusable buffer for models with arrays: the indices of all elements of the variables of a call.
+    /// Reusable buffer for models with arrays: the indices of all array elements and scalars that a call accesses.
     pub elements: Vec<u32>,
 }
 
@@ -79,8 +79,8 @@ struct State<M> {
     mode: Mode,
     /// Whether [`calculate`](crate::Model::calculate) of the model must be called before a value is read.
     stale: bool,
-    /// Whether the model has made a step or entered Continuous-Time Mode. After a de-serialization this is unknown,
-    /// and false.
+    /// Whether the model has made a step or entered Continuous-Time Mode. After a de-serialization this is unknown, so
+    /// the value is false.
     started: bool,
     /// Whether the model has requested the end of the simulation.
     ended: bool,
@@ -307,7 +307,7 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    /// Applies a change that may fail to the model, and undoes it after an error.
+    /// Applies a change to the model, and undoes the change if it fails.
     ///
     /// The change applies to the model itself, and a copy is the backup, not the other way around. A copy may lack
     /// allocated memory and cached results of the original, so this way an accepted change does not make the instance
@@ -409,8 +409,8 @@ struct Implicit<M>(std::marker::PhantomData<M>);
 impl<M: 'static> Implicit<M> {
     const TIME: &'static Variable<M> = &Variable::independent(&TIME).finished("time", "Simulation time");
 
-    /// Describes every event indicator. Its value is never read, because the model calculates the values of all
-    /// indicators together.
+    /// Describes every event indicator. The functions that read a value are never called, because the model calculates
+    /// the values of all indicators together.
     const INDICATOR: &'static Variable<M> = &Variable::local(&NUMBER)
         .read_by(
             shape_of_calculation(std::marker::PhantomData::<M>, |_| f64::NAN),

@@ -5,7 +5,7 @@ use fmi_abi::{Interface, Standard};
 use std::fmt;
 
 /// FMI version and interface type of the instance that serialized a state. An instance of another version or type
-/// rejects the state: its mode may not exist there, or may allow other calls.
+/// rejects the state, because there the mode of the state may not exist, or may allow other calls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Origin(pub Standard, pub Interface);
 

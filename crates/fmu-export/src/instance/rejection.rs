@@ -27,7 +27,7 @@ pub(crate) fn reject_with<T>(message: impl FnOnce() -> String) -> Outcome<T> {
     reject(message())
 }
 
-/// Returns the status Discard: the requested information is not available, or a step ended early.
+/// Returns the status Discard: the requested information is not available, or a step did not reach its end.
 #[cold]
 pub(crate) fn discard<T>(message: impl Into<String>) -> Outcome<T> {
     Err(Box::new(Rejection { status: Status::Discard, message: message.into() }))

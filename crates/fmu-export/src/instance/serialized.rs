@@ -41,8 +41,8 @@ pub(super) fn size<M: Exported>(state: &mut State<M>) -> usize {
     HEADER_LENGTH + counter.count + CHECKSUM_LENGTH
 }
 
-/// Serializes a state into `bytes`, which must have the length from [`size`]. Rejects a state that [`read`] would
-/// reject.
+/// Serializes a state into `bytes`, which must have the length from [`size`]. Rejects a state with values that [`read`]
+/// would reject.
 pub(super) fn write<M: Exported>(state: &mut State<M>, origin: Origin, bytes: &mut [u8]) -> Outcome {
     check(state)?;
     let (content, checksum) = bytes.split_at_mut(bytes.len() - CHECKSUM_LENGTH);
@@ -94,8 +94,8 @@ pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<
     Ok(())
 }
 
-/// Checks that the variables with start values have valid values, and that times are finite. The model must check its
-/// `memory` itself.
+/// Checks that the variables with start values have valid values, and that the times and the tolerance are finite. The
+/// model must check its `memory` itself.
 fn check<M: Exported>(state: &State<M>) -> Outcome {
     let Experiment { start_time, stop_time, tolerance } = state.experiment;
     let times = [Some(state.time), Some(start_time), stop_time, tolerance];
@@ -246,7 +246,7 @@ mod tests {
         assert_eq!(read(&bytes), Some(value));
         assert!(
             (0..bytes.len()).all(|length| read::<T>(&bytes[..length]).is_none()),
-            "missing bytes are detected"
+            "missing bytes must be detected"
         );
     }
 
@@ -295,7 +295,7 @@ mod tests {
         }
     }
 
-    /// Reads a long vector, and checks that a false length creates no elements for which there are no bytes.
+    /// Reads a long vector, and checks that a false length creates at most one element without bytes.
     #[test]
     fn long_vectors() {
         let value = vec![true; (1 << 20) + 1];

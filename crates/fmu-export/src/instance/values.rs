@@ -84,7 +84,7 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    /// Gets Reals one by one, including the time and the event indicators of FMI 3.0, which are not in the table. An
+    /// Gets Reals one by one, including the variables of FMI 3.0 after the table: the time and the event indicators. An
     /// error contains the name of the first variable that is not finite.
     #[cold]
     #[inline(never)]
@@ -124,8 +124,8 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    /// Sets Reals, if all are plain fields of the model and may be set. Otherwise returns false; the caller must then
-    /// set all of them with [`set_reals`](Self::set_reals).
+    /// Sets Reals, if the model has started, all are plain fields that may be set, and all values are finite. Otherwise
+    /// returns false; the caller must then set all of them with [`set_reals`](Self::set_reals).
     #[inline(always)]
     pub fn set_reals_fast<R: Reference, const N: usize>(&mut self, vr: &[R; N], values: &[f64; N]) -> bool {
         let fmi_state = self.fmi_state();
@@ -236,7 +236,8 @@ impl<M: Exported> Instance<M> {
     /// Records rejected start values, so that the initialization fails until the variables are set to valid values.
     /// Otherwise, importers that continue after the error would simulate with other start values than the user wants.
     /// All variables of the call are recorded, because none of them was set; `blamed` is the index of the one whose
-    /// value was rejected.
+    /// value was rejected; `None` if the model rejected the combination of values. After a success, removes the records
+    /// of the variables.
     fn record_rejection<R: Reference>(&mut self, vr: &[R], blamed: Option<u32>, set: Outcome) -> Outcome {
         if self.fmi_state().is_in(START_VALUE_MODES) {
             for vr in vr.iter().map(|vr| vr.index()) {
@@ -332,8 +333,7 @@ impl<M: Exported> Instance<M> {
     }
 }
 
-/// Returns whether a sum is finite. This implies that all its terms are finite, and is faster to check than each
-/// term.
+/// Returns whether a sum is finite. If it is, all its terms are finite, so one check replaces a check of each term.
 #[inline(always)]
 pub(super) fn is_finite(sum: f64) -> bool {
     // This takes half as many instructions as `f64::is_finite`.

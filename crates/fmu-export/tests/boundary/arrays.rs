@@ -145,8 +145,8 @@ fn rejections_name_the_element() {
     });
 }
 
-/// Checks each getter and setter with the largest and the smallest number of its type. The tests with `Rod` check
-/// arrays of most types.
+/// Checks each getter and setter of numbers with the largest and the smallest number of its type. The tests with `Rod`
+/// check arrays of several types.
 #[test]
 fn numbers_of_every_type() {
     let palette = Importer::initialized_at::<Palette>(0.0);
@@ -264,7 +264,7 @@ fn ranges() {
     let mut item = 0;
     fmu.ok(fmu.fmi3GetInt64(&colour, 1, &mut item, 1));
     assert_eq!(item, i64::from(palette::Colour::Red.number()));
-    // The number of an item has 32 bits, so its upper bits must not be ignored.
+    // The number of an item has 32 bits, but is passed in 64 bits, whose upper half must not be ignored.
     let (fmu, mood) =
         (Importer::new::<Talker>(Interface::CoSimulation), reference(talker::Name::mood as u32));
     fmu.rejected("beyond Int32", |fmu| fmu.fmi3SetInt64(&mood, 1, &(7 + (1 << 32)), 1));

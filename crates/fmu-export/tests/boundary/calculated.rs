@@ -10,7 +10,7 @@ const REAL: u32 = Name::real as u32;
 const BOOLEAN: u32 = Name::boolean as u32;
 const STATE: u32 = Name::state as u32;
 
-/// Returns the calculated sum. Asserts that it equals the sum of the values that are read without `calculate`.
+/// Returns the sum that `calculate` has stored. Asserts that it equals the sum of the current values.
 #[track_caller]
 fn sum(fmu: &Importer) -> f64 {
     let [sum, summands, time] = fmu.get([SUM, Name::summands as u32, Name::time as u32]);

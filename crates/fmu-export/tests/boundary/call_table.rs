@@ -89,8 +89,9 @@ const CO_SIMULATION: &str = "
     fmi2GetBooleanStatus         |  |  |  |x |x |x |  |x |  |
     fmi2GetStringStatus          |  |  |  |x |x |x |  |x |  |";
 
-/// Calls of FMI 2.0 that the standard forbids but real importers make: FMI Library terminates after an error, and
-/// OpenModelica sets time and states in Event Mode. Other tests cover calls that are tolerated for single variables.
+/// Calls of FMI 2.0 that the standard forbids but the FMU accepts, because real importers make them. For example, FMI Library
+/// terminates after an error, and OpenModelica sets time and states in Event Mode. Other tests cover calls that are
+/// tolerated for single variables.
 const TOLERATED: [(&str, Interface, Mode); 8] = [
     ("fmi2Terminate", CoSimulation, Error),
     ("fmi2Terminate", ModelExchange, Error),
@@ -347,7 +348,7 @@ fn walk<F: Either, M: Exported>(interface: Interface) {
     let mut visits = std::collections::BTreeMap::new();
     for _ in 0..20_000 {
         let function = F::functions()[random.bits() as usize % F::functions().len()];
-        // Fewer calls end the simulation, because most other calls need an initialized instance.
+        // Few calls reset the instance or end its simulation, because most other calls need an initialized instance.
         if matches!(&function[4..], "Reset" | "Terminate") && random.bits() % 8 > 0 {
             continue;
         }
@@ -367,8 +368,8 @@ fn walk<F: Either, M: Exported>(interface: Interface) {
     assert!(visits.len() == modes && visits.values().all(|calls| *calls > 100), "{visits:?}");
 }
 
-/// Checks that the table in fmu-export agrees with the tables here. Unlike the calls, this covers all states, and checks
-/// which calls the table marks as tolerated.
+/// Checks that the table in fmi-abi agrees with the tables here. Unlike the tests that make calls, this test covers all
+/// states, and checks which calls the table marks as tolerated.
 #[test]
 fn table_in_the_code() {
     fn check<F: Either>() {
@@ -408,14 +409,14 @@ fn table_in_the_code() {
     check::<fmi3::Importer>();
 }
 
-/// Pointers that may be NULL: the functions never write through them, or have nothing to free.
+/// Returns whether this pointer may be NULL, because the function never writes through it, or has nothing to free then.
 fn needs_no_pointer(function: &str, name: &str) -> bool {
     matches!(function, "fmi2GetStatus" | "fmi2GetIntegerStatus" | "fmi2GetStringStatus")
         || function.contains("FreeFMU") && name == "state"
 }
 
-/// Checks every pointer of every function with NULL, with a misaligned address, and with a length that is larger than
-/// memory. The call must be rejected with the reason and must not change anything.
+/// Checks the pointers of every function: NULL, misaligned addresses, and arrays with a length that is larger than memory.
+/// The call must be rejected with the reason and must not change anything.
 fn pointers<F: Either, M: Exported>() {
     let mut checked = 0;
     for (interface, mode) in modes_of_model::<F, M>() {

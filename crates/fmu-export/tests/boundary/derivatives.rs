@@ -1,5 +1,5 @@
-//! Derivatives with respect to variables (section 2.1.9 of FMI 2.0) and with respect to time (section 4.2.1), in both
-//! FMI versions. [`Either::try_directional`] also compares the adjoint with the directional derivatives.
+//! Derivatives with respect to variables and with respect to time (sections 2.1.9 and 4.2.1 of FMI 2.0), in both FMI
+//! versions. [`Either::try_directional`] also compares the adjoint with the directional derivatives.
 
 use crate::models::{Fuse, Meter, Oscillator, meter, oscillator::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
@@ -21,7 +21,7 @@ const KNOWNS: [u32; 3] = [Name::force as u32, Name::position as u32, Name::veloc
 const PARAMETERS: [u32; 3] = [Name::mass as u32, Name::stiffness as u32, Name::damping as u32];
 
 /// Returns central differences of all unknowns with respect to `known`. They have no truncation error, because the
-/// unknowns are quadratic functions of the knowns.
+/// unknowns are quadratic functions of all knowns except the mass, for which the error is negligible.
 fn differences(fmu: &impl Either, known: u32) -> [f64; 5] {
     let [start] = fmu.get([known]);
     let width = 1e-5 * start.abs().max(1.0);
@@ -33,8 +33,8 @@ fn differences(fmu: &impl Either, known: u32) -> [f64; 5] {
     std::array::from_fn(|i| (above[i] - below[i]) / (2.0 * width))
 }
 
-/// Checks directional derivatives in every mode that has them: of single pairs, and of several unknowns and knowns in any
-/// order and with repetitions. In Initialization Mode, parameters are knowns, too.
+/// Checks directional derivatives in six modes: of single pairs, and of several unknowns and knowns in any order and with
+/// repetitions. In Initialization Mode, parameters are knowns, too.
 fn fit_differences<F: Either>() {
     for (interface, mode) in [
         (CoSimulation, Initialization),
@@ -69,7 +69,7 @@ fn fit_differences<F: Either>() {
             fmu.directional(&[UNKNOWNS[2], UNKNOWNS[0], UNKNOWNS[2]], &[one, other, one], &[2.0, 3.0, -1.0]);
         let sum = fmu.partial(UNKNOWNS[2], one) + 3.0 * fmu.partial(UNKNOWNS[2], other);
         assert!((found[0] - sum).abs() < 1e-14 && found[0] == found[2] && found[1] == 0.0, "{found:?} {sum}");
-        assert_eq!(fmu.directional(&UNKNOWNS, &[], &[]), [0.0; 5], "without knowns the sum is empty");
+        assert_eq!(fmu.directional(&UNKNOWNS, &[], &[]), [0.0; 5], "without knowns, each sum must be 0");
     }
 }
 
@@ -92,8 +92,8 @@ fn calculated_states<F: Either>() {
     }
 }
 
-/// Checks that the time derivatives of all Real variables agree with steps. Orders other than 1 are rejected, because 1 is
-/// the highest order of the test models.
+/// Checks that the time derivatives of Real outputs and local variables agree with steps, and that parameters have the
+/// derivative 0. Orders other than 1 are rejected, because 1 is the highest order of the test models.
 fn output_derivatives<F: Either>() {
     let fmu = F::in_mode::<Oscillator>(CoSimulation, Instantiated);
     fmu.set(&KNOWNS[1..], &[0.25, -3.0]);
@@ -129,8 +129,8 @@ fn in_both_versions() {
     check::<fmi3::Importer>();
 }
 
-/// Checks what differs in FMI 3.0: time is a variable and has a derivative, and parameters are knowns in every mode,
-/// because the FMU accepts new values for them at any time.
+/// Checks the differences in FMI 3.0: time is a variable and has a derivative, and parameters are knowns in every mode,
+/// because the FMU accepts new values for them at any time. Also checks rejected calls of functions of FMI 3.0.
 #[test]
 fn only_in_fmi3() {
     let fmu = fmi3::Importer::new::<Oscillator>(CoSimulation);

@@ -139,7 +139,7 @@ fn event_iteration<F: Either>() {
         let Updated { again, next, .. } = fmu.update();
         (again, next.unwrap(), fmu.integer(counter::Name::count as u32))
     };
-    assert_eq!(round(), (false, 0.25, 0), "nothing is due at the start");
+    assert_eq!(round(), (false, 0.25, 0), "nothing must be due at the start");
     // After two periods, two ticks are due. The second makes the count exceed its limit of 10, so that it is carried.
     fmu.ok(fmu.enter_continuous_time_mode());
     fmu.ok(fmu.set_time(0.5));
@@ -147,7 +147,7 @@ fn event_iteration<F: Either>() {
     assert_eq!(round(), (true, 0.5, 7));
     assert_eq!(round(), (true, 0.75, 14));
     assert_eq!(round(), (false, 0.75, 4));
-    assert_eq!(round(), (false, 0.75, 4), "one more iteration is allowed");
+    assert_eq!(round(), (false, 0.75, 4), "one more iteration must change nothing");
     // A failed event is undone, and so is a failed step.
     fmu.set(&[counter::Name::weight as u32], &[f64::MAX]);
     fmu.ok(fmu.enter_continuous_time_mode());
@@ -199,7 +199,7 @@ fn the_importer_handles_events() {
         Ok(Stepped { event_handling_needed: true, early_return, last_successful_time, ..IMMEDIATE })
     };
     assert_eq!(fmu.do_step(0.0, 1.0), at(0.25, true));
-    assert_eq!(fmu.get([SUM]), [1.0], "the event is not handled yet");
+    assert_eq!(fmu.get([SUM]), [1.0], "the event must not be handled yet");
     fmu.ok(fmu.fmi3EnterEventMode());
     fmu.set(&[ticker::Name::amount as u32], &[10.0]);
     assert_eq!(fmu.update().next, Some(0.5));
@@ -217,7 +217,7 @@ fn the_importer_handles_events() {
 #[test]
 fn the_library_handles_events() {
     fn check(fmu: &impl Either) {
-        assert_eq!(fmu.get([SUM]), [1.0], "the tick at the start");
+        assert_eq!(fmu.get([SUM]), [1.0], "only the tick at the start must be counted");
         fmu.step(0.0, 0.6);
         assert_eq!(fmu.get([SUM]), [3.0]);
     }
@@ -251,9 +251,9 @@ fn trouble(fmu: &impl Either, trouble: Trouble) {
     fmu.ok(fmu.set_item(TROUBLE, trouble as i32));
 }
 
-/// Checks that the first step reports an end of the simulation that an event at the start has requested: in FMI 2.0
-/// (section 4.2.3), and in FMI 3.0 if the importer has no Event Mode or ignores the result of fmi3UpdateDiscreteStates,
-/// as FMPy does.
+/// Checks that the first step reports the end of the simulation if an event at the start has requested it (section 4.2.3 of
+/// FMI 2.0). In FMI 3.0, this concerns importers that do not use Event Mode, or that ignore the result of
+/// fmi3UpdateDiscreteStates, as FMPy does.
 #[test]
 fn the_initial_event_ends_the_simulation() {
     let fmu = of_fmi2::<Grumbler>(|fmu| trouble(fmu, Trouble::End));
@@ -315,7 +315,8 @@ fn an_event_that_fails_in_its_second_round() {
     fmu.step(0.0, 0.5);
 }
 
-/// Checks that a step with more than 10,000 events is discarded, and that a shorter step then succeeds.
+/// Checks that a step with more than 10,000 events is discarded. In FMI 3.0, it changes nothing and a shorter step then
+/// succeeds; in FMI 2.0, it ends early. An event with too many iterations is an error.
 #[test]
 fn more_events_than_a_step_may_have() {
     const EXPECTED: &str = "it has more than 10000 events; make shorter steps, or give the events hysteresis if the model chatters";
@@ -381,7 +382,7 @@ fn an_early_end_and_a_shorter_step() {
     let message = discarded(&fmu, 5.0, 5.0);
     assert!(message.contains("10") && message.contains("early, at 8"), "{message}");
     assert_eq!(progress(&fmu), (8.0, false));
-    assert_eq!(fmu.get([TEMPERATURE]), [100.0], "the value at the early end can be read");
+    assert_eq!(fmu.get([TEMPERATURE]), [100.0], "the value at the early end must be readable");
     fmu.rejected("a step after it", |fmu| fmu.try_step(8.0, 1.0));
     fmu.rejected("an input after it", |fmu| fmu.try_set(&[fuse::Name::load as u32], &[0.0]));
     fmu.ok(fmu.fmi2Terminate());
@@ -439,7 +440,7 @@ mod hasty {
     offer!(Hasty: CoSimulation);
 }
 
-/// Checks that such a step is fatal, because it contradicts the model description.
+/// Checks that a step that ends early is fatal if the model does not declare it, because it contradicts the model description.
 #[test]
 fn an_early_end_that_the_model_has_not_announced() {
     fn check<F: Either>() {

@@ -86,7 +86,7 @@ fn bad_resources() {
     let location = CString::new(resources("mute", "\n").to_str().unwrap()).unwrap();
     let arguments =
         Arguments { resource_location: Some(&location), ..Arguments::new::<Talker>(CoSimulation) };
-    let log = Importer::make::<Talker>(&arguments).expect_err("there is nothing to say");
+    let log = Importer::make::<Talker>(&arguments).expect_err("an empty file must be rejected");
     assert_eq!(log.len(), 1);
     assert_eq!(log[0].message, "fmi2Instantiate: resources/words.txt is empty");
 }

@@ -11,8 +11,8 @@ const TOTAL: u32 = Name::total as u32;
 const SUM: u32 = Name::sum as u32;
 const LEVEL: u32 = Name::level as u32;
 
-/// Sets and reads `count` inputs per call, each of them once as the first, before the first step and between steps.
-/// Asserts that all inputs have the values that were set, and that each setter had its side effect.
+/// Sets and reads `count` inputs per call, before the first step and between steps. Each input comes first in two of the
+/// calls. Asserts that all inputs have the values that were set, and that each setter had its side effect.
 fn set_and_read<F: Either>(count: usize) {
     let fmu = F::new::<Meter>(CoSimulation);
     fmu.initialize(0.0);
@@ -33,7 +33,7 @@ fn set_and_read<F: Either>(count: usize) {
         let marks = [1, 2, 3].iter().filter(|index| indices.contains(index)).count() as i32;
         assert_eq!(fmu.integer(Name::marks as u32), 10 * seconds + marks, "{indices:?}");
         if round == 0 {
-            assert_eq!(fmu.get([LEVEL]), [now[0]], "the level starts at rest");
+            assert_eq!(fmu.get([LEVEL]), [now[0]], "the level must start at rest");
         }
         // The model makes steps of size 0.5 with a later calculation, of size 2 without one, and of size 1 with `step_fast`.
         let size = [0.5, 2.0, 1.0][round % 3];

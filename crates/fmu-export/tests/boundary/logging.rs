@@ -42,8 +42,8 @@ fn shown(fmu: &Importer) -> String {
     letters.into_iter().collect()
 }
 
-/// Checks that errors and warnings are always logged, and other messages only if logging is on. According to section
-/// 2.1.3 of FMI 2.0, the message of fmi2Discard is logged only in debug mode.
+/// Checks that without a list of categories, errors and warnings are always logged, and other messages only if logging is
+/// on. According to section 2.1.3 of FMI 2.0, the message of fmi2Discard is logged only in debug mode.
 #[test]
 fn logging_on_and_off() {
     assert_eq!(shown(&logging::<Talker>(false)), "WE");
@@ -87,16 +87,16 @@ fn categories_that_do_not_exist() {
     fmu.rejected("NULL entry", |fmu| fmu.fmi2SetDebugLogging(1, 2, [c"logEvents".as_ptr(), null()].as_ptr()));
     fmu.rejected("NULL list", |fmu| fmu.fmi2SetDebugLogging(1, 3, null()));
     fmu.rejected("no UTF-8", |fmu| fmu.set_debug_logging(true, &[c"\xff"]));
-    assert_eq!(shown(&fmu), "WE", "no category was changed");
+    assert_eq!(shown(&fmu), "WE", "no category must be changed");
 }
 
-/// Checks that without logging only errors are logged (section 2.3.1 of FMI 3.0). Errors cannot be disabled.
+/// Checks that FMI 3.0 logs only errors if logging is off (section 2.3.1). Errors cannot be disabled.
 #[test]
 fn logging_of_fmi3() {
     let fmu = fmi3::Importer::new::<Talker>(CoSimulation);
     let volume = Name::volume as u32;
     fmu.set(&[volume], &[10.5]);
-    assert_eq!(fmu.take_log(), [], "a warning is not an error");
+    assert_eq!(fmu.take_log(), [], "a warning must not be logged");
     fmu.ok(fmu.fmi3SetDebugLogging(1, 1, &c"logStatusWarning".as_ptr()));
     fmu.set(&[volume], &[10.6]);
     assert_eq!(fmu.take_log().len(), 1);
@@ -122,8 +122,8 @@ fn events() {
     assert!(log.iter().all(|Message { status, category, .. }| (*status, category.as_str()) == (Status::Ok, "logEvents")));
 }
 
-/// Checks that a message of the model is delivered once, at the end of the call in which it is logged, with
-/// status OK.
+/// Checks that a message of the model is delivered once, at the end of the call in which it is logged, and that a warning
+/// has the status Warning.
 #[test]
 fn messages_of_the_model() {
     let fmu = logging::<Talker>(true);
@@ -199,8 +199,8 @@ fn instances_do_not_mix() {
     }
 }
 
-/// Checks that a NULL logger suppresses the messages and has no other effect. All tests here pass NULL for the memory
-/// callbacks.
+/// Checks that a NULL logger suppresses the messages, and does not change the statuses of calls. All tests here pass NULL
+/// for the memory callbacks.
 #[test]
 fn no_logger() {
     let arguments = Arguments { logger: false, logging_on: 1, ..Arguments::new::<Talker>(ModelExchange) };

@@ -6,7 +6,7 @@ mod models;
 
 use fmu_export::{Exported, Interface};
 
-/// Calls a function for every test model.
+/// Calls a function for every test model of this list.
 macro_rules! for_every_model {
     ($function:ident $(, $importer:ty)?) => {{
         $function::<$($importer,)? crate::models::Oscillator>();

@@ -240,7 +240,8 @@ fn status_kinds() {
     }
     fmu.rejected("NULL", |fmu| fmu.fmi2GetRealStatus(2, null_mut()));
     fmu.rejected("NULL", |fmu| fmu.fmi2GetBooleanStatus(3, null_mut()));
-    // Each kind of status is returned by one function. The others are discarded, with a message that names this function.
+    // Kinds 2 and 3 are each returned by one function. Other functions return Discard, with a message that names this function.
+    // Kinds 0 and 1 concern only asynchronous steps.
     fmu.ok(fmu.set_debug_logging(true, &[c"logStatusDiscard"]));
     type Query = fn(&Importer) -> Status;
     let queries: &[(Query, &str)] = &[

@@ -12,8 +12,8 @@ use fmu_test_kit::{Either, Importer, fmi3, serialized};
 const FORCE: u32 = Name::force as u32;
 const STATES: [u32; 2] = [Name::position as u32, Name::velocity as u32];
 
-/// Returns the serialized state without the bytes that differ between FMI versions: the version and interface type, the
-/// mode, and the checksum.
+/// Returns the serialized state without its first bytes and its checksum, because the interface type, the mode and the
+/// checksum differ between FMI versions.
 fn content(fmu: &impl Either) -> Vec<u8> {
     let bytes = fmu.bytes();
     bytes[serialized::ENDED..bytes.len() - serialized::CHECKSUM].to_vec()
@@ -83,8 +83,8 @@ fn input_derivatives() {
     assert_eq!(once.get(STATES), other.get(STATES));
 }
 
-/// Checks start values and nominal values of states. The nominal values are those of the types. A state has the same
-/// effect whether it is set as a variable or in the array of states.
+/// Checks start values and nominal values of states. The types of the variables define the nominal values. A state has the
+/// same effect whether it is set as a variable or in the array of states.
 #[test]
 fn states() {
     fn check<F: Either>() {

@@ -22,7 +22,7 @@ fn handles_are_reused() {
     let (handle, bytes) = (state, fmu.bytes());
     fmu.step(0.0, 1.0);
     fmu.ok(fmu.fmi2GetFMUstate(&mut state));
-    assert_eq!(state, handle, "the memory is used again");
+    assert_eq!(state, handle, "the handle must not change");
     fmu.ok(fmu.deserialize(bytes.as_ptr(), bytes.len(), &mut state));
     assert_eq!(state, handle);
     fmu.ok(fmu.fmi2SetFMUstate(state));
@@ -121,7 +121,7 @@ fn infinite_numbers() {
     });
 }
 
-/// Checks NULL handles; `valid_calls.rs` checks NULL pointers.
+/// Checks NULL handles; `call_table.rs` checks NULL pointers.
 fn null_handles<F: Either>() {
     for interface in INTERFACES {
         let (fmu, mut size) = (F::in_mode::<Oscillator>(interface, Instantiated), 0);
@@ -144,7 +144,7 @@ fn buffers_of_the_wrong_size() {
             fmu.fmi2SerializeFMUstate(state, buffer.as_mut_ptr().cast(), wrong)
         });
         assert!(message.contains(&size.to_string()), "{message}");
-        assert!(buffer.iter().all(|byte| *byte == 0x55), "nothing is written");
+        assert!(buffer.iter().all(|byte| *byte == 0x55), "nothing must be written");
     }
     fmu.forget(state);
 }
@@ -159,7 +159,8 @@ fn restores(fmu: &Importer, bytes: &[u8]) -> bool {
     status == Status::Ok
 }
 
-/// Step between the byte positions that are changed or cut. Under Miri, which is slow, every tenth is tried.
+/// Distance between the bytes that are changed, and between the lengths that are tried. Under Miri, which is slow, every
+/// tenth is tried.
 const STRIDE: usize = if cfg!(miri) { 10 } else { 1 };
 
 /// Checks that any change of a byte is detected, and that the state of the handle then stays unchanged. Under Miri, only
@@ -182,7 +183,7 @@ fn every_changed_byte_is_detected<F: Either, M: Exported>() {
         assert_eq!(
             fmu.take_log().len(),
             changes().count() * bytes.len().div_ceil(STRIDE),
-            "each change is reported"
+            "each change must be reported"
         );
         assert_eq!(fmu.bytes(), bytes);
         fmu.ok(fmu.set_state(state));
@@ -228,7 +229,7 @@ fn a_reset_instance_is_like_a_new_one<F: Either, M: Exported>() {
     }
 }
 
-/// Checks that a restored state restores the mode, the time and the stop time, even if the instance is in a later mode.
+/// Checks that a restored state restores the mode, the time and the stop time, even if the instance is in another mode.
 fn every_mode_is_restored<F: Either, M: Exported>() {
     for (interface, mode) in modes_of_model::<F, M>() {
         let bytes = F::in_mode::<M>(interface, mode).bytes();
@@ -290,7 +291,7 @@ fn in_both_versions() {
 fn messages_say_where_a_state_comes_from() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, StepComplete);
     let bytes = fmu.bytes();
-    assert_eq!(sealed(bytes.clone()), bytes, "the layout is as this test assumes");
+    assert_eq!(sealed(bytes.clone()), bytes, "the layout must be as this test assumes");
     assert_eq!(bytes[GUID_HASH], fnv1a(Oscillator::INFO.guid.as_bytes()));
     assert_eq!(time(&bytes), 0.0);
 
@@ -333,7 +334,7 @@ fn impossible_contents() {
         fmu.rejected_bytes(&with(bytes.clone(), value(5), &springs.to_le_bytes()));
     }
     let message = fmu.rejected_bytes(&with(bytes.clone(), value(6), &20.0_f64.to_le_bytes()));
-    assert!(message.contains("nothing oscillates"), "update rejects it: {message}");
+    assert!(message.contains("nothing oscillates"), "update must reject it: {message}");
     // The force may have any finite value and is restored exactly.
     assert!(restores(&fmu, &with(bytes, value(0), &f64::MAX.to_le_bytes())));
     assert_eq!(fmu.get([FORCE]), [f64::MAX]);
@@ -348,7 +349,7 @@ fn invalid_strings_and_items() {
     // The strings `heard` and `greeting` are a length of 8 bytes and 5 letters each. `mood` follows, an integer of 8 bytes.
     let heard = VALUES + 8..VALUES + 10;
     let mood = VALUES + 26..VALUES + 34;
-    assert_eq!(bytes[mood.clone()], 1_i64.to_le_bytes(), "the layout is as this test assumes");
+    assert_eq!(bytes[mood.clone()], 1_i64.to_le_bytes(), "the layout must be as this test assumes");
     for item in [0, 3, 1 << 32 | 1, i64::MIN] {
         fmu.rejected_bytes(&with(bytes.clone(), mood.clone(), &item.to_le_bytes()));
     }

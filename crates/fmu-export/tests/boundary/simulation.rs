@@ -14,7 +14,7 @@ fn variables_have_the_names_of_the_description() {
     assert_eq!(rod.values("limits").unwrap(), limits);
     assert_eq!(rod.get("power[2]").unwrap(), 2.0);
     assert_eq!(rod.value("labels[1]").unwrap(), Value::from("half"));
-    // The derivatives of a calculated array depend on the values that were set.
+    // The calculated array of derivatives depends on the values that were set.
     let wall = rod.get("der(T[1])").unwrap();
     assert!(rod.set("wall", 500.0).unwrap().get("der(T[1])").unwrap() > wall);
 }

@@ -67,7 +67,7 @@ fn configuration_without_structural_parameters() {
     }
 }
 
-/// Returns the communication point and the step size of the step with this number.
+/// A function that returns the communication point and the step size of the step with this number.
 type Clock = fn(i32) -> (f64, f64);
 
 /// Communication points as importers compute them, with different rounding errors.

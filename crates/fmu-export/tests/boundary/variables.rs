@@ -1,4 +1,4 @@
-//! Values of Strings, Booleans, Enumerations, tunable parameters and time (section 2.2.7 of FMI 2.0, 2.2.6 of FMI 3.0).
+//! Values of Strings, Booleans, Enumerations, tunable parameters and time (section 2.2.7 of FMI 2.0, 2.4.7.4 of FMI 3.0).
 
 use crate::INTERFACES;
 use crate::models::grumbler::{self, Trouble};
@@ -191,7 +191,7 @@ fn wrong_types() {
     }
 }
 
-/// Checks that value references of FMI 3.0 begin with 1, and that all functions reject 0.
+/// Checks that value references of FMI 3.0 begin with 1, and that functions reject 0.
 #[test]
 fn value_references_count_from_1() {
     let (fmu, mut value) = (fmi3::Importer::initialized_at::<Oscillator>(0.0), 0.0);

@@ -11,7 +11,7 @@
 #include "fmi2FunctionTypes.h"
 #include "fmi3FunctionTypes.h"
 
-/* All 44 functions; each has a type fmi2...TYPE in the headers. */
+/* All 44 functions of FMI 2.0; each has a type fmi2...TYPE in the headers. */
 #define FMI2_FUNCTIONS(F) \
     F(GetTypesPlatform) F(GetVersion) F(SetDebugLogging) F(Instantiate) F(FreeInstance) F(SetupExperiment) \
     F(EnterInitializationMode) F(ExitInitializationMode) F(Terminate) F(Reset) \
@@ -27,7 +27,7 @@
 FMI2_FUNCTIONS(DEFINE)
 #undef DEFINE
 
-/* All 75 functions; each has a type fmi3...TYPE in the headers. */
+/* All 75 functions of FMI 3.0; each has a type fmi3...TYPE in the headers. */
 #define FMI3_FUNCTIONS(F) \
     F(GetVersion) F(SetDebugLogging) F(InstantiateModelExchange) F(InstantiateCoSimulation) \
     F(InstantiateScheduledExecution) F(FreeInstance) F(EnterInitializationMode) F(ExitInitializationMode) \
@@ -66,7 +66,7 @@ static void *symbol(void *library, const char *name) {
     return address;
 }
 
-/* Loads the library and all 44 functions. */
+/* Loads the library and all functions of FMI 2.0. */
 static inline void *load(const char *path) {
     void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (!library) fprintf(stderr, "%s\n", dlerror());

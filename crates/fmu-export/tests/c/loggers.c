@@ -1,4 +1,4 @@
-/* Some importers format a log message as printf does, others show the format string unchanged. Checks that both show the
+/* Some importers format a log message as printf does, but others show the format string unchanged. Checks that both show the
    same text, regardless of the characters in it: loggers LIBRARY GUID. */
 #include "fmu.h"
 #include <stdarg.h>
@@ -22,7 +22,7 @@ static void take(fmi2ComponentEnvironment environment, fmi2String instance_name,
     snprintf(plain[plain_count++], 1000, "[%s] %s", instance_name, message);
 }
 
-/* Makes calls whose messages quote strings that the importer has passed. */
+/* Makes calls whose messages mostly quote strings that the importer has passed. */
 static void provoke(const char *guid, fmi2CallbackFunctions callbacks) {
     const fmi2String wishes[] = {"%s%s%n", "#r1#"};
     const unsigned vr = 99;

@@ -1,5 +1,5 @@
 //! Invalid tables and capabilities that are detected while constants are evaluated. The description of a variable is the
-//! rule that its line violates.
+//! rule that its line violates, unless it begins with "Valid".
 
 mod lines {
     include!("shared/fields.rs");

@@ -154,7 +154,7 @@ macro_rules! clumsy {
 
 /// A memory of three numbers.
 trait Collects {
-    /// Adds a number and removes the oldest one.
+    /// Adds a number, and removes the oldest one if there are already three.
     fn collect(&mut self, number: f64);
 }
 

@@ -97,7 +97,7 @@ impl CoSimulation for Counter {
         let end = step.time + step.size + 1e-9 * self.period;
         if end - self.next > MOST * self.period || end + self.period == end {
             return Err(Error::new(format!(
-                "a step may have at most {MOST} periods, and the time must change if a period is added"
+                "a step may have at most {MOST} periods, and a period must not vanish when it is added to the time"
             )));
         }
         // A step that fails must leave the model as it was.

@@ -1,4 +1,4 @@
-//! A model of which every method can panic. It is not an example for authors.
+//! A model whose methods can panic. It is not an example for authors.
 
 use fmu_export::*;
 use std::cell::Cell;
@@ -28,9 +28,9 @@ pub enum Fault {
     Drop,
     /// Panics in a getter with a payload that is not a string.
     NoMessage,
-    /// Panics in a getter with a payload that panics when it is dropped, with a payload that does the same.
+    /// Panics in a getter with a payload that panics when it is dropped. The payload of this second panic does the same.
     Bomb,
-    /// Set for all instances by [`while_all_break`], not by the parameter; so is `Clone`.
+    /// Like `Clone`, set for all instances by [`while_all_break`], not by the parameter.
     New,
     Clone,
 }

@@ -1,4 +1,4 @@
-//! A model of which some steps end early, and one ends the simulation.
+//! A model in which some steps end early, and one step ends the simulation.
 
 use fmu_export::*;
 

@@ -1,4 +1,5 @@
-//! A clock that logs a warning and then fails in the method that its parameter selects.
+//! A clock that logs a warning and then fails in the method that its parameter selects. Other values of the parameter cause
+//! other trouble.
 
 use fmu_export::*;
 

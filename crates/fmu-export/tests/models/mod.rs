@@ -1,5 +1,5 @@
-//! Short, complete test models that together use all features of FMI 2.0. `Palette` and `Ticker` also use features that
-//! only FMI 3.0 has.
+//! Short, complete test models that together use all features of FMI 2.0. Some, such as `Palette`, `Rod` and `Ticker`, also
+//! use features that only FMI 3.0 has.
 #![allow(dead_code, missing_docs, unused_imports, reason = "not every test uses every test model")]
 
 #[path = "../../../cargo-fmu/models/ball/src/ball.rs"]

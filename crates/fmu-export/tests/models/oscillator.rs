@@ -110,7 +110,7 @@ impl Model for Oscillator {
 impl CoSimulation for Oscillator {
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         let (k, c, slope, h) = (self.all_springs(), self.damper(), self.slope.unwrap_or(0.0), step.size);
-        // x = a + b t is one solution. The difference between it and the start values is a decaying oscillation.
+        // The motion is the sum of one solution, x = a + b t, and of a decaying oscillation, whose start values are x and v.
         let b = slope / k;
         let a = (self.force - c * b) / k;
         let (x, v) = (self.position - a, self.velocity - b);

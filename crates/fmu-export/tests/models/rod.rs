@@ -160,7 +160,7 @@ impl Model for Rod {
 }
 
 impl CoSimulation for Rod {
-    /// Uses the explicit Euler method, with substeps that are short enough for any capacity.
+    /// Uses the explicit Euler method. In steps of up to 100 s, its substeps are short enough for any capacity.
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         let count = (step.size / 0.01).ceil().clamp(1.0, 1e4);
         let mut next = self.temperatures;

@@ -25,7 +25,7 @@ pub struct Talker {
     radicand: f64,
     guess: f64,
     root: f64,
-    /// All replies so far, after the greeting.
+    /// The greeting, and the replies so far; at most 100 strings.
     said: Vec<String>,
     who: String,
     words: String,

@@ -1,4 +1,4 @@
-//! The model as a library, which a test converts to C sources.
+//! The test model `Faulty` as a library, which a test converts to C sources.
 
 #[path = "../models/faulty.rs"]
 #[allow(dead_code, reason = "only tests use some of its functions")]

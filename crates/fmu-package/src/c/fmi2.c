@@ -21,7 +21,7 @@ typedef struct {
     u32 component; /* the instance in the module */
     u32 buffer;    /* address of the module's memory for arguments */
     u32 buffer_size;
-    bool dead; /* whether a call has failed so that the module could not report it */
+    bool dead; /* whether a call has trapped and the module could not report that */
 } Instance;
 
 /* A running call. */
@@ -557,7 +557,7 @@ STATUS(fmi2GetIntegerStatus, fmi2Integer)
 STATUS(fmi2GetBooleanStatus, fmi2Boolean)
 STATUS(fmi2GetStringStatus, fmi2String)
 
-/* fmi2EventInfo as the module writes it. */
+/* fmi2EventInfo as the module writes it: five flags, padding and a time. */
 typedef struct {
     u32 flags[6];
     double next_event_time;

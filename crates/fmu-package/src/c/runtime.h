@@ -12,7 +12,7 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Results are bit-identical everywhere, because operations keep the order of the code and each one rounds to double. */
+/* Results are bit-identical everywhere, because operations keep the order of the code and each one rounds to its type. */
 #if defined(__FAST_MATH__) || defined(_M_FP_FAST) || defined(__ASSOCIATIVE_MATH__) || \
     defined(__RECIPROCAL_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
 #error "compile without -ffast-math (/fp:fast): the results would differ from the model's"
@@ -53,8 +53,8 @@ enum {
     WASM_RT_TRAP_CALL_INDIRECT
 };
 
-/* An instance contains all memory that its module can request. FMU_SMALL unused bytes follow it, so that for smaller
-   offsets only the base must be checked. */
+/* An instance contains all memory that its module can request. FMU_SMALL unused bytes follow it, so that only
+   the base of an address must be checked if the offset is smaller than FMU_SMALL. */
 #define FMU_PAGE 65536u
 #define FMU_MEMORY (FMU_MEMORY_PAGES * FMU_PAGE)
 #define FMU_SMALL 4096u

@@ -1,4 +1,4 @@
-//! The descriptions of test models, compared with the files in `expected`, and the errors on malformed models.
+//! The descriptions of test models, compared with the files in `expected`, and the errors for malformed models.
 //!
 //! If the environment variable `UPDATE_EXPECTED` is set, the tests write these files.
 #![allow(missing_docs, unsafe_code)]

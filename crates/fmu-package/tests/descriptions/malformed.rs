@@ -50,7 +50,10 @@ fn models_that_cannot_be_made() {
         ("broken", "the model cannot be made for Co-Simulation: it is broken"),
         ("panic", "the model cannot be made for Co-Simulation: it panics"),
         ("two-faced", "u starts with 1 in Co-Simulation and with 0 in Model Exchange"),
-        ("unwritable", "the start value of label has a character that XML lacks: \"a\\u{1}\""),
+        (
+            "unwritable",
+            "the start value of label has a control character that must not be in XML: \"a\\u{1}\"",
+        ),
         ("rejects itself", "the model rejects its start values: no is no"),
         (
             "unreadable",

@@ -1,4 +1,4 @@
-//! The test models. Together they use everything that a model description can contain.
+//! The test models. Together they use most of what fmu-package writes into a model description.
 
 use fmu_export::*;
 use std::cell::RefCell;
@@ -16,7 +16,7 @@ macro_rules! step {
     };
 }
 
-/// Everything that FMI 2.0 and FMI 3.0 have in common.
+/// Most of what the descriptions for FMI 2.0 and FMI 3.0 have in common.
 pub mod room {
     use super::*;
 
@@ -375,7 +375,7 @@ pub mod factors {
     offer!(Factors: CoSimulation + ModelExchange + Partials);
 }
 
-/// Arrays of every kind, whose elements have different dependencies. In FMI 3.0, the dependencies of the elements are merged.
+/// Arrays of several types, whose elements have different dependencies. In FMI 3.0, the dependencies of the elements are merged.
 pub mod chain {
     use super::*;
 

@@ -1,4 +1,5 @@
-//! A model whose states do not follow their derivatives, or change when they are read, is rejected.
+//! A model is rejected if its states do not follow their derivatives, have derivatives in another unit, or change unexpectedly: when
+//! values are calculated, or in an event that does not report it.
 
 use crate::{BOTH, changed, model};
 use fmu_export::*;

@@ -12,7 +12,7 @@ _Text = str | None
 _Number = float | None
 
 class FmuError(Exception):
-    """An FMU cannot be loaded or run, or rejects a run."""
+    """An FMU cannot be loaded or run, is closed, or has rejected a call."""
 
 class Loaded:
     def __init__(self, path: str | PathLike[str], execution_tool: bool) -> None: ...

@@ -9,21 +9,22 @@ from fmu_run.model import Model
 
 
 class Fmu(Model):
-    """An FMU, unpacked and loaded once. As a context manager, it unloads the FMU at the end, as soon as all instances are freed.
+    """An FMU, unpacked and loaded once. As a context manager, it unloads the FMU at the end of the block or, if instances still exist
+    then, when the last one is freed.
 
     The library of the FMU runs in this process, so a crash of the FMU ends the process.
 
     Parameters
     ----------
     path
-        Path of the FMU, or of a directory with an unpacked FMU.
+        Path of an FMU, or of a directory with an unpacked FMU.
     execution_tool
         Run the FMU even if its library starts another program (needsExecutionTool), which must be installed.
 
     Raises
     ------
     FmuError
-        If the file is not an FMU, or has no library for this platform.
+        If the file is not an FMU, has no library for this platform, or needs another program although `execution_tool` is false.
     """
 
     def __init__(self, path: str | os.PathLike[str], *, execution_tool: bool = False):
@@ -38,7 +39,7 @@ class Fmu(Model):
         #: dict[str, str]: name of the time derivative of each continuous state, by the name of the state, in the order of the model
         #: structure.
         self.derivatives = dict(derivatives)
-        #: tuple[str, ...]: names of the continuous outputs, in the order of the model structure.
+        #: tuple[str, ...]: names of the floating-point outputs, in the order of the model structure.
         self.outputs = tuple(outputs)
         #: dict[str, bool]: whether the FMU has directional derivatives, by interface type.
         self.directional = dict(directional)

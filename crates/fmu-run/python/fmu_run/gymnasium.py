@@ -45,7 +45,7 @@ class Task:
         Inputs by name with their bounds (low, high), or only names. In the latter case the bounds are `min` and `max` of the model
         description, or infinite if it has none.
     observations
-        Numeric variables that are observed after each step, in the same forms.
+        Numeric variables that are observed after each step, in one of the forms of `actions`.
     reward
         Function (observation before, action, observation after) -> (n,).
     step
@@ -55,7 +55,7 @@ class Task:
     terminated
         Function with the arguments of `reward` -> (n,) of bool: whether the episode terminates.
     inputs
-        Names of the inputs, if the actions are not inputs. Actions may then have any names.
+        Names of the inputs that `to_inputs` calculates, if the actions are not inputs. Actions may then have any names.
     to_inputs
         Function that converts actions to inputs: (actions, previous inputs (n, inputs)) -> (n, inputs).
     start
@@ -64,8 +64,8 @@ class Task:
         Start values that are drawn for each episode, by name: uniformly from (low, high), or by a function (generator, count) ->
         (count,).
     failed_reward
-        The reward for a step that the FMU rejects, which also ends the episode. It should be worse than anything that the rest of the
-        episode can cost; otherwise the agent learns to provoke failures.
+        The reward for a step that the FMU rejects, or after which an observation is not finite. Such a step also ends the episode. The
+        reward should be worse than anything that the rest of the episode can cost; otherwise the agent learns to provoke failures.
     threads
         Number of threads, as in `Fmu.instances`.
     """
@@ -88,10 +88,11 @@ class Task:
 
 
 class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
-    """Instances of one FMU that run episodes in parallel.
+    """Instances of one FMU or system that run episodes in parallel.
 
-    If the FMU rejects a call of an instance, or if an observation is not finite, the episode of the instance terminates: the last
-    observation is repeated, and `infos["error"]` contains the message. All other instances continue.
+    If the FMU rejects a step of an instance, or if an observation is not finite, the episode of the instance terminates: the last
+    observation is repeated, and `infos["error"]` contains the message (with SAME_STEP, `infos["final_info"]["error"]`). All other
+    instances continue.
 
     Parameters
     ----------
@@ -149,7 +150,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         self._observation: _Array | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[_Array, _Info]:
-        """Begin new episodes of all instances, or of those in `options["reset_mask"]`, (num_envs,) of bool.
+        """Begin new episodes of all instances, or of those in `options["reset_mask"]`, (num_envs,) of bool. The first call always begins
+        all.
 
         Returns
         -------
@@ -217,7 +219,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
             self._own.close()
 
     def _advance(self, actions: _Array, before: _Array) -> tuple[_Array, dict[int, str]]:
-        """Perform a step. Return the observations after it, and the messages of failed instances by index."""
+        """Perform a step. Return the observations after it, and the messages of instances whose step failed, by index."""
         after, values = np.full_like(before, np.nan), actions
         if self.task.to_inputs is not None:
             values = np.asarray(self.task.to_inputs(actions, self._instances.get(self._inputs)), dtype=np.float64)
@@ -262,7 +264,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
 
 
 class Env(gymnasium.Env[_Array, _Array]):
-    """One instance of an FMU that runs episodes: a `VectorEnv` of one instance.
+    """One instance of an FMU or system that runs episodes, like a `VectorEnv` with one instance.
 
     Parameters
     ----------
@@ -282,7 +284,7 @@ class Env(gymnasium.Env[_Array, _Array]):
         return observation[0], {}
 
     def step(self, action: ArrayLike) -> tuple[_Array, SupportsFloat, bool, bool, _Info]:
-        """Perform a step. If the FMU rejects it, `info["error"]` contains the message."""
+        """Perform a step. If the FMU rejects it, or if an observation is not finite, `info["error"]` contains the message."""
         observation, reward, terminated, truncated, info = self._one.step(np.asarray(action)[None])
         details = {name: values[0] for name, values in info.items() if not name.startswith("_")}
         return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), details

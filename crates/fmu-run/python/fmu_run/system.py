@@ -20,23 +20,23 @@ class System(Model):
     Parameters
     ----------
     source
-        Path of an SSP file, or a dict of the components by name. Components are FMUs with Co-Simulation, as open `Fmu` objects or as
-        paths. An FMU may occur more than once.
+        Path of an SSP file or of a directory with an unpacked one, or a dict of the components by name. Components are FMUs with
+        Co-Simulation, as open `Fmu` objects or as paths. An FMU may occur more than once.
     connections
         Connections from outputs to inputs, `{"law.u": "plant.u"}`, or as pairs. If an output is connected to several inputs, their names
         are a list. Not allowed with an SSP file, which contains its connections.
     order
-        The order of data exchange. With "dependencies", every output is read after the inputs on which it depends directly, at each
-        communication point; an algebraic loop is a ValueError, which names the loop. With "jacobi", all outputs are read at the end of
-        a step and all inputs are set at the start of the next step, as in FMPy and libcosim, so outputs that depend directly on inputs
-        lag by one step.
+        The order of data exchange. With "dependencies", every output is read at each communication point, after the inputs on which it
+        depends directly have been set; an algebraic loop is a ValueError, which names the loop. With "jacobi", all outputs are read at
+        the end of a step and all inputs are set at the start of the next step, as in FMPy and libcosim, so outputs that depend directly
+        on inputs lag by one step.
 
     Raises
     ------
     ValueError
-        For invalid connections.
+        For invalid arguments, invalid connections, and start values in an SSP file that do not fit its variables.
     FmuError
-        If the file is not an SSP or one of its FMUs cannot be loaded.
+        If the file is not an SSP or has unsupported content, or if an FMU cannot be loaded or does not support Co-Simulation.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ def _component(name: str, fmu: Fmu | str | os.PathLike[str]) -> Fmu:
 def _pairs(
     connections: Mapping[str, str | Sequence[str]] | Iterable[tuple[str, str | Sequence[str]]] | None,
 ) -> list[tuple[str, str]]:
-    """Returns the connections as pairs of one output and one input."""
+    """Return the connections as pairs of one output and one input."""
     try:
         given = connections.items() if isinstance(connections, Mapping) else () if connections is None else connections
         found = [(output, to) for output, ends in given for to in ([ends] if isinstance(ends, str) else ends)]

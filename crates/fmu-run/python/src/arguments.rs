@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString, PyTuple};
 use std::path::PathBuf;
 
-/// Returns the error for an invalid argument, which quotes the beginning of its value.
+/// Returns the error for an invalid argument. The message quotes the beginning of its value.
 pub fn wrong(name: &str, must: &str, value: &Bound<'_, PyAny>) -> PyErr {
     /// Maximum number of quoted characters.
     const MOST: usize = 60;
@@ -27,7 +27,7 @@ pub fn count(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<us
     if integer.lt(1)? {
         return Err(PyValueError::new_err(format!("{name} must be at least 1, it is {}", integer.str()?)));
     }
-    // A count that does not fit in memory means as many as possible.
+    // A count that does not fit in `usize` is replaced by a very large one.
     Ok(Some(integer.extract().unwrap_or(usize::MAX >> 1)))
 }
 
@@ -77,7 +77,7 @@ pub fn integration(
     })
 }
 
-/// Returns a Boolean of Python or NumPy, or one of the numbers 0 and 1.
+/// Converts a Boolean of Python or NumPy, or one of the integers 0 and 1.
 pub fn flag(name: &str, value: &Bound<'_, PyAny>) -> PyResult<bool> {
     let integer = || value.cast::<PyInt>().ok()?.extract().ok().filter(|number: &u8| *number < 2);
     let found = value.extract().ok().or_else(|| integer().map(|number| number == 1));
@@ -127,7 +127,7 @@ pub fn callable(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
     }
 }
 
-/// Returns the value and the unit if the argument is a tuple (value, unit), otherwise `None`.
+/// Returns the value and the unit if the argument is a tuple (value, unit) whose value is not a str, otherwise `None`.
 pub fn with_unit<'py>(value: &Bound<'py, PyAny>) -> Option<(Bound<'py, PyAny>, String)> {
     let pair = value.cast::<PyTuple>().ok().filter(|pair| pair.len() == 2)?;
     let (of, unit) = (pair.get_item(0).ok()?, pair.get_item(1).ok()?);

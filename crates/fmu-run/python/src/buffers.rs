@@ -70,7 +70,8 @@ pub fn array_of<'py>(name: &str, values: &Bound<'py, PyAny>) -> PyResult<Bound<'
     array.call_method1("astype", ("float64",))
 }
 
-/// Returns the numbers of an array. As with NumPy's own functions, no other thread must write to the array meanwhile.
+/// Returns the numbers of an array. As with NumPy's own functions, no other thread may write to the array while the numbers are
+/// used.
 fn read(buffer: &PyBuffer<f64>) -> &[f64] {
     match buffer.item_count() {
         0 => &[],

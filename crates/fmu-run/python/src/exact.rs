@@ -98,7 +98,8 @@ fn value_of(given: &Bound<'_, PyAny>) -> Option<PyResult<Value>> {
     None
 }
 
-/// Returns an integer. One that does not fit any type is replaced by the extreme i128, which is rejected later as out of range.
+/// Returns an integer. An integer that fits neither i64 nor u64 is replaced by the smallest or largest i128, which is rejected
+/// later as out of range.
 fn integer(given: &Bound<'_, PyAny>) -> PyResult<Value> {
     let small = given.extract::<i64>().map(i128::from);
     let large = || given.extract::<u64>().map(i128::from);
@@ -108,7 +109,7 @@ fn integer(given: &Bound<'_, PyAny>) -> PyResult<Value> {
     }
 }
 
-/// Converts a value to a Python object; None if there is none.
+/// Converts a value to a Python object. Returns Python's None if there is no value.
 fn object<'py>(py: Python<'py>, value: Option<&Value>) -> PyResult<Bound<'py, PyAny>> {
     Ok(match value {
         None => py.None().into_bound(py),

@@ -15,15 +15,17 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::{Duration, Instant};
 
-/// Instances of one FMU, which run in parallel. `Fmu.instances` creates them.
+/// Instances of one FMU or system, which run in parallel. `Fmu.instances` and `System.instances` create them.
 ///
-/// Every call acts on all instances, in threads and without the GIL. Arrays of values have the shape (n,) if one variable is given as
-/// a str, and (n, variables) if a sequence of str is given. Values to set may also be one number or one row for all instances. Arrays
-/// passed as `out` are written in place.
+/// A call acts on all instances, or on those in its `mask`. The FMUs run without the GIL, in several threads if `threads` allows
+/// it. Arrays of values have the shape (n,) if one variable is given as a str, and (n, variables) if a sequence of str is given. A
+/// str that names a whole array adds the dimensions of the array to (n,). Values to set may also be one number or one row for all
+/// instances. Arrays passed as `out` are written in place.
 ///
 /// If a call fails for an instance, the instance drops out and all others continue. `errors` contains the reason, and values read
-/// from this instance are NaN. `reset` and `restore` make it usable again. If the last instance drops out, the call raises FmuError
-/// with the reason, and so do later calls until an instance is usable again.
+/// from this instance are NaN, or None for strings, bytes and single integers of 64 bits. `reset` and `restore` make it usable
+/// again. If the last instance drops out, the call raises FmuError with the reason, and so do later calls until an instance is
+/// usable again.
 #[pyclass(frozen, module = "fmu_run")]
 pub struct Instances {
     system: System,
@@ -65,7 +67,7 @@ impl Drop for States {
 /// Instances that several Python threads may use.
 struct Shared {
     instances: Mutex<fmu_run::Instances>,
-    /// Number of the process that has locked the instances last.
+    /// Number of the process that last locked the instances, from `process()`.
     process: AtomicU32,
 }
 
@@ -74,10 +76,10 @@ impl Shared {
         Arc::new(Self { instances: Mutex::new(instances), process: AtomicU32::new(process()) })
     }
 
-    /// Waits until no other thread uses the instances. If a thread used them when this process was forked, the lock is never released
-    /// here, so this function fails.
+    /// Waits until no other thread uses the instances. If another thread of the parent process used them during the fork, their
+    /// lock is never released in this process, so this function fails.
     fn lock(&self) -> PyResult<MutexGuard<'_, fmu_run::Instances>> {
-        /// Maximum time that a thread needs from locking the instances to storing its process.
+        /// Maximum time that a thread needs from locking the instances to storing the number of its process.
         const BETWEEN_LOCK_AND_STORE: Duration = Duration::from_secs(1);
         let found = match self.instances.try_lock() {
             Ok(found) => found,
@@ -192,7 +194,7 @@ impl Instances {
         self.event_values(py, |event| f64::from(u8::from(event.states_changed)))
     }
 
-    /// (n,): 1 if the instance requests the end of the simulation, else 0.
+    /// (n,): 1 if the instance has requested the end of the simulation at its last event, else 0.
     #[getter]
     fn wants_to_end<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.event_values(py, |event| f64::from(u8::from(event.terminate)))
@@ -222,9 +224,9 @@ impl Instances {
         self.put(py, variables, values, mask, fmu_run::Instances::set)
     }
 
-    /// Read variables: (n,) for a str, (n, variables) for a sequence. The values are written to `out` if it is given. For a single
-    /// Int64 or UInt64 variable the result is an array of int64 or uint64. For a string or bytes it is an array of objects, with None
-    /// for an instance that has dropped out.
+    /// Read variables: (n,) for a str, (n, variables) for a sequence. The values are written to `out` if it is given. Without
+    /// `out`, the result for a single Int64 or UInt64 variable is an array of int64 or uint64, and for a string or bytes an array
+    /// of objects. If an instance has dropped out, all of these are arrays of objects, with None for this instance.
     #[pyo3(signature = (variables, out=None))]
     fn get<'py>(
         &self,
@@ -293,7 +295,7 @@ impl Instances {
     /// mask : (n,) of bool, optional
     ///     Selected instances; all by default.
     /// start : dict, optional
-    ///     Start values by name, which replace earlier ones: a number, (n,) numbers, or strings.
+    ///     Start values by name, which replace earlier ones, in the forms of `Fmu.instances`.
     #[pyo3(signature = (mask=None, *, start=None))]
     fn reset(&self, py: Python, mask: Optional, start: Optional) -> PyResult<()> {
         let (mask, start) = (self.mask(mask)?, Start::of(&self.system, start.as_ref())?);
@@ -317,8 +319,8 @@ impl Instances {
         self.revive(py, |all| all.restore(&states, mask.as_deref()))
     }
 
-    /// Serialize saved states, for use in another process: a list with the bytes for each instance, or None for an instance without a
-    /// state.
+    /// Serialize saved states, for use in another process: a list with the bytes for each instance, or None for an instance that
+    /// has no state or whose FMU returns an error.
     fn serialize<'py>(
         &self,
         py: Python<'py>,
@@ -446,7 +448,7 @@ impl Instances {
     /// Parameters
     /// ----------
     /// variables, values : optional
-    ///     Values to set in Event Mode before the iterations, as in `set`. Discrete variables can only be set there.
+    ///     Numbers to set in Event Mode before the iterations, in the forms of `set`. Discrete inputs can be set only in Event Mode.
     /// mask : (n,) of bool, optional
     ///     Selected instances; all by default.
     #[pyo3(signature = (variables=None, values=None, *, mask=None))]
@@ -476,7 +478,8 @@ impl Instances {
     ///
     /// Returns
     /// -------
-    /// (n, 2): whether an instance requests an event, and whether it requests the end of the simulation, as 1 or 0
+    /// (n, 2): whether an instance requests an event, and whether it requests the end of the simulation, as 1 or 0; NaN if it has
+    /// dropped out
     fn completed_integrator_step<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.only(Interface::ModelExchange)?;
         self.read(py, &[2], None, |all, values| {
@@ -487,7 +490,8 @@ impl Instances {
 }
 
 impl Instances {
-    /// Looks up the variables of an argument by name. The result is cached by the identity of the Python object.
+    /// Looks up the variables of an argument by name. The result for a str or a tuple is cached by the identity of the Python
+    /// object.
     fn named(&self, argument: &str, variables: &Bound<'_, PyAny>) -> PyResult<Arc<Named>> {
         /// Maximum number of entries in the cache.
         const MOST: usize = 64;
@@ -597,7 +601,7 @@ impl Instances {
         })
     }
 
-    /// Runs a call that may make instances usable again, even if all have dropped out before.
+    /// Runs a call that may make instances usable again, without failing if all have dropped out before.
     fn revive<T: Send>(
         &self,
         py: Python,
@@ -606,7 +610,7 @@ impl Instances {
         self.called(py, |all| body(all).map_err(python))
     }
 
-    /// Runs a call without the GIL and passes on its messages. Raises FmuError if no instance is usable after it.
+    /// Runs a call without the GIL and passes on its messages. Raises FmuError if no instance is usable after the call.
     fn called<T: Send>(
         &self,
         py: Python,
@@ -632,7 +636,7 @@ impl Instances {
     /// Returns name and type if the argument is the name of one variable whose values float64 cannot represent.
     fn exact(&self, variables: &Bound<'_, PyAny>) -> PyResult<Option<(String, BaseType)>> {
         let Ok(name) = variables.cast::<PyString>() else { return Ok(None) };
-        // A cached name belongs to numbers.
+        // Only the names of numeric variables are cached.
         if lock(&self.known).iter().any(|(object, _)| object.is(variables)) {
             return Ok(None);
         }

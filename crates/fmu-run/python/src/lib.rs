@@ -21,7 +21,12 @@ use std::collections::BTreeMap;
 use std::ops::Deref;
 use std::sync::{Arc, Mutex, PoisonError};
 
-create_exception!(fmu_run, FmuError, PyException, "An FMU that cannot be loaded or run, or rejects a run.");
+create_exception!(
+    fmu_run,
+    FmuError,
+    PyException,
+    "An FMU cannot be loaded or run, is closed, or has rejected a call."
+);
 
 /// An unpacked and loaded FMU or system; `None` after it was closed.
 #[pyclass(frozen, module = "fmu_run._native")]
@@ -47,7 +52,7 @@ impl Deref for Model {
 /// Name, type, causality, variability, start value, unit, description, minimum, maximum and display unit of a variable.
 type Described = (String, String, String, Text, Text, Text, String, Option<f64>, Option<f64>, Text);
 type Text = Option<String>;
-/// FMI version, model name, token, name of the derivative by name of the state, names of continuous outputs, whether each interface
+/// FMI version, model name, token, pairs of a state and its derivative, names of floating-point outputs, whether each interface
 /// type has directional derivatives, and attributes of units.
 type About = (String, String, String, Pairs, Vec<String>, Vec<(&'static str, bool)>, BTreeMap<String, Pairs>);
 type Pairs = Vec<(String, String)>;
@@ -200,7 +205,7 @@ impl Loaded {
         Ok(self.model()?.variables().map(describe).collect())
     }
 
-    /// Performs the runs. After Ctrl-C, all runs stop after their current step. Calls `progress(done, runs)`.
+    /// Performs the runs, and meanwhile calls `progress(done, runs)`. After Ctrl-C, all runs stop after their current step.
     #[allow(clippy::too_many_arguments, reason = "named where it is called")]
     fn run<'py>(
         &self,
@@ -352,7 +357,8 @@ fn order_of(name: &Bound<'_, PyAny>) -> PyResult<Order> {
     }
 }
 
-/// Performs the runs without the GIL. Between steps, this thread handles Python signals, passes on messages and calls `progress`.
+/// Performs the runs without the GIL. About ten times per second, this thread handles Python signals, passes on messages and calls
+/// `progress`.
 fn perform(
     py: Python,
     planned: &Planned,

@@ -166,8 +166,8 @@ fn rate_of(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Option<String>> {
     }
 }
 
-/// Separates (times, values) or (times, values, unit) into the times and the values. Other values are returned unchanged. The times
-/// must be a sequence, because a tuple of two numbers is an input with two values.
+/// Separates (times, values) into the times and the values, and (times, values, unit) into the times and (values, unit). Returns
+/// other values unchanged, without times. The times must be a sequence, because a tuple of two numbers is an input with two values.
 #[allow(clippy::type_complexity, reason = "a pair")]
 fn with_times<'py>(
     name: &str,

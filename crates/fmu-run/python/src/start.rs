@@ -8,7 +8,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 
-/// Start values by name. A value is one number or string, one for each run or instance, or a whole array.
+/// Start values by name. A variable has one number, string, bytes or integer of 64 bits, or one for each run or instance; a whole
+/// array has one for all elements, an array, or an array for each run or instance.
 #[derive(Default)]
 pub struct Start {
     values: Vec<(String, Value)>,
@@ -36,7 +37,8 @@ impl Start {
         Ok(start)
     }
 
-    /// Sets the structural parameters among the start values. Returns the new system and the other start values.
+    /// Sets the structural parameters among the start values. Returns the new system and the other start values, in whose `names`
+    /// and `dict` the structural parameters also occur.
     pub fn configured(system: &System, given: Option<&Bound<'_, PyAny>>) -> PyResult<(System, Self)> {
         let (mut structural, mut others) = (Self::default(), Vec::new());
         for (name, value) in items("start", given)? {

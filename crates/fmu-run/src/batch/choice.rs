@@ -19,7 +19,7 @@ impl Worker<'_> {
         }
     }
 
-    /// Keeps the instance for a later batch.
+    /// Keeps the instance for a later batch, if the system permits idle instances.
     pub fn finish(mut self) {
         let Some(Used { instance, origin, took }) = self.reuse.used.take() else { return };
         if !self.system.may_be_idle(Interface::CoSimulation) {
@@ -61,7 +61,8 @@ impl Worker<'_> {
     }
 
     /// Performs a run twice, in a reset instance and then in a new one, and returns the result of the new one. If both results are
-    /// bit-identical, this counts as a proof that the FMU can be reset after these changes.
+    /// bit-identical and the run is complete, this counts as a proof that the FMU can be reset after these changes. If they differ,
+    /// the FMU is not reset any more.
     pub fn check(
         &mut self,
         (instance, changes): (SystemInstance, Vec<Change>),
@@ -98,7 +99,7 @@ impl Worker<'_> {
         match (is_same, &self.reuse.used) {
             (false, _) => trust.distrust(),
             (true, Some(_)) => trust.prove(changes),
-            // The final values could not be read, so they were not compared.
+            // The final values could not be read and compared, or the run did not end normally.
             (true, None) if result.is_ok() => trust.distrust(),
             // An incomplete run proves nothing.
             (true, None) => {}
@@ -117,7 +118,7 @@ impl Worker<'_> {
     }
 
     /// Returns whether runs may share an instance. With logging on, they may not, so that the messages of each run are complete. In
-    /// Model Exchange they may not either, because resets are only checked in Co-Simulation.
+    /// Model Exchange they may not either, because resets are checked only in Co-Simulation.
     fn may_reuse(&self) -> bool {
         !self.is_logging() && self.plan.interface == Interface::CoSimulation
     }

@@ -1,4 +1,4 @@
-//! Values of the inputs in Co-Simulation.
+//! Values of the inputs, or of their time derivatives, in Co-Simulation.
 
 use super::inputs::{Inputs, Numbers};
 use super::resampling::Resampling;
@@ -6,7 +6,7 @@ use super::resampling::Resampling;
 /// Inputs of a run.
 pub(super) struct InputRows<'a> {
     values: Vec<Signal<'a>>,
-    /// Buffer for the values of all inputs at a time.
+    /// Buffer for the values of all inputs at one communication point.
     row: Vec<f64>,
 }
 

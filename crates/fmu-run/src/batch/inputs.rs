@@ -32,7 +32,8 @@ pub(super) enum Numbers<'a> {
     },
 }
 
-/// Checks the names of the inputs. Passes each numeric input to `numeric`, with its variables, and adds all others to `exact`.
+/// Checks the names of the inputs. Adds the inputs whose values `f64` cannot represent to `exact`, and passes all others to
+/// `numeric`, with their variables.
 pub(super) fn each_input<'a, 's>(
     system: &'s System,
     batch: &'a Batch,

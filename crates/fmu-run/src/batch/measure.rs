@@ -199,6 +199,9 @@ mod tests {
             }
         }
         measured.begin();
-        assert!(measures.iter().all(|measure| measured.measure(*measure, 0).is_nan()), "no outputs");
+        assert!(
+            measures.iter().all(|measure| measured.measure(*measure, 0).is_nan()),
+            "without values, all statistics must be NaN"
+        );
     }
 }

@@ -25,11 +25,11 @@ use crate::start::Start;
 use crate::system::System;
 use fmi_abi::{Interface, Value};
 
-/// Specification of runs. The number of runs is the number of values or time series that an input or a start value has for separate
-/// runs. If none has several, there is one run.
+/// Specification of one or several runs. If an input or a start value has a separate value or time series for each run, the number
+/// of these determines the number of runs; otherwise there is one run.
 ///
-/// In each run, start values are set before Initialization Mode, and the first values of the inputs in Initialization Mode. Then, at
-/// each time, inputs are set, outputs are read, and a step to the next time is performed.
+/// In each run, start values are set before Initialization Mode, and the first values of the inputs in Initialization Mode. Then,
+/// in Co-Simulation, at each time inputs are set, outputs are read, and a step to the next time is performed.
 ///
 /// In Model Exchange, the states are integrated between events. Continuous inputs are interpolated between their values by lines, or
 /// by cubics if their [derivatives](Self::input_derivatives) are given. All other inputs change in Event Mode.
@@ -37,10 +37,11 @@ use fmi_abi::{Interface, Value};
 pub struct Batch<'a> {
     /// Communication points, s. They must be finite and increasing, and at least two.
     pub time: &'a [f64],
-    /// Inputs and their values. Inputs that are not listed keep their start values.
+    /// Inputs and their values. Inputs that are not listed keep their start values. But in Model Exchange, an input that is
+    /// declared as the time derivative of a listed input follows that input, unless it has a value in `start`.
     pub inputs: Vec<(&'a str, Trajectory<'a>)>,
     /// First time derivatives of inputs. In Co-Simulation they are set together with the inputs (only FMI 2.0). In Model Exchange
-    /// they belong to a continuous input and are given at the same times as its values.
+    /// they belong to a continuous input, and are constant or given at the same times as its values.
     pub input_derivatives: Vec<(&'a str, Trajectory<'a>)>,
     /// Start values of parameters, states, inputs and so on.
     pub start: Vec<(&'a str, Start<'a>)>,
@@ -49,14 +50,14 @@ pub struct Batch<'a> {
     pub outputs: Vec<&'a str>,
     /// Stores the outputs at every `every`-th time, beginning with the first; `None` stores no trajectories.
     pub every: Option<usize>,
-    /// Statistics of each output, over all times.
+    /// Statistics of each numeric output, over all times.
     pub measures: Vec<Measure>,
-    /// Number of threads; `None` uses one thread for each processor.
+    /// Maximum number of threads; `None` means one for each processor.
     pub threads: Option<usize>,
     /// Whether outputs are read directly after a step, before the next inputs are set. This is the order of section 4.2.4 of FMI 2.0
     /// and of FMPy. Outputs that depend directly on inputs then lag by one step.
     pub read_before_set: bool,
-    /// Relative tolerance for solvers inside the FMU.
+    /// Relative tolerance for solvers inside the FMU; in Model Exchange also the default of [`Integration::rtol`].
     pub tolerance: Tolerance,
     /// Interface type; `None` means Co-Simulation, or Model Exchange if the FMU has only that.
     pub interface: Option<Interface>,
@@ -76,8 +77,8 @@ pub enum Trajectory<'a> {
     /// A time series for each run, concatenated; the index of the time varies fastest.
     EachRun(&'a [f64]),
     /// Values at the input's own times, which must not decrease: one time series for all runs, or one for each run, concatenated.
-    /// Between two times, a continuous variable is interpolated linearly and any other keeps the earlier value. Two equal times make a
-    /// jump. Before the first and after the last time, the value is constant.
+    /// Between two times, a continuous variable is interpolated linearly and any other keeps the earlier value. Two equal times
+    /// make a jump. Before the first and after the last time, the value is constant.
     Sampled {
         /// Times, s.
         times: &'a [f64],
@@ -100,7 +101,7 @@ pub enum Trajectory<'a> {
 }
 
 impl Trajectory<'_> {
-    /// Returns the number of values and the number of times of a run; `None` if one value is for all times.
+    /// Returns the number of values and the number of times of a run; `None` if there are no separate values for single times.
     fn counts(&self, times: usize) -> Option<(usize, usize)> {
         match self {
             Self::Constant(_) | Self::Value(_) | Self::RateOf(_) => None,
@@ -121,7 +122,7 @@ pub struct Size {
     pub outputs: usize,
     /// Number of [kept](Batch::every) times: the length of a trajectory.
     pub kept: usize,
-    /// Number of statistics.
+    /// Number of statistics of each output.
     pub measures: usize,
     /// Number of outputs in [`Runs::exact`], which are not among `outputs`.
     pub exact: usize,
@@ -159,8 +160,8 @@ pub struct Runs {
     /// varies fastest. They are `None` at times that a run has not reached.
     pub exact: Vec<Option<Value>>,
     /// Runs that did not reach the last time, because a call failed or the FMU ended the simulation. Each has the index of the run,
-    /// and a message with the time reached and the reason. A run that failed without a message is repeated with logging on after all
-    /// other runs, unless this takes much longer.
+    /// and a message with the time reached and the reason. A run that failed without a message is repeated with logging on after
+    /// all other runs, to get the message, as long as this takes at most 2 s longer than the runs took.
     pub errors: Vec<(usize, String)>,
     /// Notes about runs that reached the last time: the FMU ended the simulation there, or `terminate` failed.
     pub notes: Vec<(usize, String)>,
@@ -177,7 +178,7 @@ pub struct Occurrence {
     pub time: f64,
     /// Outputs before the event, except those in [`Runs::exact`].
     pub before: Vec<f64>,
-    /// Outputs after the event.
+    /// The same outputs after the event.
     pub after: Vec<f64>,
 }
 
@@ -186,8 +187,9 @@ impl System {
     ///
     /// # Errors
     /// Returns [`Error::Request`] if the batch is inconsistent or does not fit the FMU, [`Error::Memory`] if the results do not fit
-    /// in memory, [`Error::Cancelled`] if the caller cancels the runs, and [`Error::Fmu`] if no threads can be created. A failed run
-    /// is not an error here; see [`Runs::errors`].
+    /// in memory, [`Error::Cancelled`] if the caller cancels the runs, and [`Error::Fmu`] if the FMU does not support the interface
+    /// type, cannot be used with the values of its structural parameters, or no threads can be created. A failed run is not an
+    /// error here; see [`Runs::errors`].
     pub fn run(&self, batch: &Batch, watch: &Watch) -> Result<Runs, Error> {
         let planned = self.plan(batch)?;
         let size = planned.size();
@@ -200,7 +202,7 @@ impl System {
     /// Checks a batch. Used by callers that provide the memory for its results.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] as [`run`](Self::run) does.
+    /// Returns [`Error::Request`] and [`Error::Fmu`] as [`run`](Self::run) does.
     pub fn plan<'a>(&self, batch: &'a Batch) -> Result<Planned<'a>, Error> {
         let (system, start) = self.configured(&batch.start)?;
         Ok(Planned { plan: plan::Plan::of(&system, batch, &start)?, system })

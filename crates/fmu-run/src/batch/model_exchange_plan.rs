@@ -35,12 +35,12 @@ enum Source<'a> {
     RateOf(usize),
 }
 
-/// Relative tolerance if neither the caller nor the model description has one.
+/// Relative tolerance of the solver if neither the caller nor the model description specifies one.
 const RTOL: f64 = 1e-6;
 
 impl<'a> ModelExchangePlan<'a> {
-    /// Checks the inputs and settings. Adds the inputs whose values `f64` cannot represent to `exact`. Fails for a system of several
-    /// FMUs, which can only run in Co-Simulation.
+    /// Checks the inputs and settings. Adds the inputs whose values `f64` cannot represent to `exact`. Fails for a system of
+    /// connected FMUs, which can run only in Co-Simulation.
     pub fn of(system: &System, batch: &'a Batch, exact: &mut Vec<Input>) -> Result<Option<Self>, Error> {
         batch.integration.check()?;
         if batch.read_before_set {
@@ -93,7 +93,8 @@ impl<'a> ModelExchangePlan<'a> {
             }
             Ok(())
         })?;
-        // Inputs that are declared as the derivatives of other inputs get the slopes of these, unless the caller has given values.
+        // An input that is declared as the derivative of another input gets the slope of that input, unless the caller has given
+        // values for it.
         let declared = self.description.variables.iter().filter(|of| {
             of.causality == "input"
                 && !is_held(of)
@@ -128,7 +129,8 @@ impl<'a> ModelExchangePlan<'a> {
     }
 }
 
-/// Returns the time derivatives of an input, if given. They must be given at the same times as its values.
+/// Returns the time derivatives of an input, if given. They must be constant, or given at the same times as the values of the
+/// input.
 fn slopes<'a>(name: &str, values: &Trajectory, batch: &'a Batch) -> Result<Option<Numbers<'a>>, Error> {
     let mut given = batch.input_derivatives.iter().filter(|(of, _)| *of == name);
     let Some((_, slopes)) = given.next() else { return Ok(None) };

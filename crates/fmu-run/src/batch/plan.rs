@@ -21,7 +21,7 @@ pub(super) struct Plan<'a> {
     pub runs: usize,
     pub inputs: Inputs<'a>,
     pub derivatives: Inputs<'a>,
-    /// Variables of all inputs and input derivatives.
+    /// Variables of all inputs and input derivatives in Co-Simulation; empty in Model Exchange.
     pub set_in_steps: Arc<[Target]>,
     pub start: StartValues<'a>,
     /// Inputs whose values `f64` cannot represent.
@@ -163,7 +163,8 @@ fn checked_time(time: &[f64]) -> Result<&[f64], Error> {
     Ok(time)
 }
 
-/// Returns the number of runs. Fails if inputs and start values are given for different numbers of runs.
+/// Returns the number of runs. Fails if arguments have values for different numbers of runs, or a number of values that is not a
+/// multiple of the number of times.
 fn runs(batch: &Batch) -> Result<usize, Error> {
     let mut found: Option<(&str, usize)> = None;
     let trajectories =

@@ -10,7 +10,7 @@ pub(super) struct Pulse {
     every: u32,
     /// Time of the last read.
     read: Instant,
-    /// Time at which the last pulse was due.
+    /// Time of the last pulse.
     due: Instant,
 }
 

@@ -6,14 +6,14 @@ use crate::error::{Error, request};
 pub(super) struct Resampling {
     /// Number of times of the input.
     pub length: usize,
-    /// For each communication point, the index of the last time of the input that is not after it, and the fraction of the way to the
-    /// next time, from 0 to 1.
+    /// For each communication point, the index of the last time of the input that is not after it (0 if there is none), and the
+    /// fraction of the way to the next time, from 0 to 1.
     at: Vec<(usize, f64)>,
 }
 
 impl Resampling {
-    /// Checks that the times of an input are finite and do not decrease. Two equal times make a jump; the value at the second of them
-    /// holds from there on.
+    /// Checks that the times of an input are finite and do not decrease. Two equal times make a jump: from this time on, the second
+    /// value is valid.
     pub fn of(name: &str, times: &[f64], points: &[f64]) -> Result<Self, Error> {
         if times.is_empty() {
             return request(format!("{name} has no times"));
@@ -26,7 +26,7 @@ impl Resampling {
             return request(format!("the times of {name} decrease: {after} follows {before}"));
         }
         let at = (0..points.len()).map(|k| {
-            // If a communication point is only a rounding error before a time of the input, it counts as this time.
+            // A communication point that is before a time of the input only by a rounding error is treated as equal to it.
             let step = if k > 0 {
                 points[k] - points[k - 1]
             } else {

@@ -34,13 +34,13 @@ pub(super) enum Origin {
 #[derive(Default)]
 pub(super) struct Reuse {
     pub used: Option<Used>,
-    /// Whether the FMU can be reset between all runs of this batch.
+    /// Whether enough checks have shown that the FMU can be reset between all runs of this batch.
     pub is_trusted: bool,
     /// Whether the current run only checks the reset, so its results are not returned.
     pub is_check: bool,
     /// Whether all values at the end of a run are read, to compare them.
     pub compares: bool,
-    /// These values; `None` if they could not be read.
+    /// The values that were read; `None` if they could not be read.
     pub seen: Option<Observed>,
 }
 

@@ -12,7 +12,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{self, Duration};
 
-/// Messages with the index of their run.
+/// Messages, each with the index of its run.
 pub(super) type Messages = Vec<(usize, String)>;
 
 /// Maximum duration of [`repeat_with_logging`], in addition to the duration of the runs.
@@ -131,8 +131,8 @@ fn repeat_with_logging(
     repeated.map(drop)
 }
 
-/// Calls `work` in this number of threads, with the index of the thread, and returns the results. The calling thread has the index 0;
-/// while it waits for the others, it calls the pulse.
+/// Calls `work` in this number of threads, with the index of the thread, and returns the results in any order. The calling thread
+/// has the index 0; while it waits for the others, it calls the pulse.
 fn on_threads<T: Send>(
     system: &System,
     threads: usize,

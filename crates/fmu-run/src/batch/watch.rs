@@ -5,7 +5,7 @@ use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// Function that is called ten times per second.
+/// Function that is called about ten times per second.
 type OnPulse = Box<dyn Fn(&Watch) + Send + Sync>;
 
 /// Shows the progress of [`System::run`](crate::System::run) and can cancel it, from the calling thread or another one.
@@ -31,8 +31,9 @@ impl fmt::Debug for Watch {
 }
 
 impl Watch {
-    /// Creates a watch with a function that is called ten times per second, between steps, by the thread that called
-    /// [`System::run`](crate::System::run). The function may [cancel](Self::cancel) the runs.
+    /// Creates a watch with a function that is called about ten times per second by the thread that called
+    /// [`System::run`](crate::System::run), between its steps or while it waits for other threads. The function may
+    /// [cancel](Self::cancel) the runs.
     ///
     /// ```
     /// let watch = fmu_run::Watch::pulsing(|watch| eprintln!("{} runs are finished", watch.done()));
@@ -47,7 +48,7 @@ impl Watch {
         Self { listening: true, ..Self::default() }
     }
 
-    /// Collects all messages of the FMU, too, and switches logging on.
+    /// Returns a watch that also collects all messages of the FMU and switches logging on.
     #[must_use]
     pub fn and_listening(self) -> Self {
         Self { listening: true, ..self }

@@ -22,7 +22,7 @@ pub(super) struct Failure {
     /// Index of the time of the failure; `None` if the initialization failed.
     pub at: Option<usize>,
     pub text: String,
-    /// Whether the FMU logged no message.
+    /// Whether the FMU has logged no message.
     pub is_silent: bool,
 }
 
@@ -36,7 +36,7 @@ pub(super) struct Worker<'a> {
     pub watch: &'a Watch,
     /// Deadline, if failed runs are repeated with logging on.
     deadline: Option<time::Instant>,
-    /// Collector of all messages, if the caller requests them, and the number of this thread's instance.
+    /// Collector of all messages, if the caller requests them, and the index of this thread's instance.
     pub feed: Option<(Arc<Feed>, usize)>,
     /// Whether this is the thread of the caller, which calls the pulse.
     is_caller: bool,
@@ -190,7 +190,8 @@ impl<'a> Worker<'a> {
         let is_usable = is_complete && self.reuse.observe(&mut instance);
         let mut terminated = if rejected { Ok(()) } else { instance.terminate() };
         if is_complete && !is_usable {
-            // The instance became unusable when its values were read for the comparison, so this is not an error of the run.
+            // Reading all values for the comparison has failed and may have made the instance unusable, which is not an error of
+            // the run.
             terminated = Ok(());
         } else if is_complete && terminated.is_ok() {
             self.keep(instance, run, begin.map(|begin| begin.elapsed()));
@@ -245,7 +246,7 @@ impl<'a> Worker<'a> {
         self.start(instance, run).map_err(|rejection| (None, rejection))?;
         instance.forget_log();
         let measures = !plan.measures.is_empty();
-        // Index of the next stored value in a trajectory, and number of communication points until then.
+        // Length of a stored trajectory, index of its next value, and number of communication points until then.
         let (kept, mut index, mut wait) = (plan.stored_times(), 0, 0);
         let mut ended: Option<Rejection> = None;
         for (k, &time) in times.iter().enumerate() {
@@ -341,7 +342,7 @@ impl<'a> Worker<'a> {
     }
 
     /// Stores the outputs of a communication point in the trajectories, if it is one of the stored times, and adds them to the
-    /// statistics. Returns whether it is one.
+    /// statistics. Returns whether it is a stored time.
     pub fn keep_row(&mut self, kept: &mut Kept, time: f64, trajectories: &mut [f64]) -> bool {
         let (plan, length) = (self.plan, self.plan.stored_times());
         let keeps = kept.wait == 0 && kept.index < length;

@@ -86,7 +86,7 @@ impl<'a> Signal<'a> {
         Self { curve, next: 0, piece: Piece::default(), until: f64::INFINITY }
     }
 
-    /// Selects the polynomial that begins at or before this time.
+    /// Selects the polynomial for the times from this time to the next break.
     fn enter(&mut self, time: f64) {
         let (times, values, slopes, is_held) = match self.curve {
             Curve::Constant(value) => return self.piece = Piece::constant(value),
@@ -135,14 +135,14 @@ pub(crate) struct Signals<'a> {
 pub(super) enum Break {
     /// No break.
     None,
-    /// Slopes have changed, but no value has.
+    /// Another polynomial begins, but no value jumps.
     Kink,
-    /// A value has changed, which is an event.
+    /// A value jumps, which is an event.
     Jump,
 }
 
-/// Largest relative change of a continuous input that is not treated as an event, because rounding causes such changes where two
-/// polynomials meet.
+/// Largest relative change of a continuous input at a break that is not treated as a jump, because rounding causes such changes
+/// where two polynomials meet.
 const SAME: f64 = 1e-9;
 
 impl<'a> Signals<'a> {
@@ -162,7 +162,8 @@ impl<'a> Signals<'a> {
         self.find_moving();
     }
 
-    /// Passes the breaks up to this time, s. At the end of the run, continuous inputs keep their last slopes.
+    /// Passes the breaks up to this time, s. At the end of the run, continuous inputs keep their last polynomials, because
+    /// otherwise their rates would become 0 there.
     pub(super) fn pass(&mut self, time: f64, is_end: bool) -> Break {
         if self.until() > time {
             return Break::None;

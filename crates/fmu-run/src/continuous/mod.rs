@@ -1,8 +1,8 @@
 //! Model Exchange: integrates the states of an FMU from event to event.
 //!
 //! [`inputs`] describes inputs as functions of time, [`model`] evaluates the FMU for the solver, [`simulation`] alternates between smooth
-//! intervals and events, [`solve`] integrates an interval, and [`stepping`] locates events in its steps.
-//! The solvers are in the crate `ivp`. Every event restarts them.
+//! intervals and events, [`solve`] integrates an interval, [`stepping`] locates events in its steps, and [`chatter`] ends a run
+//! with too many events. The solvers are in the crate `ivp`. Every event restarts them.
 
 mod chatter;
 mod inputs;
@@ -30,8 +30,8 @@ pub enum Solver {
     Dop853,
     /// Backward differentiation formulas of order 1 to 5, for stiff models.
     Bdf,
-    /// The classical Runge-Kutta method with fixed steps, from one communication point to the next. The steps are shorter if there is
-    /// a [largest step](Integration::max_step).
+    /// The classical Runge-Kutta method with one step from each communication point or event to the next, or with several equal
+    /// steps if one would exceed the [largest step](Integration::max_step).
     Rk4,
 }
 
@@ -68,12 +68,13 @@ pub struct Integration {
     /// Absolute tolerance of a state whose nominal value is 1. For other states it is multiplied by the nominal value. `None` means a
     /// hundredth of the relative tolerance.
     pub atol: Option<f64>,
-    /// Largest step, s.
+    /// Largest step, s; `None` sets no limit.
     pub max_step: Option<f64>,
 }
 
 impl Integration {
-    /// Fails unless the tolerances and the largest step are above 0 and finite.
+    /// Fails unless the tolerances and the largest step are above 0 and finite, and the relative tolerance is from 1e-13 to below
+    /// 1.
     pub(crate) fn check(&self) -> Result<(), Error> {
         for (name, value) in [("rtol", self.rtol), ("atol", self.atol), ("max_step", self.max_step)] {
             if let Some(value) = value.filter(|value| !(*value > 0.0 && value.is_finite())) {

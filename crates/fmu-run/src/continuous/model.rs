@@ -12,9 +12,9 @@ use std::cell::{RefCell, RefMut};
 
 /// Value that all derivatives get where the FMU cannot evaluate them, so that the solver rejects the step and takes a shorter one.
 const FAR: f64 = 1e60;
-/// Largest magnitude of a state. Larger ones result from [`FAR`], and the FMU is not called with them.
+/// Largest magnitude of a state with which the FMU is called. Larger states result from [`FAR`].
 const TOO_FAR: f64 = 1e40;
-/// Number of successive evaluations that may fail without a successful step between them, before the run fails.
+/// The run fails at this number of failed evaluations since the last successful step.
 const MOST_MISSES: usize = 1000;
 
 /// An FMU with its inputs, shared by the solver and the event handling.
@@ -32,7 +32,7 @@ pub(crate) struct Parts<'a> {
     pub nominals: Vec<f64>,
     /// Whether the solver can take a shorter step after a failed evaluation.
     retries: bool,
-    /// Time that the FMU has, s; `None` if the inputs must be set again.
+    /// Time that was last set in the FMU, s; `None` if time, inputs and states must be set again.
     at: Option<f64>,
     x: Vec<f64>,
     row: Vec<f64>,
@@ -149,7 +149,8 @@ impl Parts<'_> {
         self.instance.sole().get_continuous(Continuous::Derivatives, values)
     }
 
-    /// Evaluates the derivatives at the beginning of a step and fails if one is not finite, because a shorter step would not help.
+    /// Evaluates the derivatives at the beginning of an interval and fails if one is not finite, because a shorter step would not
+    /// help.
     pub fn check_derivatives(&mut self, time: f64, x: &[f64]) -> Result<(), Rejection> {
         let mut values = vec![0.0; x.len()];
         self.derivatives(time, x, &mut values)?;
@@ -193,17 +194,17 @@ impl Parts<'_> {
         Ok(())
     }
 
-    /// Forgets failed evaluations after a successful step.
+    /// Clears the record of failed evaluations after a successful step.
     pub fn accepted(&mut self) {
         (self.misses, self.miss) = (0, None);
     }
 
-    /// Returns the reason of the last failed evaluation since the last step.
+    /// Returns the reason of the last failed evaluation, if one has failed since the last step.
     pub fn take_miss(&mut self) -> Option<Rejection> {
         self.miss.take()
     }
 
-    /// Returns the error after which the FMU is not called.
+    /// Returns the error after which the FMU is not called any more, if there was one.
     pub fn take_fault(&mut self) -> Option<Rejection> {
         self.fault.take()
     }
@@ -212,8 +213,8 @@ impl Parts<'_> {
         self.fault.is_some()
     }
 
-    /// Evaluates the derivatives. If the FMU cannot evaluate them, the solver gets [`FAR`] and takes a shorter step. After an error
-    /// the solver gets 0, so that its step succeeds and `solout` can stop it.
+    /// Evaluates the derivatives. If the FMU cannot evaluate them but a shorter step may help, the solver gets [`FAR`]. After an
+    /// error it gets 0, so that its step succeeds and `solout` can stop it.
     fn evaluate(&mut self, time: f64, x: &[f64], values: &mut [f64]) {
         if self.has_failed() {
             return values.fill(0.0);
@@ -235,7 +236,7 @@ impl Parts<'_> {
         self.misses += 1;
         if self.retries && self.misses < MOST_MISSES {
             values.fill(FAR);
-            // The reason is an earlier failure, which caused this estimate of the states.
+            // States that are too far result from an earlier failure, whose reason is kept.
             if !is_far {
                 self.miss = Some(why);
             }
@@ -262,7 +263,7 @@ impl Parts<'_> {
                 self.jacobian = Some((derivatives, states));
                 return;
             }
-            // The FMU declares directional derivatives but does not have them; from here on, finite differences replace them.
+            // The FMU declares directional derivatives, but a call has failed. From here on, finite differences replace them.
             self.instance.forget_log();
         }
         self.evaluate(time, x, &mut before);

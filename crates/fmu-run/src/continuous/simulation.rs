@@ -16,13 +16,14 @@ pub(crate) trait Hooks {
     /// Returns whether the run continues; called after each step.
     fn proceed(&mut self, time: f64) -> bool;
 
-    /// Called before an event (`is_after` is false) and after it, so that the caller can read outputs.
+    /// Called before an event (`is_after` is false) and after it, so that the caller can read outputs. At a break of an input that
+    /// is not an event, it is only called with `is_after` false.
     fn event(&mut self, instance: &mut SystemInstance, time: f64, is_after: bool) -> Result<(), Rejection>;
 
     /// Returns whether a string, bytes or a 64-bit integer among the inputs changes at this communication point.
     fn changes(&self, index: usize) -> bool;
 
-    /// Sets these inputs to their values at this communication point, in Event Mode.
+    /// Sets the inputs that are strings, bytes or 64-bit integers to their values at this communication point, in Event Mode.
     fn set_exact(&mut self, instance: &mut SystemInstance, index: usize) -> Result<(), Rejection>;
 }
 
@@ -138,15 +139,15 @@ impl<'a> Simulation<'a> {
     /// Returns the latest time, s, at which the next smooth interval may end.
     fn stop(&self, model: &Model) -> f64 {
         let mut stop = self.last().min(model.parts().until()).min(self.event.unwrap_or(f64::INFINITY));
-        // Without states there are no solver steps in which events could be located, so each interval ends at a communication point.
-        // Fixed steps end there, too.
+        // Without states, each interval is processed as one step, so it must not exceed a communication point. Fixed steps end at
+        // communication points, too.
         if self.x.is_empty() || self.settings.solver == Solver::Rk4 {
             stop = stop.min(self.times[self.next]);
         }
         stop.max(self.time)
     }
 
-    /// Passes breaks of inputs and handles an event at the end of a smooth interval.
+    /// Passes breaks of inputs at the end of a smooth interval, and handles an event if there is one.
     fn arrive(&mut self, model: &Model, hooks: &mut impl Hooks, arrival: Arrival) -> Result<(), Rejection> {
         let is_point = self.times[self.next] <= self.time;
         let is_end = is_point && self.next + 1 == self.times.len();
@@ -180,7 +181,8 @@ impl<'a> Simulation<'a> {
         hooks.event(parts.instance, self.time, true)
     }
 
-    /// Completes an event in Event Mode, enters Continuous-Time Mode and reads the values that have changed.
+    /// Updates the discrete states in Event Mode until the event is complete, enters Continuous-Time Mode and reads the values that
+    /// have changed.
     fn update(&mut self, model: &Model, is_first: bool) -> Result<(), Rejection> {
         let mut parts = model.parts();
         let event = parts.instance.sole().event()?;

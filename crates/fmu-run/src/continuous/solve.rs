@@ -38,7 +38,8 @@ impl Simulation<'_> {
             let (arrival, result) = result?;
             let reached = stop - self.time <= near;
             if reached && arrival.is_none_or(|of| of == Arrival::Stop) {
-                // If the last step was shortened to end at `stop`, the next interval may begin with a full one.
+                // If the interval had only one step, this step may have been shortened to end at `stop`, so the next interval may
+                // begin with the size that was suggested before.
                 let cut = result.steps.total <= 1;
                 self.step = Some(begin.1.filter(|_| cut).map_or(result.h, |step| step.max(result.h)));
                 self.time = stop;

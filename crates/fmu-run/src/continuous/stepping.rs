@@ -84,8 +84,8 @@ impl<'s, 'a, 'm, H: Hooks> Stepping<'s, 'a, 'm, H> {
         Ok(())
     }
 
-    /// Returns the first point after an event indicator has changed its sign, and the index of the indicator. If none has, returns
-    /// the end of the step.
+    /// Returns the first point at which an event indicator has changed its sign, and the index of the indicator. If none has,
+    /// returns the end of the step.
     fn first_event(
         &mut self,
         begin: f64,
@@ -128,8 +128,8 @@ impl<'s, 'a, 'm, H: Hooks> Stepping<'s, 'a, 'm, H> {
         Ok(point)
     }
 
-    /// Narrows the interval in which an event indicator first changes its sign, and returns its end, where the sign has changed. Uses
-    /// the Illinois method, with a bisection in every fourth iteration.
+    /// Narrows the interval in which an event indicator first changes its sign, and returns the end of the interval, where the sign
+    /// has changed. Uses the Illinois method, with a bisection in every fourth iteration.
     fn locate(
         &self,
         mut before: Point,

@@ -10,8 +10,8 @@ impl Instances {
     /// for each.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] unless all variables are Real, and each known is an input, a parameter or a
-    /// continuous state.
+    /// Returns [`Error::Request`] unless all variables are Real variables of a single FMU that provides directional derivatives,
+    /// and each known is an input, a parameter or a continuous state.
     ///
     /// # Panics
     /// Panics if the number of values is wrong.
@@ -64,7 +64,7 @@ impl Instances {
     /// Reads the first time derivatives of outputs into a row for each instance, in Co-Simulation.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] unless all variables are Real.
+    /// Returns [`Error::Request`] unless all variables are Real variables of a single FMU.
     ///
     /// # Panics
     /// Panics if the length of `values` is wrong.
@@ -76,7 +76,7 @@ impl Instances {
         Ok(())
     }
 
-    /// Returns the value references of the variables. Fails unless all of them are Real and the system is a single FMU.
+    /// Returns the value references of the variables. Fails unless all of them are Real and belong to a single FMU.
     fn real<'s>(&self, variables: &'s Selection) -> Result<&'s [u32], Error> {
         let why = "only Real variables have derivatives, of one FMU and not of a system";
         let references = self.system.sole().and_then(|_| variables.references());

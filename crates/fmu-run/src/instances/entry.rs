@@ -10,7 +10,7 @@ use fmi_client::{Event, Rejection};
 #[derive(Debug)]
 /// An instance with its state.
 pub(super) struct Entry {
-    /// The instance; `None` if it could not be created again.
+    /// The instance; `None` before it is created, or if it could not be created.
     pub instance: Option<SystemInstance>,
     /// Reason why the instance has failed, if it has.
     pub error: Option<String>,
@@ -26,7 +26,7 @@ pub(super) struct Progress {
 }
 
 impl Entry {
-    /// Calls `body` if the instance has not failed. Returns whether the instance is still usable.
+    /// Calls `body` if the instance has not failed. Returns whether the instance is usable afterwards.
     #[inline]
     pub fn with(
         &mut self,
@@ -43,14 +43,14 @@ impl Entry {
 
 /// Allocates entries for the instances of a system. Fails if memory does not suffice for them and for their data.
 pub(super) fn empty(count: usize, components: usize) -> Result<Vec<Entry>, Error> {
-    /// Minimum of further memory per component, in bytes: allocations of its FMU and of its log.
+    /// Minimum memory for allocations of a component's FMU and of its log, in bytes.
     const COMPONENT: usize = 256;
     let too_many = || Error::Memory(format!("{count} instances need more memory than there is"));
     let mut all = Vec::new();
     all.try_reserve_exact(count).map_err(|_| too_many())?;
     let each = size_of::<SystemInstance>() + components * (size_of::<Instance>() + COMPONENT);
     let needed = count.checked_mul(each).ok_or_else(too_many)?;
-    // Freed immediately, because it only tests whether so much memory is available.
+    // The memory is freed immediately, because this only tests whether so much is available.
     Vec::<u8>::new().try_reserve_exact(needed).map_err(|_| too_many())?;
     all.resize_with(count, || Entry { instance: None, error: None, progress: Progress::default() });
     Ok(all)
@@ -64,7 +64,7 @@ pub(super) fn each(
     body: impl Fn(usize, &mut Entry) + Sync,
 ) {
     if let Some(mask) = mask {
-        assert_eq!(mask.len(), all.len(), "a Boolean for each instance");
+        assert_eq!(mask.len(), all.len(), "the mask must have a Boolean for each instance");
     }
     in_parts(threads, all, 0, &mut [], |index, one, _| {
         if mask.is_none_or(|mask| mask[index]) {

@@ -24,12 +24,15 @@ impl Instances {
     /// Sets a variable that is a string, bytes or an integer of 64 bits. There is one value for all instances, or a value for each.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if the variable is read-only, or a value does not fit its type.
+    /// Returns [`Error::Request`] if the variable is unknown, read-only or of another type, or if a value does not fit its type.
     ///
     /// # Panics
     /// Panics if the number of values is wrong.
     pub fn set_values(&mut self, name: &str, values: &[Value], mask: Mask) -> Result<(), Error> {
-        assert!(values.len() == 1 || values.len() == self.len(), "a value for each instance or one");
+        assert!(
+            values.len() == 1 || values.len() == self.len(),
+            "one value is required, or a value for each instance"
+        );
         let mut targets = Vec::new();
         for found in self.system.find(name)? {
             found.check_settable(name)?;

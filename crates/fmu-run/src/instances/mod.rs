@@ -1,5 +1,5 @@
-//! Instances of an FMU that the caller controls with single calls (set, step, get, save, restore). Each call acts on all instances in
-//! parallel.
+//! Instances of an FMU that the caller controls with single calls (set, step, get, save, restore). Each call acts on all or on
+//! selected instances, mostly in parallel.
 
 mod derivatives;
 mod entry;
@@ -40,7 +40,7 @@ pub struct Setup<'a> {
     pub tolerance: Tolerance,
     /// Whether logging is on and all messages of the FMU are collected for [`Instances::take_messages`].
     pub listening: bool,
-    /// Number of threads; `None` uses one thread for each processor.
+    /// Maximum number of threads; `None` means one for each processor.
     pub threads: Option<usize>,
 }
 
@@ -60,8 +60,9 @@ impl Default for Setup<'_> {
     }
 }
 
-/// Instances of one FMU, each with its own time. Every method acts on all of them, in several threads. Arrays of values have one row
-/// for each instance, with one value for each variable; the rows follow each other.
+/// Instances of one FMU or system, each with its own time. A method acts on all of them, or on those in its [`Mask`]; most methods
+/// use several threads. Arrays of values have one row for each instance, with one value for each variable; the rows follow each
+/// other.
 ///
 /// If a call of the FMU returns an error, the instance fails, and all others continue. [`errors`](Self::errors) contains the reason;
 /// values read from a failed instance are NaN. [`reset`](Self::reset) and [`restore`](Self::restore) make it usable again.
@@ -92,8 +93,8 @@ impl System {
     /// event and are in Continuous-Time Mode.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if the settings do not fit the FMU. Returns [`Error::Fmu`] if the FMU does not support the
-    /// interface type, or if all instances fail.
+    /// Returns [`Error::Request`] if the settings do not fit the FMU, and [`Error::Memory`] if memory does not suffice. Returns
+    /// [`Error::Fmu`] if the FMU does not support the interface type, if all instances fail, or if no threads can be created.
     pub fn instances(&self, setup: &Setup) -> Result<Instances, Error> {
         let (system, start) = self.configured(&setup.start)?;
         system.instances_of(setup, &start, setup.listening.then(|| self.feed()))
@@ -196,8 +197,8 @@ impl Instances {
     /// Replaces start values for the next [`reset`](Self::reset). Start values of other variables stay as they are.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if a variable is unknown, or if the values do not fit it or the number of
-    /// instances.
+    /// Returns [`Error::Request`] if a variable is unknown or is a structural parameter, or if the values do not fit the variable
+    /// or the number of instances.
     pub fn start_from(&mut self, start: &[(&str, Start)]) -> Result<(), Error> {
         for (name, values) in start {
             if self.system.is_structural(name) {
@@ -241,8 +242,8 @@ impl Instances {
     /// Sets variables, from one row for all instances or a row for each.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if a variable is read-only or connected to an output, or if an integer or a Boolean cannot have its
-    /// value.
+    /// Returns [`Error::Request`] if a variable is read-only, a structural parameter or connected to an output, or if an integer,
+    /// an enumeration or a Boolean cannot have its value.
     ///
     /// # Panics
     /// Panics if the number of values is wrong.
@@ -278,7 +279,7 @@ impl Instances {
     /// Performs Co-Simulation steps to this time, s.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if the time is not finite, or not after the time of an instance.
+    /// Returns [`Error::Request`] if the time is not finite, or not after the time of an instance that would make the step.
     pub fn step_to(&mut self, time: f64, mask: Mask) -> Result<(), Error> {
         let steps = |index: usize, one: &Entry| one.error.is_none() && mask.is_none_or(|mask| mask[index]);
         let mut ahead = self.all.iter().enumerate().filter(|(index, one)| steps(*index, one));
@@ -333,7 +334,7 @@ impl Instances {
         self.feed.as_ref().map(|feed| feed.take()).unwrap_or_default()
     }
 
-    /// Calls `body` for each instance in the mask that has not failed. An error makes the instance fail.
+    /// Calls `body` for each instance in the mask that has not failed. If `body` returns an error, the instance has failed.
     fn alive(
         &mut self,
         mask: Mask,
@@ -368,7 +369,8 @@ fn check_size(size: f64) -> Result<(), Error> {
     request(format!("the size of a step is {size} s; it must be above 0 and finite"))
 }
 
-/// Sets start values and initializes an instance, so that it can perform its first step. Returns the initial event of Model Exchange.
+/// Sets start values and initializes an instance, so that it can perform its first step. Returns the result of the initial event in
+/// Model Exchange, and the default in Co-Simulation.
 fn initialize(
     instance: &mut SystemInstance,
     begin: &Begin,

@@ -76,7 +76,7 @@ impl Instances {
     }
 
     /// Notifies the FMU of a completed integrator step, in Model Exchange. Writes two values for each instance to `wanted`, 1 or 0:
-    /// whether the FMU requests an event, and whether it requests the end of the simulation.
+    /// whether the FMU requests an event, and whether it requests the end of the simulation. They are NaN for a failed instance.
     ///
     /// # Panics
     /// Panics if `wanted` does not have two values for each instance.

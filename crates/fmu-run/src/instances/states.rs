@@ -6,7 +6,8 @@ use crate::error::{Error, request};
 use crate::system_instance::Saved;
 
 /// States that [`Instances`] have saved, one for each instance that had not failed. They contain indices instead of pointers, so
-/// restoring them in other instances by mistake cannot corrupt memory. Freeing consumes the value, so freed states cannot be used.
+/// restoring them in other instances by mistake cannot corrupt memory. [`forget`](Instances::forget) consumes the value, so freed
+/// states cannot be used.
 ///
 /// ```compile_fail,E0382
 /// fn restore_a_freed_state(instances: &mut fmu_run::Instances) {
@@ -36,11 +37,11 @@ impl Instances {
         Ok(States(states))
     }
 
-    /// Restores states that these instances have saved.
+    /// Restores states that these instances have saved. Instances without a saved state stay as they are.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] and restores nothing if an instance has been created again since the states were saved. A reset
-    /// does this if the FMU cannot be reset, or if the instance had failed.
+    /// Returns [`Error::Request`] and restores nothing if an instance has been created again since the states were saved.
+    /// [`reset`](Self::reset) creates an instance again if the FMU rejects the reset, or has returned `fmi2Fatal` or `fmi3Fatal`.
     ///
     /// # Panics
     /// Panics if the number of states differs from the number of instances.
@@ -75,11 +76,11 @@ impl Instances {
         }
     }
 
-    /// Serializes saved states to bytes, which another process can de-serialize. An entry is `None` if the instance had no state, or
-    /// its FMU returned an error.
+    /// Serializes saved states to bytes, which another process can de-serialize. An entry is `None` if the instance has no saved
+    /// state, or if its FMU returns an error.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if the FMU does not support it.
+    /// Returns [`Error::Request`] if the FMU does not support it, or if an instance has been created again since the states were saved.
     pub fn serialize(&mut self, states: &States) -> Result<Vec<Option<Vec<u8>>>, Error> {
         let why = "cannot serialize its state (canSerializeFMUstate is not true)";
         self.system.check_offer(self.interface, |offer| offer.serializes_states, why)?;
@@ -106,8 +107,8 @@ impl Instances {
     /// De-serializes states that [`serialize`](Self::serialize) returned, one or `None` for each instance.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if the number of states is wrong, and [`Error::Fmu`] if an instance rejects
-    /// a state.
+    /// Returns [`Error::Request`] if the FMU does not support it or the number of states is wrong, and [`Error::Fmu`] if an
+    /// instance rejects a state.
     pub fn deserialize(&mut self, bytes: &[Option<impl AsRef<[u8]>>]) -> Result<States, Error> {
         if bytes.len() != self.len() {
             return request(format!("there are {} states for {} instances", bytes.len(), self.len()));

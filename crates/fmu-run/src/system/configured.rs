@@ -1,4 +1,4 @@
-//! Systems whose structural parameters differ from the model description (section 2.3.2 of FMI 3.0).
+//! Systems whose structural parameters differ from the model description (section 2.3.6 of FMI 3.0).
 
 use super::{Component, Definition, System};
 use crate::description::Structural;
@@ -17,11 +17,13 @@ impl System {
         self.find(name).is_ok_and(|found| found.iter().any(|found| found.variable.is_structural()))
     }
 
-    /// Returns the system with the structural parameters among the start values, and the other start values. The arrays of the new
-    /// system have other sizes, so it has other variables. [`run`](Self::run) and [`instances`](Self::instances) call this function.
+    /// Returns the system with the values of the structural parameters among the start values, and the other start values. The
+    /// arrays of the new system may have other sizes, so its variables may differ. [`run`](Self::run) and
+    /// [`instances`](Self::instances) call this function.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if a structural parameter has different values for several runs or instances.
+    /// Returns [`Error::Request`] if a structural parameter has separate values for several runs or instances, or a value that does
+    /// not fit, and [`Error::Fmu`] if the model description cannot be read with the new sizes.
     pub fn configured<'s, 'a>(&self, start: &[(&'s str, Start<'a>)]) -> Result<(Self, Given<'s, 'a>), Error> {
         let (structural, others): (Vec<_>, Vec<_>) =
             start.iter().copied().partition(|(name, _)| self.is_structural(name));
@@ -55,7 +57,7 @@ impl System {
     }
 }
 
-/// Returns the values. Fails unless each is the same for all runs or instances.
+/// Returns the values. Fails unless there is one value for all runs or instances of each variable.
 fn one_for_all(given: &StartValues) -> Result<Vec<(Target, Value)>, Error> {
     let all = given.values(0).map(|(target, value)| (target, value.clone()));
     // Structural parameters are always integers (section 2.4.7.4 of FMI 3.0).

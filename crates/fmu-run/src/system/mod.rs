@@ -24,11 +24,11 @@ use std::ops::Deref;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
-/// Connected FMUs in Co-Simulation. A system runs like one FMU, also in parallel in [batches](System::run)
-/// and as [instances](System::instances). An [`Fmu`](crate::Fmu) is a system with one component.
+/// Connected FMUs in Co-Simulation. A system runs like one FMU, also in parallel in [batches](System::run) and as
+/// [instances](System::instances). An [`Fmu`](crate::Fmu) is a system with one component, which may also run in Model Exchange.
 ///
-/// Variables are named `component.variable`, or by the names of the system's inputs and outputs. In a step, each component keeps the
-/// values that its inputs had at the first communication point. [`Order`] determines when outputs are passed to inputs.
+/// Variables are named `component.variable`, or by the names of the system's inputs and outputs. During a step, each component
+/// keeps the values that its inputs had at the start of the step. [`Order`] determines when outputs are passed to inputs.
 #[derive(Clone, Debug)]
 pub struct System(Arc<Definition>);
 
@@ -87,9 +87,10 @@ impl System {
     /// Connects FMUs.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] for duplicate names of components, unknown variables, wrong causalities, connections between
-    /// variables that do not match, inputs with two connections, and algebraic loops. Returns [`Error::Fmu`] if an FMU does not
-    /// support Co-Simulation, or occurs twice although a process may create only one instance of it.
+    /// Returns [`Error::Request`] if there are no components, and for empty or duplicate names of components, unknown variables,
+    /// wrong causalities, connected strings or bytes, connected variables that do not match, inputs with two connections, and
+    /// algebraic loops. Returns [`Error::Fmu`] if an FMU does not support Co-Simulation, or occurs twice although a process may
+    /// create only one instance of it.
     pub fn connect(composition: &Composition) -> Result<Self, Error> {
         let components =
             composition.components.iter().map(|(name, fmu)| ((*name).to_owned(), Arc::clone(fmu.loaded())));
@@ -143,7 +144,7 @@ impl System {
     /// Finds variables by their names.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if a name is unknown, or a variable is not numeric.
+    /// Returns [`Error::Request`] if a name is unknown, or if the values of a variable are strings or bytes.
     pub fn select(&self, names: &[impl AsRef<str>]) -> Result<Selection, Error> {
         let (mut selection, mut known) = (Selection::default(), HashMap::new());
         for name in names.iter().map(AsRef::as_ref) {
@@ -192,7 +193,7 @@ impl System {
     /// the other unit = factor * value + offset.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if the variable is unknown, or if its FMU does not define the conversion.
+    /// Returns [`Error::Request`] if the variable is unknown or has no unit, or if its FMU does not define the conversion.
     pub fn display_unit(&self, name: &str, unit: &str) -> Result<(f64, f64), Error> {
         self.find_first(name)?.display_unit(name, unit)
     }
@@ -227,7 +228,7 @@ impl System {
         &self.0.exchange
     }
 
-    /// Returns the FMU of a system with a single FMU.
+    /// Returns the FMU if the system is a single FMU and not a composition.
     pub(crate) fn sole(&self) -> Option<&Loaded> {
         self.components()
             .first()
@@ -235,7 +236,7 @@ impl System {
             .map(|component| &*component.fmu)
     }
 
-    /// Fails if a component does not support this interface type.
+    /// Fails if a component does not support this interface type, or if a system is to run in Model Exchange.
     pub(crate) fn check_interface(&self, interface: Interface) -> Result<(), Error> {
         if interface == Interface::ModelExchange && self.sole().is_none() {
             return Err(Error::Fmu(format!(
@@ -258,13 +259,13 @@ impl System {
         Ok(interface)
     }
 
-    /// Returns whether a process may create only one instance.
+    /// Returns whether a process may create only one instance of the system, because of one of its FMUs.
     pub(crate) fn once_per_process(&self, interface: Interface) -> bool {
         self.components().iter().any(|component| component.fmu.once_per_process(interface))
     }
 
     /// Returns the number of threads for `count` runs or instances: the requested number, or one for each processor, but at most
-    /// `count`.
+    /// `count`, and only one if a process may create only one instance.
     pub(crate) fn threads(
         &self,
         interface: Interface,
@@ -339,8 +340,8 @@ impl System {
     }
 }
 
-/// An FMU, unpacked and loaded once for any number of runs and instances. It stays loaded while one of them exists. It is a
-/// [`System`] with one component.
+/// An FMU, unpacked and loaded once for any number of runs and instances. It stays loaded while this object, a clone of it, a
+/// [`Planned`](crate::Planned) batch or an instance exists. An FMU is a [`System`] with one component.
 #[derive(Clone, Debug)]
 pub struct Fmu(System);
 
@@ -466,7 +467,7 @@ impl Definition {
         Ok(System(Arc::new(self)))
     }
 
-    /// Finds one end of a connection, and checks its causality.
+    /// Finds the variable at one end of a connection, and checks its causality.
     fn end(&self, name: &str, wanted: &str) -> Result<Found<'_>, Error> {
         let found = self.find(name)?[0];
         match found.variable.causality.as_str() {

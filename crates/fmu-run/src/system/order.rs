@@ -60,7 +60,8 @@ pub(super) fn stages(names: &[(String, String)], ends: &[Ends], order: Order) ->
 struct Set {
     /// Connections to the inputs on which the outputs depend.
     before: Vec<usize>,
-    /// Length of the longest chain of connections that must be passed before the outputs are read; `None` until it is known.
+    /// Length of the longest chain of connections whose values must be passed before the outputs are read; `None` until it is
+    /// known.
     level: Option<usize>,
     /// Whether the search for the level has begun but not ended.
     is_open: bool,
@@ -99,8 +100,8 @@ fn within<'a>(inputs: &'a [(u32, usize)], range: &Range<u32>) -> impl Iterator<I
     inputs[begin..end].iter().map(|(_, index)| *index)
 }
 
-/// Returns the level of each connection: the length of the longest chain of connections that must be passed before it. Searches depth
-/// first, without recursion, because chains may be long.
+/// Returns the level of each connection: the length of the longest chain of connections whose values must be passed before its own
+/// value. Searches depth first, without recursion, because chains may be long.
 fn levels(names: &[(String, String)], ends: &[Ends]) -> Result<Vec<usize>, Error> {
     let (set_of, mut sets) = sets(ends);
     for first in 0..ends.len() {

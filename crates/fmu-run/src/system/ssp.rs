@@ -22,7 +22,7 @@ struct Read<'a> {
     base: Base<'a>,
     /// Names of the components and paths of their FMUs, in the order of the file.
     components: Vec<(String, PathBuf)>,
-    /// Connectors of all systems.
+    /// Names of the connectors of the outer and all nested systems.
     connectors: HashSet<String>,
     connections: Vec<(String, String)>,
     start: Vec<(String, Value)>,
@@ -40,16 +40,16 @@ struct Value {
 
 impl System {
     /// Unpacks an SSP file, then loads and connects its FMUs. Systems may be nested. A connector of the outer system is an input or
-    /// output of the system, with the same name. Start values are read from parameter bindings. All files to which the system refers
-    /// must be in the archive. `path` may also be the directory of an unpacked system.
+    /// output of the system, with the same name, if it is connected to a component. Start values are read from parameter bindings.
+    /// All files to which the system refers must be in the archive. `path` may also be the directory of an unpacked system.
     ///
     /// # Safety
     /// The requirement of [`Fmu::open`](crate::Fmu::open), for each FMU in the file.
     ///
     /// # Errors
-    /// Returns [`Error::Fmu`] if the file is not an SSP file, or one of its FMUs cannot be loaded. Returns the errors of
-    /// [`connect`](Self::connect), and [`Error::Request`] for unsupported content: components that are not FMUs, parameter mappings,
-    /// signal dictionaries, transformations of connections.
+    /// Returns [`Error::Fmu`] if the file is not an SSP file, if one of its FMUs cannot be loaded, and for unsupported content:
+    /// components that are not FMUs, parameter mappings, signal dictionaries, transformations of connections. Returns
+    /// [`Error::Request`] if a start value does not fit its variable. Also returns the errors of [`connect`](Self::connect).
     pub unsafe fn open(path: &Path, order: Order) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
         let mut limits = Limits::default();
@@ -105,7 +105,7 @@ impl<'a> Read<'a> {
         }
     }
 
-    /// Subtracts from the number of bytes that may still be read.
+    /// Subtracts from the number of bytes that may still be read. Fails if too few remain.
     fn take(&mut self, bytes: usize) -> Result<(), String> {
         let remaining = self.remaining.checked_sub(bytes);
         self.remaining = remaining.ok_or("the names and parameters of its elements take too much memory")?;

@@ -25,7 +25,8 @@ const DESCRIPTION: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 </fmiModelDescription>
 "#;
 
-/// The FMU with a manner. Its directory also contains the record of its instances.
+/// The FMU of `resets.c` with one of its manners, and the directory with its record: a file to which the FMU writes when an
+/// instance is created, reset or freed.
 pub struct Recorded {
     pub fmu: Option<Fmu>,
     directory: TempDir,
@@ -49,7 +50,7 @@ fn library() -> &'static Path {
 }
 
 impl Recorded {
-    /// Opens the FMU with a manner, and adds an attribute to its element CoSimulation.
+    /// Builds and opens the FMU with this manner and with an attribute that is added to its element CoSimulation.
     pub fn open(manner: &str, attribute: &str) -> Self {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("resets.fmu");

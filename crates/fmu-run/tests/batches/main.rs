@@ -8,7 +8,8 @@ use built::Recorded;
 use fmu_run::{Batch, Error, Measure, Runs, Start, Trajectory, Watch};
 use proptest::prelude::*;
 
-/// What a reset leaves of the earlier run, and how it fails. "slow" instances take long to create; only these are reset.
+/// Manners of the FMU, which determine which values survive a reset, and whether the reset or the comparison of instances fails.
+/// Creating a "slow" instance takes long; only slow instances are reset.
 const MANNERS: [&str; 8] =
     ["good", "state", "parameter", "derived", "slow", "slow no reset", "slow unreadable", "slow parameter"];
 const MEASURES: [Measure; 7] = [
@@ -30,7 +31,7 @@ struct Case {
     u: Vec<f64>,
 }
 
-/// Expected results of a run: the bits of its outputs and statistics, and whether it fails.
+/// Results of a run, expected or found: the bits of its outputs and statistics, and whether it fails.
 #[derive(Debug, PartialEq)]
 struct Expected {
     outputs: Vec<u64>,
@@ -70,7 +71,7 @@ fn statistics(time: &[f64], values: &[f64]) -> Vec<f64> {
     }
     let peak = values.iter().fold(0.0, |peak: f64, value| peak.max(value.abs()));
     let first = values.iter().position(|value| value.abs() == peak).unwrap();
-    // Of 0.0 and -0.0, which are equal, the first one is the result.
+    // 0.0 and -0.0 are equal, so whichever occurs first is the result.
     let extreme = |is_beyond: fn(f64, f64) -> bool| {
         values.iter().fold(values[0], |found, value| if is_beyond(*value, found) { *value } else { found })
     };
@@ -141,7 +142,7 @@ fn value() -> impl Strategy<Value = f64> {
 }
 
 fn case(times: usize) -> impl Strategy<Value = Case> {
-    // There are few values, so that successive runs often differ in only one parameter.
+    // Some values are frequent, so that successive runs often differ in only one parameter.
     let parameter = || prop_oneof![Just(0.0), Just(1.0), Just(2.5), -3.0..3.0];
     let fails = prop_oneof![4 => Just(None), 1 => (0..times).prop_map(Some)];
     let u =

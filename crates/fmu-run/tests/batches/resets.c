@@ -1,5 +1,6 @@
-/* An FMU for Co-Simulation, y' = gain * u + bias. Its guid {MANNER:FILE} selects what survives a reset, and whether creating an instance
- * takes long. For each new instance (+), reset (r) and freed instance (-), it writes a character to the file. */
+/* An FMU for Co-Simulation, y' = gain * u + bias. Its guid {MANNER:FILE} selects what survives a reset, whether a reset or a reading
+ * fails, and whether creating an instance takes long. For each new instance (+), reset (r) and freed instance (-), the FMU writes a
+ * character to FILE. */
 #define _POSIX_C_SOURCE 199309L
 #include <fcntl.h>
 #include <stdlib.h>
@@ -66,7 +67,7 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return c != NULL ? fmi
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     Instance *i = c;
-    /* With "derived", a value is calculated from a parameter only once, so that it survives a reset. */
+    /* With "derived", the gain is calculated from the parameter only once, so that the first gain survives a reset. */
     if (!has_manner(i, "derived") || i->gain == 0) i->gain = 2 * i->factor;
     return fmi2OK;
 }

@@ -3,7 +3,7 @@
 use crate::{SOLVERS, VERSIONS, close, opened, run, tight, times};
 use fmu_run::{Batch, Integration, Solver, Start, Trajectory, Watch};
 
-/// Returns the times of the first hits of a ball that falls from 1 m, s.
+/// Returns the times, s, of the first `count` hits of a ball that falls from 1 m.
 fn hits(restitution: f64, count: usize) -> Vec<f64> {
     let mut time = (2.0 / 9.81_f64).sqrt();
     let mut flight = 2.0 * time;
@@ -17,7 +17,7 @@ fn hits(restitution: f64, count: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Returns the height of the ball, m.
+/// Returns the height of the ball, m, at this time, s.
 fn height(time: f64, restitution: f64) -> f64 {
     let all = hits(restitution, 20);
     let Some(last) = all.iter().rposition(|hit| *hit <= time) else { return 1.0 - 0.5 * 9.81 * time * time };

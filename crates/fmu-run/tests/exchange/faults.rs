@@ -1,9 +1,10 @@
-//! Runs of faulty models end with an error that names the cause and the time.
+//! Runs of faulty models: errors name the cause and the time, discarded states shorten the step, a run can be cancelled, and
+//! messages reach a listener.
 
 use crate::{VERSIONS, close, opened, run, tight};
 use fmu_run::{Batch, Error, Integration, Solver, Start, Watch};
 
-/// Runs a model and returns its error.
+/// Runs a model and returns the error of the run.
 fn why(model: &str, standard: fmu_run::Standard, solver: Solver) -> String {
     let runs = run(
         &opened(model, standard),
@@ -20,7 +21,7 @@ fn errors_name_cause_and_time() {
         for solver in [Solver::Auto, Solver::Dopri5, Solver::Bdf, Solver::Rk4] {
             let of = |model| why(model, standard, solver);
             let nan = of("nan");
-            // A fixed step cannot be shortened, so the error occurs at its middle.
+            // A fixed step, here from 0.25 s to 3 s, cannot be shortened, so the error occurs in its middle.
             let time = if solver == Solver::Rk4 { 1.625 } else { 0.5 };
             let expected =
                 format!("at 0.25 s: Model Exchange: the derivative of state 1 is NaN at t = {time}");
@@ -66,7 +67,7 @@ fn a_discarded_state_shortens_the_step() {
     }
 }
 
-/// If the run were not cancelled, the explicit method would need years for this stiff model.
+/// Checks that a run can be cancelled. Otherwise the explicit method would need years for this stiff model.
 #[test]
 fn a_run_can_be_cancelled() {
     for standard in VERSIONS {

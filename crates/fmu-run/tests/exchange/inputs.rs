@@ -67,7 +67,7 @@ fn a_stiff_model_follows_a_moving_input() {
 
 #[test]
 fn a_ramp_is_followed_exactly() {
-    // u = t until 1 s; then it steps to 3 and is constant.
+    // u = t until 1 s; then u jumps to 3 and is constant.
     let (own, values) = ([0.0, 1.0, 1.0, 2.0], [0.0, 1.0, 3.0, 3.0]);
     for standard in VERSIONS {
         let batch = Batch {

@@ -1,5 +1,5 @@
-/* Test models for Model Exchange, of FMI 2.0 and 3.0. The guid selects the model. The models reject calls that the standard does not allow
- * in their mode, such as setting discrete inputs in Continuous-Time Mode or states in Event Mode. */
+/* Test models for Model Exchange, of FMI 2.0 and 3.0. The guid selects the model. The models reject many calls that the standard does not
+ * allow in their mode, such as setting discrete inputs in Continuous-Time Mode or states in Event Mode. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -13,7 +13,7 @@
 #define MODELS(M) \
     M(ball)      /* x'' = -9.81 from x = 1; at x <= 0 the speed is reversed and multiplied by p, and the height stays as it is. */ \
     M(zeno)      /* The ball, but its height becomes 0 at a hit. It hits the ground infinitely often before 2.56 s. */ \
-    M(stair)     /* hits = number of full seconds; ends the simulation when hits = p. It has no states. */ \
+    M(stair)     /* hits = number of full seconds; ends the simulation when hits >= p. It has no states. */ \
     M(vanderpol) /* x0' = x1, x1' = p (1 - x0^2) x1 - x0, from (2, 0). */ \
     M(dahlquist) /* x' = -p x, from x = 1. */ \
     M(lag)       /* x' = u + n - p x, from x = 0. */ \
@@ -24,7 +24,7 @@
     M(relay)     /* x' = -1 if x > 0, else 1: after 1 s the sign of x changes again and again. */ \
     M(announce)  /* From t = 0.5 on, each event announces another one at the same time. */ \
     M(swap)      /* x' = x, from x = 1. After the first step with |x| > 2 it requests an event, at which x becomes -x and y = -x. */ \
-    M(ending)    /* x' = -x; ends the simulation at x = 0.5. */ \
+    M(ending)    /* x' = -x; ends the simulation at the event at x = 0.5. */ \
     M(failing)   /* x' = 1; fails from t = 0.5 on. */
 
 #define ITEM(name) name##_,

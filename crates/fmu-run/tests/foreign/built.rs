@@ -37,7 +37,7 @@ fn library(language: &'static str) -> &'static Path {
     path
 }
 
-/// Packs the FMU with a manner in a directory. `changes` are replacements in its model description.
+/// Packs the FMU with this manner into a file in a directory. `changes` are replacements in its model description.
 pub fn built(manner: &str, standard: Standard, directory: &Path, changes: &[(&str, &str)]) -> PathBuf {
     let (xml, platform) = match standard {
         Standard::Fmi2 => ("foreign2.xml", "linux64"),
@@ -72,7 +72,7 @@ pub fn packed(path: &Path, entries: impl IntoIterator<Item = (String, Vec<u8>)>)
     archive.finish().unwrap();
 }
 
-/// Opens the FMU with a manner.
+/// Packs and opens the FMU with this manner.
 pub fn opened(manner: &str, standard: Standard) -> Fmu {
     let directory = tempfile::tempdir().unwrap();
     let path = built(manner, standard, directory.path(), &[]);

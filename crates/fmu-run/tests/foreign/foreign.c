@@ -1,7 +1,7 @@
 /* An FMU of FMI 2.0 and 3.0 that behaves like FMUs of other producers. Its guid selects the behaviour (manner), so that one library can be
- * packed into many FMUs. MANNERS lists the manners and the tools in which they were observed.
+ * packed into many FMUs. MANNERS lists the manners and, for most of them, tools in which they were observed.
  *
- * The model: y is the integral of u, plus `gain`. It is compiled without -lm, as C and as C++. */
+ * The model: y is the integral of u, plus `gain`. This file is compiled without -lm, as C and as C++. */
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
 #endif
@@ -37,7 +37,7 @@
     M(resources)           /* Reads a file of its resources by URI: Dymola, OpenModelica. */ \
     M(tolerance)           /* Has a solver that uses the tolerance of the experiment: Dymola. */ \
     M(stop_time)           /* Needs a stop time: exports of tools with a fixed simulation interval. */ \
-    M(pending)             /* Performs steps in a thread and returns fmi2Pending: FMUs that run asynchronously. */ \
+    M(pending)             /* Performs steps of FMI 2.0 in a thread and returns fmi2Pending: FMUs that run asynchronously. */ \
     M(warning)             /* Returns fmi2Warning from every call: Hopsan. */ \
     M(discard)             /* Returns fmi2Discard from t = 0.5 on: Dymola at an event that it cannot handle. */ \
     M(once)                /* Allows only one instance per process: JModelica, 20-sim. */ \
@@ -50,7 +50,7 @@
     M(no_reset)            /* Returns an error from reset: many tools. */ \
     M(huge_state)          /* Reports a serialized state of 2^46 bytes. */ \
     M(endless_state)       /* Reports a serialized state of SIZE_MAX bytes. */ \
-    M(growing_state)       /* Reports another size of the serialized state with each call. */
+    M(growing_state)       /* Reports a larger size of the serialized state with each call. */
 
 #define ITEM(name) name##_,
 enum { MANNERS(ITEM) COUNT };
@@ -178,7 +178,7 @@ static int manner_of(const char *guid) {
     return -1;
 }
 
-/* Completes an instance. Returns NULL if there may not be another one. */
+/* Completes an instance. Frees it and returns NULL if its manner permits only one and there is one already. */
 static Instance *begin(Instance *i, int manner, const char *name, const char *resources, void *environment, int logging) {
     i->manner = manner, i->environment = environment, i->logging = logging;
     i->name = strdup(name);
@@ -341,7 +341,7 @@ fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status 
     return fmi2OK;
 }
 
-/* States in both FMI versions are copies of the instance. */
+/* In both FMI versions, a state is a copy of the instance. */
 static int get_state(Instance *i, void **state) {
     if (*state == NULL) *state = malloc(sizeof *i);
     memcpy(*state, i, sizeof *i);
@@ -467,7 +467,7 @@ fmi3Status fmi3SetUInt64(fmi3Instance c, const fmi3ValueReference vr[], size_t n
     Instance *i = (Instance *)c;
     (void)n_value;
     for (size_t k = 0; k < n; k++) {
-        /* A structural parameter can only be set in Configuration Mode (sections 2.3.2 and 2.3.3). */
+        /* A fixed structural parameter can be set only in Configuration Mode (sections 2.3.2 and 2.3.3). */
         if (vr[k] == SIZE && (!i->configuring || value[k] > 8)) return fmi3Error;
         *(vr[k] == SIZE ? &i->size : &i->natural) = value[k];
     }

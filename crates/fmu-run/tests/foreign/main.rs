@@ -1,4 +1,5 @@
-//! FMUs that behave like FMUs of other producers. `foreign.c` describes each manner and names tools in which it was observed.
+//! FMUs that behave like FMUs of other producers. `foreign.c` describes each manner and, for most of them, names tools in which it
+//! was observed.
 #![allow(unsafe_code, reason = "FMUs are opened")]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
@@ -14,7 +15,7 @@ fn times() -> Vec<f64> {
     (0..11).map(|k| f64::from(k) / 10.0).collect()
 }
 
-/// Runs an FMU with u = 1 for 1 s, and returns y at the end or the error.
+/// Runs an FMU with u = 1 for 1 s. Returns y at the end, or the error.
 fn end(fmu: &Fmu) -> Result<f64, String> {
     let time = times();
     let batch = Batch {
@@ -209,7 +210,7 @@ fn a_state_does_not_outlive_its_instance() {
                 let why = restored.unwrap_err().to_string();
                 assert!(why.contains("before a reset that made a new instance"), "{why}");
                 assert_eq!(serialized.unwrap_err().to_string(), why);
-                assert_eq!(value[0], 0.0, "the instance is as it was");
+                assert_eq!(value[0], 0.0, "a rejected restore must not change the instance");
             }
             one.forget(states);
         }
@@ -317,7 +318,8 @@ fn exact_values_are_start_values_inputs_and_outputs() {
     two.set_values("label", &["x".into()], Some(&[false, true])).unwrap();
     assert_eq!(two.values("wide_out").unwrap(), [Some(small), Some(large)]);
     assert_eq!(two.texts("echo").unwrap().or_empty(), ["none", "x"]);
-    // Values that do not fit the type are errors, and so are numbers that f64 may have rounded.
+    // Values that do not fit the type are errors. So are numbers that f64 may have rounded, outputs, and variables for which `set`
+    // is meant.
     for (name, value, why) in [
         ("wide", Value::Real(1.5), "its value cannot be 1.5"),
         ("wide", Value::Real(1e17), "may not be the one that is meant"),
@@ -337,7 +339,7 @@ fn exact_values_are_start_values_inputs_and_outputs() {
     assert!(two.errors().all(|(_, why)| why.contains("wide_out")) && rounded[1].is_nan(), "{rounded:?}");
 }
 
-/// Helper for the strings of all instances.
+/// Replaces missing strings by empty ones.
 trait OrEmpty {
     fn or_empty(self) -> Vec<String>;
 }
@@ -372,7 +374,7 @@ fn structural_parameters_change_the_sizes_of_arrays() {
     assert_eq!(sum, [16.0]);
     one.reset(None);
     one.get(&selection, &mut sum);
-    assert_eq!(sum, [16.0], "a reset keeps them");
+    assert_eq!(sum, [16.0], "a reset must keep the start values");
     let wrong =
         |start| fmu.instances(&Setup { start, count: 2, ..Setup::default() }).unwrap_err().to_string();
     assert!(wrong(vec![("size", Start::Each(&[1.0, 2.0]))]).contains("one value for all"));

@@ -1,4 +1,4 @@
-//! Opens FMUs and other files as an FMU.
+//! Opens FMUs and files that are not FMUs.
 
 use crate::built::{built, packed};
 use crate::end;

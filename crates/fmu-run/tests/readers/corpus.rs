@@ -1,4 +1,4 @@
-//! Generates malformed files, which a reader must survive. Each is smaller than 200 kB unless it has to be larger.
+//! Generates files, most of them malformed, which a reader must survive. They are as small as their purpose permits.
 
 use std::io::{Cursor, Write};
 use zip::write::SimpleFileOptions;
@@ -28,7 +28,7 @@ fn fmi3(variables: &str, structure: &str) -> Vec<u8> {
     description(3, "", CS, &rest)
 }
 
-/// Returns arrays of 100,000 elements.
+/// Returns the declarations of `count` arrays, each with 100,000 elements.
 fn arrays(count: usize, attributes: &str) -> String {
     let array = |number: usize| {
         format!(
@@ -98,7 +98,7 @@ pub fn descriptions() -> Files {
     ]
 }
 
-/// Returns the beginning of a system with these elements; `closed` adds the connections and the end.
+/// Returns the beginning of the description of a system with these elements; `closed` adds the connections and the end.
 fn system(elements: &str, rest: &str) -> Vec<u8> {
     format!(
         "<ssd:SystemStructureDescription xmlns:ssd=\"http://ssp-standard.org/SSP1/SystemStructureDescription\" version=\"1.0\" name=\"S\">\
@@ -127,7 +127,7 @@ fn connection(from: (&str, &str), to: (&str, &str)) -> String {
     )
 }
 
-/// Returns a system of components that are connected in a chain, from output to input; in a cycle, if `closes`.
+/// Returns a system of components that are connected from output to input in a chain or, if `closes`, in a cycle.
 pub fn chain(count: usize, closes: bool) -> Vec<u8> {
     let components: String = (0..count).map(|number| component(&format!("c{number}"), "m")).collect();
     let end = if closes { count } else { count - 1 };
@@ -224,7 +224,7 @@ fn packed(entries: impl IntoIterator<Item = (String, Vec<u8>)>) -> Vec<u8> {
     archive.finish().unwrap().into_inner()
 }
 
-/// Replaces all occurrences of bytes in an archive.
+/// Replaces all occurrences of `from` in an archive by `to`, which has the same length. There must be at least one.
 fn replaced(archive: Vec<u8>, from: &[u8], to: &[u8]) -> Vec<u8> {
     assert_eq!(from.len(), to.len());
     let mut archive = archive;
@@ -239,7 +239,7 @@ fn replaced(archive: Vec<u8>, from: &[u8], to: &[u8]) -> Vec<u8> {
     archive
 }
 
-/// Returns archives of FMUs and systems.
+/// Returns archives that are opened as an FMU and as a system.
 pub fn archives() -> Files {
     let one = |name: &str| packed([(name.to_owned(), b"x".to_vec())]);
     let link = {
@@ -247,11 +247,11 @@ pub fn archives() -> Files {
         archive.add_symlink("modelDescription.xml", "/etc/passwd", SimpleFileOptions::default()).unwrap();
         archive.finish().unwrap().into_inner()
     };
-    // Declares 2 GB, but is smaller.
+    // The entry declares 2 GB, but has 70 kB.
     let bomb = packed([("modelDescription.xml".to_owned(), vec![b' '; 70_000])]);
     let bomb = replaced(bomb, &70_000_u32.to_le_bytes(), &(2_u32 << 30).to_le_bytes());
-    // Declares fewer bytes than it contains.
     let declared = |size: u32| [b"x\x9c".to_vec(), size.to_le_bytes().to_vec()].concat();
+    // The entry declares fewer bytes than it contains.
     let liar = packed([("modelDescription.xml".to_owned(), vec![b' '; 70_000])]);
     let size = 70_000_u32.to_le_bytes();
     let liar = replaced(liar, &size, &10_u32.to_le_bytes());

@@ -1,4 +1,5 @@
-//! Reads untrusted files, in the tests and in libFuzzer. Each file is read successfully or gives an error message of one line.
+//! Reads untrusted files, in the tests and in libFuzzer. Each file must be read successfully, or cause an error message of one
+//! line.
 
 use fmu_run::{Description, Fmu, Order, System};
 use std::path::Path;
@@ -6,7 +7,7 @@ use std::path::Path;
 /// The orders of data exchange with which a system is opened.
 pub const ORDERS: [Order; 2] = [Order::Dependencies, Order::Jacobi];
 
-/// Asserts that an error message is one line that does not contain control characters.
+/// Asserts that an error message is not empty, contains no control characters such as newlines, and is not too long.
 fn check<T>(result: Result<T, String>) {
     if let Err(why) = result {
         assert!(!why.trim().is_empty(), "a message is empty");
@@ -22,7 +23,7 @@ pub fn description(bytes: &[u8]) {
     check(Description::parse(&text).map_err(|why| fmu_run::Error::Fmu(why).to_string()));
 }
 
-/// Writes one file of a system to its directory, and opens the directory. It already contains the other files.
+/// Writes one file of a system to its directory, which already contains the other files, and opens the directory.
 pub fn file_of_system(directory: &Path, name: &str, bytes: &[u8]) {
     std::fs::write(directory.join(name), bytes).unwrap();
     for order in ORDERS {
@@ -41,5 +42,5 @@ pub fn archive(directory: &Path, bytes: &[u8]) {
     check(unsafe { System::open(&path, Order::Jacobi) }.map_err(|error| error.to_string()));
     let names: Vec<_> =
         std::fs::read_dir(directory).unwrap().flatten().map(|entry| entry.file_name()).collect();
-    assert_eq!(names, ["archive"], "a file is outside");
+    assert_eq!(names, ["archive"], "a file was written outside of the temporary directory");
 }

@@ -1,4 +1,5 @@
-//! Reads malformed descriptions, systems and archives, and mutations of them, in processes with limited memory.
+//! Reads malformed model descriptions, systems, parameter sets and archives, and mutations of them, in processes with limited
+//! memory.
 #![allow(unsafe_code, reason = "FMUs are opened")]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
@@ -20,7 +21,7 @@ use tempfile::TempDir;
 const LIMITS: [u64; 4] = [48, 80, 128, 256];
 /// Environment variable that contains the directory in which the child process works.
 const DIRECTORY: &str = "READERS_DIRECTORY";
-/// Environment variable that contains the number of mutations of each kind of files.
+/// Environment variable that contains the number of mutations for each kind of file.
 const MUTATIONS: &str = "READERS_MUTATIONS";
 
 /// Creates a directory for a system, with the FMU `m`, parameters, a pipe and a link. Next to it are secret files, which the system
@@ -81,7 +82,7 @@ fn directory() -> PathBuf {
     PathBuf::from(std::env::var_os(DIRECTORY).expect("a parent process starts this test"))
 }
 
-/// Calls `read` with each file. Prints its name first, so that the parent process can report the last file.
+/// Calls `read` with each file. Prints the name of the file first, so that the parent process can report the last one.
 fn each(kind: &str, files: &Files, mut read: impl FnMut(&[u8])) {
     for (name, bytes) in files {
         println!("{kind}: {name}");
@@ -89,7 +90,8 @@ fn each(kind: &str, files: &Files, mut read: impl FnMut(&[u8])) {
     }
 }
 
-/// Writes the small files to a directory for each libFuzzer target, as its initial corpus.
+/// Writes the small files to a directory for each libFuzzer target, as its initial corpus. The last byte of an input of the target
+/// `system` selects the file of the system: 0 for `SystemStructure.ssd`, 1 for `p.ssv`.
 #[test]
 #[ignore = "make fuzz starts it"]
 fn write_corpus() {
@@ -132,7 +134,7 @@ fn malformed_files_are_errors_whatever_memory_there_is() {
     }
 }
 
-/// Mutates a file: changes bytes, repeats or removes parts, and inserts XML tokens.
+/// Mutates a file one to four times: changes bytes, repeats or removes parts, and inserts tokens that may confuse a parser.
 fn mutated(random: &mut Random, original: &[u8]) -> Vec<u8> {
     const TOKENS: [&str; 16] = [
         "<",
@@ -181,12 +183,12 @@ fn read_mutations() {
     let count: usize = std::env::var(MUTATIONS).unwrap().parse().unwrap();
     let mut random = Random(1);
     let mut mutate = |files: &Files, read: &dyn Fn(&[u8])| {
-        // Only small files are mutated, because large ones take more time and do not find more.
+        // Only small files are mutated, because large ones take more time and do not find more faults.
         let small: Vec<_> = files.iter().filter(|(_, bytes)| bytes.len() < 5000).collect();
         for _ in 0..count {
             let (_, original) = small[random.below(small.len())];
             let bytes = mutated(&mut random, original);
-            // Stored so that the input can be found if it ends this process.
+            // The input is stored outside of this process, because it may end the process.
             std::fs::write(outer.join("input"), &bytes).unwrap();
             read(&bytes);
         }
@@ -200,7 +202,7 @@ fn read_mutations() {
     mutate(&corpus::archives(), &|bytes| harness::archive(&alone, bytes));
 }
 
-/// Returns the number of mutations of each kind of files.
+/// Returns the number of mutations for each kind of file.
 fn mutations() -> usize {
     std::env::var(MUTATIONS).map_or(150, |count| count.parse().unwrap())
 }
@@ -210,14 +212,14 @@ fn mutations_of_malformed_files_are_errors() {
     run_limited("read_mutations", 256, mutations());
 }
 
-/// Returns how long it takes to open a system, s.
+/// Returns the mean time that opening a system takes over all orders of data exchange, s.
 fn seconds(directory: &Path, system: &[u8]) -> f64 {
     let begin = Instant::now();
     harness::file_of_system(directory, "SystemStructure.ssd", system);
     begin.elapsed().as_secs_f64() / harness::ORDERS.len() as f64
 }
 
-/// Repeats the tests and writes their results to the page about robustness.
+/// Repeats the tests, measures how long systems with many connections take, and writes the results to the page about robustness.
 #[test]
 #[ignore = "writes a page; run it with --profile bench, and READERS_MUTATIONS=20000"]
 fn write_figures() {

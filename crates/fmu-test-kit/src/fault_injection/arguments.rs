@@ -1,4 +1,4 @@
-//! Decodes the arguments of a call from bytes. Most are valid, so that simulations make progress. The others cover all
+//! Decodes the arguments of a call from bytes. Most are valid, so that simulations make progress. The others cover the
 //! faults of a C caller that an FMU can detect.
 
 use arbitrary::{Result, Unstructured};
@@ -121,7 +121,7 @@ enum Fault {
 pub struct CallArguments {
     pub vr: Vec<u32>,
     pub known: Vec<u32>,
-    /// Number of values of `vr`.
+    /// Number of values of the variables in `vr`, which is larger than their number if they include arrays.
     pub values: usize,
     pub known_values: usize,
     pub orders: Vec<i32>,

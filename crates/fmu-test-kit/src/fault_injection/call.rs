@@ -39,15 +39,15 @@ pub fn element_size(of: &str, function: &str) -> usize {
 }
 
 impl Call {
-    /// Returns whether a call with this status must leave the state unchanged. A step that ends early in FMI
-    /// 2.0 changes the state.
+    /// Returns whether a call with this status must leave the state unchanged. A step of FMI 2.0 that ends early returns
+    /// Discard, but changes the state.
     pub fn must_not_change(&self, status: Status) -> bool {
         let early = self.function == "fmi2DoStep" && status == Status::Discard;
         status != Status::Ok && !early || self.function[4..].starts_with("Get")
     }
 
-    /// Calls the function. Panics if the result is invalid: an unexpected status, a value that is not finite, or more values
-    /// than requested.
+    /// Calls the function. Panics if the result is invalid, such as an unexpected status, a value that is not finite, a string
+    /// that is not UTF-8, or more or fewer values than requested.
     pub fn run<F: Caller>(&self, fmu: &F) -> CallResult {
         let (name, a) = (self.function, &self.arguments);
         let list = signature(name).expect("a function of the standard").arguments;
@@ -97,7 +97,7 @@ impl Call {
             if let [_, _, early, end] = values[..] {
                 let end = f64::from_bits(end);
                 assert!(end >= point && end <= point + size, "{end}: {self:?}");
-                assert!(early == 0 || end < point + size, "not early: {self:?}");
+                assert!(early == 0 || end < point + size, "an early return at the end of the step: {self:?}");
             }
         }
         CallResult { status, values }
@@ -248,7 +248,7 @@ impl Array {
                     u64::from_le_bytes(fnv1a(string))
                 }
                 "Binary" => {
-                    let size = sizes.expect("their sizes come before").bits(index) as usize;
+                    let size = sizes.expect("an array of sizes must precede").bits(index) as usize;
                     // SAFETY: the FMU's bytes have this length and are valid until the next call.
                     let bytes = unsafe {
                         std::slice::from_raw_parts(std::ptr::with_exposed_provenance(bits as usize), size)

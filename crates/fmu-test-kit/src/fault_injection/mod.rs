@@ -3,8 +3,8 @@
 //!
 //! After every call, the importer checks that the status is valid, and that the serialized state is unchanged if the call
 //! was rejected or only reads. Values must be valid, nothing may be written after the end of an array, and messages must
-//! be clean. Sometimes the importer restores the last saved state of an instance, in it or in another instance, and
-//! repeats all calls after the save. All results and the final state must then be bit-identical.
+//! be clean. Sometimes the importer restores the last saved state of an instance, in the same or in another instance,
+//! and repeats all calls after the save. All results and the final state must then be bit-identical.
 //!
 //! The bytes come from [`random_bytes`] or from a fuzzer.
 
@@ -38,7 +38,8 @@ pub fn run<F: Caller, M: Exported>(bytes: &[u8], tally: &mut Tally) {
     session::<F, M>(&F::make::<M>, bytes, tally, None);
 }
 
-/// Makes the calls with these functions of a model in FMI 2.0. Returns one string per call with its result and messages.
+/// Makes the calls with these functions of a model in FMI 2.0. Returns strings with results and messages: one for each
+/// instantiation, each call of a randomly chosen function, and each use of a saved state.
 ///
 /// # Panics
 /// Panics at the first violated guarantee.
@@ -251,7 +252,7 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         Ok(())
     }
 
-    /// Makes the calls that initialize an instance, because random calls are rarely in this order.
+    /// Makes the calls that reset and initialize an instance, because random calls are rarely in this order.
     fn initialize(&mut self, index: usize) {
         let Some(slot) = &mut self.instances[index] else { return };
         // All arguments are 0, so no stop time is defined.
@@ -295,7 +296,8 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
     fn replay(&mut self, index: usize, elsewhere: bool) {
         let Some(slot) = &mut self.instances[index] else { return };
         let end = slot.fmu.bytes();
-        let other = elsewhere.then(|| (self.make)(&slot.arguments).expect("an equal instance exists"));
+        let other =
+            elsewhere.then(|| (self.make)(&slot.arguments).expect("an equal instance must be possible"));
         let fmu = other.as_ref().unwrap_or(&slot.fmu);
         fmu.restore(&slot.saved);
         for (call, result) in &slot.since {
@@ -403,7 +405,7 @@ fn callable<F: Caller>() -> Vec<&'static str> {
     F::functions().iter().copied().filter(|name| !has_handles(name)).collect()
 }
 
-/// Returns a pointer to the value, which is sometimes replaced by NULL or misaligned. The FMU must not dereference either.
+/// Returns a pointer to the value, or sometimes NULL or a misaligned pointer, which the FMU must not dereference.
 fn pointer_to<T>(value: &mut T, u: &mut Unstructured) -> Result<*mut T> {
     Ok(match u.int_in_range(0..=15_u8)? {
         0 => null_mut(),
@@ -412,7 +414,8 @@ fn pointer_to<T>(value: &mut T, u: &mut Unstructured) -> Result<*mut T> {
     })
 }
 
-/// Damages some bytes of a serialized state, and often updates the checksum so that the damage is not detected by it.
+/// In half of the calls, changes or cuts off some bytes of a serialized state. Mostly updates the checksum, too, so that it
+/// does not reveal the damage.
 fn damage(bytes: &mut Vec<u8>, u: &mut Unstructured) -> Result<()> {
     if u.ratio(1, 2)? || bytes.len() < 16 {
         return Ok(());
@@ -430,7 +433,7 @@ fn damage(bytes: &mut Vec<u8>, u: &mut Unstructured) -> Result<()> {
     Ok(())
 }
 
-/// Checks that messages are clean, and that at most one reports an error.
+/// Checks that messages are clean, that at most one is more severe than a warning, and that none is fatal.
 fn check_messages(messages: Vec<Message>) {
     let rejections =
         messages.iter().filter(|message| ![Status::Ok, Status::Warning].contains(&message.status));

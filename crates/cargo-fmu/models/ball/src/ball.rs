@@ -134,7 +134,7 @@ impl ModelExchange for Ball {
         StepCompleted { event: self.height < 0.0 && self.velocity < 0.0, terminate: self.height < -100.0 }
     }
 
-    /// Flights get lower, so the tolerance of the integrator should decrease.
+    /// Flights get lower, so the absolute tolerance of the integrator should decrease with them.
     fn nominals(&self, nominals: &mut [f64]) {
         nominals[0] = self.apex.max(1e-6);
     }

@@ -91,7 +91,7 @@ impl Motor {
         self.next = self.begin + if self.rises { self.period } else { duty * self.period };
     }
 
-    /// Integrates in steps that are short compared with the time constant of the winding.
+    /// Integrates in steps that are short compared with the time constant of the winding and with the period.
     fn integrate(&mut self, step: Step) -> Result<(), Error> {
         for part in step.parts(0.2 * (self.inductance / self.resistance).min(self.period))? {
             [self.current, self.speed] = rk4([self.current, self.speed], part, |_, state| self.rates(state));
