@@ -63,8 +63,8 @@ impl Table {
                 && after < before
             {
                 bail!(
-                    "{}, line {line}: the time {after} follows {before}; times must not decrease, and two rows of the same \
-                     time are a step",
+                    "{}, line {line}: the time {after} follows {before}; times must not decrease, and two rows with the same \
+                     time make a jump",
                     path()
                 );
             }
