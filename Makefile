@@ -70,6 +70,7 @@ help:
 	@echo 'make check                   check the changes since the last commit, in about a minute'
 	@echo 'make check-release           run every check and write a table        -> out/release-check.md'
 	@echo 'make test-rust               check the Rust code: format, lints, tests, documentation'
+	@echo 'make check-windows           check the Rust code for Windows with clippy'
 	@echo 'make test-python             check the Python code with ruff and mypy'
 	@echo 'make test-fmu                run the Python tests; make test runs these and the next three'
 	@echo 'make test-closed-loop        test the testbed with its controller, in several masters'

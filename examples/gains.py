@@ -1,4 +1,4 @@
-"""The controller's gains tuned over 10,000 wrists with tolerances, in a closed loop
+"""The controller's gains tuned for wrists with tolerances: 100 wrists, 100 pairs of gains, 10,000 closed loops
 
 You learn to run controller and testbed as one system (fmu_run.System), with different parameters in each run. Gains
 that suit the nominal wrist may be bad for others, so the example chooses gains that suit nearly every wrist.

@@ -1,8 +1,8 @@
-"""A move without vibration, learned on 1,024 wrists at a time
+"""A move with little vibration, learned in 1,024 environments at a time
 
-You learn to create Gymnasium environments from an FMU (`fmu_run.gymnasium`), each with a different stiffness and
-load. The cross-entropy method finds a motor trajectory and feedback gains. The result is tested on 1,000 other wrists
-with noisy sensors, and compared with input shapers (ZV, ZVD), which need no sensors.
+You learn to create Gymnasium environments from an FMU (`fmu_run.gymnasium`) with random stiffness and load. In each round, 128
+candidates are tried on the same eight wrists. The cross-entropy method finds a motor trajectory and feedback gains. The result is
+tested on 1,000 other wrists with noisy sensors, and compared with input shapers (ZV, ZVD), which need no sensors.
 
     make examples; .venv/bin/python examples/learned_move.py
 """
@@ -36,8 +36,7 @@ def draw(value: float, unlike: int, rng: np.random.Generator, count: int) -> np.
 
 
 def wrists(count: int, unlike: int) -> VectorEnv:
-    """Environments of `unlike` different wrists. The action is the rate of both motors; the reward is the negative
-    squared error after MOVE."""
+    """Environments of `unlike` different wrists. Action: rate of both motors. Reward: negative squared error after MOVE."""
     task = Task(
         fmu="target/fmu/prw_testbed.fmu",
         actions={"rate": (-RATE, RATE)},

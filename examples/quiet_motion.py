@@ -1,4 +1,4 @@
-"""The quietest motion from rest to rest, found with CasADi
+"""The smoothest motion that leaves no vibration, found with CasADi
 
 You learn to load the FMU into CasADi, and to set up an optimal control problem with the derivatives that the FMU
 returns. The motion is then replayed on the FMU: the wrist does not vibrate at the end, and vibrates little if the
@@ -39,7 +39,7 @@ def sampled() -> tuple[np.ndarray, np.ndarray]:
     return transition[:8, :8], transition[:8, 8:]
 
 
-def quietest() -> np.ndarray:
+def smoothest() -> np.ndarray:
     """The motors' rates (n, 2) in rad/s of the smoothest motion that is at rest at the goal after MOVE."""
     A, B = sampled()
     n, problem = round(MOVE / STEP), casadi.Opti()
@@ -74,9 +74,9 @@ def left(run: prw.Run) -> float:
 
 def main() -> tuple[Figure, dict[str, float]]:
     """Find, replay, print and draw; returns the figure, and the largest error after each motion, deg."""
-    rates = {"quintic": minimum_jerk(), "quietest": quietest()}
+    rates = {"quintic": minimum_jerk(), "smoothest": smoothest()}
     runs = {name: replay(trajectory) for name, trajectory in rates.items()}
-    runs["quietest, k2 10 % less"] = replay(rates["quietest"], {"k2": 0.9 * runs["quietest"].parameters["k2"]})
+    runs["smoothest, k2 10 % less"] = replay(rates["smoothest"], {"k2": 0.9 * runs["smoothest"].parameters["k2"]})
     figure = Figure(figsize=(8, 4.2), layout="constrained")
     axes = figure.subplots(2, 2, sharex=True)
     print("largest error of pitch or roll after the move:")

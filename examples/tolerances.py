@@ -1,7 +1,7 @@
 """Effect of tolerances in stiffness and damping on tracking: 10,000 wrists
 
 You learn to run an FMU ten thousand times with random parameters (fmu_run), because no wrist is built exactly as
-planned. The plots show how far pitch and roll deviate from a wrist with stiff couplings, and which parameter causes
+planned. The plots show how far pitch and roll deviate from a wrist with rigid couplings, and which parameter causes
 it.
 
     make examples; .venv/bin/python examples/tolerances.py

@@ -1,8 +1,8 @@
 """Motors with inertia and friction, current and angle loops, coupled to the FMU by their torques
 
-You learn to couple the FMU with a model of its motors, which takes the torques of the FMU and returns angles and
-rates (`fmu_run.Instances`), and how small the communication step must be, since torques are exchanged only between
-steps. examples/openmodelica/TorqueDriven.mo has the same motors, loops and move for Model Exchange.
+You learn to couple the FMU (`fmu_run.Instances`) with a model of its motors, which takes torques and returns angles and
+rates. The output shows how small the communication step must be, since torques are exchanged only between steps.
+examples/openmodelica/TorqueDriven.mo has the same motors, loops and move for Model Exchange.
 
     make examples; .venv/bin/python examples/torque_driven.py
 """

@@ -1,5 +1,5 @@
-//! Compares the model with the reference values of the paper. For each erratum, a test shows that the printed equation
-//! is wrong.
+//! Checks the model's eigenvalues and gains for the parameters of the paper, and the paper's equations against each other.
+//! For each erratum, a test shows that the printed equation is wrong.
 
 use nalgebra::{Complex, Matrix2, Matrix4, Matrix6, Vector4};
 use prw_testbed::energies::{Angles, dissipation, kinetic_energy, potential_energy, sect};
@@ -69,7 +69,8 @@ fn transfer_matrices_agree() {
 
 #[test]
 fn erratum_theta7_is_pitch_and_theta8_is_roll() {
-    // Sec. 4: with opposite motors the pitch rate is zero. With the printed definition, theta7 would be roll.
+    // Sec. 4: if the motors move in opposite directions, the pitch rate is zero. With the printed definition, theta7 would
+    // be roll.
     let (pitch, roll) = sect(&TABLE_1, 0.3, -0.3);
     assert_eq!(pitch, 0.0);
     assert!((roll - 7.0 / 4.0 * 0.3).abs() < 1e-15);

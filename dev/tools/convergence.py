@@ -14,7 +14,7 @@ from prw.motion import Array, Motion
 from prw.state_space import StateSpace
 from prw.testbed import OUTPUTS, Testbed
 
-#: The motion: theta_i = AMPLITUDE_i sin(RATE_i t + PHASE_i), rad; wrist moves of some hertz.
+#: The motion: theta_i = AMPLITUDE_i sin(RATE_i t + PHASE_i), rad, with frequencies of 2.2 and 3.7 Hz. (RATE is in rad/s.)
 AMPLITUDE, RATE, PHASE = np.array([0.3, 0.2]), np.array([14.0, 23.0]), np.array([0.4, 1.9])
 #: Duration, s.
 DURATION = 1.0
@@ -48,7 +48,8 @@ class Convergence(NamedTuple):
 
 
 def convergence(fmu: Path, model: StateSpace) -> Convergence:
-    """Run the FMU with ever smaller steps against the exact response of its linear model (outputs: OUTPUTS)."""
+    """Errors of the FMU for ever smaller steps, compared with the exact response of its linear model `model` or, for piecewise
+    linear motion, with a run of finer steps. The model must have the outputs OUTPUTS."""
     errors = [
         (_error(fmu, model, n, False), _error(fmu, model, n, True), _piecewise_linear_error(fmu, n))
         for n in STEPS_PER_SECOND
@@ -65,7 +66,8 @@ def order(step: np.ndarray, errors: dict[str, np.ndarray]) -> dict[str, float]:
 
 
 def exact_response(model: StateSpace, time: np.ndarray) -> dict[str, np.ndarray]:
-    """The response to the motion from rest at its first angles: forced sines, and transients by A's eigenvectors."""
+    """Exact response to the motion, from rest at its initial angles: forced sinusoids, plus transients calculated from the
+    eigenvectors of A."""
     motors = [(model.inputs.index(f"theta{i}"), model.inputs.index(f"omega{i}")) for i in (1, 2)]
     x, y = np.zeros((len(time), len(model.states))), np.zeros((len(time), len(model.outputs)))
     start = np.zeros(len(model.states))

@@ -18,8 +18,8 @@ TORQUES = ("tau1", "tau2")
 #: Minimum number of steps in a period. A motor follows its tangent over a step, which raises the amplitude of its motion by the
 #: fraction (2 pi / STEPS)^2 / 6: 0.0014 dB.
 STEPS = 200
-#: The longest step, s. At low frequencies it must be short, because the torques and the shaft of the other side are
-#: small differences of large angles.
+#: The longest step, s. At low frequencies it must be short: the torques, and the angles of the shafts on the side of the motor
+#: at rest, are small differences of large angles.
 LONGEST_STEP = 2e-3
 #: Number of evaluated periods.
 PERIODS = 2

@@ -24,7 +24,7 @@ ESTIMATED = {
 }
 #: Roll angle for a difference of one radian between the input shafts: N / (2 M), with 7 rollers and 4 lobes.
 RATIO = 7 / (2 * 4)
-#: Shaft rate, rad/s, that smooths dry friction: the torque is proportional to tanh(rate / KNEE).
+#: Shaft rate, rad/s, about which dry friction is smoothed: its torque is proportional to tanh(rate / KNEE).
 KNEE = 0.02
 
 
@@ -46,7 +46,8 @@ class Drives(NamedTuple):
         return np.array(angle), np.array(rate)
 
 
-#: Lowest and highest frequency of a motion, Hz, its number of sines, and the exponent by which amplitudes fall.
+#: Lowest and highest frequency of a motion, Hz, its number of sines, and the exponent with which their amplitudes fall
+#: over frequency.
 MOTIONS = {
     "broad": (0.1, 20.0, 30, 1.5),
     "gentle": (0.1, 10.0, 20, 2.0),

@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 
 import fmpy
 import numpy as np
@@ -15,6 +16,7 @@ import rig
 from built import ROOT, program
 from lxml import etree
 
+from prw.identification.findings import Findings
 from prw.identification.report import _prose
 from prw.identification.rounding import rounded
 
@@ -67,10 +69,10 @@ def test_only_torques_and_the_exchanged_couplings(prw, tmp_path, experiment):
     rig.write(tmp_path / "run.csv", rig.measure(experiment, 7, ("tau1", "tau2")))
     result = prw("identify", "run.csv", "--starts", 2)
     assert result.returncode == 0, result.stderr
-    assert "the couplings exchanged" in result.stdout and "theta3 and theta4 would distinguish them" in result.stdout
+    assert "the couplings exchanged" in result.stdout and "measurements of theta3 and theta4" in result.stdout
     # The note has the units of the table.
     page = (tmp_path / "out" / "identified" / "report.html").read_text(encoding="utf-8")
-    (note,) = re.findall(r'<p class="note">The data fit as well with (.*?)</p>', page)
+    (note,) = re.findall(r'<p class="note">Other values fit the data equally well: (.*?)</p>', page)
     assert "N·m/deg" in note and "N·m/rad" not in page
     check_estimates(report(tmp_path / "out" / "identified"), experiment.parameters)
 
@@ -211,3 +213,19 @@ def test_options_in_the_report_are_code():
     assert (
         str(_prose("add `--delay tau1`; k1 < 2 +- 1 N.m/deg")) == "add <code>--delay tau1</code>; k1 &lt; 2 ± 1 N·m/deg"
     )
+
+
+@pytest.mark.parametrize(
+    "rival, exchanged",
+    [
+        ({"k1": 54.0, "k2": 132.0, "c1": 0.42, "c2": 0.53}, True),
+        ({"k1": 54.0, "k2": 132.0, "c1": 0.42, "c2": 0.60}, False),
+        ({"c3": 0.7}, False),
+    ],
+)
+def test_only_exchanged_couplings_are_called_exchanged(rival, exchanged):
+    estimates = {"k1": 132.0, "k2": 54.0, "c1": 0.53, "c2": 0.42, "c3": 0.35}
+    logarithms = np.log([estimates[name] for name in rival])
+    solution = SimpleNamespace(task=SimpleNamespace(names=list(rival)), logarithms=logarithms)
+    found = Findings._exchanged(SimpleNamespace(solution=solution), np.log([*rival.values()]))
+    assert found is exchanged

@@ -70,7 +70,7 @@ def test_two_faults_are_both_named(experiment, fmu):
     found = prw.identify(recording(simulated._replace(outputs={**simulated.outputs, **late})), starts=1, fmu=fmu)
     first, second = found.diagnosis
     assert first.startswith("friction about pitch and roll of 0.1")
-    assert second.startswith("besides, tau1") and "ms late" in second and "(delay tau1,tau2" in second
+    assert second.startswith("besides, tau1") and "ms late" in second and "the argument delay: tau1,tau2" in second
     one = prw.identify(recording(simulated), starts=1, fmu=fmu)
     assert len(one.diagnosis) == 1, "one fault must have one cause"
 
@@ -80,7 +80,7 @@ def test_a_common_fault_is_found_if_parameters_compensate_for_each_single_one(fm
     simulated = rig.late(rig.experiment(400004, 6, pattern="slow"), 7e-4)
     found = prw.identify(recording(simulated, ("tau1", "tau2", "pitch", "roll")), starts=1, fmu=fmu)
     assert {misfit.channel for misfit in found.verdict.misfits} == {"tau1", "tau2"}, found.misfits
-    assert "(delay tau1,tau2 estimates it, too)" in found.diagnosis[0], found.diagnosis
+    assert "(`identify` estimates it, too, with the argument delay: tau1,tau2)" in found.diagnosis[0], found.diagnosis
 
 
 @pytest.mark.parametrize("pattern", ["independent", "equal", "slow", "fig4", "moves"])
@@ -165,7 +165,11 @@ def test_the_command_reports_and_writes_no_parameters(prw, tmp_path, experiment)
     result = prw("identify", "run.csv", "--starts", 1)
     reported = [line for line in result.stderr.splitlines() if not line.startswith("looking for ")]  # progress
     assert result.returncode == 3 and len(reported) == 1, result.stderr
-    assert "tau1, tau2" in result.stderr and "(delay tau1,tau2 " in result.stderr and "--write-anyway" in result.stderr
+    assert (
+        "tau1, tau2" in result.stderr
+        and "argument delay: tau1,tau2)" in result.stderr
+        and "--write-anyway" in result.stderr
+    )
     assert result.stdout.index("DOES NOT EXPLAIN") < result.stdout.index("k1 ")
     assert not (out / "identified.json").exists()
     page = (out / "report.html").read_text(encoding="utf-8")

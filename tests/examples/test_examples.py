@@ -87,16 +87,16 @@ def vibration(quiet: Any, rates: np.ndarray, **changed: float) -> float:
     return max(float(np.rad2deg(np.abs(at[name][len(rates) :] - goal[name]).max())) for name in goal)
 
 
-def test_quietest_motion_leaves_no_vibration(quiet: Any) -> None:
+def test_smoothest_motion_leaves_no_vibration(quiet: Any) -> None:
     _, left = quiet.main()
-    quietest, quintic = quiet.quietest(), quiet.minimum_jerk()
-    assert vibration(quiet, quietest) < 1e-6
+    smoothest, quintic = quiet.smoothest(), quiet.minimum_jerk()
+    assert vibration(quiet, smoothest) < 1e-6
     assert vibration(quiet, quintic) > 1
-    assert np.abs(quietest).max() <= quiet.RATE
-    assert left["quietest"] < 1e-6
+    assert np.abs(smoothest).max() <= quiet.RATE
+    assert left["smoothest"] < 1e-6
     assert left["quintic"] == pytest.approx(vibration(quiet, quintic), rel=1e-6)
-    softer = vibration(quiet, quietest, k2=0.9 * table_1()["k2"])
-    assert left["quietest, k2 10 % less"] == pytest.approx(softer, rel=1e-3)
+    softer = vibration(quiet, smoothest, k2=0.9 * table_1()["k2"])
+    assert left["smoothest, k2 10 % less"] == pytest.approx(softer, rel=1e-3)
     assert softer < 0.2 * left["quintic"]
 
 

@@ -7,6 +7,7 @@ import json
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -58,6 +59,12 @@ def test_the_numbers_of_the_readme() -> None:
     ran = {row[0].split("]")[0].removesuffix("'s runtime") for row in AT_A_GLANCE if {"✓", "(✓)"} & {*row}}
     others = ran - {"[fmu_run", "[Programs in C"}
     assert f"{len(others)} other tools have run it" in rows["Portable"], others
+
+
+def test_the_number_of_seeded_faults() -> None:
+    lists = [name for name in FILES if re.match(r"tests/faults/.*\.toml$", name)]
+    count = sum(len(tomllib.loads(text(name))["fault"]) for name in lists)
+    assert f"puts the {count} faults of `tests/faults`" in text("docs/robustness.md")
 
 
 def test_help_lists_every_target_that_no_other_needs() -> None:

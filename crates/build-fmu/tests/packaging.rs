@@ -31,7 +31,7 @@ fn description(arguments: &[&str]) -> String {
     fs::read_to_string(directory.path().join("modelDescription.xml")).unwrap()
 }
 
-/// Writes a parameter file: Table 1 with `old` replaced by `new`. Returns its path.
+/// Writes a copy of `parameters.json` in which `new` replaces `old`. Returns its path.
 fn parameter_file(directory: &Path, old: &str, new: &str) -> String {
     let table = fs::read_to_string(PARAMETERS_JSON).unwrap();
     assert!(table.contains(old));
@@ -61,13 +61,13 @@ fn it_reads_back_as_the_model_that_was_compiled() {
     assert_eq!(names, table);
 }
 
-/// Returns the names of the states and inputs with a non-zero coefficient: a row of A or C, and the same row of B or D.
+/// Returns the names of the states and inputs whose coefficients are not zero in one row of A and B, or of C and D.
 fn nonzero_names(names: [&[&'static str]; 2], rows: [Vec<f64>; 2]) -> BTreeSet<&'static str> {
     let pairs = names.into_iter().zip(rows).flat_map(|(names, row)| names.iter().zip(row));
     pairs.filter(|(_, factor)| *factor != 0.0).map(|(name, _)| *name).collect()
 }
 
-/// Expected dependencies of the initial unknowns. Each also depends on `start_at_rest`, which is left out here.
+/// Expected dependencies of some of the initial unknowns. Each also depends on `start_at_rest`, which is left out here.
 const INITIAL_DEPENDENCIES: [(&str, &[&str]); 11] = [
     ("theta3", &["theta1", "theta3_start"]),
     ("theta4", &["theta2", "theta4_start"]),
@@ -182,7 +182,7 @@ fn other_parameters_are_other_start_values() {
         changed[0].starts_with(r#"<Real declaredType="RotationalSpringConstant" start="99.5" "#),
         "{changed:?}"
     );
-    // The same values from another file are the same FMU.
+    // The same values from another file give the same description.
     let copy = parameter_file(directory.path(), "meaning", "meaning");
     assert_eq!(description(&["--parameters", &copy]), before);
 }
@@ -206,7 +206,8 @@ fn wrong_requests_are_rejected_in_one_line() {
     let file = parameter_file(directory.path(), "\"value\": 2.11", "\"value\": -2.11");
     let extreme = tempfile::tempdir().unwrap();
     let extreme = parameter_file(extreme.path(), "\"value\": 2.11", "\"value\": 1e306");
-    // Two universal libraries for macOS that are only for Intel: their header, without and with the name of an FMI function.
+    // Two libraries in the universal format of macOS, for Intel only: a header alone, and a header followed by the name of an
+    // FMI function.
     let header = [0xcafe_babe_u32, 1, 0x0100_0007, 3, 0x1000, 0, 12].map(u32::to_be_bytes).concat();
     let [empty, library] = [("empty", &b""[..]), ("a", b"fmi2Instantiate")].map(|(name, content)| {
         let library = directory.path().join(name).with_extension("dylib");
@@ -269,7 +270,10 @@ fn two_builds_give_the_same_fmu_with_the_committed_description() {
     let mut zip = zip::ZipArchive::new(std::io::Cursor::new(one)).unwrap();
     let mut read = |name: &str| std::io::read_to_string(zip.by_name(name).unwrap()).unwrap();
     let described = description(&[]).replace(fmu_package::NO_GUID, &guid);
-    assert!(read("modelDescription.xml") == described, "the FMU has another description than the sources");
+    assert!(
+        read("modelDescription.xml") == described,
+        "the description in the FMU differs from the description of the sources"
+    );
     for name in ["license.txt", "third-party.txt", "LICENSE-APACHE", "LICENSE-MIT"] {
         assert!(!read(&format!("documentation/licenses/{name}")).is_empty(), "{name}");
     }

@@ -21,8 +21,9 @@ pub enum Purpose {
 /// Cargo settings for a short compile time.
 const FAST: [&str; 2] = ["profile.release.lto=\"off\"", "profile.release.incremental=true"];
 
-/// Builds the FMUs in the directory of the options, or in `target/fmu` of the workspace. If the package has its own build program,
-/// starts it with `arguments` instead. Returns false if that program failed, because it then has printed the reason.
+/// Builds the FMUs in the directory `options.out`, by default in `target/fmu` of the workspace. If the package has its own build
+/// program, starts it with `arguments` instead. If that program fails, returns false instead of an error, because the program has
+/// printed the reason.
 pub fn build(
     project: &Project,
     options: &BuildOptions,

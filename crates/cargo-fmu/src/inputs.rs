@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 /// Inputs over time. The runner interprets the times: a continuous input is interpolated linearly between two rows, any
-/// other is held, and two rows with the same time are a step.
+/// other is held, and two rows with the same time make a jump.
 pub struct Table {
     pub time: Vec<f64>,
     /// The columns. A column for an array has the names of all its elements, which all get the same values.
@@ -63,8 +63,8 @@ impl Table {
                 && after < before
             {
                 bail!(
-                    "{}, line {line}: the time {after} follows {before}; times must not decrease, and two rows of the same \
-                     time are a step",
+                    "{}, line {line}: the time {after} follows {before}; times must not decrease, and two rows with the same \
+                     time make a jump",
                     path()
                 );
             }

@@ -25,7 +25,7 @@ pub struct Options {
     /// one for each, separated by commas; repeat the option for several variables
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
-    /// Inputs over time: a CSV file with a column time and one column for each input; two rows of the same time are a step
+    /// Inputs over time: a CSV file with a column time and one column for each input; two rows with the same time make a jump
     #[arg(long, value_name = "FILE")]
     input: Option<PathBuf>,
     /// Stop time, s [default: from the model's default experiment]

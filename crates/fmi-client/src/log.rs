@@ -18,8 +18,8 @@ use std::thread::ThreadId;
 
 /// Receiver of log messages, called while the FMU logs, also from threads of the FMU. It must not call the FMU and must not panic.
 pub trait LogListener: Send + Sync {
-    /// Receives a message of the instance with this [`number`](crate::Settings::listener); `None` if the FMU does not name one of
-    /// the living instances.
+    /// Receives a message of the instance with this [`number`](crate::Settings::listener); `None` if several instances are alive and
+    /// the FMU names none of them.
     fn on_message(&self, number: Option<usize>, message: &Message);
 }
 
@@ -133,7 +133,7 @@ unsafe fn string(pointer: *const c_char) -> String {
     if pointer.is_null() {
         return String::new();
     }
-    // SAFETY: the caller's requirement.
+    // SAFETY: the caller guarantees NULL or a NUL-terminated string.
     unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned()
 }
 
@@ -198,8 +198,8 @@ unsafe extern "C" fn log_of_fmi2(
     store(environment.addr(), message);
 }
 
-/// Logger of FMI 2.0 that does not expand formats, because it cannot read variadic arguments on these platforms. The arguments before
-/// the `...` are passed in the same way as to a function without `...`.
+/// Logger of FMI 2.0 for all other platforms. It does not expand formats, because it cannot read variadic arguments there. The
+/// arguments before the `...` are passed in the same way as to a function without `...`.
 #[cfg(not(any(all(unix, target_arch = "x86_64"), all(target_os = "linux", target_arch = "aarch64"))))]
 unsafe extern "C" fn log_of_fmi2(
     environment: fmi2ComponentEnvironment,
@@ -222,7 +222,7 @@ pub unsafe extern "C" fn log_of_fmi3(
     category: fmi3String,
     message: fmi3String,
 ) {
-    // SAFETY: the caller's requirement.
+    // SAFETY: the caller guarantees NULL or NUL-terminated strings.
     let [category, text] = [category, message].map(|text| unsafe { string(text) });
     store(environment.addr(), Message { status: Status::from_c(status), category, text });
 }

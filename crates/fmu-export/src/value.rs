@@ -4,9 +4,9 @@ use crate::saved::{Saved, StateVisitor};
 use crate::types::Item;
 use fmi_abi::{BaseType, Value};
 
-/// A Rust type that can hold a variable's value: `f64`, `i32`, `bool`, `String`, or an enum made by
-/// [`enumeration!`](crate::enumeration). Models with `f32`, `Vec<u8>` or an integer type other than `i32` can be
-/// exported only for FMI 3.0.
+/// A Rust type that can hold a variable's value: `f64`, `i32`, `bool`, `String`, an enum made by
+/// [`enumeration!`](crate::enumeration) or, only for FMI 3.0, `f32`, `Vec<u8>` and the other integers from `i8` to
+/// `u64`.
 pub trait Scalar: Saved {
     /// FMI base type.
     const BASE: BaseType;
@@ -14,7 +14,8 @@ pub trait Scalar: Saved {
     /// Returns the value.
     fn value(&self) -> Value;
 
-    /// Sets a value of the right type. Ignores impossible values, because this crate has rejected them before.
+    /// Sets the value. Ignores a value of another type and a number that the integer type or enum does not have; this
+    /// crate rejects them earlier.
     fn assign(&mut self, value: &Value);
 
     /// Returns the [`value`](Self::value) of a Real; NaN for all other types. `f64` overrides it to avoid the
@@ -53,7 +54,7 @@ pub trait Place: Saved {
     /// Number of elements in each dimension.
     const DIMENSIONS: Dimensions;
 
-    /// Returns an element. Elements count from 0, row by row; a scalar is its element 0.
+    /// Returns an element. Elements are numbered from 0, row by row; a scalar is its own element 0.
     fn element(&self, number: usize) -> &Self::Element;
 
     /// Returns an element as a mutable reference; see [`element`](Self::element).
@@ -112,7 +113,7 @@ impl Dimensions {
     pub(crate) const SCALAR: Self = Self { sizes: [0; 3], count: 0 };
 
     const fn of_array(self, size: usize) -> Self {
-        assert!(self.count < 3, "an array has at most three dimensions here");
+        assert!(self.count < 3, "the array of a variable can have at most three dimensions");
         let [a, b, _] = self.sizes;
         Self { sizes: [size, a, b], count: self.count + 1 }
     }
@@ -271,7 +272,7 @@ pub fn visit_enumeration<T: Enumeration>(value: &mut T, visitor: &mut dyn StateV
 ///     pub enum Valve {
 ///         /// Nothing passes
 ///         Closed = 1,
-///         /// All passes
+///         /// Everything passes
 ///         Open = 2,
 ///     }
 /// }

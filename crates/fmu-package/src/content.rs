@@ -37,7 +37,7 @@ pub fn content_files(directory: &Path, except: &[&str]) -> Result<Vec<ContentFil
         let Some((_, location)) = LOCATIONS.iter().find(|(name, _)| *name == top) else {
             let known = LOCATIONS.map(|(name, _)| name).join(", ");
             bail!(
-                "{} cannot be in an FMU; move it to another directory, or into one of {known}",
+                "{} cannot be in an FMU; rename it, or move it to another directory; allowed here are {known}",
                 path.display()
             );
         };

@@ -155,8 +155,8 @@ impl<'a> Instance<'a> {
             .map_err(message)
     }
 
-    /// Sets the selected variables that have a value, arrays as a whole, with one call for each type. The model must accept the values
-    /// after each call, so the values of a type that it rejects are set again after the values of the other types.
+    /// Sets the selected variables that have a value, arrays as a whole, with one call for each type. The model checks all values after
+    /// each call, so values that it rejects are set again after those of the other types.
     pub fn set(&mut self, values: &[Option<Value>], is_selected: impl Fn(&Variable) -> bool) -> Outcome {
         let variables = &self.model.table.variables;
         let mut chosen: Vec<bool> = variables
@@ -241,7 +241,7 @@ impl<'a> Instance<'a> {
         all
     }
 
-    /// Reads variables of a type into the values of all variables.
+    /// Reads variables of a type into their places in `all`, the values of all variables.
     fn read(&mut self, base: BaseType, indices: &[u32], all: &mut [Value]) -> Outcome {
         let references = self.references(indices);
         let values = self.get_values(base, &references, indices.len())?;
@@ -266,7 +266,7 @@ impl<'a> Instance<'a> {
     }
 
     /// Returns the partial derivatives of Reals, arrays as a whole, with respect to one Real: `None` for a derivative that the model
-    /// does not provide, NaN for one that is not finite.
+    /// does not provide. NaN if the call fails for another reason, such as an infinite result.
     pub fn partials(&mut self, unknowns: &[u32], known: u32) -> Vec<Option<f64>> {
         if let Ok(all) = self.all_partials(unknowns, known) {
             return all.into_iter().map(Some).collect();
@@ -277,7 +277,7 @@ impl<'a> Instance<'a> {
             match self.all_partials(&array, known) {
                 Ok(all) => found.extend(all.into_iter().map(Some)),
                 Err(message) => {
-                    // In FMI 2.0, a missing derivative has no message.
+                    // A failure without a message also counts as a derivative that is not provided.
                     let has_none = message.is_empty() || message.ends_with("is not provided");
                     found.extend(array.iter().map(|_| (!has_none).then_some(f64::NAN)));
                 }

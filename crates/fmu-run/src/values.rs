@@ -83,7 +83,8 @@ impl Instance {
         (0..self.arrays.length(array.reference)).map(number).collect()
     }
 
-    /// Sets variables of one type to exact values. All other elements of arrays keep their values.
+    /// Sets variables of one type to exact values, i.e. without conversion to `f64`, so that strings, bytes and 64-bit integers are
+    /// possible. All other elements of arrays keep their values.
     pub(crate) fn set_values(
         &mut self,
         base: BaseType,

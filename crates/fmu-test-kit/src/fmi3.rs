@@ -14,8 +14,8 @@ unsafe extern "C" fn log_message(
     category: fmi3String,
     message: fmi3String,
 ) {
-    // SAFETY: section 2.3.1 of FMI 3.0 requires NUL-terminated strings. The environment is NULL or the log. NULL is the
-    // name of the instance, which FMI 3.0 does not pass.
+    // SAFETY: section 2.3.1 of FMI 3.0 requires NUL-terminated strings. The environment is NULL or the log. FMI 3.0 does not
+    // pass the name of the instance, so NULL takes its place.
     unsafe { remember(environment, null(), status, category, message) }
 }
 
@@ -27,7 +27,8 @@ fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi3Instance
     // FMI 3.0 needs a path, not a URI.
     let path = arguments.resource_location.map(|location| {
         let bytes = location.to_bytes_with_nul();
-        CStr::from_bytes_with_nul(bytes.strip_prefix(b"file://").unwrap_or(bytes)).expect("its end is left")
+        CStr::from_bytes_with_nul(bytes.strip_prefix(b"file://").unwrap_or(bytes))
+            .expect("the terminating NUL is kept")
     });
     let resources = pointer(path);
     let environment = match arguments.environment {
@@ -81,7 +82,7 @@ fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi3Instance
 
 /// Results of `fmi3DoStep`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs, reason = "as in the standard, section 4.2.1 of FMI 3.0")]
+#[allow(missing_docs, reason = "the fields are results of fmi3DoStep in section 4.2.1 of FMI 3.0")]
 pub struct Stepped {
     pub event_handling_needed: bool,
     pub terminate: bool,
@@ -89,7 +90,7 @@ pub struct Stepped {
     pub last_successful_time: f64,
 }
 
-/// Functions that exist only in FMI 3.0.
+/// Functions whose results exist only in FMI 3.0.
 impl Importer {
     /// Performs a step.
     ///

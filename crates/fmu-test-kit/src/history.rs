@@ -1,4 +1,4 @@
-//! Checks with random histories of an instance that calls which failed or were undone do not change any later result.
+//! Checks with random histories that calls which failed or were undone do not change any later result of an instance.
 //!
 //! A history is a random sequence of calls, many of which fail. It also saves, restores and serializes states, resets the
 //! instance, and continues in a copy. The *path* contains the calls that led to the current state: a call that failed is
@@ -16,7 +16,8 @@ use std::ffi::{CStr, CString};
 use std::marker::PhantomData;
 use std::ptr::null_mut;
 
-/// Number of histories of each FMI version and interface type; fewer under Miri, which is slow.
+/// Number of seeds for each interface type, each with one history in FMI 2.0 and two in FMI 3.0; fewer under Miri, which is
+/// slow.
 const HISTORIES: u64 = if cfg!(miri) { 1 } else { 6 };
 /// Number of calls in a history.
 const CALLS: usize = 60;
@@ -382,8 +383,8 @@ fn call<M: Exported>(random: &mut Random, mode: Option<Mode>, context: &Context)
     }
 }
 
-/// Alternately restores states that were saved with different parameters, and makes a step of the same size after each. If
-/// a model did not discard values that it has stored for the other parameters, it would use them in this step.
+/// Restores states that were saved with different parameters, in random order, and makes a step of the same size after each.
+/// If a model did not discard values that it has stored for the other parameters, it would use them in this step.
 fn parameters_in_turn<F: Either, M: Exported>(random: &mut Random, context: &Context) {
     let near = M::INFO.default_experiment.step_size;
     let mut tracked = Tracked::<F, M>::new(context);

@@ -1,5 +1,5 @@
-//! Samples as events: the motion of the motors is bit-identical, regardless of whether the importer or the FMU handles the
-//! events.
+//! The samples of the controller are events. The motion of the motors is bit-identical, regardless of whether the importer
+//! or the FMU handles them.
 
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::fmi3::types::{Status, fmi3Boolean, fmi3False, fmi3True};
@@ -69,7 +69,10 @@ fn steps_of_fmi2() -> Vec<[f64; 6]> {
         fmu.get(OUTPUTS)
     };
     let path: Vec<_> = (0..SAMPLES).map(outputs).collect();
-    assert!(path.iter().any(|outputs| outputs[0].abs() > 0.3 && outputs[5] != 0.0), "it moves: {path:?}");
+    assert!(
+        path.iter().any(|outputs| outputs[0].abs() > 0.3 && outputs[5] != 0.0),
+        "no step has |theta1| > 0.3 and a roll correction: {path:?}"
+    );
     path
 }
 
@@ -191,7 +194,8 @@ fn in_model_exchange() {
     check::<fmu_test_kit::fmi3::Importer>();
 }
 
-/// Checks that an event with too many samples is rejected, as after an importer has ignored all time events for 10^6 s.
+/// Checks that an event is rejected if too many samples are due, for example because the importer has ignored all time
+/// events for 10^6 s.
 #[test]
 fn too_many_samples_in_an_event() {
     let fmu = fmu_test_kit::Importer::new::<Controller>(ModelExchange);

@@ -101,7 +101,7 @@ def _gripper(page: Any, box: Any) -> tuple[float, float]:
         if scene.evaluate("canvas => canvas.style.cursor") == "move":
             page.mouse.move(x, height + 24)
             return float(x), float(height + 24)
-    raise UserError("the page shows no gripper to hold")
+    raise UserError("the page shows no gripper that the mouse can drag")
 
 
 def _draw_pointer(frame: Image.Image, x: float, y: float, holds: bool) -> None:
@@ -113,7 +113,8 @@ def _draw_pointer(frame: Image.Image, x: float, y: float, holds: bool) -> None:
 
 
 def _look_alike(path: Path, frames: list[Image.Image]) -> bool:
-    """Whether a GIF has these frames. Chromium draws a few edge pixels differently in each run."""
+    """Whether a GIF has these frames. Up to 10 pixels of each may differ clearly, because Chromium draws a few edge pixels
+    differently in each run."""
     with Image.open(path) as kept:
         before = [np.asarray(frame.convert("RGB"), dtype=int) for frame in ImageSequence.Iterator(kept)]
     after = [np.asarray(frame.convert("RGB"), dtype=int) for frame in frames]

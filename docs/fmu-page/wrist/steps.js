@@ -1,4 +1,4 @@
-// The steps of the guide. Each sentence is true at every value that a reader can set, or is written by the values.
+// The steps of the guide. Each sentence is true at every value that a reader can set, or depends on the values.
 
 /** Numbers in the paragraphs. */
 const [ALONE, ANGLE, FREQUENCY, SOFTNESS, PITCH_GOAL, ROLL_GOAL] = [

@@ -1,4 +1,4 @@
-//! Checks what `fmi3DoStep` returns at events, in Event Mode and with early returns.
+//! Checks what `fmi3DoStep` returns at events, with `eventModeUsed` and with `earlyReturnAllowed`.
 
 use crate::call_sequence::Run;
 use crate::checker::Checker;
@@ -7,8 +7,8 @@ use crate::writer::{Read, Trajectory, Writer, value_of};
 use std::sync::Arc;
 
 /// Checks steps with `eventModeUsed`, with `earlyReturnAllowed` and with both. A step may report an event or return early only if the
-/// importer has agreed to it at the instantiation. The time that a step returns must be the time of the FMU, and a step that ends at an
-/// event before its end must report the early return.
+/// importer has agreed to it at the instantiation. The time that a step returns must be the value of the independent variable. A step
+/// that stops at an event before its requested end must report an early return.
 pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let time = checker.description.variables.iter().position(|variable| variable.causality == "independent");
     let has_events = checker.can(trajectory.interface, &["hasEventMode"]);
@@ -24,11 +24,11 @@ pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
             same_steps.iter().find_map(|step| {
                 let Returned { event, early, reached, .. } = returned_by(step, &same_steps, run)?;
                 if early && !early_return {
-                    return Some("a step returns early, where earlyReturnAllowed is false".to_owned());
+                    return Some("a step returns early although earlyReturnAllowed is false".to_owned());
                 }
                 if event && !event_mode {
                     return Some(
-                        "a step reports eventHandlingNeeded, where eventModeUsed is false".to_owned(),
+                        "a step reports eventHandlingNeeded although eventModeUsed is false".to_owned(),
                     );
                 }
                 let now = *value_of(run, &step.values, time?)?.numbers().first()?;
@@ -109,7 +109,7 @@ fn execute_steps(
     while number < points.len() && steps.len() < 30 {
         let point = &points[number];
         let end = point.time + point.size;
-        // Section 4.2.1: the importer enters Event Mode at the next event time, or when the step requests it.
+        // Without early return, the step must end at the next event time, at which the importer enters Event Mode (section 4.2.1).
         let goal = next_event.filter(|next| !early_return && *next > now && *next < end).unwrap_or(end);
         let size = goal - now;
         if size <= 1e-9 * point.size {

@@ -1,7 +1,7 @@
 //! Settings of the process that an FMU must not change.
 
 /// Returns the settings, each with its value: the working directory and its files, the environment, and the control words of the
-/// floating-point units. On Unix also the locale, signals, limits, timers, standard streams, the mask for new files, the priority
+/// floating-point units. On Unix also the locale, signals, limits, timers, standard streams, the umask, the priority
 /// and the seed of random numbers; on Linux also POSIX timers, scheduling and the name of the thread.
 pub fn settings() -> Vec<String> {
     let mut found = Vec::new();

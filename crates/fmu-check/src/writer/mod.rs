@@ -1,4 +1,4 @@
-//! Writes call sequences of an importer that follows the standard.
+//! Writes call sequences of an importer that follows the standard, except in calls that are marked as forbidden.
 
 mod parts;
 mod reads;
@@ -79,7 +79,7 @@ impl<'a> Writer<'a> {
         id
     }
 
-    /// Returns the name of a function with its prefix and, for FMI 2.0, with `FMUstate` instead of `FMUState`.
+    /// Returns the full name of a function in the spelling of the FMI version, such as `fmi2GetFMUstate` or `fmi3GetFMUState`.
     fn named(&self, function: &str) -> String {
         let mut all = signatures(self.description.standard).iter().map(|signature| signature.rule.name);
         let name = all.find(|name| name[4..].eq_ignore_ascii_case(function));
@@ -99,7 +99,7 @@ impl<'a> Writer<'a> {
         id
     }
 
-    /// Returns the arguments of an instantiation, unless a check changes them.
+    /// Returns the usual arguments of an instantiation, which a check may change.
     pub fn how(&self) -> Make {
         let stepped = self.trajectory.is_stepped();
         Make {
@@ -163,7 +163,7 @@ impl<'a> Writer<'a> {
                 args.push(Arg::Out(Kind::F64, 1));
                 ("UpdateDiscreteStates", args)
             }
-            // fmi2EventInfo has five flags, padding and the time.
+            // fmi2EventInfo has five flags and padding of 4 bytes each, and a time of 8 bytes: 32 bytes in total.
             false => ("NewDiscreteStates", vec![Arg::Out(Kind::U64, 4)]),
         };
         self.call(instance, name, args)
@@ -226,7 +226,7 @@ impl<'a> Writer<'a> {
         if self.fmi3() { "GetContinuousStateDerivatives" } else { "GetDerivatives" }
     }
 
-    /// Serializes a saved state; returns the numbers of the calls for the size and for the bytes.
+    /// Serializes a saved state in two calls, for the size and for the bytes; returns the step number of each.
     pub fn serialize(&mut self, instance: usize, slot: usize) -> [u32; 2] {
         let bytes = vec![Arg::State(slot), Arg::SavedOut(slot), Arg::SavedSize(slot)];
         [

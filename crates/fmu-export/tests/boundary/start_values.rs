@@ -107,7 +107,7 @@ fn reset_and_restored_states_start_again() {
 }
 
 /// Checks that only rejected start values are recorded. Other rejected calls have no consequences, because importers
-/// probe what an FMU accepts; neither has a value that is rejected during the simulation.
+/// probe what an FMU accepts. A value that is rejected during the simulation has none either.
 #[test]
 fn probing_has_no_consequences() {
     for interface in INTERFACES {
@@ -131,8 +131,8 @@ fn probing_has_no_consequences() {
     }
 }
 
-/// Checks that a calculated start value follows the values on which it depends until the first step, or until the importer
-/// sets the state. It does so even in a restored state.
+/// Checks that a calculated start value follows the values on which it depends until the first step or Continuous-Time
+/// Mode, or until the importer sets the state. It does so even in a restored state.
 fn calculated_start<F: Either>() {
     let [plain, stiffness, level] =
         [meter::Name::plain, meter::Name::stiffness, meter::Name::level].map(|name| name as u32);

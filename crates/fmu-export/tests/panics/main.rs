@@ -1,5 +1,5 @@
-//! Panics of a model, in every method: the importer gets `fmi2Fatal` or `fmi3Fatal` and a message, and neither its
-//! process, nor other instances, nor its memory are affected.
+//! Panics of a model, in every method: the importer gets `fmi2Fatal` or `fmi3Fatal` and a message, and its process and its
+//! other instances continue.
 #![allow(missing_docs)]
 
 #[path = "../models/mod.rs"]
@@ -87,9 +87,9 @@ fn contained<F: Special>() {
     check_that_all_is_over(&fmu);
     let none = || F::make::<Faulty>(&Arguments::new::<Faulty>(CoSimulation)).map(drop);
     let log = without_output(|| while_all_break(Fault::New, none))
-        .expect_err("a panic while an instance is created");
+        .expect_err("the instantiation must fail if the model panics");
     let [message] = log.as_slice() else {
-        panic!("a message about a panic while an instance is made: {log:?}")
+        panic!("expected one message about the panic of an instantiation: {log:?}")
     };
     assert!(message.message.starts_with(&named::<F>("Instantiate")), "{message:?}");
     assert!(message.message.contains("fault _New at 100_s"), "{message:?}");
@@ -125,8 +125,9 @@ fn is_contained<F: Either>((interface, names, fault, call): Case<F>, bystanders:
 }
 
 /// Tests the library that `FMU_LIBRARY` names, which was compiled from the C sources of the model (`make test-source-fmu`).
-/// Cases with the fault `None` are left out, because [`while_all_break`] has no effect in that library. Panics while a model
-/// is dropped or saved end differently there, so the cases with `Drop` and `Memory` are replaced by one case of saving.
+/// Cases with the fault `None` are left out, because [`while_all_break`] has no effect in that library. Saving a state already
+/// visits `memory` there, so one case of saving replaces the cases with `Memory`. Cases with `Drop` are left out, because a
+/// panic there ends the call before its results are written.
 #[test]
 #[ignore = "needs compiled C sources"]
 fn every_panic_of_c_sources_is_contained() {

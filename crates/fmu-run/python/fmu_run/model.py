@@ -98,7 +98,7 @@ class Model:
         max_step: float | None = None,
         events: bool = False,
     ) -> Runs:
-        """Run the FMU once, or as many times as an argument has values for separate runs.
+        """Run the FMU once, or several times if an argument has a separate value for each run.
 
         If the FMU rejects a call or ends a run early, all other runs continue. `Runs.errors` contains the errors, and `Runs.check`
         raises the first one. A run that fails without a message is repeated with logging on after all other runs, only to get the
@@ -117,11 +117,12 @@ class Model:
             {"theta1": (angles, "deg")}. Inputs that are not named keep their start values.
 
             An input may have its own times: {"u": (times, values)}, where the values have the shape (times,) or (runs, times). Between
-            these times, a continuous variable is interpolated linearly, and any other keeps the earlier value. Two equal times are a
-            step. Before the first and after the last time, the value is constant.
+            these times, a continuous variable is interpolated linearly, and any other keeps the earlier value. Two equal times make a
+            jump. Before the first and after the last time, the value is constant.
 
             Strings and bytes are given in the same shapes. For a whole array, the dimensions of the array follow the dimensions above;
-            a constant array has only its own dimensions. In Model Exchange, the value "der(u)" stands for the derivative of the input u.
+            a constant array has only its own dimensions. In Model Exchange, an input can be the derivative of another input,
+            {"omega1": "der(theta1)"}.
         input_derivatives
             First time derivatives of inputs by name, in the same shapes. In Co-Simulation, they are for FMUs of FMI 2.0 that can
             interpolate inputs. In Model Exchange, they are for any continuous input, which is then interpolated by cubics instead of lines.
@@ -146,9 +147,9 @@ class Model:
             Relative tolerance of a solver inside the FMU; also the default of rtol. Default: the tolerance of the default experiment in
             the model description, as in FMPy. With None, the FMU chooses.
         log
-            Receiver of the messages of the FMU, which switches its logging on: a function that is called with the index of the run, the
-            status, the category and the message, or a `logging.Logger`. The index is None if the message cannot be attributed to a run,
-            because the FMU logs from another thread with an unknown environment.
+            Receiver of the FMU's messages: a function that is called with the index of the run, the status, the category and the
+            message, or a `logging.Logger`. With a receiver, the FMU's logging is switched on. The index is None if the run is unknown,
+            because the FMU logs from a thread of its own and passes an unknown environment pointer to the logger.
         interface
             "co-simulation" or "model-exchange". Default: Co-Simulation, or Model Exchange if the FMU has only that. In Model Exchange,
             fmu_run integrates the states from event to event. Continuous inputs are interpolated linearly between their values, even
@@ -162,8 +163,8 @@ class Model:
             Relative and absolute tolerance of the solver in Model Exchange. Default of rtol: `tolerance`, or 1e-6 if there is none.
             Default of atol: a hundredth of rtol. For each state, atol is multiplied by the nominal value.
         max_step
-            Largest step of the solver, s. Choose it so that no event indicator changes its sign twice within one step and between the
-            same two communication points, because such a pair of events is not detected.
+            Largest step of the solver, s. Event indicators are evaluated at the ends of steps and at communication points. Choose
+            `max_step` so that no indicator changes its sign twice between two such times, because these events are not detected.
         events
             Store the outputs before and after each event in `Runs.events`.
 

@@ -49,7 +49,8 @@ class Runs(Mapping[str, _Array]):
 
     runs["roll"] is an array (runs, times), at the stored times, and runs["roll", "peak"] is an array (runs,). A whole array is
     (runs, times, ...), and its measures are (runs, ...). Values at times that a run has not reached are NaN. The measures of a run are
-    NaN if it failed, or if a value is NaN. If the FMU ended a run early, they cover the times until then.
+    NaN if it failed. If a value is NaN, all of them except "end", the last value, are NaN. If the FMU ended a run early, they cover the
+    times until then.
 
     Strings and bytes are arrays of objects. An Int64 or UInt64 variable is an array of integers, or of objects if a run has not reached
     all times. These arrays have None instead of NaN, and no measures.

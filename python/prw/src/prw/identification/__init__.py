@@ -99,8 +99,8 @@ def identify(
     Returns
     -------
     Identification
-        Estimates, their standard errors, and reasons to doubt them. Data that the model does not explain raise no error, nor do
-        undetermined parameters: see `fits`, `misfits` and `undetermined`.
+        Estimates, standard errors, notes and warnings. Data that the model does not explain raise no error, nor do undetermined
+        parameters: see `fits`, `misfits` and `undetermined`.
 
     Raises
     ------

@@ -26,14 +26,14 @@ TOLERANCE = 1.7
 #: Correlation above which two signals are alike, and below which they are unlike.
 ALIKE, UNLIKE = 0.9, 0.7
 #: A channel saturates if at least FLATS sequences of FLAT equal values are at an end of its range. A channel that is constant
-#: for longer than STUCK, s, is stuck.
+#: for longer than STUCK, s, mostly while the motors move, is stuck.
 FLAT, FLATS, STUCK = 4, 3, 0.25
-#: Share of its greatest rate below which a motor is at rest.
+#: The motors are at rest while the rate of the faster one is at most this share of its maximum.
 AT_REST = 1e-3
-#: Number of candidate sets of channels that are fitted.
+#: Number of groups of channels that are fitted for each kind of distortion.
 TRIED = 2
-#: Another fault is named if its gain is at least this share of the best fault's gain: SHARE for an alternative to the
-#: best fault, SECOND for a fault that remains after the best one is included.
+#: Another fault is named if its gain in likelihood exceeds this share of the best fault's: SHARE for an alternative to
+#: the best fault, SECOND for a fault that remains after the best one is included.
 SHARE, SECOND = 0.6, 0.05
 
 
@@ -60,11 +60,11 @@ class _Cause(NamedTuple):
     Attributes
     ----------
     gain
-        Rise of twice the log likelihood if the cause is included.
+        Rise of twice the log likelihood if the cause is included, less 12 for each distorted channel.
     name, message
         Name of the fault and its description.
     explains
-        Whether the data fit if the cause is included.
+        Whether the data fit if the cause is included; False if this was not tested.
     after
         Returns the fit that includes the cause.
     """
@@ -82,7 +82,7 @@ def _causes(solution: Solution, verdict: Verdict) -> list[_Cause]:
     signs = [fault for fault in verdict.faults if fault.clear > CLEAR and fault.signs]
     for fault in sorted(signs, key=lambda fault: -fault.gain)[:1]:
         size = f"{fault.size:.2g} +- {fault.error:.1g} {fault.unit}"
-        message = f"{fault.name} of {size} would explain it: the residual follows the sign of a rate"
+        message = f"{fault.name} of {size} would explain at least a part of the misfit: the residual follows the sign of a rate"
         causes.append(_Cause(fault.gain, fault.name, message, False, partial(_with_fault, solution, fault.name)))
     return sorted(causes, key=lambda cause: -cause.gain)
 
@@ -126,7 +126,7 @@ def _obvious_causes(solution: Solution, i: int, experiment: Experiment) -> Itera
                     return
         for gain, like in zip(gains, likes):
             if like[j, j] < -ALIKE or (like[j, j] < -UNLIKE and abs(np.log(-gain[j])) < np.log(TOLERANCE)):
-                yield f"{name} has the wrong sign: it moves against the FMU's value, {gain[j]:.2g} times as far"
+                yield f"{name} has the wrong sign: it is {gain[j]:.2g} times the FMU's value"
                 break
             slip = _slip(gain[j])
             if slip and like[j, j] > UNLIKE:
@@ -141,7 +141,7 @@ def _slip(gain: float) -> float:
 
 
 def _flat(name: str, time: Array, column: Array, moving: NDArray[np.bool_]) -> Iterator[str]:
-    """Messages if a channel saturates, or is constant while the motors move (n,)."""
+    """Messages if a channel saturates, or is constant while the motors move. time, column, moving: (n,)."""
     there = np.isfinite(column)
     time, column, moving = time[there], column[there], moving[there]
     edges = np.flatnonzero(np.diff(column) != 0)
@@ -166,7 +166,8 @@ def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
     clear = {fault.name: fault.gain for fault in verdict.faults}
 
     def expected_gain(kind: str, group: Sequence[str]) -> float:
-        """The gain expected of a group; a group that explains no more than its parts ranks below them."""
+        """The gain in likelihood expected of a group, less 10 for each channel. So a group ranks below a channel that explains
+        as much alone."""
         like = "gain" if kind == "gain" else "delay"
         parts = sum(clear.get(named(like, (name,)), 0.0) for name in group)
         return max(parts, clear.get(named(like, group), 0.0)) - 10 * len(group)
@@ -191,13 +192,15 @@ def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
             good = judge(found).fits
             then = "with that, the data fit" if good else "that explains a part of the misfit"
             channels = ",".join(distortion.channel for distortion in new)
-            message = f"{_sizes(found, new)}: {then} ({kind} {channels} estimates it, too)"
+            message = (
+                f"{_sizes(found, new)}: {then} (`identify` estimates it, too, with the argument {kind}: {channels})"
+            )
             yield _Cause(gain, kind, message, good, partial(refitted, solution, new))
 
 
 def _sizes(found: Solution, new: tuple[Distortion, ...]) -> str:
-    """The estimates of the last distortions of a fit, `new`, as a string; channels with equal estimates are listed
-    together."""
+    """The estimates of the distortions `new`, the last unknowns of a fit, as a string; channels with equal estimates are
+    listed together."""
     errors = np.sqrt(np.diag(covariance_of(information_of(found.jacobians) + found.task.prior_information())))
     sizes: dict[str, list[str]] = {}
     for distortion, x, error in zip(new, found.logarithms[-len(new) :], errors[-len(new) :]):

@@ -1,4 +1,4 @@
-"""The findings of `prw.identify`: estimates, standard errors and doubts, as numbers and sentences."""
+"""The findings of `prw.identify`: estimates, standard errors, notes and warnings, as numbers and sentences."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from prw.motion import Array
 
 #: If residuals and given noise differ by more than this factor, a note reports it.
 UNLIKE = 1.5
-#: An estimate that is off its prior by this many standard deviations contradicts it.
+#: An estimate that differs from its prior by this many standard deviations contradicts it.
 CONTRADICTION = 3.0
 #: Relative standard error above which a parameter is reported as not determined.
 HOPELESS = 1.0
@@ -39,7 +39,7 @@ class Estimate(NamedTuple):
     unit
         SI unit.
     shown
-        Display unit of the FMU.
+        Display unit of the parameter in the FMU.
     factor
         Factor from the display unit to SI.
     prior
@@ -74,7 +74,7 @@ class ChannelFit(NamedTuple):
     experiment, channel
         Names of both.
     unit
-        SI unit of the channel and of the next numbers.
+        SI unit of the channel, and of `noise`, `residual` and `offset`.
     samples
         Number of values.
     noise
@@ -99,7 +99,8 @@ class ChannelFit(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class Findings:
-    """Estimates and doubts about one FMU. `prw.identification.results.Identification` documents the attributes."""
+    """Estimates of the parameters of one FMU, with notes on how reliable they are.
+    `prw.identification.results.Identification` documents the attributes."""
 
     fmu: Path
     known: Parameters
@@ -124,7 +125,7 @@ class Findings:
 
     @property
     def values(self) -> dict[str, float]:
-        """All Real parameters of the FMU in SI by name, fixed ones included."""
+        """All Real parameters of the FMU by name, in SI, including those that were not estimated."""
         return self.solution.values
 
     @property
@@ -139,7 +140,7 @@ class Findings:
 
     @property
     def fits(self) -> bool:
-        """Whether the model explains the data. If not, they are not the testbed's parameters."""
+        """Whether the model explains the data. If not, the estimates are not the parameters of the testbed."""
         return self.verdict.fits
 
     @property
@@ -159,7 +160,7 @@ class Findings:
         return [str(combination) for combination in self.sure.undetermined]
 
     def residual(self, i: int) -> Array:
-        """Measured minus modelled of experiment i, (n, c), SI, NaN if missing."""
+        """Measured minus modelled values of experiment i, (n, c), SI; NaN where no value was measured."""
         values = self.experiments[i].values
         assert values is not None
         return values - self.solution.modelled[i]
@@ -183,28 +184,30 @@ class Findings:
 
     @property
     def notes(self) -> list[str]:
-        """Notes and doubts for the user, one line each, in SI."""
+        """Notes and warnings for the user, one line each, in SI."""
         return self.notes_in(shown=False)
 
     def notes_in(self, *, shown: bool) -> list[str]:
-        """Notes and doubts for the user, one line each; with `shown` parameters in display units."""
+        """Notes and warnings for the user, one line each. If `shown` is true, parameters are in display units, otherwise in SI."""
         solution, sure = self.solution, self.sure
         lines = [f"{file}: {note}" for file, e in zip(self.files, self.experiments) for note in e.notes]
         for name in solution.task.names:
             low, high = solution.task.bounds[name]
             if min(self.values[name] / low, high / self.values[name]) < 1.001:
-                lines.append(f"{name} ended at its bound; give wider bounds, or doubt the data")
+                lines.append(f"the estimate of {name} is at its bound; give wider bounds, or check the data")
         for point, _ in solution.rivals:
             values = ", ".join(
                 f"{name} {value / factor:.4g} {unit}"
                 for name, value in zip(solution.task.names, np.exp(point))
                 for factor, unit in [self._unit(name, shown)]
             )
-            swapped = " (the couplings exchanged)" if self._exchanged(point) else ""
+            swapped = self._exchanged(point)
             lines.append(
-                f"the data fit as well with {values}{swapped}; the result is the one nearest to the start values. "
-                "theta3 and theta4 would distinguish them"
+                f"other values fit the data equally well: {values}{' (the couplings exchanged)' if swapped else ''}; "
+                "the result is the solution nearest to the start values"
             )
+            if swapped:
+                lines.append("measurements of theta3 and theta4 distinguish solutions with exchanged couplings")
         first = self.verdict.suggested
         if self.fits and first is not None and not sure.undetermined:
             lines.append(
@@ -220,10 +223,12 @@ class Findings:
                 off = abs(np.log(estimate.value / estimate.prior.value)) / estimate.prior.relative
                 if off > CONTRADICTION:
                     lines.append(
-                        f"{name} came out {off:.1f} standard deviations off its prior; data and prior disagree"
+                        f"{name} differs from its prior by {off:.1f} standard deviations; data and prior disagree"
                     )
         if (sure.whiteness > UNLIKE).any() and not sure.undetermined:
-            lines.append("the noise is not white (quantised angles do that); the standard errors take it into account")
+            lines.append(
+                "the noise is not white, for example because angles are quantised; the standard errors take this into account"
+            )
         return list(dict.fromkeys(lines))
 
     def _unit(self, name: str, shown: bool) -> tuple[float, str]:
@@ -241,9 +246,8 @@ class Findings:
         return float(np.sqrt(np.mean(np.concatenate(columns) ** 2)))
 
     def _exchanged(self, point: Array) -> bool:
+        """Whether a solution has the estimated values with the two couplings exchanged."""
         index = {name: i for i, name in enumerate(self.solution.task.names)}
-        return all(
-            abs(point[index[a]] - self.solution.logarithms[index[b]]) < 0.05
-            for a, b in (("k1", "k2"), ("k2", "k1"), ("c1", "c2"), ("c2", "c1"))
-            if a in index and b in index
-        )
+        pairs = [(a, b) for a, b in (("k1", "k2"), ("k2", "k1"), ("c1", "c2"), ("c2", "c1")) if {a, b} <= index.keys()]
+        differences = [abs(point[index[a]] - self.solution.logarithms[index[b]]) for a, b in pairs]
+        return bool(pairs) and bool(max(differences) < 0.05)

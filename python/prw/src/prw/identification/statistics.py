@@ -1,10 +1,10 @@
 """Standard errors of the estimates, and combinations of parameters that the data do not determine.
 
-The covariance of the estimates is H^-1 S H^-1: H is the information of the data, S the variance of the score J'r of
-residuals r. One S assumes white sensor noise and draws the effect of encoders on the score (parametric bootstrap; Efron
-and Tibshirani 1993, Sec. 6.5). The other S is the sum over frequencies of the squares of the actual scores, which holds
-for noise of any colour (White, Econometrica 48 (1980) 817, in the form HC3 of
-MacKinnon and White, J. Econometrics 29 (1985) 305). The larger of the two errors counts.
+The covariance of the estimates is H^-1 S H^-1: H is the information of the data and the priors, and S the variance of
+the score J'r, with residuals r and their Jacobian J. One S assumes white sensor noise, and simulates the effect of
+encoder errors on the score with random draws (parametric bootstrap; Efron and Tibshirani 1993, Sec. 6.5). The other S is
+the sum over frequencies of the squares of the actual scores, which holds for noise of any colour (White, Econometrica 48
+(1980) 817, in the form HC3 of MacKinnon and White, J. Econometrics 29 (1985) 305). The larger of the two errors counts.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def _end(solution: Solution, i: int, step: Array, wanted: float) -> float:
     return float(point[i])
 
 
-#: Larger condition numbers are limited to this; they are rounding errors.
+#: Largest condition number; larger ones would be rounding errors only.
 WORST_CONDITION = 1e15
 #: Largest distance of an interval's end from the estimate, as a logarithm; larger ones overflow.
 WIDEST = 600.0
@@ -64,7 +64,7 @@ WIDEST = 600.0
 LEAST_FREEDOM = 0.1
 #: A combination of parameters that is uncertain by more than this fraction (one sigma) counts as not determined.
 UNDETERMINED = 0.3
-#: Factor of the encoders' contribution that is subtracted from the information.
+#: This multiple of the encoders' contribution is subtracted from the information.
 MARGIN = 3.0
 #: Least share of a parameter that is named in a combination.
 SHARE = 0.15
@@ -90,7 +90,8 @@ class Combination(NamedTuple):
             return f"{next(iter(self.shares))} has hardly any effect on the measurements"
         names = list(self.shares)
         return (
-            f"{', '.join(names[:-1])} and {names[-1]} cannot be distinguished: {moves} together change next to nothing"
+            f"{', '.join(names[:-1])} and {names[-1]} cannot be distinguished: "
+            f"changing them together by {moves} has hardly any effect on the measurements"
         )
 
 
@@ -104,11 +105,11 @@ class Certainty(NamedTuple):
     relative
         (p,), standard errors of their logarithms, which are fractions of the values.
     low, high
-        (p,) each, ends of the 95 % intervals of the parameters, SI.
+        (p,) each, exponentials of the ends of the unknowns' 95 % intervals; for parameters, the ends in SI.
     correlation
         (p, p), correlation of the estimates.
     information
-        (p, p), Fisher information about the logarithms, with the priors and without the encoders' contribution.
+        (p, p), Fisher information about the logarithms, with the priors, minus MARGIN times the encoders' contribution.
     condition
         Condition number of the information, scaled to a unit diagonal.
     whiteness
@@ -130,7 +131,7 @@ class Certainty(NamedTuple):
 
 def certainty(solution: Solution, widening: Array) -> Certainty:
     """Standard errors, correlation, intervals and undetermined combinations of a fit. widening: (p,), standard
-    deviations that possible faults add to the noise."""
+    deviations of the unknowns due to possible faults, which are added to the standard errors in quadrature."""
     names, prior = solution.task.unknowns, solution.task.prior_information()
     squares = prior + information_of(solution.jacobians)
     inverse = covariance_of(_positive(squares - solution.noise_information))
@@ -145,7 +146,7 @@ def certainty(solution: Solution, widening: Array) -> Certainty:
     whiteness = errors / scale
     corrected = noise_corrected(squares, solution.noise_information)
     open_ones = undetermined(names, corrected)
-    # An undetermined combination keeps its full uncertainty.
+    # If a combination is undetermined, the corrected information gives the full uncertainty, and the widening is left out.
     errors = np.hypot(errors, 0.0 if open_ones else widening)
     if open_ones:
         errors = np.maximum(errors, np.sqrt(np.diag(covariance_of(corrected))))
@@ -186,7 +187,7 @@ def scores(comparison: Comparison, jacobian: Array, inverse: Array) -> Array:
 
 
 def noise_corrected(information: Array, noise: Array) -> Array:
-    """Information (p, p) without the encoders' contribution `noise` (p, p) times a margin."""
+    """Information (p, p) minus MARGIN times the encoders' contribution `noise` (p, p), without negative directions."""
     return _positive(information - MARGIN * noise)
 
 
@@ -198,7 +199,8 @@ def _positive(matrix: Array) -> Array:
 
 
 def covariance_of(information: Array) -> Array:
-    """The inverse of an information matrix; directions without any information get a huge variance, not an error."""
+    """The inverse of an information matrix. A direction without any information gets a huge variance; no exception is
+    raised."""
     scale = _scale(information)
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
     values = np.maximum(values, 1 / WORST_CONDITION)
