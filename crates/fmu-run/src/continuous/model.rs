@@ -12,7 +12,7 @@ use std::cell::{RefCell, RefMut};
 
 /// Value that all derivatives get where the FMU cannot evaluate them, so that the solver rejects the step and takes a shorter one.
 const FAR: f64 = 1e60;
-/// Largest magnitude of a state with which the FMU is called. Larger states result from [`FAR`].
+/// Largest magnitude of a state with which the FMU is called. Larger states result from [`FAR`] or from a model that diverges.
 const TOO_FAR: f64 = 1e40;
 /// The run fails at this number of failed evaluations since the last successful step.
 const MOST_MISSES: usize = 1000;
@@ -38,7 +38,7 @@ pub(crate) struct Parts<'a> {
     row: Vec<f64>,
     /// Number of failed evaluations since the last step.
     misses: usize,
-    /// Reason of the last failed evaluation.
+    /// Reason for the last failed evaluation, except evaluations with states beyond [`TOO_FAR`].
     miss: Option<Rejection>,
     /// Error after which the FMU is not called any more.
     fault: Option<Rejection>,
@@ -199,7 +199,7 @@ impl Parts<'_> {
         (self.misses, self.miss) = (0, None);
     }
 
-    /// Returns the reason of the last failed evaluation, if one has failed since the last step.
+    /// Returns the reason for the last failed evaluation since the last step, except evaluations with states beyond [`TOO_FAR`].
     pub fn take_miss(&mut self) -> Option<Rejection> {
         self.miss.take()
     }
@@ -219,15 +219,15 @@ impl Parts<'_> {
         if self.has_failed() {
             return values.fill(0.0);
         }
-        let is_far = x.iter().any(|x| x.is_nan() || x.abs() > TOO_FAR);
-        let result = if is_far { None } else { Some(self.derivatives(time, x, values)) };
+        let far = x.iter().position(|x| x.is_nan() || x.abs() > TOO_FAR);
+        let result = far.map_or_else(|| Ok(self.derivatives(time, x, values)), Err);
         let index = values.iter().position(|value| !value.is_finite());
         let why = match (result, index) {
-            (Some(Ok(())), None) => return,
-            (Some(Ok(())), Some(index)) => missing("the derivative of state", index, values[index], time),
-            (None, _) => missing("the solver's estimate of state", 0, f64::INFINITY, time),
-            (Some(Err(rejection)), _) if rejection.status() == Status::Discard => rejection,
-            (Some(Err(rejection)), _) => {
+            (Ok(Ok(())), None) => return,
+            (Ok(Ok(())), Some(index)) => missing("the derivative of state", index, values[index], time),
+            (Err(index), _) => missing("the solver's estimate of state", index, x[index], time),
+            (Ok(Err(rejection)), _) if rejection.status() == Status::Discard => rejection,
+            (Ok(Err(rejection)), _) => {
                 self.fault = Some(rejection);
                 return values.fill(0.0);
             }
@@ -236,8 +236,8 @@ impl Parts<'_> {
         self.misses += 1;
         if self.retries && self.misses < MOST_MISSES {
             values.fill(FAR);
-            // States that are too far result from an earlier failure, whose reason is kept.
-            if !is_far {
+            // States that are too large usually result from an earlier failure, so the reason for that failure is kept.
+            if far.is_none() {
                 self.miss = Some(why);
             }
         } else {
@@ -278,7 +278,7 @@ impl Parts<'_> {
     }
 }
 
-/// Returns the error for a value that is not finite.
+/// Returns the error for a value that is not finite or is too large.
 fn missing(what: &str, index: usize, value: f64, time: f64) -> Rejection {
     Rejection::without_fmu("Model Exchange", &format!("{what} {} is {value} at t = {time} s", index + 1))
 }

@@ -17,8 +17,8 @@ impl System {
         self.find(name).is_ok_and(|found| found.iter().any(|found| found.variable.is_structural()))
     }
 
-    /// Returns the system with the values of the structural parameters among the start values, and the other start values. The
-    /// arrays of the new system may have other sizes, so its variables may differ. [`run`](Self::run) and
+    /// Takes the structural parameters out of the start values. Returns a system in which they have these values, and the other start
+    /// values. The arrays of the new system may have other sizes, so its variables may differ. [`run`](Self::run) and
     /// [`instances`](Self::instances) call this function.
     ///
     /// # Errors
@@ -57,11 +57,14 @@ impl System {
     }
 }
 
-/// Returns the values. Fails unless there is one value for all runs or instances of each variable.
+/// Returns the values. Fails unless each variable has a single value for all runs or instances.
 fn one_for_all(given: &StartValues) -> Result<Vec<(Target, Value)>, Error> {
     let all = given.values(0).map(|(target, value)| (target, value.clone()));
-    // Structural parameters are always integers (section 2.4.7.4 of FMI 3.0).
-    let numbers = given.numbers(0).map(|(target, number)| (target, Value::Integer(number as i128)));
+    // Only sizes of arrays must be integers (section 2.4.7.2 of FMI 3.0).
+    let numbers = given.numbers(0).map(|(target, number)| {
+        let value = if target.base.is_float() { Value::Real(number) } else { Value::Integer(number as i128) };
+        (target, value)
+    });
     if !given.is_for_all() {
         return request("a structural parameter needs one value for all runs or instances".to_owned());
     }

@@ -58,7 +58,7 @@ enum { MANNERS(ITEM) COUNT };
 static const char *const NAMES[] = {MANNERS(NAME)};
 
 /* Value references in both FMI versions. */
-enum { U = 1, Y, GAIN, TOLERANCE, STOP, LABEL, ECHO, COUNTER, WIDE, WIDE_OUT, BYTES, BYTES_OUT, SIZE, VECTOR, SUM, VALVE, NATURAL };
+enum { U = 1, Y, GAIN, TOLERANCE, STOP, LABEL, ECHO, COUNTER, WIDE, WIDE_OUT, BYTES, BYTES_OUT, SIZE, VECTOR, SUM, VALVE, NATURAL, SCALE };
 
 typedef struct {
     int manner, is_fmi3, logging;
@@ -66,7 +66,7 @@ typedef struct {
     fmi3LogMessageCallback log3;
     void *environment;
     char *name;
-    double u, y, gain, tolerance, stop, time, vector[8];
+    double u, y, gain, tolerance, stop, time, scale, vector[8];
     int32_t counter, valve;
     int64_t wide;
     uint64_t natural, size;
@@ -151,7 +151,7 @@ static void read_resources(Instance *i, const char *location) {
 static void set_defaults(Instance *i) {
     i->u = i->y = 0.0, i->gain = 0.0, i->tolerance = i->stop = 0.0, i->counter = 0, i->valve = 1;
     i->has_tolerance = i->has_stop = 0;
-    i->wide = 0, i->natural = 0, i->size = 3;
+    i->wide = 0, i->natural = 0, i->size = 3, i->scale = 1.0;
     strcpy(i->label, "none");
     memset(i->vector, 0, sizeof i->vector);
     for (int k = 0; k < 3; k++) i->vector[k] = k + 1.0;
@@ -256,6 +256,7 @@ static double *real_of(Instance *i, unsigned vr) {
     case GAIN: return &i->gain;
     case TOLERANCE: return &i->tolerance;
     case STOP: return &i->stop;
+    case SCALE: return &i->scale;
     default: return NULL;
     }
 }
@@ -430,7 +431,8 @@ fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
         if (vr[k] == VECTOR) {
             if ((size_t)(from - value) + i->size > n_value) return fmi3Error;
             memcpy(i->vector, from, i->size * sizeof *from), from += i->size;
-        } else *real_of(i, vr[k]) = *from++;
+        } else if (vr[k] == SCALE && !i->configuring) return fmi3Error;
+        else *real_of(i, vr[k]) = *from++;
     }
     return (size_t)(from - value) == n_value ? (fmi3Status)ok(i) : fmi3Error;
 }
@@ -441,7 +443,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
         double sum = 0.0;
         for (size_t j = 0; j < i->size; j++) sum += i->vector[j];
         if (vr[k] == VECTOR) memcpy(to, i->vector, i->size * sizeof *to), to += i->size;
-        else *to++ = vr[k] == SUM ? sum : vr[k] == Y ? i->y + i->gain : *real_of(i, vr[k]);
+        else *to++ = vr[k] == SUM ? i->scale * sum : vr[k] == Y ? i->y + i->gain : *real_of(i, vr[k]);
     }
     return (size_t)(to - value) == n_value ? (fmi3Status)ok(i) : fmi3Error;
 }

@@ -366,6 +366,10 @@ fn structural_parameters_change_the_sizes_of_arrays() {
         let runs = fmu.run(&batch, &Watch::default()).unwrap();
         assert_eq!((runs.errors.len(), &runs.trajectories[..]), (0, &[sum, size][..]), "{:?}", runs.errors);
     }
+    // A structural parameter that is not the size of an array can have any type (section 2.4.7.2 of FMI 3.0).
+    let start = vec![("size", Start::Same(2.0)), ("scale", Start::Same(2.5))];
+    let batch = Batch { time: &time, start, outputs: vec!["sum"], every: Some(2), ..Batch::default() };
+    assert_eq!(fmu.run(&batch, &Watch::default()).unwrap().trajectories, [7.5]);
     let start = vec![("size", Start::Value(&Value::Integer(4))), ("vector[4]", Start::Same(10.0))];
     let mut one = fmu.instances(&Setup { start, ..Setup::default() }).unwrap();
     let mut sum = [0.0];
