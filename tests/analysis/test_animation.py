@@ -1,4 +1,4 @@
-"""Animations: bodies turn as in eq. (1), and files have the format of their suffix; the film of the README loops."""
+"""Animations: bodies turn as in eq. (1), and files have the format of their suffix; the animation of the README loops."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def corners(at: dict[str, float], colour: str) -> np.ndarray:
 
 def frames_of(path: Path) -> list[np.ndarray]:
     """Returns the frames of a GIF, (height, width, 3) each."""
-    with Image.open(path) as film:
-        return [np.asarray(image.convert("RGB")).astype(int) for image in ImageSequence.Iterator(film)]
+    with Image.open(path) as animation:
+        return [np.asarray(image.convert("RGB")).astype(int) for image in ImageSequence.Iterator(animation)]
 
 
 def test_pitch_swings_ring_and_gripper_from_up_to_the_viewer() -> None:
@@ -75,8 +75,8 @@ def test_carriers_follow_from_pitch_and_roll(fmu: Path) -> None:
 
 def test_gif_has_all_frames_and_ends_at_the_first_position(tmp_path: Path) -> None:
     animate(swing(), tmp_path / "run.gif", speed=1.0)
-    with Image.open(tmp_path / "run.gif") as film:
-        assert film.info["duration"] == 1000 / RATES[".gif"]
+    with Image.open(tmp_path / "run.gif") as animation:
+        assert animation.info["duration"] == 1000 / RATES[".gif"]
     images = frames_of(tmp_path / "run.gif")
     assert len(images) == round(0.5 * RATES[".gif"]) + 1
     height = images[0].shape[0]
@@ -134,8 +134,8 @@ def test_command(prw: Any, tmp_path: Path) -> None:
     assert len(frames_of(tmp_path / "wrist.gif")) > 1
 
 
-def test_film_of_the_readme() -> None:
-    """The film is small, its first and last positions look equal, and the axes do not move."""
+def test_the_animation_of_the_readme() -> None:
+    """The animation is small, its first and last positions look equal, and the axes do not move."""
     path = ROOT / "docs" / "wrist.gif"
     assert path.stat().st_size < 500_000
     images = frames_of(path)

@@ -82,7 +82,7 @@ def test_only_opposite_motors_determine_the_roll_inertia(prw, tmp_path):
     "arguments, message",
     [
         (["--measure", "tau3"], "--measure: tau3 is not known"),
-        (["--angle", "0"], "--angle: 0.0 is not a positive number"),
+        (["--angle", "0"], "--angle: 0.0 is not a finite number above 0"),
         (["--duration", "1"], "--duration 1: it must be 2 s or more"),
         (["--rate", "10"], "--rate 10: the testbed moves at up to 30 Hz"),
     ],

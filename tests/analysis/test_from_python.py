@@ -78,15 +78,15 @@ def test_either_version_of_fmi(recording, fmu, found):
         ({"estimate": ["k9"]}, "estimate: k9 is not known; there are J2, J3, H3, k1"),
         ({"estimate": []}, "estimate: nothing is named"),
         ({"estimate": None}, "estimate: None is neither a name nor a sequence of names"),
-        ({"priors": {"k1": -0.1}}, "priors: k1 -0.1 is not a positive number"),
+        ({"priors": {"k1": -0.1}}, "priors: k1 -0.1 is not a finite number above 0"),
         ({"priors": {"J3": 10}}, "priors: J3 has a standard deviation of 1000%; 100 % is the most"),
-        ({"priors": {"J3": (None, 0.1)}}, "priors: J3 None is not a positive number"),
-        ({"parameters": {"k1": None}}, "parameters: k1 None is not a number of 0 or more"),
+        ({"priors": {"J3": (None, 0.1)}}, "priors: J3 None is not a finite number above 0"),
+        ({"parameters": {"k1": None}}, "parameters: k1 None is not a finite number of at least 0"),
         ({"bounds": {"k1": None}}, "bounds: k1 None; write (least, greatest)"),
-        ({"parameters": {"k1": float("nan")}}, "parameters: k1 nan is not a number of 0 or more"),
+        ({"parameters": {"k1": float("nan")}}, "parameters: k1 nan is not a finite number of at least 0"),
         ({"bounds": {"k1": (5, 2)}}, "bounds: k1 from 5 to 2"),
         ({"noise": {"pitch": 0.1}}, "noise: pitch is not known; there are tau1"),
-        ({"noise": {"tau1": None}}, "noise: tau1 None is not a positive number"),
+        ({"noise": {"tau1": None}}, "noise: tau1 None is not a finite number above 0"),
         (
             {"parameters": {"c3": 0}, "estimate": "c3"},
             "c3 starts at 0, from where it cannot be estimated; pass priors={'c3'",
@@ -142,5 +142,5 @@ def test_columns_in_memory_and_one_name(recording, fmu):
 def test_excite(fmu):
     ranking = prw.excite("tau1", estimate="k1", duration=2, rate=100, fmu=fmu)
     assert 39 < np.rad2deg(max(np.abs(each.motion.theta).max() for each in ranking)) < 40.01
-    with pytest.raises(prw.UserError, match="angle: None is not a positive number"):
+    with pytest.raises(prw.UserError, match="angle: None is not a finite number above 0"):
         prw.excite(angle=None, fmu=fmu)

@@ -166,7 +166,7 @@ def _fixed(simulated) -> list:
     [
         (["--estimate", "M"], "M, N are counted, not estimated"),
         (["--prior", "J3=ten"], "--prior J3=ten: write NAME=10%"),
-        (["--set", "k1=-4"], "--set k1=-4: '-4' is not a number of 0 or more"),
+        (["--set", "k1=-4"], "--set k1=-4: '-4' is not a finite number of at least 0"),
         (["--bounds", "k1=5:2"], "--bounds: k1 from 5 to 2; the first must be below the second"),
         (["--bounds", "k1=1:2"], "k1 starts at 120.894, outside of its bounds 1 to 2"),
         (["--units", "torque=N.m"], "--units: torque is not known"),

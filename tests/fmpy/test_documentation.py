@@ -177,7 +177,7 @@ def test_numbers_are_up_to_date(found):
 
 
 def write(directory: Path, found) -> dict[str, bytes]:
-    """Writes the figures and numbers that `make figures` commits, without the films. Returns their content by name."""
+    """Writes the figures and numbers that `make figures` commits, without the animations. Returns their content by name."""
     (directory / "numbers.json").write_text(numbers(found), encoding="utf-8")
     for name, drawn in figures(found).items():
         if drawn.for_page:

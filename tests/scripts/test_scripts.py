@@ -105,7 +105,7 @@ def test_docs_are_written(tmp_path: Path) -> None:
 
 
 def test_figures_are_written(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Writes the files of `make figures`, but with two figures and short films. An unchanged screencast is not replaced."""
+    """Writes the files of `make figures`, but with two figures and short animations. An unchanged screencast is not replaced."""
     if shutil.which("chromium") is None:
         pytest.skip("chromium is not installed")
     built("prw_controller.fmu")

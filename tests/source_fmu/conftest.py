@@ -1,4 +1,4 @@
-"""Fixtures: the C sources in the source FMU, and the environment of compiled programs. Also the compilers."""
+"""The compilers, and fixtures: the C sources in the source FMU, and the environment of compiled programs."""
 
 from __future__ import annotations
 

@@ -274,7 +274,9 @@ def test_the_tests_of_the_library_pass(sources: Path, tmp_path: Path) -> None:
 
 @pytest.mark.small
 def test_random_sessions(sources: Path, tmp_path: Path) -> None:
-    """Runs fewer sessions than the test above. `--workspace` uses the Rust test that `make test` has compiled."""
+    """Runs fewer sessions than the test above. With `--workspace`, cargo reuses the dependencies that `make test` has compiled; only code
+    that contains the guid is compiled again."""
+    COMPILERS["gcc"].require()
     library = tmp_path / "compiled.so"
     files = [str(sources / name) for name in ("prw_testbed.c", "prw_testbed_fmi2.c")]
     COMPILERS["gcc"].compile(sources, library, "-O0", "-fPIC", "-shared", "-DFMU_MEMORY_PAGES=64", *files, "-lm")

@@ -22,7 +22,7 @@ impl Fingerprint {
         Self::default()
     }
 
-    /// Adds a piece. Lengths are hashed as well, so that different lists of pieces differ.
+    /// Adds a piece. Lengths are hashed as well, so that different lists of pieces have different hashes.
     pub fn add(&mut self, name: &str, content: &[u8]) {
         for bytes in [name.as_bytes(), content] {
             self.0.update((bytes.len() as u64).to_le_bytes());

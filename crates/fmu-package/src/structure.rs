@@ -2,8 +2,8 @@
 //!
 //! The model is evaluated at points near its start values, which are the same in every build. If its equations are `smooth`, an unknown
 //! that does not react to a known at any point does not depend on it, unless its `depends_on` lists the known, and a factor that is the
-//! same at all points is constant. For other models this proves nothing, so an unknown depends on the variables in its `depends_on`, or on every known if it has no
-//! `depends_on`. The evaluations then only find wrong declarations.
+//! same at all points is constant. For other models this proves nothing, so an unknown depends on the variables in its `depends_on`, or
+//! on every known if it has no `depends_on`. The evaluations then only find wrong declarations.
 
 use crate::check::{Starts, check};
 use crate::model::LoadedModel;

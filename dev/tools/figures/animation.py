@@ -54,7 +54,7 @@ def captioned_run(testbed_fmu: Path, controller_fmu: Path) -> tuple[Run, list[tu
         counts = {name: int(testbed.get(name)[0]) for name in ("M", "N")}
     found = np.array(rows)
     time: Array = STEP * np.arange(len(rows), dtype=np.float64)
-    motion = Motion(time, found[:, :2], found[:, 2:4], "film")
+    motion = Motion(time, found[:, :2], found[:, 2:4], "animation")
     return Run(motion, dict(zip(MEASURED, found[:, 4:].T)), counts), captions
 
 

@@ -48,7 +48,7 @@ def record(fmu: Path, path: Path) -> None:
             page_file = Path(archive.extract("documentation/index.html", directory))
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": WINDOW[0], "height": WINDOW[1]})
-        # The page's clock moves only between frames, so that the film is the same on slow machines.
+        # The page's clock moves only between frames, so that the screencast is the same on slow machines.
         page.clock.install(time=0)
         page.goto(f"{page_file.as_uri()}#try&motion=hand")
         page.locator(".live-scene").wait_for()

@@ -185,7 +185,8 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
             read_back(checker, trajectory, before, values.clone(), after)?;
         }
     }
-    // At a communication point, only variables that can be set outside of Event Mode are set.
+    // At a communication point, only inputs and tunable variables are set, most of which can be set outside of Event Mode. A rejected
+    // call is not a finding.
     for index in indices.iter().take(checker.at_most(400)) {
         let of = variable(index);
         let may_change = of.causality == "input" || of.variability == "tunable" && trajectory.is_stepped();

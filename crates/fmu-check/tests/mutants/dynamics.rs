@@ -98,7 +98,8 @@ fn digits_and_partial_derivatives() {
 
 /// Asserts that nothing is found in variants that the standard allows. In FMI 2.0, the FMU converts units, counts how often Event
 /// Mode is entered and has an input that acts from time zero on, and its solver carries the remainder of a step to the next one.
-/// In another variant, the solver's error depends on the steps. In FMI 3.0, it takes one step of Euler's method. All variants have an event indicator that never changes.
+/// In a second variant of FMI 2.0, the error of the solver depends on its steps. In FMI 3.0, the solver takes one step of Euler's
+/// method. All variants have an event indicator that never changes.
 #[test]
 fn sound() {
     for (fmi, variants) in [

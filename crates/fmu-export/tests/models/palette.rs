@@ -72,7 +72,7 @@ variables! { for Palette;
     binary = input(&PICTURE) in binary;
     /// Enumeration
     colour = output(&COLOUR) by |palette| palette.colour.unwrap_or(Colour::Red);
-    /// Its largest value
+    /// Float32 parameter with a maximum
     shade = parameter(&SMALL) in shade;
 }
 

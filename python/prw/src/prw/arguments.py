@@ -33,7 +33,7 @@ def names_of(argument: str, given: str | Iterable[str]) -> tuple[str, ...]:
 
 
 def check_names(argument: str, names: Iterable[str], known: Collection[str], others: str = "") -> None:
-    """Raise UserError for a name that is not among the `known` ones. others: the end of the message."""
+    """Raise UserError for a name that is not among the `known` ones. others: text that the message adds after the known names."""
     for name in names:
         if name not in known:
             raise UserError(f"{name} is not known; there are {', '.join(known)}{others}", argument=argument)
@@ -42,21 +42,21 @@ def check_names(argument: str, names: Iterable[str], known: Collection[str], oth
 def counted(argument: str, value: Any) -> int:
     """The value as an int. Raises UserError unless it is an integer of at least 1."""
     if not isinstance(value, Integral) or value < 1:
-        raise UserError("at least 1 is needed", argument=argument, given=repr(value))
+        raise UserError("must be an integer of at least 1", argument=argument, given=repr(value))
     return int(value)
 
 
 def positive(argument: str, value: Any, name: str = "") -> float:
     """The value as a float. Raises UserError unless it is finite and above 0. name: the parameter or channel that has the value."""
     if not isinstance(value, Real) or not 0 < float(value) < math.inf:
-        raise UserError(f"{name} {value!r} is not a positive number".lstrip(), argument=argument)
+        raise UserError(f"{name} {value!r} is not a finite number above 0".lstrip(), argument=argument)
     return float(value)
 
 
 def not_negative(argument: str, value: Any, name: str = "") -> float:
     """The value as a float. Raises UserError unless it is finite and 0 or above. name: the parameter that has the value."""
     if not isinstance(value, Real) or not 0 <= float(value) < math.inf:
-        raise UserError(f"{name} {value!r} is not a number of 0 or more".lstrip(), argument=argument)
+        raise UserError(f"{name} {value!r} is not a finite number of at least 0".lstrip(), argument=argument)
     return float(value)
 
 

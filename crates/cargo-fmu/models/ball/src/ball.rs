@@ -31,9 +31,9 @@ variables! { for Ball, memory in apex;
     der_height as "der(height)" = local(&VELOCITY).derivative_of(height) by |ball| ball.velocity;
     /// Rate of the velocity
     der_velocity as "der(velocity)" = local(&RATE).derivative_of(velocity) by |ball| -ball.gravity;
-    /// Acceleration by gravity
+    /// Gravitational acceleration
     gravity = parameter(&ACCELERATION) in gravity;
-    /// Ratio of the velocities after and before a bounce
+    /// Ratio of the speeds after and before a bounce
     restitution = parameter(&RATIO) in restitution;
     /// Number of bounces
     bounces = output(&COUNT).exact() in bounces;
@@ -83,7 +83,7 @@ impl CoSimulation for Ball {
     /// A step ends at the last bounce.
     const ENDS_EARLY: bool = true;
 
-    /// Flights are parabolas, so a step goes exactly from bounce to bounce.
+    /// Each flight is a parabola, so the times of the bounces within a step are calculated exactly.
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         const MOST: usize = 10_000;
         let mut left = step.size;

@@ -131,7 +131,7 @@ def number(string: str) -> float:
     """A positive number. Raises ValueError."""
     value = finite(string)
     if not value > 0:
-        raise ValueError(f"{string!r} is not a positive number")
+        raise ValueError(f"{string!r} is not a finite number above 0")
     return value
 
 
@@ -139,7 +139,7 @@ def not_negative(string: str) -> float:
     """A number that is 0 or above. Raises ValueError."""
     value = finite(string)
     if not value >= 0:
-        raise ValueError(f"{string!r} is not a number of 0 or more")
+        raise ValueError(f"{string!r} is not a finite number of at least 0")
     return value
 
 
