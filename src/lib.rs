@@ -1,8 +1,8 @@
 //! The McGill pitch-roll wrist testbed: its equations, their exact solution from one communication point to
 //! the next, and the FMU made from them.
 //!
-//! Two motors turn by theta1 and theta2. Each motor drives one input shaft of the spherical epicyclic cam
-//! train (SECT; theta5, theta6). Between motor and input shaft are a torque sensor and two flexible
+//! Two motors turn by theta1 and theta2. Each motor drives one of the two input shafts (theta5, theta6) of the
+//! spherical epicyclic cam train (SECT). Between motor and input shaft are a torque sensor and two flexible
 //! couplings. A massless shaft (theta3, theta4) connects the two couplings. The output shaft of the SECT
 //! pitches (theta7) and rolls (theta8).
 //!
@@ -19,10 +19,10 @@
 //!    outputs include the sensor torques, eqs. (9) and (10). The transfer matrices are G(s), eqs. (12) and (13),
 //!    and H(s), eqs. (14) and (15).
 //! 4. [`motor`]: the motion of a motor between samples of its angle.
-//! 5. [`decoupled`]: the same equations for pitch and roll, the mean and the half difference of the two
-//!    sides. Pitch and roll do not influence each other; a [`pair`] stores both.
+//! 5. [`decoupled`]: the same equations, split into pitch (the mean of the two sides) and roll (half their
+//!    difference). Pitch and roll do not influence each other; a [`pair`] stores both.
 //! 6. [`propagator`]: the exact solution over one step during which the motor angles change linearly; its
-//!    matrices are computed with the scaling of [`balance`] and the numbers of [`number`].
+//!    matrices are computed with the scaling of [`balance`] and the number types of [`number`].
 //! 7. [`testbed`]: motors and state, advanced from one communication point to the next.
 //! 8. [`instant`]: torques, rates and accelerations at one instant, and their derivatives with respect to the
 //!    parameters.
@@ -69,8 +69,8 @@ pub use parameters::Parameters;
 pub use prw_parameters as parameters;
 pub use testbed::Testbed;
 
-/// The built-in parameters: Table 1, or the file that replaced it when the library was built. The build script
-/// reads Table 1 from `modelDescription/parameters.json`.
+/// The built-in parameters: Table 1, or the file that the environment variable `PRW_PARAMETERS` named when the library
+/// was built. The build script reads Table 1 from `modelDescription/parameters.json`.
 pub const BUILT_IN: Parameters = include!(concat!(env!("OUT_DIR"), "/table_1.rs"));
 
 fmu_export::export_fmu!(

@@ -206,7 +206,7 @@ def test_no_fmu(tmp_path: Path) -> None:
 
 def test_an_fmu_in_place_of_the_parameters(testbed: Path) -> None:
     with pytest.raises(
-        prw.UserError, match="parameters: .* is not a JSON file with values by name; an FMU is named by `fmu`"
+        prw.UserError, match="parameters: .* is not a JSON file with values by name; if it is an FMU, pass it as `fmu`"
     ):
         prw.linearize(testbed)
 

@@ -21,14 +21,14 @@ use std::path::{Path, PathBuf};
 ///
 /// A saved state is a clone of the model. Instances and saved states can move between threads.
 ///
-/// # Calls of the importer and calls of the model
+/// # Calls of the importer and their effect on the model
 ///
 /// | call of the importer | effect on the model |
 /// |---|---|
 /// | instantiate, reset | [`new`](Self::new) |
-/// | set inputs, states, start values of outputs | sets the field and runs the `then` of the table; before the first step, also calls [`calculate_start`](Self::calculate_start) |
+/// | set inputs, states, start values of outputs | sets the field and runs the `then` of the table; until the first step or Continuous-Time Mode, also calls [`calculate_start`](Self::calculate_start) |
 /// | set parameters | as above, then [`update`](Self::update) once; an error undoes the change |
-/// | enter initialization | [`initialize`](Self::initialize), undone after an error. If any start value was rejected and not set again, this is an error and nothing is called |
+/// | enter initialization | [`initialize`](Self::initialize), undone after an error. If a start value was rejected and not set again, the importer gets an error and the model is not called |
 /// | get | [`calculate`](Self::calculate), if a value, the state or the time has changed since its last call; then the `by` of the table |
 /// | step | [`CoSimulation::step_fast`](crate::CoSimulation::step_fast), then [`step_any_size`](crate::CoSimulation::step_any_size) and [`step`](crate::CoSimulation::step), until one of them makes the step; an error undoes it |
 /// | event | [`ModelExchange::event`](crate::ModelExchange::event); an error undoes it |
@@ -72,9 +72,9 @@ pub trait Model: Variables + Clone + Send + Sync {
     }
 
     /// Calculates the states whose start value is [`calculated`](crate::Variable::calculated). This crate calls it
-    /// whenever a value is set, until the first step or Continuous-Time Mode. The importer may have set the states
-    /// itself by then. A de-serialized state may come from a later time, but this crate then also calls the function
-    /// until the next step. In both cases the states must not change, so the model must remember whether they are
+    /// whenever a value is set, until the first step or Continuous-Time Mode. The importer may already have
+    /// set the states itself. A de-serialized state may have been saved after the first step; this crate then calls the
+    /// function again until the next step. In both cases the states must not change, so the model must remember whether they are
     /// still to be calculated.
     #[inline]
     fn calculate_start(&mut self) {}
@@ -129,11 +129,11 @@ impl Setup {
         resources(self.resource_location.as_deref()?, cfg!(windows))
     }
 
-    /// Returns the path of a file in the directory `resources`. In the package, the file is in
-    /// `modelDescription/resources`.
+    /// Returns the path of a file in the directory `resources`. In the Cargo package of the
+    /// model, the file is in `modelDescription/resources`.
     ///
     /// # Errors
-    /// Fails if there is no such directory, or if the name is not a plain file name.
+    /// Fails if [`resources`](Self::resources) returns `None`, or if the name is not a plain file name.
     pub fn resource(&self, name: &str) -> Result<PathBuf, Error> {
         if name.contains(['/', '\\', ':']) || name.starts_with('.') {
             return Err(Error::new(format!(
@@ -142,8 +142,8 @@ impl Setup {
         }
         let directory = self.resources().ok_or_else(|| {
             Error::new(format!(
-                "there is no directory with {name:?}: a package needs modelDescription/resources, a test \
-                 Simulation::with_resources, and an importer passes the location of the resources"
+                "there is no directory with {name:?}: the package must have modelDescription/resources, a test must call \
+                 Simulation::with_resources, and the importer must pass the location of the resources"
             ))
         })?;
         Ok(directory.join(name))

@@ -1,4 +1,5 @@
-//! Checks start values, values that are read after they were set, value ranges, and that constants and inputs keep their values.
+//! Checks start values and value ranges, that getters return the values that were set, and that constants and inputs keep their
+//! values.
 
 use crate::call_sequence::{Run, Values};
 use crate::checker::Checker;
@@ -121,8 +122,8 @@ fn values(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Checks that constants and parameters do not change while time advances. Other fixed variables are checked only if the model
-/// has no tunable variables and no fixed inputs, on which they may depend.
+/// Checks that constants and parameters do not change while time advances. Other fixed variables may depend on tunable variables
+/// and on fixed inputs (which FMI forbids), so they are checked only if there are none.
 fn constants(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let variables = &checker.description.variables;
     let tunable = variables.iter().any(|other| {
@@ -160,7 +161,7 @@ pub fn settable(checker: &Checker) -> Vec<usize> {
 }
 
 /// Checks that getters return the values that were set in Initialization Mode, before it, and at a communication point. Also
-/// checks that the time of setting does not matter, and that inputs keep their values.
+/// checks that values have the same effect whether they are set before or in Initialization Mode, and that inputs keep their values.
 pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let variable = |index: &usize| &description.variables[*index];
@@ -218,7 +219,7 @@ fn same_effect(checker: &Checker, trajectory: &Trajectory, values: &[(usize, Val
     })
 }
 
-/// Returns the criterion that `reads` have the values that were set, if the calls `ids` succeeded. `has` is the verb of the message.
+/// Returns a criterion: if the calls `ids` succeeded, the getters `reads` must return `values`. `has` is the verb of the message.
 pub fn values_are_kept(
     checker: &Checker,
     ids: Vec<u32>,

@@ -20,7 +20,7 @@ pub fn end(result: Result<(), String>) -> ! {
         }
     };
     #[cfg(unix)]
-    // SAFETY: writes the buffers of the C library, and ends the process.
+    // SAFETY: a null stream is allowed and stands for all streams; `_exit` takes only a number.
     unsafe {
         libc::fflush(std::ptr::null_mut());
         libc::_exit(status)
@@ -53,8 +53,8 @@ pub fn work(job: Job, file: File) {
     executor.write(&Last { bytes: std::mem::take(&mut locked(&executor.bytes)) });
 }
 
-/// In the working directory, makes a link with this name to the directory of the FMU; returns the setting with the paths through
-/// the link.
+/// On Unix, creates a symbolic link with this name in the working directory, which leads to the directory of the FMU. Returns the
+/// setting with all paths changed to lead through this link.
 fn elsewhere(setting: &Setting, name: &str) -> Setting {
     let directory = setting.resources.parent().unwrap_or(&setting.resources);
     let there = std::env::current_dir().unwrap_or_default().join(name);
@@ -71,14 +71,14 @@ fn elsewhere(setting: &Setting, name: &str) -> Setting {
     }
 }
 
-/// Limits the size of files of this process on Unix. On Linux also limits its memory, and ends it together with its parent
-/// process.
+/// Limits the size of files of this process on Unix. On Linux, also limits its memory and makes the kernel end it
+/// when its parent process ends.
 pub fn limit(memory: u64) {
     #[cfg(unix)]
     {
         let set = |what, value| {
             let limit = libc::rlimit { rlim_cur: value, rlim_max: value };
-            // SAFETY: sets a limit of this process.
+            // SAFETY: `limit` is alive during the call, which only reads it.
             unsafe { libc::setrlimit(what, &limit) };
         };
         set(libc::RLIMIT_CORE, 0);
@@ -86,7 +86,7 @@ pub fn limit(memory: u64) {
         #[cfg(target_os = "linux")]
         {
             set(libc::RLIMIT_AS, memory as _);
-            // SAFETY: this process is killed when its parent process ends.
+            // The kernel kills this process when its parent process ends. SAFETY: the call takes only numbers.
             unsafe { libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) };
         }
     }

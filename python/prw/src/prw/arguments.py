@@ -94,7 +94,8 @@ def columns_of(table: Any) -> dict[str, Any]:
 
 
 def numbers_of(where: str, values: Any) -> NDArray[np.float64]:
-    """The values as a column (n,) of floats. Raises a UserError whose message begins with `where`."""
+    """The values as a column (n,) of floats. Raises UserError, with a message that begins with `where`, if they
+    are not numbers or not one column."""
     array = np.asarray(values)
     if array.dtype.kind in "mM":
         raise UserError(f"{where}: has dates or durations; write seconds as numbers")
@@ -120,7 +121,8 @@ def values_of(given: Given, loaded: fmu_run.Fmu) -> dict[str, Any]:
         return {name: in_own_unit(name, value, loaded) for name, value in given.items()}
     if not is_path(given):
         raise UserError(
-            f"{given!r} is neither a mapping from names to values nor a JSON file with one", argument="parameters"
+            f"{given!r} is neither a mapping from names to values nor the path of a JSON file with such a mapping",
+            argument="parameters",
         )
     path = Path(given)
     try:
@@ -131,14 +133,14 @@ def values_of(given: Given, loaded: fmu_run.Fmu) -> dict[str, Any]:
         raise UserError(f"{path} cannot be read ({error.strerror or error})", argument="parameters") from None
     except (ValueError, AttributeError, RecursionError):
         raise UserError(
-            f"{path} is not a JSON file with values by name; an FMU is named by `fmu`", argument="parameters"
+            f"{path} is not a JSON file with values by name; if it is an FMU, pass it as `fmu`", argument="parameters"
         ) from None
     return {name: _value(path, name, entry, loaded) for name, entry in entries.items()}
 
 
 def in_own_unit(name: str, value: Any, loaded: fmu_run.Fmu) -> Any:
-    """(value, unit) in the unit of the FMU's variable; a value without a unit is returned unchanged. Raises UserError
-    for a unit that cannot be converted."""
+    """The value of a pair (value, unit), converted to the unit of the FMU's variable. Any other value, and the value of an unknown
+    variable, is returned unchanged. Raises UserError for a unit that cannot be converted."""
     if not (isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], str)) or name not in loaded.variables:
         return value
     try:
