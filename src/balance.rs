@@ -13,7 +13,7 @@ pub struct Balance {
     /// Velocity unit, rad/s.
     pub(crate) scale: f64,
     /// Base-2 logarithm of the factor by which a step of 1 s must be divided so that the norm of `A h` is 1/4. The
-    /// product of the factor itself and a long step would overflow for stiff systems.
+    /// logarithm is stored because, for stiff systems, the product of the factor and a long step would overflow.
     halvings: f64,
 }
 
@@ -29,8 +29,8 @@ impl Balance {
         Self { scale, halvings: (norm / 0.25).log2() }
     }
 
-    /// Returns the number of times that a step is halved before the series is evaluated. The result is then doubled as many
-    /// times. `log2_of_h` is the base-2 logarithm of the step size in s.
+    /// Returns the number of times that a step is halved before the series is evaluated. After the evaluation, the same
+    /// number of doublings extends the result to the full step. `log2_of_h` is the base-2 logarithm of the step size in s.
     pub(crate) fn doublings(&self, log2_of_h: f64) -> i32 {
         (self.halvings + log2_of_h).ceil().clamp(0.0, 2100.0) as i32
     }

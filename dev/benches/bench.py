@@ -151,7 +151,7 @@ def steps(guid: str, sources: Path | None) -> None:
     }
     if sources:
         rows["step of the C sources / step of the library"] = least["sources"] / one
-    table("others", ("other ratios", "ratio"), *rows.items())
+    table("others", ("other numbers", "value"), *rows.items())
 
 
 class Case:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 
-#: The packages whose libraries go into FMUs, and their modelIdentifiers.
+#: The packages whose libraries go into FMUs. The name of a package is also the modelIdentifier of its FMU.
 MODEL = "prw_testbed"
 CONTROLLER = "prw_controller"
 MODELS = (MODEL, CONTROLLER)
@@ -68,8 +68,8 @@ DIRECTORIES = {
     "aarch64-darwin": (MAC_ARM,),
 }
 
-#: With FMI 2.0, importers on ARM Linux also look in linux64. An FMU for Intel and ARM has the Intel library there, so the
-#: library for ARM needs a separate FMU.
+#: With FMI 2.0, some importers on ARM Linux look in linux64, where the FMU for Intel and ARM has the Intel library. For
+#: them, a separate FMU has the ARM library in linux64.
 ARM_DIRECTORIES = {"linux64": (LINUX_ARM,)}
 
 #: FMI 3.0 has a directory for each target.

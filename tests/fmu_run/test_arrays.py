@@ -268,7 +268,7 @@ def test_whole_arrays_of_inputs_for_each_run(rods) -> None:
             (
                 {},
                 {"limits": np.eye(3)},
-                r"limits has the shape \(3, 3\); it must be \(2, 2\), \(n, 2, 2\) with an array for each",
+                r"limits has the shape \(3, 3\); it must be \(2, 2\), \(n, 2, 2\) with an array for each run or instance,",
             ),
             ({}, {"limits": [1.0, 2.0]}, r"limits has the shape \(2,\)"),
             ({}, {"limits": np.ones((3, 2, 2)), "capacities": np.ones((2, 8))}, "is given for 3 runs, .* for 2"),

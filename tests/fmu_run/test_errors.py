@@ -38,7 +38,8 @@ def fmu(testbed):
         ({"inputs": {"roll": TIME}}, "roll is not an input but a continuous output"),
         (
             {"start": {"k1": [[1.0]]}},
-            "the start value of k1 has the shape (1, 1); it must be one number for all, or (n,) with one value for each",
+            "the start value of k1 has the shape (1, 1); it must be one number for all runs or instances, or (n,) with one number "
+            "for each",
         ),
         ({"start": {"k1": "stiff"}}, 'k1 is a number, its start value cannot be "stiff"'),
         ({"start": {"M": 2.5}}, "M is an integer from -2147483648 to 2147483647 and cannot be 2.5"),

@@ -166,7 +166,7 @@ def test_units_of_the_header_and_of_the_option(file: Any) -> None:
     assert read(path)["pitch"][1] == 6 and read(path, degrees=True)["pitch"][1] == pytest.approx(np.deg2rad(6))
     for unit, factor in {"N.m": 1, "Nm": 1, "N·m": 1, "mN.m": 1e-3, "N cm": 1e-2}.items():
         assert read(path, units={"tau1": unit})["tau1"][1] == pytest.approx(factor)
-    with pytest.raises(UserError, match="column theta1: in deg by its header, but in rad by the units given"):
+    with pytest.raises(UserError, match="column theta1: the header has the unit deg, but `units` has rad"):
         read(path, units={"theta1": "rad"})
 
 

@@ -34,7 +34,7 @@ pub struct Options {
     /// Step size, s [default: from the model's default experiment]
     #[arg(long, value_name = "S")]
     step: Option<f64>,
-    /// Variables to show, with commas between the names [default: all outputs except bytes]
+    /// Variables to show, separated by commas [default: all outputs except bytes]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     show: Vec<String>,
     /// Simulate the FMU for FMI 2.0 or for FMI 3.0 [default: 2, if FMI 2.0 has all types of the model]

@@ -6,11 +6,11 @@ use std::path::PathBuf;
 /// Options of a check, which are also the options of the command line.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Options {
-    /// Checks only these topics, with commas between: description, package, functions, start_values, life_cycle,
+    /// Checks only these topics, separated by commas: description, package, functions, start_values, life_cycle,
     /// states, derivatives, dependencies, dynamics, results, reset, rejections, logs, resources, malformed.
     #[arg(long, value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(rules::TOPICS))]
     pub only: Vec<String>,
-    /// Does not fail if these topics or interfaces (co-simulation, model-exchange, scheduled-execution; with commas between) are
+    /// Does not fail if these topics or interfaces (co-simulation, model-exchange, scheduled-execution; separated by commas) are
     /// not checked.
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(
         rules::TOPICS.iter().chain(&INTERFACES)))]
@@ -31,17 +31,19 @@ pub struct Options {
     /// Seed of the random call sequences.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Checks in at most 30 seconds, without malformed calls and resources, and with fewer values and call sequences.
+    /// Checks in at most 30 seconds, without the topics malformed and resources, and with fewer values and call sequences.
     #[arg(long, conflicts_with = "time")]
     pub quick: bool,
-    /// Accepts the findings in this file, which has a line for each: NAME: REASON.
+    /// Accepts the findings, and the unchecked topics and interfaces, in this file. A line is NAME: REASON, or
+    /// NAME "PART OF THE OBSERVATION": REASON.
     #[arg(long, value_name = "FILE")]
     pub baseline: Option<PathBuf>,
     /// Prints a rule, its severity and its section of the standard; `all` prints all rules.
     #[arg(long, value_name = "RULE")]
     pub explain: Option<String>,
-    /// Writes report.html, report.json, junit.xml, report.sarif and a program in C for each finding to this directory.
-    #[arg(long, value_name = "FOLDER")]
+    /// Writes report.html, report.json, junit.xml, report.sarif and, for each finding that calls reproduce, a C program to this
+    /// directory.
+    #[arg(long, value_name = "DIRECTORY")]
     pub out: Option<PathBuf>,
     /// Prints the report as JSON.
     #[arg(long)]
@@ -49,13 +51,14 @@ pub struct Options {
     /// Fails for findings of this severity and worse.
     #[arg(long, value_enum, default_value_t = FailOn::Violation)]
     pub fail_on: FailOn,
-    /// Maximum duration in seconds of the repetitions that detect leaks.
+    /// Seconds after which the repetitions that detect leaks end; if there are then too few for an evaluation, they may take four
+    /// times as long.
     #[arg(long, default_value_t = 1.5)]
     pub repeat: f64,
     /// Does not shorten call sequences.
     #[arg(long)]
     pub no_shrink: bool,
-    /// Runs an FMU that starts another program, which must be installed.
+    /// Also checks interface types that start another program (needsExecutionTool); that program must be installed.
     #[arg(long)]
     pub execution_tool: bool,
 }

@@ -8,8 +8,8 @@ const LONGEST: usize = 1000;
 /// Error of a whole call. The error of a single run is [part of the results](crate::Runs::errors).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Error {
-    /// A file is not an FMU, an FMU cannot be run on this machine, all instances fail, an FMU rejects a serialized state, or no
-    /// threads can be created.
+    /// A file is not an FMU or SSP file that can be run on this machine, or an FMU does not support what is requested, such as the
+    /// interface type. Also if all instances fail, an FMU rejects a serialized state, or no threads can be created.
     Fmu(String),
     /// The request does not fit the FMU, or is inconsistent.
     Request(String),
@@ -23,7 +23,8 @@ impl Error {
     /// Returns the error for a batch whose results do not fit in memory.
     pub fn too_much() -> Self {
         Self::Memory(
-            "the trajectories need more memory than there is; request measures, keep fewer times (every), or split the runs"
+            "the trajectories need more memory than there is; return only measures, store fewer sample times (increase `every`), or \
+            split the runs"
                 .to_owned(),
         )
     }
@@ -38,7 +39,8 @@ impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Fmu(message) | Self::Request(message) | Self::Memory(message) => {
-                // Messages contain names from the FMU, which may be long, or contain control characters that would act on a terminal.
+                // Messages contain names from the FMU, which may be long or contain control characters that a terminal would
+                // interpret.
                 f.write_str(&fmi_abi::shown_to(message, LONGEST))
             }
             Self::Cancelled => f.write_str("cancelled"),

@@ -167,7 +167,7 @@ impl Selection {
         Ok(())
     }
 
-    /// Fails if an integer of 64 bits is so large that it may have been rounded.
+    /// Fails if a 64-bit integer is so large that it may have been rounded.
     fn check_rounding(&self, indices: &[usize], values: &[f64]) -> Result<(), Rejection> {
         /// Integers below this magnitude are exact in `f64`.
         const EXACT: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;

@@ -19,7 +19,7 @@ pub enum Start<'a> {
     Text(&'a str),
     /// A string for each run or instance.
     EachText(&'a [String]),
-    /// One exact value for all runs or instances. It can have any type, for example bytes or an integer of 64 bits.
+    /// One exact value for all runs or instances. It can have any type, for example bytes or a 64-bit integer.
     Value(&'a Value),
     /// An exact value for each run or instance.
     EachValue(&'a [Value]),
@@ -37,11 +37,11 @@ impl Start<'_> {
     }
 }
 
-/// Checked start values. Each variable has one value for all runs or instances, or one for each.
+/// Checked start values. Each variable has one value for all runs or instances, or a value for each run or instance.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct StartValues<'a> {
     numbers: Vec<(Target, Cow<'a, [f64]>)>,
-    /// Values that `f64` cannot represent: strings, bytes, integers of 64 bits.
+    /// Values that `f64` cannot represent: strings, bytes, 64-bit integers.
     values: Vec<(Target, Vec<Value>)>,
 }
 
@@ -94,7 +94,7 @@ impl<'a> StartValues<'a> {
         self.numbers.iter().map(|(index, _)| *index).chain(values)
     }
 
-    /// Returns the strings, bytes and integers of 64 bits of a run or an instance, by its index.
+    /// Returns the strings, bytes and 64-bit integers of a run or an instance, by its index.
     pub fn values(&self, of: usize) -> impl Iterator<Item = (Target, &Value)> {
         self.values.iter().filter_map(move |(index, values)| Some((*index, one(values, of)?)))
     }
@@ -164,7 +164,7 @@ pub(crate) fn exact(found: Found, name: &str, value: Value) -> Result<Value, Err
             if number.fract() == 0.0 && number.abs() > EXACT =>
         {
             return request(format!(
-                "{name} is an integer of 64 bits, and the floating-point number {number} may not be the one that is meant; give an \
+                "{name} is a 64-bit integer, and the floating-point number {number} may not be the one that is meant; give an \
                 integer"
             ));
         }

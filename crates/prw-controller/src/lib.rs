@@ -1,9 +1,9 @@
 //! A controller for the pitch-roll wrist testbed, and the FMU made from it.
 //!
-//! [`Controller`] moves the two motors of the testbed so that the wrist reaches a reference pitch and roll. The
-//! inverse of eq. (1) gives the feed-forward, which a PI controller corrects from measured pitch and roll. Measured rates
-//! damp vibration. Rate, acceleration and torque of the motors are limited. The table of [`variables`] and `fmu.rs`
-//! define the FMU; the other modules do not depend on FMI.
+//! [`Controller`] moves the two motors of the testbed so that the wrist reaches a reference pitch and roll. A PI
+//! controller corrects the reference with measured pitch and roll. The inverse of eq. (1) of the testbed's paper then
+//! gives the motor angles. Feedback of the measured rates damps vibration. Rate, acceleration and torque of the motors
+//! are limited. The table of [`variables`] and `fmu.rs` define the FMU; the other modules do not depend on FMI.
 //!
 //! ```
 //! use prw_controller::controller::Inputs;

@@ -3,7 +3,7 @@
  *   bench LIBRARY GUID WAY STEPS THREADS            seconds per step; with 0 threads also the outputs of every step
  *   bench LIBRARY GUID RUNS SAMPLES STEP INPUTS OUTPUTS INSTANCES
  * The last form times RUNS runs of INSTANCES instances with the inputs in stdin, SAMPLES rows of doubles. It stores all
- * outputs, and prints those of the last instance in the last run. INPUTS and OUTPUTS are value references with commas. */
+ * outputs, and prints those of the last instance in the last run. INPUTS and OUTPUTS are value references, separated by commas. */
 #define _GNU_SOURCE
 #include <malloc.h>
 #include <math.h>

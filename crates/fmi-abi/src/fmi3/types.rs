@@ -14,25 +14,25 @@ pub type fmi3InstanceEnvironment = *mut c_void;
 pub type fmi3FMUState = *mut c_void;
 /// Value reference of a variable.
 pub type fmi3ValueReference = u32;
-/// A floating-point value of 32 bits.
+/// A 32-bit floating-point value.
 pub type fmi3Float32 = f32;
-/// A floating-point value of 64 bits.
+/// A 64-bit floating-point value.
 pub type fmi3Float64 = f64;
-/// A signed integer of 8 bits.
+/// A signed 8-bit integer.
 pub type fmi3Int8 = i8;
-/// An unsigned integer of 8 bits.
+/// An unsigned 8-bit integer.
 pub type fmi3UInt8 = u8;
-/// A signed integer of 16 bits.
+/// A signed 16-bit integer.
 pub type fmi3Int16 = i16;
-/// An unsigned integer of 16 bits.
+/// An unsigned 16-bit integer.
 pub type fmi3UInt16 = u16;
-/// A signed integer of 32 bits.
+/// A signed 32-bit integer.
 pub type fmi3Int32 = i32;
-/// An unsigned integer of 32 bits.
+/// An unsigned 32-bit integer.
 pub type fmi3UInt32 = u32;
-/// A signed integer of 64 bits.
+/// A signed 64-bit integer.
 pub type fmi3Int64 = i64;
-/// An unsigned integer of 64 bits.
+/// An unsigned 64-bit integer.
 pub type fmi3UInt64 = u64;
 /// A Boolean: `bool` in C. The type is a byte, because a C caller can pass values other than 0 and 1.
 pub type fmi3Boolean = u8;

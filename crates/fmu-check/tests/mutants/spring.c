@@ -1,5 +1,5 @@
 /* A mass on a spring that touches a second spring at x = CONTACT, and a clock that counts periods, as an FMU of FMI 2.0 or, with
-   -DFMI=3, of FMI 3.0. It is correct, unless the environment variable SPRING_FAULTS lists faults, with commas between them. The faults
+   -DFMI=3, of FMI 3.0. It is correct, unless the environment variable SPRING_FAULTS lists faults, separated by commas. The faults
    concern the behaviour in time, so the FMU has few functions. The variants "harmless_..." are correct, but do what a careless check
    would report. */
 #include <math.h>

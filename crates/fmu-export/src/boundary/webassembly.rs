@@ -40,8 +40,9 @@ pub(super) fn keep_panics() {
     std::panic::set_hook(Box::new(keep));
 }
 
-/// Returns whether blocks of memory with these sizes can be allocated at the same time, and another one for messages.
-/// The blocks are separate because memory is fragmented: after a state was freed, another one must fit in its place.
+/// Returns whether blocks of these sizes and another block for messages can be allocated at the same time. They are
+/// allocated separately, because free memory may be fragmented: a new state must fit in the gaps that a freed state has
+/// left.
 pub(super) fn has_memory<const N: usize>(sizes: [usize; N]) -> bool {
     const MESSAGES: usize = 4096;
     let allocate = |size| {

@@ -75,7 +75,7 @@ fn contained<F: Special>() {
     assert!(message.starts_with(&named::<F>("EnterContinuousTimeMode")), "{message}");
     check_that_all_is_over(&fmu);
 
-    // A panic while an instance or one of its states is dropped does not reach the caller.
+    // Freeing an instance succeeds even if the model panics while the instance or one of its remaining states is dropped.
     let fmu = F::new::<Faulty>(CoSimulation);
     fmu.ok(set_fault(&fmu, Fault::Drop));
     (0..3).for_each(|_| _ = fmu.save());
@@ -125,9 +125,10 @@ fn is_contained<F: Either>((interface, names, fault, call): Case<F>, bystanders:
 }
 
 /// Tests the library that `FMU_LIBRARY` names, which was compiled from the C sources of the model (`make test-source-fmu`).
-/// Cases with the fault `None` are left out, because [`while_all_break`] has no effect in that library. Saving a state already
-/// visits `memory` there, so one case of saving replaces the cases with `Memory`. Cases with `Drop` are left out, because a
-/// panic there ends the call before its results are written.
+/// Cases with the fault `None` are left out: they call [`while_all_break`], which has no effect in that library. There,
+/// `GetFMUstate` already visits the field `memory` and panics, so one case of it replaces the cases with the fault `Memory`.
+/// Cases with the fault `Drop` are left out: in that library, a panic ends `FreeFMUstate` before it sets the importer's
+/// pointer to NULL.
 #[test]
 #[ignore = "needs compiled C sources"]
 fn every_panic_of_c_sources_is_contained() {

@@ -14,9 +14,9 @@ Measure = Literal["min", "max", "peak", "time_of_peak", "mean", "rms", "end"]
 Interface = Literal["co-simulation", "model-exchange", "co_simulation", "model_exchange"]
 #: Method for integrating an FMU in Model Exchange, as described in `Fmu.run`.
 Solver = Literal["auto", "dopri5", "dop853", "bdf", "rk4"]
-#: A start value: one for all runs or instances, or one for each. A string is the value of a String variable, the name of an item of an
-#: enumeration, or "true" or "false" for a Boolean. In a pair (values, unit), the values are converted from this unit, which must be the
-#: unit or a display unit of the variable.
+#: A start value: one for all runs or instances, or one for each run or instance. A string is the value of a String variable, the name
+#: of an item of an enumeration, or "true" or "false" for a Boolean. In a pair (values, unit), the values are converted from this unit,
+#: which must be the unit or a display unit of the variable.
 Start = ArrayLike | str | Sequence[str] | tuple[ArrayLike, str]
 #: Values of an input: one for all times or one for each communication point, as values or (values, unit); at other times, (times, values)
 #: or (times, values, unit).

@@ -1,4 +1,4 @@
-//! Values that float64 cannot represent: strings, bytes and integers of 64 bits.
+//! Values that float64 cannot represent: strings, bytes and 64-bit integers.
 
 use crate::arguments::wrong;
 use crate::buffers::shape;

@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 /// instances. Arrays passed as `out` are written in place.
 ///
 /// If a call fails for an instance, the instance drops out and all others continue. `errors` contains the reason, and values read
-/// from this instance are NaN, or None for strings, bytes and single integers of 64 bits. `reset` and `restore` make it usable
+/// from this instance are NaN, or None for strings, bytes and single 64-bit integers. `reset` and `restore` make it usable
 /// again. If the last instance drops out, the call raises FmuError with the reason, and so do later calls until an instance is
 /// usable again.
 #[pyclass(frozen, module = "fmu_run")]

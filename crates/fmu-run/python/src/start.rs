@@ -8,12 +8,12 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 
-/// Start values by name. A variable has one number, string, bytes or integer of 64 bits, or one for each run or instance; a whole
-/// array has one for all elements, an array, or an array for each run or instance.
+/// Start values by name. A variable has a number, a string, bytes or a 64-bit integer, or a sequence of them, one for each run or
+/// instance. A whole array has one value for all elements, an array, or an array for each run or instance.
 #[derive(Default)]
 pub struct Start {
     values: Vec<(String, Value)>,
-    /// The values as the caller gave them, converted to the units of the variables. They are returned as `Runs.start`.
+    /// The values as Python objects, in the units of the variables. They are returned as `Runs.start`.
     given: Vec<(String, Py<PyAny>)>,
 }
 
@@ -23,7 +23,7 @@ enum Value {
     Each(Vec<f64>),
     Text(String),
     Texts(Vec<String>),
-    /// Strings, bytes or integers of 64 bits: one for all runs or instances, or one for each.
+    /// Strings, bytes or 64-bit integers: one for all runs or instances, or one for each.
     Exact(Exact),
 }
 
@@ -37,8 +37,8 @@ impl Start {
         Ok(start)
     }
 
-    /// Sets the structural parameters among the start values. Returns the new system and the other start values, in whose `names`
-    /// and `dict` the structural parameters also occur.
+    /// Sets the structural parameters among the start values. Returns the new system and its start values. Their `names` and `dict`
+    /// include the structural parameters, but their `values` do not.
     pub fn configured(system: &System, given: Option<&Bound<'_, PyAny>>) -> PyResult<(System, Self)> {
         let (mut structural, mut others) = (Self::default(), Vec::new());
         for (name, value) in items("start", given)? {
@@ -91,7 +91,8 @@ impl Start {
         Ok(dict)
     }
 
-    /// Adds the elements of an array. The value is one for all elements, an array for all runs or instances, or an array for each.
+    /// Adds the elements of an array. The start value is a single value for all elements, an array for all runs or instances, or an
+    /// array for each run or instance.
     fn add_array(
         &mut self,
         system: &System,
@@ -141,7 +142,8 @@ fn check_shape(name: &str, given: &[usize], array: &Elements) -> PyResult<bool> 
     }
     let own = array.sizes.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
     Err(PyValueError::new_err(format!(
-        "the start value of {name} has the shape {}; it must be {}, (n, {own}) with an array for each, or one value for all elements",
+        "the start value of {name} has the shape {}; it must be {}, (n, {own}) with an array for each run or instance, or one value \
+        for all elements",
         shape(given),
         shape(&array.sizes)
     )))
@@ -176,7 +178,8 @@ impl Value {
         match numbers.shape() {
             [] | [_] => Ok(Self::Numbers(numbers)),
             given => Err(PyValueError::new_err(format!(
-                "the start value of {name} has the shape {}; it must be one number for all, or (n,) with one value for each",
+                "the start value of {name} has the shape {}; it must be one number for all runs or instances, or (n,) with one number \
+                for each",
                 shape(given)
             ))),
         }

@@ -1,4 +1,4 @@
-//! Inputs whose values `f64` cannot represent: strings, bytes, integers of 64 bits.
+//! Inputs whose values `f64` cannot represent: strings, bytes, 64-bit integers.
 
 use super::Trajectory;
 use super::resampling::Resampling;

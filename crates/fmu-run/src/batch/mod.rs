@@ -45,7 +45,7 @@ pub struct Batch<'a> {
     pub input_derivatives: Vec<(&'a str, Trajectory<'a>)>,
     /// Start values of parameters, states, inputs and so on.
     pub start: Vec<(&'a str, Start<'a>)>,
-    /// Variables to read. Strings, bytes and integers of 64 bits are returned in [`Runs::exact`], all others in
+    /// Variables to read. Strings, bytes and 64-bit integers are returned in [`Runs::exact`], all others in
     /// [`Runs::trajectories`], each in this order.
     pub outputs: Vec<&'a str>,
     /// Stores the outputs at every `every`-th time, beginning with the first; `None` stores no trajectories.
@@ -156,7 +156,7 @@ pub struct Runs {
     /// Statistics, with the indices run, output and statistic, of which the last varies fastest. They are NaN for a failed run. If
     /// the FMU ended a run early, they cover the times until then.
     pub measures: Vec<f64>,
-    /// Values of outputs that are strings, bytes or integers of 64 bits, with the indices run, output and time, of which the last
+    /// Values of outputs that are strings, bytes or 64-bit integers, with the indices run, output and time, of which the last
     /// varies fastest. They are `None` at times that a run has not reached.
     pub exact: Vec<Option<Value>>,
     /// Runs that did not reach the last time, because a call failed or the FMU ended the simulation. Each has the index of the run,

@@ -1,4 +1,4 @@
-//! Values that `f64` cannot represent: strings, bytes and integers of 64 bits.
+//! Values that `f64` cannot represent: strings, bytes and 64-bit integers.
 
 use super::{Instances, Mask};
 use crate::error::{Error, request};
@@ -21,7 +21,7 @@ impl Instances {
         Ok(values)
     }
 
-    /// Sets a variable that is a string, bytes or an integer of 64 bits. There is one value for all instances, or a value for each.
+    /// Sets a variable that is a string, bytes or a 64-bit integer. There is one value for all instances, or a value for each.
     ///
     /// # Errors
     /// Returns [`Error::Request`] if the variable is unknown, read-only or of another type, or if a value does not fit its type.

@@ -41,8 +41,8 @@ class Channel(NamedTuple):
     quantity
         A key of UNITS.
     noise
-        Standard deviation in SI that is assumed before anything is measured: 0.1 % of a torque sensor of 20 N.m, and 0.06 deg
-        and 0.6 deg/s of an encoder or inertial sensor.
+        Standard deviation in SI that is assumed before anything is measured: 0.1 % of the range of a 20 N.m torque
+        sensor; 0.06 deg and 0.6 deg/s for an encoder or inertial sensor.
     """
 
     quantity: str
@@ -104,7 +104,7 @@ class Columns(NamedTuple):
     units
         Unit by name.
     notes
-        Lines for the user.
+        Notes for the user, for example on ignored columns.
     """
 
     taken: list[tuple[str, int]]
@@ -178,7 +178,7 @@ def column(title: str) -> tuple[str, str]:
 
 def _unit(name: str, in_header: str, given: str, degrees: bool) -> str:
     if in_header and given and factor(name, in_header) != factor(name, given):
-        raise UserError(f"in {in_header} by its header, but in {given} by the units given")
+        raise UserError(f"the header has the unit {in_header}, but `units` has {given}")
     default = si_unit(name)
     if degrees and QUANTITIES[name] in ("angle", "rate"):
         default = default.replace("rad", "deg")

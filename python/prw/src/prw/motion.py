@@ -32,7 +32,7 @@ class Motion:
     name
         Name for files and titles.
     notes
-        Lines for the user.
+        Notes for the user, for example on probable mistakes in the recording.
 
     Raises
     ------

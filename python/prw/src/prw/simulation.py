@@ -21,7 +21,7 @@ from prw.testbed import OUTPUTS, Testbed
 
 #: Sampling error, as a fraction of the peak, above which there is a warning.
 DOUBTFUL = 0.01
-#: The sampling error is estimated if a second run, with every other time, has at least this number of times.
+#: The sampling error is estimated only if a second run, with every second sample, has at least this number of samples.
 MIN_TIMES = 8
 #: Peak below which an output is a rounding error.
 ROUNDING = 1e-12
@@ -41,10 +41,11 @@ class Run(Mapping[str, Array]):
     motion
         The motion of the motors.
     parameters
-        The value of every parameter of the FMU in this run, in SI.
+        The value of every parameter of the FMU in this run, except strings and `use_omega`, in SI.
     sampling_errors
         The largest error of each output that is caused by the sampling of the motors, as a fraction of the output's
-        peak. The errors are estimated by a second run, with every other time; empty if that run would be too short.
+        peak. They are estimated by a second run with every second sample. The mapping is empty if that run would be too
+        short.
     """
 
     def __init__(
@@ -59,7 +60,7 @@ class Run(Mapping[str, Array]):
 
     @property
     def notes(self) -> list[str]:
-        """Lines for the user."""
+        """Notes for the user, for example on probable mistakes in the recording, and on a large sampling error."""
         return [*self.motion.notes, *([self.doubt] if self.doubt else [])]
 
     @property
@@ -70,20 +71,20 @@ class Run(Mapping[str, Array]):
             return ""
         rate = (len(self.time) - 1) / float(self.time[-1] - self.time[0])
         needed = _rounded_up(rate * float(np.sqrt(error / DOUBTFUL)))
-        rates = "; give the motors' rates omega1 and omega2, too" if self.motion.omega is None else ""
+        rates = "; also give the motors' rates omega1 and omega2" if self.motion.omega is None else ""
         return (
-            f"{worst} may be off by {error:.1%} of its peak, because the motors are sampled with "
-            f"{float(f'{rate:.3g}'):.10g} Hz: with some {needed:.10g} Hz it would be {DOUBTFUL:.0%}{rates}"
+            f"{worst} may be off by {error:.1%} of its peak, because the motors are sampled at "
+            f"{float(f'{rate:.3g}'):.10g} Hz; at about {needed:.10g} Hz, the error would be {DOUBTFUL:.0%}{rates}"
         )
 
     @property
     def time(self) -> Array:
-        """(n,) s."""
+        """Times of the samples, (n,), in s."""
         return self.motion.time
 
     def __getitem__(self, output: str) -> Array:
         if output not in self._outputs:
-            raise KeyError(f"{output}: was not asked for; there are {', '.join(self)}, and `outputs=` chooses others")
+            raise KeyError(f"{output} is not in this run, which has {', '.join(self)}; request it with `outputs=`")
         return self._outputs[output]
 
     def __iter__(self) -> Iterator[str]:
@@ -111,7 +112,8 @@ class Run(Mapping[str, Array]):
         return pandas.DataFrame(columns, index=pandas.Index(columns.pop("time"), name="time"))
 
     def plot(self, title: str | None = None, *, angles: bool = True) -> Figure:
-        """Motors, pitch and roll, and torques over time, if the run has them; save it with `.savefig(path)`.
+        """A figure of the motors, pitch and roll, and the torques over time, if the run has them. Save the figure with
+        `.savefig(path)`.
 
         angles: show the angles of motors and wrist, in degrees. If false, the wrist's angles are left out, and the motors'
         rates, if they are known, replace their angles, as in Fig. 4. Raises UserError without matplotlib.
@@ -156,7 +158,7 @@ def simulate(
         Values of parameters by name, in SI or with a unit as in (1.9, "N.m/deg"), or the path of a JSON file that `prw
         identify` has written. Other parameters keep the FMU's start values.
     fmu
-        The testbed FMU, of FMI 2.0 or 3.0 (default: the one inside this package, see `default_fmu`).
+        The testbed FMU, of FMI 2.0 or 3.0. Default: see `default_fmu`.
     outputs
         Names of any Real variables.
 
@@ -195,7 +197,8 @@ def simulate(
 
 def _sampling_error(fine: Array, coarse: Array) -> float:
     """The error of the output `fine` (n,) as a fraction of its peak. `coarse` is the same output of a run with every
-    other time, in which the error is four times as large, because errors are second order in the step size."""
+    second sample. Errors are second order in the step size, so its error is four times as large, and the difference is
+    three times the error of `fine`."""
     peak = float(np.abs(fine).max())
     return float(np.abs(coarse - fine[::2]).max()) / 3 / peak if peak > ROUNDING else 0.0
 

@@ -21,7 +21,7 @@ variables! { for Lag;
 impl Model for Lag {
     const INFO: Info = Info {
         description: "First-order lag with time constant 1 s",
-        // There are no branches and limits, so the build finds dependencies by changing one variable at a time.
+        // There are no branches or limits, so the build finds dependencies by changing one variable at a time.
         smooth: true,
         ..info!("Lag", "lag")
     };

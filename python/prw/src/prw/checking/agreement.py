@@ -77,7 +77,7 @@ class Agreement:
     found, expected
         (n,) by output, the result and the reference, SI.
     notes
-        Lines for the user.
+        Notes for the user, for example on missing outputs.
     """
 
     source: Path

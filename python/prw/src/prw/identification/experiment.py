@@ -80,7 +80,7 @@ class Experiment:
     paths
         Paths of the two motors through the recorded samples, or None if the experiment is planned.
     notes
-        Lines for the user.
+        Notes for the user, for example on channels that never change.
     jumps
         (n, 2) rad, if the FMU simulated the recording, else None: the difference of each angle from its extrapolation
         with the rate, which makes the FMU's states jump at the start of the next step.
