@@ -92,8 +92,8 @@ def test_either_version_of_fmi(recording, fmu, found):
             "c3 starts at 0, from where it cannot be estimated; pass priors={'c3'",
         ),
         ({"parameters": {"c3": 0}, "priors": {"c3": 0.1}}, "priors: c3 starts at 0; write (value, fraction)"),
-        ({"starts": 0}, "starts 0: at least 1"),
-        ({"starts": None}, "starts None: at least 1"),
+        ({"starts": 0}, "starts 0: must be an integer of at least 1"),
+        ({"starts": None}, "starts None: must be an integer of at least 1"),
         ({"fmu": "none.fmu"}, "none.fmu: no such FMU"),
     ],
 )

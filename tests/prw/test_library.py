@@ -257,9 +257,10 @@ def test_wrong_sweeps(testbed: Path) -> None:
         ({"random": {"k1": -0.1}}, "random: k1 -0.1 is not a finite number above 0"),
         ({"random": {"k1": None}}, "random: k1 None is not a finite number above 0"),
         ({"random": {"k1": 10}}, "random: k1 has a standard deviation of 1000%; 100 % is the most"),
-        ({"random": {"k1": 0.1}, "runs": 0}, "runs 0: at least 1"),
-        ({"random": {"k1": 0.1}, "runs": None}, "runs None: at least 1"),
-        ({"random": {"k1": 0.1}, "threads": 0}, "threads 0: at least 1"),
+        ({"random": {"k1": 0.1}, "runs": 0}, "runs 0: must be an integer of at least 1"),
+        ({"random": {"k1": 0.1}, "runs": None}, "runs None: must be an integer of at least 1"),
+        ({"random": {"k1": 0.1}, "runs": 2.5}, "runs 2.5: must be an integer of at least 1"),
+        ({"random": {"k1": 0.1}, "threads": 0}, "threads 0: must be an integer of at least 1"),
         ({"grid": {"k1": np.ones(4000), "k2": np.ones(4000)}}, "16000000 runs are more than"),
     ]:
         with pytest.raises(prw.UserError, match=message):

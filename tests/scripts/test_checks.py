@@ -13,7 +13,7 @@ from tools import changed, release_check
 #: Targets that check nothing, or whose checks another target contains.
 NO_PARTS = {
     "help", "demo", "demo-fmu", "check", "check-release", "fmu", "closed-loop", "release", "source-fmu", "study", "examples", "clean",
-    "test-rust", "test-python", "test-fmu", "test-closed-loop", "test-importers", "test-examples", "reference",
+    "test-rust", "check-windows", "test-python", "test-fmu", "test-closed-loop", "test-importers", "test-examples", "reference",
 }  # fmt: skip
 
 
