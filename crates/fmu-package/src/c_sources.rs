@@ -26,7 +26,7 @@ const FMI2: &str = include_str!("c/fmi2.c");
 const UNUSED: &str = "#ifdef __GNUC__\n#pragma GCC diagnostic ignored \"-Wunused-parameter\"\n\
                       #pragma GCC diagnostic ignored \"-Wunused-const-variable\"\n#endif\n";
 
-/// The files in the FMU's directory `sources`: names and contents. The first [`COMPILED`] files are to be compiled.
+/// The files in the FMU's directory `sources`: names and contents. The first `COMPILED` files are to be compiled.
 pub type CSources = Vec<(String, Vec<u8>)>;
 
 /// Number of files to compile.
