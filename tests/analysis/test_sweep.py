@@ -56,7 +56,7 @@ def test_dask_cluster(prw, tmp_path):
         (["--grid", "k1=1:2"], "--grid k1=1:2: write NAME=LOW:HIGH:N"),
         (["--grid", "k9=1:2:3"], "--grid: k9 is not known"),
         (["--random", "k1=5"], "--random k1=5: write NAME=10%"),
-        (["--random", "k1=5%", "--runs", "0"], "--runs 0: at least 1"),
+        (["--random", "k1=5%", "--runs", "0"], "--runs 0: must be an integer of at least 1"),
         (["--random", "k1=5%", "--input", "none.csv"], "none.csv: cannot be read"),
     ],
 )

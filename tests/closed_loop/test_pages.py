@@ -156,7 +156,7 @@ def test_it_is_reproducible_and_reports_errors(closed_loop, tmp_path):
     for wrong, message in [
         ({"--testbed": fmus["--controller"]}, "testbed.pitch is input, not output"),
         ({"--controller": "none.fmu"}, "none.fmu is not a usable FMU: it cannot be read"),
-        ({"--step-size": 0}, "--step-size must be > 0"),
+        ({"--step-size": 0}, "--step-size must be finite and > 0"),
     ]:
         run = build(wrong, tmp_path / "no")
         assert run.returncode == 1 and message in run.stderr and run.stderr.count("\n") == 1, run.stderr

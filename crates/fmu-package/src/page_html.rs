@@ -110,9 +110,9 @@ impl Resources {
 /// Returns the script that runs the first FMU. It also contains the other FMUs, which the model's own `scripts` run.
 fn script(runnables: &[Runnable], resources: &Resources, scripts: &[&str]) -> Result<String> {
     let mut text = "(() => {\n\"use strict\";\n".to_owned();
-    for script in SCRIPTS.iter().chain(scripts) {
-        text += script;
-    }
+    // The scripts of a model stay unchanged, because a string of several lines may contain what looks like a comment.
+    SCRIPTS.iter().for_each(|script| text += &without_comments(script));
+    scripts.iter().for_each(|script| text += script);
     text += "live([\n";
     for Runnable { description, module } in runnables {
         let description = base64(&deflated(description.as_bytes())?);
@@ -122,6 +122,19 @@ fn script(runnables: &[Runnable], resources: &Resources, scripts: &[&str]) -> Re
     writeln!(text, "], ...{resources}).catch(showFailure);\n}})();")?;
     // Browsers do not normalize the line ends of a script that another script adds.
     Ok(text.replace("\r\n", "\n"))
+}
+
+/// Removes the comments that are lines of their own, a tenth of the size of the script in the page.
+fn without_comments(script: &str) -> String {
+    let mut in_comment = false;
+    let is_code = |line: &&str| {
+        let line = line.trim();
+        let starts = line.starts_with("/**");
+        let is_comment = in_comment || starts || line.starts_with("//");
+        in_comment = (in_comment || starts) && !line.ends_with("*/");
+        !is_comment
+    };
+    script.split_inclusive('\n').filter(is_code).collect()
 }
 
 /// Adds a script to the page, in compressed form.
@@ -236,6 +249,17 @@ mod tests {
         let page = with_script("<body><p>text</p></body></html>", &script).unwrap();
         assert!(page.contains(&format!("<body>{SPACE}<p>text</p><style>")));
         assert!(page.ends_with(".catch(showFailure);\n</script>\n</body></html>"));
+    }
+
+    #[test]
+    fn comments_on_lines_of_their_own_are_removed() {
+        let script = "/** A\n * b. */\nconst a = /** @type {A} */ (1); // c\n  // d\n/** E. */\n  b();\n";
+        assert_eq!(without_comments(script), "const a = /** @type {A} */ (1); // c\n  b();\n");
+        for script in SCRIPTS {
+            // Code after the end of a comment would be lost.
+            let ends = script.lines().filter(|line| line.trim().starts_with("/**")).map(str::trim);
+            assert!(ends.filter(|line| line.contains("*/")).all(|line| line.ends_with("*/")));
+        }
     }
 
     #[test]
