@@ -18,14 +18,9 @@ pub(super) struct Handles<V> {
 #[derive(Debug)]
 struct Slot<V> {
     generation: usize,
-    content: Content<V>,
-}
-
-#[derive(Debug)]
-enum Content<V> {
-    Value(V),
-    /// No object; the next empty slot.
-    Empty(Option<u32>),
+    value: Option<V>,
+    /// The next empty slot, if this one is empty.
+    next_empty: Option<u32>,
 }
 
 /// Number of bits of a handle that contain the index. The other bits contain the generation.
@@ -56,10 +51,7 @@ impl<V> Handles<V> {
     }
 
     pub fn get_mut(&mut self, handle: usize) -> Option<&mut V> {
-        match &mut self.slot(handle)?.1.content {
-            Content::Value(value) => Some(value),
-            Content::Empty(_) => None,
-        }
+        self.slot(handle)?.1.value.as_mut()
     }
 
     /// Inserts an object and returns its handle; `None` if there are more objects than a handle has indices, or too little
@@ -70,16 +62,15 @@ impl<V> Handles<V> {
             Some(index) => index as usize,
             None if self.slots.len() <= INDEX_MASK => {
                 self.slots.try_reserve(1).ok()?;
-                self.slots.push(Slot { generation: 0, content: Content::Empty(None) });
+                self.slots.push(Slot { generation: 0, value: None, next_empty: None });
                 self.slots.len() - 1
             }
             None => return None,
         };
         let secret = self.secret();
         let slot = &mut self.slots[index];
-        if let Content::Empty(next) = std::mem::replace(&mut slot.content, Content::Value(value)) {
-            self.empty = next;
-        }
+        slot.value = Some(value);
+        self.empty = slot.next_empty;
         let handle = |generation: usize| (generation << INDEX_BITS | index) ^ secret;
         if handle(slot.generation) == NULL {
             slot.generation = next(slot.generation);
@@ -88,24 +79,21 @@ impl<V> Handles<V> {
     }
 
     pub fn remove(&mut self, handle: usize) -> Option<V> {
-        self.get_mut(handle)?;
-        let empty = self.empty;
+        let next_empty = self.empty;
         let (index, slot) = self.slot(handle)?;
+        let value = slot.value.take()?;
         slot.generation = next(slot.generation);
-        let removed = std::mem::replace(&mut slot.content, Content::Empty(empty));
+        slot.next_empty = next_empty;
         self.empty = Some(index);
-        match removed {
-            Content::Value(value) => Some(value),
-            Content::Empty(_) => None,
-        }
+        Some(value)
     }
 
     /// Removes any object and returns it, to empty the collection. No handle may be used afterwards.
     pub fn pop(&mut self) -> Option<V> {
         while let Some(slot) = self.slots.pop() {
             self.empty = None;
-            if let Content::Value(value) = slot.content {
-                return Some(value);
+            if slot.value.is_some() {
+                return slot.value;
             }
         }
         None
