@@ -91,7 +91,7 @@ fn changes(mut pending: Vec<PathBuf>) -> BTreeMap<PathBuf, Option<SystemTime>> {
     found
 }
 
-/// Checks FMUs with fmu-check: the given ones or, if none are given, those of the project, which are built first. Returns false if the
+/// Checks FMUs with fmu-check: the given FMUs or, if none are given, the FMUs of the project, which are built first. Returns false if the
 /// build or a check fails.
 pub fn check(package: &Package, given: &[PathBuf], options: &fmu_check::Options) -> Result<bool> {
     let mut fmus = given.to_vec();

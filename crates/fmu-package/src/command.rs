@@ -281,7 +281,7 @@ impl Builder {
         vec![Standard::Fmi3]
     }
 
-    /// Returns the libraries to pack: those of `--binary`, and one compiled for each target. If there are neither, compiles one for
+    /// Returns the libraries to pack: the libraries of `--binary`, and one compiled for each target. If there are neither, compiles one for
     /// this machine, unless only a description or C sources are requested.
     fn libraries(&self, options: &BuildOptions, guid: &str) -> Result<Vec<Library>> {
         let mut libraries = Vec::new();

@@ -165,7 +165,8 @@ impl Check<'_> {
     fn values(&self, base: &mut Base, value: f64) -> Option<Vec<f64>> {
         let is_time = self.known == self.model.table.time();
         if is_time && base.point.interface == Interface::CoSimulation {
-            // No function of Co-Simulation sets the time, so it is varied in Model Exchange if the FMU offers that.
+            // An importer can set the time only in Model Exchange, so the derivative is tested there if the FMU supports it.
+            // Otherwise, another instance starts at the other time.
             if self.model.table.model_exchange.is_some() {
                 return None;
             }

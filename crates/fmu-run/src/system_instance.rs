@@ -364,8 +364,8 @@ impl SystemInstance {
         self.each(|_, instance| instance.forget(saved))
     }
 
-    /// Serializes a saved state. For a single FMU, returns the bytes of the FMU. For a system, returns the length and the bytes of
-    /// each component, followed by the outputs of the last step.
+    /// Serializes a saved state. A single FMU returns the bytes. For a system, the bytes of each component follow their length, which
+    /// the FMU chooses; at the end are the outputs of the last step, because the next step sets the inputs to them.
     pub fn serialize(&mut self, saved: Saved) -> Result<Vec<u8>, Rejection> {
         let saved = self.own(saved)?;
         if self.system.sole().is_some() {

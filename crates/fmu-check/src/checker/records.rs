@@ -13,8 +13,9 @@ pub struct Unchecked {
     pub allowed: bool,
 }
 
-/// Records a finding. Of several findings with the same name, the most severe is kept, and of equally severe ones the one with
-/// the shortest call sequence. The field `more` of the kept finding lists the other observations.
+/// Adds a finding to the list, which has one finding for each name, because one fault is often found by many call sequences. The most
+/// severe finding stays, and of equally severe ones the one with the shortest call sequence, which is the easiest to understand. Its
+/// field `more` lists what the others observed.
 pub fn record(found: &mut Vec<Finding>, mut finding: Finding) {
     let Some(kept) = found.iter_mut().find(|kept| kept.name == finding.name) else {
         found.push(finding);

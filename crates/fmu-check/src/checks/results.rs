@@ -226,8 +226,9 @@ pub fn cut(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     })
 }
 
-/// Describes values of a variable that are not similar. `values` has the values after 8, 4, 16 and, if the step size is free, 24 steps to
-/// the same time.
+/// Describes how far the values of a variable at one time differ if that time is reached in different numbers of steps; `None` if they
+/// are similar. `values` contains the values after 8, 4 and 16 steps and, unless there is a `fixedInternalStepSize`,
+/// after 24.
 fn different_in_steps(description: &Description, index: usize, values: &[Vec<f64>]) -> Option<String> {
     let variable = &description.variables[index];
     let name = &variable.name;

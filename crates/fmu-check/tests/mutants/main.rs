@@ -27,7 +27,7 @@ fn caught(
     let directory = TempDir::new().expect("a directory");
     let path = fmu(directory.path(), fmi, &library(fmi, macro_name), change);
     let out = directory.path().join("out");
-    // A hang takes as long as the limit, so the limit is short.
+    // A hanging call sequence always runs until the limit, so a short limit saves time.
     let limit = if name.ends_with("hang") { "0.3" } else { "2" };
     // Repetitions end after 0.3 s, or after four times as long if they are fewer than the 50 that an evaluation needs.
     let options = ["--only", topic, "--no-shrink", "--limit", limit, "--repeat", "0.3"];

@@ -132,7 +132,7 @@ fn standard_of_fmi2(function: &str, interface: Interface, mode: Mode) -> bool {
     }
 }
 
-/// Functions that are allowed in all states below: those of the super state FMU State Settable, section 2.3.1 of FMI 3.0.
+/// Functions that are allowed in all states below: the functions of the super state FMU State Settable, section 2.3.1 of FMI 3.0.
 const EVERYWHERE: &str = "SetDebugLogging Reset GetFMUState SetFMUState FreeFMUState SerializedFMUStateSize \
     SerializeFMUState DeserializeFMUState";
 
