@@ -3,9 +3,12 @@ and uneven steps. If the angles are sines, the error of every output is of secon
 
 from __future__ import annotations
 
+import re
+
 import mpmath
 import numpy as np
 import pytest
+from built import ROOT
 from fmpy import simulate_fmu
 from instance import assert_close
 from lagrange import OUTPUTS, REAL, linear_model, table_1, varied
@@ -175,3 +178,17 @@ def test_second_order_with_true_rates(make_instance, model, spacing):
     coarse, fine = with_rates(200), with_rates(400)
     orders = {name: float(np.log2(coarse[name] / fine[name])) for name in OUTPUTS}
     assert min(orders.values()) >= 1.9, orders
+
+
+def test_sines_in_steps_of_1_ms_are_as_accurate_as_the_readme_says(make_instance, model):
+    text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    (percent,) = re.findall(
+        r"every 1 ms, pitch and roll are within (\S+) % and torques within (\S+) % of their peaks", text
+    )
+    true = integrate(model, np.linspace(0, END, 1001), angle, rate)
+    for reading in ("at", "after"):
+        errors = order_error(make_instance, model, SPACING["even"], round(END / 1e-3), reading)
+        for stated, names in zip(map(float, percent), [("pitch", "roll"), ("tau1", "tau2")]):
+            largest = max(100 * errors[name] / np.max(np.abs(true[name])) for name in names)
+            # A stated number is at most twice the error, because it should not hide an improvement.
+            assert stated / 2 < largest <= stated, (reading, names)

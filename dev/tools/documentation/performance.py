@@ -18,9 +18,14 @@ def render(project: Path) -> str:
 
     ratios, counted = (json.loads((project / path).read_text(encoding="utf-8")) for path in (RATIOS, INSTRUCTIONS))
     loader = jinja2.FileSystemLoader(Path(__file__).parent)
+    runs = [[_number(pick(row[i] for row in ratios["runs"].values())) for pick in (min, max)] for i in (0, 4)]
     environment = jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
     return environment.get_template(TEMPLATE).render(
         compiler=counted["compiler"],
+        step=_number(*ratios["steps"]["angles set, step, 4 outputs, as vectors"]),
+        sizes=_number(*ratios["others"]["four alternating sizes / steps of one size"]),
+        loop=runs[0],
+        fmpy=runs[1],
         table=lambda name, *header: _table(header, ratios[name].items()),
         instructions=lambda: _table(("use", "instructions"), ((k, [v]) for k, v in counted["instructions"].items())),
     )
