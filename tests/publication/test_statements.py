@@ -61,6 +61,22 @@ def test_the_numbers_of_the_readme() -> None:
     assert f"{len(others)} other tools have run it" in rows["Portable"], others
 
 
+def test_the_severities_of_findings() -> None:
+    """The severities in docs/checking.md are those that the rules have in the FMI versions of the FMUs."""
+    rules = dict(re.findall(r"^## (\S+)\n(.*?)(?=^## |\Z)", text("crates/fmu-check/RULES.md"), re.S | re.M))
+    compared = 0
+    for section, versions in {"Reference FMUs": (2, 3), "PythonFMU": (2,)}.items():
+        rows = text("docs/checking.md").split(f"## {section}\n")[1].split("\n## ")[0]
+        row = r"^\| `([\w.-]+)`.*? \| ((?:violation|fragile|note)\b.*?) \|"
+        for name, stated in re.findall(row, rows, re.MULTILINE):
+            rule = rules.get(name) or rules[name.rpartition(".")[0]]
+            severities = re.findall(r"^\* (?:FMI \d\.0: )?(\w+)", rule, re.MULTILINE)
+            expected = {severities[version - 2] for version in versions}
+            assert set(re.findall(r"violation|fragile|note", stated)) == expected, f"{section}: {name}"
+            compared += 1
+    assert compared > 12
+
+
 def test_the_number_of_seeded_faults() -> None:
     lists = [name for name in FILES if re.match(r"tests/faults/.*\.toml$", name)]
     count = sum(len(tomllib.loads(text(name))["fault"]) for name in lists)
