@@ -77,6 +77,17 @@ def test_the_severities_of_findings() -> None:
     assert compared > 12
 
 
+def test_models_are_created_outside_of_the_clone() -> None:
+    """In the clone, `cargo fmu new` would change Cargo.toml, because cargo adds the model to the workspace."""
+    found = 0
+    for name in PAGES:
+        for block in re.findall(r"^```.*?^```", text(name), re.DOTALL | re.MULTILINE):
+            if "cargo install --path crates/cargo-fmu" in block and "cargo fmu new" in block:
+                found += 1
+                assert re.search(r"crates/cargo-fmu.*^(?:\$ )?cd \.\..*cargo fmu new", block, re.DOTALL | re.M), name
+    assert found >= 2
+
+
 def test_the_number_of_seeded_faults() -> None:
     lists = [name for name in FILES if re.match(r"tests/faults/.*\.toml$", name)]
     count = sum(len(tomllib.loads(text(name))["fault"]) for name in lists)
