@@ -61,6 +61,20 @@ def test_the_numbers_of_the_readme() -> None:
     assert f"{len(others)} other tools have run it" in rows["Portable"], others
 
 
+def test_the_numbers_of_the_readmes_of_crates() -> None:
+    """They come from docs/checking.md and from `make bench`."""
+    section = text("docs/checking.md").split("## Reference FMUs")[1].split("\n## ")[0]
+    counts = re.search(r"(\d+) FMUs for FMI 2\.0 and (\d+) for FMI 3\.0", " ".join(section.split()))
+    # Rows with a violation in all FMUs of FMI 2.0, and in all of FMI 3.0.
+    assert counts and "| violation | all of 2.0 |" in section and "| violation in 3.0, note in 2.0 | all |" in section
+    assert f"In each of the {int(counts[1]) + int(counts[2])} Reference FMUs" in text("crates/fmu-check/README.md")
+    step = json.loads(text("dev/benches/ratios.json"))["steps"]["angles set, step, 4 outputs, as vectors"][0]
+    stated = re.search(
+        r"takes about ([\d.]+) times as long as in C", " ".join(text("crates/fmu-export/README.md").split())
+    )
+    assert stated and abs(float(stated[1]) - step) <= 0.1, step
+
+
 def test_the_severities_of_findings() -> None:
     """The severities in docs/checking.md are those that the rules have in the FMI versions of the FMUs."""
     rules = dict(re.findall(r"^## (\S+)\n(.*?)(?=^## |\Z)", text("crates/fmu-check/RULES.md"), re.S | re.M))
