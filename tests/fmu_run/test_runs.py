@@ -242,13 +242,20 @@ def test_many_short_runs_leave_nothing_behind(testbed, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_programs_run(fmu, monkeypatch):
+def test_the_programs_run(fmu, monkeypatch, capsys):
+    """The programs run unchanged in the repository root, and print what the page shows after them."""
     page = "crates/fmu-run/README.md"
-    programs = re.findall(r"^```python\n(.*?)^```", (ROOT / page).read_text(encoding="utf-8"), flags=re.S | re.M)
-    text = "\n".join(program for program in programs if "fmu_run" in program)
+    blocks = re.findall(r"^```(\w+)[^\n]*\n(.*?)^```", (ROOT / page).read_text(encoding="utf-8"), flags=re.S | re.M)
     monkeypatch.chdir(ROOT)
     names: dict = {}
-    exec(compile(text, page, "exec"), names)
+    outputs = []
+    for (language, program), (following, output) in zip(blocks, [*blocks[1:], ("", "")]):
+        if language == "python":
+            exec(compile(program, page, "exec"), names)
+            outputs.append(output if following == "text" else "")
+            assert capsys.readouterr().out == outputs[-1]
+    assert sum(map(bool, outputs)) == 2
+    text = "\n".join(program for language, program in blocks if language == "python")
     runs = names["runs"].check()
     assert runs["roll"].shape == (1000, 2001) and abs(runs["roll"]).max() > 0.01
     assert names["torques"].shape == (1000, 2) and names["wrists"].errors == {}

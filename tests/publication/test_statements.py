@@ -61,6 +61,47 @@ def test_the_numbers_of_the_readme() -> None:
     assert f"{len(others)} other tools have run it" in rows["Portable"], others
 
 
+def test_the_numbers_of_the_readmes_of_crates() -> None:
+    """They come from docs/checking.md and from `make bench`."""
+    section = text("docs/checking.md").split("## Reference FMUs")[1].split("\n## ")[0]
+    counts = re.search(r"(\d+) FMUs for FMI 2\.0 and (\d+) for FMI 3\.0", " ".join(section.split()))
+    # Rows with a violation in all FMUs of FMI 2.0, and in all of FMI 3.0.
+    assert counts and "| violation | all of 2.0 |" in section and "| violation in 3.0, note in 2.0 | all |" in section
+    assert f"In each of the {int(counts[1]) + int(counts[2])} Reference FMUs" in text("crates/fmu-check/README.md")
+    step = json.loads(text("dev/benches/ratios.json"))["steps"]["angles set, step, 4 outputs, as vectors"][0]
+    stated = re.search(
+        r"takes about ([\d.]+) times as long as in C", " ".join(text("crates/fmu-export/README.md").split())
+    )
+    assert stated and abs(float(stated[1]) - step) <= 0.1, step
+
+
+def test_the_severities_of_findings() -> None:
+    """The severities in docs/checking.md are those that the rules have in the FMI versions of the FMUs."""
+    rules = dict(re.findall(r"^## (\S+)\n(.*?)(?=^## |\Z)", text("crates/fmu-check/RULES.md"), re.S | re.M))
+    compared = 0
+    for section, versions in {"Reference FMUs": (2, 3), "PythonFMU": (2,)}.items():
+        rows = text("docs/checking.md").split(f"## {section}\n")[1].split("\n## ")[0]
+        row = r"^\| `([\w.-]+)`.*? \| ((?:violation|fragile|note)\b.*?) \|"
+        for name, stated in re.findall(row, rows, re.MULTILINE):
+            rule = rules.get(name) or rules[name.rpartition(".")[0]]
+            severities = re.findall(r"^\* (?:FMI \d\.0: )?(\w+)", rule, re.MULTILINE)
+            expected = {severities[version - 2] for version in versions}
+            assert set(re.findall(r"violation|fragile|note", stated)) == expected, f"{section}: {name}"
+            compared += 1
+    assert compared > 12
+
+
+def test_models_are_created_outside_of_the_clone() -> None:
+    """In the clone, `cargo fmu new` would change Cargo.toml, because cargo adds the model to the workspace."""
+    found = 0
+    for name in PAGES:
+        for block in re.findall(r"^```.*?^```", text(name), re.DOTALL | re.MULTILINE):
+            if "cargo install --path crates/cargo-fmu" in block and "cargo fmu new" in block:
+                found += 1
+                assert re.search(r"crates/cargo-fmu.*^(?:\$ )?cd \.\..*cargo fmu new", block, re.DOTALL | re.M), name
+    assert found >= 2
+
+
 def test_the_number_of_seeded_faults() -> None:
     lists = [name for name in FILES if re.match(r"tests/faults/.*\.toml$", name)]
     count = sum(len(tomllib.loads(text(name))["fault"]) for name in lists)

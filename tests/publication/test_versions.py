@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from built import ROOT
+from test_readmes import PAGES
 
 
 def read(path: Path | str) -> dict[str, Any]:
@@ -38,6 +39,17 @@ def test_packages_have_this_version_and_require_it() -> None:
             asked.append(dependencies[name].get("version"))
             assert asked[-1] in (None, VERSION), f"{table}: {name}"
     assert VERSION in asked
+
+
+def test_the_pages_name_the_oldest_rust() -> None:
+    oldest = WORKSPACE["package"]["rust-version"]
+    naming = set()
+    for page in PAGES:
+        versions = re.findall(r"\bRust(?:\]\([^)]*\))?(?: is)? (\d+\.\d+)", (ROOT / page).read_text(encoding="utf-8"))
+        if versions and page != "CHANGELOG.md":
+            assert set(versions) == {oldest}, page
+            naming.add(page)
+    assert naming >= {f"crates/{name}/README.md" for name in ("cargo-fmu", "fmu-check", "fmu-export", "fmu-run")}
 
 
 def test_lock_files_are_of_this_version() -> None:

@@ -111,6 +111,25 @@ def test_python_requirements_suffice_alone(name: str, version: str, platform: st
     assert done.returncode == 0, done.stderr
 
 
+def used_actions() -> set[tuple[str, str]]:
+    """Returns the names and versions of all actions of the workflows."""
+    return set(re.findall(r"uses: (\S+)@(.*)", "".join(path.read_text(encoding="utf-8") for path in WORKFLOWS)))
+
+
 def test_an_action_has_one_version() -> None:
-    used = re.findall(r"uses: (\S+)@(.*)", "".join(path.read_text(encoding="utf-8") for path in WORKFLOWS))
-    assert used and len(set(used)) == len({name for name, _ in used})
+    used = used_actions()
+    assert used and len(used) == len({name for name, _ in used})
+
+
+@pytest.mark.parametrize("name", ["cargo-fmu", "fmu-check"])
+def test_workflows_in_readmes(name: str, tmp_path: Path) -> None:
+    """They pass the linter, and use the versions of actions that the workflows use."""
+    page = (ROOT / "crates" / name / "README.md").read_text(encoding="utf-8")
+    (workflow,) = re.findall(r"^```yaml\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    path = tmp_path / "workflow.yml"
+    path.write_text(workflow, encoding="utf-8")
+    done = checked("actionlint", path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    major = {name: re.sub(r".* # (v\d+).*", r"\1", version) for name, version in used_actions()}
+    for action, version in re.findall(r"uses: (\S+)@(\S+)", workflow):
+        assert version == major.get(action, version), action

@@ -91,24 +91,34 @@ pub fn new(options: &Options) -> Result<()> {
         };
         write(&path, &text)?;
     }
-    let in_workspace = in_workspace(directory);
+    let workspace = workspace_above(directory);
     let export = Dependency::of(directory, options.git.as_deref())?;
-    write(&directory.join("Cargo.toml"), &manifest(&name, &export, !in_workspace))?;
+    write(&directory.join("Cargo.toml"), &manifest(&name, &export, workspace.is_none()))?;
     let lock = tested_lock();
-    if !lock.is_empty() && !in_workspace {
+    if !lock.is_empty() && workspace.is_none() {
         write(&directory.join("Cargo.lock"), &lock)?;
     }
     // The new names change line lengths, so the code is formatted again, unless rustfmt is not installed.
     let _ = Command::new(&cargo).args(["fmt", "--quiet"]).current_dir(directory).output();
+    let run = match options.from {
+        Begin::Lag => "cargo fmu run --set u=1",
+        _ => "cargo fmu run",
+    };
     println!(
-        "{0} begins with {model}: change {0}/src/{1}, then\n  cd {0}\n  cargo test        # the model before changes\n  {2:<16}  # the FMU, a table and a plot",
+        "{0} begins with {model}: change {0}/src/{1}, then\n  cd {0}\n  {2:<width$}  # the model before changes\n  \
+        {run}  # the FMU, a table and a plot",
         short(directory),
         if files.len() > 2 { format!("{model}.rs") } else { "lib.rs".to_owned() },
-        match options.from {
-            Begin::Lag => "cargo fmu run --set u=1",
-            _ => "cargo fmu run",
-        },
+        "cargo test",
+        width = run.len(),
     );
+    if let Some(root) = workspace {
+        println!(
+            "It is a member of the workspace in {0}, whose Cargo.toml lists it, so its FMUs go to {1}",
+            root.display(),
+            root.join("target/fmu").display()
+        );
+    }
     if let Dependency::Local(path) = export {
         println!(
             "Its Cargo.toml names {}, which is only on this machine; --git URL names a repository for everyone",
@@ -118,13 +128,14 @@ pub fn new(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// Returns whether the crate is a member of a workspace in another directory, so that cargo uses the `Cargo.lock` there.
-fn in_workspace(directory: &Path) -> bool {
+/// Returns the directory of the workspace, if the crate is a member of one in another directory. Cargo then uses the `Cargo.lock` there.
+fn workspace_above(directory: &Path) -> Option<PathBuf> {
     let mut command = Command::new(cargo());
     command.args(["locate-project", "--workspace", "--message-format", "plain"]).current_dir(directory);
-    let root = command.output().map(|output| String::from_utf8_lossy(&output.stdout).trim().to_owned());
-    let own = fs::canonicalize(directory.join("Cargo.toml"));
-    !matches!((root.and_then(fs::canonicalize), own), (Ok(root), Ok(own)) if root == own)
+    let output = command.output().ok()?;
+    let root = PathBuf::from(String::from_utf8_lossy(&output.stdout).trim());
+    let is_own = fs::canonicalize(&root).ok()? == fs::canonicalize(directory.join("Cargo.toml")).ok()?;
+    if is_own { None } else { root.parent().map(Path::to_owned) }
 }
 
 /// The source of fmu-export in a model's `Cargo.toml`.

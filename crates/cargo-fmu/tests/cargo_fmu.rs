@@ -370,7 +370,13 @@ fn a_model_is_built_in_another_directory() {
     // A separate workspace within the clone.
     fs::write(inside.path().join("Cargo.toml"), "[workspace]\nmembers = [\"shared\"]\nresolver = \"3\"\n")
         .unwrap();
-    directory.prints("", &["new", model.to_str().unwrap()]);
+    let output = directory.prints("", &["new", model.to_str().unwrap()]);
+    let root_of_workspace = fs::canonicalize(inside.path()).unwrap();
+    let stated = format!(
+        "workspace in {0}, whose Cargo.toml lists it, so its FMUs go to {0}/",
+        root_of_workspace.display()
+    );
+    assert!(output.contains(&stated), "{output}");
     let manifest = fs::read_to_string(model.join("Cargo.toml")).unwrap();
     assert!(
         manifest.contains("path = \"../../../crates/fmu-export\"") && !manifest.contains(root),
@@ -387,7 +393,7 @@ fn a_model_is_built_in_another_directory() {
 
     let url = format!("file://{}", directory.path("origin.git").display());
     let output = directory.prints("", &["new", "from-git", "--git", &url]);
-    assert!(!output.contains("only on this machine"), "{output}");
+    assert!(!output.contains("only on this machine") && !output.contains("workspace"), "{output}");
     assert!(!directory.read("from-git/Cargo.toml").contains(root));
     fs::rename(directory.path("from-git"), directory.path("elsewhere")).unwrap();
     assert!(source("elsewhere").contains("/git/checkouts/"));
@@ -420,12 +426,14 @@ fn a_model_is_built_in_another_directory() {
     );
 }
 
-/// The README of fmu-export contains the smallest model.
+/// The README of fmu-export contains the smallest model, which is about 40 lines, as the README of cargo-fmu states.
 #[test]
 fn the_readme_shows_a_complete_fmu() {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let source = fs::read_to_string(crates.join("cargo-fmu/models/lag/src/lib.rs")).unwrap();
     let (_, code) = source.split_once("\n\n").unwrap();
+    let lines = code.lines().count();
+    assert!((35..=45).contains(&lines) && include_str!("../README.md").contains("about 40 lines"), "{lines}");
     let readme = fs::read_to_string(crates.join("fmu-export/README.md")).unwrap();
     assert!(readme.contains(&format!("```rust,ignore\n{code}```")), "{readme}");
 }

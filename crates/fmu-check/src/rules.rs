@@ -1,6 +1,6 @@
-//! Rules, which are read from RULES.md, so that the program and its users read the same text. Each section of the page is a rule:
-//! its heading is the name, and its text has the requirement and, for FMI 2.0 and FMI 3.0, the severity and the section of the
-//! standard.
+//! Rules, which are read from RULES.md, so that the program and its users read the same text. The page begins with a table of the
+//! topics. Each section is a rule: its heading is the name, and its text has the requirement and, for FMI 2.0 and FMI 3.0, the
+//! severity and the section of the standard.
 
 use crate::finding::{Finding, Severity};
 use fmi_abi::Standard;
@@ -119,6 +119,19 @@ mod tests {
             let complete = [Fmi2, Fmi3].iter().all(|standard| rule.severity(*standard).is_some());
             assert!(complete && rule.requirement().ends_with('.'), "{}", rule.name);
         }
+    }
+
+    #[test]
+    fn the_pages_list_every_topic() {
+        let (before, _) = super::PAGE.split_once("\n## ").expect("rules");
+        let rows = before.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next());
+        let mut listed: Vec<&str> = rows.collect();
+        let mut topics = TOPICS.to_vec();
+        listed.sort_unstable();
+        topics.sort_unstable();
+        assert_eq!(listed, topics);
+        let count = format!("There are {} topics", TOPICS.len());
+        assert!(include_str!("../README.md").contains(&count), "{count}");
     }
 
     #[test]

@@ -207,7 +207,7 @@ fn descriptions() {
     }
 }
 
-/// Asserts that every fault in the source is tested, and that the documentation states the number of faults.
+/// Asserts that every fault in the source is tested, and that the pages state the number of faults.
 #[test]
 fn no_fault_is_forgotten() {
     let read = |path: &str| {
@@ -223,11 +223,15 @@ fn no_fault_is_forgotten() {
     faults.dedup();
     tested.sort_unstable();
     assert_eq!(faults, tested);
-    let page = read("../../docs/checking.md").split_whitespace().collect::<Vec<_>>().join(" ");
-    let count = format!(
-        "{} faults into its library, one at a time, and {} more into its description",
-        tested.len() + ["SYMBOL_MISSING", "WITHOUT_NOMINALS"].len(),
-        DESCRIPTIONS.len()
-    );
-    assert!(page.contains(&count), "{count}");
+    let of_library = tested.len() + ["SYMBOL_MISSING", "WITHOUT_NOMINALS"].len();
+    for (path, library) in
+        [("../../docs/checking.md", "its library"), ("README.md", "the library of a correct FMU")]
+    {
+        let page = read(path).split_whitespace().collect::<Vec<_>>().join(" ");
+        let count = format!(
+            "{of_library} faults into {library}, one at a time, and {} more into its description",
+            DESCRIPTIONS.len()
+        );
+        assert!(page.contains(&count), "{path}: {count}");
+    }
 }
