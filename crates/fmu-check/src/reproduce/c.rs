@@ -7,7 +7,7 @@ use crate::call_sequence::{
 use crate::description::Description;
 use crate::finding::Finding;
 use fmi_abi::calls::signature;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 /// Returns the program that makes the calls of a finding and compares their results with the evidence.
@@ -168,9 +168,9 @@ struct Writer<'a> {
     fmi3: bool,
     evidence: &'a Evidence,
     description: &'a Description,
-    /// Number of the next C variable or thread function.
+    /// Number of the next loop or thread function.
     next: usize,
-    /// Functions that run on separate threads.
+    /// Functions that run on separate threads, and the functions that they call.
     threads: String,
     /// Indices of the instances, saved states and serialized states that need a variable.
     instances: BTreeSet<usize>,
@@ -185,8 +185,38 @@ impl Writer<'_> {
     }
 
     fn block(&mut self, sequence: &[Numbered], indent: &str) -> String {
-        let lines = sequence.iter().map(|numbered| self.step(numbered)).collect::<String>();
-        lines.lines().fold(String::new(), |text, line| text + indent + line + "\n")
+        indented(&sequence.iter().map(|numbered| self.step(numbered)).collect::<String>(), indent)
+    }
+
+    /// Writes each call that the threads make several times as a function, because threads repeat whole simulations: a program
+    /// with every call in full would have tens of thousands of lines. Returns the names of the functions by their bodies.
+    fn repeated_calls(&mut self, sequences: &[Vec<Numbered>]) -> BTreeMap<String, String> {
+        let mut counts = BTreeMap::<String, usize>::new();
+        for numbered in sequences.iter().flatten() {
+            if let Step::Call { instance: Some(_), function, args } = &numbered.step {
+                *counts.entry(self.call(numbered.id, FUNCTION_ARGUMENTS, function, args)).or_default() += 1;
+            }
+        }
+        let mut names = BTreeMap::new();
+        for body in counts.into_iter().filter(|(_, count)| *count > 1).map(|(body, _)| body) {
+            let name = format!("call{}", self.number());
+            let lines = indented(&body, "    ");
+            let _ = write!(self.threads, "static void {name}(void *instance, int id) {{\n{lines}}}\n\n");
+            names.insert(body, name);
+        }
+        names
+    }
+
+    /// Writes a step of a thread; `repeated` has the names of the functions that make calls.
+    fn step_on_thread(&mut self, numbered: &Numbered, repeated: &BTreeMap<String, String>) -> String {
+        if let Step::Call { instance: Some(index), function, args } = &numbered.step {
+            let body = self.call(numbered.id, FUNCTION_ARGUMENTS, function, args);
+            if let Some(name) = repeated.get(&body) {
+                self.instances.insert(*index);
+                return format!("{name}(c{index}, {});\n", numbered.id);
+            }
+        }
+        self.step(numbered)
     }
 
     /// Returns whether the values and the messages of a call are compared; `None` if the call is not compared.
@@ -205,7 +235,11 @@ impl Writer<'_> {
     fn step(&mut self, Numbered { id, step, .. }: &Numbered) -> String {
         match step {
             Step::Make(index, make) => self.make(*id, *index, make),
-            Step::Call { instance, function, args } => self.call(*id, *instance, function, args),
+            Step::Call { instance, function, args } => {
+                self.instances.extend(*instance);
+                let handle = instance.map_or("NULL".to_owned(), |index| format!("c{index}"));
+                self.call(*id, [&handle, &id.to_string()], function, args)
+            }
             Step::Version(name) => format!("version({id}, \"{name}\");\n"),
             Step::Free(index) => {
                 let name = if self.fmi3 { "fmi3FreeInstance" } else { "fmi2FreeInstance" };
@@ -223,8 +257,11 @@ impl Writer<'_> {
             }
             Step::Parallel(sequences) => {
                 let (mut text, mut joins) = (String::new(), String::new());
+                let repeated = self.repeated_calls(sequences);
                 for sequence in sequences {
-                    let (body, number) = (self.block(sequence, "    "), self.number());
+                    let line = |numbered| self.step_on_thread(numbered, &repeated);
+                    let body = indented(&sequence.iter().map(line).collect::<String>(), "    ");
+                    let number = self.number();
                     let _ = write!(
                         self.threads,
                         "static void *thread{number}(void *nothing) {{\n{body}    return nothing;\n}}\n\n"
@@ -268,22 +305,21 @@ impl Writer<'_> {
         made + if self.matters(id).is_some() { result.as_str() } else { "" }
     }
 
-    fn call(&mut self, id: u32, instance: Option<usize>, name: &str, args: &[Arg]) -> String {
+    /// Writes a call. `handle` and `number` are the C expressions for the instance and for `id`.
+    fn call(&mut self, id: u32, [handle, number]: [&str; 2], name: &str, args: &[Arg]) -> String {
         let Some(signature) = signature(name) else { return String::new() };
-        self.instances.extend(instance);
         let mut parts = Parts::default();
         let (mut types, mut passed) = (String::new(), String::new());
-        for (arg, argument) in args.iter().zip(signature.arguments) {
+        for (index, (arg, argument)) in args.iter().zip(signature.arguments).enumerate() {
             let _ = write!(types, ", {}", type_of(argument.of));
-            let _ = write!(passed, ", {}", self.argument(&mut parts, arg, name));
+            let _ = write!(passed, ", {}", self.argument(&mut parts, (index, arg), name));
         }
-        let handle = instance.map_or("NULL".to_owned(), |index| format!("c{index}"));
-        let guard = instance.map_or(String::new(), |index| format!("if (c{index}) "));
+        let guard = if handle == "NULL" { String::new() } else { format!("if ({handle}) ") };
         let comment =
             comment(args, self.description).map_or(String::new(), |names| format!(" /* {names} */"));
         let mut after = parts.after;
         if let Some([written, log]) = self.matters(id) {
-            after.push(format!("FILE *file = begin({id}, status);"));
+            after.push(format!("FILE *file = begin({number}, status);"));
             after.extend(parts.results.into_iter().filter(|_| written));
             after.push(format!("end(file, {});", if log { "messages" } else { "\"\"" }));
         }
@@ -308,9 +344,8 @@ impl Writer<'_> {
         )
     }
 
-    /// Returns the C expression for an argument, and adds the lines that it needs to `parts`.
-    fn argument(&mut self, parts: &mut Parts, arg: &Arg, name: &str) -> String {
-        let number = self.number();
+    /// Returns the C expression for the argument with this number, and adds the lines that it needs to `parts`.
+    fn argument(&mut self, parts: &mut Parts, (number, arg): (usize, &Arg), name: &str) -> String {
         let string = |text: &Vec<u8>, end: usize| format!("guarded({}, {})", literal(text), text.len() + end);
         match arg {
             Arg::State(slot) | Arg::StateOut(slot) => self.states.extend([*slot]),
@@ -353,6 +388,14 @@ impl Writer<'_> {
             }
         }
     }
+}
+
+/// C expressions for the instance and the number of a call in a function that makes it.
+const FUNCTION_ARGUMENTS: [&str; 2] = ["instance", "id"];
+
+/// Returns the lines of a text with an indent.
+fn indented(text: &str, indent: &str) -> String {
+    text.lines().fold(String::new(), |all, line| all + indent + line + "\n")
 }
 
 /// Lines that the arguments of a call need.

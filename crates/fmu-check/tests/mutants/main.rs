@@ -40,6 +40,9 @@ fn caught(
     let findings = report["findings"].as_array().expect("a list").iter();
     let proofs: Vec<_> = findings.filter(|finding| finding["name"] == name).map(|of| &of["proof"]).collect();
     assert!(proofs.iter().all(|proof| *proof == "shown" || *proof == "files"), "{fault}: {proofs:?}");
+    if let Ok(program) = std::fs::read_to_string(out.join(format!("{name}.c"))) {
+        assert!(program.lines().count() < 10_000, "{fault}: the program writes repeated calls in full");
+    }
     if fault != "none" {
         let unpacked = directory.path().join("unpacked");
         unpack(&path, &unpacked);
