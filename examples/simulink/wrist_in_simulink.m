@@ -19,7 +19,7 @@ closed_loop();
 end
 
 function fig4()
-% Fig. 4 with opposite motors: angles and rates from the workspace, all outputs to the file fig4.mat.
+% Fig. 4 with opposite motor rates: angles and rates from the workspace, all outputs to the file fig4.mat.
 model = fresh('wrist_fig4');
 testbed = add_fmu(model, 'prw_testbed.fmu');
 t = (0:1e-3:1)';

@@ -21,7 +21,7 @@ DEGREES = ("pitch", "roll", "theta3", "theta4")
 
 
 def fig4(**change: float) -> dict[str, np.ndarray]:
-    """Returns time, motors and outputs of Fig. 4 with opposite motors, every millisecond for a second. change: parameters."""
+    """Returns time, motors and outputs of Fig. 4 with opposite motor rates, every millisecond for a second. change: parameters."""
     t = np.arange(1001) * STEP
     theta = np.outer(2 * np.sin(5 * np.pi * t) ** 2 / (10 * np.pi), [1, -1])
     omega = np.outer(np.sin(10 * np.pi * t), [1, -1])

@@ -40,7 +40,9 @@ def test_a_run_is_taken_as_it_is(run, fmu):
     check(found, K1, 1e-6)
     assert all(abs(found.values[name] / run.parameters[name] - 1) < 1e-6 for name in rig.NAMES)
     left_out = [note for note in found.notes if "never changes and is left out" in note]
-    assert [note.split()[1] for note in left_out] == ["pitch", "pitch_rate"], "opposite motors do not pitch the wrist"
+    assert [note.split()[1] for note in left_out] == ["pitch", "pitch_rate"], (
+        "motors at opposite rates do not pitch the wrist"
+    )
 
 
 def test_a_run_without_rates(run, fmu):

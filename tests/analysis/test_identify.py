@@ -134,7 +134,7 @@ def test_equal_motors_do_not_determine_the_roll_inertia(prw, tmp_path):
     assert result.returncode == 1
     assert "J3 has hardly any effect on the measurements" in result.stderr
     assert re.search(
-        r"an experiment with (opposite motors|only one motor|motors that move independently|a spectrum made for these parameters)",
+        r"an experiment with (opposite motor rates|only one motor|motors that move independently|a spectrum made for these parameters)",
         result.stderr,
     )
     assert "`excite` proposes it for tau1,tau2 as" in result.stderr

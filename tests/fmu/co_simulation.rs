@@ -215,7 +215,7 @@ fn derivatives_of_the_initialization_are_used() {
 
 /// Checks that a step is rejected if the state would become infinite, and that the instance then works as before.
 #[test]
-fn steps_out_of_the_range_of_numbers() {
+fn steps_with_a_state_that_is_not_finite() {
     let fmu = in_mode(CoSimulation, StepComplete);
     start_at(&fmu, [0.0; 6]);
     fmu.set(&[vr(Name::theta1)], &[f64::MAX]);
@@ -227,10 +227,10 @@ fn steps_out_of_the_range_of_numbers() {
     fmu.step(0.0, 10.0);
 }
 
-/// Checks that a step is rejected if the motor angle at its end is in the range of numbers but the motor rate is not,
-/// because a saved state with an infinite rate could not be restored.
+/// Checks that a step is rejected if the motor angle at its end is finite but the motor rate is not, because a saved state
+/// with an infinite rate could not be restored.
 #[test]
-fn motors_out_of_the_range_of_numbers() {
+fn steps_with_a_motor_rate_that_is_not_finite() {
     let fmu = in_mode(CoSimulation, StepComplete);
     let h = 1.0 / 1024.0;
     fmu.step(0.0, h);

@@ -114,7 +114,7 @@ def test_torques_are_passed_on_after_the_motors_are_set(fmus) -> None:
     "connections, order, message",
     [
         ({"testbed.pich": "controller.pitch"}, "jacobi", 'system has no variable "testbed.pich"; did you mean "testbed.pitch"?'),
-        ({"testbed.pitch": "controller.tau1"}, "jacobi", "testbed.pitch cannot feed controller.tau1: the one is in rad, the other in N.m"),
+        ({"testbed.pitch": "controller.tau1"}, "jacobi", "testbed.pitch cannot feed controller.tau1: the output is in rad, the input in N.m"),
         ({"controller.pitch": "testbed.theta1"}, "jacobi", "controller.pitch is input, not output"),
         ({"testbed.pitch": "testbed.roll"}, "jacobi", "testbed.roll is output, not input"),
         ({"testbed.pitch": ["controller.pitch", "controller.pitch"]}, "jacobi", "controller.pitch is fed twice"),

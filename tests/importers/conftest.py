@@ -32,8 +32,8 @@ def closed_loop() -> Path:
 
 @pytest.fixture
 def record(request):
-    """Returns a function that records the result of a test, and checks that docs/compatibility.md has a row for it: with the same tool,
-    version, FMU and way to run it, but perhaps with another result and date. The table "At a glance" must name the version, too."""
+    """Returns a function that records the result of a test. It also checks that docs/compatibility.md has a row with the same tool,
+    version, FMU and way to run it; the result and the date may differ. The table "At a glance" must name the version, too."""
 
     def record(tool: str, package: str, fmu: str, run: str, seen: str) -> None:
         RESULTS.mkdir(parents=True, exist_ok=True)
@@ -47,7 +47,7 @@ def record(request):
         )
         name, glance = re.split(r",| \(", tool)[0], read_table(ROOT / PAGE, "At a glance").rows
         assert any(name in cell and row["version"] in cell for cell, *_ in glance), (
-            f"{PAGE}: “At a glance” lacks {tool}"
+            f"{PAGE}: “At a glance” lacks {name} {row['version']}"
         )
 
     return record

@@ -1,11 +1,11 @@
-"""The testbed's equations of motion from its energies only: eqs. (1), (3)-(7) and Lagrange's equation (2).
+"""The testbed's equations of motion from its energies and Rayleigh's function R: eqs. (1)-(7) of the paper that README.md names.
 
-Nothing here comes from eqs. (8)-(11). M, Delta and K are the second derivatives of T, the Rayleigh function and V,
-which are exact, because T, V and the Rayleigh function are quadratic forms. The caller chooses the number type: floats
-for speed, or mpmath numbers for more digits.
+Eqs. (8)-(11), which the FMU uses, only confirm a correction and the sign of the torques, so the results are an independent check. The
+second derivatives of T, R and V are exact, because T, R and V are quadratic forms. The caller chooses the number type: floats for
+speed, or mpmath numbers for more digits.
 
-Three errors of the paper are corrected. Its other equations and its text confirm the corrections: theta7 is pitch and theta8 is
-roll (eq. 1, eq. 4a, Sec. 4), the last spring of eq. (6) is k2 (K of eq. 8), and Table 1 is per degree.
+Two errors of the paper are corrected, as its other equations and its text confirm: theta7 is pitch and theta8 is roll (eq. 1, eq. 4a,
+Sec. 4), and the last spring of eq. (6) is k2 (K of eq. 8). c and k of Table 1 are per degree, and are converted for use with rad.
 """
 
 from __future__ import annotations
@@ -29,19 +29,14 @@ TABLE_1 = {
     "N": "7",
 }
 PER_DEGREE = tuple(name for name in TABLE_1 if name[0] in "ck")
-#: The parameters that are measured, not counted.
+#: The Real parameters; M and N are numbers of lobes and rollers.
 REAL = tuple(name for name in TABLE_1 if name not in ("M", "N"))
 
 
 def varied(factors) -> dict[str, Any]:
-    """Returns Table 1 in SI units with each measured value multiplied by its factor; M and N are unchanged. A value of 0 would stay
-    0, so it is first replaced by the largest value of its kind."""
+    """Returns Table 1 in SI units with each Real parameter multiplied by its factor; M and N are unchanged."""
     table = table_1()
-    largest = {name: max(table[other] for other in REAL if other[0] == name[0]) for name in REAL}
-    return {
-        **table,
-        **{name: (table[name] or largest[name]) * factor for name, factor in zip(REAL, factors, strict=True)},
-    }
+    return {**table, **{name: table[name] * factor for name, factor in zip(REAL, factors, strict=True)}}
 
 
 # Order of the six angles in every quadratic form below.
@@ -126,8 +121,8 @@ class LinearModel:
         """Returns the change of x when the motor angles jump by `jump` (2,) rad.
 
         Lagrange's equation is integrated over the instant of the jump, where terms with angles vanish. theta5 and theta6 do
-        not jump, because they have inertia. For the jumps [q] and [q'], this leaves Delta [q] + M [q'] =
-        -(dissipative coupling) jump.
+        not jump, because they have inertia. With [q] for the jump of q, this leaves D [q] + M [q'] = -C jump, with the second
+        derivatives M of T, and the blocks of the second derivatives of R that belong to q (D), and to q and the motors (C).
         """
         h_d, h_t = hessian(dissipation, self.parameters), hessian(kinetic_energy, self.parameters)
         jump_shaft = -inverse2(h_d[SHAFT, SHAFT]) @ (h_d[SHAFT, MOTOR] @ jump)
@@ -149,9 +144,9 @@ OUTPUTS = ("tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3",
 def linear_model(p) -> LinearModel:
     """Returns the testbed as a first-order linear system, by Lagrange's equation for each of theta3 ... theta6.
 
-    d/dt dT/dq' + dV/dq + dDelta/dq' = 0. The rows of the massless shafts (theta3, theta4) give their rates; the rows of
-    the carriers (theta5, theta6) give the accelerations. The torque on a sensor is the torque of its coupling:
-    tau = -(dV/dtheta_motor + dDelta/dtheta_motor'), which is eq. (9) with the sign of the paper.
+    With Rayleigh's function R, it is d/dt dT/dq' + dV/dq + dR/dq' = 0. The rows of the massless shafts (theta3, theta4) give
+    their rates; the rows of the carriers (theta5, theta6) give the accelerations. The torque of a sensor is minus the torque
+    with which the motor turns its coupling, as in eq. (9): tau = -(dV/dtheta_motor + dR/dtheta_motor').
     """
     h_t, h_v, h_d = hessian(kinetic_energy, p), hessian(potential_energy, p), hessian(dissipation, p)
     zero = 0 * h_v[:2, :2]

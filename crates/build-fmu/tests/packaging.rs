@@ -218,7 +218,7 @@ fn wrong_requests_are_rejected_in_one_line() {
         (&["--parameters", file.as_str()][..], "mine.json: in SI units: k1 must be > 0, it is -120.89"),
         (
             &["--parameters", extreme.as_str()],
-            "mine.json: the model cannot be made for Co-Simulation: the parameters are too far",
+            "mine.json: the model cannot be instantiated for Co-Simulation: the parameters are too far",
         ),
         (&["--parameters", "none.json"], "none.json: cannot be read"),
         (&["--binary", "linux65=a.so"], "'linux65' is not a platform of FMI 2.0"),

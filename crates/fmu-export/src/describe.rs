@@ -251,7 +251,7 @@ fn starts<M: Exported>(json: &mut Json, setup: &Setup) {
     json.close('}');
 }
 
-/// Returns the number of the first event indicator that the model does not overwrite.
+/// Returns the index of the first event indicator that the model does not overwrite.
 fn forgotten_indicator<M: Exported>(mut model: M) -> Option<usize> {
     let count = M::MODEL_EXCHANGE.map_or(0, |offer| offer.indicators);
     model.calculate(0.0);

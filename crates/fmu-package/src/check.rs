@@ -290,7 +290,7 @@ fn check_starts(table: &Table) -> Result<Starts> {
                  index out of bounds",
                 table.variables[*index].name
             ),
-            Start::Error(error) => bail!("the model cannot be made for {interface}: {error}"),
+            Start::Error(error) => bail!("the model cannot be instantiated for {interface}: {error}"),
         }
     }
     for (_, starts) in &all {

@@ -120,11 +120,12 @@ pub(crate) struct Unit {
 /// The start values of a new model.
 #[derive(Debug)]
 pub(crate) enum Start {
-    /// By index; `None` for a variable without start value.
+    /// The start value of each variable, by index, `None` if it has none; and the index of the first event indicator that the model
+    /// does not overwrite, if there is one.
     Values { values: Vec<Option<Value>>, forgotten_indicator: Option<usize> },
     /// The index of a variable that cannot be read.
     Unreadable(usize),
-    /// The reason why the model cannot be made.
+    /// The reason why the model cannot be instantiated: the error or the panic of its `new`.
     Error(String),
 }
 
@@ -363,7 +364,7 @@ fn start(json: &Json, variables: &[Variable]) -> Result<Start> {
 }
 
 fn lacks(name: &str) -> impl Fn() -> String + use<'_> {
-    move || format!("the library's description of its model is wrong at {name}")
+    move || format!("the library's description of its model lacks a valid {name}")
 }
 
 fn text(json: &Json, name: &str) -> Result<String> {
@@ -380,7 +381,7 @@ fn flag(json: &Json, name: &str) -> Result<bool> {
 }
 
 fn count<T: TryFrom<u64>>(json: &Json) -> Result<T> {
-    json.as_u64().and_then(|count| count.try_into().ok()).with_context(lacks("a number"))
+    json.as_u64().and_then(|count| count.try_into().ok()).with_context(lacks("number"))
 }
 
 fn list<T>(json: &Json, name: &str, read: impl Fn(&Json) -> Result<T>) -> Result<Vec<T>> {

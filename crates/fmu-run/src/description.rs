@@ -42,8 +42,8 @@ pub struct Attributes {
     pub declared_type: Option<String>,
     /// Display unit of the variable or of its declared type, if given.
     pub display_unit: Option<Arc<str>>,
-    /// For an output, the variables on which it depends directly, that is without a step. `None` if they are not declared; then the
-    /// output may depend on all inputs (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
+    /// For an output, the variables on which it depends directly, that is, on their values at the same instant. `None` if they are not
+    /// declared; then the output may depend on all inputs (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
     pub depends_on: Option<Dependencies>,
     /// Description.
     pub description: String,
@@ -100,8 +100,8 @@ pub struct Description {
     /// Arrays, whose elements are variables.
     pub(crate) arrays: Arc<Arrays>,
     indices: Index,
-    /// For each variable of the file, the range of its `variables`: one, or the elements of an array. The range is empty for a
-    /// clock, or for an array whose size is unknown or too large.
+    /// For each variable of the file, the range of its entries in `variables`: one entry, or one for each element of an array. The
+    /// range is empty for a clock, or for an array whose size is unknown or too large.
     spans: Vec<Range<usize>>,
     /// Structural parameters to which the caller has given values; they are set in Configuration Mode.
     pub(crate) structure: Vec<Structural>,
@@ -142,7 +142,7 @@ impl Description {
         let written = ModelDescription::parse_configured(text, &structure.iter().filter_map(size).collect())?;
         if written.co_simulation.is_none() && written.model_exchange.is_none() {
             let why = if written.scheduled_execution {
-                "it has only Scheduled Execution, which is not supported here; FMPy calls it by its class FMU3ScheduledExecution"
+                "it has only Scheduled Execution, which is not supported here; FMPy supports it with its class FMU3ScheduledExecution"
             } else {
                 "it has neither Co-Simulation nor Model Exchange"
             };
@@ -232,15 +232,17 @@ impl Description {
     pub fn connects(&self, output: &Variable, to: &Self, input: &Variable) -> Result<(), String> {
         let [one, other] = [output, input].map(Variable::kind);
         if one != other {
-            return Err(format!("the one is {one}, the other {other}"));
+            return Err(format!("the output is {one}, the input {other}"));
         }
         if let (Some(one), Some(other)) = (&output.unit, &input.unit)
             && one != other
         {
-            return Err(format!("the one is in {one}, the other in {other}"));
+            return Err(format!("the output is in {one}, the input in {other}"));
         }
         match (self.items(output), to.items(input)) {
-            (Some(one), Some(other)) if one != other => Err("they have different items".to_owned()),
+            (Some(one), Some(other)) if one != other => {
+                Err("their enumerations have different items".to_owned())
+            }
             _ => Ok(()),
         }
     }
@@ -257,7 +259,7 @@ impl Variable {
         self.causality == "structuralParameter"
     }
 
-    /// Returns the type of the variable as it is used in messages: `is a string`, `is binary`.
+    /// Returns the type of the variable, as it follows “is” in messages: `a string`, `binary`.
     pub(crate) fn kind_in_words(&self) -> &'static str {
         match self.kind() {
             "Boolean" => "a Boolean",

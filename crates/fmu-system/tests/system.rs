@@ -103,11 +103,11 @@ fn wrong_systems_are_rejected() {
         (|s| s.connections.push(("plant.u", "law.y")), "plant.u is input, not output"),
         (
             |s| s.connections.push(("plant.delay", "law.r")),
-            "plant.delay cannot feed law.r: the one is in s, the other in rad",
+            "plant.delay cannot feed law.r: the output is in s, the input in rad",
         ),
         (
             |s| s.connections.push(("plant.y", "law.n")),
-            "plant.y cannot feed law.n: the one is Real, the other Integer",
+            "plant.y cannot feed law.n: the output is Real, the input Integer",
         ),
         (|s| s.connections.push(("plant.y", "law.r")), "law.r is fed twice"),
         (|s| s.outputs.push(("x", "plant.on")), "plant.on is parameter, not output"),
@@ -128,7 +128,7 @@ fn wrong_systems_are_rejected() {
         ),
         (
             |s| s.connections.push(("plant.gear_now", "law.other_gear")),
-            "plant.gear_now cannot feed law.other_gear: they have different items",
+            "plant.gear_now cannot feed law.other_gear: their enumerations have different items",
         ),
         (|s| s.components[0].1 = "none.fmu".into(), "none.fmu is not a usable FMU: it cannot be read"),
         (|s| s.inputs[0].2 = "NaN".into(), "the start value of law.r must be a finite number, it is NaN"),

@@ -1,7 +1,7 @@
-//! Code that tests, fuzzing and benchmarks of FMUs share; not published.
+//! Code shared by the tests, fuzzing and benchmarks of FMUs; not published.
 //!
-//! * [`Importer`] is an instance of FMI 2.0: its methods are the C functions, and it is freed when dropped.
-//!   [`fmi3::Importer`] is the same for FMI 3.0. [`Either`] contains the operations that both share, and assertions.
+//! * [`Importer`] owns an instance of an FMU for FMI 2.0: its methods call the C functions, and dropping it frees the instance.
+//!   [`fmi3::Importer`] does the same for FMI 3.0. [`Either`] contains the operations that both share, and assertions.
 //! * [`serialized`] describes the bytes of saved states.
 //! * [`c_programs`] compiles and runs C programs that load FMUs.
 //! * [`fault_injection`] is a fault-injecting importer, which makes any calls in any order.

@@ -128,7 +128,7 @@ impl CoSimulation for Motors {
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         let after = [0, 1].map(|motor| self.after(motor, step.size));
         if !after.as_flattened().iter().all(|value| value.is_finite()) {
-            return Err(Error::new("a motor turns so fast that its angle leaves the range of numbers"));
+            return Err(Error::new("a motor turns so fast that its angle would not be finite"));
         }
         self.theta = after.map(|[theta, _]| theta);
         self.omega = after.map(|[_, omega]| omega);

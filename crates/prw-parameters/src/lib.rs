@@ -57,7 +57,7 @@ macro_rules! parameters {
             /// All parameters 0. Used for the direction of a derivative, in which one parameter is then set to 1.
             pub const ZERO: Self = Self { $($name: 0 as $kind,)+ };
 
-            /// Returns other parameters, for tests. In the order of Table 1, every measured value is multiplied by exp of the
+            /// Returns other parameters, for tests. In the order of Table 1, every Real parameter is multiplied by exp of the
             /// next exponent. A value of 0 would stay 0, so the largest value with its unit is used instead.
             #[must_use]
             pub fn varied(&self, mut exponent: impl FnMut() -> f64) -> Self {

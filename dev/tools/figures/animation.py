@@ -1,4 +1,4 @@
-"""The animation of the wrist in the README: equal motors, opposite motors, and both motions with a controller."""
+"""The animation of the wrist in the README: equal motor rates, opposite ones, and both motions with a controller."""
 
 from __future__ import annotations
 

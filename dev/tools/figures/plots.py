@@ -72,7 +72,7 @@ def _draw_velocities(figure: Any, run: Run) -> None:
 
 
 def _fig4_plate(found: Results) -> Figure:
-    """Draws Fig. 4, with opposite motors, next to the same plots with equal motors."""
+    """Draws Fig. 4, with opposite motor rates, next to the same plots with equal motor rates."""
     figure = Figure(figsize=(2 * COLUMN, 4.8), layout="constrained")
     left, right = np.asarray(figure.subfigures(1, 2, wspace=0.04))
     for subfigure, title, run in (

@@ -45,7 +45,7 @@ class Results(NamedTuple):
     sweep
         Measured response of SHAFTS and TORQUES at POINTS.
     fig4, fig4_equal
-        The experiment of Fig. 4, and the same with equal motors.
+        The experiment of Fig. 4, and the same with equal motor rates.
     pitch_step, roll_step
         Responses if both motors step by 1 degree, and if motor 2 steps by -1 degree instead.
     convergence

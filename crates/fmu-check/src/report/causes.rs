@@ -27,7 +27,7 @@ const CAUSES: [(&str, &[&str]); 6] = [
     ("resources.settings", &["results.", "states.", "reset.", "logs.printed"]),
 ];
 
-/// Sets the cause of each finding that may follow from another one, and moves the finding behind its cause.
+/// Sets the cause of each finding that may follow from another one, and moves the finding after its cause.
 pub fn explain(findings: &mut Vec<Finding>) {
     let found: Vec<String> = findings.iter().map(|finding| finding.name.clone()).collect();
     for finding in findings.iter_mut() {
@@ -48,7 +48,7 @@ pub fn explain(findings: &mut Vec<Finding>) {
         findings.push(cause);
         findings.extend(followers);
     }
-    // A finding whose cause also has a cause was not listed behind its cause, so it is added at the end.
+    // A finding whose cause also has a cause was not listed after its cause, so it is added at the end.
     let listed: Vec<String> = findings.iter().map(|finding| finding.name.clone()).collect();
     findings.extend(consequences.into_iter().filter(|finding| !listed.contains(&finding.name)));
 }

@@ -49,7 +49,7 @@ pub struct Report {
     pub unreached: Vec<Unchecked>,
     /// Names in the baseline that match no finding and no unchecked interface or topic.
     pub unused: Vec<String>,
-    /// Findings, the most severe first; findings that may follow from another one are listed behind it.
+    /// Findings, the most severe first; a finding that may follow from another one is listed after it.
     pub findings: Vec<Finding>,
 }
 
@@ -237,7 +237,7 @@ impl Report {
         )
     }
 
-    /// Writes all reports and the programs of the findings to a directory.
+    /// Writes the reports as files to a directory, and for each finding the C program that should reproduce it, if there is one.
     ///
     /// # Errors
     /// Fails if a file cannot be written.

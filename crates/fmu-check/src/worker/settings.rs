@@ -56,7 +56,7 @@ fn floating_point() -> Vec<String> {
 fn linux() -> Vec<String> {
     let timers = std::fs::read_to_string("/proc/self/timers").unwrap_or_default();
     let timers = timers.lines().filter(|line| line.starts_with("ID:")).count();
-    // SAFETY: writes the set, and returns a number.
+    // SAFETY: only copies the set of processor cores to `set`, and returns a number.
     let (policy, cores) = unsafe {
         let mut set: libc::cpu_set_t = std::mem::zeroed();
         libc::sched_getaffinity(0, size_of_val(&set), &raw mut set);
@@ -134,7 +134,7 @@ mod unix {
             format!("handler of {name} {handler:#x}")
         });
         let mut found: Vec<String> = handlers.collect();
-        // SAFETY: writes the set of blocked signals.
+        // SAFETY: only copies the set of blocked signals to `set`.
         let blocked = unsafe {
             let mut set: libc::sigset_t = std::mem::zeroed();
             libc::pthread_sigmask(libc::SIG_BLOCK, std::ptr::null(), &raw mut set);
@@ -158,7 +158,7 @@ mod unix {
         ];
         let limit = |(name, resource)| {
             let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
-            // SAFETY: writes the limit.
+            // SAFETY: only copies the limit of the process to `limit`.
             unsafe { libc::getrlimit(resource, &raw mut limit) };
             format!("limit of {name} {} of {}", limit.rlim_cur, limit.rlim_max)
         };
@@ -172,7 +172,7 @@ mod unix {
             ("profiling", libc::ITIMER_PROF),
         ];
         let timer = |(name, timer)| {
-            // SAFETY: writes the timer.
+            // SAFETY: only copies the state of the timer to `now`.
             let timer = unsafe {
                 let mut now: libc::itimerval = std::mem::zeroed();
                 libc::getitimer(timer, &raw mut now);
@@ -188,7 +188,7 @@ mod unix {
     /// Returns the files that the standard streams are connected with, and their flags.
     fn streams() -> Vec<String> {
         let stream = |(name, number): (&str, c_int)| {
-            // SAFETY: writes the status of the file, and returns its flags.
+            // SAFETY: only copies the status of the file to `file`, and returns its flags.
             let (file, flags) = unsafe {
                 let mut file: libc::stat = std::mem::zeroed();
                 libc::fstat(number, &raw mut file);
@@ -208,7 +208,7 @@ mod unix {
     /// Seed that the importer has set.
     const SEED: c_uint = 4711;
 
-    /// How many random numbers that follow from the importer's seed are searched for the next ones, because an FMU may have used
+    /// The next random numbers are sought among this many numbers that follow from the importer's seed, because an FMU may have used
     /// some of them.
     const SEARCHED: usize = 5_000_000;
 
@@ -221,7 +221,8 @@ mod unix {
         // The state of the generator has 31 numbers and a header.
         let mut reference = [0_u64; 16];
         let reference = reference.as_mut_ptr().cast::<c_char>();
-        // SAFETY: the memory is large enough. The generator uses the state at `OWN` afterwards, which is never freed.
+        // SAFETY: the memory is large enough. Afterwards the generator does not use `reference`, and the state at `OWN` is never
+        // freed.
         unsafe {
             let own = OWN.load(Ordering::Relaxed);
             if own.is_null() {

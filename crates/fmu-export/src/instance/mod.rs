@@ -471,9 +471,6 @@ fn finite<M>(variable: &Variable<M>, value: f64) -> Outcome<f64> {
         return Ok(value);
     }
     reject_with(|| {
-        format!(
-            "{} is out of the range of numbers; look for extreme inputs, states or parameters",
-            variable.name()
-        )
+        format!("{} is not a finite number; look for extreme inputs, states or parameters", variable.name())
     })
 }

@@ -124,7 +124,7 @@ impl<M: Exported> Instance<M> {
         let mut now = vec![0.0; count];
         self.calculated().exported_indicators(&mut now);
         if let Some(index) = now.iter().position(|indicator| !indicator.is_finite()) {
-            return reject(format!("event indicator {index} is out of the range of numbers"));
+            return reject(format!("event indicator {index} is not a finite number"));
         }
         indicators.iter_mut().zip(now).for_each(|(indicator, now)| {
             indicator.write(now);

@@ -153,12 +153,12 @@ fn event_iteration<F: Either>() {
     fmu.ok(fmu.enter_continuous_time_mode());
     fmu.ok(fmu.set_time(1.0));
     fmu.ok(fmu.enter_event_mode());
-    fmu.rejected_with(&["range of numbers"], |fmu| fmu.try_update().unwrap_err());
+    fmu.rejected_with(&["the sum would not be finite"], |fmu| fmu.try_update().unwrap_err());
     let fmu: F = F::in_mode::<Counter>(CoSimulation, Mode::Instantiated);
     prepare_counter(&fmu);
     fmu.initialize(0.0);
     fmu.set(&[counter::Name::weight as u32], &[f64::MAX]);
-    fmu.rejected_with(&["range of numbers"], |fmu| fmu.try_step(0.0, 1.0));
+    fmu.rejected_with(&["the sum would not be finite"], |fmu| fmu.try_step(0.0, 1.0));
 }
 
 #[test]

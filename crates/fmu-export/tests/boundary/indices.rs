@@ -77,10 +77,10 @@ fn rejected<F: Either>() {
         assert_eq!(fmu.bytes(), before);
         fmu.step(f64::from(round), 1.0);
     }
-    // Each value is in the range of numbers, but the sum of both is not.
+    // Each value is finite, but the sum of both is not.
     fmu.set(&[0, 1], &[f64::MAX, f64::MAX]);
     assert_eq!(fmu.get([0, 1]), [f64::MAX; 2]);
-    fmu.rejected_with(&["total", "out of the range"], |fmu| fmu.try_get(&[TOTAL, 0, 1, 2], &mut [0.0; 4]));
+    fmu.rejected_with(&["total is not a finite number"], |fmu| fmu.try_get(&[TOTAL, 0, 1, 2], &mut [0.0; 4]));
     assert_eq!(fmu.try_step(3.0, 1.0), Status::Ok);
 }
 

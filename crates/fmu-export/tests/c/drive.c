@@ -1,4 +1,4 @@
-/* Simulates an FMU as an importer in C does: drive LIBRARY GUID.
+/* Simulates an FMU as an importer in C does. Usage: drive LIBRARY GUID.
    Prints a line "name value" for each value that the tests compare. The FMU is the test model Oscillator, or the testbed
    if TESTBED is defined. */
 #include "fmu.h"
@@ -23,11 +23,11 @@ static void count(fmi2ComponentEnvironment environment, fmi2String instance_name
 }
 
 static void *no_memory(size_t n, size_t size) {
-    CHECK(!"allocateMemory is not used (canNotUseMemoryManagementFunctions)");
+    CHECK(!"allocateMemory is called although canNotUseMemoryManagementFunctions is true");
     return (void *)(n + size);
 }
 
-static void no_free(void *memory) { CHECK(!memory && !"freeMemory is not used"); }
+static void no_free(void *memory) { CHECK(!memory && !"freeMemory is called"); }
 
 static fmi2Component instantiate(fmi2Type type) {
     fmi2CallbackFunctions callbacks = {count, no_memory, no_free, NULL, &messages};

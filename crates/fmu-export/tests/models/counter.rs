@@ -49,7 +49,7 @@ impl Counter {
             self.sum += self.weight * f64::from(self.increment);
         }
         if !self.sum.is_finite() {
-            return Err(Error::new("the sum leaves the range of numbers"));
+            return Err(Error::new("the sum would not be finite"));
         }
         self.next += self.period;
         Ok(())

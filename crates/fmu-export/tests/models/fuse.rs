@@ -34,7 +34,7 @@ impl CoSimulation for Fuse {
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         let (start, end) = (self.temperature, self.temperature + self.load * step.size);
         if !end.is_finite() {
-            return Err(Error::new("the temperature leaves the range of numbers"));
+            return Err(Error::new("the temperature would not be finite"));
         }
         let time_of = |temperature: f64| step.time + (temperature - start).max(0.0) / self.load;
         // A step that ends at 100 degrees, within rounding error, is not early.

@@ -77,7 +77,7 @@ impl ModelExchange for Lazy {
 
     fn event(&mut self, _: f64) -> Result<Event, Error> {
         if !self.sum.is_finite() {
-            return Err(Error::new("the sum leaves the range of numbers"));
+            return Err(Error::new("the sum would not be finite"));
         }
         self.state = self.sum;
         Ok(Event { states_changed: true, ..Event::default() })

@@ -122,7 +122,7 @@ impl CoSimulation for Oscillator {
         let position = a + b * h + fading * (x * cosine + amplitude * sine);
         let velocity = b + fading * (v * cosine - (decay * amplitude + frequency * x) * sine);
         if !(position.is_finite() && velocity.is_finite()) {
-            return Err(Error::new("the mass leaves the range of numbers"));
+            return Err(Error::new("position or velocity would not be finite"));
         }
         (self.position, self.velocity, self.slope) = (position, velocity, None);
         Ok(Stepped::Done)

@@ -169,7 +169,7 @@ impl CoSimulation for Rod {
             next.iter_mut().zip(rates).for_each(|(next, rate)| *next += step.size / count * rate);
         }
         if !next.iter().all(|temperature| temperature.is_finite()) {
-            return Err(Error::new("a temperature leaves the range of numbers"));
+            return Err(Error::new("a temperature would not be finite"));
         }
         self.temperatures = next;
         self.look();

@@ -1,8 +1,8 @@
-//! A clock whose steps stop at its ticks.
+//! A model with periodic events, its ticks, at which its steps stop.
 
 use fmu_export::*;
 
-/// Ticks in every period; each tick adds the input.
+/// Ticks once in every period; each tick adds the input `amount` to `sum`.
 #[derive(Clone)]
 pub struct Ticker {
     amount: f64,
@@ -42,7 +42,7 @@ impl ModelExchange for Ticker {
     fn event(&mut self, time: f64) -> Result<Event, Error> {
         if time >= self.next {
             if !(self.sum + self.amount).is_finite() {
-                return Err(Error::new("the sum leaves the range of numbers"));
+                return Err(Error::new("the sum would not be finite"));
             }
             self.sum += self.amount;
             self.ticks = self.ticks.saturating_add(1);

@@ -47,8 +47,8 @@ fn changed_descriptions() {
 #[test]
 fn models_that_cannot_be_made() {
     for (fault, message) in [
-        ("broken", "the model cannot be made for Co-Simulation: it is broken"),
-        ("panic", "the model cannot be made for Co-Simulation: it panics"),
+        ("broken", "the model cannot be instantiated for Co-Simulation: it is broken"),
+        ("panic", "the model cannot be instantiated for Co-Simulation: it panics"),
         ("two-faced", "u starts with 1 in Co-Simulation and with 0 in Model Exchange"),
         (
             "unwritable",

@@ -71,7 +71,9 @@ class Run(Mapping[str, Array]):
             return ""
         rate = (len(self.time) - 1) / float(self.time[-1] - self.time[0])
         needed = _rounded_up(rate * float(np.sqrt(error / DOUBTFUL)))
-        rates = "; also give the motors' rates omega1 and omega2" if self.motion.omega is None else ""
+        rates = (
+            "; it also decreases if you give the motors' rates omega1 and omega2" if self.motion.omega is None else ""
+        )
         return (
             f"{worst} may be off by {error:.1%} of its peak, because the motors are sampled at "
             f"{float(f'{rate:.3g}'):.10g} Hz; at about {needed:.10g} Hz, the error would be {DOUBTFUL:.0%}{rates}"
@@ -165,7 +167,7 @@ def simulate(
     Returns
     -------
     Run
-        The run. Row k of its outputs is read at time[k], with the motors' angles at that time.
+        The run. Sample k of each output is read at time[k], after the motors' angles of that time are set.
 
     Raises
     ------
@@ -197,8 +199,8 @@ def simulate(
 
 def _sampling_error(fine: Array, coarse: Array) -> float:
     """The error of the output `fine` (n,) as a fraction of its peak. `coarse` is the same output of a run with every
-    second sample. Errors are second order in the step size, so its error is four times as large, and the difference is
-    three times the error of `fine`."""
+    second sample. Errors are second order in the step size, so the error of `coarse` is four times the error of `fine`,
+    and their difference is three times the error of `fine`."""
     peak = float(np.abs(fine).max())
     return float(np.abs(coarse - fine[::2]).max()) / 3 / peak if peak > ROUNDING else 0.0
 

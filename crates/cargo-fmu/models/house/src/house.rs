@@ -127,7 +127,7 @@ impl CoSimulation for House {
             room = end + (room - end) * (-part.size * self.loss / self.capacity).exp();
         }
         if !room.is_finite() {
-            return Err(Error::new("the temperature is out of the range of numbers; look at the heating"));
+            return Err(Error::new("the temperature would not be finite; look at the heating"));
         }
         self.room = room;
         Ok(Stepped::Done)

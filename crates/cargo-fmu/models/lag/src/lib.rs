@@ -1,4 +1,4 @@
-//! A first-order lag as an FMU: the smallest complete model, to be extended.
+//! The smallest complete model of an FMU, to be extended.
 
 use fmu_export::*;
 
@@ -20,7 +20,7 @@ variables! { for Lag;
 
 impl Model for Lag {
     const INFO: Info = Info {
-        description: "First-order lag with time constant 1 s",
+        description: "x follows u with the time constant 1 s",
         // There are no branches or limits, so the build finds dependencies by changing one variable at a time.
         smooth: true,
         ..info!("Lag", "lag")

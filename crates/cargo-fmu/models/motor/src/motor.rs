@@ -158,7 +158,7 @@ impl CoSimulation for Motor {
         }
         self.integrate(Step::new(time, end - time))?;
         if !(self.current.is_finite() && self.speed.is_finite()) {
-            return Err(Error::new("current or speed leave the range of numbers"));
+            return Err(Error::new("current or speed would not be finite"));
         }
         Ok(Stepped::Done)
     }

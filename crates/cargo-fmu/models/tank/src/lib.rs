@@ -32,9 +32,9 @@ pub struct Tank {
     flows: [f64; 4],
     /// The time at which the pump was switched last, s.
     since: f64,
-    /// The last value of the bucket.
+    /// The value of the input `bucket` at the last event.
     was_poured: bool,
-    /// The time of the values, s.
+    /// The time to which the other values belong, s.
     time: f64,
     log: Log,
 }
@@ -172,7 +172,7 @@ impl CoSimulation for Tank {
             let event = find_event(part, Crossing::Falling, 1e-9, |part| self.distance(after(part)));
             level = after(event.unwrap_or(part));
             if !level.is_finite() {
-                return Err(Error::new("the level is out of the range of numbers; look at the flows"));
+                return Err(Error::new("the level would not be finite; look at the flows"));
             }
             if let Some(event) = event {
                 self.level = level;

@@ -120,7 +120,7 @@ def _summary(
         f"torque {_tidy(peak('tau1', 'tau2'))} N.m"
     )
     if arguments.input is None:
-        lines.append("            opposite motors turn the wrist about its roll axis only, as in the paper")
+        lines.append("            motors at opposite rates turn the wrist about its roll axis only, as in the paper")
     else:
         lines.append(f"at the end  pitch {_degrees(response['pitch'][-1])}, roll {_degrees(response['roll'][-1])}")
     lines += [f"note        {note}" for note in response.notes]

@@ -202,8 +202,8 @@ REACH = 10.0
 DURATION, RATE = 10.0, 1000.0
 #: Descriptions of the patterns in messages.
 DESCRIBED = {
-    "equal": "equal motors",
-    "opposite": "opposite motors",
+    "equal": "equal motor rates",
+    "opposite": "opposite motor rates",
     "single": "only one motor",
     "independent": "motors that move independently",
 }

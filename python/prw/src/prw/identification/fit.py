@@ -181,7 +181,7 @@ class Comparison:
         """Derivatives (2, bins, c, p) of `residual`, and the part (p, p) of their squares that is noise.
 
         change: the model's derivatives with respect to the parameters; derivatives with respect to the distortions follow.
-        The contribution of encoders' errors to the squares is not information. For example, with equal motors the difference
+        The contribution of encoders' errors to the squares is not information. For example, at equal motor rates the difference
         of two encoders' steps seems to roll the wrist a little, and J3 would look determined."""
         outputs, transfer = self.response.slopes(change, self.initial)
         bins, whiten = self.experiment.bins, self._whiten

@@ -28,15 +28,15 @@ TRIALS, CLOSE, LONGEST = 8, 0.02, 2.0
 FOLLOWED = {"ftol": 1e-5, "xtol": 1e-5}
 
 
-def ends(solution: Solution, white: Array, errors: Array, quantile: float) -> tuple[Array, Array]:
-    """Lower and upper ends (p,) of the logarithms' intervals. white: (p, p), the covariance for white noise. errors:
-    (p,) standard errors. quantile: of the normal distribution, 1.96 for 95 %."""
+def ends(solution: Solution, inverse: Array, errors: Array, quantile: float) -> tuple[Array, Array]:
+    """Lower and upper ends (p,) of the unknowns' intervals. inverse: (p, p), of the information. errors: (p,) standard
+    errors. quantile: of the normal distribution, 1.96 for 95 %."""
     low, high = solution.logarithms - quantile * errors, solution.logarithms + quantile * errors
     for i, error in enumerate(errors):
         if LINEAR < error < HOPELESS:
             # The direction in which the misfit rises least with parameter i.
-            step = quantile * error * white[:, i] / white[i, i]
-            rise = (quantile * error) ** 2 / white[i, i]
+            step = quantile * error * inverse[:, i] / inverse[i, i]
+            rise = (quantile * error) ** 2 / inverse[i, i]
             low[i], high[i] = _end(solution, i, -step, rise), _end(solution, i, step, rise)
     return low, high
 
@@ -103,7 +103,8 @@ class Certainty(NamedTuple):
     names
         Names of the unknowns.
     relative
-        (p,), standard errors of their logarithms, which are fractions of the values.
+        (p,), standard errors of the unknowns. For a parameter or a gain the unknown is the logarithm, so its error is a
+        fraction of the value; for a delay or a lag it is the value in ms.
     low, high
         (p,) each, exponentials of the ends of the unknowns' 95 % intervals; for parameters, the ends in SI.
     correlation
