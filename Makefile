@@ -307,7 +307,7 @@ $(VENV)/made.stamp $(DIST_VENV)/made.stamp: dev/requirements/uv.txt | need-pytho
 	@$(@D)/bin/pip install --quiet --progress-bar off --no-compile -r $<
 	@touch $@
 
-FMU_RUN := $(wildcard crates/fmu-run/*.toml crates/fmu-run/python/*.toml $(addprefix crates/fmu-run/,\
+FMU_RUN := Cargo.lock $(wildcard crates/fmu-run/*.toml crates/fmu-run/python/*.toml $(addprefix crates/fmu-run/,\
   src/*.rs src/*/*.rs python/src/*.rs python/fmu_run/*)\
   $(foreach crate,fmi-abi fmi-client,crates/$(crate)/*.toml crates/$(crate)/src/*.rs crates/$(crate)/src/*/*.rs))
 
