@@ -289,7 +289,7 @@ fuzz: need-rust need-nightly
 	    -- -max_len=20000 -timeout=10 -rss_limit_mb=1024 -max_total_time=$(FUZZ_SECONDS) -print_final_stats=1 || exit 1; \
 	done
 
-sanitize: need-rust need-nightly $(VENV)/tests.stamp source-fmu fmu
+sanitize: need-rust need-nightly $(VENV)/tests.stamp source-fmu closed-loop-fmus
 	@command -v valgrind >/dev/null || $(call stop,valgrind is missing; on Debian: apt install valgrind)
 	@$(CARGO) +nightly miri --version >/dev/null 2>&1 || \
 	  $(call stop,Miri is missing; install it with: rustup component add --toolchain nightly miri rust-src)
