@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tomllib
@@ -80,21 +81,26 @@ def tests_fail(arguments: str) -> bool:
     headers = next(Path(sys.prefix).glob("lib/python3*/site-packages/fmpy/c-code"), None)
     environment = {"FMI2_HEADERS": str(headers)} if headers else {}
     command = ["cargo", "test", "--locked", "--quiet", *arguments.split()]
-    try:
-        done = subprocess.run(
-            command,
-            cwd=SOURCE_COPY,
-            env={**os.environ, **environment, "CARGO_TARGET_DIR": str(SOURCE_COPY.parent / "target")},
-            timeout=TIMEOUT,
-            check=False,
-            capture_output=True,
-            text=True,
-        )
-    except subprocess.TimeoutExpired:
-        return True
-    if "could not compile" in done.stderr:
-        raise RuntimeError(f"the faulty sources do not compile:\n{done.stderr}")
-    return done.returncode != 0
+    # In a separate session, the tests that cargo has started are killed with it.
+    with subprocess.Popen(
+        command,
+        cwd=SOURCE_COPY,
+        env={**os.environ, **environment, "CARGO_TARGET_DIR": str(SOURCE_COPY.parent / "target")},
+        start_new_session=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            _, errors = process.communicate(timeout=TIMEOUT)
+        except subprocess.TimeoutExpired:
+            return True
+        finally:
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
+    if "could not compile" in errors:
+        raise RuntimeError(f"the faulty sources do not compile:\n{errors}")
+    return process.returncode != 0
 
 
 def survives(fault: Fault) -> bool:
