@@ -73,7 +73,7 @@ def experiments() -> list[Experiment]:
         ),
         experiment_from_motion(
             "other_parameters",
-            "Another testbed: every parameter differs from Table 1; sines of 3 and 5 Hz",
+            "Another testbed: every parameter differs from Table 1; the motor rates are sines of 3 and 5 Hz",
             another_testbed(),
             *sines(np.array([0.2, -0.1]), 2 * np.pi * np.array([3.0, 5.0])),
         ),
@@ -82,7 +82,7 @@ def experiments() -> list[Experiment]:
 
 
 def another_testbed() -> dict[str, Any]:
-    """Returns parameters that all differ from Table 1. If a parameter were not named here, it would be half as large."""
+    """Returns parameters that all differ from Table 1. A parameter that `named` lacks would have half its value of Table 1."""
     named = {
         "J2": 5e-3,
         "J3": 0.02,
@@ -193,7 +193,7 @@ def closed_loop(parameters: dict[str, Any]) -> Experiment:
     fine, every = times(STOP, law.sample_time), round(INTERVAL / law.sample_time)
     return Experiment(
         "closed_loop",
-        "Closed loop with prw_controller to a pitch of 30 and a roll of 60 degrees; the inputs are its motors",
+        "Closed loop with the control law of prw_controller, from rest to a pitch of 30 and a roll of 60 degrees",
         {**parameters, "use_omega": True},
         {"time": fine, **{name: loop[name] for name in MOTORS}},
         {"time": fine[::every], **{name: loop[name][::every] for name in OUTPUTS}},

@@ -76,7 +76,7 @@ def test_one_motor_does_both(visit: Any, fmu: Path) -> None:
     """The page opens with this step, and says by which angles the wrist pitches and rolls."""
     page = visit()
     expect(page.locator(".lead")).to_have_text(
-        "Two motors turn one shaft: together they pitch it, against each other they roll it."
+        "Two motors turn one shaft: in the same direction to pitch it, in opposite directions to roll it."
     )
     expect(page.locator("[aria-pressed=true]")).to_have_text(STEPS[0])
     for angle, counts in [(20, {}), (37, {}), (37, {"M": 6}), (12, {"M": 5, "N": 5})]:

@@ -62,7 +62,7 @@ pub trait Exported: Model {
     }
 }
 
-/// Capabilities in Co-Simulation, as in the model description.
+/// Capabilities in Co-Simulation. All except `atomic_step` are in the model description.
 #[derive(Clone, Copy, Debug)]
 pub struct CoSimulationOffer {
     /// Whether the step size may vary.
@@ -135,7 +135,7 @@ macro_rules! offer {
             if <Is<$model>>::IMPLEMENTED && !(<$model as $crate::Exported>::$($offered)+) {
                 ::core::panic!(::core::concat!(
                     ::core::stringify!($model), " implements ", ::core::stringify!($capability),
-                    ": name it in export_fmu! as well"
+                    ": name it in export_fmu! or offer! as well"
                 ));
             }
         };
@@ -245,7 +245,8 @@ macro_rules! offer {
             if let ::core::option::Option::Some(offer) = <$model as $crate::Exported>::CO_SIMULATION {
                 ::core::assert!(
                     !offer.has_event_mode() || <$model as $crate::Exported>::MODEL_EXCHANGE.is_some(),
-                    "EVENTS needs ModelExchange, whose function event handles them"
+                    "a model with other EVENTS than Events::None needs ModelExchange, because ModelExchange::event handles \
+                     the events"
                 );
             }
             $crate::offer! { @must_agree $model, CoSimulation, CO_SIMULATION.is_some() }

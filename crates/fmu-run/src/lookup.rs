@@ -37,7 +37,7 @@ impl Found<'_> {
     pub fn check_settable(self, name: &str) -> Result<(), Error> {
         self.check_own(name)?;
         if self.variable.is_structural() {
-            return request(format!("{name} is a structural parameter; give it among the start values"));
+            return request(format!("{name} is a structural parameter; set it with the start values"));
         }
         if self.variable.is_settable() {
             return Ok(());

@@ -120,7 +120,7 @@ pub trait Either: Send {
     where
         Self: Sized;
 
-    /// Returns a handle without an instance (NULL).
+    /// Returns an importer without an instance: its functions pass NULL.
     fn null_instance<M: Exported>() -> Self
     where
         Self: Sized;

@@ -19,8 +19,8 @@ pub struct Message {
 }
 
 impl Message {
-    /// Asserts that the message is not empty and has a known category. It must not contain `%`, `#` or a newline,
-    /// because `printf` or importers interpret these characters (section 2.1.5 of FMI 2.0).
+    /// Asserts that the message is not empty and has a known category. It must not contain `%` or `#`, because
+    /// `printf` or importers interpret them, or a newline, because importers append one (section 2.1.5 of FMI 2.0).
     ///
     /// # Panics
     /// Panics if one of these assertions fails.
@@ -139,7 +139,7 @@ impl Arguments<'static> {
     }
 }
 
-/// Returns the value of a Boolean of C.
+/// Converts a Boolean that an FMI function wrote. Panics if its integer value is neither 0 nor 1.
 #[track_caller]
 pub(crate) fn to_bool(flag: i32) -> bool {
     assert!([0, 1].contains(&flag), "{flag} is not a Boolean");
@@ -187,12 +187,12 @@ macro_rules! importer {
                 if instance.is_null() { Err(log.take()) } else { Ok(Self { functions, instance, log }) }
             }
 
-            /// Returns a handle without an instance (NULL).
+            /// Returns an importer without an instance: its functions pass NULL.
             pub(crate) fn without_instance(functions: Functions) -> Self {
                 Self { functions, instance: null_mut(), log: Default::default() }
             }
 
-            /// Frees the instance, as an importer might do in a log callback.
+            /// Calls the function that frees the instance, as an importer might do in a log callback.
             ///
             /// # Safety
             /// Call this only from the log callback of this instance; the FMU then ignores the call.

@@ -1,6 +1,6 @@
 """Reproduces the paper's Figs. 4 and 5 and draws Bode plots of the torques, poles and zeros, step responses and the
-order of convergence, all from the FMU. Writes each figure as SVG and PNG, and the numbers that the text quotes as
-numbers.json."""
+order of convergence, all from the FMU. Writes each figure as SVG and PNG, and the numbers that the page of the FMU quotes
+as numbers.json."""
 
 from __future__ import annotations
 

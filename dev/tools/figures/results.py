@@ -20,7 +20,7 @@ from tools.modes import Mode, pitch_and_roll
 #: Frequencies in Hz of the curves of the Bode plots, and of the measured points.
 CURVE = np.geomspace(0.1, 1000, 321)
 POINTS = 10 ** (np.arange(-6, 16) / 6)
-#: Highest frequency in Hz of the points for which the text states the deviation from the curves.
+#: The page of the FMU states the deviation of the measured points from the curves up to this frequency in Hz.
 STATED = 50.0
 
 Run = tuple[Motion, dict[str, np.ndarray]]
@@ -96,7 +96,7 @@ def _step(fmu: Path, sides: tuple[int, int]) -> Step:
 
 
 def numbers(found: Results) -> str:
-    """The numbers that the text quotes, by name, and the version of matplotlib that drew the figures, as JSON."""
+    """The numbers that the page of the FMU quotes, by name, and the version of matplotlib that drew the figures, as JSON."""
     low = POINTS <= STATED
     ratio = found.sweep / found.model.response_at_hz(POINTS, ANGLE_OF)
     high = found.model.response_at_hz(1e5, ANGLE_OF)

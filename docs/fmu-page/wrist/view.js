@@ -1,7 +1,7 @@
 // The wrist as the view of a page that runs an FMU: the image, and controls for what it shows.
 
 /**
- * The view, with the number of lobes and rollers of these parameters.
+ * The view. Its function `set` takes the numbers of lobes and rollers from the parameters M and N.
  * @param {Move} move @param {("motors" | "gripper")[]} handles parts that can be dragged @param {(speed: number) => void} pace sets the speed of the run
  */
 function wristView(move, handles, pace) {

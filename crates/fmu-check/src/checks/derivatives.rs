@@ -94,7 +94,8 @@ pub fn numbers_if_ok(run: &Run, id: u32) -> Option<Vec<f64>> {
     run.written(id).filter(|_| run.status(id) == Some(0)).map(Values::numbers)
 }
 
-/// Sets a known. If it is one of `states`, sets the state vector to `vector` with one number replaced, otherwise sets an input.
+/// Sets a known to `numbers`. If it is one of `states`, sets the state vector to `vector`, in which the first of `numbers` replaces the
+/// value of this state. Otherwise sets an input.
 pub fn set_known(writer: &mut Writer, states: &[usize], vector: &[f64], known: usize, numbers: &[f64]) {
     match states.iter().position(|index| *index == known) {
         Some(at) => {

@@ -67,7 +67,7 @@ impl<'a> Worker<'a> {
     }
 }
 
-/// Functions for the simulation loop: they read outputs into the results of a run.
+/// Functions for the simulation loop: they store outputs and events, set exact inputs, and tell whether the run continues.
 struct Observed<'w, 'a> {
     worker: &'w mut Worker<'a>,
     times: &'w [f64],

@@ -203,7 +203,7 @@ impl Instances {
         for (name, values) in start {
             if self.system.is_structural(name) {
                 return request(format!(
-                    "{name} is a structural parameter; give its value when the instances are made"
+                    "{name} is a structural parameter; set it when the instances are created"
                 ));
             }
             if let Some(count) = values.count()

@@ -3,7 +3,8 @@
 use ball::Ball;
 use fmu_export::*;
 
-/// The fifth bounce ends the fall from 1 m and four flights, each shorter by the factor `restitution`.
+/// The fifth bounce follows the fall from 1 m and four flights. The first flight takes `2 * restitution` times as long as the fall,
+/// each other flight `restitution` times as long as the flight before it.
 #[test]
 fn it_bounces_when_it_should() {
     let fall = (2.0_f64 / 9.81).sqrt();

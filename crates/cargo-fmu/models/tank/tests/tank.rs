@@ -3,7 +3,7 @@
 use fmu_export::*;
 use tank::Tank;
 
-/// The characteristic is a straight line: the level falls by e^(-0.01 t), to 0.5 after 100 ln 2.
+/// The characteristic is a straight line: the level falls from 1 m as e^(-0.01 t), to 0.5 m after 100 ln 2 s.
 #[test]
 fn the_pump_starts_at_the_lower_level() {
     for size in [0.5, 1.0, 200.0] {
