@@ -31,7 +31,8 @@ HEAD = """# Examples
 <!-- written by make docs -->
 
 These short programs show what you can do with the FMU and the package prw, and are meant to be changed. `make examples` installs the
-packages that they need and builds the FMUs. Then run one of them in the root of the repository: `.venv/bin/python examples/lqr.py`."""
+packages that they need and builds the FMUs. Then run one of them in the root of the repository: `.venv/bin/python examples/lqr.py`. It
+writes its figure into that directory, as `lqr.png`, and so do the others, but `identify.py` writes a report, `out/identify/report.html`."""
 
 HELP = f"run the examples and write {PAGE}"
 

@@ -3,7 +3,7 @@ function wrist_in_simulink(directory)
 %
 %     wrist_in_simulink('../../target/fmu')
 %
-% The directory contains prw_testbed.fmu and prw_controller.fmu (`make closed-loop`, or from a release). The script needs
+% The directory contains prw_testbed.fmu and prw_controller.fmu (`make closed-loop-fmus`, or from a release). The script needs
 % Simulink R2023a or later, which has the block FMU, and the command `prw` on the system's path (python/prw/README.md). The
 % script was written from documentation and has not been run in Simulink. Please report your results.
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 
 import monte_carlo
+import rig
+from built import ROOT
 
 
 def test_one_rig_without_a_fault_and_one_with(fmu, tmp_path, monkeypatch, capsys):
@@ -38,3 +41,12 @@ def test_rigs_with_friction_in_the_input_shafts(fmu, tmp_path, monkeypatch):
     assert monte_carlo.main() == 0
     sound, braked = json.loads(out.read_text())["friction"]
     assert sound["accepted"] == 1 and braked["accepted"] == 0
+
+
+def test_the_command_for_the_table_of_the_tutorial_repeats_it():
+    page = (ROOT / "python/prw/tutorial.md").read_text(encoding="utf-8")
+    rigs, faulty = map(int, re.search(r"`make monte-carlo RIGS=(\d+) FAULTY=(\d+)", page).groups())
+    clean, intervals = map(int, re.search(r"^\| (\d+) without faults .* of (\d+) intervals", page, re.M).groups())
+    assert clean == rigs and intervals == rigs * len(rig.NAMES)
+    cases = sum(len(sizes) for _, sizes in monte_carlo.FAULTS.values())
+    assert int(re.search(r"^\| (\d+) with faults", page, re.M)[1]) == faulty * cases

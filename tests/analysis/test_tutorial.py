@@ -26,7 +26,7 @@ def test_the_commands_work_as_on_the_page(tmp_path, fmu):
     shutil.copytree(ROOT / "examples", tmp_path / "examples", ignore=shutil.ignore_patterns("*-fmu"))
     directories = [str(Path(sys.executable).parent), os.environ["PATH"]]
     environment = {**os.environ, "PATH": os.pathsep.join(directories)}
-    reported = ""
+    reported, is_built = "", False
     for language, block in BLOCK.findall(TUTORIAL.read_text(encoding="utf-8")):
         if language == "python":
             reported += run([sys.executable, "-c", block], tmp_path, environment)
@@ -41,10 +41,12 @@ def test_the_commands_work_as_on_the_page(tmp_path, fmu):
                 command = [*program("build_fmu"), *command[command.index("--") + 1 :], "--describe"]
                 command = [str(tmp_path / w) if w.startswith("out/") or w == "mine" else w for w in command]
                 reported += run(command, ROOT, environment)
+                is_built = True
             elif "--fmu" in command:
                 command[command.index("--fmu") + 1] = "target/fmu/prw_testbed.fmu"
                 reported += run([sys.executable, "-m", *command], tmp_path, environment)
             else:
+                assert not is_built, f"{line}: does not use the FMU with the identified parameters"
                 start = [sys.executable] if command[0] == "python" else [sys.executable, "-m", "prw"]
                 reported += run([*start, *command[1:]], tmp_path, environment)
     rig = dict(re.findall(r"(\w\d) ([\d.e+-]+) N\.m", reported))

@@ -17,6 +17,8 @@ FILES = [name for name in LISTED.split("\0") if name]
 PAGES = [name for name in FILES if name.endswith(".md") or name in ("CITATION.cff",)]
 #: Sites that pages may name: documentation and sources, but not package registries.
 HOSTS = {"docs.rs", "github.com", "rustup.rs", "semver.org"}
+#: Sentences that are no longer true after a release.
+UNRELEASED = re.compile(r"not published yet|no download yet|no version has been published yet", re.IGNORECASE)
 LINK = re.compile(r"\]\(<?([^)>\s]+)[^)]*\)|^\[[^\]]+\]:\s*(\S+)|(?:href|src)=\"([^\"]+)\"", re.MULTILINE)
 
 
@@ -81,6 +83,15 @@ def test_the_page_of_a_crate_is_complete(home: Path) -> None:
     assert ("not published yet" in readme.read_text(encoding="utf-8")) != released(), (
         f"{readme.relative_to(ROOT)}: state that the crate is not published only until it is released"
     )
+
+
+def test_pages_state_that_nothing_is_published_only_until_the_release() -> None:
+    texts = {name: " ".join((ROOT / name).read_text(encoding="utf-8").split()) for name in PAGES}
+    found = {name for name, text in texts.items() if UNRELEASED.search(text)}
+    if released():
+        assert not found, "correct these pages, which state that nothing is published"
+    else:
+        assert found >= {"CHANGELOG.md", "README.md", "docs/author-guide.md", "python/prw/README.md"}
 
 
 def anchors(page: Path) -> set[str]:

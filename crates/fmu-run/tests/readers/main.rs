@@ -221,7 +221,7 @@ fn seconds(directory: &Path, system: &[u8]) -> f64 {
 
 /// Repeats the tests, measures how long systems with many connections take, and writes the results to the page about robustness.
 #[test]
-#[ignore = "writes a page; run it with --profile bench, and READERS_MUTATIONS=20000"]
+#[ignore = "writes a page; run it with --profile bench, and READERS_MUTATIONS=2500"]
 fn write_figures() {
     for megabytes in LIMITS {
         run_limited("read_all", megabytes, 0);
