@@ -1,7 +1,7 @@
-//! The bytes of a serialized state of fmu-export. This module was written from a description of the layout and shares no
-//! code with fmu-export, so that tests detect errors there.
+//! The bytes of a serialized state of fmu-export. This module was written from a description of the layout and shares only
+//! the enumeration `Mode` with fmu-export, so that tests detect errors there.
 //!
-//! The layout is: 7 bytes of magic, one byte for the version, the hash of the guid, and the interface type
+//! The layout is: 7 bytes of magic, one byte for the version, 8 bytes for the hash of the guid, and one byte for the interface type
 //! (plus 2 for FMI 3.0). The mode, the end flag, time, start time, stop time and tolerance follow, then the
 //! values and the `memory` fields of the variable table. The last 8 bytes are the FNV-1a checksum of all bytes before.
 //! Integers have 64 bits, little-endian. Before an optional value, there is a Boolean of one byte, which is

@@ -28,7 +28,10 @@ pub fn unpack(path: &Path, directory: &Path, max_bytes: u64) -> anyhow::Result<V
     match unpacked {
         Ok(()) => Ok(found),
         Err(why) if why.contains("MB when it is unpacked") => {
-            bail!("{}: {why}; if that is right, give --unpacked MB", path.display())
+            bail!(
+                "{}: {why}; if it is meant to be so large, raise the limit with --unpacked MB",
+                path.display()
+            )
         }
         Err(why) => bail!("{}: {why}", path.display()),
     }
@@ -68,9 +71,8 @@ fn directories(standard: Standard) -> Vec<String> {
 pub fn library(directory: &Path, standard: Standard, offer: &Offer) -> Result<PathBuf, String> {
     let name = format!("{}{DLL_SUFFIX}", offer.identifier);
     let expected = directories(standard);
-    let library =
-        expected.iter().map(|of| directory.join("binaries").join(of).join(&name)).find(|path| path.is_file());
-    let Some(library) = library else {
+    let path = |of: &str| directory.join("binaries").join(of).join(&name);
+    let Some(of) = expected.iter().find(|of| path(of).is_file()) else {
         let binaries = std::fs::read_dir(directory.join("binaries")).into_iter().flatten().flatten();
         let mut others: Vec<String> =
             binaries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
@@ -79,10 +81,11 @@ pub fn library(directory: &Path, standard: Standard, offer: &Offer) -> Result<Pa
         let expected = expected.join(" nor in binaries/");
         return Err(format!("there is no {name} in binaries/{expected}; binaries has {others}"));
     };
+    let library = path(of);
     let bytes = std::fs::read(&library).map_err(|error| error.to_string())?;
     match object::File::parse(bytes.as_slice()).ok().and_then(|file| machine(&file)) {
         Some(other) if other != ARCH && OS != "macos" => {
-            Err(format!("the library for this machine, {ARCH}, is for {other}"))
+            Err(format!("binaries/{of}/{name} is for {other}, but this machine is {ARCH}"))
         }
         _ => Ok(library),
     }
@@ -188,8 +191,9 @@ fn check_library(path: &Path, platform: &str, add: &mut impl FnMut(&'static str,
     let unversioned = unversioned_symbols(&bytes).unwrap_or_default();
     if libraries.iter().all(|library| is_system(library)) && !unversioned.is_empty() {
         let list = unversioned.join(", ");
-        let observed =
-            format!("binaries/{platform}/{name} needs {list}, which none of the libraries that it names has");
+        let observed = format!(
+            "binaries/{platform}/{name} needs the symbols {list}, which no library that it links to provides"
+        );
         add("package.symbols", observed);
     }
     if !foreign.is_empty() {
@@ -198,8 +202,9 @@ fn check_library(path: &Path, platform: &str, add: &mut impl FnMut(&'static str,
     }
 }
 
-/// Returns the undefined symbols of a library for Linux that have no version, if other symbols have one. The linker has found them in no
-/// library, so only the program that loads the library can provide them.
+/// Returns the undefined global symbols without a version in a 64-bit library for Linux, if other undefined symbols have a version. If the
+/// library links only to system libraries, whose symbols have versions, the linker has found these symbols in none of them. Then only the
+/// program that loads the library can provide them.
 fn unversioned_symbols(bytes: &[u8]) -> object::Result<Vec<String>> {
     use object::read::elf::{FileHeader as _, Sym as _};
     let header = object::elf::FileHeader64::<object::Endianness>::parse(bytes)?;
@@ -223,7 +228,7 @@ fn unversioned_symbols(bytes: &[u8]) -> object::Result<Vec<String>> {
     Ok(found)
 }
 
-/// Reports the version of glibc that a library needs, if it is 2.29 or later.
+/// Reports the version of glibc that a library needs, if it is later than 2.28, because systems that are some years old do not have it.
 fn check_glibc(bytes: &[u8], platform: &str, name: &str, add: &mut impl FnMut(&'static str, String)) {
     let marker = b"GLIBC_2.";
     let markers = bytes.windows(marker.len()).enumerate().filter(|(_, window)| window == marker);

@@ -3,8 +3,8 @@
 
 use crate::finding::Finding;
 
-/// Rules whose violation may cause further findings, with patterns for the names of these: a prefix, or `*` and a suffix. The
-/// cause of a rule in this list can only be an earlier rule of the list.
+/// Rules whose violation may cause further findings, with patterns for the names of those findings: a prefix, or `*` and a suffix.
+/// The cause of a rule in this list can only be an earlier rule of the list.
 const CAUSES: [(&str, &[&str]); 6] = [
     ("arrays.written-beyond", &["*.crash", "results.", "states.", "reset."]),
     ("results.process", &["results.", "states.", "reset."]),

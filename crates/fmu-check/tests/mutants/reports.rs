@@ -151,6 +151,7 @@ fn unpacking_has_a_limit() {
     let output = run("2");
     let text = String::from_utf8_lossy(&output.stderr);
     assert!(text.contains("has more than 2 MB when it is unpacked"), "{text}");
+    assert!(text.contains("raise the limit with --unpacked MB"), "{text}");
     assert_eq!(output.status.code(), Some(2));
     assert_eq!(run("4").status.code(), Some(0));
 }

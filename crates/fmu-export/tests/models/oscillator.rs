@@ -47,7 +47,7 @@ variables! { for Oscillator, memory in slope;
     mass = parameter(&MASS) in mass;
     /// Stiffness of one spring
     stiffness = parameter(&STIFFNESS) in stiffness;
-    /// Number of springs, side by side
+    /// Number of springs in parallel
     springs = parameter(&SPRINGS) in springs;
     /// Damping
     damping = parameter(&DAMPING) in damping;
@@ -68,7 +68,7 @@ impl Oscillator {
         (self.force - self.all_springs() * self.position - self.damper() * self.velocity) / self.mass
     }
 
-    /// Returns the decay rate, which is the negative real part of the eigenvalues, and the square of the angular frequency.
+    /// Returns the decay rate, which is minus the real part of the eigenvalues, and the square of the angular frequency.
     fn decay_and_frequency_squared(&self) -> (f64, f64) {
         let decay = 0.5 * self.damper() / self.mass;
         (decay, self.all_springs() / self.mass - decay * decay)
@@ -110,7 +110,7 @@ impl Model for Oscillator {
 impl CoSimulation for Oscillator {
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         let (k, c, slope, h) = (self.all_springs(), self.damper(), self.slope.unwrap_or(0.0), step.size);
-        // The motion is the sum of one solution, x = a + b t, and of a decaying oscillation, whose start values are x and v.
+        // The motion is the sum of a particular solution, a + b t, and a decaying oscillation that starts at x with velocity v.
         let b = slope / k;
         let a = (self.force - c * b) / k;
         let (x, v) = (self.position - a, self.velocity - b);

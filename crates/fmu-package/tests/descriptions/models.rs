@@ -100,7 +100,7 @@ pub mod room {
         label = parameter(&STRING).tunable() in label;
         /// Half the share, as it was in the beginning
         half = local(&INTEGER).fixed() by |room| room.share / 2;
-        /// Share of the heat that comes back, %
+        /// Share of the heat that is recovered, %
         share = parameter(&SHARE) in share;
     }
 
@@ -407,7 +407,7 @@ pub mod chain {
     variables! { for Chain;
         /// States
         x = output(&NUMBER).state() in x;
-        /// The first input; p times the first state plus the sine of the second input
+        /// u[1]; p * x[1] + sin(u[2])
         der_x as "der(x)" = local(&NUMBER).derivative_of(x) by |c| [c.u[0], c.p * c.x[0] + c.u[1].sin()];
         /// Inputs
         u = input(&NUMBER) in u;
@@ -447,7 +447,7 @@ pub mod chain {
         fn update(&mut self) -> Result<(), Error> {
             match self.limits.iter().all(|[low, high]| low <= high) {
                 true => Ok(()),
-                false => Err(Error::new("the limits must be a lower one and an upper one")),
+                false => Err(Error::new("a lower limit must not exceed its upper limit")),
             }
         }
     }
@@ -515,12 +515,12 @@ pub mod branches {
         v = input(&NUMBER) in v;
         /// u if it is above 10, else 0
         above = output(&NUMBER) by |model| model.above();
-        /// u within 100, plus v after the first step
+        /// u limited to -100 to 100, plus v after the first step
         limited = output(&NUMBER)
             by |model| model.u.clamp(-100.0, 100.0) + if model.stepped { model.v } else { 0.0 };
-        /// The same as above
+        /// The same value as the variable `above`, with its dependency declared
         declared = output(&NUMBER).depends_on(&[u]) by |model| model.above();
-        /// The sum of u at the steps before, times the gain
+        /// gain * (1 + the sum of u at the earlier steps)
         sum = output(&NUMBER).depends_on(&[gain]) by |model| model.gain * (1.0 + model.sum);
         /// One
         timed = output(&NUMBER).depends_on(&[Index::TIME]) by |_| 1.0;
@@ -608,7 +608,7 @@ pub mod breakpoints {
     offer!(Breakpoints: CoSimulation);
 }
 
-/// A model with one of several faults that a change of its description cannot cause.
+/// A model whose code has one of several faults. The module `malformed` makes other faults by changing the descriptions of correct models.
 pub mod faulty {
     use super::*;
 

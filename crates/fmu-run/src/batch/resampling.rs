@@ -1,4 +1,4 @@
-//! Interpolates inputs that are given at their own times.
+//! Interpolates inputs that have their own times, which need not be communication points.
 
 use crate::error::{Error, request};
 
@@ -12,8 +12,8 @@ pub(super) struct Resampling {
 }
 
 impl Resampling {
-    /// Checks that the times of an input are finite and do not decrease. Two equal times make a jump: from this time on, the second
-    /// value is valid.
+    /// Finds the communication points `points` among the `times` of the input `name`. Two equal times make a jump: from this time on,
+    /// the second value is valid. Fails if there are no times, or if they are not finite or decrease.
     pub fn of(name: &str, times: &[f64], points: &[f64]) -> Result<Self, Error> {
         if times.is_empty() {
             return request(format!("{name} has no times"));

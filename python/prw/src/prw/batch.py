@@ -12,7 +12,7 @@ from prw.testbed import OUTPUTS, Testbed, driven_by, stopped
 
 #: The statistics of each output in a result.
 MEASURES: tuple[fmu_run.Measure, ...] = ("peak", "rms", "end")
-#: Statistics of runs, (runs,) each, by the name of the column; and the messages of failed runs, by run.
+#: Statistics by the name of the column, each an array with one value per run; and the messages of failed runs, by run.
 Statistics = tuple[dict[str, Array], dict[int, str]]
 
 

@@ -1,4 +1,4 @@
-"""The command `prw`: runs the subcommand, and reports an error that the user can fix as one line on stderr."""
+"""The command `prw`: runs the subcommand. An error that the user can fix is reported in one line on stderr."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from prw.errors import UserError, one_line
 #: optionally, add_options(parser) and EXAMPLES.
 _MODULES = (simulate, check, linearize, identify, excite, sweep)
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in _MODULES}
-#: The option for each argument of a function, if their names differ.
+#: The option that a message names instead of the argument of a UserError, if their names differ.
 OPTIONS = {"parameters": "--set", "priors": "--prior", "skip": "--skip-lines"}
 
 

@@ -65,7 +65,7 @@ def sweep(
     threads
         Number of threads (default: one for each processor).
     scheduler
-        The address of the scheduler of a Dask cluster, which then makes the runs instead of this process.
+        The address of the scheduler of a Dask cluster. The simulations then run on the cluster instead of in this process.
     out
         A directory, in which the table is written as runs.parquet.
 
@@ -73,9 +73,9 @@ def sweep(
     -------
     pyarrow.Table
         An Arrow table with a row for each run; its method to_pandas makes a DataFrame. The columns are `run`; `status`,
-        "done" or "failed"; `message`, the cause of a failure, for example that the FMU rejects a value; the parameters;
-        and three statistics of each output in SI: the peak of its magnitude, as in `roll_peak`, its rms, and its value
-        at the end.
+        "done" or "failed"; `message`, the cause of a failure, for example that the FMU rejects a value; and the parameters
+        in `grid` and `random`. Three more columns for each output have its statistics in SI. For the roll these are
+        `roll_peak`, the peak of its magnitude; `roll_rms`; and `roll_end`, its value at the end.
 
     Raises
     ------
@@ -112,7 +112,8 @@ def _run_all(
     threads: int,
     scheduler: str | None,
 ) -> pyarrow.Table:
-    """The table of the runs with the `values` (runs,) by parameter, and with the values `fixed` in all of them."""
+    """Carry out all runs and return their table. `values` has an array for each parameter that varies, with one value per
+    run; `fixed` has the values that are the same in all runs."""
     import pyarrow as pa
 
     start, total = {**fixed, **values}, len(next(iter(values.values())))
@@ -142,7 +143,7 @@ def layout(
     testbed: Testbed,
     fixed: Mapping[str, Any],
 ) -> dict[str, Array]:
-    """The values of the parameters that vary, (runs,) each: all combinations of the grid, each with all draws. If
+    """The values of each parameter that varies, one value per run: all combinations of the grid, each with its own draws. If
     only a relative standard deviation is given, the median is the value in `fixed` or the FMU's start value. Raises UserError for
     invalid arguments."""
     testbed.with_starts(fixed)
@@ -158,7 +159,7 @@ def layout(
     axes = {name: _column(name, in_own_unit(name, values, testbed.loaded)) for name, values in grid.items()}
     total = math.prod(map(len, axes.values())) * draws
     if total > MAX_RUNS:
-        raise UserError(f"{total} runs are more than {MAX_RUNS}; take fewer steps or runs")
+        raise UserError(f"{total} runs are more than the limit of {MAX_RUNS}; give fewer values (grid) or draws (runs)")
     combinations = np.array(list(itertools.product(*axes.values())), dtype=np.float64).reshape(
         total // draws, len(axes)
     )
@@ -192,7 +193,7 @@ def _column(name: str, values: Any) -> Array:
         column = np.atleast_1d(np.asarray(values, dtype=np.float64))
     except (TypeError, ValueError):
         column = np.empty(0)
-    # If the FMU rejects a value, the run fails and the sweep continues.
+    # The range is not checked here: if the FMU rejects a value, only the runs with this value fail.
     if column.ndim != 1 or not len(column) or not np.isfinite(column).all():
-        raise UserError(f"{name}: {values!r} are not the values of a parameter, one or more finite numbers")
+        raise UserError(f"{name} must have one or more finite numbers as values, not {values!r}")
     return column
