@@ -22,7 +22,7 @@ impl From<InvalidParameter> for Error {
 impl Model for Controller {
     const INFO: Info = Info {
         description: "Sampled controller for the pitch-roll wrist testbed: moves its two motors so that the wrist \
-                      takes a pitch and a roll angle",
+                      reaches given pitch and roll angles",
         copyright: "Copyright (c) 2026 The pitch-roll wrist testbed authors",
         default_experiment: DefaultExperiment {
             start_time: 0.0,
