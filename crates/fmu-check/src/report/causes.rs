@@ -3,8 +3,8 @@
 
 use crate::finding::Finding;
 
-/// Rules whose violation may cause further findings, with patterns for the names of those findings: a prefix, or `*` and a suffix.
-/// The cause of a rule in this list can only be an earlier rule of the list.
+/// Rules that can cause other findings, each with patterns for their names. A pattern is a prefix, or `*` and a suffix. A rule of
+/// this list can itself be a consequence, but only of an earlier rule, so that the search for causes has no circles.
 const CAUSES: [(&str, &[&str]); 6] = [
     ("arrays.written-beyond", &["*.crash", "results.", "states.", "reset."]),
     ("results.process", &["results.", "states.", "reset."]),
