@@ -246,10 +246,8 @@ test-importers: $(VENV)/importers.stamp importer-fmus
 test-faults: need-rust headers
 	@$(PY) dev/tools/seeded_faults.py $(ARGS)
 
-# The tools for other platforms have a separate environment. The standard library is compiled from its sources.
+# The tools for other platforms have a separate environment. dev/platforms/rust-toolchain.toml names the compiler.
 release: need-rust $(DIST_VENV)/release.stamp
-	@$(ADD_WEBASSEMBLY)
-	@rustup component list --installed | grep -q rust-src || rustup component add rust-src
 	@$(DIST_VENV)/bin/python dev/platforms/release.py
 
 # The library is compiled to WebAssembly and translated to C, for targets with a C compiler but without Rust.

@@ -11,10 +11,12 @@ import hashlib
 import os
 import re
 import shutil
+import subprocess
 import sys
 import tempfile
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import bill_of_materials
 import fmus
@@ -25,6 +27,8 @@ from targets import MODEL, ROOT
 DIST = ROOT / "dist"
 SUMS = "SHA256SUMS"
 CHANGELOG = ROOT / "CHANGELOG.md"
+#: The Rust compiler of a release.
+RUST: dict[str, Any] = tomllib.loads(Path(__file__).with_name("rust-toolchain.toml").read_text("utf-8"))["toolchain"]
 #: The compilers, linkers and translators of a release.
 VERSIONS = (("rustc", "--version"), ("python-zig", "version"), ("wasm2c", "--version"))
 
@@ -35,6 +39,7 @@ def main() -> None:
     if len(sys.argv) == 3 and sys.argv[1] == "--tag":
         return check_tag(sys.argv[2], changelog, version)
     # The checks that take no time come first.
+    select_rust()
     prw_wheel.check_version(version)
     bill_of_materials.check()
     compilers = [
@@ -56,6 +61,26 @@ def main() -> None:
         put(out)
     for path in sorted(DIST.iterdir()):
         print(f"dist/{path.name}: {path.stat().st_size / 1000:.0f} kB")
+
+
+def select_rust() -> None:
+    """Selects the Rust compiler of a release for all programs that this one starts. Exits if it is missing, or a part of it."""
+    # Without the second variable, rustup might download the compiler, but not all of its parts.
+    os.environ |= {"RUSTUP_TOOLCHAIN": RUST["channel"], "RUSTUP_AUTO_INSTALL": "0"}
+    version, sysroot = (
+        subprocess.run(["rustc", option], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True).stdout.strip()
+        for option in ("--version", "--print=sysroot")
+    )
+    # The component rust-src is in lib/rustlib/src, the library for a target in a directory with the name of the target.
+    parts = [name.removeprefix("rust-") for name in RUST["components"]] + RUST["targets"]
+    installed = all((Path(sysroot) / "lib" / "rustlib" / part).is_dir() for part in parts)
+    if not version.startswith(f"rustc {RUST['channel']} ") or not installed:
+        options = [f"--profile {RUST['profile']}", *(f"--component {name}" for name in RUST["components"])]
+        options += [f"--target {name}" for name in RUST["targets"]]
+        raise SystemExit(
+            f"error: releases are compiled with Rust {RUST['channel']}, which is missing or incomplete; install it with: "
+            f"rustup toolchain install {RUST['channel']} {' '.join(options)}"
+        )
 
 
 def cargo_version() -> str:

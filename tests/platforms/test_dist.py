@@ -18,7 +18,7 @@ from cyclonedx.schema import SchemaVersion
 from cyclonedx.validation.json import JsonStrictValidator
 from fmpy.validation import validate_fmu
 from packaging.utils import parse_wheel_filename
-from release import CHANGELOG, SUMS, cargo_version, release_notes
+from release import CHANGELOG, RUST, SUMS, cargo_version, release_notes
 from targets import ARM_DIRECTORIES, CONTROLLER, DIRECTORIES, FMI3_DIRECTORIES, MODEL, MODELS, TARGETS, WINDOWS, Target
 
 ARM, SOURCE = f"{MODEL}-linux-arm64.fmu", f"{MODEL}-source.fmu"
@@ -51,6 +51,7 @@ def test_all_files_of_one_version() -> None:
         assert f'version="{version}"'.encode() in files_except_binaries(name)["modelDescription.xml"], name
     compilers = (DIST / "compilers.txt").read_text(encoding="utf-8")
     assert [line.split(": ")[0] for line in compilers.splitlines()] == ["rustc", "python-zig", "wasm2c"]
+    assert compilers.startswith(f"rustc: rustc {RUST['channel']} ")
 
 
 @pytest.mark.parametrize("name", MODEL_FMUS)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from built import ROOT
-from test_readmes import PAGES
+from test_readmes import FILES, PAGES
 
 
 def read(path: Path | str) -> dict[str, Any]:
@@ -50,6 +50,15 @@ def test_the_pages_name_the_oldest_rust() -> None:
             assert set(versions) == {oldest}, page
             naming.add(page)
     assert naming >= {f"crates/{name}/README.md" for name in ("cargo-fmu", "fmu-check", "fmu-export", "fmu-run")}
+
+
+def test_releases_are_compiled_with_an_exact_supported_rust() -> None:
+    channel = read("dev/platforms/rust-toolchain.toml")["toolchain"]["channel"]
+    assert re.fullmatch(r"\d+\.\d+\.\d+", channel)
+    oldest = WORKSPACE["package"]["rust-version"]
+    assert [int(part) for part in channel.split(".")] >= [int(part) for part in oldest.split(".")]
+    # In the root, such a file would select the compiler of everybody.
+    assert [name for name in FILES if "rust-toolchain" in name] == ["dev/platforms/rust-toolchain.toml"]
 
 
 def test_lock_files_are_of_this_version() -> None:
