@@ -1,5 +1,5 @@
-"""The GitHub workflows pass the linters and pin actions to commits. Crates have one source and allowed licences. Python packages are
-installed only with the hashes in dev/requirements.txt, which suffices for each group."""
+"""The GitHub workflows, also those that READMEs show, pass the linters and pin actions to commits and tools to versions. Crates have one
+source and allowed licences. Python packages are installed only with the hashes in dev/requirements.txt, which suffices for each group."""
 
 from __future__ import annotations
 
@@ -10,14 +10,18 @@ import subprocess
 import sys
 import sysconfig
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
 from built import ROOT
 from packaging.requirements import Requirement
+from test_readmes import PAGES
 from test_versions import read
 
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
+#: Actions in workflows that only READMEs show, so no workflow here determines their versions.
+ONLY_SHOWN = {"github/codeql-action/upload-sarif"}
 LOCK = ROOT / "dev" / "requirements.txt"
 #: Options of uv, with which the Makefile installs packages.
 LOCKED = ("--require-hashes", "--constraints", "dev/requirements.txt", "--excludes", "dev/own-packages.txt")
@@ -188,25 +192,59 @@ def test_the_lock_has_the_tools_that_build_the_packages() -> None:
             assert required.specifier.contains(entry.split()[0].partition("==")[2]), path
 
 
-def used_actions() -> set[tuple[str, str]]:
-    """Returns the names and versions of all actions of the workflows."""
-    return set(re.findall(r"uses: (\S+)@(.*)", "".join(path.read_text(encoding="utf-8") for path in WORKFLOWS)))
+def test_the_tools_of_workflows_have_exact_versions() -> None:
+    lines = [line for path in WORKFLOWS for line in path.read_text(encoding="utf-8").splitlines()]
+    installs = [found[0] for line in lines if (found := re.search(r"\b(?:cargo|pip) install .*", line))]
+    cargo, pip = (
+        r"cargo install --locked [\w-]+@\d+\.\d+\.\d+",
+        r"[\w-]+==\d+\.\d+\.\d+|.*--require-hashes .*|--no-index .*",
+    )
+    pinned = re.compile(f"{cargo}|pip install ({pip})")
+    assert len(installs) > 4 and [command for command in installs if not pinned.fullmatch(command)] == []
+    # docs/releasing.md shows how to install one of them.
+    page = (ROOT / "docs" / "releasing.md").read_text(encoding="utf-8")
+    shown = re.findall(r"`(cargo install --locked [^`]*)`", page)
+    assert shown and set(shown) <= {*installs}
+
+
+def used_actions(workflows: Iterable[str]) -> set[tuple[str, str]]:
+    """Returns the names of all actions of the workflows, with their commits and versions."""
+    return set(re.findall(r"uses: (\S+)@(.*)", "\n".join(workflows)))
+
+
+def own_actions() -> dict[str, str]:
+    return dict(used_actions(path.read_text(encoding="utf-8") for path in WORKFLOWS))
 
 
 def test_an_action_has_one_version() -> None:
-    used = used_actions()
+    used = used_actions(path.read_text(encoding="utf-8") for path in WORKFLOWS)
     assert used and len(used) == len({name for name, _ in used})
 
 
-@pytest.mark.parametrize("name", ["cargo-fmu", "fmu-check"])
+def shown_workflows() -> dict[str, list[str]]:
+    """Returns the workflows that pages show, by the names of the pages."""
+    pages = {name: (ROOT / name).read_text(encoding="utf-8") for name in PAGES}
+    blocks = {name: re.findall(r"^```yaml\n(.*?)^```", page, re.DOTALL | re.MULTILINE) for name, page in pages.items()}
+    return {name: found for name in pages if (found := [block for block in blocks[name] if "uses:" in block])}
+
+
+def test_pages_with_workflows_are_found() -> None:
+    assert shown_workflows().keys() == {"crates/cargo-fmu/README.md", "crates/fmu-check/README.md"}
+    # An action outside of these blocks would not be checked.
+    for name in PAGES:
+        page = (ROOT / name).read_text(encoding="utf-8")
+        assert used_actions([page]) == used_actions(shown_workflows().get(name, [])), name
+
+
+@pytest.mark.parametrize("name", shown_workflows())
 def test_workflows_in_readmes(name: str, tmp_path: Path) -> None:
-    """They pass the linter, and use the versions of actions that the workflows use."""
-    page = (ROOT / "crates" / name / "README.md").read_text(encoding="utf-8")
-    (workflow,) = re.findall(r"^```yaml\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
-    path = tmp_path / "workflow.yml"
-    path.write_text(workflow, encoding="utf-8")
-    done = checked("actionlint", path)
-    assert done.returncode == 0, done.stdout + done.stderr
-    major = {name: re.sub(r".* # (v\d+).*", r"\1", version) for name, version in used_actions()}
-    for action, version in re.findall(r"uses: (\S+)@(\S+)", workflow):
-        assert version == major.get(action, version), action
+    """They pass the linter, and use the commits of actions that the workflows use."""
+    own = own_actions()
+    for workflow in shown_workflows()[name]:
+        path = tmp_path / "workflow.yml"
+        path.write_text(workflow, encoding="utf-8")
+        done = checked("actionlint", path)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert unpinned(workflow) == []
+        for action, commit in used_actions([workflow]):
+            assert own[action] == commit if action not in ONLY_SHOWN else action not in own, action
