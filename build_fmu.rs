@@ -1,86 +1,63 @@
 //! Builds the FMU: compiles the library, describes the model, packs both. See `--help`.
 
 use anyhow::{Context, Error, Result};
-use clap::Parser;
+use clap::{Arg, ArgMatches, FromArgMatches, value_parser};
 use fmu_package::terminal::{exit, short};
-use fmu_package::{BuildOptions, Builder, Companion, Page, Sources, Terminal};
-use std::path::{Path, PathBuf, absolute};
+use fmu_package::{BuildOptions, Builder, Page, Sources, Terminal, directory_of};
+use std::path::{PathBuf, absolute};
 use std::process::ExitCode;
 
-/// Table 1 of the paper.
-const PARAMETERS: &str = "modelDescription/parameters.json";
-
-/// Builds the FMU of the pitch-roll wrist testbed: target/fmu/prw_testbed.fmu for FMI 2.0 and
-/// target/fmu/fmi3/prw_testbed.fmu for FMI 3.0.
-#[derive(Parser)]
-#[command(
-    override_usage = "cargo run --bin build_fmu [-- OPTIONS]",
-    after_help = "Examples (after `cargo run --bin build_fmu --`):
+const ABOUT: &str = "Builds the FMU of the pitch-roll wrist testbed: target/fmu/prw_testbed.fmu for FMI 2.0 and \
+                     target/fmu/fmi3/prw_testbed.fmu for FMI 3.0";
+const EXAMPLES: &str = "Examples (after `cargo run --bin build_fmu --`):
   --parameters mine.json --out mine    an FMU with other start values, in mine/
   --tunable --out tunable              parameters can be changed while Simulink runs
   --describe                           after a change of the variables, before a commit
   --fmi 3                              for FMI 3.0 only
   --target x86_64-pc-windows-gnu       a Windows FMU, if rustup has that target
   --binary linux64=a.so --binary win64=b.dll
-                                       one FMU from libraries that were compiled elsewhere"
-)]
-struct Options {
-    /// Build in the parameters of this file [default: modelDescription/parameters.json, Table 1]
-    #[arg(long, value_name = "FILE")]
-    parameters: Option<PathBuf>,
-    #[command(flatten)]
-    build: BuildOptions,
-}
+                                       one FMU from libraries that were compiled elsewhere";
 
 fn main() -> ExitCode {
-    exit(run(&Options::parse()))
+    let parameters = Arg::new("parameters")
+        .long("parameters")
+        .value_name("FILE")
+        .value_parser(value_parser!(PathBuf))
+        .help("Build in the parameters of this file [default: modelDescription/parameters.json, Table 1]")
+        .display_order(0);
+    let command = BuildOptions::command("build_fmu", ABOUT, "cargo run --bin build_fmu [-- OPTIONS]");
+    exit(run(&command.arg(parameters).after_help(EXAMPLES).get_matches()))
 }
 
-fn run(options: &Options) -> Result<()> {
-    let other = match &options.parameters {
+fn run(matches: &ArgMatches) -> Result<()> {
+    let other = match matches.get_one::<PathBuf>("parameters") {
         Some(file) => Some(absolute(file).with_context(|| format!("{} is not a file", file.display()))?),
         None => None,
     };
-    let project = project();
-    let file = other.clone().unwrap_or_else(|| project.join(PARAMETERS));
+    let start = match &other {
+        Some(file) => prw_parameters::file::read(file).map_err(Error::msg)?.start_values(),
+        // The library is compiled with Table 1.
+        None => Vec::new(),
+    };
+    let project = directory_of("prw_testbed")?;
     let builder = Builder {
-        sources: sources(project),
+        sources: Sources {
+            // The description is generated, and the parameters are compiled in.
+            not_content: vec!["modelDescription.xml", "parameters.json"],
+            licenses: vec!["LICENSE-APACHE", "LICENSE-MIT"],
+            ..Sources::of_package(&project)
+        },
         terminals: terminals(),
-        start: prw_parameters::file::read(&file).map_err(Error::msg)?.start_values(),
+        start,
         variant: other.as_deref().map(|file| format!("parameters from {}", short(file))),
-        page: page(project),
-        environment: vec![("PRW_PARAMETERS", other.map(Into::into))],
+        page: page(),
         ..Builder::new("prw_testbed", project)
     };
-    builder.run(&options.build)
-}
-
-/// Returns the directory of the project.
-fn project() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .ancestors()
-        .nth(2)
-        .expect("crates/build-fmu must be two levels below the project")
-}
-
-/// Returns the files of this package from which the library and its description are built. The guid depends on them.
-fn sources(project: &Path) -> Sources {
-    Sources {
-        directory: project.to_owned(),
-        code: vec!["Cargo.toml", "build.rs", "build_fmu.rs", "src"],
-        content: Some("modelDescription"),
-        // The description is generated, and the parameters are compiled in.
-        not_content: vec!["modelDescription.xml", "parameters.json"],
-        licenses: vec!["LICENSE-APACHE", "LICENSE-MIT"],
-    }
+    builder.run(&BuildOptions::from_arg_matches(matches)?)
 }
 
 /// Returns the scripts that draw the wrist on the page of the FMU, and the controller FMU that closes the loop there.
-fn page(project: &Path) -> Page {
-    let controller = Sources {
-        licenses: vec!["../../LICENSE-APACHE", "../../LICENSE-MIT"],
-        ..Sources::of_package(project.join("crates/prw-controller"))
-    };
+fn page() -> Page {
     Page {
         scripts: vec![
             include_str!("docs/fmu-page/wrist/wrist.js"),
@@ -89,7 +66,7 @@ fn page(project: &Path) -> Page {
             include_str!("docs/fmu-page/wrist/testbed.js"),
             include_str!("docs/fmu-page/wrist/steps.js"),
         ],
-        companions: vec![Companion { package: "prw_controller", sources: controller }],
+        companions: vec!["prw_controller"],
     }
 }
 

@@ -69,8 +69,7 @@ pub use parameters::Parameters;
 pub use prw_parameters as parameters;
 pub use testbed::Testbed;
 
-/// The built-in parameters: Table 1, or the file that the environment variable `PRW_PARAMETERS` named when the library
-/// was built. The build script reads Table 1 from `modelDescription/parameters.json`.
+/// The built-in parameters, Table 1. The build script reads them from `modelDescription/parameters.json`.
 pub const BUILT_IN: Parameters = include!(concat!(env!("OUT_DIR"), "/table_1.rs"));
 
 fmu_export::export_fmu!(

@@ -1,14 +1,13 @@
 //! Connects controller and testbed to a closed loop, as SSP and for libcosim. See `--help`.
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use clap::Parser;
+use fmu_package::directory_of;
 use fmu_package::terminal::{exit, short};
 use fmu_system::System;
 use std::f64::consts::PI;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
-
-const DIRECTORY: &str = env!("CARGO_MANIFEST_DIR");
 
 /// Connects the FMUs of controller and testbed to a closed loop: prw_closed_loop.ssp, and the directory
 /// prw_closed_loop with OspSystemStructure.xml.
@@ -48,9 +47,7 @@ fn run(options: &Options) -> Result<()> {
     for angle in &options.go_to {
         ensure!(angle.is_finite(), "--go-to must have finite numbers, not {angle}");
     }
-    let workspace =
-        Path::new(DIRECTORY).ancestors().nth(2).context("this program was moved out of its workspace")?;
-    let directory = workspace.join("target/fmu");
+    let directory = directory_of("prw_testbed")?.join("target/fmu");
     let fmu = |option: &Option<PathBuf>, name: &str| option.clone().unwrap_or_else(|| directory.join(name));
     let [pitch, roll] = [0, 1].map(|axis| options.go_to[axis] * PI / 180.0);
     let system = System {

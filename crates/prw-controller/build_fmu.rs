@@ -2,8 +2,8 @@
 
 use clap::Parser;
 use fmu_package::terminal::exit;
-use fmu_package::{BuildOptions, Builder, Companion, Page, Sources, Terminal};
-use std::path::Path;
+use fmu_package::{BuildOptions, Builder, Page, Sources, Terminal, directory_of};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Builds the FMU of the wrist's controller, target/fmu/prw_controller.fmu.
@@ -15,11 +15,16 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    let builder = Builder {
+    let options = Options::parse();
+    exit(directory_of("prw_controller").and_then(|directory| builder(directory).run(&options.build)))
+}
+
+fn builder(directory: PathBuf) -> Builder {
+    Builder {
         command: "cargo run -p prw_controller --bin build_controller --",
         sources: Sources {
             licenses: vec!["../../LICENSE-APACHE", "../../LICENSE-MIT"],
-            ..Sources::of_package(env!("CARGO_MANIFEST_DIR"))
+            ..Sources::of_package(&directory)
         },
         terminals: terminals(),
         page: Page {
@@ -29,23 +34,9 @@ fn main() -> ExitCode {
                 include_str!("../../docs/fmu-page/wrist/view.js"),
                 include_str!("../../docs/fmu-page/wrist/controller.js"),
             ],
-            companions: vec![Companion { package: "prw_testbed", sources: testbed() }],
+            companions: vec!["prw_testbed"],
         },
-        ..Builder::new(env!("CARGO_PKG_NAME"), env!("CARGO_MANIFEST_DIR"))
-    };
-    exit(builder.run(&Options::parse().build))
-}
-
-/// Returns the sources of the testbed, whose FMU runs with the controller on the controller's page.
-fn testbed() -> Sources {
-    let project = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .ancestors()
-        .nth(2)
-        .expect("this package must be in the project");
-    Sources {
-        not_content: vec!["modelDescription.xml", "parameters.json"],
-        licenses: vec!["LICENSE-APACHE", "LICENSE-MIT"],
-        ..Sources::of_package(project)
+        ..Builder::new("prw_controller", directory)
     }
 }
 

@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 
 import macos_linker
-from targets import GLIBC, LINUX, MODEL, MODELS, PACKERS, ROOT, TARGETS, WINDOWS, Target
+from targets import GLIBC, LINUX, MODEL, MODELS, ROOT, TARGETS, WINDOWS, Target
 
 #: Compiles the standard library as well, without the code for backtraces, which would be a third of a library although
 #: importers never print a backtrace.
@@ -109,14 +109,6 @@ def macos_sdk() -> Path:
 
 
 @cache
-def guid(model: str) -> str:
-    """The guid of a model's FMU, which is compiled into its libraries."""
-    program, package = PACKERS[model]
-    cargo = ("cargo", "run", "--quiet", "--locked", "--package", package, "--bin", program)
-    return run(*cargo, "--", "--guid")
-
-
-@cache
 def library(model: str, target: Target) -> Path:
     """Compiles the library of a model for a target. The exports for Windows are read from the library for Linux."""
     exports: list[str] = []
@@ -127,7 +119,7 @@ def library(model: str, target: Target) -> Path:
     command = [program, "rustc", *STD, "--target", target.triple + glibc, "--package", model, "--no-default-features"]
     command += ["--lib", "--crate-type=cdylib", "--release", "--locked"]
     command += link(target, f"{model}{target.suffix}", exports)
-    run(*command, environment=environment(target) | {"FMU_GUID": guid(model)})
+    run(*command, environment=environment(target))
     return target_directory() / target.triple / "release" / target.library(model)
 
 

@@ -1,8 +1,11 @@
 //! The output of `build_fmu`: the description, its variants, the FMU.
 
+use fmi_abi::stamp::Stamp;
 use fmi_schema::fmi2::{Fmi2ModelDescription, Fmi2VariableDependency};
 use fmi_schema::traits::FmiModelDescription;
 use fmu_export::Variables;
+use fmu_package::files::unzip;
+use fmu_run::{Batch, Watch};
 use prw_testbed::state_space::{StateSpace, state_space};
 use prw_testbed::{BUILT_IN, TestbedFmu};
 use std::collections::BTreeSet;
@@ -187,16 +190,54 @@ fn other_parameters_are_other_start_values() {
     assert_eq!(description(&["--parameters", &copy]), before);
 }
 
-/// The guid depends on the options and on every digit of the parameters, but not on the format of their file.
+/// Builds the FMU for FMI 2.0 without its page. Returns the output of the program and the FMU.
+fn fmu(arguments: &[&str]) -> (String, Vec<u8>) {
+    let directory = tempfile::tempdir().unwrap();
+    let output = build_fmu(&[&["--no-page", "--fmi", "2"], arguments].concat(), directory.path());
+    assert!(output.status.success(), "{output:?}");
+    (String::from_utf8(output.stdout).unwrap(), fs::read(directory.path().join("prw_testbed.fmu")).unwrap())
+}
+
+/// The guid depends on the options and on every digit of the parameters, but not on the format of their file. The library contains the
+/// parameters, although it is not compiled again.
 #[test]
 fn every_variant_has_a_separate_guid() {
     let directory = tempfile::tempdir().unwrap();
-    let file =
-        |value: &str| parameter_file(directory.path(), "\"value\": 2.11,", &format!("\"value\": {value},"));
-    let same = guid(&["--parameters", &file("2.110")]);
-    let other = guid(&["--parameters", &file("2.1100000000000003")]);
-    assert_eq!(same, guid(&[]));
-    assert_eq!(BTreeSet::from([same, other, guid(&["--tunable"])]).len(), 3);
+    let with_k1 = |value: &str| {
+        let file = parameter_file(
+            directory.path(),
+            "\"value\": 2.11, \"unit\": \"N.m/deg\"",
+            &format!("\"value\": {value}"),
+        );
+        fmu(&["--parameters", &file])
+    };
+    let same = with_k1("2.110, \"unit\": \"N.m/deg\"").1;
+    let default = fmu(&[]).1;
+    assert!(same == default, "the values of Table 1 from another file must give the same FMU");
+    let other = with_k1("99.5, \"unit\": \"N.m/rad\"");
+    let near = with_k1("99.50000000000001, \"unit\": \"N.m/rad\"");
+    let all = [(String::new(), default), other, near, fmu(&["--tunable"])];
+    let guids: BTreeSet<_> = all.iter().map(|(_, fmu)| guid(fmu)).collect();
+    assert_eq!(guids.len(), all.len());
+    for ((printed, fmu), variant) in all.iter().skip(1).zip(["parameters from", "parameters from", "tunable"])
+    {
+        assert!(printed.contains(&guid(fmu)) && printed.contains(variant), "{printed}");
+    }
+    let k1 = |fmu: &[u8]| {
+        let out = directory.path().join("k1.fmu");
+        fs::write(&out, fmu).unwrap();
+        // SAFETY: the FMU of this project.
+        #[allow(unsafe_code)]
+        let fmu = unsafe { fmu_run::Fmu::open(&out) }.unwrap();
+        let batch = Batch { time: &[0.0, 1e-3], outputs: vec!["k1"], every: Some(1), ..Batch::default() };
+        fmu.run(&batch, &Watch::default()).unwrap().trajectories[0]
+    };
+    assert_eq!(all.each_ref().map(|(_, fmu)| k1(fmu)), [BUILT_IN.k1, 99.5, 99.5_f64.next_up(), BUILT_IN.k1]);
+}
+
+fn guid(fmu: &[u8]) -> String {
+    let description = String::from_utf8(unzip(fmu, "modelDescription.xml").unwrap()).unwrap();
+    Fmi2ModelDescription::deserialize(&description).unwrap().guid
 }
 
 #[test]
@@ -226,11 +267,7 @@ fn wrong_requests_are_rejected_in_one_line() {
         (&["--binary", &format!("linux64={file}")], "it is not a shared library"),
         (&["--binary", &format!("win64={library}")], "it is for darwin64, not for win64"),
         (&["--binary", &format!("aarch64-darwin={library}")], "add --any-processor"),
-        (
-            &["--fmi", "2", "--any-processor", "--binary", &format!("aarch64-darwin={library}")],
-            "was not compiled from these sources and parameters",
-        ),
-        (&["--binary", &format!("darwin64={library}")], "was not compiled from these sources and parameters"),
+        (&["--binary", &format!("darwin64={library}")], "it has no place for the guid"),
         (&["--binary", &format!("darwin64={empty}")], "has no functions of FMI"),
         (&["--target", "sparc"], "no FMU platform is known for the target 'sparc'"),
     ] {
@@ -246,30 +283,68 @@ fn wrong_requests_are_rejected_in_one_line() {
     assert!(text.contains("--out"), "{text}");
 }
 
-fn guid(arguments: &[&str]) -> String {
-    let output =
-        Command::new(env!("CARGO_BIN_EXE_build_fmu")).arg("--guid").args(arguments).output().unwrap();
+/// A library whose table of variables differs would read and set other variables than the description names.
+#[test]
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+fn libraries_of_other_sources_are_rejected() {
+    let directory = tempfile::tempdir().unwrap();
+    let own = unzip(&fmu(&[]).1, "binaries/linux64/prw_testbed.so").unwrap();
+    let mut other = own.clone();
+    let [position] = Stamp::positions(&own)[..] else { panic!("the library must have one stamp") };
+    Stamp::new(1).write(&mut other, position);
+    let [own, other] = [("own.so", own), ("other.so", other)].map(|(name, library)| {
+        let path = directory.path().join(name);
+        fs::write(&path, library).unwrap();
+        path.display().to_string()
+    });
+    let arguments = ["--binary", &format!("linux64={own}"), "--binary", &format!("aarch64-linux={other}")];
+    let out = directory.path().join("out");
+    let text = errors(&build_fmu(&[&arguments[..], &["--fmi", "2", "--any-processor"]].concat(), &out));
+    assert!(text.contains("the library for aarch64-linux has other variables than the model"), "{text}");
+    assert!(!out.exists());
+}
+
+/// The program finds the project at run time, so in a copy of the clone it does not write into the original.
+#[test]
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+fn a_copied_clone_builds_in_its_own_place() {
+    let directory = tempfile::tempdir().unwrap();
+    let library = directory.path().join("prw_testbed.so");
+    fs::write(&library, unzip(&fmu(&[]).1, "binaries/linux64/prw_testbed.so").unwrap()).unwrap();
+    let copy = directory.path().join("copy");
+    fs::create_dir(&copy).unwrap();
+    let sources = ["Cargo.toml", "Cargo.lock", "build.rs", "build_fmu.rs", "LICENSE-APACHE", "LICENSE-MIT"];
+    let directories = ["crates", "dev", "docs", "modelDescription", "src", "tests"];
+    let copied = Command::new("cp")
+        .args(["-r", "--no-dereference"])
+        .args(sources.iter().chain(&directories))
+        .arg(&copy)
+        .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+        .status();
+    assert!(copied.unwrap().success());
+    let output = Command::new(env!("CARGO_BIN_EXE_build_fmu"))
+        .args(["--no-page", "--fmi", "2", "--binary", &format!("linux64={}", library.display())])
+        .env_remove("CARGO_MANIFEST_DIR")
+        .current_dir(copy.join("crates"))
+        .output()
+        .unwrap();
     assert!(output.status.success(), "{output:?}");
-    String::from_utf8(output.stdout).unwrap().trim().to_owned()
+    assert!(copy.join("target/fmu/prw_testbed.fmu").is_file(), "{output:?}");
+    let elsewhere = Command::new(env!("CARGO_BIN_EXE_build_fmu"))
+        .env_remove("CARGO_MANIFEST_DIR")
+        .current_dir(directory.path())
+        .output();
+    let text = errors(&elsewhere.unwrap());
+    assert!(text.contains("is not in the project of prw_testbed; change to its directory"), "{text}");
 }
 
 #[test]
 fn two_builds_give_the_same_fmu_with_the_committed_description() {
-    let (directory, guid) = (tempfile::tempdir().unwrap(), guid(&[]));
-    let build = |name: &str| {
-        let out = directory.path().join(name);
-        let output = build_fmu(&[], &out);
-        assert!(output.status.success(), "{output:?}");
-        let text = String::from_utf8_lossy(&output.stdout).into_owned();
-        assert!(text.contains(&guid), "{text}");
-        fs::read(out.join("prw_testbed.fmu")).unwrap()
-    };
-    let (one, other) = (build("one"), build("other"));
+    let (one, other) = (fmu(&[]).1, fmu(&[]).1);
     assert!(one == other, "the same sources gave two different FMUs");
 
-    let mut zip = zip::ZipArchive::new(std::io::Cursor::new(one)).unwrap();
-    let mut read = |name: &str| std::io::read_to_string(zip.by_name(name).unwrap()).unwrap();
-    let described = description(&[]).replace(fmu_package::NO_GUID, &guid);
+    let read = |name: &str| String::from_utf8(unzip(&one, name).unwrap()).unwrap();
+    let described = description(&[]).replace(fmu_package::NO_GUID, &guid(&one));
     assert!(
         read("modelDescription.xml") == described,
         "the description in the FMU differs from the description of the sources"

@@ -15,6 +15,7 @@ pub mod fmi3;
 mod log_category;
 mod mode;
 mod rule;
+pub mod stamp;
 mod standard;
 mod status;
 mod text;

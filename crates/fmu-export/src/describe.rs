@@ -9,6 +9,7 @@ use crate::capabilities::Events;
 use crate::export::Exported;
 use crate::info::Info;
 use crate::model::Setup;
+use crate::stamp::{new_model, stamp};
 use crate::types::{Attributes, Type};
 use crate::units::{BaseUnit, Unit};
 use crate::variable::Variable;
@@ -80,6 +81,7 @@ fn describe_with<M: Exported>(resources: Option<&String>) -> String {
     json.open("", '{');
     json.word("version", &VERSION);
     info(&mut json, &M::INFO);
+    json.string("guid", stamp::<M>().guid());
     json.word("arrays", &M::ARRAYS);
     if let Some(offer) = M::CO_SIMULATION {
         json.open("coSimulation", '{');
@@ -119,7 +121,6 @@ fn describe_with<M: Exported>(resources: Option<&String>) -> String {
 fn info(json: &mut Json, of: &Info) {
     json.string("name", of.name);
     json.string("identifier", of.identifier);
-    json.string("guid", of.guid);
     json.string("description", of.description);
     json.string("author", of.author);
     json.string("modelVersion", of.version);
@@ -219,7 +220,7 @@ fn unit(json: &mut Json, of: &Unit) {
 /// first event indicator that the model leaves unwritten.
 fn starts<M: Exported>(json: &mut Json, setup: &Setup) {
     json.open("", '{');
-    let instantiated = catch_unwind(|| M::new(setup));
+    let instantiated = catch_unwind(|| new_model::<M>(setup));
     match instantiated {
         Ok(Ok(model)) => {
             json.open("values", '[');

@@ -3,6 +3,7 @@
 
 use crate::capabilities::{Event, Events, Step, StepCompleted, Stepped};
 use crate::model::{Error, Model};
+use fmi_abi::stamp::Stamp;
 
 /// A model with its capabilities. [`offer!`](crate::offer) implements this trait from the capability traits. The
 /// functions of missing capabilities have defaults, which this crate never calls.
@@ -18,6 +19,9 @@ pub trait Exported: Model {
     /// Highest order of output derivatives; 0 if there are none.
     const OUTPUT_DERIVATIVES: u32 = 0;
 
+    /// Returns the stamp of the library, in which fmu-package writes the guid.
+    #[doc(hidden)]
+    fn stamp() -> &'static Stamp;
     #[doc(hidden)]
     fn exported_step(&mut self, _step: Step) -> Result<Stepped, Error> {
         Err(Error::new("this FMU has no Co-Simulation"))
@@ -237,6 +241,10 @@ macro_rules! offer {
 
     ($model:ty : $first:ident $(+ $next:ident)*) => {
         impl $crate::Exported for $model {
+            fn stamp() -> &'static $crate::Stamp {
+                static STAMP: $crate::Stamp = $crate::Stamp::new($crate::hash_of_interface::<$model>());
+                &STAMP
+            }
             $crate::offer! { @capability $first }
             $( $crate::offer! { @capability $next } )*
         }

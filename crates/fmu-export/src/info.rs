@@ -8,9 +8,6 @@ pub struct Info {
     pub name: &'static str,
     /// `modelIdentifier`, the name of the library file.
     pub identifier: &'static str,
-    /// GUID (FMI 2.0) or instantiation token (FMI 3.0). The importer passes it at instantiation, and a library that was
-    /// built from other sources rejects it.
-    pub guid: &'static str,
     /// Description in one sentence.
     pub description: &'static str,
     /// Author of the model.
@@ -67,11 +64,10 @@ impl Default for DefaultExperiment {
 impl Info {
     /// Creates the data of a model. The remaining strings are empty, the experiment is
     /// [`DefaultExperiment::DEFAULT`], and `smooth` is false.
-    pub const fn new(name: &'static str, identifier: &'static str, guid: &'static str) -> Self {
+    pub const fn new(name: &'static str, identifier: &'static str) -> Self {
         Self {
             name,
             identifier,
-            guid,
             description: "",
             author: "",
             version: "",
@@ -84,10 +80,6 @@ impl Info {
 }
 
 /// Creates the [`Info`] of a model with this name and identifier. Author, version and licence come from `Cargo.toml`.
-/// The guid comes from the environment variable `FMU_GUID`, in which fmu-package passes a hash of the model's sources
-/// and of its build options to the compiler.
-///
-/// If that variable is not set, the guid consists of zeros, and fmu-package rejects the library.
 ///
 /// ```
 /// const INFO: fmu_export::Info =
@@ -100,14 +92,7 @@ macro_rules! info {
             author: ::core::env!("CARGO_PKG_AUTHORS"),
             version: ::core::env!("CARGO_PKG_VERSION"),
             license: ::core::env!("CARGO_PKG_LICENSE"),
-            ..$crate::Info::new(
-                $name,
-                $identifier,
-                match ::core::option_env!("FMU_GUID") {
-                    ::core::option::Option::Some(guid) => guid,
-                    ::core::option::Option::None => "{00000000-0000-0000-0000-000000000000}",
-                },
-            )
+            ..$crate::Info::new($name, $identifier)
         }
     };
 }

@@ -28,6 +28,7 @@ mod offsets;
 mod saved;
 mod settable;
 mod simulation;
+mod stamp;
 mod symbols;
 mod table;
 mod types;
@@ -52,6 +53,7 @@ pub use lookup::{LookupTable, interpolate};
 pub use model::{Error, Experiment, Model, Setup, read_resource};
 pub use saved::{Saved, StateVisitor};
 pub use simulation::Simulation;
+pub use stamp::guid;
 pub use table::Variables;
 pub use types::{Attributes, BINARY, BOOLEAN, INTEGER, Item, NUMBER, STRING, TIME, Type};
 pub use units::{BaseUnit, DisplayUnit, Unit};
@@ -61,8 +63,10 @@ pub use variable::{Index, Variable};
 #[doc(hidden)]
 pub use {
     describe::{Receive, pass_description, pass_panics},
+    fmi_abi::stamp::Stamp,
     fmi_abi::{fmi2_functions, fmi3_functions},
     offsets::{both_offsets, offset_in, offset_of_real},
+    stamp::hash_of_interface,
     table::{
         StateOfTable, check_line, count_elements, count_letters, count_states, find_states, spread,
         write_names,

@@ -24,7 +24,7 @@ use fmi_abi::{BaseType, Interface, Mode, Standard, Status, Value};
 /// #     x = output(&NUMBER).exact() in x;
 /// # }
 /// # impl Model for Lag {
-/// #     const INFO: Info = Info::new("Lag", "lag", "{lag}");
+/// #     const INFO: Info = Info::new("Lag", "lag");
 /// #     fn new(_: &Setup) -> Result<Self, Error> { Ok(Self::default()) }
 /// # }
 /// # impl CoSimulation for Lag {

@@ -7,8 +7,8 @@ mod models;
 
 use fmu_export::Interface::ModelExchange;
 use fmu_export::Mode::ContinuousTime;
+use fmu_export::Standard;
 use fmu_export::fmi2::types::*;
-use fmu_export::{Model, Standard};
 use fmu_test_kit::c_programs::{check_syntax, command, compile, headers, library, output, reload};
 use fmu_test_kit::calls;
 use fmu_test_kit::{Either, Importer};
@@ -27,7 +27,10 @@ fn program(name: &str) -> PathBuf {
 /// Compiles tests/c/NAME.c and runs it with the oscillator's library and its guid.
 fn run(name: &str) -> String {
     let mut command = command(&program(name));
-    output(command.arg(library("oscillator")).arg(Oscillator::INFO.guid), "the compiled program does not run")
+    output(
+        command.arg(library("oscillator")).arg(fmu_export::guid::<Oscillator>()),
+        "the compiled program does not run",
+    )
 }
 
 const OUTPUTS: [u32; 4] =

@@ -29,7 +29,7 @@ fn main() -> Result<()> {
         .arg("-o")
         .arg(&module)
         .arg(absolute(file)?))?;
-    for (name, content) in c_sources(&wasm2c, &module, identifier)? {
+    for (name, content) in c_sources(&wasm2c, &std::fs::read(&module)?, identifier)? {
         std::fs::write(Path::new(directory).join(name), content)?;
     }
     Ok(())

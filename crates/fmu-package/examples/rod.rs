@@ -10,7 +10,7 @@ fn main() -> Result<()> {
     let [library, directory] = arguments.as_slice() else { bail!("usage: rod LIBRARY DIRECTORY") };
     // SAFETY: the test has compiled the library with fmu-export.
     let model = unsafe { LoadedModel::load(Path::new(library), None) }?;
-    let libraries = [Library { platform: Platform::host()?, path: library.into() }];
+    let libraries = [Library::read(Platform::host()?, Path::new(library), false)?];
     let (changes, identifier) = (Changes::default(), model.identifier());
     for fmi in [Standard::Fmi2, Standard::Fmi3] {
         let description = describe(&model, fmi, &changes)?;
@@ -20,7 +20,7 @@ fn main() -> Result<()> {
             description: &description,
             terminals: None,
             libraries: &libraries,
-            sources: &[],
+            with_guid: &|_| Ok(Vec::new()),
             content: &[],
         };
         let version = if fmi == Standard::Fmi2 { 2 } else { 3 };

@@ -1,12 +1,12 @@
 //! C sources of an FMU: wasm2c translates the library from WebAssembly to C, and the FMI functions in `c/fmi2.c` call that code.
 
 use crate::cross::check_targets;
+use crate::pack::Files;
 use anyhow::{Context, Result, bail, ensure};
 use fmi_abi::fmi2::ALLOWED;
 use std::ffi::OsStr;
 use std::fmt::Write;
 use std::fs;
-use std::path::Path;
 use std::process::Command;
 
 /// The Rust target of a library that is translated to C or runs in a browser.
@@ -26,29 +26,28 @@ const FMI2: &str = include_str!("c/fmi2.c");
 const UNUSED: &str = "#ifdef __GNUC__\n#pragma GCC diagnostic ignored \"-Wunused-parameter\"\n\
                       #pragma GCC diagnostic ignored \"-Wunused-const-variable\"\n#endif\n";
 
-/// The files in the FMU's directory `sources`: names and contents. The first `COMPILED` files are to be compiled.
-pub type CSources = Vec<(String, Vec<u8>)>;
-
 /// Number of files to compile.
 pub const COMPILED: usize = 2;
 
-/// Translates a WebAssembly module to C.
+/// Translates a WebAssembly module to C. Returns the files in the FMU's directory `sources`: names and contents. The first [`COMPILED`]
+/// files are to be compiled.
 ///
 /// # Errors
 /// When wasm2c cannot be started or fails, or when its output has an unknown form.
-pub fn c_sources(wasm2c: &OsStr, module: &Path, identifier: &str) -> Result<CSources> {
+pub fn c_sources(wasm2c: &OsStr, module: &[u8], identifier: &str) -> Result<Files> {
     let directory = tempfile::tempdir().context("cannot make a temporary directory")?;
     let output = directory.path().join("module.c");
+    let input = directory.path().join("module.wasm");
+    fs::write(&input, module).context("cannot write in the temporary directory")?;
     let mut command = Command::new(wasm2c);
     command.arg("--no-debug-names").args(["--module-name", identifier]).arg("--output").args([&output]);
     for unused in ["tail-call", "simd", "exceptions", "multi-memory", "memory64"] {
         command.arg(format!("--disable-{unused}"));
     }
-    let done = command.arg(module).output().context("cannot start wasm2c")?;
+    let done = command.arg(&input).output().context("cannot start wasm2c")?;
     ensure!(
         done.status.success(),
-        "wasm2c cannot translate {}: {}",
-        module.display(),
+        "wasm2c cannot translate {identifier}: {}",
         String::from_utf8_lossy(&done.stderr)
     );
     let read =

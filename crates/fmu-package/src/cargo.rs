@@ -4,7 +4,6 @@ use crate::c_sources::WEBASSEMBLY;
 use crate::cross::{ZIGBUILD, rustc_for};
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
-use std::ffi::OsString;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -25,8 +24,6 @@ pub struct LibraryBuild<'a> {
     pub settings: Vec<String>,
     /// Arguments for the compiler.
     pub arguments: &'a [&'a str],
-    /// Environment variables to set, or to remove if the value is `None`.
-    pub environment: Vec<(&'a str, Option<OsString>)>,
 }
 
 impl LibraryBuild<'_> {
@@ -52,6 +49,8 @@ impl LibraryBuild<'_> {
         }
         if self.target == Some(WEBASSEMBLY) {
             command.args(["--config", &remap_standard_library(&self.directory)?]);
+            // Small for the page, and translated to C as fast as at level 3. With one level, both uses share a module.
+            command.args(["--config", &format!("profile.{PROFILE}.opt-level=\"s\"")]);
         }
         // The library needs no debug information, but cargo-zigbuild cannot strip libraries for macOS.
         if cargo == ZIGBUILD {
@@ -63,12 +62,6 @@ impl LibraryBuild<'_> {
         }
         if !self.arguments.is_empty() {
             command.arg("--").args(self.arguments);
-        }
-        for (name, value) in &self.environment {
-            match value {
-                Some(value) => command.env(name, value),
-                None => command.env_remove(name),
-            };
         }
         let mut child =
             command.spawn().with_context(|| format!("cannot start cargo ({})", cargo.to_string_lossy()))?;

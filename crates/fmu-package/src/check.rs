@@ -130,7 +130,6 @@ fn check_info(info: &Info) -> Result<()> {
         "the identifier '{}' must be a C identifier: letters, digits and underscores, and not a digit first",
         info.identifier.escape_debug()
     );
-    ensure!(is_text(&info.guid), "{} has no guid", info.name);
     for (fact, text) in [
         ("description", &info.description),
         ("author", &info.author),

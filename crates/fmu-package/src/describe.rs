@@ -11,20 +11,19 @@ use crate::structure::{ModelStructure, Unknown, checked_starts};
 use crate::table::{CoSimulation, ModelExchange, Table, Type, Variable};
 use crate::xml::Element;
 use anyhow::{Result, bail, ensure};
+use fmi_abi::stamp::NO_GUID;
 use fmi_abi::{BaseType, Category, Causality, Standard, Value, Variability};
 
 /// Values of the description that differ from the compiled model.
 #[derive(Clone, Debug, Default)]
 pub struct Changes {
-    /// The guid, if it differs from the compiled one.
-    pub guid: Option<String>,
     /// Whether parameters are `tunable` instead of `fixed`.
     pub tunable_parameters: bool,
     /// The files in the directory `sources` that an importer compiles (FMI 2.0).
     pub source_files: Vec<String>,
 }
 
-/// Returns `modelDescription.xml` of the model's FMU for this version of FMI.
+/// Returns `modelDescription.xml` of the model's FMU for this version of FMI, with the guid [`NO_GUID`].
 ///
 /// # Errors
 /// When the model contradicts itself, for example because a range is empty, a start value is outside its range or differs between
@@ -97,7 +96,7 @@ impl Description<'_> {
 
     /// Returns the root element with the attributes of the model.
     fn root(&self) -> Element {
-        let Self { table: Table { info, arrays, .. }, fmi, changes } = self;
+        let Self { table: Table { info, arrays, .. }, fmi, .. } = self;
         let (version, guid) = match fmi {
             Standard::Fmi2 => ("2.0", "guid"),
             Standard::Fmi3 => ("3.0", "instantiationToken"),
@@ -107,7 +106,7 @@ impl Description<'_> {
         Element::new("fmiModelDescription")
             .with("fmiVersion", version)
             .with("modelName", &info.name)
-            .with(guid, changes.guid.as_ref().unwrap_or(&info.guid))
+            .with(guid, NO_GUID)
             .with_some("description", filled(&info.description))
             .with_some("author", filled(&info.author))
             .with_some("version", filled(&info.version))

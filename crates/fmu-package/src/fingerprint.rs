@@ -1,4 +1,4 @@
-//! The guid, a hash of the content that it identifies.
+//! The guid, a hash of everything in the FMU.
 
 use sha2::{Digest, Sha256};
 

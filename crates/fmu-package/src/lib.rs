@@ -5,19 +5,19 @@
 //! * [`LoadedModel`] is the model of a loaded library, which describes itself. [`describe`] checks the model and returns its model
 //!   description; [`structure`] finds the dependencies between its variables.
 //! * [`LibraryBuild`] compiles the library with cargo, [`pack()`] writes the FMU, and [`Builder`] does both.
-//! * [`Fingerprint`], [`Sources`] and [`Variant`] compute the guid.
+//! * [`Fingerprint`] computes the guid from the content of the FMU.
 //!
 //! A file uses only files that come before it in this table:
 //!
 //! | purpose | files |
 //! |---|---|
-//! | the guid | `fingerprint`, `directory`, `content`, `packages`, `sources`, `variant` |
+//! | the sources | `directory`, `content`, `packages`, `sources` |
 //! | files | `xml`, `files` |
 //! | the model | `table`, `call_monitor`, `model`, `instance` |
 //! | checks of the model | `check`, `sample`, `saved_states`, `state_derivatives`, `partial_derivatives` |
 //! | the description | `structure`, `definitions`, `describe` |
-//! | the FMU | `connectors`, `platform`, `pack` |
-//! | the command | `cross`, `c_sources`, `cargo`, `library`, `universal`, `page_html`, `page`, `terminal`, `command` |
+//! | the FMU | `connectors`, `platform`, `signature`, `library`, `starts`, `universal`, `fingerprint`, `pack` |
+//! | the command | `cross`, `c_sources`, `cargo`, `page_html`, `page`, `terminal`, `options`, `command` |
 
 mod c_sources;
 mod call_monitor;
@@ -35,6 +35,7 @@ mod fingerprint;
 mod instance;
 mod library;
 mod model;
+mod options;
 mod pack;
 mod packages;
 mod page;
@@ -43,29 +44,32 @@ mod partial_derivatives;
 mod platform;
 mod sample;
 mod saved_states;
+mod signature;
 mod sources;
+mod starts;
 mod state_derivatives;
 pub mod structure;
 mod table;
 pub mod terminal;
 mod universal;
-mod variant;
 pub mod xml;
 
 pub use {
-    c_sources::{CSources, LINKING, WEBASSEMBLY, c_sources, check_tools},
+    c_sources::{LINKING, WEBASSEMBLY, c_sources, check_tools},
     cargo::LibraryBuild,
-    command::{BuildOptions, Builder, build},
+    command::{Builder, build},
     connectors::{Terminal, terminals},
     content::{ContentFile, content_files},
     describe::{Changes, describe},
     fingerprint::Fingerprint,
     fmi_abi::Standard,
+    fmi_abi::stamp::NO_GUID,
+    library::Library,
     model::LoadedModel,
-    pack::{Library, Parts, pack},
-    packages::{cargo, metadata},
-    page::{Companion, Page},
+    options::BuildOptions,
+    pack::{Files, Packed, Parts, pack},
+    packages::{cargo, directory_of, metadata, workspace},
+    page::Page,
     platform::Platform,
     sources::Sources,
-    variant::{NO_GUID, Variant},
 };

@@ -1,11 +1,114 @@
-//! Reads a compiled library: its platforms, its guid and the version of glibc that it needs.
+//! A compiled library: its platforms, its stamp, and the version of glibc that it needs.
 
 use crate::platform::Platform;
-use crate::variant::NO_GUID;
+use crate::signature::sign;
 use anyhow::{Context, Result, bail, ensure};
+use fmi_abi::stamp::{NO_GUID, Stamp};
 use object::read::macho::{FatArch, MachOFatFile32};
 use object::{Architecture, BinaryFormat, File, FileKind, Object, ObjectKind, ObjectSection};
-use std::path::Path;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use zip::ZipArchive;
+
+/// A compiled library.
+#[derive(Clone, Debug)]
+pub struct Library {
+    /// The platform that it is for.
+    pub platform: Platform,
+    /// The content of its file.
+    pub bytes: Vec<u8>,
+    /// Its file, unless it comes from an FMU.
+    path: Option<PathBuf>,
+}
+
+impl Library {
+    /// A library that is not a file.
+    pub fn new(platform: Platform, bytes: Vec<u8>) -> Self {
+        Self { platform, bytes, path: None }
+    }
+
+    /// Returns the path of a file with the library, and with these start values. Writes one into `directory` unless the library's own file
+    /// has them.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub(crate) fn file(&self, starts: &[(u32, f64)], directory: &Path) -> Result<PathBuf> {
+        if let Some(path) = &self.path
+            && stamp(&self.bytes)?.starts().eq(starts.iter().copied())
+        {
+            return Ok(path.clone());
+        }
+        let path = directory.join(format!("{}-{}", starts.len(), self.platform.library_name("varied")));
+        let bytes = with_stamp(&self.bytes, NO_GUID, Some(starts))?;
+        std::fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
+        Ok(path)
+    }
+
+    /// Reads a library, also from an FMU that contains it, and checks that it is for this platform (with `any_processor`, only for its operating system) and was compiled
+    /// with fmu-export.
+    ///
+    /// # Errors
+    /// When the file cannot be read or is another kind of file; the message contains the path.
+    pub fn read(platform: Platform, path: &Path, any_processor: bool) -> Result<Self> {
+        let is_fmu = path.extension().is_some_and(|suffix| suffix == "fmu");
+        let bytes = if is_fmu { library_in(path, platform) } else { std::fs::read(path).map_err(Into::into) };
+        let bytes =
+            bytes.with_context(|| format!("cannot read {}, the library for {platform}", path.display()))?;
+        let check = || {
+            check_platform(&bytes, platform, any_processor)?;
+            stamp(&bytes)
+        };
+        check().with_context(|| path.display().to_string())?;
+        Ok(Self { platform, bytes, path: (!is_fmu).then(|| path.to_owned()) })
+    }
+}
+
+/// Returns the library for a platform in an FMU.
+fn library_in(fmu: &Path, platform: Platform) -> Result<Vec<u8>> {
+    let mut archive = ZipArchive::new(std::fs::File::open(fmu)?)?;
+    let is_library = |name: &String| {
+        let mut parts = name.split('/');
+        parts.next() == Some("binaries")
+            && parts.next().and_then(|part| Platform::of_directory(part).ok()) == Some(platform)
+    };
+    let name = archive.file_names().flatten().map(|name| name.into_owned()).find(is_library);
+    let mut bytes = Vec::new();
+    archive.by_name(&name.context("it has none")?)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// Returns the stamp of a library or of a WebAssembly module. The parts of a universal library must have the same.
+pub fn stamp(library: &[u8]) -> Result<Stamp> {
+    let positions = Stamp::positions(library);
+    let mut stamps = positions.iter().map(|position| Stamp::read(library, *position));
+    let has = |part: &str| library.windows(part.len()).any(|window| window == part.as_bytes());
+    ensure!(
+        has("fmi2Instantiate"),
+        "it has no functions of FMI; its crate needs `export_fmu!(...)` in src/lib.rs (`offer!` makes none)"
+    );
+    let stamp = stamps.next().with_context(|| {
+        let version = env!("CARGO_PKG_VERSION");
+        format!("it has no place for the guid; compile it with the same version of fmu-export as fmu-package ({version})")
+    })?;
+    ensure!(
+        stamps.all(|other| other.interface() == stamp.interface()),
+        "its parts come from different models"
+    );
+    Ok(stamp)
+}
+
+/// Returns the library with this guid in its stamps; `starts` are also replaced if there are any. Signs a library for macOS again, because
+/// its signature contains hashes of its content.
+pub fn with_stamp(library: &[u8], guid: &str, starts: Option<&[(u32, f64)]>) -> Result<Vec<u8>> {
+    let mut library = library.to_vec();
+    for position in Stamp::positions(&library) {
+        let stamp = Stamp::read(&library, position).with_guid(guid);
+        let stamp = starts.map_or(stamp, |starts| stamp.with_starts(starts));
+        stamp.write(&mut library, position);
+    }
+    sign(&mut library)?;
+    Ok(library)
+}
 
 /// Returns the platforms of a library: one, or several if it is a universal library for macOS.
 fn platforms(library: &[u8]) -> Result<Vec<Platform>> {
@@ -55,25 +158,6 @@ pub fn check_platform(library: &[u8], wanted: Platform, any_processor: bool) -> 
         any_processor || found.contains(&wanted),
         "it is for {}, not for {wanted}; if importers on any processor are to load it from there, add --any-processor",
         names()
-    );
-    Ok(())
-}
-
-/// Checks that a library has FMI functions and was compiled with this guid.
-pub fn check_guid(library: &[u8], guid: &str, path: &Path) -> Result<()> {
-    let has = |part: &str| library.windows(part.len()).any(|window| window == part.as_bytes());
-    let path = path.display();
-    ensure!(
-        has(guid) || has("fmi2Instantiate"),
-        "{path} has no functions of FMI; its crate needs `export_fmu!(...)` in src/lib.rs (`offer!` makes none)",
-    );
-    ensure!(
-        has(guid) || !has(NO_GUID),
-        "{path} has no guid: compile it with FMU_GUID={guid} in the environment, and let INFO begin with info!",
-    );
-    ensure!(
-        has(guid),
-        "{path} was not compiled from these sources and parameters (the guid {guid} is not in it); compile it again",
     );
     Ok(())
 }

@@ -168,8 +168,8 @@ impl LoadedModel {
         &self.table.info.identifier
     }
 
-    /// The guid that the library was compiled with.
-    pub fn guid(&self) -> &str {
+    /// The guid in the stamp of the library.
+    pub(crate) fn guid(&self) -> &str {
         &self.table.info.guid
     }
 }

@@ -1,62 +1,50 @@
-//! Finds the packages that a package uses by path, with `cargo metadata`.
+//! Finds packages and their workspaces with `cargo metadata`.
 
 use anyhow::{Context, Result, ensure};
 use serde_json::Value;
-use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// A package that is used by path.
-#[derive(Clone, Debug)]
-pub(crate) struct LocalPackage {
-    pub name: String,
-    pub directory: PathBuf,
-    /// The directory of the library's sources, and the build script.
-    pub code: Vec<PathBuf>,
-    dependencies: Vec<PathBuf>,
-    workspace: PathBuf,
+/// Returns the directory of a package in the workspace of the current directory. If cargo has started this program with
+/// `--manifest-path`, the workspace of that file is used.
+///
+/// The directory is not compiled into the program, because then a copy of a workspace would build in the original.
+///
+/// # Errors
+/// When there is no such package, or cargo cannot be started.
+pub fn directory_of(package: &str) -> Result<PathBuf> {
+    let current = std::env::current_dir().context("there is no current directory")?;
+    let directory = std::env::var_os("CARGO_MANIFEST_DIR").map_or(current, PathBuf::from);
+    let manifest =
+        directory.ancestors().map(|directory| directory.join("Cargo.toml")).find(|path| path.is_file());
+    let outside =
+        || format!("{} is not in the project of {package}; change to its directory", directory.display());
+    let metadata = without_dependencies(&manifest.with_context(outside)?).with_context(outside)?;
+    let packages = metadata["packages"].as_array().map_or(&[][..], Vec::as_slice);
+    let manifest = packages
+        .iter()
+        .find(|other| other["name"] == package)
+        .and_then(|found| found["manifest_path"].as_str());
+    let directory = manifest.and_then(|manifest| Path::new(manifest).parent()).with_context(outside)?;
+    Ok(directory.to_owned())
 }
 
-/// The workspace of a package, and the packages that it uses by path.
-#[derive(Clone, Debug)]
-pub(crate) struct Neighbourhood {
-    /// The directory of the workspace, or of the package if there is none.
-    pub workspace: PathBuf,
-    /// The packages that this one uses by path, directly or indirectly, except development dependencies; sorted by name.
-    pub used: Vec<LocalPackage>,
+/// Returns the directory of the workspace to which the package in this directory belongs; the package's own directory if there is none.
+///
+/// # Errors
+/// When there is no package, or cargo cannot be started.
+pub fn workspace(directory: &Path) -> Result<PathBuf> {
+    let failed = || format!("cannot find the workspace of {}", directory.display());
+    let manifest = directory.join("Cargo.toml");
+    let metadata = without_dependencies(&manifest).with_context(failed)?;
+    metadata["workspace_root"].as_str().map(PathBuf::from).with_context(failed)
 }
 
-impl Neighbourhood {
-    /// Returns the workspace of the package in this directory, and the packages that it uses by path.
-    pub fn of(directory: &Path) -> Result<Self> {
-        let mut known = BTreeMap::new();
-        let own = find(&mut known, directory)?;
-        let mut used: Vec<LocalPackage> = Vec::new();
-        let mut pending = own.dependencies;
-        while let Some(directory) = pending.pop() {
-            if directory != own.directory && used.iter().all(|package| package.directory != directory) {
-                let package = find(&mut known, &directory)?;
-                pending.extend(package.dependencies.iter().cloned());
-                used.push(package);
-            }
-        }
-        used.sort_by(|a, b| (&a.name, &a.directory).cmp(&(&b.name, &b.directory)));
-        Ok(Self { workspace: own.workspace, used })
-    }
-}
-
-/// Returns the package in this directory. A call of cargo describes all packages of a workspace, so they are all added to `known`.
-fn find(known: &mut BTreeMap<PathBuf, LocalPackage>, directory: &Path) -> Result<LocalPackage> {
-    if !known.contains_key(directory) {
-        let failed = || format!("cannot find the packages that {} uses", directory.display());
-        let manifest = directory.join("Cargo.toml");
-        let arguments = ["--no-deps", "--offline", "--manifest-path"].map(OsStr::new);
-        let metadata = metadata(arguments.into_iter().chain([manifest.as_os_str()]));
-        let packages = metadata.and_then(|metadata| packages(&metadata)).with_context(failed)?;
-        known.extend(packages.into_iter().map(|package| (package.directory.clone(), package)));
-    }
-    known.get(directory).cloned().with_context(|| format!("{} is not a package", directory.display()))
+/// Returns the metadata of a workspace, without its dependencies.
+fn without_dependencies(manifest: &Path) -> Result<Value> {
+    let arguments = ["--no-deps", "--offline", "--manifest-path"].map(OsStr::new);
+    metadata(arguments.into_iter().chain([manifest.as_os_str()]))
 }
 
 /// Returns the cargo that has started this program, or the cargo of the system.
@@ -78,37 +66,9 @@ pub fn metadata(arguments: impl IntoIterator<Item: AsRef<OsStr>>) -> Result<Valu
     serde_json::from_slice(&output.stdout).context("cargo metadata returns no JSON")
 }
 
-fn packages(metadata: &Value) -> Result<Vec<LocalPackage>> {
-    let path = |value: &Value| value.as_str().map(PathBuf::from);
-    let workspace = path(&metadata["workspace_root"]).context("cargo names no workspace")?;
-    let package = |package: &Value| {
-        let directory = path(&package["manifest_path"])?.parent()?.to_owned();
-        let mut code = Vec::new();
-        for target in package["targets"].as_array()? {
-            let source = path(&target["src_path"])?;
-            match target["kind"].as_array()?.first()?.as_str()? {
-                "custom-build" => code.push(source),
-                "bin" | "test" | "bench" | "example" => {}
-                _library => code.push(source.parent()?.to_owned()),
-            }
-        }
-        let used = |dependency: &&Value| dependency["kind"] != "dev";
-        let dependencies = package["dependencies"].as_array()?.iter().filter(used);
-        Some(LocalPackage {
-            name: package["name"].as_str()?.to_owned(),
-            code,
-            dependencies: dependencies.filter_map(|dependency| path(&dependency["path"])).collect(),
-            workspace: workspace.clone(),
-            directory,
-        })
-    };
-    let packages = metadata["packages"].as_array().context("cargo names no packages")?;
-    packages.iter().map(|value| package(value).context("cargo metadata has an unknown format")).collect()
-}
-
 #[cfg(test)]
 mod tests {
-    use super::Neighbourhood;
+    use super::workspace;
     use std::fs;
 
     /// The workspace of a package is its own directory, unless it is a member of a workspace above.
@@ -119,7 +79,7 @@ mod tests {
         fs::create_dir_all(model.join("src")).unwrap();
         fs::write(model.join("src/lib.rs"), "").unwrap();
         fs::write(model.join("Cargo.toml"), "[package]\nname = \"model\"\n").unwrap();
-        let workspace = || Neighbourhood::of(&model).unwrap().workspace;
+        let workspace = || workspace(&model).unwrap();
         assert_eq!(workspace(), model);
         fs::write(directory.path().join("Cargo.toml"), "[workspace]\nmembers = [\"models/*\"]\n").unwrap();
         assert_eq!(workspace(), directory.path());

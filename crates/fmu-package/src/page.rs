@@ -1,18 +1,18 @@
 //! Compiles the model for the page that runs it in a browser.
 
 use crate::c_sources::{LINKING, WEBASSEMBLY};
-use crate::cargo::{LibraryBuild, PROFILE};
+use crate::cargo::LibraryBuild;
 use crate::content::ContentFile;
 use crate::cross::has_std;
-use crate::library::check_guid;
-use crate::page_html::{Runnable, with_page};
-use crate::sources::{DESCRIPTION, Sources};
+use crate::library::{stamp, with_stamp};
+use crate::pack::with_guid_of;
+use crate::packages::directory_of;
+use crate::page_html::{Runnable, page};
+use crate::sources::DESCRIPTION;
 use crate::table::Info;
-use crate::variant::{NO_GUID, Variant};
 use anyhow::{Context, Result};
 use std::fs;
-use std::path::PathBuf;
-use tempfile::TempDir;
+use std::path::Path;
 
 /// Additions to the page that runs an FMU in a browser. Without them, the page has plots and sliders, but not a view of the model.
 ///
@@ -20,7 +20,7 @@ use tempfile::TempDir;
 /// # use fmu_package::{Builder, Page};
 /// let builder = Builder {
 ///     page: Page { scripts: vec!["addOns.my_model = (own) => ({ ...plain(own) });"], ..Page::default() },
-///     ..Builder::new(env!("CARGO_PKG_NAME"), env!("CARGO_MANIFEST_DIR"))
+///     ..Builder::new("my_model", "directory/of/my_model")
 /// };
 /// ```
 ///
@@ -29,36 +29,31 @@ use tempfile::TempDir;
 pub struct Page {
     /// Scripts that run after the scripts that every page has. One of them registers an add-on under the model's identifier.
     pub scripts: Vec<&'static str>,
-    /// Other FMUs that the page contains, so that these scripts can run them together with the model.
-    pub companions: Vec<Companion>,
+    /// Packages in the same workspace whose FMUs the page contains, so that these scripts can run them together with the model, for
+    /// example the plant in the page of a controller. The page uses the model descriptions that are kept with their sources.
+    pub companions: Vec<&'static str>,
 }
 
-/// An FMU in the page of another FMU, for example the plant in the page of a controller.
-#[derive(Clone, Debug)]
-pub struct Companion {
-    /// The package of its model, which is in the same workspace.
-    pub package: &'static str,
-    /// The files that it is made from. The page uses the model description that is kept with them.
-    pub sources: Sources,
+/// The model and its companions, compiled for a page.
+pub(crate) struct CompiledPage<'a> {
+    page: &'a Page,
+    model: Runnable,
+    companions: Vec<Runnable>,
 }
 
 impl Page {
-    /// Compiles the model and its companions for WebAssembly. Returns the content with the page, and the temporary directory of the
-    /// page. If the model cannot be compiled for WebAssembly, prints a note and returns `None`.
-    pub(crate) fn with_model(
+    /// Compiles the model and its companions for WebAssembly. If the model cannot be compiled for WebAssembly, prints a note and returns
+    /// `None`.
+    pub(crate) fn compile(
         &self,
         build: &LibraryBuild,
-        guid: &str,
-        info: &Info,
         description: String,
-        content: &[ContentFile],
-    ) -> Result<Option<(TempDir, Vec<ContentFile>)>> {
+    ) -> Result<Option<CompiledPage<'_>>> {
         if !has_std(WEBASSEMBLY) {
             eprintln!("note: no page runs the FMU in a browser; that needs: rustup target add {WEBASSEMBLY}");
             return Ok(None);
         }
-        let mut build = LibraryBuild { target: Some(WEBASSEMBLY), arguments: &LINKING, ..build.clone() };
-        build.settings.push(format!("profile.{PROFILE}.opt-level=\"z\""));
+        let build = LibraryBuild { target: Some(WEBASSEMBLY), arguments: &LINKING, ..build.clone() };
         let path = match build.run() {
             Ok(path) => path,
             Err(error) => {
@@ -66,34 +61,40 @@ impl Page {
                 return Ok(None);
             }
         };
-        let mut runnables = vec![runnable(description, path, guid)?];
-        for companion in &self.companions {
-            runnables.push(companion.runnable(&build)?);
-        }
-        with_page(content, (&info.name, &info.description), &runnables, &self.scripts).map(Some)
+        let model = runnable(description, &path)?;
+        let companions = self.companions.iter().map(|package| {
+            let directory = directory_of(package)?;
+            let kept = directory.join(DESCRIPTION);
+            let kept =
+                fs::read_to_string(&kept).with_context(|| format!("cannot read {}", kept.display()))?;
+            runnable(kept, &LibraryBuild { directory, package, ..build.clone() }.run()?)
+        });
+        let companions = companions.collect::<Result<_>>()?;
+        Ok(Some(CompiledPage { page: self, model, companions }))
     }
 }
 
-impl Companion {
-    /// Compiles the library of the companion with the settings of the model's library.
-    fn runnable(&self, build: &LibraryBuild) -> Result<Runnable> {
-        let Self { package, sources } = self;
-        let guid = Variant { sources: sources.fingerprint()?, start: Vec::new(), tunable: false }.guid();
-        let kept = sources.directory.join(DESCRIPTION);
-        let kept = fs::read_to_string(&kept).with_context(|| format!("cannot read {}", kept.display()))?;
-        let build = LibraryBuild {
-            directory: sources.directory.clone(),
-            package,
-            environment: vec![("FMU_GUID", Some(guid.clone().into()))],
-            ..build.clone()
+impl CompiledPage<'_> {
+    /// Returns the page for an FMU with this guid and these start values. Companions keep the guid of their descriptions.
+    pub fn html(
+        &self,
+        guid: &str,
+        starts: &[(u32, f64)],
+        info: &Info,
+        content: &[ContentFile],
+    ) -> Result<Vec<u8>> {
+        let Runnable { description, module } = &self.model;
+        let model = Runnable {
+            description: with_guid_of(description, guid),
+            module: with_stamp(module, guid, Some(starts))?,
         };
-        runnable(kept.replace(NO_GUID, &guid), build.run()?, &guid)
+        let runnables: Vec<_> = std::iter::once(model).chain(self.companions.iter().cloned()).collect();
+        page(content, (&info.name, &info.description), &runnables, &self.page.scripts)
     }
 }
 
-/// Reads a module, and checks that it was compiled with this guid.
-fn runnable(description: String, path: PathBuf, guid: &str) -> Result<Runnable> {
-    let module = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
-    check_guid(&module, guid, &path)?;
+fn runnable(description: String, path: &Path) -> Result<Runnable> {
+    let module = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    stamp(&module).with_context(|| path.display().to_string())?;
     Ok(Runnable { description, module })
 }

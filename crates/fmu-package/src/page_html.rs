@@ -11,10 +11,9 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
-use tempfile::TempDir;
 
 /// Name of the page in an FMU.
-const PAGE: &str = "documentation/index.html";
+pub(crate) const PAGE: &str = "documentation/index.html";
 
 /// The page for a model that does not have one.
 const PLAIN: &str = include_str!("../page/page.html");
@@ -41,6 +40,7 @@ const SCRIPTS: [&str; 8] = [
 const RESOURCE_LIMIT: u64 = 4 << 20;
 
 /// The parts of an FMU that a browser runs.
+#[derive(Clone)]
 pub(crate) struct Runnable {
     /// The content of `modelDescription.xml` of FMI 2.0.
     pub description: String,
@@ -48,13 +48,13 @@ pub(crate) struct Runnable {
     pub module: Vec<u8>,
 }
 
-/// Returns the content with the page that runs the FMU, and the temporary directory of the page.
-pub(crate) fn with_page(
+/// Returns the page that runs the FMU. It contains the page among the content, if there is one.
+pub(crate) fn page(
     content: &[ContentFile],
     (title, about): (&str, &str),
     runnables: &[Runnable],
     scripts: &[&str],
-) -> Result<(TempDir, Vec<ContentFile>)> {
+) -> Result<Vec<u8>> {
     let own = content.iter().find(|file| file.name == PAGE);
     let page = match own {
         Some(file) => {
@@ -62,13 +62,8 @@ pub(crate) fn with_page(
         }
         None => PLAIN.replace("{{ title }}", &escape(title)).replace("{{ description }}", &escape(about)),
     };
-    let directory = tempfile::tempdir().context("cannot make a temporary directory")?;
-    let path = directory.path().join("index.html");
     let script = script(runnables, &Resources::of(content)?, scripts)?;
-    fs::write(&path, with_script(&page, &script)?).context("cannot write the page")?;
-    let mut content: Vec<_> = content.iter().filter(|file| file.name != PAGE).cloned().collect();
-    content.push(ContentFile { name: PAGE.to_owned(), path });
-    Ok((directory, content))
+    Ok(with_script(&page, &script)?.into_bytes())
 }
 
 /// The files in the FMU's directory `resources`.
@@ -309,9 +304,7 @@ mod tests {
 
     #[test]
     fn a_model_without_a_page_gets_one() {
-        let (_directory, content) = with_page(&[], ("A & B", "Two <models>"), &[], &[]).unwrap();
-        let page = fs::read_to_string(&content[0].path).unwrap();
-        assert_eq!(content[0].name, PAGE);
+        let page = String::from_utf8(page(&[], ("A & B", "Two <models>"), &[], &[]).unwrap()).unwrap();
         assert!(page.contains("<h1>A &amp; B</h1>\n<p>Two &lt;models&gt;</p>") && page.contains("<script>"));
     }
 }

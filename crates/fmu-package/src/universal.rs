@@ -1,13 +1,12 @@
 //! Joins the macOS libraries for Intel and ARM in one file, because importers on both processors look in the same directory of an FMU
 //! for FMI 2.0.
 
-use crate::pack::Library;
+use crate::library::Library;
 use crate::platform::Platform;
 use anyhow::{Context, Result, ensure};
 use object::macho::{FAT_MAGIC, MachHeader64};
 use object::read::macho::MachHeader;
 use object::{BigEndian, Endianness, U32};
-use std::fs;
 
 /// Binary logarithm of the alignment of each part. 16 KiB is the largest page size.
 const ALIGNMENT: u32 = 14;
@@ -20,32 +19,24 @@ pub fn join_for_macos(libraries: &mut [Library]) -> Result<()> {
         libraries.iter().position(|library| library.platform == platform)
     };
     let (Some(intel), Some(arm)) = (find("x86_64"), find("aarch64")) else { return Ok(()) };
-    let mut parts = Vec::new();
-    for index in [intel, arm] {
-        let path = &libraries[index].path;
-        parts.push(fs::read(path).with_context(|| format!("cannot read {}", path.display()))?);
+    let parts = [intel, arm].map(|index| &libraries[index].bytes[..]);
+    if !parts[0].starts_with(&FAT_MAGIC.to_be_bytes()) {
+        libraries[intel].bytes = joined(&parts).context("the libraries for macOS")?;
     }
-    if parts[0].starts_with(&FAT_MAGIC.to_be_bytes()) {
-        return Ok(());
-    }
-    let path = libraries[intel].path.with_extension("universal.dylib");
-    let joined = joined(&parts).context("the libraries for macOS")?;
-    fs::write(&path, joined).with_context(|| format!("cannot write {}", path.display()))?;
-    libraries[intel].path = path;
     Ok(())
 }
 
 /// Returns a universal library: a header with the processor and the position of each part, followed by the parts.
-fn joined(parts: &[Vec<u8>]) -> Result<Vec<u8>> {
+fn joined(parts: &[&[u8]]) -> Result<Vec<u8>> {
     let mut header = vec![FAT_MAGIC, parts.len() as u32];
     let mut file = vec![0; 1 << ALIGNMENT];
     for part in parts {
-        let library = MachHeader64::<Endianness>::parse(&part[..], 0)?;
+        let library = MachHeader64::<Endianness>::parse(*part, 0)?;
         let endian = library.endian()?;
         file.resize(file.len().next_multiple_of(1 << ALIGNMENT), 0);
         header.extend([library.cputype(endian).0, library.cpusubtype(endian).0]);
         header.extend([u32::try_from(file.len())?, u32::try_from(part.len())?, ALIGNMENT]);
-        file.extend(part);
+        file.extend(*part);
     }
     ensure!(header.len() * size_of::<u32>() <= 1 << ALIGNMENT, "too many parts");
     for (index, word) in header.into_iter().enumerate() {
@@ -61,14 +52,12 @@ mod tests {
 
     #[test]
     fn a_universal_library_is_kept() {
-        let directory = tempfile::tempdir().expect("a directory");
         let mut libraries = Vec::new();
         for (architecture, bytes) in [("x86_64", FAT_MAGIC.to_be_bytes()), ("aarch64", [0; 4])] {
-            let path = directory.path().join(architecture);
-            fs::write(&path, bytes).expect("a file");
-            libraries.push(Library { platform: Platform::of(architecture, "macos").expect("known"), path });
+            let platform = Platform::of(architecture, "macos").expect("known");
+            libraries.push(Library::new(platform, bytes.to_vec()));
         }
         join_for_macos(&mut libraries).expect("nothing is joined");
-        assert_eq!(libraries[0].path, directory.path().join("x86_64"));
+        assert_eq!(libraries[0].bytes, FAT_MAGIC.to_be_bytes());
     }
 }

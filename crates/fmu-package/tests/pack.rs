@@ -1,69 +1,160 @@
 //! The FMU as a zip file.
 
 use anyhow::bail;
+use fmi_abi::stamp::Stamp;
 use fmu_package::files::write_atomically;
-use fmu_package::{ContentFile, Library, Parts, Platform, Standard, pack};
+use fmu_package::{ContentFile, Library, NO_GUID, Packed, Parts, Platform, Standard, pack};
 use std::fs;
 use std::io::{Cursor, Read, Write};
 use std::path::{Path, PathBuf};
+use tempfile::TempDir;
 use zip::{CompressionMethod, ZipArchive};
 
-/// A directory with the files to pack.
-struct Sources {
-    directory: tempfile::TempDir,
+/// The parts of an FMU, and a directory with its files.
+struct Example {
+    directory: TempDir,
+    fmi: Standard,
+    description: String,
+    terminals: Option<String>,
+    libraries: Vec<Library>,
+    page: String,
+    content: Vec<&'static str>,
 }
 
-impl Sources {
+impl Example {
     fn new() -> Self {
         let directory = tempfile::tempdir().unwrap();
-        for (name, content) in
-            [("lib.so", "machine code"), ("lib.dll", "other code"), ("index.html", "<html>")]
-        {
-            fs::write(directory.path().join(name), content).unwrap();
+        for name in CONTENT {
+            fs::write(directory.path().join(name.replace('/', "-")), name).unwrap();
         }
-        Self { directory }
+        Self {
+            directory,
+            fmi: Standard::Fmi2,
+            description: format!("<fmiModelDescription guid=\"{NO_GUID}\" author=\"me\"/>"),
+            terminals: None,
+            libraries: vec![library("win64", "other code"), library("linux64", "machine code")],
+            page: "<html>".to_owned(),
+            content: vec!["documentation/licenses/license.txt"],
+        }
     }
 
     fn path(&self, name: &str) -> PathBuf {
         self.directory.path().join(name)
     }
 
-    fn library(&self, platform: &str, name: &str) -> Library {
-        Library { platform: Platform::of_directory(platform).unwrap(), path: self.path(name) }
-    }
-
-    fn content(&self, names: &[&str]) -> Vec<ContentFile> {
-        names.iter().map(|name| ContentFile { name: (*name).into(), path: self.path("index.html") }).collect()
-    }
-
-    fn pack(&self, destination: &Path, libraries: &[Library]) -> anyhow::Result<u64> {
-        let content = self.content(&["documentation/index.html"]);
-        pack(destination, &self.parts(Standard::Fmi2, libraries, &content))
-    }
-
-    fn parts<'a>(&self, fmi: Standard, libraries: &'a [Library], content: &'a [ContentFile]) -> Parts<'a> {
-        Parts {
-            fmi,
+    fn pack(&self, destination: &Path) -> anyhow::Result<Packed> {
+        let content: Vec<_> = self
+            .content
+            .iter()
+            .map(|name| ContentFile { name: (*name).to_owned(), path: self.path(&name.replace('/', "-")) })
+            .collect();
+        let page = |guid: &str| {
+            Ok(vec![("documentation/index.html".to_owned(), format!("{}{guid}", self.page).into_bytes())])
+        };
+        let parts = Parts {
+            fmi: self.fmi,
             identifier: "model",
-            description: "<xml/>",
-            terminals: None,
-            libraries,
-            sources: &[],
-            content,
-        }
+            description: &self.description,
+            terminals: self.terminals.as_deref(),
+            libraries: &self.libraries,
+            with_guid: &page,
+            content: &content,
+        };
+        pack(destination, &parts)
     }
 
-    fn pack_both(&self, destination: &Path) -> u64 {
-        let libraries = [self.library("win64", "lib.dll"), self.library("linux64", "lib.so")];
-        self.pack(destination, &libraries).unwrap()
+    fn guid(&self) -> String {
+        self.pack(&self.path("model.fmu")).unwrap().guid
+    }
+
+    fn names(&self) -> Vec<String> {
+        let fmu = self.path("model.fmu");
+        self.pack(&fmu).unwrap();
+        let zip = ZipArchive::new(Cursor::new(fs::read(&fmu).unwrap())).unwrap();
+        zip.file_names().map(|name| name.unwrap().into_owned()).collect()
+    }
+}
+
+const CONTENT: [&str; 4] =
+    ["documentation/licenses/license.txt", "model.png", "resources/a.csv", "terminalsAndIcons/icon.png"];
+
+/// A library that contains this code and a stamp.
+fn library(platform: &str, code: &str) -> Library {
+    let mut bytes = code.as_bytes().to_vec();
+    bytes.extend([0; Stamp::SIZE]);
+    Stamp::new(1).write(&mut bytes, code.len());
+    Library::new(Platform::of_directory(platform).unwrap(), bytes)
+}
+
+/// Importers that unpack FMUs by their guid show the content of another FMU if both have the same.
+#[test]
+fn any_changed_byte_changes_the_guid() {
+    type Change = fn(&mut Example);
+    let changes: [(&str, Change); 16] = [
+        ("nothing", |_| ()),
+        ("FMI version", |of| of.fmi = Standard::Fmi3),
+        ("description", |of| of.description = of.description.replace("me", "we")),
+        ("terminals", |of| of.terminals = Some("<terminals/>".into())),
+        ("other terminals", |of| of.terminals = Some("<terminals />".into())),
+        ("code of a library", |of| of.libraries[0].bytes[3] ^= 1),
+        ("last byte of a library", |of| of.libraries[1].bytes.push(0)),
+        ("start value in a library", |of| {
+            let position = Stamp::positions(&of.libraries[1].bytes)[0];
+            Stamp::new(1).with_starts(&[(3, 0.5)]).write(&mut of.libraries[1].bytes, position);
+        }),
+        ("last digit of a start value in a library", |of| {
+            let position = Stamp::positions(&of.libraries[1].bytes)[0];
+            Stamp::new(1).with_starts(&[(3, 0.5_f64.next_up())]).write(&mut of.libraries[1].bytes, position);
+        }),
+        ("platform", |of| of.libraries[1].platform = Platform::of_directory("linux32").unwrap()),
+        ("number of libraries", |of| drop(of.libraries.pop())),
+        ("page", |of| of.page.push(' ')),
+        ("content", |of| fs::write(of.path("documentation-licenses-license.txt"), "other").unwrap()),
+        ("additional content", |of| of.content.push("resources/a.csv")),
+        ("additional picture", |of| of.content.push("model.png")),
+        ("content with another name", |of| of.content[0] = "resources/a.csv"),
+    ];
+    let mut guids: Vec<(String, &str)> = Vec::new();
+    for (what, change) in changes {
+        let mut example = Example::new();
+        change(&mut example);
+        let guid = example.guid();
+        assert_eq!(guid, example.guid(), "{what}");
+        if let Some((_, other)) = guids.iter().find(|(known, _)| *known == guid) {
+            panic!("{what} and {other} have the same guid");
+        }
+        guids.push((guid, what));
+    }
+}
+
+/// The description, the libraries and the page contain the guid; it does not depend on a guid that a library had before.
+#[test]
+fn the_guid_is_written_everywhere() {
+    for (fmi, attribute) in [(Standard::Fmi2, "guid"), (Standard::Fmi3, "instantiationToken")] {
+        let mut example = Example { fmi, ..Example::new() };
+        example.description = example.description.replace("guid", attribute);
+        let guid = example.guid();
+        let content = fs::read(example.path("model.fmu")).unwrap();
+        let read = |name: &str| fmu_package::files::unzip(&content, name).unwrap();
+        let description = String::from_utf8(read("modelDescription.xml")).unwrap();
+        assert_eq!(description, format!("<fmiModelDescription {attribute}=\"{guid}\" author=\"me\"/>"));
+        let library = read(if fmi == Standard::Fmi2 {
+            "binaries/win64/model.dll"
+        } else {
+            "binaries/x86_64-windows/model.dll"
+        });
+        assert_eq!(Stamp::read(&library, Stamp::positions(&library)[0]).guid(), guid);
+        assert_eq!(read("documentation/index.html"), format!("<html>{guid}").into_bytes());
+        example.libraries[0].bytes = library;
+        assert_eq!(example.guid(), guid);
     }
 }
 
 #[test]
 fn the_zip_file_has_the_form_that_fmi_requires() {
-    let sources = Sources::new();
-    let fmu = sources.path("out/deep/model.fmu");
-    let size = sources.pack_both(&fmu);
+    let example = Example::new();
+    let fmu = example.path("out/deep/model.fmu");
+    let size = example.pack(&fmu).unwrap().size;
     let bytes = fs::read(&fmu).unwrap();
     assert_eq!(bytes.len() as u64, size);
 
@@ -75,7 +166,8 @@ fn the_zip_file_has_the_form_that_fmi_requires() {
             "modelDescription.xml",
             "binaries/linux64/model.so",
             "binaries/win64/model.dll",
-            "documentation/index.html"
+            "documentation/index.html",
+            "documentation/licenses/license.txt"
         ]
     );
     for i in 0..zip.len() {
@@ -88,66 +180,56 @@ fn the_zip_file_has_the_form_that_fmi_requires() {
         assert_eq!(bytes[header + 4..header + 8], [20, 0, 0, 0]);
         assert_eq!(bytes[header + 28..header + 30], [0, 0]);
     }
-    let mut text = String::new();
-    zip.by_name("binaries/win64/model.dll").unwrap().read_to_string(&mut text).unwrap();
-    assert_eq!(text, "other code");
+    let mut library = Vec::new();
+    zip.by_name("binaries/win64/model.dll").unwrap().read_to_end(&mut library).unwrap();
+    assert!(library.starts_with(b"other code"));
 }
 
 #[test]
 fn in_fmi_3_directories_and_icon_have_other_names() {
-    let sources = Sources::new();
-    let fmu = sources.path("model.fmu");
-    let libraries = [sources.library("win64", "lib.dll"), sources.library("x86_64-linux", "lib.so")];
-    let names = |content: &[&str]| {
-        let content = sources.content(content);
-        let parts = sources.parts(Standard::Fmi3, &libraries, &content);
-        pack(&fmu, &Parts { terminals: Some("<terminals/>"), ..parts }).unwrap();
-        let zip = ZipArchive::new(Cursor::new(fs::read(&fmu).unwrap())).unwrap();
-        zip.file_names().map(|name| name.unwrap().into_owned()).collect::<Vec<_>>()
-    };
+    let terminals = Some("<terminals/>".to_owned());
+    let mut example = Example { fmi: Standard::Fmi3, terminals, ..Example::new() };
+    example.content.push("model.png");
     let expected = [
         "modelDescription.xml",
         "binaries/x86_64-linux/model.so",
         "binaries/x86_64-windows/model.dll",
+        "documentation/index.html",
         "documentation/licenses/license.txt",
         "terminalsAndIcons/icon.png",
         "terminalsAndIcons/terminalsAndIcons.xml",
     ];
-    assert_eq!(names(&["documentation/licenses/license.txt", "model.png"]), expected);
-    let both = ["documentation/licenses/license.txt", "model.png", "terminalsAndIcons/icon.png"];
-    assert_eq!(names(&both), expected);
+    assert_eq!(example.names(), expected);
+    example.content.push("terminalsAndIcons/icon.png");
+    assert_eq!(example.names(), expected);
 }
 
 #[test]
 fn the_same_content_gives_the_same_bytes() {
-    let (one, other) = (Sources::new(), Sources::new());
+    let (one, other) = (Example::new(), Example::new());
     let (a, b) = (one.path("a.fmu"), other.path("b.fmu"));
-    one.pack_both(&a);
-    other.pack_both(&b);
-    one.pack_both(&a);
+    for (example, path) in [(&one, &a), (&other, &b), (&one, &a)] {
+        example.pack(path).unwrap();
+    }
     assert_eq!(fs::read(a).unwrap(), fs::read(b).unwrap());
 }
 
 #[test]
 fn errors_name_the_file_and_leave_nothing() {
-    let sources = Sources::new();
-    let fmu = sources.path("out/model.fmu");
-    for (libraries, message) in [
-        (vec![], "at least one library"),
-        (vec![sources.library("linux64", "none.so")], "none.so"),
-        (
-            vec![sources.library("linux64", "lib.so"), sources.library("linux64", "lib.dll")],
-            "linux64/model.so occurs twice",
-        ),
-    ] {
-        let error = format!("{:#}", sources.pack(&fmu, &libraries).unwrap_err());
-        assert!(error.contains(message), "{error}");
-    }
+    let example = Example::new();
+    let fmu = example.path("out/model.fmu");
+    let error = |example: &Example, fmu: &Path| format!("{:#}", example.pack(fmu).unwrap_err());
+    let libraries = vec![library("linux64", "one"), library("linux64", "other")];
+    let twice = error(&Example { libraries, ..Example::new() }, &fmu);
+    assert!(twice.contains("linux64/model.so occurs twice"), "{twice}");
+    let none = error(&Example { libraries: Vec::new(), ..Example::new() }, &fmu);
+    assert!(none.contains("at least one library"), "{none}");
+    let missing = error(&Example { content: vec!["resources/none"], ..Example::new() }, &fmu);
+    assert!(missing.contains("resources-none"), "{missing}");
     assert!(!fmu.exists());
 
-    let blocked = sources.path("lib.so/model.fmu");
-    let error = format!("{:#}", sources.pack(&blocked, &[sources.library("linux64", "lib.so")]).unwrap_err());
-    assert!(error.contains("cannot make the directory") && error.contains("lib.so"), "{error}");
+    let blocked = error(&example, &example.path("model.png/model.fmu"));
+    assert!(blocked.contains("cannot make the directory") && blocked.contains("model.png"), "{blocked}");
 }
 
 #[test]

@@ -119,7 +119,7 @@ impl Arguments<'static> {
         Self {
             instance_name: Some(c"instance"),
             fmu_type: interface as i32,
-            guid: CString::new(M::INFO.guid).ok(),
+            guid: CString::new(fmu_export::guid::<M>()).ok(),
             resource_location: Some(c"file:///tmp/fmu/resources"),
             callbacks: true,
             logger: true,

@@ -5,6 +5,7 @@ use crate::export::Exported;
 use crate::instance::{Importer, Instance, Outcome, reject};
 use crate::log::{Logger, Message};
 use crate::model::Setup;
+use crate::stamp::guid;
 use fmi_abi::Status;
 use fmi_abi::c_types::c_void;
 use fmi_abi::{Interface, Standard};
@@ -64,19 +65,19 @@ pub(crate) fn instantiate<M: Exported>(
 }
 
 fn make_instance<M: Exported>(arguments: Arguments) -> Outcome<Instance<M>> {
-    let Arguments { name, guid, resources, logging_on, interface, importer } = arguments;
+    let Arguments { name, guid: wanted, resources, logging_on, interface, importer } = arguments;
     let Some(name) = name.filter(|name| !name.to_bytes().trim_ascii().is_empty()) else {
         return reject("the instance needs a name");
     };
-    let own = M::INFO.guid;
-    if guid.map(CStr::to_bytes) != Some(own.as_bytes()) {
+    let own = guid::<M>();
+    if wanted.map(CStr::to_bytes) != Some(own.as_bytes()) {
         let what = match importer.standard {
             Standard::Fmi2 => "guid",
             Standard::Fmi3 => "instantiationToken",
         };
         return reject(format!(
             "the {what} {} is not this library's {own}: modelDescription.xml and library come from different FMUs",
-            guid.map_or("NULL".into(), CStr::to_string_lossy),
+            wanted.map_or("NULL".into(), CStr::to_string_lossy),
         ));
     }
     let string = |string: &CStr| string.to_string_lossy().into_owned();

@@ -25,6 +25,7 @@ use crate::export::Exported;
 use crate::log::Logger;
 use crate::model::{Error, Experiment, Setup};
 use crate::offsets::Placed;
+use crate::stamp::new_model;
 use crate::types::{NUMBER, TIME};
 use crate::variable::{Read, Variable, shape_of_calculation};
 use fmi_abi::BaseType;
@@ -148,7 +149,7 @@ impl<M: Exported> State<M> {
             ended: false,
             time: 0.0,
             experiment: Experiment::default(),
-            model: Placed::new(M::new(setup)?),
+            model: Placed::new(new_model(setup)?),
         })
     }
 }

@@ -7,6 +7,7 @@ use crate::export::Exported;
 use crate::model::Experiment;
 use crate::saved::{Saved, StateVisitor};
 use crate::settable::ALL_MODES;
+use crate::stamp::stamp;
 use fmi_abi::Mode;
 
 impl<M: Exported> State<M> {
@@ -110,8 +111,10 @@ fn check<M: Exported>(state: &State<M>) -> Outcome {
     Ok(())
 }
 
+/// Identifies the FMU. Depends on the table as well, because all libraries that are not packed have the same guid.
 fn guid_hash<M: Exported>() -> [u8; 8] {
-    fnv1a(M::INFO.guid.as_bytes()).to_le_bytes()
+    let stamp = stamp::<M>();
+    fnv1a(&[stamp.interface(), stamp.guid().as_bytes()].concat()).to_le_bytes()
 }
 
 /// Computes the FNV-1a hash. It detects any single changed byte, because every step maps different hashes to

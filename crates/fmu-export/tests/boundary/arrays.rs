@@ -198,7 +198,7 @@ variables! { for Rack, names Shelf;
 }
 
 impl Model for Rack {
-    const INFO: Info = Info { guid: "{rack}", ..info!("Rack", "rack") };
+    const INFO: Info = info!("Rack", "rack");
 
     fn new(_: &Setup) -> Result<Self, Error> {
         Ok(Self::default())

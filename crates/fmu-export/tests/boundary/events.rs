@@ -424,7 +424,7 @@ mod hasty {
     }
 
     impl Model for Hasty {
-        const INFO: Info = Info::new("Hasty", "hasty", "{hasty}");
+        const INFO: Info = Info::new("Hasty", "hasty");
 
         fn new(_: &Setup) -> Result<Self, Error> {
             Ok(Self { u: 0.0 })

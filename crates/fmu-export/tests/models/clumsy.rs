@@ -80,7 +80,6 @@ macro_rules! clumsy {
 
         impl Model for $model {
             const INFO: Info = Info {
-                guid: concat!("{", stringify!($model), "}"),
                 ..info!(stringify!($model), "clumsy")
             };
 

@@ -62,8 +62,7 @@ impl Counter {
 }
 
 impl Model for Counter {
-    const INFO: Info =
-        Info { description: "Counts in regular intervals", guid: "{counter}", ..info!("Counter", "counter") };
+    const INFO: Info = Info { description: "Counts in regular intervals", ..info!("Counter", "counter") };
 
     fn new(_: &Setup) -> Result<Self, Error> {
         let (on, increment, weight, count, carries, sum) = (false, 1, 1.0, 0, 0, 0.0);

@@ -144,7 +144,7 @@ impl Drop for Faulty {
 }
 
 impl Model for Faulty {
-    const INFO: Info = Info { guid: "{faulty}", ..info!("Faulty", "faulty") };
+    const INFO: Info = info!("Faulty", "faulty");
 
     fn new(_: &Setup) -> Result<Self, Error> {
         check(EVERYWHERE.get() as i32, Fault::New);

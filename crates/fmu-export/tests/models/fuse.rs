@@ -21,7 +21,7 @@ const HOT: f64 = 100.0;
 const MELTED: f64 = 200.0;
 
 impl Model for Fuse {
-    const INFO: Info = Info { guid: "{fuse}", ..info!("Fuse", "fuse") };
+    const INFO: Info = info!("Fuse", "fuse");
 
     fn new(_: &Setup) -> Result<Self, Error> {
         Ok(Self { load: 10.0, temperature: 20.0 })

@@ -89,7 +89,7 @@ impl Grumbler {
 }
 
 impl Model for Grumbler {
-    const INFO: Info = Info { guid: "{grumbler}", ..info!("Grumbler", "grumbler") };
+    const INFO: Info = info!("Grumbler", "grumbler");
 
     fn new(_: &Setup) -> Result<Self, Error> {
         let mut log = Log::default();

@@ -46,7 +46,7 @@ impl Lazy {
 }
 
 impl Model for Lazy {
-    const INFO: Info = Info { guid: "{lazy}", ..info!("Lazy", "lazy") };
+    const INFO: Info = info!("Lazy", "lazy");
 
     fn new(_: &Setup) -> Result<Self, Error> {
         let (real, integer, boolean, string) = (1.0, 2, false, "abc".to_owned());

@@ -90,7 +90,7 @@ impl Meter {
 }
 
 impl Model for Meter {
-    const INFO: Info = Info { guid: "{meter}", ..info!("Meter", "meter") };
+    const INFO: Info = info!("Meter", "meter");
 
     fn new(_: &Setup) -> Result<Self, Error> {
         Ok(Self { list: vec![0.0; 3], stiffness: 1.0, ..Self::default() })

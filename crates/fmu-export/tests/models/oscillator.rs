@@ -76,11 +76,7 @@ impl Oscillator {
 }
 
 impl Model for Oscillator {
-    const INFO: Info = Info {
-        description: "Mass on springs",
-        guid: "{oscillator}", // The guid of a real FMU is a hash that fmu-package calculates.
-        ..info!("Oscillator", "oscillator")
-    };
+    const INFO: Info = Info { description: "Mass on springs", ..info!("Oscillator", "oscillator") };
 
     fn new(_: &Setup) -> Result<Self, Error> {
         Ok(Self {

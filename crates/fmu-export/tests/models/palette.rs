@@ -77,7 +77,7 @@ variables! { for Palette;
 }
 
 impl Model for Palette {
-    const INFO: Info = Info { guid: "{palette}", ..info!("Palette", "palette") };
+    const INFO: Info = info!("Palette", "palette");
 
     fn new(_: &Setup) -> Result<Self, Error> {
         Ok(Self { uint16: 8080, ..Self::default() })

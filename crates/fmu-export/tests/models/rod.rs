@@ -127,7 +127,7 @@ impl Rod {
 impl Model for Rod {
     const INFO: Info = Info {
         description: "Heated rod",
-        guid: "{rod}",
+
         default_experiment: DefaultExperiment {
             stop_time: 10.0,
             step_size: 0.1,

@@ -87,8 +87,7 @@ impl Talker {
 }
 
 impl Model for Talker {
-    const INFO: Info =
-        Info { description: "Says what it hears", guid: "{talker}", ..info!("Talker", "talker") };
+    const INFO: Info = Info { description: "Says what it hears", ..info!("Talker", "talker") };
 
     fn new(setup: &Setup) -> Result<Self, Error> {
         let path = setup.resources().map(|directory| directory.join("words.txt"));

@@ -26,7 +26,7 @@ variables! { for Ticker, memory in next;
 const PERIOD: f64 = 0.25;
 
 impl Model for Ticker {
-    const INFO: Info = Info { guid: "{ticker}", ..info!("Ticker", "ticker") };
+    const INFO: Info = info!("Ticker", "ticker");
 
     fn new(_: &Setup) -> Result<Self, Error> {
         Ok(Self { amount: 1.0, sum: 0.0, last: 1000, next: 0.0, ticks: 0 })

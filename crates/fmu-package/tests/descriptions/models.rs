@@ -112,7 +112,7 @@ pub mod room {
             version: "1",
             license: "MIT",
             copyright: "(c)",
-            ..Info::new("Room", "room", "{room}")
+            ..Info::new("Room", "room")
         };
 
         fn new(_: &Setup) -> Result<Self, Error> {
@@ -243,7 +243,7 @@ pub mod types {
     }
 
     impl Model for Types {
-        const INFO: Info = Info { smooth: true, ..Info::new("Types", "types", "{types}") };
+        const INFO: Info = Info { smooth: true, ..Info::new("Types", "types") };
 
         fn new(_: &Setup) -> Result<Self, Error> {
             Ok(Self {
@@ -334,7 +334,7 @@ pub mod factors {
                 tolerance: 1e-7,
             },
             smooth: true,
-            ..Info::new("Factors", "factors", "{factors}")
+            ..Info::new("Factors", "factors")
         };
 
         fn new(_: &Setup) -> Result<Self, Error> {
@@ -429,7 +429,7 @@ pub mod chain {
     }
 
     impl Model for Chain {
-        const INFO: Info = Info { smooth: true, ..Info::new("Chain", "chain", "{chain}") };
+        const INFO: Info = Info { smooth: true, ..Info::new("Chain", "chain") };
 
         fn new(_: &Setup) -> Result<Self, Error> {
             Ok(Self {
@@ -529,7 +529,7 @@ pub mod branches {
     }
 
     impl Model for Branches {
-        const INFO: Info = Info::new("Branches", "branches", "{branches}");
+        const INFO: Info = Info::new("Branches", "branches");
 
         fn new(_: &Setup) -> Result<Self, Error> {
             Ok(Self { gain: 1.0, ..Self::default() })
@@ -586,7 +586,7 @@ pub mod breakpoints {
     }
 
     impl Model for Breakpoints {
-        const INFO: Info = Info { smooth: true, ..Info::new("Breakpoints", "breakpoints", "{breakpoints}") };
+        const INFO: Info = Info { smooth: true, ..Info::new("Breakpoints", "breakpoints") };
 
         fn new(_: &Setup) -> Result<Self, Error> {
             Ok(Self { u: 1.0, x: BREAKPOINTS.with_borrow(|(start, _)| *start) })
@@ -642,7 +642,7 @@ pub mod faulty {
     }
 
     impl Model for Faulty {
-        const INFO: Info = Info::new("Faulty", "faulty", "{faulty}");
+        const INFO: Info = Info::new("Faulty", "faulty");
 
         fn new(setup: &Setup) -> Result<Self, Error> {
             if has("broken") {

@@ -35,7 +35,7 @@ macro_rules! models {
             }
 
             impl Model for Memory {
-                const INFO: Info = Info::new("Memory", "memory", "{memory}");
+                const INFO: Info = Info::new("Memory", "memory");
 
                 fn new(_: &Setup) -> Result<Self, Error> {
                     let (gain, is_moving) = (2.0, false);
@@ -123,7 +123,7 @@ mod dice {
     }
 
     impl Model for Dice {
-        const INFO: Info = Info::new("Dice", "dice", "{dice}");
+        const INFO: Info = Info::new("Dice", "dice");
 
         fn new(_: &Setup) -> Result<Self, Error> {
             Ok(Self { thrown: 0 })

@@ -1,7 +1,7 @@
 //! A model is rejected if its states do not follow their derivatives, have derivatives in another unit, or change unexpectedly: when
 //! values are calculated, or in an event that does not report it.
 
-use crate::{BOTH, changed, model};
+use crate::{BOTH, changed};
 use fmu_export::*;
 use fmu_package::{Changes, Standard, describe};
 use std::cell::Cell;
@@ -76,7 +76,7 @@ impl Cart {
 }
 
 impl Model for Cart {
-    const INFO: Info = Info::new("Cart", "cart", "{cart}");
+    const INFO: Info = Info::new("Cart", "cart");
 
     fn new(_: &Setup) -> Result<Self, Error> {
         let (x, k) = if case() == "at rest" { (0.0, 100.0) } else { (0.2, 40.0) };
@@ -195,5 +195,4 @@ fn derivatives_have_the_unit_of_the_state_per_second() {
         text.starts_with("der(x) is in m/s, whose factor is 0.001, but x is in m, whose factor is 1;"),
         "{text}"
     );
-    assert!(!model::<Cart>().guid().is_empty());
 }

@@ -1,0 +1,76 @@
+//! The values that fmu-package writes into the compiled library: the guid, and start values of a variant.
+#![allow(
+    unsafe_code,
+    reason = "fmu-package changes these values, so the compiler must not assume the compiled ones"
+)]
+
+use crate::export::Exported;
+use crate::model::{Error, Setup};
+use crate::table::Variables;
+use fmi_abi::stamp::Stamp;
+use fmi_abi::{BaseType, Value};
+
+/// Reads the stamp of a model from memory.
+pub(crate) fn stamp<M: Exported>() -> Stamp {
+    let stamp: *const Stamp = M::stamp();
+    // SAFETY: the pointer comes from a reference to a static. The read is volatile, because fmu-package changes the bytes after the
+    // compiler has seen them.
+    unsafe { stamp.read_volatile() }
+}
+
+/// Returns the guid of the FMU to which this library belongs. It consists of zeros until fmu-package has packed the library.
+pub fn guid<M: Exported>() -> String {
+    stamp::<M>().guid().to_owned()
+}
+
+/// Creates a model with the start values of the FMU: these in the stamp, and for the other variables those of
+/// [`Model::new`](crate::Model::new).
+pub(crate) fn new_model<M: Exported>(setup: &Setup) -> Result<M, Error> {
+    let mut model = M::new(setup)?;
+    let stamp = stamp::<M>();
+    let mut starts = stamp.starts().peekable();
+    if starts.peek().is_none() {
+        return Ok(model);
+    }
+    for (index, value) in starts {
+        let Some(variable) = M::TABLE.get(index as usize) else { continue };
+        let value = match variable.base() {
+            BaseType::Real | BaseType::Float32 => Value::Real(value),
+            BaseType::Boolean => Value::Boolean(value != 0.0),
+            _ => Value::Integer(value as _),
+        };
+        variable.set(&mut model, &value);
+        model.calculate_start();
+    }
+    model.update()?;
+    Ok(model)
+}
+
+/// Returns a hash of the lines of the table (FNV-1a): names, types, causalities, variabilities and dimensions. Libraries in one FMU must
+/// agree in these, because they share a description.
+#[doc(hidden)]
+pub const fn hash_of_interface<M: Variables>() -> u64 {
+    let (mut hash, mut line) = (0xcbf2_9ce4_8422_2325, 0);
+    while line < M::LINES.len() {
+        let of = &M::LINES[line];
+        let (name, mut letter) = (of.name().as_bytes(), 0);
+        while letter < name.len() {
+            hash = with_byte(hash, name[letter]);
+            letter += 1;
+        }
+        hash = with_byte(hash, of.base() as u8);
+        hash = with_byte(hash, of.causality() as u8);
+        hash = with_byte(hash, of.variability() as u8);
+        let (sizes, mut direction) = (of.dimensions(), 0);
+        while direction < sizes.len() {
+            hash = with_byte(hash ^ sizes[direction] as u64, 1);
+            direction += 1;
+        }
+        line += 1;
+    }
+    hash
+}
+
+const fn with_byte(hash: u64, byte: u8) -> u64 {
+    (hash ^ byte as u64).wrapping_mul(0x0000_0100_0000_01b3)
+}
