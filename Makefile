@@ -43,7 +43,7 @@ LOCKED ?= --locked
 
 # Rust target of the page in the FMU and of the C sources.
 WEBASSEMBLY := wasm32-unknown-unknown
-# Rust target for which `make test` compiles without linking, because some modules are for one system only.
+# Rust target for which `make check-windows` compiles without linking, because some modules are for one system only.
 WINDOWS := x86_64-pc-windows-gnu
 # make does not pass its job server on to these programs, so rustc would warn that it cannot connect to it.
 NO_JOBS := env -u MAKEFLAGS -u MFLAGS
@@ -76,6 +76,7 @@ help:
 	@echo 'make test                    run all checks and tests that need no browser and no other platform'
 	@echo 'make check                   check the changes since the last commit, in about a minute'
 	@echo 'make check-release           run every check and write a table        -> out/release-check.md'
+	@echo 'make test-long               run the tests that take too long for make test: templates, maintenance tools'
 	@echo 'make test-rust               check the Rust code: format, lints, tests, documentation'
 	@echo 'make check-windows           check the Rust code for Windows with clippy'
 	@echo 'make test-python             check the Python code with ruff and mypy'
@@ -131,13 +132,18 @@ check-release: $(VENV)/importers.stamp need-rust
 	@$(PY) dev/tools/release_check.py $(ARGS)
 
 # Two targets run at a time, so that no processor waits during an installation. The FMUs are built by the programs that
-# the Rust tests compiled.
+# the Rust tests compiled. make test-long runs the tests that are left out here.
 test: need-rust need-python
 	@$(MAKE) --no-print-directory $(TWO_JOBS) PROGRAMS=target/debug test-crates test-python $(VENV)/importers.stamp \
-	  $(VENV)/examples.stamp test-docs check-windows importer-fmus source-fmu
+	  $(VENV)/examples.stamp test-docs importer-fmus source-fmu
 	$(PY) dev/platforms/bill_of_materials.py --check
-	PROGRAMS=target/debug $(PYTEST) $(FMU_TESTS) tests/closed_loop tests/importers tests/examples
+	PROGRAMS=target/debug $(PYTEST) -m 'not long' $(FMU_TESTS) tests/closed_loop tests/importers tests/examples
 	$(PYTEST) -m small tests/source_fmu
+
+# What takes too long for make test: each template of cargo fmu to its checked FMU, and the tools that maintain this repository.
+test-long: need-rust headers importer-fmus source-fmu
+	$(NO_JOBS) $(CARGO) test $(LOCKED) -p cargo-fmu --test cargo_fmu -- --ignored
+	$(PYTEST) -m long $(FMU_TESTS) tests/closed_loop
 
 # C programs are compiled with the headers of the standard, which FMPy contains.
 headers: $(VENV)/tests.stamp
@@ -317,9 +323,10 @@ FMU_RUN := Cargo.lock $(wildcard crates/fmu-run/*.toml crates/fmu-run/python/*.t
   src/*.rs src/*/*.rs python/src/*.rs python/fmu_run/*)\
   $(foreach crate,fmi-abi fmi-client,crates/$(crate)/*.toml crates/$(crate)/src/*.rs crates/$(crate)/src/*/*.rs))
 
+# In a separate target directory, so that it need not wait until cargo has compiled the FMU.
 $(VENV)/fmu_run.stamp: $(VENV)/made.stamp $(FMU_RUN) | $(VENV)/build.stamp need-rust
 	@echo 'compiling fmu-run, which runs FMUs for Python (once)'
-	@$(PIP_BUILD) ./crates/fmu-run
+	@CARGO_TARGET_DIR='$(CURDIR)/target/python' $(PIP_BUILD) ./crates/fmu-run
 	@touch $@
 
 # prw has its own list of packages.

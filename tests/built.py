@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-FMUS = ROOT / "target" / "fmu"
+#: `make check` tests the FMUs in another directory.
+FMUS = Path(os.environ.get("FMUS", ROOT / "target" / "fmu"))
 #: The call with which a page decompresses and runs its script.
 SCRIPT = re.compile(r'\nbegin\("([^"]*)"\)\.catch\(showFailure\);\n')
 

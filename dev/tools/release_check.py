@@ -17,6 +17,8 @@ ROOT = Path(__file__).resolve().parents[2]
 #: Names of the checks, each with a target of the Makefile and its variables.
 PARTS = {
     "tests": ("test",),
+    "long tests": ("test-long",),
+    "Windows": ("check-windows",),
     "seeded faults": ("test-faults",),
     "newest FMPy": ("test-newest-fmpy",),
     "page in browsers": ("test-page",),

@@ -13,7 +13,7 @@ from built import FMUS, ROOT, built
 
 from tools.documentation.sources import read_table
 
-CHECK = FMUS.parent / "debug" / "cargo-fmu"
+CHECK = ROOT / "target" / "debug" / "cargo-fmu"
 
 
 def listed(model: str) -> list[tuple[str, str, str]]:
@@ -29,7 +29,10 @@ def needs_new_system(fmu: Path) -> bool:
     return any(int(minor) > 28 for minor in re.findall(rb"GLIBC_2\.(\d+)", library))
 
 
-@pytest.mark.parametrize("model", ["prw_testbed", "prw_controller", "prw_motor"])
+@pytest.mark.parametrize(
+    "model",
+    ["prw_testbed", *(pytest.param(name, marks=pytest.mark.long) for name in ("prw_controller", "prw_motor"))],
+)
 def test_only_listed_notes_are_found(version: str, model: str) -> None:
     fmu = built(f"{version}{model}.fmu")
     # The check takes about 20 seconds. The limits are much longer, so that it reaches every topic on a busy machine, too.

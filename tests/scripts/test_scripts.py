@@ -55,6 +55,7 @@ def rows(page: str) -> dict[str, list[float]]:
     return {label: [float(figure.replace(",", "")) for figure in figures.split("|")[:-1]] for label, figures in found}
 
 
+@pytest.mark.long
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the benchmarks use the library for linux64")
 def test_the_benchmarks(fmu: Path) -> None:
     """One test, because the benchmarks share target/bench."""
@@ -78,6 +79,7 @@ def test_no_use_takes_more_instructions_than_before(fmu: Path) -> None:
     )
 
 
+@pytest.mark.long
 def test_seeded_faults_are_found_or_escape(tmp_path: Path) -> None:
     written = sum(path.read_text(encoding="utf-8").count("\n[[") for path in (ROOT / "tests/faults").glob("*.toml"))
     assert f"{written} faults fit the sources" in run(sys.executable, "dev/tools/seeded_faults.py", "--check")
@@ -89,12 +91,14 @@ def test_seeded_faults_are_found_or_escape(tmp_path: Path) -> None:
     assert done.stdout == "found    Pending is a status\nescaped  a number is hexadecimal\n1 of 2 faults found\n"
 
 
+@pytest.mark.long
 def test_the_reference_experiments_are_written(tmp_path: Path) -> None:
     run(sys.executable, "tests/oracle/write_experiments.py", tmp_path)
     written = {path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()}
     assert len(written) > 10 and all((ROOT / "modelDescription" / path).is_file() for path in written)
 
 
+@pytest.mark.long
 def test_docs_are_written(tmp_path: Path) -> None:
     for directory in ("docs", "dev/benches", TESTBED.content, CONTROLLER.content):
         shutil.copytree(ROOT / directory, tmp_path / directory)
@@ -104,6 +108,7 @@ def test_docs_are_written(tmp_path: Path) -> None:
         assert (tmp_path / path).read_bytes() == (ROOT / path).read_bytes(), f"{path} is stale: run `make docs`"
 
 
+@pytest.mark.long
 def test_figures_are_written(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Writes the files of `make figures`, but with two figures and short animations. An unchanged screencast is not replaced."""
     if shutil.which("chromium") is None:
@@ -134,6 +139,7 @@ def test_figures_are_written(fmu: Path, tmp_path: Path, monkeypatch: pytest.Monk
     assert figures.SCREENCAST.read_bytes() != changed
 
 
+@pytest.mark.long
 def test_compatibility_writes_the_rows_that_tests_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for path in (compatibility.RESULTS, compatibility.PAGE.parent):

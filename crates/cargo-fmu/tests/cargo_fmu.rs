@@ -22,8 +22,10 @@ impl Directory {
             .args(arguments)
             .current_dir(self.0.path().join(directory))
             .env("CARGO_TARGET_DIR", Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("models"))
+            // These tests do not measure the speed of the libraries. With these settings, `build` has the dependencies of `run`.
+            .env("CARGO_PROFILE_RELEASE_LTO", "off")
+            .env("CARGO_PROFILE_RELEASE_INCREMENTAL", "true")
             .env("WASM2C", "/nowhere/wasm2c")
-            .env_remove("FMU_GUID")
             .output()
             .unwrap()
     }
@@ -57,14 +59,31 @@ impl Directory {
     }
 }
 
-/// Creates, tests, simulates and checks a model.
+/// The templates of `cargo fmu new`.
+const TEMPLATES: [&str; 5] = ["lag", "ball", "motor", "house", "tank"];
+
+/// Each template passes its tests. They are in one workspace, so fmu-export is compiled once. `lag` and `tank` are also packed and checked
+/// below, the others in the tests that `make test-long` runs.
+#[test]
+fn templates_pass_their_tests() {
+    let directory = Directory::new();
+    // `cargo new` adds the members.
+    fs::write(directory.path("Cargo.toml"), "[workspace]\nresolver = \"3\"\n").unwrap();
+    let lock = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../Cargo.lock");
+    fs::copy(lock, directory.path("Cargo.lock")).unwrap();
+    for name in TEMPLATES {
+        let output = directory.prints("", &["new", &format!("my-{name}"), "--from", name]);
+        assert!(output.contains(&format!("cd my-{name}")) && output.contains("cargo fmu run"), "{output}");
+    }
+    let output = directory.run("", env!("CARGO"), &["test", "--quiet", "--workspace"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// Creates, simulates and checks a model.
 fn develop(from: &str, arguments: &[&str], columns: &str, trajectory: &str) -> Directory {
     let directory = Directory::new();
     let name = format!("my-{from}");
-    let output = directory.prints("", &["new", &name, "--from", from]);
-    assert!(output.contains(&format!("cd {name}")) && output.contains("cargo fmu run"), "{output}");
-    let output = directory.run(&name, env!("CARGO"), &["test", "--quiet"]);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    directory.prints("", &["new", &name, "--from", from]);
     let output = directory.prints(&name, &[&["run"], arguments].concat());
     assert!(output.contains(trajectory), "{output}");
     let fmu = format!("my_{from}");
@@ -178,6 +197,7 @@ fn lag() {
 
 /// The ball ends the simulation after five bounces.
 #[test]
+#[ignore = "make test-long runs it"]
 fn ball() {
     let directory =
         develop("ball", &[], "time,height,velocity,bounces", "ended by the FMU at t = 2.0527167766");
@@ -195,12 +215,14 @@ fn ball() {
 }
 
 #[test]
+#[ignore = "make test-long runs it"]
 fn motor() {
     let directory = develop("motor", &["--set", "duty=1"], "time,current,speed,on", "rad/s");
     assert!(directory.read("my-motor/target/fmu/my_motor.csv").trim_end().ends_with(",true"));
 }
 
 #[test]
+#[ignore = "make test-long runs it"]
 fn house() {
     let directory = develop(
         "house",
